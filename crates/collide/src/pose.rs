@@ -1,0 +1,31 @@
+//! The few linear-algebra names that every crate above shares.
+
+/// A vector in three dimensions; frame and unit are said where it is used.
+pub type Vec3 = nalgebra::Vector3<f64>;
+/// A 3×3 matrix.
+pub type Mat3 = nalgebra::Matrix3<f64>;
+/// A unit quaternion; in flat arrays and files its order is `x, y, z, w`.
+pub type Quat = nalgebra::UnitQuaternion<f64>;
+/// The pose of a body frame in the world, `X_WB`: rotate, then translate (metres).
+pub type Pose = nalgebra::Isometry3<f64>;
+
+/// An axis-aligned box in world axes, metres. Unbounded sides are `±∞`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Least corner.
+    pub min: Vec3,
+    /// Greatest corner.
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// Whether the two boxes share a point (touching counts).
+    pub fn overlaps(&self, other: &Aabb) -> bool {
+        (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])
+    }
+
+    /// The box grown by `margin` metres on every side.
+    pub fn grown(&self, margin: f64) -> Aabb {
+        Aabb { min: self.min.add_scalar(-margin), max: self.max.add_scalar(margin) }
+    }
+}

@@ -1,0 +1,1 @@
+//! Dynamics for tumble: the traits, rigid bodies, contact rows, solvers, integrators, steppers and the world.

@@ -1,0 +1,1 @@
+//! A world to pixels: draw list without a GPU, wgpu passes, offscreen targets.

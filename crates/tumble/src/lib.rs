@@ -1,0 +1,1 @@
+//! Real-time dynamics for interactive and immersive environments: the library facade and the tumble command.
