@@ -1,0 +1,196 @@
+//! Constraint rows in whitened coordinates: all that a solver ever sees.
+//!
+//! With `M = LᵀL` per object and `u = L·v`, an impulse `λ` along the rows `J` changes `u` by `Y·λ`, where
+//! `Y = L⁻ᵀJᵀ` is the thesis's test impulse (§IV.B.3, Algorithms 2 and 3) seen where every mass is 1. The
+//! matrix of the contact problem is `K = YᵀY`, and nothing here says rigid or articulated.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `u`  | whitened velocity of all objects, one stretch of `dof` numbers each |
+//! | `Y`  | whitened response; stored per side and row, so a block of `r` rows on a side of `d` freedoms is `r × d`, row-major |
+//! | `c`  | free value of every row: the relative velocity (or acceleration) that the solve must mend |
+//! | `λ`  | multiplier of every row: impulse in N·s, or force in N at the acceleration level |
+
+/// What a block's multipliers may be, and what its row velocities must be in return. With `w = c + K·λ`:
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RowSet {
+    /// `w = 0`, `λ` free (loop closure). One row.
+    Equality,
+    /// `0 ≤ λ ⟂ w ≥ 0` (joint limit, frictionless contact). One row.
+    HalfLine,
+    /// `lo ≤ λ ≤ hi`; `w = 0` inside, `w ≥ 0` at `lo`, `w ≤ 0` at `hi` (motor, joint friction). One row.
+    Interval {
+        /// Least multiplier.
+        lo: f64,
+        /// Greatest multiplier.
+        hi: f64,
+    },
+    /// Contact with Coulomb friction. Three rows: normal, two tangents. `0 ≤ λ_n ⟂ w_n ≥ 0` and
+    /// `|λ_t| ≤ μ·λ_n`, with `λ_t = −μ·λ_n·w_t/|w_t|` wherever `w_t ≠ 0`.
+    Cone {
+        /// Friction coefficient, at least 0.
+        mu: f64,
+    },
+}
+
+impl RowSet {
+    /// Rows in a block of this kind.
+    pub fn rows(&self) -> usize {
+        if let RowSet::Cone { .. } = self { 3 } else { 1 }
+    }
+}
+
+/// One object's part in a block.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Side {
+    /// First index of the object's stretch in `u`.
+    pub u: u32,
+    /// Freedoms of the object.
+    pub dof: u32,
+    /// First index of the block's `rows × dof` numbers in [`Rows::y`].
+    pub y: u32,
+}
+
+/// Rows that are solved together: one scalar row, or the three of a contact. A side that cannot move
+/// (static, kinematic) is absent.
+#[derive(Clone, Copy, Debug)]
+pub struct Block {
+    /// What the multipliers may be.
+    pub set: RowSet,
+    /// First row of the block in `c` and `λ`.
+    pub row: u32,
+    sides: [Side; 2],
+    side_count: u8,
+}
+
+impl Block {
+    /// The sides that can move: none, one or two, of different objects.
+    pub fn sides(&self) -> &[Side] {
+        &self.sides[..self.side_count as usize]
+    }
+
+    /// The indices of the block's rows in `c` and `λ`.
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.row as usize..self.row as usize + self.set.rows()
+    }
+}
+
+/// All rows of one solve.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    /// The blocks, in the order in which they were added.
+    pub blocks: Vec<Block>,
+    /// Whitened responses of all sides.
+    pub y: Vec<f64>,
+    /// Number of rows: the length of `c` and `λ`.
+    pub len: usize,
+    /// Length of `u`.
+    pub dof: usize,
+}
+
+impl Rows {
+    /// Forgets all rows and keeps the memory; `dof` is the length of `u`.
+    pub fn clear(&mut self, dof: usize) {
+        self.blocks.clear();
+        self.y.clear();
+        self.len = 0;
+        self.dof = dof;
+    }
+
+    /// Starts a block without sides and returns its index.
+    pub fn push_block(&mut self, set: RowSet) -> usize {
+        self.blocks.push(Block { set, row: self.len as u32, sides: [Side::default(); 2], side_count: 0 });
+        self.len += set.rows();
+        self.blocks.len() - 1
+    }
+
+    /// Gives the *last* block the side of the object whose `u` starts at `u` and has `dof` numbers, and returns its
+    /// `rows × dof` responses to be **added to**. A second part of the same object merges into the side that is
+    /// there, so that the cross term is seen. `None` where a third object is named: a row touches at most two.
+    pub fn side(&mut self, u: usize, dof: usize) -> Option<&mut [f64]> {
+        let start = self.y.len();
+        let block = self.blocks.last_mut()?;
+        let size = block.set.rows() * dof;
+        let count = block.side_count as usize;
+        if let Some(side) = block.sides[..count].iter().find(|s| s.u as usize == u) {
+            let y = side.y as usize;
+            return Some(&mut self.y[y..y + size]);
+        }
+        if count == 2 {
+            return None;
+        }
+        block.sides[count] = Side { u: u as u32, dof: dof as u32, y: start as u32 };
+        block.side_count += 1;
+        self.y.resize(start + size, 0.0);
+        Some(&mut self.y[start..])
+    }
+
+    /// The response of row `k` (from 0 within the block) on one side: `dof` numbers.
+    pub fn response(&self, side: &Side, k: usize) -> &[f64] {
+        let d = side.dof as usize;
+        let y = side.y as usize + k * d;
+        &self.y[y..y + d]
+    }
+
+    /// `c_i += (Yᵀu)_i` for every row.
+    pub fn add_velocity(&self, u: &[f64], c: &mut [f64]) {
+        for block in &self.blocks {
+            for (k, row) in block.range().enumerate() {
+                c[row] += self.row_velocity(block, k, u);
+            }
+        }
+    }
+
+    /// `(Yᵀu)` of row `k` of one block.
+    pub fn row_velocity(&self, block: &Block, k: usize, u: &[f64]) -> f64 {
+        let dot = |s: &Side| -> f64 {
+            let u = &u[s.u as usize..(s.u + s.dof) as usize];
+            self.response(s, k).iter().zip(u).map(|(y, u)| y * u).sum()
+        };
+        block.sides().iter().map(dot).sum()
+    }
+
+    /// `u += Y·λ` for the rows of one block.
+    pub fn apply_block(&self, block: &Block, lambda: &[f64], u: &mut [f64]) {
+        for (k, row) in block.range().enumerate() {
+            for s in block.sides() {
+                let u = &mut u[s.u as usize..(s.u + s.dof) as usize];
+                for (u, y) in u.iter_mut().zip(self.response(s, k)) {
+                    *u += y * lambda[row];
+                }
+            }
+        }
+    }
+
+    /// `K = YᵀY` of the given blocks, dense, row-major, in the order of their rows. For the pivoting solvers and the tests.
+    pub fn dense(&self, blocks: &[u32]) -> Vec<f64> {
+        let rows: Vec<(&Block, usize)> = blocks
+            .iter()
+            .flat_map(|&b| {
+                let block = &self.blocks[b as usize];
+                (0..block.set.rows()).map(move |k| (block, k))
+            })
+            .collect();
+        let n = rows.len();
+        let mut dense = vec![0.0; n * n];
+        for (i, (a, ka)) in rows.iter().enumerate() {
+            for (j, (b, kb)) in rows.iter().enumerate().take(i + 1) {
+                let value = self.coupling(a, *ka, b, *kb);
+                dense[i * n + j] = value;
+                dense[j * n + i] = value;
+            }
+        }
+        dense
+    }
+
+    /// One number of `K`: what a unit multiplier of row `kb` of `b` does to row `ka` of `a`.
+    pub fn coupling(&self, a: &Block, ka: usize, b: &Block, kb: usize) -> f64 {
+        let mut sum = 0.0;
+        for sa in a.sides() {
+            for sb in b.sides().iter().filter(|sb| sb.u == sa.u) {
+                sum += self.response(sa, ka).iter().zip(self.response(sb, kb)).map(|(x, y)| x * y).sum::<f64>();
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,191 @@
+//! Block Gauss–Seidel on the friction cone.
+//!
+//! For each block in turn, with everything else held: `w = c + Yᵀ(Yλ)`, then
+//!
+//! - equality, half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K`;
+//! - contact, all three rows at once: `λ ← λ − K⁻¹w` where that lies in the cone (it sticks); otherwise
+//!   `λ_n ← max(0, λ_n − w_n/k_nn)`, then `λ_t ← Π_{|λ_t| ≤ μλ_n}(λ_t − ρ·w_t)` with `ρ = 1/λ_max(K_tt)` (it slides).
+//!
+//! Its fixed points are the exact Coulomb solutions: `λ_n ⟂ w_n` without the dilation that a convex cone brings, and
+//! friction against the sliding velocity. It converges linearly, and slowly at high mass ratios; the residual says how far.
+
+use super::{Accuracy, Outcome, RowSolver};
+use crate::rows::{Block, RowSet, Rows, Side};
+
+/// The block Gauss–Seidel solver, `gauss_seidel`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GaussSeidel;
+
+impl RowSolver for GaussSeidel {
+    fn name(&self) -> &'static str {
+        "gauss_seidel"
+    }
+
+    fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome {
+        let locals: Vec<Local> = blocks.iter().map(|&b| Local::new(rows, &rows.blocks[b as usize])).collect();
+        for local in &locals {
+            local.warm_start(rows, lambda, du);
+        }
+        for sweep in 1..=accuracy.sweeps.max(1) {
+            let change = locals.iter().map(|local| local.relax(rows, c, lambda, du)).fold(0.0, f64::max);
+            if change <= accuracy.tolerance {
+                return Outcome { iterations: sweep, converged: true, ray: false };
+            }
+        }
+        Outcome { iterations: accuracy.sweeps, converged: false, ray: false }
+    }
+
+    fn fork(&self) -> Box<dyn RowSolver> {
+        Box::new(*self)
+    }
+}
+
+/// A block with what its own diagonal block of `K` gives.
+struct Local {
+    block: Block,
+    step: Step,
+}
+
+enum Step {
+    /// No response: no impulse.
+    Dead,
+    Scalar { k: f64, lo: f64, hi: f64 },
+    Contact(Contact),
+}
+
+struct Contact {
+    mu: f64,
+    k: [[f64; 3]; 3],
+    /// `K⁻¹`, absent where a direction has no response.
+    inverse: Option<[[f64; 3]; 3]>,
+    /// `1/λ_max(K_tt)`; 0 where no tangent has a response.
+    rho: f64,
+}
+
+impl Local {
+    fn new(rows: &Rows, block: &Block) -> Local {
+        let diagonal = rows.coupling(block, 0, block, 0);
+        let step = match block.set {
+            _ if diagonal <= f64::MIN_POSITIVE => Step::Dead,
+            RowSet::Equality => Step::Scalar { k: diagonal, lo: f64::NEG_INFINITY, hi: f64::INFINITY },
+            RowSet::HalfLine => Step::Scalar { k: diagonal, lo: 0.0, hi: f64::INFINITY },
+            RowSet::Interval { lo, hi } => Step::Scalar { k: diagonal, lo, hi },
+            RowSet::Cone { mu } => Step::Contact(Contact::new(rows, block, mu)),
+        };
+        Local { block: *block, step }
+    }
+
+    fn warm_start(&self, rows: &Rows, lambda: &mut [f64], du: &mut [f64]) {
+        if let Step::Dead = self.step {
+            lambda[self.block.range()].fill(0.0);
+        } else {
+            rows.apply_block(&self.block, lambda, du);
+        }
+    }
+
+    /// Solves this block with the others held; the largest change of its own row velocities.
+    fn relax(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> f64 {
+        let i = self.block.row as usize;
+        match &self.step {
+            Step::Dead => 0.0,
+            Step::Scalar { k, lo, hi } => {
+                let w = c[i] + rows.row_velocity(&self.block, 0, du);
+                let next = (lambda[i] - w / k).clamp(*lo, *hi);
+                let delta = next - lambda[i];
+                lambda[i] = next;
+                for side in self.block.sides() {
+                    let u = &mut du[side.u as usize..(side.u + side.dof) as usize];
+                    u.iter_mut().zip(rows.response(side, 0)).for_each(|(u, y)| *u += y * delta);
+                }
+                (delta * k).abs()
+            }
+            Step::Contact(contact) => {
+                let mut w = [c[i], c[i + 1], c[i + 2]];
+                self.block.sides().iter().for_each(|s| add_velocity(rows, s, du, &mut w));
+                let old = [lambda[i], lambda[i + 1], lambda[i + 2]];
+                let next = contact.solve(old, w);
+                let delta = [next[0] - old[0], next[1] - old[1], next[2] - old[2]];
+                if delta == [0.0; 3] {
+                    return 0.0;
+                }
+                lambda[i..i + 3].copy_from_slice(&next);
+                self.block.sides().iter().for_each(|s| add_impulse(rows, s, delta, du));
+                (0..3).map(|r| (delta[r] * contact.k[r][r]).abs()).fold(0.0, f64::max)
+            }
+        }
+    }
+}
+
+impl Contact {
+    fn new(rows: &Rows, block: &Block, mu: f64) -> Contact {
+        let mut k = [[0.0; 3]; 3];
+        for (i, j) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
+            k[i][j] = rows.coupling(block, i, block, j);
+            k[j][i] = k[i][j];
+        }
+        let mean = 0.5 * (k[1][1] + k[2][2]);
+        let largest = mean + (0.5 * (k[1][1] - k[2][2])).hypot(k[1][2]);
+        let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
+        Contact { mu, k, inverse: if mu > 0.0 { invert(&k) } else { None }, rho }
+    }
+
+    /// The multipliers that answer row velocities `w` found with multipliers `old`.
+    fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+        if let Some(inverse) = &self.inverse {
+            let full: [f64; 3] = std::array::from_fn(|i| old[i] - (0..3).map(|j| inverse[i][j] * w[j]).sum::<f64>());
+            if full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) && full[0] >= 0.0 {
+                return full;
+            }
+        }
+        let normal = (old[0] - w[0] / self.k[0][0]).max(0.0);
+        let dn = normal - old[0];
+        let t = [1, 2].map(|r| old[r] - self.rho * (w[r] + self.k[r][0] * dn));
+        let (size, bound) = (t[0].hypot(t[1]), self.mu * normal);
+        let scale = if size > bound { bound / size } else { 1.0 };
+        [normal, scale * t[0], scale * t[1]]
+    }
+}
+
+/// `w += Yᵀu` of one side of a contact.
+#[inline]
+fn add_velocity(rows: &Rows, side: &Side, u: &[f64], w: &mut [f64; 3]) {
+    let (d, y) = (side.dof as usize, &rows.y[side.y as usize..]);
+    if let (6, Some((y, _)), Some((u, _))) = (d, y.split_first_chunk::<18>(), u[side.u as usize..].split_first_chunk::<6>()) {
+        for r in 0..3 {
+            let y = &y[6 * r..6 * r + 6];
+            w[r] += (y[0] * u[0] + y[1] * u[1] + y[2] * u[2]) + (y[3] * u[3] + y[4] * u[4] + y[5] * u[5]);
+        }
+        return;
+    }
+    let u = &u[side.u as usize..side.u as usize + d];
+    for r in 0..3 {
+        w[r] += y[r * d..(r + 1) * d].iter().zip(u).map(|(y, u)| y * u).sum::<f64>();
+    }
+}
+
+/// `u += Y·δ` of one side of a contact.
+#[inline]
+fn add_impulse(rows: &Rows, side: &Side, delta: [f64; 3], u: &mut [f64]) {
+    let (d, y) = (side.dof as usize, &rows.y[side.y as usize..]);
+    let u = &mut u[side.u as usize..side.u as usize + d];
+    if let (6, Some((y, _))) = (d, y.split_first_chunk::<18>()) {
+        for k in 0..6 {
+            u[k] += y[k] * delta[0] + y[6 + k] * delta[1] + y[12 + k] * delta[2];
+        }
+        return;
+    }
+    for k in 0..d {
+        u[k] += y[k] * delta[0] + y[d + k] * delta[1] + y[2 * d + k] * delta[2];
+    }
+}
+
+/// Inverse of a symmetric 3×3 matrix, `None` where it is singular to working precision.
+fn invert(k: &[[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
+    let cofactor = |i: usize, j: usize| {
+        let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
+        k[a][c] * k[b][d] - k[a][d] * k[b][c]
+    };
+    let determinant: f64 = (0..3).map(|j| k[0][j] * cofactor(0, j)).sum();
+    let scale = k[0][0].max(k[1][1]).max(k[2][2]);
+    (determinant > 1e-12 * scale.powi(3)).then(|| std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i) / determinant)))
+}

@@ -1,0 +1,94 @@
+//! Islands: sets of blocks that share no moving object, found by union-find. Statics do not merge.
+
+use crate::rows::Rows;
+
+/// The blocks of a solve, grouped. Islands are ordered by their first block, blocks within one as they were added.
+#[derive(Clone, Debug, Default)]
+pub struct Islands {
+    blocks: Vec<u32>,
+    starts: Vec<u32>,
+    parent: Vec<u32>,
+    island_of_root: Vec<u32>,
+    count: Vec<u32>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Islands {
+    /// Groups the blocks of `rows` for which `keep` holds; a block without sides is left out.
+    pub fn build(&mut self, rows: &Rows, keep: impl Fn(usize) -> bool) {
+        self.parent.clear();
+        self.parent.extend(0..rows.dof as u32);
+        for (b, block) in rows.blocks.iter().enumerate() {
+            if let ([first, second], true) = (block.sides(), keep(b)) {
+                let (a, b) = (self.root(first.u), self.root(second.u));
+                self.parent[a.max(b) as usize] = a.min(b);
+            }
+        }
+        self.number(rows, &keep);
+        self.sort(rows, &keep);
+    }
+
+    /// How many islands there are.
+    pub fn len(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The blocks of island `i`.
+    pub fn get(&self, i: usize) -> &[u32] {
+        &self.blocks[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+
+    /// All islands in order.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        (0..self.len()).map(|i| self.get(i))
+    }
+
+    fn root(&mut self, mut i: u32) -> u32 {
+        while self.parent[i as usize] != i {
+            self.parent[i as usize] = self.parent[self.parent[i as usize] as usize];
+            i = self.parent[i as usize];
+        }
+        i
+    }
+
+    /// Numbers the islands by first block and counts their blocks.
+    fn number(&mut self, rows: &Rows, keep: &impl Fn(usize) -> bool) {
+        self.island_of_root.clear();
+        self.island_of_root.resize(rows.dof, NONE);
+        self.count.clear();
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let Some(side) = block.sides().first().filter(|_| keep(b)) else { continue };
+            let root = self.root(side.u) as usize;
+            if self.island_of_root[root] == NONE {
+                self.island_of_root[root] = self.count.len() as u32;
+                self.count.push(0);
+            }
+            self.count[self.island_of_root[root] as usize] += 1;
+        }
+    }
+
+    /// Counting sort of the blocks by island.
+    fn sort(&mut self, rows: &Rows, keep: &impl Fn(usize) -> bool) {
+        self.starts.clear();
+        self.starts.push(0);
+        for i in 0..self.count.len() {
+            self.starts.push(self.starts[i] + self.count[i]);
+        }
+        let mut next: Vec<u32> = self.starts.clone();
+        self.blocks.clear();
+        self.blocks.resize(*self.starts.last().unwrap_or(&0) as usize, 0);
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let Some(side) = block.sides().first().filter(|_| keep(b)) else { continue };
+            let root = self.root(side.u) as usize;
+            let island = self.island_of_root[root] as usize;
+            self.blocks[next[island] as usize] = b as u32;
+            next[island] += 1;
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! Solvers of the one contact problem, each behind [`RowSolver`].
+//!
+//! Find `λ` in the rows' sets so that `w = c + K·λ` answers each set as [`RowSet`](crate::rows::RowSet) says.
+
+mod gauss_seidel;
+mod island;
+mod residual;
+
+pub use gauss_seidel::GaussSeidel;
+pub use island::Islands;
+pub use residual::residual;
+
+use crate::rows::Rows;
+
+/// How far an iterative solver goes. Pivoting solvers are exact and take no notice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accuracy {
+    /// Sweeps at most, at least 1.
+    pub sweeps: u32,
+    /// A sweep that changes no row velocity by more than this ends the solve (m/s; m/s² at the acceleration level).
+    pub tolerance: f64,
+}
+
+/// How one island's solve ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// Sweeps or pivots taken.
+    pub iterations: u32,
+    /// Whether the solver itself says that it reached its aim: the tolerance, or a complementary basis.
+    pub converged: bool,
+    /// A pivoting solver ended on a secondary ray: with friction no solution may exist (Painlevé), and the
+    /// caller resolves the contacts at the impulse level instead.
+    pub ray: bool,
+}
+
+/// A way to solve rows.
+///
+/// `lambda` comes in as the warm start and goes out as the answer; `du = Y·λ` of **these blocks** is added to `du`,
+/// which comes in as the sum over other islands (0 on this island's own stretches). A block without sides, or a
+/// row without response, gets no multiplier.
+pub trait RowSolver: Send + Sync {
+    /// The name that `--solver` takes.
+    fn name(&self) -> &'static str;
+    /// Solves the island made of `blocks` (indices into `rows.blocks`).
+    fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome;
+    /// An independent copy.
+    fn fork(&self) -> Box<dyn RowSolver>;
+}

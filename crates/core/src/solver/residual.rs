@@ -1,0 +1,54 @@
+//! How wrong a solution is, by a formula that shares no code with any solver.
+//!
+//! The natural map with De Saxcé's shift: for a contact, `λ` solves the problem iff
+//! `λ = Π(λ − (w + μ·|w_t|·n) / d)`, with `Π` the projection onto the friction cone `|λ_t| ≤ μ·λ_n` and any `d > 0`.
+//! The residual is `‖λ − Π(…)‖·d`, in m/s, with `d` the mean diagonal of the block of `K`; for the scalar sets the shift is
+//! absent and `Π` clamps. Source: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008, ch. 13.
+
+use crate::rows::{Block, RowSet, Rows};
+
+/// The largest residual of any block, m/s (m/s² where `c` holds accelerations). `du` must be `Y·λ` of all blocks.
+pub fn residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
+    blocks.iter().map(|&b| block_residual(rows, &rows.blocks[b as usize], c, lambda, du)).fold(0.0, f64::max)
+}
+
+fn block_residual(rows: &Rows, block: &Block, c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
+    let n = block.set.rows();
+    let d = (0..n).map(|k| rows.coupling(block, k, block, k)).sum::<f64>() / n as f64;
+    if d <= f64::MIN_POSITIVE {
+        return 0.0;
+    }
+    let first = block.row as usize;
+    let w = |k: usize| c[first + k] + rows.row_velocity(block, k, du);
+    match block.set {
+        RowSet::Equality => w(0).abs(),
+        RowSet::HalfLine => scalar(lambda[first], w(0), d, 0.0, f64::INFINITY),
+        RowSet::Interval { lo, hi } => scalar(lambda[first], w(0), d, lo, hi),
+        RowSet::Cone { mu } => cone([lambda[first], lambda[first + 1], lambda[first + 2]], [w(0), w(1), w(2)], d, mu),
+    }
+}
+
+fn scalar(lambda: f64, w: f64, d: f64, lo: f64, hi: f64) -> f64 {
+    (lambda - (lambda - w / d).clamp(lo, hi)).abs() * d
+}
+
+fn cone(lambda: [f64; 3], w: [f64; 3], d: f64, mu: f64) -> f64 {
+    let shift = mu * w[1].hypot(w[2]);
+    let moved = [lambda[0] - (w[0] + shift) / d, lambda[1] - w[1] / d, lambda[2] - w[2] / d];
+    let onto = project(moved, mu);
+    (0..3).map(|k| (lambda[k] - onto[k]).powi(2)).sum::<f64>().sqrt() * d
+}
+
+/// Euclidean projection onto `{ |x_t| ≤ μ·x_n }`.
+fn project(x: [f64; 3], mu: f64) -> [f64; 3] {
+    let t = x[1].hypot(x[2]);
+    if t <= mu * x[0] {
+        return x;
+    }
+    if mu * t <= -x[0] {
+        return [0.0; 3];
+    }
+    let n = (x[0] + mu * t) / (1.0 + mu * mu);
+    let scale = mu * n / t;
+    [n, scale * x[1], scale * x[2]]
+}
