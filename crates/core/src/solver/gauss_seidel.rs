@@ -124,7 +124,8 @@ impl Contact {
             k[j][i] = k[i][j];
         }
         let mean = 0.5 * (k[1][1] + k[2][2]);
-        let largest = mean + (0.5 * (k[1][1] - k[2][2])).hypot(k[1][2]);
+        let half = 0.5 * (k[1][1] - k[2][2]);
+        let largest = mean + (half * half + k[1][2] * k[1][2]).sqrt();
         let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
         Contact { mu, k, inverse: if mu > 0.0 { invert(&k) } else { None }, rho }
     }
@@ -140,7 +141,7 @@ impl Contact {
         let normal = (old[0] - w[0] / self.k[0][0]).max(0.0);
         let dn = normal - old[0];
         let t = [1, 2].map(|r| old[r] - self.rho * (w[r] + self.k[r][0] * dn));
-        let (size, bound) = (t[0].hypot(t[1]), self.mu * normal);
+        let (size, bound) = ((t[0] * t[0] + t[1] * t[1]).sqrt(), self.mu * normal);
         let scale = if size > bound { bound / size } else { 1.0 };
         [normal, scale * t[0], scale * t[1]]
     }

@@ -33,7 +33,7 @@ fn scalar(lambda: f64, w: f64, d: f64, lo: f64, hi: f64) -> f64 {
 }
 
 fn cone(lambda: [f64; 3], w: [f64; 3], d: f64, mu: f64) -> f64 {
-    let shift = mu * w[1].hypot(w[2]);
+    let shift = mu * (w[1] * w[1] + w[2] * w[2]).sqrt();
     let moved = [lambda[0] - (w[0] + shift) / d, lambda[1] - w[1] / d, lambda[2] - w[2] / d];
     let onto = project(moved, mu);
     (0..3).map(|k| (lambda[k] - onto[k]).powi(2)).sum::<f64>().sqrt() * d
@@ -41,7 +41,7 @@ fn cone(lambda: [f64; 3], w: [f64; 3], d: f64, mu: f64) -> f64 {
 
 /// Euclidean projection onto `{ |x_t| ≤ μ·x_n }`.
 fn project(x: [f64; 3], mu: f64) -> [f64; 3] {
-    let t = x[1].hypot(x[2]);
+    let t = (x[1] * x[1] + x[2] * x[2]).sqrt();
     if t <= mu * x[0] {
         return x;
     }

@@ -1,0 +1,203 @@
+//! The interfaces of the thesis (§IV.A), as traits.
+//!
+//! Objects are open: a new kind of behaviour is a new type in anybody's crate that answers some of these. All that changes with time lives in
+//! the world's flat state `X`; an object is a model that says how to read its slice, so that saving, forking and integrator stages are
+//! copies of a slice.
+
+use crate::collidable::Collidable;
+use crate::rows::RowSet;
+use crate::site::{Dims, ForceSlice, Forces, Site, Span};
+use crate::view::WorldView;
+use crate::row_builder::RowBuilder;
+use std::any::Any;
+use tumble_collide::{Pose, Vec3};
+
+/// Everything the world holds. One accessor per interface; the default answer is "not I" (the thesis's
+/// `ImplementsInterface`, §IV.B.1).
+pub trait Object: Any + Send + Sync {
+    /// Unique in its world; at most 63 bytes, so that it fits the network header.
+    fn name(&self) -> &str;
+    /// An independent copy.
+    fn fork(&self) -> Box<dyn Object>;
+    /// Writes the poses and velocities of its sites from its slice of the state, and its caches, which must be pure functions of `x`
+    /// (thesis `UpdateState`). Accelerations are left to [`Integratable::accelerations`].
+    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
+        let _ = (x, sites);
+    }
+    /// Whether it has a state that the integrator advances.
+    fn integratable(&self) -> Option<&dyn Integratable> {
+        None
+    }
+    /// Whether it has parts that collide.
+    fn collidable(&self) -> Option<&dyn Collidable> {
+        None
+    }
+    /// Whether it constrains itself or others.
+    fn constraint(&self) -> Option<&dyn Constraint> {
+        None
+    }
+    /// Whether it acts on others: "live" but not necessarily integrated (thesis §IV.B.2).
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        None
+    }
+    /// Whether it can be drawn.
+    fn renderable(&self) -> Option<&dyn Renderable> {
+        None
+    }
+}
+
+/// An object with a state (thesis `Integratable` and `SimulationState`, §IV.A.1–2).
+///
+/// `x` is always the object's own slice of the state, `v`, `dp`, `u` its `dof` numbers: generalized velocity, generalized force (or impulse),
+/// and whitened velocity `u = L·v` where the mass matrix is `M = LᵀL`. The four whitening maps hold at the state last refreshed.
+pub trait Integratable {
+    /// How many numbers it needs.
+    fn dims(&self) -> Dims;
+    /// Writes its state at time 0.
+    fn write_initial(&self, x: &mut [f64]);
+    /// Adds the forces that it feels of itself (gravity, damping) to its own rows of the force table.
+    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces);
+    /// Generalized velocity at `x`.
+    fn velocity(&self, x: &[f64], v: &mut [f64]);
+    /// Rate of change of momentum under the forces `f`: the thesis's derivative.
+    fn derivative(&self, x: &[f64], f: &ForceSlice, dp: &mut [f64]);
+    /// Writes the accelerations of its sites for a rate of momentum `dp`.
+    fn accelerations(&self, x: &[f64], dp: &[f64], sites: &mut [Site]);
+    /// Momentum changes by `h·dp`; positions stay.
+    fn kick(&self, x: &mut [f64], dp: &[f64], h: f64);
+    /// Free motion for `h` seconds with the momentum held: exact or symmetric of second order at least.
+    fn coast(&self, x: &mut [f64], h: f64);
+    /// Positions move with generalized velocity `v` for `h` seconds; exact on rotations. Momentum stays.
+    fn drift(&self, x: &mut [f64], v: &[f64], h: f64);
+    /// `u = L·v` of the momentum in `x`.
+    fn whiten(&self, x: &[f64], u: &mut [f64]);
+    /// `v = L⁻¹·u`.
+    fn unwhiten(&self, u: &[f64], v: &mut [f64]);
+    /// `y = L⁻ᵀ·j`: the whitened response to a generalized impulse `j`.
+    fn respond(&self, j: &[f64], y: &mut [f64]);
+    /// `dp = Lᵀ·du`: the momentum that a change of `u` means.
+    fn recover(&self, du: &[f64], dp: &mut [f64]);
+    /// Called once per committed step, for what must be put right after integration.
+    fn stabilize(&self, x: &mut [f64], h: f64) {
+        let _ = (x, h);
+    }
+    /// Kinetic energy, and potential energy in uniform gravity (zero at the world's origin), J.
+    fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy;
+    /// Linear momentum, N·s, and angular momentum about the world's origin, N·m·s.
+    fn momentum(&self, x: &[f64]) -> Momentum;
+}
+
+/// Mechanical energy, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Of motion.
+    pub kinetic: f64,
+    /// In uniform gravity, zero at the world's origin.
+    pub potential: f64,
+}
+
+impl Energy {
+    /// Kinetic and potential.
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.potential
+    }
+}
+
+/// Momentum of an object or a world, world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Momentum {
+    /// Linear, N·s.
+    pub linear: Vec3,
+    /// Angular about the world's origin, N·m·s.
+    pub angular: Vec3,
+}
+
+impl Default for Momentum {
+    fn default() -> Momentum {
+        Momentum { linear: Vec3::zeros(), angular: Vec3::zeros() }
+    }
+}
+
+/// Acts on others without a state of its own: wind, springs, a flock (thesis §IV.A.2).
+pub trait ForceGenerator {
+    /// Adds forces, at the view's state and time.
+    fn apply(&self, me: &Span, view: &WorldView, out: &mut Forces);
+}
+
+/// At which level rows are asked for: the thesis's two `Evaluate…Constraints` (§IV.A.4).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Level {
+    /// Impulses that mend velocities over a step of `h` seconds.
+    Velocity {
+        /// Length of the step, s.
+        h: f64,
+    },
+    /// Forces that mend accelerations.
+    Acceleration,
+}
+
+/// Constrains itself or others: joint limits, loop closures, rods (thesis §IV.A.4). Its rows are solved together with all contacts.
+pub trait Constraint {
+    /// Adds its rows. See [`RowBuilder`] for how a row is made.
+    fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder);
+}
+
+/// One row of a [`Constraint`]: what it may do and how far off it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowTarget {
+    /// What the multiplier may be.
+    pub set: RowSet,
+    /// Position error of the row (metres or radians): the equality's drift, or the one-sided row's gap (negative where violated).
+    pub error: f64,
+    /// Velocity that the row aims at (0 but for motors), m/s or rad/s.
+    pub velocity: f64,
+    /// The part of the row's acceleration that is there without any force or change of velocity (`J̇·v`); used at the acceleration level alone.
+    pub bias_acceleration: f64,
+}
+
+impl RowTarget {
+    /// A row at rest with the given set and position error.
+    pub fn new(set: RowSet, error: f64) -> RowTarget {
+        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0 }
+    }
+}
+
+/// Can be drawn (thesis `Renderable` and `SidRenderable`, §IV.A.5): says what, never how.
+pub trait Renderable {
+    /// Its pictures.
+    fn visuals(&self) -> &[Visual];
+}
+
+/// One thing to draw, fixed to a site.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visual {
+    /// Part of the object that it moves with.
+    pub part: usize,
+    /// Pose in the part's frame.
+    pub pose: Pose,
+    /// Geometry.
+    pub shape: tumble_collide::Shape,
+    /// Look.
+    pub look: Look,
+}
+
+/// How a surface looks: a shader by name and its properties, as the thesis's shader attributes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// Base colour, sRGB, each 0 to 1.
+    pub color: [f32; 3],
+    /// 0 is a mirror, 1 is chalk.
+    pub roughness: f32,
+    /// 0 or 1, or between for mixtures.
+    pub metallic: f32,
+    /// Name of the surface's pattern, `plain` where none.
+    pub shader: String,
+    /// Named properties of the shader, in the order given.
+    pub properties: Vec<(String, f64)>,
+}
+
+impl Default for Look {
+    fn default() -> Look {
+        Look { color: [0.7, 0.7, 0.72], roughness: 0.5, metallic: 0.0, shader: "plain".into(), properties: Vec::new() }
+    }
+}

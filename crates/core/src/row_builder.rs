@@ -1,0 +1,96 @@
+//! How constraints and contacts become rows.
+
+use crate::object::{Object, RowTarget};
+use crate::rows::Rows;
+use crate::site::Site;
+use crate::view::{Entry, ObjectId, Table};
+use tumble_collide::Vec3;
+
+/// Collects rows. A row is started with [`row`](Self::row) and then told what it acts on; its velocity is the sum of what it was told.
+///
+/// ```text
+/// out.row(RowTarget::new(RowSet::Equality, drift))
+///    .on_point(bead, 0, &p, &axis, 1.0)
+///    .on_point(post, 0, &p, &axis, -1.0);
+/// ```
+pub struct RowBuilder<'a> {
+    pub(crate) rows: &'a mut Rows,
+    /// Velocity of each row that comes from sides without freedoms (kinematic motion).
+    pub(crate) bias: &'a mut Vec<f64>,
+    pub(crate) targets: &'a mut Vec<RowTarget>,
+    pub(crate) table: &'a Table,
+    pub(crate) sites: &'a [Site],
+    pub(crate) problem: &'a mut Option<String>,
+}
+
+impl RowBuilder<'_> {
+    /// Starts a row. A `Cone` set is for contacts, which the world makes itself: it is refused here, and the step reports it.
+    pub fn row(&mut self, target: RowTarget) -> &mut Self {
+        if target.set.rows() != 1 || !(target.error.is_finite() && target.velocity.is_finite()) {
+            self.refuse("a constraint's row must be Equality, HalfLine or Interval, with finite error and velocity".into());
+            return self;
+        }
+        self.rows.push_block(target.set);
+        self.bias.push(0.0);
+        self.targets.push(target);
+        self
+    }
+
+    /// Adds `sign ·` the velocity along `axis` of the material point of one part that is at world point `p`.
+    pub fn on_point(&mut self, id: ObjectId, part: usize, p: &Vec3, axis: &Vec3, sign: f64) -> &mut Self {
+        let table = self.table;
+        match table.slots.get(id) {
+            Some(entry) if part < entry.span.site.len() && self.point_side(entry, part, p, &[*axis], sign) => {}
+            Some(entry) => self.refuse(format!("'{}' has no part {part} that answers impulses, or the row names a third object", entry.object.name())),
+            None => self.refuse("a row names an object that is not in the world".into()),
+        }
+        self
+    }
+
+    /// Adds `Σ j_k · v_k` over the generalized velocities of one object.
+    pub fn on_coordinates(&mut self, id: ObjectId, jacobian: &[f64]) -> &mut Self {
+        let table = self.table;
+        let Some(entry) = table.slots.get(id) else {
+            self.refuse("a row names an object that is not in the world".into());
+            return self;
+        };
+        let done = entry.object.integratable().filter(|i| i.dims().dof == jacobian.len()).is_some_and(|i| {
+            !entry.moves() || {
+                let mut y = vec![0.0; jacobian.len()];
+                i.respond(jacobian, &mut y);
+                let side = self.rows.side(entry.span.v.start, y.len());
+                side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()
+            }
+        });
+        if !done {
+            self.refuse(format!("'{}': the row's Jacobian has {} numbers, or it names a third object", entry.object.name(), jacobian.len()));
+        }
+        self
+    }
+
+    /// One side of the last block: a test impulse where it moves, its velocity where it is led.
+    pub(crate) fn point_side(&mut self, entry: &Entry, part: usize, p: &Vec3, axes: &[Vec3], sign: f64) -> bool {
+        let site = &self.sites[entry.span.site.start + part];
+        let Some(collidable) = entry.object.collidable() else { return false };
+        if entry.moves() {
+            let Some(y) = self.rows.side(entry.span.v.start, entry.span.v.len()) else { return false };
+            collidable.test_impulse(part, site, p, axes, sign, y);
+        } else {
+            let velocity = entry.seen(site).velocity_at(p);
+            let first = self.bias.len() - axes.len();
+            for (bias, axis) in self.bias[first..].iter_mut().zip(axes) {
+                *bias += sign * velocity.dot(axis);
+            }
+        }
+        true
+    }
+
+    fn refuse(&mut self, why: String) {
+        self.problem.get_or_insert(why);
+    }
+}
+
+/// Lets every constraint of the table add its rows.
+pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (&Entry, &dyn Object)> {
+    table.iter().filter(|e| e.status.alive && e.object.constraint().is_some()).map(|e| (e, e.object.as_ref()))
+}

@@ -1,0 +1,137 @@
+//! The table of objects and the read-only view of the world that objects are given.
+
+use crate::object::Object;
+use crate::site::{Site, Span};
+use slotmap::{SlotMap, new_key_type};
+use tumble_collide::Vec3;
+
+new_key_type! {
+    /// Names an object of a world. After the object is removed the id is `None` everywhere, never somebody else.
+    pub struct ObjectId;
+}
+
+/// How a body takes part; switched between steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Mode {
+    /// Never moves; its velocity counts as zero.
+    Static,
+    /// Follows the pose and velocity it is given, and pushes others (the thesis's scripted motion).
+    Kinematic,
+    /// Moved by forces and impulses.
+    #[default]
+    Dynamic,
+}
+
+/// An object's switches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Status {
+    /// How it takes part.
+    pub mode: Mode,
+    /// Not alive: neither moves, nor collides, nor acts, until it is alive again.
+    pub alive: bool,
+    /// Whether its parts meet others.
+    pub collidable: bool,
+}
+
+impl Default for Status {
+    fn default() -> Status {
+        Status { mode: Mode::Dynamic, alive: true, collidable: true }
+    }
+}
+
+impl Status {
+    /// Whether impulses move it.
+    pub fn moves(&self) -> bool {
+        self.alive && self.mode == Mode::Dynamic
+    }
+}
+
+/// An object and its place.
+pub(crate) struct Entry {
+    pub object: Box<dyn Object>,
+    pub span: Span,
+    pub status: Status,
+    /// Never used twice in a world: what warm starts are filed under.
+    pub serial: u32,
+}
+
+impl Entry {
+    /// Whether forces and impulses move it: dynamic, alive, and with a state.
+    pub fn moves(&self) -> bool {
+        self.status.moves() && !self.span.v.is_empty()
+    }
+
+    /// Its velocity as others meet it: zero for what is static.
+    pub fn seen(&self, site: &Site) -> Site {
+        if self.status.mode != Mode::Static && self.status.alive {
+            return *site;
+        }
+        Site { pose: site.pose, ..Site::default() }
+    }
+}
+
+/// All objects, addressed by id and walked in the order in which they were added.
+#[derive(Default)]
+pub(crate) struct Table {
+    pub slots: SlotMap<ObjectId, Entry>,
+    pub order: Vec<ObjectId>,
+}
+
+impl Table {
+    pub fn iter(&self) -> impl Iterator<Item = &Entry> {
+        self.order.iter().map(|&id| &self.slots[id])
+    }
+
+    /// Walks the objects that a step moves, and lets them change their caches.
+    pub fn for_each_mut(&mut self, mut f: impl FnMut(&mut Entry)) {
+        for &id in &self.order {
+            f(&mut self.slots[id]);
+        }
+    }
+}
+
+/// What an object may read while it accumulates forces or makes rows.
+pub struct WorldView<'a> {
+    /// Simulated time of this stage, s.
+    pub time: f64,
+    /// Gravity, m/s².
+    pub gravity: Vec3,
+    /// The state `X` at this stage.
+    pub x: &'a [f64],
+    /// The site table at this stage.
+    pub sites: &'a [Site],
+    pub(crate) table: &'a Table,
+}
+
+impl WorldView<'_> {
+    /// An object by id.
+    pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
+        self.table.slots.get(id).map(|e| e.object.as_ref())
+    }
+
+    /// An object by id, as its own type.
+    pub fn get<T: Object>(&self, id: ObjectId) -> Option<&T> {
+        let object: &dyn std::any::Any = self.object(id)?;
+        object.downcast_ref()
+    }
+
+    /// Where an object's numbers lie.
+    pub fn span(&self, id: ObjectId) -> Option<&Span> {
+        self.table.slots.get(id).map(|e| &e.span)
+    }
+
+    /// The site of one part.
+    pub fn site(&self, id: ObjectId, part: usize) -> Option<&Site> {
+        self.sites[self.span(id)?.site.clone()].get(part)
+    }
+
+    /// An object's switches.
+    pub fn status(&self, id: ObjectId) -> Option<Status> {
+        self.table.slots.get(id).map(|e| e.status)
+    }
+
+    /// All ids in the order in which the objects were added.
+    pub fn ids(&self) -> &[ObjectId] {
+        &self.table.order
+    }
+}
