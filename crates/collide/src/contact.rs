@@ -34,3 +34,33 @@ pub enum NormalFrom {
     /// Two edges: perpendicular to both.
     Edges,
 }
+
+impl Contact {
+    /// The same contact with A and B exchanged.
+    pub(crate) fn flipped(self) -> Contact {
+        let normal_from = match self.normal_from {
+            NormalFrom::FaceOfA => NormalFrom::FaceOfB,
+            NormalFrom::FaceOfB => NormalFrom::FaceOfA,
+            other => other,
+        };
+        Contact { normal: -self.normal, core_a: self.core_b, core_b: self.core_a, normal_from, ..self }
+    }
+
+    /// A contact between two balls about core points; coincident centres are pushed apart along z.
+    pub(crate) fn between_cores(core_a: (Vec3, f64), core_b: (Vec3, f64), feature: u64) -> Contact {
+        let ((a, radius_a), (b, radius_b)) = (core_a, core_b);
+        let offset = a - b;
+        let distance = offset.norm();
+        let normal = if distance > 1e-300 { offset / distance } else { Vec3::z() };
+        let gap = distance - radius_a - radius_b;
+        Contact {
+            point: b + normal * (radius_b + 0.5 * gap),
+            normal,
+            gap,
+            feature,
+            core_a: radius_a,
+            core_b: radius_b,
+            normal_from: NormalFrom::CorePoints,
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! The narrow phase: contacts between two posed shapes. One file per family of pairs.
+
+mod box_box;
+mod box_closest;
+mod capsule;
+mod clip;
+mod half_space;
+mod reduce;
+mod segment;
+mod sphere;
+
+use crate::{Contact, Pose, Shape};
+
+/// Appends to `out` all contacts between `a` and `b` whose gap is at most `margin` metres (`margin ≥ 0`).
+///
+/// Normals point from B towards A. Exact among half-space, sphere, box and capsule. Manifolds are reduced
+/// to the few points that matter. Does not allocate beyond the growth of `out`.
+pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    let start = out.len();
+    if rank(a) <= rank(b) {
+        ordered(a, pose_a, b, pose_b, margin, out);
+    } else {
+        ordered(b, pose_b, a, pose_a, margin, out);
+        out[start..].iter_mut().for_each(|c| *c = c.flipped());
+    }
+}
+
+/// Pairs are handled with the lower rank first.
+fn rank(shape: &Shape) -> u8 {
+    match shape {
+        Shape::Sphere { .. } => 0,
+        Shape::Capsule { .. } => 1,
+        Shape::Box { .. } => 2,
+        Shape::HalfSpace => 4,
+    }
+}
+
+fn ordered(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    use Shape::{Box, Capsule, HalfSpace, Sphere};
+    match (a, b) {
+        (Sphere { radius: ra }, Sphere { radius: rb }) => sphere::sphere_sphere(*ra, pose_a, *rb, pose_b, margin, out),
+        (Sphere { radius }, Capsule { radius: rb, half_length }) => {
+            sphere::sphere_capsule(*radius, pose_a, (*rb, *half_length), pose_b, margin, out)
+        }
+        (Sphere { radius }, Box { half_extents }) => sphere::sphere_box(*radius, pose_a, half_extents, pose_b, margin, out),
+        (Sphere { radius }, HalfSpace) => half_space::sphere(*radius, pose_a, pose_b, margin, out),
+        (Capsule { radius: ra, half_length: la }, Capsule { radius: rb, half_length: lb }) => {
+            capsule::capsule_capsule((*ra, *la), pose_a, (*rb, *lb), pose_b, margin, out)
+        }
+        (Capsule { radius, half_length }, Box { half_extents }) => {
+            capsule::capsule_box((*radius, *half_length), pose_a, half_extents, pose_b, margin, out)
+        }
+        (Capsule { radius, half_length }, HalfSpace) => {
+            half_space::capsule((*radius, *half_length), pose_a, pose_b, margin, out)
+        }
+        (Box { half_extents: ha }, Box { half_extents: hb }) => box_box::box_box(ha, pose_a, hb, pose_b, margin, out),
+        (Box { half_extents }, HalfSpace) => half_space::cuboid(half_extents, pose_a, pose_b, margin, out),
+        (HalfSpace, HalfSpace) => {}
+        // ranks put every other combination the other way round
+        _ => debug_assert!(false, "pair out of order"),
+    }
+}

@@ -1,0 +1,125 @@
+//! The shapes that a body's part can have.
+
+use crate::{Aabb, MassProperties, Pose, ShapeError, Vec3, mass};
+
+/// A solid in its own frame. Primitives are centred on the origin.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// All points with local `z ≤ 0`; the outward normal is local `+z`.
+    HalfSpace,
+    /// A ball.
+    Sphere {
+        /// Metres.
+        radius: f64,
+    },
+    /// A block with its faces across the local axes.
+    Box {
+        /// From the centre to the faces, metres.
+        half_extents: Vec3,
+    },
+    /// All points within `radius` of a segment on the local z axis.
+    Capsule {
+        /// Metres.
+        radius: f64,
+        /// From the centre to an end of the segment (caps not counted), metres.
+        half_length: f64,
+    },
+}
+
+impl Shape {
+    /// The half-space `z ≤ 0`.
+    pub fn half_space() -> Shape {
+        Shape::HalfSpace
+    }
+
+    /// A ball of `radius` metres.
+    pub fn sphere(radius: f64) -> Result<Shape, ShapeError> {
+        length("radius of a sphere", radius)?;
+        Ok(Shape::Sphere { radius })
+    }
+
+    /// A block; half extents in metres.
+    pub fn cuboid(half_extents: Vec3) -> Result<Shape, ShapeError> {
+        for (k, what) in ["half extent x of a box", "half extent y of a box", "half extent z of a box"].into_iter().enumerate() {
+            length(what, half_extents[k])?;
+        }
+        Ok(Shape::Box { half_extents })
+    }
+
+    /// A capsule along z: radius and half length of the segment, metres.
+    pub fn capsule(radius: f64, half_length: f64) -> Result<Shape, ShapeError> {
+        length("radius of a capsule", radius)?;
+        length("half length of a capsule", half_length)?;
+        Ok(Shape::Capsule { radius, half_length })
+    }
+
+    /// The box in world axes around the shape at `pose`. A half-space that faces along an axis
+    /// is bounded on that side; any other is unbounded on all sides.
+    pub fn aabb(&self, pose: &Pose) -> Aabb {
+        let center = pose.translation.vector;
+        let half = match self {
+            Shape::HalfSpace => return half_space_aabb(pose),
+            Shape::Sphere { radius } => Vec3::repeat(*radius),
+            Shape::Box { half_extents } => pose.rotation.to_rotation_matrix().matrix().abs() * half_extents,
+            Shape::Capsule { radius, half_length } => (axis(pose).abs() * *half_length).add_scalar(*radius),
+        };
+        Aabb { min: center - half, max: center + half }
+    }
+
+    /// Mass properties at a uniform `density` in kg/m³.
+    pub fn mass_properties(&self, density: f64) -> Result<MassProperties, ShapeError> {
+        if !(density.is_finite() && density > 0.0) {
+            return Err(ShapeError::Density(density));
+        }
+        match self {
+            Shape::HalfSpace => Err(ShapeError::Unbounded),
+            Shape::Sphere { radius } => Ok(mass::sphere(*radius, density)),
+            Shape::Box { half_extents } => Ok(mass::cuboid(half_extents, density)),
+            Shape::Capsule { radius, half_length } => Ok(mass::capsule(*radius, *half_length, density)),
+        }
+    }
+
+    /// Volume in m³; infinite for a half-space.
+    pub fn volume(&self) -> f64 {
+        match self {
+            Shape::HalfSpace => f64::INFINITY,
+            Shape::Sphere { radius } => mass::sphere_volume(*radius),
+            Shape::Box { half_extents } => mass::cuboid_volume(half_extents),
+            Shape::Capsule { radius, half_length } => {
+                mass::sphere_volume(*radius) + mass::cylinder_volume(*radius, *half_length)
+            }
+        }
+    }
+
+    /// Radius of a ball about the local origin that holds the shape, metres; infinite for a half-space.
+    pub fn bounding_radius(&self) -> f64 {
+        match self {
+            Shape::HalfSpace => f64::INFINITY,
+            Shape::Sphere { radius } => *radius,
+            Shape::Box { half_extents } => half_extents.norm(),
+            Shape::Capsule { radius, half_length } => radius + half_length,
+        }
+    }
+}
+
+fn length(what: &'static str, value: f64) -> Result<(), ShapeError> {
+    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(ShapeError::Length { what, value }) }
+}
+
+/// The local z axis in the world.
+pub(crate) fn axis(pose: &Pose) -> Vec3 {
+    pose.rotation * Vec3::z()
+}
+
+fn half_space_aabb(pose: &Pose) -> Aabb {
+    let mut all = Aabb { min: Vec3::repeat(f64::NEG_INFINITY), max: Vec3::repeat(f64::INFINITY) };
+    let normal = axis(pose);
+    for k in 0..3 {
+        // within rounding of the axis the plane rises less than 1e-12 m per metre; it is taken as level
+        if normal[(k + 1) % 3].abs() < 1e-12 && normal[(k + 2) % 3].abs() < 1e-12 {
+            let bound = if normal[k] > 0.0 { &mut all.max } else { &mut all.min };
+            bound[k] = pose.translation.vector[k];
+        }
+    }
+    all
+}
