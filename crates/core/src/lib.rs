@@ -1,4 +1,45 @@
 //! Dynamics for tumble: the traits, rigid bodies, contact rows, solvers, integrators, steppers and the world.
+//!
+//! A step reads a flat state, accumulates forces, finds contacts, turns test impulses into rows, solves all rows at once and writes the state.
+//! Same inputs, same bits: no IO, clock, thread count, file format or GPU in here.
+//!
+//! ```
+//! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};
+//! let mut world = World::new(Settings::default())?;
+//! world.add_static(RigidBody::fixture("ground", Shape::half_space()))?;
+//! let ball = RigidBody::with_mass("ball", Shape::sphere(0.1).unwrap(), 1.0)?.at(Pose::translation(0.0, 0.0, 1.0));
+//! let ball = world.add(ball)?;
+//! for _ in 0..120 {
+//!     world.step().unwrap();
+//! }
+//! assert!((world.site(ball, 0).unwrap().position().z - 0.1).abs() < 1e-6);
+//! # Ok::<(), tumble_core::WorldError>(())
+//! ```
 
+mod collidable;
+mod detect;
+mod motion;
+mod object;
+mod rigid;
+mod rotation;
+mod row_builder;
 pub mod rows;
+mod settings;
+mod site;
 pub mod solver;
+mod step;
+mod view;
+mod world;
+
+pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
+pub use object::{
+    Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, Object, Renderable, RowTarget, Visual,
+};
+pub use rigid::{BodyError, RigidBody};
+pub use row_builder::RowBuilder;
+pub use settings::{Integrator, Settings, SettingsError, StepReport};
+pub use site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
+pub use step::{Backtracking, Frame, Stepper, TimeStepping};
+pub use tumble_collide as collide;
+pub use view::{Mode, ObjectId, Status, WorldView};
+pub use world::{ContactPoint, SnapshotError, StepError, World, WorldError};

@@ -59,6 +59,8 @@ pub trait Integratable {
     fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces);
     /// Generalized velocity at `x`.
     fn velocity(&self, x: &[f64], v: &mut [f64]);
+    /// Changes the momentum in `x` so that the generalized velocity there is `v`: the inverse of [`velocity`](Self::velocity).
+    fn write_velocity(&self, x: &mut [f64], v: &[f64]);
     /// Rate of change of momentum under the forces `f`: the thesis's derivative.
     fn derivative(&self, x: &[f64], f: &ForceSlice, dp: &mut [f64]);
     /// Writes the accelerations of its sites for a rate of momentum `dp`.
@@ -169,7 +171,7 @@ pub trait Renderable {
 }
 
 /// One thing to draw, fixed to a site.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Visual {
     /// Part of the object that it moves with.
     pub part: usize,

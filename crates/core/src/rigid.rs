@@ -323,6 +323,13 @@ impl Integratable for RigidBody {
         write6(v, &self.omega(&orientation(x), &vec3(&x[10..])), &(vec3(&x[7..]) / self.mass));
     }
 
+    fn write_velocity(&self, x: &mut [f64], v: &[f64]) {
+        let q = orientation(x);
+        let l = q * (self.inertia.tensor * q.inverse_transform_vector(&vec3(v)));
+        x[7..10].copy_from_slice((self.mass * vec3(&v[3..])).as_slice());
+        x[10..13].copy_from_slice(l.as_slice());
+    }
+
     fn derivative(&self, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         write6(dp, &f.wrenches[0].torque, &f.wrenches[0].force);
         dp.iter_mut().zip(f.generalized).for_each(|(dp, f)| *dp += f);

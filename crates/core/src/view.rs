@@ -70,8 +70,14 @@ impl Entry {
     }
 }
 
+impl Clone for Entry {
+    fn clone(&self) -> Entry {
+        Entry { object: self.object.fork(), span: self.span.clone(), status: self.status, serial: self.serial }
+    }
+}
+
 /// All objects, addressed by id and walked in the order in which they were added.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Table {
     pub slots: SlotMap<ObjectId, Entry>,
     pub order: Vec<ObjectId>,

@@ -1,0 +1,206 @@
+//! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
+
+use crate::collidable::ContactFrame;
+use crate::settings::Settings;
+use crate::site::Site;
+use crate::view::{Entry, Mode, ObjectId, Table};
+use tumble_collide::{Aabb, BroadPhase, Contact, NormalFrom, Vec3};
+
+/// Who owns a row of the site table.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Owner {
+    pub id: ObjectId,
+    pub part: u32,
+    pub serial: u32,
+}
+
+/// Names a contact across steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Key {
+    /// Serial and part of either side, A first.
+    pub pair: [u32; 4],
+    pub feature: u64,
+}
+
+/// A contact between two sites, with the constants of the pair.
+#[derive(Clone, Debug)]
+pub(crate) struct Touch {
+    pub a: u32,
+    pub b: u32,
+    pub contact: Contact,
+    pub frame: ContactFrame,
+    pub friction: f64,
+    pub restitution: f64,
+    pub key: Key,
+}
+
+/// Last step's impulse (or force) per contact, world axes, on A.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct WarmStarts {
+    entries: Vec<(Key, [f64; 3])>,
+}
+
+impl WarmStarts {
+    /// Files anew; `entries` may come in any order.
+    pub fn replace(&mut self, entries: impl Iterator<Item = (Key, Vec3)>) {
+        self.entries.clear();
+        self.entries.extend(entries.map(|(k, v)| (k, [v.x, v.y, v.z])));
+        self.entries.sort_by_key(|e| e.0);
+    }
+
+    pub fn get(&self, key: &Key) -> Option<Vec3> {
+        let found = self.entries.binary_search_by_key(key, |e| e.0).ok()?;
+        Some(Vec3::from(self.entries[found].1))
+    }
+
+    /// Whether any contact of the key's pair carried a force.
+    pub fn carries(&self, key: &Key) -> bool {
+        let first = self.entries.partition_point(|e| e.0.pair < key.pair);
+        self.entries[first..].iter().take_while(|e| e.0.pair == key.pair).any(|e| e.1 != [0.0; 3])
+    }
+
+    pub fn finite(&self) -> bool {
+        self.entries.iter().flat_map(|e| e.1).all(f64::is_finite)
+    }
+
+    pub fn forget(&mut self, serial: u32) {
+        self.entries.retain(|(k, _)| k.pair[0] != serial && k.pair[2] != serial);
+    }
+}
+
+/// The detector's working memory.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    proxies: Vec<u32>,
+    boxes: Vec<Aabb>,
+    reach: Vec<f64>,
+    moving: Vec<bool>,
+    pairs: Vec<[u32; 2]>,
+    found: Vec<Contact>,
+}
+
+/// What the detector reads.
+pub(crate) struct Detector<'a> {
+    pub table: &'a Table,
+    pub owners: &'a [Owner],
+    pub sites: &'a [Site],
+    pub settings: &'a Settings,
+    pub broad: &'a mut dyn BroadPhase,
+    pub scratch: &'a mut Scratch,
+}
+
+impl Detector<'_> {
+    /// All contacts whose gap is at most what the pair may close within `horizon` seconds, plus the drift tolerance.
+    pub fn detect(&mut self, horizon: f64, out: &mut Vec<Touch>) {
+        out.clear();
+        self.gather(horizon);
+        let mut pairs = std::mem::take(&mut self.scratch.pairs);
+        self.broad.pairs(&self.scratch.boxes, &self.scratch.moving, &mut pairs);
+        for &[i, j] in &pairs {
+            self.narrow(i as usize, j as usize, out);
+        }
+        self.scratch.pairs = pairs;
+    }
+
+    /// One grown box per part that can meet anything.
+    fn gather(&mut self, horizon: f64) {
+        let s = &mut *self.scratch;
+        (s.proxies.clear(), s.boxes.clear(), s.reach.clear(), s.moving.clear());
+        for entry in self.table.iter().filter(|e| e.status.alive && e.status.collidable) {
+            let Some(collidable) = entry.object.collidable() else { continue };
+            for (part, index) in entry.span.site.clone().enumerate() {
+                let (shape, site) = (collidable.shape(part), entry.seen(&self.sites[index]));
+                let bound = shape.bounding_radius();
+                let turning = if bound.is_finite() { site.angular_velocity.norm() * bound } else { 0.0 };
+                let gain = 0.5 * horizon * horizon * self.settings.gravity.norm();
+                let reach = self.settings.drift_tolerance + horizon * (site.velocity.norm() + turning) + gain;
+                s.proxies.push(index as u32);
+                s.boxes.push(shape.aabb(&site.pose).grown(reach));
+                s.reach.push(reach);
+                s.moving.push(entry.status.mode != Mode::Static);
+            }
+        }
+    }
+
+    fn narrow(&mut self, i: usize, j: usize, out: &mut Vec<Touch>) {
+        let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
+        let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
+        let (entry_a, entry_b) = (&self.table.slots[owner_a.id], &self.table.slots[owner_b.id]);
+        if !meet(entry_a, owner_a.part as usize, entry_b, owner_b.part as usize) {
+            return;
+        }
+        let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
+        let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
+        let (site_a, site_b) = (&self.sites[a as usize], &self.sites[b as usize]);
+        let margin = self.scratch.reach[i] + self.scratch.reach[j];
+        let found = &mut self.scratch.found;
+        found.clear();
+        tumble_collide::contacts(body_a.shape(part_a), &site_a.pose, body_b.shape(part_b), &site_b.pose, margin, found);
+        let (ma, mb) = (body_a.material(part_a), body_b.material(part_b));
+        let friction = self.settings.combine_friction.of(ma.friction, mb.friction);
+        let restitution = self.settings.combine_restitution.of(ma.restitution, mb.restitution);
+        let pair = [owner_a.serial, owner_a.part, owner_b.serial, owner_b.part];
+        out.extend(found.iter().map(|contact| Touch {
+            a,
+            b,
+            contact: *contact,
+            frame: ContactFrame::new(contact.point, contact.normal),
+            friction,
+            restitution,
+            key: Key { pair, feature: contact.feature },
+        }));
+    }
+}
+
+/// Whether two parts are to be tested: one of them moves, and both kinds say yes.
+fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize) -> bool {
+    if !(a.moves() || b.moves()) {
+        return false;
+    }
+    let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
+    if a.serial == b.serial && !ca.collides_with_itself() {
+        return false;
+    }
+    ca.collides_with(part_a, cb.kind(part_b)) && cb.collides_with(part_b, ca.kind(part_a))
+}
+
+impl Touch {
+    /// Relative velocity of A against B at the contact, m/s; negative along the normal where they approach.
+    pub fn velocity(&self, a: &Site, b: &Site) -> Vec3 {
+        a.velocity_at(&self.contact.point) - b.velocity_at(&self.contact.point)
+    }
+
+    /// Rate of the relative velocity along the contact's axes, as the *contact* moves, m/s²; the first is the second derivative of the gap.
+    ///
+    /// The contact point is not a material point of a rounded surface: a ball that spins in place has a centripetal acceleration at its
+    /// lowest point, and yet does not rise (thesis Fig. 17). So the point's own velocity `ṗ` and the normal's `ṅ` are taken from the core
+    /// features that carry the contact:
+    ///
+    /// ```text
+    /// s = v_A(p) − v_B(p)        ds/dt = [a + α×r + ω×(ṗ − v)]_A − [ … ]_B        d²gap/dt² = n·ds/dt + ṅ·s
+    /// ```
+    pub fn acceleration(&self, a: &Site, b: &Site) -> Vec3 {
+        let (c, n) = (&self.contact, &self.contact.normal);
+        let (core_a, core_b) = (c.point + n * (0.5 * c.gap + c.core_a), c.point - n * (0.5 * c.gap + c.core_b));
+        let (va, vb) = (a.velocity_at(&core_a), b.velocity_at(&core_b));
+        let (n_rate, p_rate) = match c.normal_from {
+            NormalFrom::FaceOfA => {
+                let n_rate = a.angular_velocity.cross(n);
+                (n_rate, vb + c.core_b * n_rate)
+            }
+            NormalFrom::FaceOfB => {
+                let n_rate = b.angular_velocity.cross(n);
+                (n_rate, va - c.core_a * n_rate)
+            }
+            NormalFrom::CorePoints => {
+                let (relative, distance) = (va - vb, c.core_a + c.core_b + c.gap);
+                let n_rate = if distance > 0.0 { (relative - n * n.dot(&relative)) / distance } else { Vec3::zeros() };
+                (n_rate, va - c.core_a * n_rate)
+            }
+            NormalFrom::Edges => (Vec3::zeros(), 0.5 * (va + vb)),
+        };
+        let rate = a.acceleration_following(&c.point, &p_rate) - b.acceleration_following(&c.point, &p_rate);
+        let [n, t1, t2] = &self.frame.axes;
+        Vec3::new(n.dot(&rate) + n_rate.dot(&self.velocity(a, b)), t1.dot(&rate), t2.dot(&rate))
+    }
+}

@@ -1,0 +1,200 @@
+//! Smooth motion: forces at a stage, and the integrators that use them (thesis §IV.B.2).
+//!
+//! | integrator | one step of `h` |
+//! |---|---|
+//! | explicit Euler | `x += h·v(x,p)`, `p += h·f(x,p,t)` |
+//! | symplectic Euler | `p += h·f(x,p,t)`, `x += h·v(x,p)` |
+//! | Verlet | `x` coasts `h/2`, `p += h·f(x,p,t+h/2)`, `x` coasts `h/2` |
+//! | RK4 | classical on `p`; on `x` the commutator-free method of Celledoni, Marthinsen and Owren (2003), two exponentials in the last stage |
+
+use crate::settings::Integrator;
+use crate::site::{Forces, Site, Wrench};
+use crate::view::{Entry, Mode, Table, WorldView};
+use tumble_collide::Vec3;
+
+/// What the integrators work on, borrowed from the world.
+pub(crate) struct Motion<'a> {
+    pub table: &'a mut Table,
+    pub x: &'a mut Vec<f64>,
+    pub sites: &'a mut [Site],
+    pub forces: &'a mut Forces,
+    pub gravity: Vec3,
+    /// Forces set by the user, per site.
+    pub applied: &'a [Wrench],
+    /// Generalized contact forces that hold over the sub-step.
+    pub held: &'a [f64],
+}
+
+impl Motion<'_> {
+    /// Writes sites and caches from the state.
+    pub fn refresh(&mut self) {
+        let (x, sites) = (&self.x[..], &mut *self.sites);
+        self.table.for_each_mut(|e| e.object.refresh(&x[e.span.x.clone()], &mut sites[e.span.site.clone()]));
+    }
+
+    /// Forces at the present state and time `t`: rate of momentum of every object into `dp`, accelerations into the sites.
+    pub fn evaluate(&mut self, t: f64, dp: &mut [f64]) {
+        self.refresh();
+        self.forces.wrenches.clear();
+        self.forces.wrenches.extend_from_slice(self.applied);
+        self.forces.generalized.clear();
+        self.forces.generalized.extend_from_slice(self.held);
+        let view = WorldView { time: t, gravity: self.gravity, x: self.x, sites: self.sites, table: self.table };
+        for entry in self.table.iter().filter(|e| e.status.alive) {
+            if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {
+                body.accumulate_forces(&entry.span, &view, self.forces);
+            }
+            if let Some(force) = entry.object.force() {
+                force.apply(&entry.span, &view, self.forces);
+            }
+        }
+        dp.fill(0.0);
+        for entry in self.table.iter() {
+            let Some(body) = entry.object.integratable() else { continue };
+            let (span, sites) = (&entry.span, &mut self.sites[entry.span.site.clone()]);
+            if entry.moves() {
+                let dp = &mut dp[span.v.clone()];
+                body.derivative(&self.x[span.x.clone()], &self.forces.slice(span), dp);
+                body.accelerations(&self.x[span.x.clone()], dp, sites);
+            } else {
+                sites.iter_mut().for_each(|s| (s.acceleration, s.angular_acceleration) = (Vec3::zeros(), Vec3::zeros()));
+            }
+        }
+    }
+
+    /// Every object that moves goes on freely for `h`; what is led follows its velocity.
+    pub fn coast(&mut self, h: f64) {
+        for entry in self.table.iter() {
+            coast(entry, &mut self.x[entry.span.x.clone()], h);
+        }
+    }
+
+    fn kick(&mut self, dp: &[f64], h: f64) {
+        for entry in self.table.iter().filter(|e| e.moves()) {
+            if let Some(body) = entry.object.integratable() {
+                body.kick(&mut self.x[entry.span.x.clone()], &dp[entry.span.v.clone()], h);
+            }
+        }
+    }
+
+    fn velocities(&self, v: &mut [f64]) {
+        v.fill(0.0);
+        for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode != Mode::Static) {
+            if let Some(body) = entry.object.integratable() {
+                body.velocity(&self.x[entry.span.x.clone()], &mut v[entry.span.v.clone()]);
+            }
+        }
+    }
+
+    fn drift(&mut self, v: &[f64], h: f64) {
+        for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode != Mode::Static) {
+            let (x, v) = (&mut self.x[entry.span.x.clone()], &v[entry.span.v.clone()]);
+            if let Some(body) = entry.object.integratable() {
+                body.drift(x, v, h);
+            }
+        }
+    }
+
+    /// One step of `h` from time `t`; sites and caches are left at the new state.
+    pub fn integrate(&mut self, integrator: Integrator, t: f64, h: f64, dp: &mut [f64]) {
+        let start = self.x.clone();
+        match integrator {
+            Integrator::Verlet => {
+                self.coast(0.5 * h);
+                self.evaluate(t + 0.5 * h, dp);
+                self.kick(dp, h);
+                self.coast(0.5 * h);
+            }
+            Integrator::SymplecticEuler => {
+                self.evaluate(t, dp);
+                self.kick(dp, h);
+                let mut v = vec![0.0; dp.len()];
+                self.velocities(&mut v);
+                self.drift(&v, h);
+            }
+            Integrator::ExplicitEuler => {
+                self.evaluate(t, dp);
+                let mut v = vec![0.0; dp.len()];
+                self.velocities(&mut v);
+                self.kick(dp, h);
+                self.drift(&v, h);
+            }
+            Integrator::Rk4 => self.rk4(t, h, dp),
+        }
+        self.restore_led_velocities(&start);
+        self.refresh();
+    }
+
+    fn rk4(&mut self, t: f64, h: f64, dp: &mut [f64]) {
+        let n = dp.len();
+        let start = self.x.clone();
+        let (mut v, mut f) = (vec![vec![0.0; n]; 4], vec![vec![0.0; n]; 4]);
+        self.stage(t, &mut v[0], &mut f[0]);
+        let led = v[0].clone();
+        // stages 2 and 3 start from x0 with half a step
+        self.kick(&f[0], 0.5 * h);
+        self.drift(&v[0], 0.5 * h);
+        let second = self.x.clone();
+        self.stage(t + 0.5 * h, &mut v[1], &mut f[1]);
+        self.keep_led(&led, &mut v[1]);
+        self.x.copy_from_slice(&start);
+        self.kick(&f[1], 0.5 * h);
+        self.drift(&v[1], 0.5 * h);
+        self.stage(t + 0.5 * h, &mut v[2], &mut f[2]);
+        self.keep_led(&led, &mut v[2]);
+        // stage 4: positions from stage 2 by v3 − v1/2, momenta p0 + h·f3
+        self.x.copy_from_slice(&second);
+        self.kick(&combine(&f, [-0.5, 0.0, 1.0, 0.0]), h);
+        self.drift(&combine(&v, [-0.5, 0.0, 1.0, 0.0]), h);
+        self.stage(t + h, &mut v[3], &mut f[3]);
+        self.keep_led(&led, &mut v[3]);
+        // the step
+        self.x.copy_from_slice(&start);
+        let sixth = 1.0 / 6.0;
+        dp.copy_from_slice(&combine(&f, [sixth, 2.0 * sixth, 2.0 * sixth, sixth]));
+        self.kick(dp, h);
+        self.drift(&combine(&v, [3.0 / 12.0, 2.0 / 12.0, 2.0 / 12.0, -1.0 / 12.0]), h);
+        self.drift(&combine(&v, [-1.0 / 12.0, 2.0 / 12.0, 2.0 / 12.0, 3.0 / 12.0]), h);
+    }
+
+    fn stage(&mut self, t: f64, v: &mut [f64], f: &mut [f64]) {
+        self.evaluate(t, f);
+        self.velocities(v);
+    }
+
+    /// What is led has one velocity over the whole step.
+    fn keep_led(&self, led: &[f64], v: &mut [f64]) {
+        for entry in self.table.iter().filter(|e| e.status.mode == Mode::Kinematic) {
+            v[entry.span.v.clone()].copy_from_slice(&led[entry.span.v.clone()]);
+        }
+    }
+
+    /// What is led keeps the velocity it started with, whatever the stages made of it.
+    fn restore_led_velocities(&mut self, start: &[f64]) {
+        for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode == Mode::Kinematic) {
+            let Some(body) = entry.object.integratable() else { continue };
+            let mut v = vec![0.0; entry.span.v.len()];
+            body.velocity(&start[entry.span.x.clone()], &mut v);
+            body.write_velocity(&mut self.x[entry.span.x.clone()], &v);
+        }
+    }
+}
+
+/// One object goes on for `h`: freely where it moves, with its given velocity where it is led, not at all where it is static.
+pub(crate) fn coast(entry: &Entry, x: &mut [f64], h: f64) {
+    let Some(body) = entry.object.integratable().filter(|_| entry.status.alive) else { return };
+    match entry.status.mode {
+        Mode::Static => {}
+        Mode::Dynamic => body.coast(x, h),
+        Mode::Kinematic => {
+            let mut v = vec![0.0; entry.span.v.len()];
+            body.velocity(x, &mut v);
+            body.drift(x, &v, h);
+            body.write_velocity(x, &v);
+        }
+    }
+}
+
+fn combine(k: &[Vec<f64>], weight: [f64; 4]) -> Vec<f64> {
+    (0..k[0].len()).map(|i| (0..4).map(|s| weight[s] * k[s][i]).sum()).collect()
+}

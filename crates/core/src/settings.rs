@@ -1,0 +1,138 @@
+//! What a world can be told, and what a step reports.
+
+use crate::collidable::Combine;
+use crate::solver::Accuracy;
+use tumble_collide::Vec3;
+
+/// How smooth motion is integrated between contacts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Integrator {
+    /// Drift, kick, drift: symplectic, of second order, one evaluation of the forces per step.
+    #[default]
+    Verlet,
+    /// Kick, then drift with the new velocity: symplectic, of first order.
+    SymplecticEuler,
+    /// The thesis's integrator (§IV.B.2): drift and kick with what was there before. First order; gains energy.
+    ExplicitEuler,
+    /// Fourth order: classical Runge–Kutta on momenta, commutator-free on rotations.
+    Rk4,
+}
+
+impl Integrator {
+    /// All of them with the names that files and the command line use.
+    pub const NAMES: [(&'static str, Integrator); 4] = [
+        ("verlet", Integrator::Verlet),
+        ("symplectic_euler", Integrator::SymplecticEuler),
+        ("explicit_euler", Integrator::ExplicitEuler),
+        ("rk4", Integrator::Rk4),
+    ];
+}
+
+/// A world's constants; they may be changed between steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Gravity, m/s².
+    pub gravity: Vec3,
+    /// Length of a frame, s.
+    pub dt: f64,
+    /// Equal sub-steps that `time_stepping` divides a frame into, at least 1.
+    pub substeps: u32,
+    /// How the backtracking stepper integrates. `time_stepping` is the midpoint rule whatever is chosen here.
+    pub integrator: Integrator,
+    /// Effort of the iterative solvers.
+    pub accuracy: Accuracy,
+    /// Sweeps at most of the position projection.
+    pub projection_sweeps: u32,
+    /// `backtracking`: surfaces closer than this touch, metres; deeper than this, a new contact makes the step go back. A rebound
+    /// lower than this rests.
+    pub contact_tolerance: f64,
+    /// Depth that contacts which last may drift to within a sub-step before they are projected out, metres.
+    pub drift_tolerance: f64,
+    /// Greatest speed at which existing penetration is pushed out, m/s.
+    pub recovery_speed: f64,
+    /// How the friction of two bodies combines.
+    pub combine_friction: Combine,
+    /// How the restitution of two bodies combines.
+    pub combine_restitution: Combine,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            gravity: Vec3::new(0.0, 0.0, -9.81),
+            dt: 1.0 / 60.0,
+            substeps: 1,
+            integrator: Integrator::default(),
+            accuracy: Accuracy { sweeps: 50, tolerance: 1e-9 },
+            projection_sweeps: 20,
+            contact_tolerance: 1e-7,
+            drift_tolerance: 1e-4,
+            recovery_speed: 3.0,
+            combine_friction: Combine::GeometricMean,
+            combine_restitution: Combine::Minimum,
+        }
+    }
+}
+
+/// A setting out of its range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{what} is {value}; it must be {wanted}")]
+pub struct SettingsError {
+    /// Which setting.
+    pub what: &'static str,
+    /// Value given.
+    pub value: f64,
+    /// What would be right.
+    pub wanted: &'static str,
+}
+
+impl Settings {
+    /// Checks every range.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        let check = |what, value: f64, right: bool, wanted| {
+            if right && value.is_finite() { Ok(()) } else { Err(SettingsError { what, value, wanted }) }
+        };
+        self.gravity.iter().try_for_each(|&g| check("gravity", g, true, "finite"))?;
+        check("dt", self.dt, self.dt > 0.0 && self.dt <= 1.0, "above 0 and at most 1 s")?;
+        check("substeps", self.substeps as f64, (1..=1000).contains(&self.substeps), "1 to 1000")?;
+        check("sweeps", self.accuracy.sweeps as f64, (1..=1_000_000).contains(&self.accuracy.sweeps), "1 to 1000000")?;
+        check("solver tolerance", self.accuracy.tolerance, self.accuracy.tolerance >= 0.0, "at least 0")?;
+        check("contact tolerance", self.contact_tolerance, self.contact_tolerance > 0.0, "above 0 m")?;
+        check("drift tolerance", self.drift_tolerance, self.drift_tolerance >= self.contact_tolerance, "at least the contact tolerance")?;
+        check("recovery speed", self.recovery_speed, self.recovery_speed >= 0.0, "at least 0 m/s")
+    }
+}
+
+/// What one frame took and how well it went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepReport {
+    /// Committed sub-steps.
+    pub substeps: u32,
+    /// `backtracking`: integrations tried, committed ones included.
+    pub tries: u32,
+    /// `backtracking`: sub-steps taken at the floor, where a crossing was accepted and projected out.
+    pub floor_hits: u32,
+    /// Contacts at the last sub-step: what the narrow phase found within its margin.
+    pub contacts: u32,
+    /// Passes of the impact phase.
+    pub impact_passes: u32,
+    /// Largest residual of any solve, m/s (see [`crate::solver::residual`]).
+    pub residual: f64,
+    /// Solves that did not reach the solver's own aim.
+    pub unconverged: u32,
+    /// Solves that ended on a secondary ray and were resolved at the impulse level.
+    pub rays: u32,
+    /// Iterations of the largest solve.
+    pub iterations: u32,
+    /// Deepest penetration found by the narrow phase, metres.
+    pub max_penetration: f64,
+}
+
+impl StepReport {
+    pub(crate) fn solved(&mut self, outcome: crate::solver::Outcome, residual: f64) {
+        self.residual = self.residual.max(residual);
+        self.unconverged += !outcome.converged as u32;
+        self.rays += outcome.ray as u32;
+        self.iterations = self.iterations.max(outcome.iterations);
+    }
+}

@@ -1,0 +1,166 @@
+//! From touches to rows, and from multipliers back to momentum: what both steppers share.
+
+use crate::detect::{Detector, Touch};
+use crate::object::{Level, RowTarget};
+use crate::row_builder::{RowBuilder, constraints};
+use crate::rows::{RowSet, Rows};
+use crate::solver::{Accuracy, Islands, residual};
+use crate::view::{Mode, WorldView};
+use crate::world::{Core, StepError};
+use tumble_collide::Vec3;
+
+/// Buffers of a step, kept from one to the next. Rows of touches come first, in the order of `touches`, then those of constraints.
+#[derive(Default)]
+pub(crate) struct Workspace {
+    pub touches: Vec<Touch>,
+    pub rows: Rows,
+    pub islands: Islands,
+    /// Row velocities that come from led and static sides.
+    pub bias: Vec<f64>,
+    /// Targets of the constraints' rows, after those of the touches.
+    pub targets: Vec<RowTarget>,
+    /// Right-hand side of a solve.
+    pub c: Vec<f64>,
+    pub lambda: Vec<f64>,
+    /// `Y·λ` of the last solve.
+    pub du: Vec<f64>,
+    /// Whitened velocity at the start, and what the forces add in a step.
+    pub u: Vec<f64>,
+    pub du_force: Vec<f64>,
+    pub dp: Vec<f64>,
+}
+
+/// Finds the contacts within reach of the next `horizon` seconds.
+pub(crate) fn detect(core: &mut Core, horizon: f64, out: &mut Vec<Touch>) {
+    let mut detector = Detector {
+        table: &core.table, owners: &core.owners, sites: &core.sites, settings: &core.settings,
+        broad: core.broad.as_mut(), scratch: &mut core.detect_scratch,
+    };
+    detector.detect(horizon, out);
+    let deepest = out.iter().map(|t| -t.contact.gap).fold(0.0, f64::max);
+    core.report.max_penetration = core.report.max_penetration.max(deepest);
+    core.report.contacts = out.len() as u32;
+}
+
+/// Makes the rows of all touches and constraints at the present state: the thesis's test impulses.
+pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Result<(), StepError> {
+    work.rows.clear(core.dof);
+    work.bias.clear();
+    work.targets.clear();
+    let mut problem = None;
+    let mut builder = RowBuilder {
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, sites: &core.sites, problem: &mut problem,
+    };
+    for touch in &work.touches {
+        let set = if touch.friction > 0.0 { RowSet::Cone { mu: touch.friction } } else { RowSet::HalfLine };
+        builder.rows.push_block(set);
+        builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
+        let axes = &touch.frame.axes[..set.rows()];
+        for (site, sign) in [(touch.a, 1.0), (touch.b, -1.0)] {
+            let owner = core.owners[site as usize];
+            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &touch.contact.point, axes, sign);
+        }
+    }
+    let view = WorldView { time: core.time, gravity: core.settings.gravity, x: &core.x, sites: &core.sites, table: &core.table };
+    for (entry, object) in constraints(&core.table) {
+        if let Some(constraint) = object.constraint() {
+            constraint.rows(&entry.span, &view, level, &mut builder);
+            if let Some(why) = builder.problem.take() {
+                return Err(StepError::Row { object: object.name().to_string(), why });
+            }
+        }
+    }
+    let n = work.rows.len;
+    work.c.resize(n, 0.0);
+    work.lambda.clear();
+    work.lambda.resize(n, 0.0);
+    Ok(())
+}
+
+/// Writes the whitened velocities and what `dp` (rate of momentum) adds to them in `h`, of everything that moves.
+pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut Vec<f64>) {
+    (u.clear(), u.resize(core.dof, 0.0));
+    (du.clear(), du.resize(core.dof, 0.0));
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        body.whiten(&core.x[entry.span.x.clone()], &mut u[v.clone()]);
+        body.respond(&dp[v.clone()], &mut du[v.clone()]);
+        du[v].iter_mut().for_each(|x| *x *= h);
+    }
+}
+
+/// What a change `du` of whitened velocity means as momentum.
+pub(crate) fn recover(core: &Core, du: &[f64], dp: &mut [f64]) {
+    dp.fill(0.0);
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        if let Some(body) = entry.object.integratable() {
+            body.recover(&du[entry.span.v.clone()], &mut dp[entry.span.v.clone()]);
+        }
+    }
+}
+
+/// Adds momentum to the state.
+pub(crate) fn kick(core: &mut Core, dp: &[f64], h: f64) {
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        if let Some(body) = entry.object.integratable() {
+            body.kick(&mut core.x[entry.span.x.clone()], &dp[entry.span.v.clone()], h);
+        }
+    }
+}
+
+/// Moves positions by `h·L⁻¹u`.
+pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let (Some(body), v) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
+        if v.iter().any(|x| *x != 0.0) {
+            let mut velocity = vec![0.0; v.len()];
+            body.unwhiten(v, &mut velocity);
+            body.drift(&mut core.x[entry.span.x.clone()], &velocity, h);
+        }
+    }
+}
+
+/// `c = Yᵀu + bias`.
+pub(crate) fn row_velocities(rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f64>) {
+    c.clear();
+    c.extend_from_slice(bias);
+    rows.add_velocity(u, c);
+}
+
+/// Solves the blocks that `keep` names, island by island, from `work.c` and the warm start in `work.lambda`, into `work.du`.
+pub(crate) fn solve(core: &mut Core, work: &mut Workspace, accuracy: Accuracy, keep: impl Fn(usize) -> bool) -> bool {
+    work.du.clear();
+    work.du.resize(core.dof, 0.0);
+    work.islands.build(&work.rows, keep);
+    let mut ray = false;
+    for blocks in work.islands.iter() {
+        let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, accuracy);
+        core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
+        ray |= outcome.ray;
+    }
+    ray
+}
+
+/// Multipliers from last time, turned into the present contact frames and scaled; what is no longer allowed by the cone is left to the solver.
+pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
+    for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
+        if let Some(impulse) = core.warm.get(&touch.key) {
+            for (row, axis) in block.range().zip(&touch.frame.axes) {
+                work.lambda[row] = scale * axis.dot(&impulse);
+            }
+            work.lambda[block.row as usize] = work.lambda[block.row as usize].max(0.0);
+        }
+    }
+}
+
+/// The impulse on A of each touch, world axes, for given multipliers.
+pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Iterator<Item = Vec3> + 'a {
+    work.touches.iter().zip(&work.rows.blocks).map(|(touch, block)| {
+        block.range().zip(&touch.frame.axes).map(|(row, axis)| lambda[row] * axis).sum()
+    })
+}
+
+/// Whether anything that is led moves: then energy may rightly grow.
+pub(crate) fn something_is_led(core: &Core) -> bool {
+    core.table.iter().any(|e| e.status.alive && e.status.mode == Mode::Kinematic)
+}

@@ -1,0 +1,133 @@
+//! Impacts: what happens in no time when surfaces meet with speed.
+//!
+//! Generalized reflections (Smith et al., *Reflections on simultaneous impact*, 2012): reflect the set of contacts that approach **now**, and
+//! repeat until none does. This passes a shock along Newton's cradle, which one simultaneous solve does not.
+//!
+//! ```text
+//! repeat   A = { i : c_i < 0 },  c = Yᵀu + bias
+//!          find λ on A with  w_n = (1 + e_i)·c_n + Kλ ≥ 0 ⟂ λ_n ≥ 0,  friction on w_t = c_t + Kλ      (Newton's law on A)
+//!          u += Yλ
+//! ```
+//!
+//! A contact slower than its rest speed has `e = 0`. When only such contacts approach, or after the cap, all candidates are solved at once with
+//! `e = 0`, which ends the phase. With equal `e` on `A` and no friction the energy of a pass cannot grow; with friction or unequal `e` Newton's law can
+//! create energy, so a pass that does is blended with its `e = 0` solution just as far as the energy allows.
+
+use super::contacts::{Workspace, row_velocities, something_is_led};
+use crate::rows::{RowSet, Rows};
+use crate::solver::{Accuracy, RowSolver, residual};
+use crate::world::Core;
+
+/// What the phase is told of each touch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    /// Whether the touch may take part.
+    pub takes_part: bool,
+    /// Approach speed up to which it rests instead of bouncing, m/s.
+    pub rest_speed: f64,
+    /// Coefficient of restitution of the pair.
+    pub restitution: f64,
+}
+
+/// An approach slower than this is none, m/s.
+const APPROACH: f64 = 1e-10;
+
+/// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`.
+pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candidate], cap: u32, u: &mut [f64], total: &mut [f64]) {
+    let accuracy = Accuracy { sweeps: core.settings.accuracy.sweeps.max(2000), tolerance: core.settings.accuracy.tolerance.min(1e-14) };
+    let guard = !something_is_led(core);
+    let mut c = Vec::new();
+    for pass in 0..=cap {
+        row_velocities(&work.rows, &work.bias, u, &mut c);
+        aim_constraints(work, &mut c);
+        let approach = |i: usize| candidates[i].takes_part && c[work.rows.blocks[i].row as usize] < -APPROACH;
+        let bounces = |i: usize| approach(i) && candidates[i].restitution > 0.0 && -c[work.rows.blocks[i].row as usize] > candidates[i].rest_speed;
+        if !(0..candidates.len()).any(approach) {
+            return;
+        }
+        core.report.impact_passes += 1;
+        let last = pass == cap || !(0..candidates.len()).any(bounces);
+        let member: Vec<bool> = (0..candidates.len()).map(|i| if last { candidates[i].takes_part } else { approach(i) }).collect();
+        let bounce: Vec<f64> = (0..candidates.len()).map(|i| if !last && bounces(i) { candidates[i].restitution } else { 0.0 }).collect();
+        reflect(core, work, &c, &member, &bounce, accuracy, guard);
+        u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
+        total.iter_mut().zip(&work.lambda).for_each(|(t, l)| *t += l);
+        if last {
+            return;
+        }
+    }
+}
+
+/// Velocities of the constraints' rows against their targets.
+fn aim_constraints(work: &Workspace, c: &mut [f64]) {
+    for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
+        c[block.row as usize] -= target.velocity;
+    }
+}
+
+/// One pass: leaves the multipliers in `work.lambda` and their effect in `work.du`.
+fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bounce: &[f64], accuracy: Accuracy, guard: bool) {
+    let touches = work.touches.len();
+    let targets = &work.targets;
+    work.islands.build(&work.rows, |b| {
+        if b < touches { member[b] } else { targets[b - touches].set == RowSet::Equality || targets[b - touches].error <= 0.0 }
+    });
+    work.c.copy_from_slice(c);
+    for (block, bounce) in work.rows.blocks.iter().zip(bounce) {
+        work.c[block.row as usize] *= 1.0 + bounce;
+    }
+    work.lambda.fill(0.0);
+    (work.du.clear(), work.du.resize(core.dof, 0.0));
+    for blocks in work.islands.iter() {
+        let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, accuracy);
+        core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
+        let bounces = blocks.iter().any(|&b| bounce.get(b as usize).is_some_and(|e| *e > 0.0));
+        let scale: f64 = rows_of(&work.rows, blocks).map(|i| (work.lambda[i] * c[i]).abs()).sum();
+        if guard && bounces && work_done(&work.rows, blocks, c, &work.lambda, &work.du) > 1e-12 * scale {
+            blend(core.solver.as_ref(), &work.rows, blocks, c, &mut work.lambda, &mut work.du, accuracy);
+        }
+    }
+}
+
+fn rows_of<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = usize> + 'a {
+    blocks.iter().flat_map(|&b| rows.blocks[b as usize].range())
+}
+
+/// Kinetic energy that the multipliers add, J: `λᵀc + ½λᵀKλ = ½ Σ λ·(c + w)`.
+fn work_done(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
+    let pairs = blocks.iter().flat_map(|&b| {
+        let block = &rows.blocks[b as usize];
+        block.range().enumerate().map(move |(k, row)| lambda[row] * (c[row] + 0.5 * rows.row_velocity(block, k, du)))
+    });
+    pairs.sum()
+}
+
+/// Goes from the plastic solution (`e = 0`, which never adds energy) towards the bouncing one as far as no energy is made.
+///
+/// With `δ = λ_e − λ_0` the energy is `W(s) = W_0 + s·B + s²·A`, `B = δᵀ(c + Kλ_0)`, `A = W_e − W_0 − B`; `s` is its positive root.
+fn blend(solver: &dyn RowSolver, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) {
+    let energy_bounce = work_done(rows, blocks, c, lambda, du);
+    let bounce: Vec<f64> = rows_of(rows, blocks).map(|i| lambda[i]).collect();
+    rows_of(rows, blocks).for_each(|i| lambda[i] = 0.0);
+    for side in blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides()) {
+        du[side.u as usize..(side.u + side.dof) as usize].fill(0.0);
+    }
+    solver.solve(rows, blocks, c, lambda, du, accuracy);
+    let energy_plastic = work_done(rows, blocks, c, lambda, du).min(0.0);
+    let plastic_velocity = blocks.iter().flat_map(|&b| {
+        let block = &rows.blocks[b as usize];
+        let du = &*du;
+        block.range().enumerate().map(move |(k, row)| c[row] + rows.row_velocity(block, k, du))
+    });
+    let delta: Vec<f64> = rows_of(rows, blocks).zip(&bounce).map(|(i, b)| b - lambda[i]).collect();
+    let slope: f64 = delta.iter().zip(plastic_velocity).map(|(d, w)| d * w).sum();
+    let curve = energy_bounce - energy_plastic - slope;
+    let root = (-slope + (slope * slope - 4.0 * curve * energy_plastic).max(0.0).sqrt()) / (2.0 * curve);
+    let s = if root.is_finite() { root.clamp(0.0, 1.0) } else { 0.0 };
+    let mut step = vec![0.0; lambda.len()];
+    for (i, d) in rows_of(rows, blocks).zip(&delta) {
+        step[i] = s * d;
+        lambda[i] += s * d;
+    }
+    blocks.iter().for_each(|&b| rows.apply_block(&rows.blocks[b as usize], &step, du));
+}

@@ -1,0 +1,28 @@
+//! One frame of simulated time, by either of two steppers.
+
+mod backtracking;
+mod contacts;
+mod impact;
+mod projection;
+mod time_stepping;
+
+pub use backtracking::Backtracking;
+pub use time_stepping::TimeStepping;
+pub(crate) use contacts::Workspace;
+
+use crate::world::{Core, StepError};
+
+/// A way to advance a world by one frame.
+pub trait Stepper: Send + Sync {
+    /// The name that `--stepper` takes.
+    fn name(&self) -> &'static str;
+    /// Advances by one frame. On an error the world is as the last committed sub-step left it.
+    fn step(&mut self, frame: Frame) -> Result<(), StepError>;
+    /// An independent copy.
+    fn fork(&self) -> Box<dyn Stepper>;
+}
+
+/// The inside of a world, lent to a stepper for one frame.
+pub struct Frame<'a> {
+    pub(crate) core: &'a mut Core,
+}

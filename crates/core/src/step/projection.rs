@@ -1,0 +1,74 @@
+//! Position projection: what still overlaps is moved apart, with no effect on velocity and so none on kinetic energy.
+//!
+//! ```text
+//! find Δ = M⁻¹Jᵀλ of least kinetic norm with   gap + h·n·(v̄ + Δ) ≥ 0 ⟂ λ ≥ 0   and, for equalities,   error + h·J(v̄ + Δ) = 0
+//! ```
+//!
+//! `v̄` is the displacement velocity of the step (0 for a projection in place, with `h = 1`). Existing depth is recovered at a bounded speed.
+
+use super::contacts::{Workspace, displace, row_velocities};
+use crate::rows::{RowSet, Rows};
+use crate::solver::{Accuracy, GaussSeidel, RowSolver};
+use crate::world::Core;
+
+/// A violation smaller than this is left alone, metres.
+const SMALLEST: f64 = 1e-9;
+
+/// Corrects positions so that the step's displacement `h·mean` (whitened) ends without overlap. `recovery` bounds how much of the depth that
+/// was there before is undone, metres.
+pub(crate) fn project(core: &mut Core, work: &mut Workspace, mean: &[f64], h: f64, recovery: f64) {
+    row_velocities(&work.rows, &work.bias, mean, &mut work.c);
+    let touches = work.touches.len();
+    let violated = |b: usize, c: &[f64]| -> bool {
+        let v = c[work.rows.blocks[b].row as usize];
+        match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
+            (Some(touch), _) => allowed(touch.contact.gap, recovery) + h * v < -SMALLEST,
+            (None, Some(t)) if t.set == RowSet::Equality => (t.error + h * v).abs() > SMALLEST,
+            (None, Some(t)) if t.set == RowSet::HalfLine => allowed(t.error, recovery) + h * v < -SMALLEST,
+            _ => false,
+        }
+    };
+    if !(0..work.rows.blocks.len()).any(|b| violated(b, &work.c)) {
+        return;
+    }
+    let (rows, c) = normal_rows(work, h, recovery);
+    let mut lambda = vec![0.0; rows.len];
+    let mut du = vec![0.0; core.dof];
+    let targets = &work.targets;
+    work.islands.build(&work.rows, |b| b < touches || !matches!(targets[b - touches].set, RowSet::Interval { .. }));
+    let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, tolerance: 0.1 * SMALLEST / h };
+    for blocks in work.islands.iter().filter(|blocks| blocks.iter().any(|&b| violated(b as usize, &work.c))) {
+        GaussSeidel.solve(&rows, blocks, &c, &mut lambda, &mut du, accuracy);
+    }
+    displace(core, &du, h);
+}
+
+fn allowed(gap: f64, recovery: f64) -> f64 {
+    gap.max(-recovery)
+}
+
+/// The same blocks without friction, and the right-hand side that asks for no overlap.
+fn normal_rows(work: &Workspace, h: f64, recovery: f64) -> (Rows, Vec<f64>) {
+    let mut rows = Rows::default();
+    rows.clear(work.rows.dof);
+    rows.y.reserve(work.rows.blocks.len() * 12);
+    let mut c = Vec::with_capacity(work.rows.blocks.len());
+    for (b, block) in work.rows.blocks.iter().enumerate() {
+        let (set, error) = match work.touches.get(b) {
+            Some(touch) => (RowSet::HalfLine, allowed(touch.contact.gap, recovery)),
+            None => match work.targets[b - work.touches.len()] {
+                t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
+                t => (t.set, t.error),
+            },
+        };
+        rows.push_block(set);
+        for side in block.sides() {
+            let response = work.rows.response(side, 0);
+            if let Some(y) = rows.side(side.u as usize, side.dof as usize) {
+                y.copy_from_slice(response);
+            }
+        }
+        c.push(work.c[block.row as usize] + error / h);
+    }
+    (rows, c)
+}

@@ -1,0 +1,163 @@
+//! What a user does to the objects of a world between steps.
+
+use super::{World, WorldError};
+use crate::object::{Integratable, Object};
+use crate::rigid::{RigidBody, orientation, vec3};
+use crate::rotation::turn;
+use crate::site::Site;
+use crate::view::{Mode, ObjectId, Status};
+use tumble_collide::{Pose, Quat, Vec3};
+
+impl World {
+    /// An object by id.
+    pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
+        self.core.table.slots.get(id).map(|e| e.object.as_ref())
+    }
+
+    /// An object by id, as its own type.
+    pub fn get<T: Object>(&self, id: ObjectId) -> Option<&T> {
+        let object: &dyn std::any::Any = self.object(id)?;
+        object.downcast_ref()
+    }
+
+    /// An object's constants, to be changed between steps. What of it is state lies in the world.
+    pub fn get_mut<T: Object>(&mut self, id: ObjectId) -> Option<&mut T> {
+        let object: &mut dyn std::any::Any = self.core.table.slots.get_mut(id)?.object.as_mut();
+        object.downcast_mut()
+    }
+
+    /// An object's switches.
+    pub fn status(&self, id: ObjectId) -> Option<Status> {
+        self.core.table.slots.get(id).map(|e| e.status)
+    }
+
+    /// Switches an object between static, kinematic and dynamic.
+    pub fn set_mode(&mut self, id: ObjectId, mode: Mode) -> Result<(), WorldError> {
+        self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.mode = mode;
+        Ok(())
+    }
+
+    /// Takes an object out of the world's doings, or back in; its state stays.
+    pub fn set_alive(&mut self, id: ObjectId, alive: bool) -> Result<(), WorldError> {
+        self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.alive = alive;
+        Ok(())
+    }
+
+    /// Switches an object's collisions.
+    pub fn set_collidable(&mut self, id: ObjectId, collidable: bool) -> Result<(), WorldError> {
+        self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.collidable = collidable;
+        Ok(())
+    }
+
+    /// The site of one part: pose, velocity, acceleration.
+    pub fn site(&self, id: ObjectId, part: usize) -> Option<&Site> {
+        let entry = self.core.table.slots.get(id)?;
+        self.core.sites[entry.span.site.clone()].get(part)
+    }
+
+    /// An object's slice of the state.
+    pub fn state_of(&self, id: ObjectId) -> Option<&[f64]> {
+        Some(&self.core.x[self.core.table.slots.get(id)?.span.x.clone()])
+    }
+
+    /// Writes an object's slice of the state, all of it (see the object's type for what the numbers mean). Refused where a number is not
+    /// finite or the length is wrong.
+    pub fn write_state_of(&mut self, id: ObjectId, x: &[f64]) -> Result<(), WorldError> {
+        let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        if x.len() != entry.span.x.len() || x.iter().any(|x| !x.is_finite()) {
+            return Err(WorldError::NotFinite(entry.object.name().to_string()));
+        }
+        self.core.x[entry.span.x.clone()].copy_from_slice(x);
+        self.core.motion().refresh();
+        Ok(())
+    }
+
+    /// Puts a rigid body at a pose; its velocity stays what it was.
+    pub fn set_pose(&mut self, id: ObjectId, pose: Pose) -> Result<(), WorldError> {
+        self.edit_rigid(id, |body, x| {
+            let mut v = [0.0; 6];
+            body.velocity(x, &mut v);
+            x[..3].copy_from_slice(pose.translation.vector.as_slice());
+            x[3..7].copy_from_slice(pose.rotation.coords.as_slice());
+            body.write_velocity(x, &v);
+        })
+    }
+
+    /// Gives a rigid body a velocity (m/s, of the centre of mass) and angular velocity (rad/s, world axes). A kinematic body follows it.
+    pub fn set_velocity(&mut self, id: ObjectId, velocity: Vec3, angular_velocity: Vec3) -> Result<(), WorldError> {
+        let (w, v) = (angular_velocity, velocity);
+        self.edit_rigid(id, |body, x| body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]))
+    }
+
+    /// Gives a kinematic body the velocity that brings it to `target` at the end of the next frame.
+    pub fn move_to(&mut self, id: ObjectId, target: Pose) -> Result<(), WorldError> {
+        let dt = self.core.settings.dt;
+        self.edit_rigid(id, |body, x| {
+            let v = (target.translation.vector - vec3(x)) / dt;
+            let w = rotation_vector(&(target.rotation * orientation(x).inverse())) / dt;
+            body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]);
+        })
+    }
+
+    /// Applies a force (N) at a world point of one part during the next frame.
+    pub fn apply_force(&mut self, id: ObjectId, part: usize, force: Vec3, point: &Vec3) -> Result<(), WorldError> {
+        let index = self.part(id, part, &[force, *point])?;
+        let arm = point - self.core.sites[index].position();
+        self.core.applied[index].force += force;
+        self.core.applied[index].torque += arm.cross(&force);
+        Ok(())
+    }
+
+    /// Applies a torque (N·m, world axes) to one part during the next frame.
+    pub fn apply_torque(&mut self, id: ObjectId, part: usize, torque: Vec3) -> Result<(), WorldError> {
+        let index = self.part(id, part, &[torque])?;
+        self.core.applied[index].torque += torque;
+        Ok(())
+    }
+
+    /// Applies an impulse (N·s) at a world point of one part, at once.
+    pub fn apply_impulse(&mut self, id: ObjectId, part: usize, impulse: Vec3, point: &Vec3) -> Result<(), WorldError> {
+        let index = self.part(id, part, &[impulse, *point])?;
+        let core = &mut self.core;
+        let entry = &core.table.slots[id];
+        let (Some(collidable), Some(body), true) = (entry.object.collidable(), entry.object.integratable(), entry.moves()) else { return Ok(()) };
+        let dof = entry.span.v.len();
+        let (mut y, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof]);
+        collidable.test_impulse(part, &core.sites[index], point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
+        let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
+        body.recover(&du, &mut dp);
+        body.kick(&mut core.x[entry.span.x.clone()], &dp, 1.0);
+        core.motion().refresh();
+        Ok(())
+    }
+
+    fn part(&self, id: ObjectId, part: usize, numbers: &[Vec3]) -> Result<usize, WorldError> {
+        let entry = self.core.table.slots.get(id).filter(|e| part < e.span.site.len()).ok_or(WorldError::Stale)?;
+        if numbers.iter().flat_map(|v| v.iter()).any(|x| !x.is_finite()) {
+            return Err(WorldError::NotFinite(entry.object.name().to_string()));
+        }
+        Ok(entry.span.site.start + part)
+    }
+
+    fn edit_rigid(&mut self, id: ObjectId, edit: impl FnOnce(&RigidBody, &mut [f64])) -> Result<(), WorldError> {
+        let core = &mut self.core;
+        let entry = core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        let any: &dyn std::any::Any = entry.object.as_ref();
+        let body = any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.object.name().to_string()))?;
+        let mut x = core.x[entry.span.x.clone()].to_vec();
+        edit(body, &mut x);
+        if x.iter().any(|x| !x.is_finite()) {
+            return Err(WorldError::NotFinite(entry.object.name().to_string()));
+        }
+        core.x[entry.span.x.clone()].copy_from_slice(&x);
+        core.motion().refresh();
+        Ok(())
+    }
+}
+
+/// The rotation vector (axis times angle up to π) of a rotation: the inverse of [`turn`] by one second.
+fn rotation_vector(q: &Quat) -> Vec3 {
+    let v = q.scaled_axis();
+    debug_assert!((turn(&Quat::identity(), &v, 1.0).angle_to(q)) < 1e-6);
+    v
+}

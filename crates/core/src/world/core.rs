@@ -1,0 +1,127 @@
+//! The inside of a world: what the steppers work on.
+
+use crate::detect::{Owner, Scratch, Touch, WarmStarts};
+use crate::motion::Motion;
+use crate::settings::{Settings, StepReport};
+use crate::site::{Forces, Site, Wrench};
+use crate::solver::RowSolver;
+use crate::view::{ObjectId, Table};
+use tumble_collide::{BroadPhase, Vec3};
+
+/// Why a step stopped. The world is as the last committed sub-step left it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// A force, a momentum or a position is no longer a number.
+    #[error("'{object}' at t = {time} s: {what} is not finite; look at the forces and impulses given to it")]
+    NotFinite {
+        /// Object.
+        object: String,
+        /// Force or state.
+        what: &'static str,
+        /// Simulated time, s.
+        time: f64,
+    },
+    /// A constraint made a row that cannot be.
+    #[error("constraint '{object}': {why}")]
+    Row {
+        /// Object.
+        object: String,
+        /// What is wrong with the row.
+        why: String,
+    },
+}
+
+/// One contact as the world shows it after a step. World axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPoint {
+    /// The object that the normal points to.
+    pub a: ObjectId,
+    /// Part of `a`.
+    pub part_a: usize,
+    /// The object that the normal points from.
+    pub b: ObjectId,
+    /// Part of `b`.
+    pub part_b: usize,
+    /// Contact point, metres.
+    pub point: Vec3,
+    /// Unit normal from `b` to `a`.
+    pub normal: Vec3,
+    /// Signed distance when it was detected, metres.
+    pub gap: f64,
+    /// Relative velocity of `a` against `b` when it was detected, m/s.
+    pub velocity: Vec3,
+    /// Impulse on `a` over the last sub-step, N·s.
+    pub impulse: Vec3,
+    /// Force on `a` that it stands for, N; impacts left out.
+    pub force: Vec3,
+}
+
+/// Everything of a world but its stepper.
+pub struct Core {
+    pub(crate) table: Table,
+    pub(crate) x: Vec<f64>,
+    pub(crate) dof: usize,
+    pub(crate) sites: Vec<Site>,
+    pub(crate) owners: Vec<Owner>,
+    pub(crate) applied: Vec<Wrench>,
+    pub(crate) held: Vec<f64>,
+    pub(crate) forces: Forces,
+    pub(crate) settings: Settings,
+    pub(crate) time: f64,
+    pub(crate) frame: u64,
+    pub(crate) broad: Box<dyn BroadPhase>,
+    pub(crate) detect_scratch: Scratch,
+    pub(crate) solver: Box<dyn RowSolver>,
+    pub(crate) warm: WarmStarts,
+    pub(crate) contacts: Vec<ContactPoint>,
+    pub(crate) report: StepReport,
+    pub(crate) next_serial: u32,
+}
+
+impl Core {
+    pub(crate) fn motion(&mut self) -> Motion<'_> {
+        Motion {
+            table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces,
+            gravity: self.settings.gravity, applied: &self.applied, held: &self.held,
+        }
+    }
+
+    /// Shows the contacts of the sub-step and files their forces as warm starts.
+    pub(crate) fn publish(&mut self, touches: &[Touch], impulses: Vec<Vec3>, forces: impl Iterator<Item = Vec3>) {
+        self.contacts.clear();
+        for ((touch, impulse), force) in touches.iter().zip(impulses).zip(forces) {
+            let (a, b) = (self.owners[touch.a as usize], self.owners[touch.b as usize]);
+            let velocity = touch.velocity(&self.sites[touch.a as usize], &self.sites[touch.b as usize]);
+            self.contacts.push(ContactPoint {
+                a: a.id, part_a: a.part as usize, b: b.id, part_b: b.part as usize, velocity, impulse, force,
+                point: touch.contact.point, normal: touch.contact.normal, gap: touch.contact.gap,
+            });
+        }
+        let contacts = &self.contacts;
+        self.warm.replace(touches.iter().zip(contacts).filter(|(_, c)| c.force != Vec3::zeros()).map(|(t, c)| (t.key, c.force)));
+    }
+
+    /// Counts time, lets objects put right what they must, writes the sites anew and checks the state.
+    pub(crate) fn finish_substep(&mut self, h: f64) -> Result<(), StepError> {
+        self.time += h;
+        self.report.substeps += 1;
+        for entry in self.table.iter().filter(|e| e.moves()) {
+            if let Some(body) = entry.object.integratable() {
+                body.stabilize(&mut self.x[entry.span.x.clone()], h);
+            }
+        }
+        self.motion().refresh();
+        let bad = self.table.iter().find(|e| self.x[e.span.x.clone()].iter().any(|x| !x.is_finite()));
+        bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
+    }
+
+    /// Stops forces and impulses that are not numbers.
+    pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
+        let bad = self.table.iter().find(|e| dp[e.span.v.clone()].iter().any(|x| !x.is_finite()));
+        bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "the force on it")))
+    }
+
+    fn not_finite(&self, object: &str, what: &'static str) -> StepError {
+        StepError::NotFinite { object: object.to_string(), what, time: self.time }
+    }
+}

@@ -1,0 +1,262 @@
+//! The world: objects in, frames out (the thesis's `Engine`, §IV.B).
+
+mod bodies;
+mod core;
+mod snapshot;
+
+pub use self::core::{ContactPoint, Core, StepError};
+pub use snapshot::SnapshotError;
+
+use crate::detect::{Owner, Scratch, WarmStarts};
+use crate::object::{Energy, Momentum, Object};
+use crate::rigid::{BodyError, RigidBody};
+use crate::settings::{Settings, SettingsError, StepReport};
+use crate::site::{Dims, Forces, Site, Span, Wrench};
+use crate::solver::{GaussSeidel, RowSolver};
+use crate::step::{Frame, Stepper, TimeStepping};
+use crate::view::{Entry, Mode, ObjectId, Status, Table, WorldView};
+use tumble_collide::SweepAndPrune;
+
+/// Why an object was not added or found.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WorldError {
+    /// Names are unique.
+    #[error("an object named '{0}' is already in the world; names must be unique")]
+    DuplicateName(String),
+    /// Names travel in a 64-byte header.
+    #[error("the name '{0}' must have 1 to 63 bytes")]
+    Name(String),
+    /// Constants of a body out of range.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// A setting out of range.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The id belongs to no object of this world.
+    #[error("no such object: it was removed, or belongs to another world")]
+    Stale,
+    /// What was asked for needs a rigid body.
+    #[error("'{0}' is not a rigid body")]
+    NotRigid(String),
+    /// A number given is not finite.
+    #[error("'{0}': a number given is not finite")]
+    NotFinite(String),
+}
+
+/// A world of objects that moves in frames of `settings.dt` seconds.
+pub struct World {
+    core: Core,
+    stepper: Box<dyn Stepper>,
+}
+
+impl World {
+    /// An empty world with the default solver (`gauss_seidel`) and stepper (`time_stepping`).
+    pub fn new(settings: Settings) -> Result<World, WorldError> {
+        settings.validate()?;
+        let core = Core {
+            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), held: Vec::new(),
+            forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
+            detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
+            report: StepReport::default(), next_serial: 0,
+        };
+        Ok(World { core, stepper: Box::<TimeStepping>::default() })
+    }
+
+    /// Replaces the stepper.
+    pub fn set_stepper(&mut self, stepper: Box<dyn Stepper>) {
+        self.stepper = stepper;
+    }
+
+    /// Replaces the solver of contact rows.
+    pub fn set_solver(&mut self, solver: Box<dyn RowSolver>) {
+        self.core.solver = solver;
+    }
+
+    /// Names of the stepper and the solver in use.
+    pub fn methods(&self) -> (&'static str, &'static str) {
+        (self.stepper.name(), self.core.solver.name())
+    }
+
+    /// The constants in use.
+    pub fn settings(&self) -> &Settings {
+        &self.core.settings
+    }
+
+    /// Changes the constants from the next step on.
+    pub fn set_settings(&mut self, settings: Settings) -> Result<(), WorldError> {
+        settings.validate()?;
+        self.core.settings = settings;
+        Ok(())
+    }
+
+    /// Advances by one frame. On an error the world is as the last committed sub-step left it.
+    pub fn step(&mut self) -> Result<&StepReport, StepError> {
+        let core = &mut self.core;
+        core.report = StepReport::default();
+        self.stepper.step(Frame { core })?;
+        core.frame += 1;
+        core.applied.fill(Wrench::default());
+        Ok(&core.report)
+    }
+
+    /// Simulated time, s.
+    pub fn time(&self) -> f64 {
+        self.core.time
+    }
+
+    /// Frames stepped since the world was made.
+    pub fn frame(&self) -> u64 {
+        self.core.frame
+    }
+
+    /// The report of the last step.
+    pub fn report(&self) -> &StepReport {
+        &self.core.report
+    }
+
+    /// The contacts of the last sub-step.
+    pub fn contacts(&self) -> &[ContactPoint] {
+        &self.core.contacts
+    }
+
+    /// The flat state `X`.
+    pub fn state(&self) -> &[f64] {
+        &self.core.x
+    }
+
+    /// The site table.
+    pub fn sites(&self) -> &[Site] {
+        &self.core.sites
+    }
+
+    /// A read-only view, as objects get it.
+    pub fn view(&self) -> WorldView<'_> {
+        let c = &self.core;
+        WorldView { time: c.time, gravity: c.settings.gravity, x: &c.x, sites: &c.sites, table: &c.table }
+    }
+
+    /// Ids in the order in which the objects were added.
+    pub fn ids(&self) -> &[ObjectId] {
+        &self.core.table.order
+    }
+
+    /// The object of that name.
+    pub fn find(&self, name: &str) -> Option<ObjectId> {
+        self.ids().iter().copied().find(|&id| self.core.table.slots[id].object.name() == name)
+    }
+
+    /// Mechanical energy of everything that moves, J.
+    pub fn energy(&self) -> Energy {
+        let g = self.core.settings.gravity;
+        self.moving().fold(Energy::default(), |sum, (x, body)| {
+            let e = body.energy(x, &g);
+            Energy { kinetic: sum.kinetic + e.kinetic, potential: sum.potential + e.potential }
+        })
+    }
+
+    /// Momentum of everything that moves, about the world's origin.
+    pub fn momentum(&self) -> Momentum {
+        self.moving().fold(Momentum::default(), |sum, (x, body)| {
+            let m = body.momentum(x);
+            Momentum { linear: sum.linear + m.linear, angular: sum.angular + m.angular }
+        })
+    }
+
+    fn moving(&self) -> impl Iterator<Item = (&[f64], &dyn crate::object::Integratable)> {
+        let moving = self.core.table.iter().filter(|e| e.moves());
+        moving.filter_map(|e| Some((&self.core.x[e.span.x.clone()], e.object.integratable()?)))
+    }
+
+    /// Adds an object; it moves unless [`set_mode`](Self::set_mode) says otherwise.
+    pub fn add(&mut self, object: impl Object) -> Result<ObjectId, WorldError> {
+        self.add_boxed(Box::new(object), Mode::Dynamic)
+    }
+
+    /// Adds an object that never moves.
+    pub fn add_static(&mut self, object: impl Object) -> Result<ObjectId, WorldError> {
+        self.add_boxed(Box::new(object), Mode::Static)
+    }
+
+    /// Adds an object in a given mode.
+    pub fn add_boxed(&mut self, object: Box<dyn Object>, mode: Mode) -> Result<ObjectId, WorldError> {
+        let name = object.name().to_string();
+        if name.is_empty() || name.len() > 63 {
+            return Err(WorldError::Name(name));
+        }
+        if self.find(&name).is_some() {
+            return Err(WorldError::DuplicateName(name));
+        }
+        let any: &dyn std::any::Any = object.as_ref();
+        if let Some(body) = any.downcast_ref::<RigidBody>() {
+            body.validate()?;
+        }
+        let core = &mut self.core;
+        let parts = object.collidable().map_or(0, |c| c.parts());
+        let dims = object.integratable().map_or(Dims { x: 0, dof: 0, sites: parts }, |i| i.dims());
+        let span = Span {
+            x: core.x.len()..core.x.len() + dims.x,
+            v: core.dof..core.dof + dims.dof,
+            site: core.sites.len()..core.sites.len() + dims.sites,
+        };
+        core.x.resize(span.x.end, 0.0);
+        if let Some(body) = object.integratable() {
+            body.write_initial(&mut core.x[span.x.clone()]);
+        }
+        if core.x[span.x.clone()].iter().any(|x| !x.is_finite()) {
+            core.x.truncate(span.x.start);
+            return Err(WorldError::NotFinite(name));
+        }
+        core.dof = span.v.end;
+        core.held.resize(core.dof, 0.0);
+        core.sites.resize(span.site.end, Site::default());
+        core.applied.resize(span.site.end, Wrench::default());
+        let serial = core.next_serial;
+        core.next_serial += 1;
+        let id = core.table.slots.insert(Entry { object, span: span.clone(), status: Status { mode, ..Status::default() }, serial });
+        core.table.order.push(id);
+        core.owners.extend((0..dims.sites).map(|part| Owner { id, part: part as u32, serial }));
+        core.motion().refresh();
+        Ok(id)
+    }
+
+    /// Removes an object and gives it back; its state goes, and the slices behind it move up.
+    pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
+        let core = &mut self.core;
+        let gone = core.table.slots.remove(id).ok_or(WorldError::Stale)?;
+        core.table.order.retain(|&other| other != id);
+        core.x.drain(gone.span.x.clone());
+        core.sites.drain(gone.span.site.clone());
+        core.owners.drain(gone.span.site.clone());
+        core.applied.drain(gone.span.site.clone());
+        core.dof -= gone.span.v.len();
+        core.held.resize(core.dof, 0.0);
+        let (dx, dv, ds) = (gone.span.x.len(), gone.span.v.len(), gone.span.site.len());
+        for &other in &core.table.order {
+            let span = &mut core.table.slots[other].span;
+            if span.x.start >= gone.span.x.end && span.v.start >= gone.span.v.end && span.site.start >= gone.span.site.end {
+                *span = Span {
+                    x: span.x.start - dx..span.x.end - dx,
+                    v: span.v.start - dv..span.v.end - dv,
+                    site: span.site.start - ds..span.site.end - ds,
+                };
+            }
+        }
+        core.warm.forget(gone.serial);
+        core.contacts.retain(|c| c.a != id && c.b != id);
+        Ok(gone.object)
+    }
+
+    /// An independent copy: same state, same future.
+    pub fn fork(&self) -> World {
+        let c = &self.core;
+        World {
+            core: Core {
+                table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(),
+                held: c.held.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
+                broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
+                contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial,
+            },
+            stepper: self.stepper.fork(),
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Saving and restoring: everything that the next step reads, and nothing else.
+//!
+//! A snapshot is the state `X`, the switches, the sites' accelerations (objects may read them), the forces that users applied, the warm starts,
+//! time and frame. Shapes, masses and settings are the scene's and are not in it: it is restored into a world of the same objects, which is
+//! checked by their names and sizes. The sweep order of the broad phase is left out because its pairs come sorted: no result depends on it.
+
+use super::World;
+use crate::detect::WarmStarts;
+use crate::site::Wrench;
+use crate::view::Status;
+use serde::{Deserialize, Serialize};
+use tumble_collide::Vec3;
+
+/// Why a snapshot was refused. The world is unchanged.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SnapshotError {
+    /// Not bytes that [`World::save`] wrote.
+    #[error("not a snapshot of tumble, or cut off, or of another version: {0}")]
+    Format(String),
+    /// Another set of objects.
+    #[error("the snapshot is of another world: object {index} is {theirs} there and {ours} here")]
+    Objects {
+        /// Place in the order of adding.
+        index: usize,
+        /// Name and size in the snapshot.
+        theirs: String,
+        /// Name and size here.
+        ours: String,
+    },
+    /// A number in it is not finite.
+    #[error("the snapshot holds a number that is not finite")]
+    NotFinite,
+}
+
+const MAGIC: [u8; 8] = *b"tumbleS1";
+
+#[derive(Serialize, Deserialize)]
+struct Snapshot {
+    magic: [u8; 8],
+    time: f64,
+    frame: u64,
+    next_serial: u32,
+    objects: Vec<Saved>,
+    x: Vec<f64>,
+    /// Angular, then linear acceleration of every site.
+    accelerations: Vec<[f64; 6]>,
+    /// Torque, then force on every site.
+    applied: Vec<[f64; 6]>,
+    warm: WarmStarts,
+}
+
+#[derive(Serialize, Deserialize, PartialEq)]
+struct Saved {
+    name: String,
+    sizes: [u32; 3],
+    serial: u32,
+    status: Status,
+}
+
+impl Saved {
+    fn label(&self) -> String {
+        format!("'{}' ({} state, {} freedoms, {} parts)", self.name, self.sizes[0], self.sizes[1], self.sizes[2])
+    }
+}
+
+fn six(a: &Vec3, b: &Vec3) -> [f64; 6] {
+    [a.x, a.y, a.z, b.x, b.y, b.z]
+}
+
+fn halves(v: &[f64; 6]) -> (Vec3, Vec3) {
+    (Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5]))
+}
+
+impl World {
+    /// Everything that the next step reads, as bytes: the same bytes for the same state.
+    pub fn save(&self) -> Vec<u8> {
+        let c = &self.core;
+        let snapshot = Snapshot {
+            magic: MAGIC,
+            time: c.time,
+            frame: c.frame,
+            next_serial: c.next_serial,
+            objects: self.inventory(),
+            x: c.x.clone(),
+            accelerations: c.sites.iter().map(|s| six(&s.angular_acceleration, &s.acceleration)).collect(),
+            applied: c.applied.iter().map(|w| six(&w.torque, &w.force)).collect(),
+            warm: c.warm.clone(),
+        };
+        postcard::to_stdvec(&snapshot).unwrap_or_default() // writing plain numbers to memory cannot fail
+    }
+
+    /// Puts a saved state back. The world must hold the same objects in the same order.
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
+        let saved: Snapshot = postcard::from_bytes(bytes).map_err(|e| SnapshotError::Format(e.to_string()))?;
+        if saved.magic != MAGIC {
+            return Err(SnapshotError::Format("the first eight bytes are not 'tumbleS1'".into()));
+        }
+        self.check(&saved)?;
+        let core = &mut self.core;
+        (core.time, core.frame, core.next_serial, core.warm) = (saved.time, saved.frame, saved.next_serial, saved.warm);
+        core.x = saved.x;
+        for (i, object) in saved.objects.iter().enumerate() {
+            let entry = &mut core.table.slots[core.table.order[i]];
+            (entry.status, entry.serial) = (object.status, object.serial);
+            core.owners[entry.span.site.clone()].iter_mut().for_each(|o| o.serial = object.serial);
+        }
+        for (site, a) in core.sites.iter_mut().zip(&saved.accelerations) {
+            (site.angular_acceleration, site.acceleration) = halves(a);
+        }
+        for (wrench, w) in core.applied.iter_mut().zip(&saved.applied) {
+            let (torque, force) = halves(w);
+            *wrench = Wrench { torque, force };
+        }
+        core.contacts.clear();
+        core.motion().refresh();
+        Ok(())
+    }
+
+    fn inventory(&self) -> Vec<Saved> {
+        let saved = |e: &crate::view::Entry| Saved {
+            name: e.object.name().to_string(),
+            sizes: [e.span.x.len() as u32, e.span.v.len() as u32, e.span.site.len() as u32],
+            serial: e.serial,
+            status: e.status,
+        };
+        self.core.table.iter().map(saved).collect()
+    }
+
+    fn check(&self, saved: &Snapshot) -> Result<(), SnapshotError> {
+        let ours = self.inventory();
+        for index in 0..ours.len().max(saved.objects.len()) {
+            let label = |list: &[Saved]| list.get(index).map_or("absent".to_string(), Saved::label);
+            let (theirs, ours) = (label(&saved.objects), label(&ours));
+            if theirs != ours {
+                return Err(SnapshotError::Objects { index, theirs, ours });
+            }
+        }
+        let c = &self.core;
+        if (saved.x.len(), saved.accelerations.len(), saved.applied.len()) != (c.x.len(), c.sites.len(), c.sites.len()) {
+            return Err(SnapshotError::Format("its tables have the wrong lengths".into()));
+        }
+        let numbers = saved.x.iter().chain(saved.accelerations.iter().flatten()).chain(saved.applied.iter().flatten());
+        let finite = saved.time.is_finite() && numbers.copied().all(f64::is_finite) && saved.warm.finite();
+        if finite { Ok(()) } else { Err(SnapshotError::NotFinite) }
+    }
+}

@@ -1,0 +1,147 @@
+//! Saving, forking, removing, switching: what changes with time lives in the world.
+
+use crate::common::*;
+use tumble_core::collide::{Pose, Vec3};
+use tumble_core::*;
+
+fn messy(stepper: &str) -> World {
+    let mut world = world(stepper, 1.0 / 60.0);
+    ground(&mut world, 0.3, 0.4);
+    for i in 0..12 {
+        let shape = if i % 2 == 0 { sphere(0.2) } else { cube(0.35) };
+        let body = RigidBody::with_mass(format!("body{i}"), shape, 1.0 + i as f64).unwrap().surface(0.3, 0.4);
+        let pose = Pose::translation(0.05 * (i % 3) as f64, 0.04 * (i % 4) as f64, 0.4 + 0.45 * i as f64);
+        world.add(body.at(pose).moving(Vec3::zeros(), Vec3::new(0.3 * i as f64, 1.0, 0.2))).unwrap();
+    }
+    world
+}
+
+fn run(world: &mut World, frames: usize) {
+    (0..frames).for_each(|_| { world.step().unwrap(); });
+}
+
+fn bits(world: &World) -> Vec<u64> {
+    world.state().iter().map(|x| x.to_bits()).collect()
+}
+
+#[test]
+fn two_runs_give_the_same_bits() {
+    for stepper in STEPPERS {
+        let (mut a, mut b) = (messy(stepper), messy(stepper));
+        for frame in 0..90 {
+            run(&mut a, 1);
+            run(&mut b, 1);
+            assert_eq!(bits(&a), bits(&b), "{stepper}: frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn save_run_restore_run_gives_the_same_bytes() {
+    for stepper in STEPPERS {
+        let mut world = messy(stepper);
+        run(&mut world, 45);
+        assert!(!world.contacts().is_empty(), "saved in mid-contact");
+        let saved = world.save();
+        run(&mut world, 45);
+        let expected = world.save();
+        let mut other = messy(stepper);
+        other.restore(&saved).unwrap();
+        run(&mut other, 45);
+        assert!(other.save() == expected, "{stepper}: a restored world goes another way");
+        let mut forked = messy(stepper);
+        run(&mut forked, 45);
+        let mut forked = forked.fork();
+        run(&mut forked, 45);
+        assert!(forked.save() == expected, "{stepper}: a forked world goes another way");
+    }
+}
+
+#[test]
+fn a_damaged_or_foreign_snapshot_is_refused_and_changes_nothing() {
+    let mut world = messy("time_stepping");
+    run(&mut world, 20);
+    let saved = world.save();
+    for cut in 0..saved.len() {
+        assert!(world.restore(&saved[..cut]).is_err(), "cut at {cut}");
+    }
+    let before = bits(&world);
+    let mut other = crate::common::world("time_stepping", 1.0 / 60.0);
+    ground(&mut other, 0.0, 0.0);
+    assert!(matches!(other.restore(&saved), Err(SnapshotError::Objects { index: 1, .. })));
+    assert_eq!(bits(&world), before);
+}
+
+#[test]
+fn objects_come_and_go_in_mid_run() {
+    let mut world = messy("time_stepping");
+    run(&mut world, 30);
+    let gone = world.find("body5").unwrap();
+    world.remove(gone).unwrap();
+    assert!(world.object(gone).is_none() && world.site(gone, 0).is_none());
+    assert!(matches!(world.set_mode(gone, Mode::Static), Err(WorldError::Stale)));
+    let added = world.add(RigidBody::with_mass("late", sphere(0.1), 1.0).unwrap().at(Pose::translation(3.0, 0.0, 1.0))).unwrap();
+    assert_ne!(gone, added);
+    run(&mut world, 120);
+    assert!((position(&world, added).z - 0.1).abs() < 1e-6, "the late one landed");
+    assert!(matches!(world.add(RigidBody::fixture("late", sphere(1.0))), Err(WorldError::DuplicateName(_))));
+}
+
+#[test]
+fn a_kinematic_body_follows_its_motion_and_pushes() {
+    for stepper in STEPPERS {
+        let mut world = world(stepper, 1.0 / 60.0);
+        ground(&mut world, 0.0, 0.0);
+        let pusher = RigidBody::fixture("pusher", cube(0.4)).surface(0.0, 0.0).at(Pose::translation(-1.0, 0.0, 0.2));
+        let pusher = world.add(pusher).unwrap();
+        world.set_mode(pusher, Mode::Kinematic).unwrap();
+        world.set_velocity(pusher, Vec3::new(2.0, 0.0, 0.0), Vec3::zeros()).unwrap();
+        let ball = RigidBody::with_mass("box", cube(0.2), 3.0).unwrap().surface(0.0, 0.0).at(Pose::translation(0.0, 0.0, 0.1));
+        let ball = world.add(ball).unwrap();
+        run(&mut world, 60);
+        assert!((position(&world, pusher).x - 1.0).abs() < 1e-9, "{stepper}: pusher at {}", position(&world, pusher).x);
+        assert!((position(&world, ball).x - 1.3).abs() < 1e-5, "{stepper}: pushed to {}", position(&world, ball).x);
+        let target = Pose::new(Vec3::new(0.5, 0.5, 0.7), Vec3::new(0.0, 0.3, 1.0));
+        world.move_to(pusher, target).unwrap();
+        run(&mut world, 1);
+        let reached = world.site(pusher, 0).unwrap().pose;
+        assert!((reached.inverse() * target).translation.vector.norm() < 1e-12 && reached.rotation.angle_to(&target.rotation) < 1e-7);
+    }
+}
+
+#[test]
+fn switches_take_a_body_out_and_back_in() {
+    let mut world = world("time_stepping", 1.0 / 60.0);
+    ground(&mut world, 0.0, 0.5);
+    let id = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.1))).unwrap();
+    world.set_collidable(id, false).unwrap();
+    run(&mut world, 60);
+    assert!((position(&world, id).z - (0.1 - 0.5 * G)).abs() < 1e-9, "falls through");
+    world.set_alive(id, false).unwrap();
+    let there = position(&world, id);
+    run(&mut world, 60);
+    assert_eq!(position(&world, id), there, "stands still");
+}
+
+#[test]
+fn user_forces_act_for_one_frame_and_impulses_at_once() {
+    let mut world = no_gravity(world("time_stepping", 0.01));
+    let id = world.add(RigidBody::with_mass("ball", sphere(0.5), 2.0).unwrap()).unwrap();
+    world.apply_force(id, 0, Vec3::new(4.0, 0.0, 0.0), &Vec3::new(0.0, 0.5, 0.0)).unwrap();
+    run(&mut world, 2);
+    assert!((velocity(&world, id).x - 0.02).abs() < 1e-14);
+    // τ = r × f = (0, 0.5, 0) × (4, 0, 0) = (0, 0, −2); I = 2/5·2·0.25 = 0.2
+    assert!((world.site(id, 0).unwrap().angular_velocity.z + 0.1).abs() < 1e-12);
+    world.apply_impulse(id, 0, Vec3::new(0.0, 1.0, 0.0), &position(&world, id)).unwrap();
+    assert!((velocity(&world, id).y - 0.5).abs() < 1e-14);
+    assert!(world.apply_force(id, 0, Vec3::new(f64::NAN, 0.0, 0.0), &Vec3::zeros()).is_err());
+}
+
+#[test]
+fn a_state_that_is_not_finite_is_reported_with_its_object() {
+    let mut world = no_gravity(world("time_stepping", 0.01));
+    let id = world.add(RigidBody::with_mass("ball", sphere(0.5), 2.0).unwrap()).unwrap();
+    world.apply_force(id, 0, Vec3::new(f64::MAX, f64::MAX, 0.0), &Vec3::new(f64::MAX, 0.0, 0.0)).unwrap();
+    let error = world.step().unwrap_err();
+    assert!(error.to_string().contains("'ball'"), "{error}");
+}
