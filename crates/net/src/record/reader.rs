@@ -106,7 +106,8 @@ impl Reader {
 
     /// The next frame, or `None` at the end.
     ///
-    /// Errors: damage, with the byte where the damaged record begins. After an error there are no more frames.
+    /// Errors: damage, with the byte where the damaged record begins. After an error there are no more frames. Each frame
+    /// handed out passed its chunk's checksum; that a whole chunk is missing shows only in the checksum at the end.
     pub fn next_frame(&mut self) -> Result<Option<Frame>> {
         if let Some(frame) = self.ahead.take() {
             return Ok(Some(frame));

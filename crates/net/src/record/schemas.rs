@@ -109,3 +109,39 @@ fn published<M: Encode>() -> Vec<u8> {
     // Every generated message has a schema; `None` is for hand-written encoders only.
     M::get_schema().map(|schema| schema.data.into_owned()).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The text and its compiled form are two writings of one thing.
+    #[test]
+    fn text_and_descriptor_say_the_same() {
+        let set = FileDescriptorSet::decode(&state_descriptor()[..]).unwrap();
+        let file = &set.file[0];
+        assert!(STATE_PROTO.contains(&format!("package {};", file.package())));
+        assert!(STATE_PROTO.contains(&format!("syntax = \"{}\";", file.syntax())));
+        let message = &file.message_type[0];
+        assert!(STATE_PROTO.contains(&format!("message {} {{", message.name())));
+        let compiled: Vec<String> = message.field.iter().map(|f| format!("{} {} = {}", type_word(f.r#type()), f.name(), f.number())).collect();
+        let text: Vec<&str> = STATE_PROTO.lines().filter_map(|line| line.strip_prefix("  ")?.split(';').next()).collect();
+        assert_eq!(compiled, text);
+    }
+
+    fn type_word(kind: Type) -> String {
+        kind.as_str_name().trim_start_matches("TYPE_").to_lowercase()
+    }
+
+    /// Wire bytes worked out by hand: key = number·8 + wire type (5 fixed32, 1 fixed64, 2 bytes), little-endian values.
+    #[test]
+    fn state_bytes_are_as_documented() {
+        let state = State { version: 1, frame: 0x0102, time_s: 0.5, payload: vec![7, 8] };
+        let wire = [
+            &[0x0d, 1, 0, 0, 0][..],
+            &[0x11, 2, 1, 0, 0, 0, 0, 0, 0],
+            &[0x19, 0, 0, 0, 0, 0, 0, 0xe0, 0x3f],
+            &[0x22, 2, 7, 8],
+        ];
+        assert_eq!(state.encode_to_vec(), wire.concat());
+    }
+}
