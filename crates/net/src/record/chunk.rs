@@ -1,6 +1,6 @@
 //! Chunks: decompression under a bound, checksum, and the records inside (MCAP specification, "Records").
 
-use super::MAX_CHUNK_BYTES;
+use super::{MAX_CHUNK_BYTES, MAX_DEFINITION_BYTES, MAX_DEFINITIONS};
 use super::bytes::{Fault, Fields};
 use mcap::records::op;
 use std::collections::BTreeMap;
@@ -23,6 +23,19 @@ pub(crate) struct Channel {
     pub metadata: BTreeMap<String, String>,
 }
 
+/// Notes a definition, if it is new to both. Another one under the same number is a fault, and so is one too many.
+pub(crate) fn define<T: PartialEq>(known: &BTreeMap<u16, T>, new: &mut BTreeMap<u16, T>, id: u16, value: T) -> Result<(), Fault> {
+    match known.get(&id).or(new.get(&id)) {
+        Some(old) if *old == value => Ok(()),
+        Some(_) => Err(format!("schema or channel {id} is defined twice, and differently")),
+        None if known.len() + new.len() >= MAX_DEFINITIONS => Err(format!("more than {MAX_DEFINITIONS} schemas or channels")),
+        None => {
+            new.insert(id, value);
+            Ok(())
+        }
+    }
+}
+
 /// A record that can stand inside a chunk.
 #[derive(Debug)]
 pub(crate) enum Inner<'a> {
@@ -37,6 +50,9 @@ pub(crate) enum Inner<'a> {
 pub(crate) fn parse_inner(opcode: u8, body: &[u8]) -> Result<Inner<'_>, Fault> {
     let mut f = Fields(body);
     match opcode {
+        op::SCHEMA | op::CHANNEL if body.len() > MAX_DEFINITION_BYTES => {
+            Err(format!("a schema or channel of {} bytes, at most {MAX_DEFINITION_BYTES} are read", body.len()))
+        }
         op::SCHEMA => {
             let id = f.u16("schema id")?;
             let schema = Schema {

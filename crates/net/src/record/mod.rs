@@ -23,9 +23,11 @@
 //! # Bounds
 //!
 //! No length in a file is believed before it was checked against the bytes that are there and against a cap:
-//! [`MAX_RECORD_BYTES`], [`MAX_CHUNK_BYTES`], [`MAX_ENTITIES`], [`MAX_NAME_BYTES`]. The writer keeps to the same caps
+//! [`MAX_RECORD_BYTES`], [`MAX_CHUNK_BYTES`], [`MAX_DEFINITION_BYTES`], [`MAX_DEFINITIONS`], [`MAX_SCENE_MEMORY`],
+//! [`MAX_ENTITIES`], [`MAX_NAME_BYTES`]. The writer keeps to the same caps
 //! (and [`MAX_STATE_BYTES`], [`MAX_SCENE_BYTES`]), so whatever it writes can be read.
 
+mod budget;
 mod bytes;
 mod chunk;
 mod container;
@@ -57,5 +59,11 @@ pub const MAX_NAME_BYTES: usize = 256;
 pub const MAX_STATE_BYTES: usize = 64 << 20;
 /// Most bytes of one encoded scene (all entities with their meshes).
 pub const MAX_SCENE_BYTES: usize = 128 << 20;
+/// Most memory that a scene may take once decoded, by a count made before.
+pub const MAX_SCENE_MEMORY: u64 = 512 << 20;
+/// Most bytes in the definition of one schema or channel, or in one metadata record.
+pub const MAX_DEFINITION_BYTES: usize = 1 << 20;
+/// Most schemas, channels and metadata records in a file, of each.
+pub const MAX_DEFINITIONS: usize = 256;
 /// Latest simulated time, s: Foxglove's time stamps count seconds in 32 bits.
 pub const MAX_TIME_S: f64 = 4.0e9;

@@ -1,13 +1,14 @@
 //! Reading a recording back, frame by frame.
 
 use super::bytes::Fields;
-use super::chunk::{Channel, Inner, Schema, next_inner, open_chunk, parse_inner};
+use super::budget;
+use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse_inner};
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
 use super::messages::{entities_of, nanoseconds, poses_of};
 use super::scene::{Entity, Pose, name_fault};
 use super::schemas::{METADATA_NAME, PROTOBUF, SCENE_SCHEMA, STATE_SCHEMA, State, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS, TRANSFORMS_SCHEMA, VERSION};
-use super::{MAX_ENTITIES, MAX_TIME_S};
+use super::{MAX_DEFINITION_BYTES, MAX_TIME_S};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 use mcap::records::op;
 use prost::Message;
@@ -191,8 +192,8 @@ impl Reader {
 
     fn inner_record(&mut self, record: Inner) -> std::result::Result<Option<Event>, String> {
         match record {
-            Inner::Schema(id, schema) => drop(self.schemas.insert(id, schema)),
-            Inner::Channel(id, channel) => drop(self.channels.insert(id, channel)),
+            Inner::Schema(id, schema) => define(&BTreeMap::new(), &mut self.schemas, id, schema)?,
+            Inner::Channel(id, channel) => define(&BTreeMap::new(), &mut self.channels, id, channel)?,
             Inner::Message { channel, log_time, data, .. } => return self.message(channel, log_time, data),
             Inner::Other => {}
         }
@@ -219,6 +220,7 @@ impl Reader {
     }
 
     fn scene(&mut self, data: &[u8]) -> std::result::Result<(), String> {
+        budget::check_scene(data)?;
         let message = SceneUpdate::decode(data).map_err(|e| format!("scene: {e}"))?;
         let entities = entities_of(message);
         super::scene::check_entities(&entities).map_err(|e| format!("scene: {e}"))?;
@@ -227,10 +229,8 @@ impl Reader {
     }
 
     fn transforms(&mut self, log_time: u64, data: &[u8]) -> std::result::Result<(), String> {
+        budget::check_transforms(data)?;
         let message = FrameTransforms::decode(data).map_err(|e| format!("transforms: {e}"))?;
-        if message.transforms.len() > MAX_ENTITIES {
-            return Err(format!("{} transforms, at most {MAX_ENTITIES} are read", message.transforms.len()));
-        }
         let named = poses_of(message);
         if let Some((name, why)) = named.iter().find_map(|(name, pose)| Some((name, name_fault(name).or_else(|| pose.fault())?))) {
             return Err(format!("transform of \"{name}\": {why}"));
@@ -280,6 +280,9 @@ impl Iterator for Reader {
 
 /// Name and entries of a metadata record.
 pub(crate) fn metadata_of(body: &[u8]) -> std::result::Result<(String, BTreeMap<String, String>), String> {
+    if body.len() > MAX_DEFINITION_BYTES {
+        return Err(format!("a metadata record of {} bytes, at most {MAX_DEFINITION_BYTES} are read", body.len()));
+    }
     let mut fields = Fields(body);
     let name = fields.string("metadata name")?.to_owned();
     let entries = fields.map("metadata")?;

@@ -1,7 +1,8 @@
 //! Mending: whatever can be read of a cut or damaged file, written out as a complete one.
 
+use super::MAX_DEFINITIONS;
 use super::bytes::{Fault, Fields};
-use super::chunk::{Channel, Inner, Schema, next_inner, open_chunk, parse_inner};
+use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse_inner};
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
 use super::reader::{as_content, metadata_of};
@@ -64,6 +65,7 @@ struct Mender<'a> {
     channels: BTreeMap<u16, Channel>,
     /// Metadata met before the compression was known.
     metadata: Vec<Metadata>,
+    metadata_count: usize,
     report: RecoverReport,
 }
 
@@ -79,6 +81,7 @@ impl<'a> Mender<'a> {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             metadata: Vec::new(),
+            metadata_count: 0,
             report,
         }
     }
@@ -118,6 +121,7 @@ impl<'a> Mender<'a> {
         let offset = record.offset;
         let done = match record.opcode {
             op::HEADER => self.header(&record.body).map(Ok),
+            op::METADATA if self.metadata_count >= MAX_DEFINITIONS => Err(format!("more than {MAX_DEFINITIONS} metadata records")),
             op::METADATA => metadata_of(&record.body).map(|(name, metadata)| self.put_metadata(Metadata { name, metadata })),
             op::CHUNK => open_chunk(&record.body).and_then(|chunk| self.content(&chunk.content, &chunk.compression)),
             // Outside of chunks. The summary repeats schemas and channels, which changes nothing.
@@ -157,12 +161,12 @@ impl<'a> Mender<'a> {
         let mut new = Parsed::default();
         while let Some((opcode, body)) = next_inner(&mut rest)? {
             match parse_inner(opcode, body)? {
-                Inner::Schema(id, schema) => define(&self.schemas, &mut new.schemas, id, schema, "schema")?,
+                Inner::Schema(id, schema) => define(&self.schemas, &mut new.schemas, id, schema)?,
                 Inner::Channel(id, channel) => {
                     if channel.schema != 0 && !self.schemas.contains_key(&channel.schema) && !new.schemas.contains_key(&channel.schema) {
                         return Err(format!("channel {id} has schema {}, which the readable part does not define", channel.schema));
                     }
-                    define(&self.channels, &mut new.channels, id, channel, "channel")?;
+                    define(&self.channels, &mut new.channels, id, channel)?;
                 }
                 Inner::Message { channel, sequence, log_time, publish_time, data } => {
                     if !self.channels.contains_key(&channel) && !new.channels.contains_key(&channel) {
@@ -183,18 +187,6 @@ struct Parsed<'b> {
     schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, Channel>,
     messages: Vec<(MessageHeader, &'b [u8])>,
-}
-
-/// Notes a definition, if it is new. Another one under the same number is a fault.
-fn define<T: PartialEq>(known: &BTreeMap<u16, T>, new: &mut BTreeMap<u16, T>, id: u16, value: T, what: &str) -> std::result::Result<(), Fault> {
-    match known.get(&id).or(new.get(&id)) {
-        Some(old) if *old == value => Ok(()),
-        Some(_) => Err(format!("{what} {id} is defined twice, and differently")),
-        None => {
-            new.insert(id, value);
-            Ok(())
-        }
-    }
 }
 
 impl Mender<'_> {
@@ -218,6 +210,7 @@ impl Mender<'_> {
     }
 
     fn put_metadata(&mut self, metadata: Metadata) -> Result<()> {
+        self.metadata_count += 1;
         match &mut self.writer {
             None => self.metadata.push(metadata),
             Some(writer) => writer.write_metadata(&metadata).map_err(RecordError::write(self.output))?,

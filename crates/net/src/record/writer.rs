@@ -1,5 +1,6 @@
 //! The recorder: frames in, an MCAP file out.
 
+use super::budget;
 use super::error::{RecordError, Result};
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
 use super::scene::{Entity, Pose, check_entities};
@@ -253,7 +254,9 @@ impl Recorder {
         if bytes > MAX_SCENE_BYTES {
             return Err(RecordError::input("the scene", format!("its meshes take {bytes} bytes, at most {MAX_SCENE_BYTES} are allowed")));
         }
-        self.write(self.channels.scene, 0, log_time, &update.encode_to_vec())?;
+        let update = update.encode_to_vec();
+        budget::check_scene(&update).map_err(|why| RecordError::input("the scene", why))?;
+        self.write(self.channels.scene, 0, log_time, &update)?;
         self.names = entities.iter().map(|entity| entity.name.clone()).collect();
         self.transforms = transforms_for(entities);
         self.flush()

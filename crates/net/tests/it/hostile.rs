@@ -81,6 +81,46 @@ fn a_bomb_does_not_go_off() {
     }
 }
 
+/// Channel and schema definitions, then messages, as a chunk's content.
+fn on_topic(topic: &str, schema: &str, message: &[u8]) -> Vec<u8> {
+    let schema = [&[1, 0], &sized(schema.as_bytes())[..], &sized(b"protobuf"), &sized(b"")].concat();
+    let channel = [&[1, 0, 1, 0], &sized(topic.as_bytes())[..], &sized(b"protobuf"), &sized(b"")].concat();
+    let message = [&[1, 0], &[0; 20][..], message].concat();
+    [whole(3, &schema), whole(4, &channel), whole(5, &message)].concat()
+}
+
+/// Empty submessages take two bytes on the wire, hundreds in memory, and next to nothing when compressed.
+#[test]
+fn messages_that_swell_are_refused_before_they_are_decoded() {
+    let scratch = Scratch::new("swell");
+    let entities = [0x12, 0].repeat(10_000_000);
+    let spheres = [&[0x12, 0x80, 0xad, 0xe2, 0x04][..], &[0x4a, 0].repeat(5_000_000)].concat(); // one entity of 10,000,000 bytes
+    let transforms = [0x0a, 0].repeat(100_001);
+    for (topic, schema, message, wanted) in [
+        ("/scene", "foxglove.SceneUpdate", &entities, "bytes of memory, at most 536870912"),
+        ("/scene", "foxglove.SceneUpdate", &spheres, "bytes of memory, at most 536870912"),
+        ("/tf", "foxglove.FrameTransforms", &transforms, "100001 transforms, at most 100000"),
+    ] {
+        let content = on_topic(topic, schema, message);
+        let packed = zstd::encode_all(&content[..], 3).unwrap();
+        assert!(packed.len() < 10_000);
+        let error = error_of(&scratch, &chunk(content.len() as u64, "zstd", &packed));
+        assert!(error.contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn definitions_are_counted_and_measured() {
+    let scratch = Scratch::new("definitions");
+    let schema = |id: u16, text: &[u8]| whole(3, &[&id.to_le_bytes(), &sized(b"s")[..], &sized(b""), &sized(text)].concat());
+    let plain = |content: &[u8]| chunk(content.len() as u64, "", content);
+    let many: Vec<u8> = (1..=257).flat_map(|id| schema(id, b"")).collect();
+    assert!(error_of(&scratch, &plain(&many)).contains("more than 256"));
+    assert!(error_of(&scratch, &plain(&schema(1, &vec![0; 1 << 20]))).contains("at most 1048576"));
+    assert!(error_of(&scratch, &plain(&[schema(1, b"a"), schema(1, b"b")].concat())).contains("defined twice"));
+    assert!(error_of(&scratch, &plain(&schema(0, b""))).contains("id 0"));
+}
+
 #[test]
 fn other_files_are_told_apart() {
     let scratch = Scratch::new("other");
