@@ -13,7 +13,10 @@ impl<'a> Fields<'a> {
     /// The next `n` bytes.
     pub fn take(&mut self, n: u64, what: &str) -> Result<&'a [u8], Fault> {
         let have = self.0.len();
-        let n = usize::try_from(n).ok().filter(|n| *n <= have).ok_or_else(|| format!("{what} takes {n} bytes, but {have} are left"))?;
+        let n = usize::try_from(n)
+            .ok()
+            .filter(|n| *n <= have)
+            .ok_or_else(|| format!("{what} takes {n} bytes, but {have} are left"))?;
         let (head, rest) = self.0.split_at(n);
         self.0 = rest;
         Ok(head)

@@ -1,7 +1,7 @@
 //! Chunks: decompression under a bound, checksum, and the records inside (MCAP specification, "Records").
 
-use super::{MAX_CHUNK_BYTES, MAX_DEFINITION_BYTES, MAX_DEFINITIONS};
 use super::bytes::{Fault, Fields};
+use super::{MAX_CHUNK_BYTES, MAX_DEFINITION_BYTES, MAX_DEFINITIONS};
 use mcap::records::op;
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -24,11 +24,18 @@ pub(crate) struct Channel {
 }
 
 /// Notes a definition, if it is new to both. Another one under the same number is a fault, and so is one too many.
-pub(crate) fn define<T: PartialEq>(known: &BTreeMap<u16, T>, new: &mut BTreeMap<u16, T>, id: u16, value: T) -> Result<(), Fault> {
+pub(crate) fn define<T: PartialEq>(
+    known: &BTreeMap<u16, T>,
+    new: &mut BTreeMap<u16, T>,
+    id: u16,
+    value: T,
+) -> Result<(), Fault> {
     match known.get(&id).or(new.get(&id)) {
         Some(old) if *old == value => Ok(()),
         Some(_) => Err(format!("schema or channel {id} is defined twice, and differently")),
-        None if known.len() + new.len() >= MAX_DEFINITIONS => Err(format!("more than {MAX_DEFINITIONS} schemas or channels")),
+        None if known.len() + new.len() >= MAX_DEFINITIONS => {
+            Err(format!("more than {MAX_DEFINITIONS} schemas or channels"))
+        }
         None => {
             new.insert(id, value);
             Ok(())
@@ -41,7 +48,13 @@ pub(crate) fn define<T: PartialEq>(known: &BTreeMap<u16, T>, new: &mut BTreeMap<
 pub(crate) enum Inner<'a> {
     Schema(u16, Schema),
     Channel(u16, Channel),
-    Message { channel: u16, sequence: u32, log_time: u64, publish_time: u64, data: &'a [u8] },
+    Message {
+        channel: u16,
+        sequence: u32,
+        log_time: u64,
+        publish_time: u64,
+        data: &'a [u8],
+    },
     /// A kind that we do not read.
     Other,
 }
@@ -132,8 +145,13 @@ fn decompress(compression: &str, stored: &[u8], size: u64) -> Result<Vec<u8>, Fa
     let mut out = Vec::new();
     match compression {
         "" => out.extend_from_slice(stored),
-        "lz4" => lz4::Decoder::new(stored).and_then(|d| d.take(size + 1).read_to_end(&mut out)).map(drop).map_err(fault)?,
-        "zstd" => zstd::Decoder::with_buffer(stored).and_then(|d| d.take(size + 1).read_to_end(&mut out)).map(drop).map_err(fault)?,
+        "lz4" => {
+            lz4::Decoder::new(stored).and_then(|d| d.take(size + 1).read_to_end(&mut out)).map(drop).map_err(fault)?
+        }
+        "zstd" => zstd::Decoder::with_buffer(stored)
+            .and_then(|d| d.take(size + 1).read_to_end(&mut out))
+            .map(drop)
+            .map_err(fault)?,
         other => return Err(format!("compression \"{other}\", only lz4, zstd and none are known")),
     }
     Ok(out)

@@ -44,6 +44,7 @@ pub(crate) enum Next {
     End(Ending),
 }
 
+#[derive(Debug)]
 enum Section {
     Data,
     Summary,
@@ -53,6 +54,7 @@ enum Section {
 const HEAD_BYTES: u64 = 9;
 
 /// Reads an MCAP file from start to end.
+#[derive(Debug)]
 pub(crate) struct Container {
     path: PathBuf,
     file: BufReader<File>,
@@ -84,7 +86,11 @@ impl Container {
             return Err(not_mcap(format!("it ends at byte {}, within the signature", container.length)));
         }
         let magic: [u8; 8] = container.array()?;
-        if magic != MAGIC { Err(not_mcap(format!("it begins with {magic:02x?}, not with {MAGIC:02x?}"))) } else { Ok(container) }
+        if magic != MAGIC {
+            Err(not_mcap(format!("it begins with {magic:02x?}, not with {MAGIC:02x?}")))
+        } else {
+            Ok(container)
+        }
     }
 
     /// The file's name.
@@ -148,15 +154,26 @@ impl Container {
         self.compare_crc(offset, body, 16, crc, "summary")?;
         let left = self.length - self.offset;
         if left < MAGIC.len() as u64 {
-            return Ok(Next::End(Ending::Cut { offset: self.offset, what: format!("the file stops {left} bytes into its last signature") }));
+            return Ok(Next::End(Ending::Cut {
+                offset: self.offset,
+                what: format!("the file stops {left} bytes into its last signature"),
+            }));
         }
         let at = self.offset;
         let magic: [u8; 8] = self.array()?;
         if magic != MAGIC {
-            return Err(RecordError::corrupt(&self.path, at, format!("the file should end with {MAGIC:02x?}, not with {magic:02x?}")));
+            return Err(RecordError::corrupt(
+                &self.path,
+                at,
+                format!("the file should end with {MAGIC:02x?}, not with {magic:02x?}"),
+            ));
         }
         if self.offset != self.length {
-            return Err(RecordError::corrupt(&self.path, self.offset, format!("{} bytes follow the end", self.length - self.offset)));
+            return Err(RecordError::corrupt(
+                &self.path,
+                self.offset,
+                format!("{} bytes follow the end", self.length - self.offset),
+            ));
         }
         Ok(Next::End(Ending::Complete))
     }

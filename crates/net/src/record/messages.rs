@@ -3,8 +3,9 @@
 use super::scene::{Entity, Pose, Shape, VisualPart};
 use super::schemas::ROOT_FRAME;
 use foxglove::messages::{
-    Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, Point3, Pose as FoxPose, Quaternion, SceneEntity,
-    SceneEntityDeletion, SceneUpdate, SpherePrimitive, Timestamp, TriangleListPrimitive, Vector3, scene_entity_deletion,
+    Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, Point3, Pose as FoxPose, Quaternion,
+    SceneEntity, SceneEntityDeletion, SceneUpdate, SpherePrimitive, Timestamp, TriangleListPrimitive, Vector3,
+    scene_entity_deletion,
 };
 use std::collections::BTreeSet;
 
@@ -58,8 +59,12 @@ fn push_part(out: &mut SceneEntity, part: &VisualPart) {
     let color = Some(fox_color(part.color));
     match &part.shape {
         Shape::Sphere { radius } => out.spheres.push(ball(&part.pose, part.color, *radius)),
-        Shape::Box { half_extents } => out.cubes.push(CubePrimitive { pose, size: Some(vector(half_extents.map(|h| 2.0 * h))), color }),
-        Shape::Cylinder { radius, half_height } => out.cylinders.push(tube(&part.pose, part.color, *radius, *half_height)),
+        Shape::Box { half_extents } => {
+            out.cubes.push(CubePrimitive { pose, size: Some(vector(half_extents.map(|h| 2.0 * h))), color })
+        }
+        Shape::Cylinder { radius, half_height } => {
+            out.cylinders.push(tube(&part.pose, part.color, *radius, *half_height))
+        }
         Shape::Capsule { radius, half_height } => {
             out.cylinders.push(tube(&part.pose, part.color, *radius, *half_height));
             for end in [-*half_height, *half_height] {
@@ -89,7 +94,12 @@ fn tube(pose: &Pose, color: [f32; 4], radius: f64, half_height: f64) -> Cylinder
     }
 }
 
-fn triangle_list(pose: Option<FoxPose>, color: Option<Color>, vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> TriangleListPrimitive {
+fn triangle_list(
+    pose: Option<FoxPose>,
+    color: Option<Color>,
+    vertices: &[[f64; 3]],
+    triangles: &[[u32; 3]],
+) -> TriangleListPrimitive {
     TriangleListPrimitive {
         pose,
         points: vertices.iter().map(|&[x, y, z]| Point3 { x, y, z }).collect(),

@@ -1,5 +1,26 @@
 //! Recordings: MCAP files that Foxglove and Rerun open as they are, and that a killed run leaves readable.
 //!
+//! ```
+//! use tumble_net::record::{Entity, Pose, Recorder, RecorderOptions, Shape, VisualPart, read};
+//! # fn main() -> Result<(), tumble_net::record::RecordError> {
+//! # let path = std::env::temp_dir().join(format!("tumble-doc-{}.mcap", std::process::id()));
+//! let shape = Shape::Sphere { radius: 0.1 };
+//! let ball = VisualPart { shape, pose: Pose::IDENTITY, color: [0.9, 0.2, 0.2, 1.0] };
+//! let entities = [Entity { name: "ball".into(), parts: vec![ball] }];
+//! let mut recorder = Recorder::create(&path, "falling", &entities, RecorderOptions::default())?;
+//! for frame in 0..60 {
+//!     let t = frame as f64 / 60.0;
+//!     recorder.frame(t, frame, &[Pose::at([0.0, 0.0, 5.0 - 4.905 * t * t])], b"state")?;
+//! }
+//! recorder.finish()?;
+//!
+//! let last = read(&path)?.last().expect("60 frames")?;
+//! assert_eq!((last.frame, last.state.as_slice()), (59, &b"state"[..]));
+//! # std::fs::remove_file(&path).ok();
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # What is in a file
 //!
 //! | topic | schema | when |
@@ -10,6 +31,9 @@
 //!
 //! All three are protobuf and carry their schema in the file; the text of `tumble.State` stands in the channel's
 //! metadata under `proto` as well. A metadata record named `tumble` says the version and the world's name.
+//!
+//! **What viewers show.** Foxglove draws the entities and moves them. Rerun (0.41) reads all three topics and moves the
+//! frames, but does not draw `foxglove.SceneUpdate`; it lists the message's fields.
 //!
 //! **Time.** Every time stamp is *simulated* time in nanoseconds from 0, rounded to the nearest; no wall clock enters
 //! the file, so the same run gives the same bytes. A viewer that shows dates shows 1 January 1970. The unrounded

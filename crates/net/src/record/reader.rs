@@ -1,13 +1,16 @@
 //! Reading a recording back, frame by frame.
 
-use super::bytes::Fields;
 use super::budget;
+use super::bytes::Fields;
 use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse_inner};
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
 use super::messages::{entities_of, nanoseconds, poses_of};
 use super::scene::{Entity, Pose, name_fault};
-use super::schemas::{METADATA_NAME, PROTOBUF, SCENE_SCHEMA, STATE_SCHEMA, State, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS, TRANSFORMS_SCHEMA, VERSION};
+use super::schemas::{
+    METADATA_NAME, PROTOBUF, SCENE_SCHEMA, STATE_SCHEMA, State, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS,
+    TRANSFORMS_SCHEMA, VERSION,
+};
 use super::{MAX_DEFINITION_BYTES, MAX_TIME_S};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 use mcap::records::op;
@@ -62,6 +65,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Reader> {
 }
 
 /// Reads frames in order; also an iterator over them.
+#[derive(Debug)]
 pub struct Reader {
     container: Container,
     schemas: BTreeMap<u16, Schema>,
@@ -201,7 +205,10 @@ impl Reader {
     }
 
     fn message(&mut self, channel: u16, log_time: u64, data: &[u8]) -> std::result::Result<Option<Event>, String> {
-        let info = self.channels.get(&channel).ok_or_else(|| format!("a message on channel {channel}, which the file does not define"))?;
+        let info = self
+            .channels
+            .get(&channel)
+            .ok_or_else(|| format!("a message on channel {channel}, which the file does not define"))?;
         let wanted = match info.topic.as_str() {
             TOPIC_SCENE => SCENE_SCHEMA,
             TOPIC_TRANSFORMS => TRANSFORMS_SCHEMA,
@@ -210,7 +217,10 @@ impl Reader {
         };
         let schema = self.schemas.get(&info.schema).map_or("", |schema| schema.name.as_str());
         if schema != wanted || info.encoding != PROTOBUF {
-            return Err(format!("topic {} has schema \"{schema}\" in \"{}\", not {wanted} in {PROTOBUF}", info.topic, info.encoding));
+            return Err(format!(
+                "topic {} has schema \"{schema}\" in \"{}\", not {wanted} in {PROTOBUF}",
+                info.topic, info.encoding
+            ));
         }
         match wanted {
             SCENE_SCHEMA => self.scene(data).map(|()| Some(Event::Scene)),
@@ -232,7 +242,9 @@ impl Reader {
         budget::check_transforms(data)?;
         let message = FrameTransforms::decode(data).map_err(|e| format!("transforms: {e}"))?;
         let named = poses_of(message);
-        if let Some((name, why)) = named.iter().find_map(|(name, pose)| Some((name, name_fault(name).or_else(|| pose.fault())?))) {
+        if let Some((name, why)) =
+            named.iter().find_map(|(name, pose)| Some((name, name_fault(name).or_else(|| pose.fault())?)))
+        {
             return Err(format!("transform of \"{name}\": {why}"));
         }
         self.adopt_names(&named);
@@ -245,8 +257,11 @@ impl Reader {
         if named.iter().map(|(name, _)| name).eq(self.entities.iter().map(|entity| &entity.name)) {
             return;
         }
-        let mut known: BTreeMap<String, Entity> = self.entities.drain(..).map(|entity| (entity.name.clone(), entity)).collect();
-        let entity = |(name, _): &(String, Pose)| known.remove(name).unwrap_or_else(|| Entity { name: name.clone(), parts: Vec::new() });
+        let mut known: BTreeMap<String, Entity> =
+            self.entities.drain(..).map(|entity| (entity.name.clone(), entity)).collect();
+        let entity = |(name, _): &(String, Pose)| {
+            known.remove(name).unwrap_or_else(|| Entity { name: name.clone(), parts: Vec::new() })
+        };
         self.entities = named.iter().map(entity).collect();
     }
 
@@ -258,7 +273,9 @@ impl Reader {
         if !(0.0..=MAX_TIME_S).contains(&time_s) || nanoseconds(time_s) != log_time {
             return Err(format!("frame {frame} is of time {time_s} s, but was logged at {log_time} ns"));
         }
-        if let Some(last) = self.last_frame && frame <= last {
+        if let Some(last) = self.last_frame
+            && frame <= last
+        {
             return Err(format!("frame {frame} follows frame {last}"));
         }
         let poses = match self.poses.take() {

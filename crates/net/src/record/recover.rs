@@ -71,7 +71,15 @@ struct Mender<'a> {
 
 impl<'a> Mender<'a> {
     fn new(container: Container, output: &'a Path, file: File) -> Self {
-        let report = RecoverReport { frames: 0, messages: 0, chunks: 0, damaged_chunks: 0, dropped_records: 0, bytes_used: 0, fault: None };
+        let report = RecoverReport {
+            frames: 0,
+            messages: 0,
+            chunks: 0,
+            damaged_chunks: 0,
+            dropped_records: 0,
+            bytes_used: 0,
+            fault: None,
+        };
         Mender {
             container,
             output,
@@ -121,8 +129,12 @@ impl<'a> Mender<'a> {
         let offset = record.offset;
         let done = match record.opcode {
             op::HEADER => self.header(&record.body).map(Ok),
-            op::METADATA if self.metadata_count >= MAX_DEFINITIONS => Err(format!("more than {MAX_DEFINITIONS} metadata records")),
-            op::METADATA => metadata_of(&record.body).map(|(name, metadata)| self.put_metadata(Metadata { name, metadata })),
+            op::METADATA if self.metadata_count >= MAX_DEFINITIONS => {
+                Err(format!("more than {MAX_DEFINITIONS} metadata records"))
+            }
+            op::METADATA => {
+                metadata_of(&record.body).map(|(name, metadata)| self.put_metadata(Metadata { name, metadata }))
+            }
             op::CHUNK => open_chunk(&record.body).and_then(|chunk| self.content(&chunk.content, &chunk.compression)),
             // Outside of chunks. The summary repeats schemas and channels, which changes nothing.
             op::SCHEMA | op::CHANNEL | op::MESSAGE => self.content(&as_content(record), ""),
@@ -163,8 +175,14 @@ impl<'a> Mender<'a> {
             match parse_inner(opcode, body)? {
                 Inner::Schema(id, schema) => define(&self.schemas, &mut new.schemas, id, schema)?,
                 Inner::Channel(id, channel) => {
-                    if channel.schema != 0 && !self.schemas.contains_key(&channel.schema) && !new.schemas.contains_key(&channel.schema) {
-                        return Err(format!("channel {id} has schema {}, which the readable part does not define", channel.schema));
+                    if channel.schema != 0
+                        && !self.schemas.contains_key(&channel.schema)
+                        && !new.schemas.contains_key(&channel.schema)
+                    {
+                        return Err(format!(
+                            "channel {id} has schema {}, which the readable part does not define",
+                            channel.schema
+                        ));
                     }
                     define(&self.channels, &mut new.channels, id, channel)?;
                 }
@@ -199,7 +217,8 @@ impl Mender<'_> {
                 _ => None,
             };
             let options = append_options(compression).library(self.library.as_str());
-            let mut writer = options.create(NoSeek::new(BufWriter::new(file))).map_err(RecordError::write(self.output))?;
+            let mut writer =
+                options.create(NoSeek::new(BufWriter::new(file))).map_err(RecordError::write(self.output))?;
             for metadata in self.metadata.drain(..) {
                 writer.write_metadata(&metadata).map_err(RecordError::write(self.output))?;
             }
@@ -228,7 +247,13 @@ impl Mender<'_> {
                 writer.add_schema_with_id(*id, &schema.name, &schema.encoding, &schema.data)?;
             }
             for (id, channel) in &chunk.channels {
-                writer.add_channel_with_id(*id, channel.schema, &channel.topic, &channel.encoding, &channel.metadata)?;
+                writer.add_channel_with_id(
+                    *id,
+                    channel.schema,
+                    &channel.topic,
+                    &channel.encoding,
+                    &channel.metadata,
+                )?;
             }
             for (header, data) in &chunk.messages {
                 writer.write_to_known_channel(header, data)?;
@@ -239,7 +264,8 @@ impl Mender<'_> {
         put.map_err(RecordError::write(self.output))?;
         self.schemas.extend(chunk.schemas);
         self.channels.extend(chunk.channels);
-        let is_frame = |header: &MessageHeader| self.channels.get(&header.channel_id).is_some_and(|c| c.topic == TOPIC_STATE);
+        let is_frame =
+            |header: &MessageHeader| self.channels.get(&header.channel_id).is_some_and(|c| c.topic == TOPIC_STATE);
         self.report.frames += chunk.messages.iter().filter(|(header, _)| is_frame(header)).count() as u64;
         self.report.messages += chunk.messages.len() as u64;
         self.report.chunks += u64::from(!chunk.messages.is_empty());

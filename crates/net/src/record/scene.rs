@@ -28,8 +28,12 @@ impl Pose {
         let finite = self.position.iter().chain(&self.rotation).all(|x| x.is_finite());
         let norm = self.rotation.iter().map(|x| x * x).sum::<f64>().sqrt();
         match (finite, (norm - 1.0).abs() <= 1e-3) {
-            (false, _) => Some(format!("pose is not finite: position {:?}, rotation {:?}", self.position, self.rotation)),
-            (true, false) => Some(format!("rotation {:?} has length {norm}, a unit quaternion x, y, z, w is needed", self.rotation)),
+            (false, _) => {
+                Some(format!("pose is not finite: position {:?}, rotation {:?}", self.position, self.rotation))
+            }
+            (true, false) => {
+                Some(format!("rotation {:?} has length {norm}, a unit quaternion x, y, z, w is needed", self.rotation))
+            }
             (true, true) => None,
         }
     }
@@ -99,7 +103,10 @@ pub struct Entity {
 /// Checks a list before it is recorded: count, names, numbers, indices.
 pub(crate) fn check_entities(entities: &[Entity]) -> Result<()> {
     if entities.len() > MAX_ENTITIES {
-        return Err(RecordError::input("the scene", format!("{} entities, at most {MAX_ENTITIES} are allowed", entities.len())));
+        return Err(RecordError::input(
+            "the scene",
+            format!("{} entities, at most {MAX_ENTITIES} are allowed", entities.len()),
+        ));
     }
     let mut seen = BTreeSet::new();
     for entity in entities {

@@ -68,8 +68,14 @@ fn state_descriptor() -> Vec<u8> {
         json_name: Some(if name == "time_s" { "timeS".into() } else { name.into() }),
         ..Default::default()
     };
-    let fields = [(1, "version", Type::Fixed32), (2, "frame", Type::Fixed64), (3, "time_s", Type::Double), (4, "payload", Type::Bytes)];
-    let message = DescriptorProto { name: Some("State".into()), field: fields.map(field).to_vec(), ..Default::default() };
+    let fields = [
+        (1, "version", Type::Fixed32),
+        (2, "frame", Type::Fixed64),
+        (3, "time_s", Type::Double),
+        (4, "payload", Type::Bytes),
+    ];
+    let message =
+        DescriptorProto { name: Some("State".into()), field: fields.map(field).to_vec(), ..Default::default() };
     let file = FileDescriptorProto {
         name: Some("tumble/State.proto".into()),
         package: Some("tumble".into()),
@@ -123,8 +129,10 @@ mod tests {
         assert!(STATE_PROTO.contains(&format!("syntax = \"{}\";", file.syntax())));
         let message = &file.message_type[0];
         assert!(STATE_PROTO.contains(&format!("message {} {{", message.name())));
-        let compiled: Vec<String> = message.field.iter().map(|f| format!("{} {} = {}", type_word(f.r#type()), f.name(), f.number())).collect();
-        let text: Vec<&str> = STATE_PROTO.lines().filter_map(|line| line.strip_prefix("  ")?.split(';').next()).collect();
+        let compiled: Vec<String> =
+            message.field.iter().map(|f| format!("{} {} = {}", type_word(f.r#type()), f.name(), f.number())).collect();
+        let text: Vec<&str> =
+            STATE_PROTO.lines().filter_map(|line| line.strip_prefix("  ")?.split(';').next()).collect();
         assert_eq!(compiled, text);
     }
 

@@ -70,11 +70,16 @@ const MAX_CHUNK_SIZE: u64 = 64 << 20;
 impl RecorderOptions {
     fn check(&self) -> Result<()> {
         if !(1..=MAX_CHUNK_SIZE).contains(&self.chunk_size) {
-            return Err(RecordError::input("with these options", format!("chunk_size {}, 1 to {MAX_CHUNK_SIZE} bytes is allowed", self.chunk_size)));
+            return Err(RecordError::input(
+                "with these options",
+                format!("chunk_size {}, 1 to {MAX_CHUNK_SIZE} bytes is allowed", self.chunk_size),
+            ));
         }
         let fault = match self.flush_every {
             FlushEvery::Frames(0) => "flush_every 0 frames, at least 1 is needed".to_owned(),
-            FlushEvery::SimulatedSeconds(s) if !(s.is_finite() && s > 0.0) => format!("flush_every {s} s, a finite number above 0 is needed"),
+            FlushEvery::SimulatedSeconds(s) if !(s.is_finite() && s > 0.0) => {
+                format!("flush_every {s} s, a finite number above 0 is needed")
+            }
             _ => return Ok(()),
         };
         Err(RecordError::input("with these options", fault))
@@ -125,12 +130,20 @@ impl Recorder {
     /// Creates (or replaces) the file `path`, and writes the scene. `world` is a name for people.
     ///
     /// Errors: the file cannot be created; an option, a name or a number is out of range.
-    pub fn create(path: impl AsRef<Path>, world: &str, entities: &[Entity], options: RecorderOptions) -> Result<Recorder> {
+    pub fn create(
+        path: impl AsRef<Path>,
+        world: &str,
+        entities: &[Entity],
+        options: RecorderOptions,
+    ) -> Result<Recorder> {
         let path = path.as_ref().to_owned();
         options.check()?;
         check_entities(entities)?;
         if world.len() > MAX_NAME_BYTES {
-            return Err(RecordError::input("this world", format!("its name has {} bytes, at most {MAX_NAME_BYTES} are allowed", world.len())));
+            return Err(RecordError::input(
+                "this world",
+                format!("its name has {} bytes, at most {MAX_NAME_BYTES} are allowed", world.len()),
+            ));
         }
         let file = File::create(&path).map_err(RecordError::io(&path, "cannot create"))?;
         let mut writer = append_options(options.compression.to_mcap())
@@ -226,12 +239,17 @@ impl Recorder {
         if (earliest..=MAX_TIME_S).contains(&time_s) {
             return Ok(());
         }
-        Err(RecordError::input(format!("time {time_s} s"), format!("it must lie from {earliest} (the last frame's) to {MAX_TIME_S}")))
+        Err(RecordError::input(
+            format!("time {time_s} s"),
+            format!("it must lie from {earliest} (the last frame's) to {MAX_TIME_S}"),
+        ))
     }
 
     fn check_frame(&self, frame: u64, poses: &[Pose], state: &[u8]) -> Result<()> {
         let refuse = |why: String| Err(RecordError::input(format!("frame {frame}"), why));
-        if let Some((_, last)) = self.last && frame <= last {
+        if let Some((_, last)) = self.last
+            && frame <= last
+        {
             return refuse(format!("frame {last} is already recorded, and numbers must increase"));
         }
         if poses.len() != self.names.len() {
@@ -252,7 +270,10 @@ impl Recorder {
         let update = scene_update(log_time, entities, &self.names);
         let bytes = update.encoded_len();
         if bytes > MAX_SCENE_BYTES {
-            return Err(RecordError::input("the scene", format!("its meshes take {bytes} bytes, at most {MAX_SCENE_BYTES} are allowed")));
+            return Err(RecordError::input(
+                "the scene",
+                format!("its meshes take {bytes} bytes, at most {MAX_SCENE_BYTES} are allowed"),
+            ));
         }
         let update = update.encode_to_vec();
         budget::check_scene(&update).map_err(|why| RecordError::input("the scene", why))?;

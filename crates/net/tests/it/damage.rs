@@ -16,13 +16,18 @@ fn cut_at_every_byte_it_reads_up_to_the_last_flush() {
         let mut most = 8;
         for n in (0..full).rev() {
             file.set_len(n).unwrap();
-            let safe = lengths.iter().rposition(|length| *length <= n && *length != lengths[0]).map_or(0, |k| k / 2 * 2);
+            let safe =
+                lengths.iter().rposition(|length| *length <= n && *length != lengths[0]).map_or(0, |k| k / 2 * 2);
             // Frame k is on disk once frame k | 1 is recorded, and lengths[1] is the first length with frames.
             let safe = if n >= lengths[1] { safe.max(2) } else { 0 };
             match read_all(&path) {
                 (frames, Ok(Ending::Cut { offset, .. })) => {
                     assert!(offset <= n);
-                    assert!(frames.len() >= safe && frames.len() <= most, "{} frames of {n} bytes, {safe} are safe", frames.len());
+                    assert!(
+                        frames.len() >= safe && frames.len() <= most,
+                        "{} frames of {n} bytes, {safe} are safe",
+                        frames.len()
+                    );
                     assert_eq!(frames.len() % 2, 0, "whole flushes");
                     assert_frames(&frames);
                     most = frames.len();
@@ -83,7 +88,10 @@ fn random_damage_never_panics() {
             assert_true_frames(&frames);
             noticed += usize::from(!matches!(ending, Ok(Ending::Complete)));
             // A run of zeros may hit a checksum, which then counts as "none made".
-            assert!(bytes == whole || kind == 1 || !matches!(ending, Ok(Ending::Complete)), "round {round}: not noticed");
+            assert!(
+                bytes == whole || kind == 1 || !matches!(ending, Ok(Ending::Complete)),
+                "round {round}: not noticed"
+            );
         }
         assert!(noticed > 2500, "{compression:?}: {noticed}");
     }

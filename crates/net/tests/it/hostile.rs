@@ -19,7 +19,15 @@ fn whole(opcode: u8, body: &[u8]) -> Vec<u8> {
 
 /// A chunk without a checksum.
 fn chunk(size: u64, compression: &str, stored: &[u8]) -> Vec<u8> {
-    let body = [&[0; 16], &size.to_le_bytes()[..], &[0; 4], &sized(compression.as_bytes()), &(stored.len() as u64).to_le_bytes(), stored].concat();
+    let body = [
+        &[0; 16],
+        &size.to_le_bytes()[..],
+        &[0; 4],
+        &sized(compression.as_bytes()),
+        &(stored.len() as u64).to_le_bytes(),
+        stored,
+    ]
+    .concat();
     whole(6, &body)
 }
 
@@ -112,7 +120,8 @@ fn messages_that_swell_are_refused_before_they_are_decoded() {
 #[test]
 fn definitions_are_counted_and_measured() {
     let scratch = Scratch::new("definitions");
-    let schema = |id: u16, text: &[u8]| whole(3, &[&id.to_le_bytes(), &sized(b"s")[..], &sized(b""), &sized(text)].concat());
+    let schema =
+        |id: u16, text: &[u8]| whole(3, &[&id.to_le_bytes(), &sized(b"s")[..], &sized(b""), &sized(text)].concat());
     let plain = |content: &[u8]| chunk(content.len() as u64, "", content);
     let many: Vec<u8> = (1..=257).flat_map(|id| schema(id, b"")).collect();
     assert!(error_of(&scratch, &plain(&many)).contains("more than 256"));
@@ -127,7 +136,9 @@ fn other_files_are_told_apart() {
     let path = scratch.file("a.mcap");
     assert!(matches!(read(&path), Err(RecordError::Io { .. })), "no such file");
     assert!(read(scratch.file("")).is_err(), "a folder");
-    for (bytes, wanted) in [(&b""[..], "ends at byte 0"), (b"\x89MCA", "ends at byte 4"), (b"#VRML V2.0 utf8", "begins with")] {
+    for (bytes, wanted) in
+        [(&b""[..], "ends at byte 0"), (b"\x89MCA", "ends at byte 4"), (b"#VRML V2.0 utf8", "begins with")]
+    {
         std::fs::write(&path, bytes).unwrap();
         let error = read(&path).err().unwrap().to_string();
         assert!(error.contains(wanted) && error.contains("a.mcap"), "{error}");

@@ -15,7 +15,8 @@ fn frames_out_of_range_are_refused_and_not_written() {
     let zero = with(Pose { position: [0.0; 3], rotation: [0.0; 4] });
     let good = poses(2);
     let big = vec![0; MAX_STATE_BYTES + 1];
-    let bad: [(f64, u64, &[Pose], &[u8], &str); 9] = [
+    type Case<'a> = (f64, u64, &'a [Pose], &'a [u8], &'a str);
+    let bad: [Case; 9] = [
         (1.0, 2, &nan, &[], "entity \"crate\": pose is not finite"),
         (1.0, 2, &zero, &[], "entity \"crate\": rotation [0.0, 0.0, 0.0, 0.0] has length 0"),
         (1.0, 2, &good[..2], &[], "2 poses for 3 entities"),
@@ -44,7 +45,8 @@ fn scenes_out_of_range_are_refused_before_a_file_is_made() {
     let one = |name: &str, shape: Shape| vec![Entity { name: name.into(), parts: vec![part(shape)] }];
     let ball = || Shape::Sphere { radius: 1.0 };
     let twice = [one("a", ball()), one("a", ball())].concat();
-    let glaring = vec![Entity { name: "a".into(), parts: vec![VisualPart { color: [2.0, 0.0, 0.0, 1.0], ..part(ball()) }] }];
+    let glaring =
+        vec![Entity { name: "a".into(), parts: vec![VisualPart { color: [2.0, 0.0, 0.0, 1.0], ..part(ball()) }] }];
     let open = Shape::Mesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 3]] };
     let cases = [
         (one("", ball()), "the name is empty"),
@@ -60,14 +62,17 @@ fn scenes_out_of_range_are_refused_before_a_file_is_made() {
         let error = Recorder::create(&path, WORLD, &entities, RecorderOptions::default()).err().unwrap().to_string();
         assert!(error.contains(wanted), "got: {error}\nwanted: {wanted}");
     }
-    for flush_every in [FlushEvery::Frames(0), FlushEvery::SimulatedSeconds(0.0), FlushEvery::SimulatedSeconds(f64::NAN)] {
+    for flush_every in
+        [FlushEvery::Frames(0), FlushEvery::SimulatedSeconds(0.0), FlushEvery::SimulatedSeconds(f64::NAN)]
+    {
         assert!(Recorder::create(&path, WORLD, &[], RecorderOptions { flush_every, ..Default::default() }).is_err());
     }
     for chunk_size in [0, u64::MAX] {
         assert!(Recorder::create(&path, WORLD, &[], RecorderOptions { chunk_size, ..Default::default() }).is_err());
     }
     assert!(!path.exists());
-    let error = Recorder::create(scratch.file("no/such/folder.mcap"), WORLD, &[], RecorderOptions::default()).err().unwrap();
+    let error =
+        Recorder::create(scratch.file("no/such/folder.mcap"), WORLD, &[], RecorderOptions::default()).err().unwrap();
     assert!(error.to_string().contains("no/such/folder.mcap: cannot create"), "{error}");
 }
 
@@ -75,6 +80,7 @@ fn scenes_out_of_range_are_refused_before_a_file_is_made() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_is_an_error() {
-    let error = Recorder::create("/dev/full", WORLD, &entities(), RecorderOptions::default()).err().unwrap().to_string();
+    let error =
+        Recorder::create("/dev/full", WORLD, &entities(), RecorderOptions::default()).err().unwrap().to_string();
     assert!(error.starts_with("/dev/full: cannot write: No space left"), "{error}");
 }

@@ -45,7 +45,8 @@ fn the_container_is_valid_for_another_reader() {
     assert_eq!((stats.schema_count, stats.channel_count, stats.message_count), (3, 3, 1 + 2 * 20));
     assert_eq!(stats.chunk_count, 1 + 4, "the scene's, and 20 frames by 6");
     assert_eq!((stats.message_start_time, stats.message_end_time), (0, 79_166_667), "19/240 s in ns, to the nearest");
-    let topics: Vec<String> = mcap::MessageStream::new(&bytes).unwrap().map(|m| m.unwrap().channel.topic.clone()).collect();
+    let topics: Vec<String> =
+        mcap::MessageStream::new(&bytes).unwrap().map(|m| m.unwrap().channel.topic.clone()).collect();
     assert_eq!(topics[..3], [TOPIC_SCENE, TOPIC_TRANSFORMS, TOPIC_STATE]);
 }
 
@@ -58,7 +59,11 @@ fn every_shape_is_drawn_where_it_stands() {
     let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
     let mesh = part(Shape::Mesh { vertices, triangles });
-    let capsule = VisualPart { shape: Shape::Capsule { radius: 0.25, half_height: 2.0 }, pose: turned, color: [1.0, 0.0, 0.0, 0.5] };
+    let capsule = VisualPart {
+        shape: Shape::Capsule { radius: 0.25, half_height: 2.0 },
+        pose: turned,
+        color: [1.0, 0.0, 0.0, 0.5],
+    };
     let all = [
         Entity { name: "mesh".into(), parts: vec![mesh.clone()] },
         Entity { name: "capsule".into(), parts: vec![capsule] },
@@ -93,7 +98,9 @@ fn objects_come_and_go() {
     recorder.frame(0.75, 2, &poses(2)[2..], b"one").unwrap();
     recorder.finish().unwrap();
     let mut reader = read(&path).unwrap();
-    for (names, state) in [(&["ball", "crate"][..], "two"), (&["ball", "crate", "ground"], "three"), (&["ground"], "one")] {
+    for (names, state) in
+        [(&["ball", "crate"][..], "two"), (&["ball", "crate", "ground"], "three"), (&["ground"], "one")]
+    {
         let frame = reader.next_frame().unwrap().unwrap();
         assert_eq!(frame.state, state.as_bytes());
         assert_eq!(frame.poses.len(), names.len());
