@@ -1,0 +1,76 @@
+//! Little-endian fields out of a slice. A length is believed only as far as the slice goes; nothing is allocated on
+//! the strength of a number.
+
+use std::collections::BTreeMap;
+
+/// What is missing, for an error message.
+pub(crate) type Fault = String;
+
+/// The unread rest of a record.
+pub(crate) struct Fields<'a>(pub &'a [u8]);
+
+impl<'a> Fields<'a> {
+    /// The next `n` bytes.
+    pub fn take(&mut self, n: u64, what: &str) -> Result<&'a [u8], Fault> {
+        let have = self.0.len();
+        let n = usize::try_from(n)
+            .ok()
+            .filter(|n| *n <= have)
+            .ok_or_else(|| format!("{what} takes {n} bytes, but {have} are left"))?;
+        let (head, rest) = self.0.split_at(n);
+        self.0 = rest;
+        Ok(head)
+    }
+
+    fn array<const N: usize>(&mut self, what: &str) -> Result<[u8; N], Fault> {
+        let bytes = self.take(N as u64, what)?;
+        bytes.try_into().map_err(|_| format!("{what} is cut"))
+    }
+
+    /// A `u8`.
+    pub fn u8(&mut self, what: &str) -> Result<u8, Fault> {
+        self.array::<1>(what).map(|[b]| b)
+    }
+
+    /// A `u16`.
+    pub fn u16(&mut self, what: &str) -> Result<u16, Fault> {
+        self.array(what).map(u16::from_le_bytes)
+    }
+
+    /// A `u32`.
+    pub fn u32(&mut self, what: &str) -> Result<u32, Fault> {
+        self.array(what).map(u32::from_le_bytes)
+    }
+
+    /// A `u64`.
+    pub fn u64(&mut self, what: &str) -> Result<u64, Fault> {
+        self.array(what).map(u64::from_le_bytes)
+    }
+
+    /// Bytes behind their `u32` length.
+    pub fn sized(&mut self, what: &str) -> Result<&'a [u8], Fault> {
+        let n = self.u32(what)?;
+        self.take(n.into(), what)
+    }
+
+    /// A string behind its `u32` length.
+    pub fn string(&mut self, what: &str) -> Result<&'a str, Fault> {
+        std::str::from_utf8(self.sized(what)?).map_err(|e| format!("{what} is not UTF-8: {e}"))
+    }
+
+    /// A map of strings behind its `u32` length in bytes.
+    pub fn map(&mut self, what: &str) -> Result<BTreeMap<String, String>, Fault> {
+        let mut inner = Fields(self.sized(what)?);
+        let mut map = BTreeMap::new();
+        while !inner.0.is_empty() {
+            let key = inner.string(what)?.to_owned();
+            map.insert(key, inner.string(what)?.to_owned());
+        }
+        Ok(map)
+    }
+
+    /// Refuses what is left over.
+    pub fn end(&self, what: &str) -> Result<(), Fault> {
+        if self.0.is_empty() { Ok(()) } else { Err(format!("{} bytes too many after {what}", self.0.len())) }
+    }
+}

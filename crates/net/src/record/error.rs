@@ -1,0 +1,96 @@
+//! What can go wrong while recording, reading and mending.
+
+use std::path::{Path, PathBuf};
+
+/// An error of this module. The message names the file, and for a damaged file the byte.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The operating system refused.
+    #[error("{}: {what}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried.
+        what: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// The container's writer refused (a full disk, usually).
+    #[error("{}: cannot write the recording: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The writer's answer.
+        source: mcap::McapError,
+    },
+    /// What the caller wants recorded cannot be.
+    #[error("cannot record {what}: {why}")]
+    Input {
+        /// Which entity, frame or option.
+        what: String,
+        /// The value, and what would be right.
+        why: String,
+    },
+    /// The file is not an MCAP file.
+    #[error("{}: not an MCAP file: {why}", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+        /// What is there instead.
+        why: String,
+    },
+    /// An MCAP file, but not one of ours.
+    #[error("{}: not a tumble recording: {why}", path.display())]
+    NotARecording {
+        /// The file.
+        path: PathBuf,
+        /// What is missing or different.
+        why: String,
+    },
+    /// The file is damaged.
+    #[error("{}: damaged at byte {offset}: {what}", path.display())]
+    Corrupt {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file the damaged record begins.
+        offset: u64,
+        /// What is wrong there.
+        what: String,
+    },
+    /// A cut or damaged file holds no whole frame.
+    #[error("{}: nothing to recover: no whole frame before byte {offset} ({what})", path.display())]
+    NothingToRecover {
+        /// The file.
+        path: PathBuf,
+        /// Where reading ended.
+        offset: u64,
+        /// Why it ended.
+        what: String,
+    },
+}
+
+/// This module's result.
+pub(crate) type Result<T> = std::result::Result<T, RecordError>;
+
+impl RecordError {
+    pub(crate) fn io(path: &Path, what: &'static str) -> impl FnOnce(std::io::Error) -> RecordError {
+        let path = path.to_owned();
+        move |source| RecordError::Io { path, what, source }
+    }
+
+    pub(crate) fn write(path: &Path) -> impl FnOnce(mcap::McapError) -> RecordError {
+        let path = path.to_owned();
+        move |source| match source {
+            mcap::McapError::Io(source) => RecordError::Io { path, what: "cannot write", source },
+            source => RecordError::Write { path, source },
+        }
+    }
+
+    pub(crate) fn input(what: impl Into<String>, why: impl Into<String>) -> RecordError {
+        RecordError::Input { what: what.into(), why: why.into() }
+    }
+
+    pub(crate) fn corrupt(path: &Path, offset: u64, what: impl Into<String>) -> RecordError {
+        RecordError::Corrupt { path: path.to_owned(), offset, what: what.into() }
+    }
+}

@@ -1,0 +1,164 @@
+//! What is drawn: entities, their parts and poses, as plain data.
+
+use super::error::{RecordError, Result};
+use super::schemas::ROOT_FRAME;
+use super::{MAX_ENTITIES, MAX_NAME_BYTES};
+use std::collections::BTreeSet;
+
+/// Where a frame stands in its parent: rotate, then translate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Origin, metres.
+    pub position: [f64; 3],
+    /// Unit quaternion, `x, y, z, w`.
+    pub rotation: [f64; 4],
+}
+
+impl Pose {
+    /// No rotation, no translation.
+    pub const IDENTITY: Pose = Pose { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
+
+    /// Translation alone, metres.
+    pub const fn at(position: [f64; 3]) -> Pose {
+        Pose { position, ..Pose::IDENTITY }
+    }
+
+    /// Why a viewer could not use this pose, if it could not: numbers not finite, quaternion not of unit length (1e-3).
+    pub(crate) fn fault(&self) -> Option<String> {
+        let finite = self.position.iter().chain(&self.rotation).all(|x| x.is_finite());
+        let norm = self.rotation.iter().map(|x| x * x).sum::<f64>().sqrt();
+        match (finite, (norm - 1.0).abs() <= 1e-3) {
+            (false, _) => {
+                Some(format!("pose is not finite: position {:?}, rotation {:?}", self.position, self.rotation))
+            }
+            (true, false) => {
+                Some(format!("rotation {:?} has length {norm}, a unit quaternion x, y, z, w is needed", self.rotation))
+            }
+            (true, true) => None,
+        }
+    }
+}
+
+/// The form of a part, about its own origin. All lengths in metres.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// A ball.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+    /// A box, axes along x, y, z.
+    Box {
+        /// Half of each edge.
+        half_extents: [f64; 3],
+    },
+    /// A cylinder along z.
+    Cylinder {
+        /// Radius.
+        radius: f64,
+        /// Half of the length.
+        half_height: f64,
+    },
+    /// A cylinder along z with half a ball on each end. Stored as a cylinder and two spheres, and read back as these.
+    Capsule {
+        /// Radius of cylinder and caps.
+        radius: f64,
+        /// Half of the cylinder's length, caps not counted.
+        half_height: f64,
+    },
+    /// Triangles.
+    Mesh {
+        /// Corners.
+        vertices: Vec<[f64; 3]>,
+        /// Three indices each, counter-clockwise from outside.
+        triangles: Vec<[u32; 3]>,
+    },
+    /// The plane z = 0 with normal +z, drawn as a square. Stored as two triangles, and read back as a mesh.
+    Plane {
+        /// Half of the square's edge.
+        half_size: f64,
+    },
+}
+
+/// A coloured shape at a place in its entity's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VisualPart {
+    /// The form.
+    pub shape: Shape,
+    /// The shape's pose in the entity's frame.
+    pub pose: Pose,
+    /// Red, green, blue, alpha, each 0 to 1.
+    pub color: [f32; 4],
+}
+
+/// Something with a name and a pose per frame: a body, a link, a piece of ground.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entity {
+    /// Name, unique in the recording at a time; 1 to [`MAX_NAME_BYTES`] bytes, and not `world`.
+    pub name: String,
+    /// What is drawn; may be empty.
+    pub parts: Vec<VisualPart>,
+}
+
+/// Checks a list before it is recorded: count, names, numbers, indices.
+pub(crate) fn check_entities(entities: &[Entity]) -> Result<()> {
+    if entities.len() > MAX_ENTITIES {
+        return Err(RecordError::input(
+            "the scene",
+            format!("{} entities, at most {MAX_ENTITIES} are allowed", entities.len()),
+        ));
+    }
+    let mut seen = BTreeSet::new();
+    for entity in entities {
+        let refuse = |why: String| RecordError::input(format!("entity \"{}\"", entity.name), why);
+        if let Some(why) = name_fault(&entity.name) {
+            return Err(refuse(why));
+        }
+        if !seen.insert(entity.name.as_str()) {
+            return Err(refuse("this name is used twice".into()));
+        }
+        for (k, part) in entity.parts.iter().enumerate() {
+            if let Some(why) = part_fault(part) {
+                return Err(refuse(format!("part {k}: {why}")));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Why a name cannot be a frame's name.
+pub(crate) fn name_fault(name: &str) -> Option<String> {
+    match name.len() {
+        0 => Some("the name is empty".into()),
+        n if n > MAX_NAME_BYTES => Some(format!("the name has {n} bytes, at most {MAX_NAME_BYTES} are allowed")),
+        _ if name == ROOT_FRAME => Some(format!("the name \"{ROOT_FRAME}\" is taken by the root frame")),
+        _ => None,
+    }
+}
+
+fn part_fault(part: &VisualPart) -> Option<String> {
+    if !part.color.iter().all(|c| (0.0..=1.0).contains(c)) {
+        return Some(format!("color {:?}, four numbers from 0 to 1 are needed", part.color));
+    }
+    part.pose.fault().or_else(|| shape_fault(&part.shape))
+}
+
+fn shape_fault(shape: &Shape) -> Option<String> {
+    let lengths: &[f64] = match shape {
+        Shape::Sphere { radius } => &[*radius],
+        Shape::Box { half_extents } => half_extents,
+        Shape::Cylinder { radius, half_height } | Shape::Capsule { radius, half_height } => &[*radius, *half_height],
+        Shape::Plane { half_size } => &[*half_size],
+        Shape::Mesh { vertices, triangles } => return mesh_fault(vertices, triangles),
+    };
+    let bad = lengths.iter().find(|x| !(x.is_finite() && **x >= 0.0))?;
+    Some(format!("length {bad}, a finite number of metres not below 0 is needed"))
+}
+
+fn mesh_fault(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Option<String> {
+    if let Some(k) = vertices.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
+        return Some(format!("vertex {k} is not finite: {:?}", vertices[k]));
+    }
+    let (k, t) = triangles.iter().enumerate().find(|(_, t)| t.iter().any(|i| *i as usize >= vertices.len()))?;
+    Some(format!("triangle {k} is {t:?}, but there are only {} vertices", vertices.len()))
+}

@@ -1,0 +1,155 @@
+//! Topics, and the schemas that go into the file with them.
+
+use super::error::{RecordError, Result};
+use foxglove::Encode;
+use foxglove::messages::{FrameTransforms, SceneUpdate};
+use mcap::Writer;
+use prost::Message;
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+use std::path::Path;
+
+/// Topic of what is drawn.
+pub const TOPIC_SCENE: &str = "/scene";
+/// Topic of the poses.
+pub const TOPIC_TRANSFORMS: &str = "/tf";
+/// Topic of our own state.
+pub const TOPIC_STATE: &str = "/tumble/state";
+/// Name of the frame that all entities hang from: metres, z up, right-handed.
+pub const ROOT_FRAME: &str = "world";
+
+pub(crate) const STATE_SCHEMA: &str = "tumble.State";
+pub(crate) const SCENE_SCHEMA: &str = "foxglove.SceneUpdate";
+pub(crate) const TRANSFORMS_SCHEMA: &str = "foxglove.FrameTransforms";
+pub(crate) const PROTOBUF: &str = "protobuf";
+/// Name of the metadata record that marks a recording of ours.
+pub(crate) const METADATA_NAME: &str = "tumble";
+/// Version of the recording's layout.
+pub(crate) const VERSION: u32 = 1;
+
+/// The state message, as text. It is in every file twice: compiled, as the channel's schema, and like this.
+///
+/// Protobuf rather than bare bytes, so that viewers open the channel without complaint and any protobuf tool decodes
+/// it. Fixed-width fields are little-endian on the wire; the payload is the caller's, by convention little-endian.
+pub const STATE_PROTO: &str = r#"syntax = "proto3";
+package tumble;
+
+// One frame of a simulation. The schema's name takes the place of a magic number.
+message State {
+  fixed32 version = 1;  // layout of this message: 1
+  fixed64 frame = 2;    // frame number, strictly increasing within a file
+  double time_s = 3;    // simulated time in seconds from 0, not rounded; the log time is this in whole nanoseconds
+  bytes payload = 4;    // the state, opaque here; little-endian
+}
+"#;
+
+/// One frame of our own channel; [`STATE_PROTO`] says what the fields mean.
+#[derive(Clone, PartialEq, prost::Message)]
+pub(crate) struct State {
+    #[prost(fixed32, tag = "1")]
+    pub version: u32,
+    #[prost(fixed64, tag = "2")]
+    pub frame: u64,
+    #[prost(double, tag = "3")]
+    pub time_s: f64,
+    #[prost(bytes = "vec", tag = "4")]
+    pub payload: Vec<u8>,
+}
+
+/// The compiled form of [`STATE_PROTO`], as `protoc --descriptor_set_out` would give it.
+fn state_descriptor() -> Vec<u8> {
+    let field = |(number, name, kind): (i32, &str, Type)| FieldDescriptorProto {
+        name: Some(name.into()),
+        number: Some(number),
+        label: Some(Label::Optional as i32),
+        r#type: Some(kind as i32),
+        json_name: Some(if name == "time_s" { "timeS".into() } else { name.into() }),
+        ..Default::default()
+    };
+    let fields = [
+        (1, "version", Type::Fixed32),
+        (2, "frame", Type::Fixed64),
+        (3, "time_s", Type::Double),
+        (4, "payload", Type::Bytes),
+    ];
+    let message =
+        DescriptorProto { name: Some("State".into()), field: fields.map(field).to_vec(), ..Default::default() };
+    let file = FileDescriptorProto {
+        name: Some("tumble/State.proto".into()),
+        package: Some("tumble".into()),
+        message_type: vec![message],
+        syntax: Some("proto3".into()),
+        ..Default::default()
+    };
+    FileDescriptorSet { file: vec![file] }.encode_to_vec()
+}
+
+/// Channel numbers of one file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Channels {
+    pub scene: u16,
+    pub transforms: u16,
+    pub state: u16,
+}
+
+/// Writes the three schemas, then the three channels.
+pub(crate) fn add_channels<W: Write + Seek>(writer: &mut Writer<W>, path: &Path) -> Result<Channels> {
+    let mut all = || {
+        let scene = writer.add_schema(SCENE_SCHEMA, PROTOBUF, &published::<SceneUpdate>())?;
+        let transforms = writer.add_schema(TRANSFORMS_SCHEMA, PROTOBUF, &published::<FrameTransforms>())?;
+        let state = writer.add_schema(STATE_SCHEMA, PROTOBUF, &state_descriptor())?;
+        let (none, proto) = (BTreeMap::new(), BTreeMap::from([("proto".to_owned(), STATE_PROTO.to_owned())]));
+        Ok(Channels {
+            scene: writer.add_channel(scene, TOPIC_SCENE, PROTOBUF, &none)?,
+            transforms: writer.add_channel(transforms, TOPIC_TRANSFORMS, PROTOBUF, &none)?,
+            state: writer.add_channel(state, TOPIC_STATE, PROTOBUF, &proto)?,
+        })
+    };
+    all().map_err(RecordError::write(path))
+}
+
+/// The published schema of a Foxglove message: a compiled descriptor set.
+fn published<M: Encode>() -> Vec<u8> {
+    // Every generated message has a schema; `None` is for hand-written encoders only.
+    M::get_schema().map(|schema| schema.data.into_owned()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The text and its compiled form are two writings of one thing.
+    #[test]
+    fn text_and_descriptor_say_the_same() {
+        let set = FileDescriptorSet::decode(&state_descriptor()[..]).unwrap();
+        let file = &set.file[0];
+        assert!(STATE_PROTO.contains(&format!("package {};", file.package())));
+        assert!(STATE_PROTO.contains(&format!("syntax = \"{}\";", file.syntax())));
+        let message = &file.message_type[0];
+        assert!(STATE_PROTO.contains(&format!("message {} {{", message.name())));
+        let compiled: Vec<String> =
+            message.field.iter().map(|f| format!("{} {} = {}", type_word(f.r#type()), f.name(), f.number())).collect();
+        let text: Vec<&str> =
+            STATE_PROTO.lines().filter_map(|line| line.strip_prefix("  ")?.split(';').next()).collect();
+        assert_eq!(compiled, text);
+    }
+
+    fn type_word(kind: Type) -> String {
+        kind.as_str_name().trim_start_matches("TYPE_").to_lowercase()
+    }
+
+    /// Wire bytes worked out by hand: key = number·8 + wire type (5 fixed32, 1 fixed64, 2 bytes), little-endian values.
+    #[test]
+    fn state_bytes_are_as_documented() {
+        let state = State { version: 1, frame: 0x0102, time_s: 0.5, payload: vec![7, 8] };
+        let wire = [
+            &[0x0d, 1, 0, 0, 0][..],
+            &[0x11, 2, 1, 0, 0, 0, 0, 0, 0],
+            &[0x19, 0, 0, 0, 0, 0, 0, 0xe0, 0x3f],
+            &[0x22, 2, 7, 8],
+        ];
+        assert_eq!(state.encode_to_vec(), wire.concat());
+    }
+}

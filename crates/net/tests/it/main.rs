@@ -1,0 +1,10 @@
+//! Recordings, from outside.
+
+mod damage;
+mod hostile;
+mod inputs;
+mod kill;
+mod outside;
+mod recover;
+mod roundtrip;
+mod support;

@@ -1,0 +1,143 @@
+//! What goes in comes out, and the same in gives the same bytes.
+
+use crate::support::*;
+use tumble_net::record::*;
+
+#[test]
+fn frames_come_back_bit_for_bit() {
+    let scratch = Scratch::new("roundtrip");
+    for compression in COMPRESSIONS {
+        let path = scratch.file("a.mcap");
+        record(&path, 100, options(compression, 16));
+        let mut reader = read(&path).unwrap();
+        assert_eq!(reader.world(), WORLD);
+        let names: Vec<_> = reader.entities().iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, ["ball", "crate", "ground"]);
+        let frames: Vec<Frame> = reader.by_ref().map(|frame| frame.unwrap()).collect();
+        assert_eq!(frames.len(), 100);
+        assert_frames(&frames);
+        assert_eq!(reader.ending(), Some(&Ending::Complete));
+    }
+}
+
+#[test]
+fn the_same_run_gives_the_same_bytes() {
+    let scratch = Scratch::new("same");
+    for compression in COMPRESSIONS {
+        let [a, b] = ["a.mcap", "b.mcap"].map(|name| {
+            let path = scratch.file(name);
+            record(&path, 50, options(compression, 8));
+            std::fs::read(path).unwrap()
+        });
+        assert!(a == b, "{compression:?}: two runs differ");
+    }
+}
+
+/// A reader that shares no code with ours accepts the file, its index included.
+#[test]
+fn the_container_is_valid_for_another_reader() {
+    let scratch = Scratch::new("container");
+    let path = scratch.file("a.mcap");
+    record(&path, 20, options(Compression::Zstd, 6));
+    let bytes = std::fs::read(&path).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let stats = summary.stats.unwrap();
+    assert_eq!((stats.schema_count, stats.channel_count, stats.message_count), (3, 3, 1 + 2 * 20));
+    assert_eq!(stats.chunk_count, 1 + 4, "the scene's, and 20 frames by 6");
+    assert_eq!((stats.message_start_time, stats.message_end_time), (0, 79_166_667), "19/240 s in ns, to the nearest");
+    let topics: Vec<String> =
+        mcap::MessageStream::new(&bytes).unwrap().map(|m| m.unwrap().channel.topic.clone()).collect();
+    assert_eq!(topics[..3], [TOPIC_SCENE, TOPIC_TRANSFORMS, TOPIC_STATE]);
+}
+
+#[test]
+fn every_shape_is_drawn_where_it_stands() {
+    let scratch = Scratch::new("shapes");
+    let path = scratch.file("a.mcap");
+    // A quarter turn about y takes z to x.
+    let turned = Pose { position: [1.0, 2.0, 3.0], rotation: [0.0, 0.5f64.sqrt(), 0.0, 0.5f64.sqrt()] };
+    let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let mesh = part(Shape::Mesh { vertices, triangles });
+    let capsule = VisualPart {
+        shape: Shape::Capsule { radius: 0.25, half_height: 2.0 },
+        pose: turned,
+        color: [1.0, 0.0, 0.0, 0.5],
+    };
+    let all = [
+        Entity { name: "mesh".into(), parts: vec![mesh.clone()] },
+        Entity { name: "capsule".into(), parts: vec![capsule] },
+        Entity { name: "none".into(), parts: vec![] },
+    ];
+    Recorder::create(&path, "", &all, RecorderOptions::default()).unwrap().finish().unwrap();
+    let reader = read(&path).unwrap();
+    let [a, b, c] = reader.entities() else { panic!("three entities") };
+    assert_eq!(a.parts, [mesh]);
+    assert!(c.parts.is_empty());
+    let [first, second, tube] = &b.parts[..] else { panic!("two spheres and a cylinder") };
+    assert_eq!(tube.shape, Shape::Cylinder { radius: 0.25, half_height: 2.0 });
+    assert_eq!((tube.pose, tube.color), (turned, [1.0, 0.0, 0.0, 0.5]));
+    for (cap, x) in [(first, -1.0), (second, 3.0)] {
+        assert_eq!(cap.shape, Shape::Sphere { radius: 0.25 });
+        for (got, want) in cap.pose.position.iter().zip([x, 2.0, 3.0]) {
+            assert!((got - want).abs() < 1e-15, "cap at {:?}, should be at x = {x}", cap.pose.position);
+        }
+    }
+}
+
+#[test]
+fn objects_come_and_go() {
+    let scratch = Scratch::new("change");
+    let path = scratch.file("a.mcap");
+    let all = entities();
+    let mut recorder = Recorder::create(&path, WORLD, &all[..2], RecorderOptions::default()).unwrap();
+    recorder.frame(0.0, 0, &poses(0)[..2], b"two").unwrap();
+    recorder.set_entities(0.5, &all).unwrap();
+    recorder.frame(0.5, 1, &poses(1), b"three").unwrap();
+    recorder.set_entities(0.75, &all[2..]).unwrap();
+    recorder.frame(0.75, 2, &poses(2)[2..], b"one").unwrap();
+    recorder.finish().unwrap();
+    let mut reader = read(&path).unwrap();
+    for (names, state) in
+        [(&["ball", "crate"][..], "two"), (&["ball", "crate", "ground"], "three"), (&["ground"], "one")]
+    {
+        let frame = reader.next_frame().unwrap().unwrap();
+        assert_eq!(frame.state, state.as_bytes());
+        assert_eq!(frame.poses.len(), names.len());
+        assert!(reader.entities().iter().map(|e| e.name.as_str()).eq(names.iter().copied()));
+    }
+    assert!(reader.next_frame().unwrap().is_none());
+}
+
+#[test]
+fn a_dropped_recorder_leaves_a_complete_file() {
+    let scratch = Scratch::new("drop");
+    let path = scratch.file("a.mcap");
+    let mut recorder = Recorder::create(&path, WORLD, &entities(), options(Compression::Lz4, 1000)).unwrap();
+    for k in 0..10 {
+        recorder.frame(time(k), k, &poses(k), &state(k)).unwrap();
+    }
+    assert_eq!(recorder.flushed_frames(), 0);
+    drop(recorder);
+    let (frames, ending) = read_all(&path);
+    assert_eq!((frames.len(), ending.unwrap()), (10, Ending::Complete));
+    assert_frames(&frames);
+}
+
+/// 240 frames a second for a second: a flush every quarter leaves 60, 120, 180 (and the frame that completes it).
+#[test]
+fn flushes_follow_simulated_time_and_size() {
+    let scratch = Scratch::new("flush");
+    let by_time = RecorderOptions { flush_every: FlushEvery::SimulatedSeconds(0.25), ..Default::default() };
+    let mut recorder = Recorder::create(scratch.file("t.mcap"), WORLD, &entities(), by_time).unwrap();
+    let mut flushed = Vec::new();
+    for k in 0..240 {
+        recorder.frame(time(k), k, &poses(k), &state(k)).unwrap();
+        flushed.push(recorder.flushed_frames());
+    }
+    assert_eq!((flushed[59], flushed[60], flushed[119], flushed[120], flushed[180]), (0, 61, 61, 121, 181));
+    let by_size = RecorderOptions { chunk_size: 1, flush_every: FlushEvery::Frames(u32::MAX), ..Default::default() };
+    let mut recorder = Recorder::create(scratch.file("s.mcap"), WORLD, &entities(), by_size).unwrap();
+    recorder.frame(0.0, 0, &poses(0), &[]).unwrap();
+    assert_eq!(recorder.flushed_frames(), 1);
+}
