@@ -17,8 +17,22 @@ use crate::rows::Rows;
 pub struct Accuracy {
     /// Sweeps at most, at least 1.
     pub sweeps: u32,
+    /// Relaxations of one block at most, all sweeps of an island together: large islands get fewer sweeps, so that the cost of a
+    /// step is bounded, but never fewer than [`FEWEST_SWEEPS`] (or `sweeps`, if that is less).
+    pub relaxations: u32,
     /// A sweep that changes no row velocity by more than this ends the solve (m/s; m/s² at the acceleration level).
     pub tolerance: f64,
+}
+
+/// What an island gets however large it is.
+pub const FEWEST_SWEEPS: u32 = 20;
+
+impl Accuracy {
+    /// Sweeps for an island of that many blocks.
+    pub fn sweeps_of(&self, blocks: usize) -> u32 {
+        let share = self.relaxations / (blocks.max(1) as u32);
+        share.max(FEWEST_SWEEPS).min(self.sweeps).max(1)
+    }
 }
 
 /// How one island's solve ended.

@@ -159,7 +159,7 @@ impl Backtracking {
         warm_start(core, work, 1.0);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         let s = core.settings.accuracy;
-        let ray = solve(core, work, Accuracy { sweeps: s.sweeps.max(2000), tolerance: s.tolerance }, |b| keep[b]);
+        let ray = solve(core, work, Accuracy { sweeps: s.sweeps.max(2000), relaxations: s.relaxations.max(1_000_000), tolerance: s.tolerance }, |b| keep[b]);
         let mut held = vec![0.0; core.dof];
         if ray {
             // no force at the acceleration level keeps the contacts: an impulse without collision does

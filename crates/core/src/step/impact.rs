@@ -34,7 +34,8 @@ const APPROACH: f64 = 1e-10;
 
 /// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`.
 pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candidate], cap: u32, u: &mut [f64], total: &mut [f64]) {
-    let accuracy = Accuracy { sweeps: core.settings.accuracy.sweeps.max(2000), tolerance: core.settings.accuracy.tolerance.min(1e-14) };
+    let set = core.settings.accuracy;
+    let accuracy = Accuracy { sweeps: set.sweeps.max(2000), relaxations: set.relaxations.max(100_000), tolerance: set.tolerance.min(1e-14) };
     let guard = !something_is_led(core);
     let mut c = Vec::new();
     for pass in 0..=cap {

@@ -36,7 +36,7 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, mean: &[f64], h: f6
     let mut du = vec![0.0; core.dof];
     let targets = &work.targets;
     work.islands.build(&work.rows, |b| b < touches || !matches!(targets[b - touches].set, RowSet::Interval { .. }));
-    let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, tolerance: 0.1 * SMALLEST / h };
+    let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, relaxations: u32::MAX, tolerance: 0.1 * SMALLEST / h };
     for blocks in work.islands.iter().filter(|blocks| blocks.iter().any(|&b| violated(b as usize, &work.c))) {
         GaussSeidel.solve(&rows, blocks, &c, &mut lambda, &mut du, accuracy);
     }
