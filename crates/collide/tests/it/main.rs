@@ -1,5 +1,8 @@
 //! One binary for all integration tests of the crate.
 
 mod broad;
+mod meshes;
 mod primitives;
 mod rng;
+mod shared_meshes;
+mod trees;
