@@ -19,6 +19,9 @@ pub enum ShapeError {
     /// A half-space has no volume, mass or centre.
     #[error("a half-space is unbounded and has no mass properties; make the body static")]
     Unbounded,
+    /// A mesh that makes no shape.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
 }
 
 /// A mesh that cannot be read or is no solid. The caller adds the file's name. Vertices and faces count from 1.

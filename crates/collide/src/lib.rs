@@ -12,6 +12,7 @@ mod mesh;
 mod narrow;
 mod pose;
 mod shape;
+mod solid;
 mod tree;
 
 pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
@@ -22,4 +23,5 @@ pub use mesh::{ClosedReport, ClosestPoint, MeshDistance, TriMesh};
 pub use narrow::contacts;
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use shape::Shape;
+pub use solid::{CylinderShape, MeshShape};
 pub use tree::{Builder, SphereNode, SphereTree, TreeSettings};

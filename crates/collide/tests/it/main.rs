@@ -1,5 +1,6 @@
 //! One binary for all integration tests of the crate.
 
+mod against_parry;
 mod broad;
 mod meshes;
 mod primitives;
