@@ -19,4 +19,143 @@ pub enum ShapeError {
     /// A half-space has no volume, mass or centre.
     #[error("a half-space is unbounded and has no mass properties; make the body static")]
     Unbounded,
+    /// A mesh that makes no shape.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// A mesh that cannot be read or is no solid. The caller adds the file's name. Vertices and faces count from 1.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum MeshError {
+    /// An error with the line it was found on.
+    #[error("line {line}: {error}")]
+    At {
+        /// From 1.
+        line: usize,
+        /// What is wrong there.
+        error: Box<MeshError>,
+    },
+    /// Text that cannot be read.
+    #[error("line {line}: {what}")]
+    Syntax {
+        /// From 1.
+        line: usize,
+        /// What was found.
+        what: String,
+    },
+    /// No triangle at all.
+    #[error("the mesh has no triangles; at least 4 are needed to close a solid")]
+    Empty,
+    /// A vertex that is NaN or infinite.
+    #[error("vertex {vertex} is ({x}, {y}, {z}), but coordinates must be finite")]
+    NotFinite {
+        /// From 1.
+        vertex: usize,
+        /// As read.
+        x: f64,
+        /// As read.
+        y: f64,
+        /// As read.
+        z: f64,
+    },
+    /// A corner of an STL facet that is NaN or infinite.
+    #[error("facet {face} has the vertex ({x}, {y}, {z}), but coordinates must be finite")]
+    NotFiniteInFace {
+        /// From 1.
+        face: usize,
+        /// As read.
+        x: f64,
+        /// As read.
+        y: f64,
+        /// As read.
+        z: f64,
+    },
+    /// A face that points at a vertex that does not exist.
+    #[error("face {face} points at vertex {index}, but there are {count} vertices")]
+    IndexOutOfRange {
+        /// From 1.
+        face: usize,
+        /// As read, counted from 1 (0 or less: before the first).
+        index: i64,
+        /// How many vertices there are.
+        count: usize,
+    },
+    /// A binary STL whose size does not fit the count in its header.
+    #[error("the STL header announces {count} triangles ({needed} bytes), but the file has {size} bytes")]
+    StlSize {
+        /// As announced.
+        count: usize,
+        /// Bytes that many triangles take.
+        needed: usize,
+        /// Bytes there are.
+        size: usize,
+    },
+    /// Neither text nor binary STL.
+    #[error("no STL: {size} bytes, neither text that begins with `solid` nor a binary header of 84 bytes")]
+    StlShort {
+        /// Bytes there are.
+        size: usize,
+    },
+    /// Edges with a face on one side only.
+    #[error("the mesh is open: {edges} edges have a face on one side only, in {holes} hole(s); the first hole has {first_hole} edges and \
+             begins at edge {from}–{to} of face {face}; close it")]
+    Open {
+        /// How many such edges there are.
+        edges: usize,
+        /// How many loops they form.
+        holes: usize,
+        /// Edges of the loop with the first such edge.
+        first_hole: usize,
+        /// The first such edge.
+        from: u32,
+        /// The first such edge.
+        to: u32,
+        /// The face it belongs to.
+        face: usize,
+    },
+    /// An edge whose faces do not pair up (a fin, or a Möbius band).
+    #[error("edge {from}–{to} of face {face} is shared by {faces} faces that do not pair up ({edges} such edge(s), {open} open edge(s)): \
+             remove the dangling face or split the edge")]
+    NonManifold {
+        /// How many such edges there are.
+        edges: usize,
+        /// How many edges have one face.
+        open: usize,
+        /// Faces at the first one.
+        faces: usize,
+        /// The first such edge.
+        from: u32,
+        /// The first such edge.
+        to: u32,
+        /// The face named: one with an open edge (the fin) where there is one.
+        face: usize,
+    },
+    /// A closed surface around nothing.
+    #[error("the mesh is closed but encloses no volume ({volume:e} m³); it must be a solid")]
+    NoVolume {
+        /// What was found, m³.
+        volume: f64,
+    },
+    /// A lathe profile that makes no solid.
+    #[error("the profile {what}")]
+    Profile {
+        /// What is wrong.
+        what: String,
+    },
+    /// Sphere tree settings out of range.
+    #[error("{what} is {value}, but must be {allowed}")]
+    Settings {
+        /// Which setting.
+        what: &'static str,
+        /// As given.
+        value: f64,
+        /// What would be right.
+        allowed: &'static str,
+    },
+    /// A sphere tree that breaks one of its promises: an error in the builder, never in the data.
+    #[error("the sphere tree is wrong: {what}")]
+    Tree {
+        /// Which promise, and where.
+        what: String,
+    },
 }

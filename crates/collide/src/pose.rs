@@ -29,3 +29,11 @@ impl Aabb {
         Aabb { min: self.min.add_scalar(-margin), max: self.max.add_scalar(margin) }
     }
 }
+
+impl Aabb {
+    /// The least box around points; empty (`min = +∞ > max = −∞`) if there are none.
+    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Aabb {
+        let empty = Aabb { min: Vec3::repeat(f64::INFINITY), max: Vec3::repeat(f64::NEG_INFINITY) };
+        points.into_iter().fold(empty, |b, p| Aabb { min: b.min.inf(&p), max: b.max.sup(&p) })
+    }
+}

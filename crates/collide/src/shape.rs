@@ -1,6 +1,8 @@
 //! The shapes that a body's part can have.
 
-use crate::{Aabb, MassProperties, Pose, ShapeError, Vec3, mass};
+use crate::solid::tree_box;
+use crate::{Aabb, CylinderShape, MassProperties, MeshShape, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3, mass};
+use std::sync::Arc;
 
 /// A solid in its own frame. Primitives are centred on the origin.
 #[derive(Clone, Debug)]
@@ -24,6 +26,10 @@ pub enum Shape {
         /// From the centre to an end of the segment (caps not counted), metres.
         half_length: f64,
     },
+    /// A cylinder along the local z axis; shared, because its tree is large.
+    Cylinder(Arc<CylinderShape>),
+    /// A closed mesh about its centre of mass; shared.
+    Mesh(Arc<MeshShape>),
 }
 
 impl Shape {
@@ -53,15 +59,40 @@ impl Shape {
         Ok(Shape::Capsule { radius, half_length })
     }
 
+    /// A cylinder along z: radius and half length, metres.
+    pub fn cylinder(radius: f64, half_length: f64) -> Result<Shape, ShapeError> {
+        length("radius of a cylinder", radius)?;
+        length("half length of a cylinder", half_length)?;
+        Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, half_length)?)))
+    }
+
+    /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its centre of mass is the origin. Also
+    /// returns the offset that was subtracted from its vertices, metres.
+    pub fn mesh(mesh: TriMesh, settings: &TreeSettings) -> Result<(Shape, Vec3), ShapeError> {
+        let (shape, offset) = MeshShape::new(mesh, settings)?;
+        Ok((Shape::Mesh(Arc::new(shape)), offset))
+    }
+
+    /// The sphere tree of a mesh or cylinder.
+    pub fn tree(&self) -> Option<&SphereTree> {
+        match self {
+            Shape::Cylinder(cylinder) => Some(cylinder.tree()),
+            Shape::Mesh(mesh) => Some(mesh.tree()),
+            _ => None,
+        }
+    }
+
     /// The box in world axes around the shape at `pose`. A half-space that faces along an axis
-    /// is bounded on that side; any other is unbounded on all sides.
+    /// is bounded on that side; any other is unbounded on all sides. Meshes and cylinders include the leaves of their trees.
     pub fn aabb(&self, pose: &Pose) -> Aabb {
-        let center = pose.translation.vector;
-        let half = match self {
+        let here = pose.translation.vector;
+        let (center, half) = match self {
             Shape::HalfSpace => return half_space_aabb(pose),
-            Shape::Sphere { radius } => Vec3::repeat(*radius),
-            Shape::Box { half_extents } => pose.rotation.to_rotation_matrix().matrix().abs() * half_extents,
-            Shape::Capsule { radius, half_length } => (axis(pose).abs() * *half_length).add_scalar(*radius),
+            Shape::Sphere { radius } => (here, Vec3::repeat(*radius)),
+            Shape::Box { half_extents } => (here, pose.rotation.to_rotation_matrix().matrix().abs() * half_extents),
+            Shape::Capsule { radius, half_length } => (here, (axis(pose).abs() * *half_length).add_scalar(*radius)),
+            Shape::Cylinder(cylinder) => tree_box(cylinder.tree(), pose),
+            Shape::Mesh(mesh) => tree_box(mesh.tree(), pose),
         };
         Aabb { min: center - half, max: center + half }
     }
@@ -76,6 +107,8 @@ impl Shape {
             Shape::Sphere { radius } => Ok(mass::sphere(*radius, density)),
             Shape::Box { half_extents } => Ok(mass::cuboid(half_extents, density)),
             Shape::Capsule { radius, half_length } => Ok(mass::capsule(*radius, *half_length, density)),
+            Shape::Cylinder(c) => Ok(mass::cylinder(c.radius(), c.half_length(), density)),
+            Shape::Mesh(mesh) => Ok(mesh.mass_properties(density)),
         }
     }
 
@@ -88,6 +121,8 @@ impl Shape {
             Shape::Capsule { radius, half_length } => {
                 mass::sphere_volume(*radius) + mass::cylinder_volume(*radius, *half_length)
             }
+            Shape::Cylinder(c) => mass::cylinder_volume(c.radius(), c.half_length()),
+            Shape::Mesh(mesh) => mesh.volume(),
         }
     }
 
@@ -98,6 +133,8 @@ impl Shape {
             Shape::Sphere { radius } => *radius,
             Shape::Box { half_extents } => half_extents.norm(),
             Shape::Capsule { radius, half_length } => radius + half_length,
+            Shape::Cylinder(c) => (c.radius().powi(2) + c.half_length().powi(2)).sqrt(),
+            Shape::Mesh(mesh) => mesh.bounding_radius(),
         }
     }
 }

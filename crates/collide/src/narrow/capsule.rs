@@ -55,8 +55,8 @@ fn any_perpendicular(e: &Vec3) -> Vec3 {
     e.cross(&Vec3::ith(e.iamin(), 1.0)).normalize()
 }
 
-/// Contacts at both ends of the stretch where the two run side by side; false if they tell less than the
-/// closest points do (no overlap, or the closest points lie inside it).
+/// Contacts at both ends of the stretch where the two run side by side; false if there is none, or if the closest points, at gap
+/// `least`, lie inside it and so tell more.
 fn push_overlap_ends(a: (Vec3, Vec3, f64), b: (Vec3, Vec3, f64), least: f64, margin: f64, out: &mut Vec<Contact>) -> bool {
     let ((ca, ua, ra), (cb, ub, rb)) = (a, b);
     let uu = ua.norm_squared();
@@ -72,11 +72,11 @@ fn push_overlap_ends(a: (Vec3, Vec3, f64), b: (Vec3, Vec3, f64), least: f64, mar
     };
     let pair = [at(low, 1), at(high, 2)];
     let touching = pair[0].gap + ra + rb < 1e-9 * (ra + rb) || pair[1].gap + ra + rb < 1e-9 * (ra + rb);
-    if touching || pair[0].gap.min(pair[1].gap) > least + 1e-3 * (ra + rb) {
+    if touching {
         return false;
     }
     out.extend(pair.into_iter().filter(|c| c.gap <= margin));
-    true
+    pair[0].gap.min(pair[1].gap) <= least + 1e-9 * (ra + rb)
 }
 
 /// All in the box's frame until a contact is emitted.

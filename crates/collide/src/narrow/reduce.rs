@@ -3,7 +3,7 @@
 //! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from it; the one that makes
 //! the greatest triangle; the one furthest out on the other side of it. Ties go to the earlier point.
 
-use crate::{Contact, Vec3};
+use crate::{Contact, Pose, Vec3};
 
 /// Keeps at most four of `out[start..]`, in the order they were found.
 pub(super) fn to_four(out: &mut Vec<Contact>, start: usize) {
@@ -48,3 +48,111 @@ fn best(count: usize, score: impl Fn(usize) -> f64) -> usize {
 fn outside_triangle([a, b, c]: [Vec3; 3], side: f64, normal: &Vec3, p: Vec3) -> f64 {
     [(a, b), (b, c), (c, a)].iter().map(|(u, v)| -side * (v - u).cross(&(p - u)).dot(normal)).fold(f64::NEG_INFINITY, f64::max)
 }
+
+/// Contacts whose normals are within this cosine of the deepest one's belong together.
+const SAME_SIDE: f64 = 0.85;
+/// Above this many, those found so far are reduced, so that a deep overlap costs no memory.
+const PENDING: usize = 512;
+/// At most this many sides.
+const MOST_CLUSTERS: usize = 8;
+/// Tilt (radians, its tangent) for which a support point is kept.
+const TILT: f64 = 0.03;
+
+/// Gathers the many contacts of leaf balls in B's frame at the end of `out` and keeps few.
+///
+/// Contacts are clustered by normal, the deepest first. Of each cluster are kept the deepest, and for each of five directions the
+/// point that would touch first if A tilted a little that way: the vertices of the manifold's lower hull, which is what it can rest on.
+pub(super) struct Collector<'a> {
+    out: &'a mut Vec<Contact>,
+    start: usize,
+}
+
+impl<'a> Collector<'a> {
+    pub fn new(out: &'a mut Vec<Contact>) -> Collector<'a> {
+        Collector { start: out.len(), out }
+    }
+
+    pub fn push(&mut self, contact: Contact) {
+        if self.out.len() - self.start >= PENDING {
+            self.reduce();
+        }
+        self.out.push(contact);
+    }
+
+    /// Reduces what was gathered and turns it into world axes.
+    pub fn finish(mut self, pose_b: &Pose) {
+        self.reduce();
+        for contact in &mut self.out[self.start..] {
+            contact.point = (pose_b * nalgebra::Point3::from(contact.point)).coords;
+            contact.normal = pose_b.rotation * contact.normal;
+        }
+    }
+
+    fn reduce(&mut self) {
+        let found = &mut self.out[self.start..];
+        if found.len() < 2 {
+            return;
+        }
+        found.sort_unstable_by(|a, b| a.gap.total_cmp(&b.gap).then(a.feature.cmp(&b.feature)));
+        // `rest` is what no cluster has taken yet, deepest first; kept contacts gather at the front
+        let (mut kept, mut rest) = (0, 0);
+        for _ in 0..MOST_CLUSTERS {
+            if rest == found.len() {
+                break;
+            }
+            let end = gather_cluster(found, rest);
+            let count = keep_hull(&mut found[rest..end]);
+            for n in 0..count {
+                found.swap(kept + n, rest + n);
+            }
+            kept += count;
+            rest = end;
+        }
+        let length = self.start + kept;
+        self.out.truncate(length);
+    }
+}
+
+/// Moves all of `found[first..]` that face the way of `found[first]` next to it, both parts staying in order; returns their end.
+fn gather_cluster(found: &mut [Contact], first: usize) -> usize {
+    let normal = found[first].normal;
+    let tail = &mut found[first..];
+    // a stable partition in place: order within the tail is by gap and feature, restored by a sort of each half
+    let mut end = 0;
+    for n in 0..tail.len() {
+        if tail[n].normal.dot(&normal) >= SAME_SIDE {
+            tail.swap(end, n);
+            end += 1;
+        }
+    }
+    let by_depth = |a: &Contact, b: &Contact| a.gap.total_cmp(&b.gap).then(a.feature.cmp(&b.feature));
+    tail[..end].sort_unstable_by(by_depth);
+    tail[end..].sort_unstable_by(by_depth);
+    first + end
+}
+
+/// Moves to the front the deepest contact of a cluster and its support points in five tilted directions; returns how many.
+fn keep_hull(cluster: &mut [Contact]) -> usize {
+    let normal = cluster[0].normal;
+    let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
+    let v = normal.cross(&u);
+    let mut kept = 1;
+    for (x, y) in DIRECTIONS {
+        let way = (u * x + v * y) * TILT;
+        let support = best(cluster.len(), |n| way.dot(&cluster[n].point) - cluster[n].gap);
+        if support >= kept {
+            cluster.swap(kept, support);
+            kept += 1;
+        }
+    }
+    kept
+}
+
+/// Corners of a regular pentagon.
+const DIRECTIONS: [(f64, f64); 5] = [
+    (1.0, 0.0),
+    (0.309_016_994_374_947_45, 0.951_056_516_295_153_5),
+    (-0.809_016_994_374_947_5, 0.587_785_252_292_473_1),
+    (-0.809_016_994_374_947_5, -0.587_785_252_292_473_1),
+    (0.309_016_994_374_947_45, -0.951_056_516_295_153_5),
+];

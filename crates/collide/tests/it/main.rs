@@ -1,5 +1,9 @@
 //! One binary for all integration tests of the crate.
 
+mod against_parry;
 mod broad;
+mod meshes;
 mod primitives;
 mod rng;
+mod shared_meshes;
+mod trees;

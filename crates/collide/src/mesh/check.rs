@@ -1,0 +1,284 @@
+//! Is the mesh a solid? Harmless defects are mended and told; the rest is an error that names where.
+//!
+//! A surface is closed and consistently wound iff every directed edge `u→v` is met by as many `v→u`. More than one of each is a
+//! non-manifold edge with a well-defined volume, which is accepted and told.
+
+use super::TriMesh;
+use crate::{MeshError, Vec3};
+
+/// What [`TriMesh::check_closed`] found and did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClosedReport {
+    /// Vertices merged with another at exactly the same place.
+    pub welded_vertices: usize,
+    /// Zero-area faces removed.
+    pub degenerate_faces: usize,
+    /// Faces removed because the same face was there before (coincident shells).
+    pub duplicate_faces: usize,
+    /// Faces reversed to agree with their neighbours.
+    pub flipped_faces: usize,
+    /// Whether the whole mesh was inside out.
+    pub turned: bool,
+    /// Edges with four or more faces.
+    pub nonmanifold_edges: usize,
+    /// Connected pieces of the surface.
+    pub shells: usize,
+    /// Volume, m³.
+    pub volume: f64,
+}
+
+impl ClosedReport {
+    /// One sentence per thing a user should know; empty for a faultless mesh.
+    pub fn notes(&self) -> Vec<String> {
+        let counted = [
+            (self.welded_vertices, "vertices at the same place were welded"),
+            (self.degenerate_faces, "faces of zero area were dropped"),
+            (self.duplicate_faces, "faces that were there twice were dropped"),
+            (self.flipped_faces, "faces were reversed to agree with their neighbours"),
+            (self.nonmanifold_edges, "edges have four or more faces (accepted: the volume is well defined)"),
+        ];
+        let mut notes: Vec<String> = counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        if self.turned {
+            notes.push("the mesh was inside out and was turned".into());
+        }
+        if self.shells > 1 {
+            notes.push(format!("the surface has {} separate shells; where they overlap the mass counts more than once", self.shells));
+        }
+        notes
+    }
+}
+
+impl TriMesh {
+    /// Makes sure that the mesh is a closed, outward-wound solid. Welds equal vertices, drops zero-area and duplicate faces, makes
+    /// the winding consistent and turns an inside-out mesh, all in place and told in the report. An open or dangling surface, or one
+    /// without volume, is an error, and the mesh is then left as it was. Vertex numbers in errors are those after welding.
+    pub fn check_closed(&mut self) -> Result<ClosedReport, MeshError> {
+        self.check_data()?;
+        // zero-area faces are first dropped; where that opens a seam that they close, they stay
+        let (mesh, report) = self.mended(true).or_else(|error| self.mended(false).map_err(|_| error))?;
+        *self = mesh;
+        Ok(report)
+    }
+
+    fn mended(&self, drop_collinear: bool) -> Result<(TriMesh, ClosedReport), MeshError> {
+        let (mut mesh, welded_vertices) = self.welded();
+        let mut report = ClosedReport { welded_vertices, ..ClosedReport::default() };
+        report.degenerate_faces = mesh.drop_degenerate(drop_collinear);
+        report.duplicate_faces = mesh.drop_duplicates();
+        if mesh.triangles.is_empty() {
+            return Err(MeshError::Empty);
+        }
+        if unbalanced(&edge_groups(&mesh)).next().is_some() {
+            report.flipped_faces = mesh.unify_winding();
+        }
+        let groups = edge_groups(&mesh);
+        refuse_unbalanced(&groups)?;
+        report.nonmanifold_edges = groups.iter().filter(|g| g.len() > 2).count();
+        report.shells = shell_of_faces(&mesh, &groups).1;
+        report.volume = mesh.signed_volume();
+        if report.volume.abs() < 1e-12 * mesh.diagonal().powi(3) {
+            return Err(MeshError::NoVolume { volume: report.volume });
+        }
+        if report.volume < 0.0 {
+            mesh.turn();
+            (report.turned, report.volume) = (true, -report.volume);
+        }
+        Ok((mesh, report))
+    }
+
+    /// Merges vertices at exactly the same place (`-0` equals `0`) and drops those not in use; also returns how many were merged.
+    pub(crate) fn welded(&self) -> (TriMesh, usize) {
+        let mut order: Vec<u32> = self.triangles.iter().flatten().copied().collect();
+        order.sort_unstable();
+        order.dedup();
+        let used = order.len();
+        let key = |v: u32| self.vertices[v as usize].map(|x| x + 0.0);
+        let compare = |a: &Vec3, b: &Vec3| (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal);
+        order.sort_by(|&u, &v| compare(&key(u), &key(v)).then(u.cmp(&v)));
+        // each vertex stands for the first of its place
+        let mut stands_for: Vec<u32> = (0..self.vertices.len() as u32).collect();
+        for w in 1..order.len() {
+            let (before, here) = (order[w - 1], order[w]);
+            if key(before) == key(here) {
+                stands_for[here as usize] = stands_for[before as usize];
+            }
+        }
+        let mut kept: Vec<u32> = order.iter().copied().filter(|&v| stands_for[v as usize] == v).collect();
+        kept.sort_unstable();
+        let index = |v: u32| kept.partition_point(|&k| k < stands_for[v as usize]) as u32;
+        let triangles = self.triangles.iter().map(|t| t.map(index)).collect();
+        (TriMesh { vertices: kept.iter().map(|&v| self.vertices[v as usize]).collect(), triangles }, used - kept.len())
+    }
+
+    fn drop_degenerate(&mut self, collinear_too: bool) -> usize {
+        let before = self.triangles.len();
+        let vertices = &self.vertices;
+        self.triangles.retain(|&[a, b, c]| {
+            let repeated = a == b || b == c || c == a;
+            let [u, v] = [b, c].map(|k| vertices[k as usize] - vertices[a as usize]);
+            !repeated && !(collinear_too && u.cross(&v).norm() <= 1e-14 * u.norm_squared().max(v.norm_squared()))
+        });
+        before - self.triangles.len()
+    }
+
+    /// Drops a face that has the same corners in the same sense as an earlier one.
+    fn drop_duplicates(&mut self) -> usize {
+        let before = self.triangles.len();
+        let smallest_first = |t: [u32; 3]| {
+            let k = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
+            [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
+        };
+        let mut order: Vec<([u32; 3], usize)> = self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
+        order.sort_unstable();
+        order.dedup_by_key(|(t, _)| *t);
+        order.sort_unstable_by_key(|(_, n)| *n);
+        self.triangles = order.iter().map(|&(_, n)| self.triangles[n]).collect();
+        before - self.triangles.len()
+    }
+
+    /// Spreads the winding of each shell's first face over edges of two faces, then turns each shell that was changed outwards.
+    fn unify_winding(&mut self) -> usize {
+        let groups = edge_groups(self);
+        let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.triangles.len()];
+        for group in groups.iter().filter(|g| g.len() == 2) {
+            let (a, b) = (group[0], group[1]);
+            neighbours[a.face].push((b.face, a.forward == b.forward));
+            neighbours[b.face].push((a.face, a.forward == b.forward));
+        }
+        let original = self.triangles.clone();
+        let mut seen = vec![false; original.len()];
+        for seed in 0..original.len() {
+            if !seen[seed] {
+                self.unify_shell(seed, &neighbours, &mut seen);
+            }
+        }
+        (0..original.len()).filter(|&t| original[t] != self.triangles[t]).count()
+    }
+
+    fn unify_shell(&mut self, seed: usize, neighbours: &[Vec<(usize, bool)>], seen: &mut [bool]) {
+        let mut shell = vec![(seed, false)];
+        seen[seed] = true;
+        let mut next = 0;
+        while next < shell.len() {
+            let (face, flip) = shell[next];
+            for &(other, disagree) in &neighbours[face] {
+                if !seen[other] {
+                    seen[other] = true;
+                    shell.push((other, flip ^ disagree));
+                }
+            }
+            next += 1;
+        }
+        if shell.iter().all(|(_, flip)| !flip) {
+            return;
+        }
+        let origin = self.corners(seed)[0];
+        let volume: f64 = shell.iter().map(|&(t, flip)| {
+            let [a, b, c] = self.corners(t).map(|p| p - origin);
+            let d = a.dot(&b.cross(&c));
+            if flip { -d } else { d }
+        }).sum();
+        for (t, flip) in shell {
+            if flip ^ (volume < 0.0) {
+                self.triangles[t].swap(1, 2);
+            }
+        }
+    }
+}
+
+/// One face's use of an edge.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct EdgeUse {
+    pub low: u32,
+    pub high: u32,
+    pub face: usize,
+    /// Whether the face goes from `low` to `high`.
+    pub forward: bool,
+}
+
+/// The uses of each undirected edge, edges in ascending order.
+pub(super) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
+    let mut uses: Vec<EdgeUse> = Vec::with_capacity(3 * mesh.triangles.len());
+    for (face, t) in mesh.triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (u, v) = (t[k], t[(k + 1) % 3]);
+            uses.push(EdgeUse { low: u.min(v), high: u.max(v), face, forward: u < v });
+        }
+    }
+    uses.sort_unstable();
+    uses.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)).map(<[EdgeUse]>::to_vec).collect()
+}
+
+fn unbalanced(groups: &[Vec<EdgeUse>]) -> impl Iterator<Item = &Vec<EdgeUse>> {
+    groups.iter().filter(|g| 2 * g.iter().filter(|u| u.forward).count() != g.len())
+}
+
+fn refuse_unbalanced(groups: &[Vec<EdgeUse>]) -> Result<(), MeshError> {
+    let bad: Vec<&Vec<EdgeUse>> = unbalanced(groups).collect();
+    let Some(first) = bad.first() else { return Ok(()) };
+    let open: Vec<EdgeUse> = bad.iter().filter(|g| g.len() == 1).map(|g| g[0]).collect();
+    if let Some(shared) = bad.iter().find(|g| g.len() > 1) {
+        // the dangling face is the one at this edge that also has an open edge
+        let fin = shared.iter().find(|u| open.iter().any(|o| o.face == u.face)).unwrap_or(&shared[0]);
+        return Err(MeshError::NonManifold {
+            edges: bad.len() - open.len(),
+            open: open.len(),
+            faces: shared.len(),
+            from: shared[0].low + 1,
+            to: shared[0].high + 1,
+            face: fin.face + 1,
+        });
+    }
+    let loops = joined(open.len(), |a, b| touches(&open[a], &open[b]));
+    Err(MeshError::Open {
+        edges: open.len(),
+        holes: loops.iter().enumerate().filter(|(n, l)| n == *l).count(),
+        first_hole: loops.iter().filter(|l| **l == loops[0]).count(),
+        from: first[0].low + 1,
+        to: first[0].high + 1,
+        face: first[0].face + 1,
+    })
+}
+
+fn touches(a: &EdgeUse, b: &EdgeUse) -> bool {
+    [a.low, a.high].iter().any(|v| *v == b.low || *v == b.high)
+}
+
+/// Groups `0..count` by a relation; each item gets the least member of its group. Quadratic, but open edges are few or the
+/// answer's wording does not matter; beyond 2000 all count as one group.
+fn joined(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
+    if count > 2000 {
+        return vec![0; count];
+    }
+    let mut group: Vec<usize> = (0..count).collect();
+    for a in 0..count {
+        for b in 0..a {
+            let (ga, gb) = (group[a], group[b]);
+            if ga != gb && related(a, b) {
+                group.iter_mut().filter(|g| **g == ga.max(gb)).for_each(|g| *g = ga.min(gb));
+            }
+        }
+    }
+    group
+}
+
+/// The shell that each face belongs to (connected over edges), and how many there are.
+fn shell_of_faces(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> (Vec<usize>, usize) {
+    let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
+    fn root(parent: &mut [usize], mut f: usize) -> usize {
+        while parent[f] != f {
+            parent[f] = parent[parent[f]];
+            f = parent[f];
+        }
+        f
+    }
+    for group in groups {
+        for pair in group.windows(2) {
+            let (a, b) = (root(&mut parent, pair[0].face), root(&mut parent, pair[1].face));
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    let roots: Vec<usize> = (0..parent.len()).map(|f| root(&mut parent, f)).collect();
+    let count = roots.iter().enumerate().filter(|(f, r)| f == *r).count();
+    (roots, count)
+}

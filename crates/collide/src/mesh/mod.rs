@@ -1,0 +1,70 @@
+//! Triangle meshes: reading, checking, generating, integrating, measuring distance to.
+
+mod check;
+mod distance;
+mod generate;
+mod integrals;
+mod obj;
+mod stl;
+
+pub use check::ClosedReport;
+pub use distance::{ClosestPoint, MeshDistance};
+
+use crate::{Aabb, MeshError, Vec3};
+
+/// A surface made of triangles, counter-clockwise seen from outside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriMesh {
+    /// Positions, metres.
+    pub vertices: Vec<Vec3>,
+    /// Three indices into `vertices` each.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriMesh {
+    /// The corners of triangle `t`; the index must be in range.
+    pub fn corners(&self, t: usize) -> [Vec3; 3] {
+        self.triangles[t].map(|v| self.vertices[v as usize])
+    }
+
+    /// The box around the vertices in use by triangles or not; empty (`min > max`) if there are none.
+    pub fn aabb(&self) -> Aabb {
+        Aabb::around(self.vertices.iter().copied())
+    }
+
+    /// Length of the diagonal of the bounding box, metres (0 for an empty mesh).
+    pub fn diagonal(&self) -> f64 {
+        if self.vertices.is_empty() { 0.0 } else { (self.aabb().max - self.aabb().min).norm() }
+    }
+
+    /// The same mesh moved by `offset` metres.
+    pub fn translated(mut self, offset: &Vec3) -> TriMesh {
+        self.vertices.iter_mut().for_each(|v| *v += offset);
+        self
+    }
+
+    /// The same mesh scaled about the origin.
+    pub fn scaled(mut self, factor: f64) -> TriMesh {
+        self.vertices.iter_mut().for_each(|v| *v *= factor);
+        self
+    }
+
+    /// Refuses an empty mesh, vertices that are not finite and indices out of range, naming the first offender
+    /// (numbers count from 1, as in an OBJ file).
+    pub fn check_data(&self) -> Result<(), MeshError> {
+        if self.triangles.is_empty() {
+            return Err(MeshError::Empty);
+        }
+        if let Some(n) = self.vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
+            let v = self.vertices[n];
+            return Err(MeshError::NotFinite { vertex: n + 1, x: v.x, y: v.y, z: v.z });
+        }
+        let count = self.vertices.len();
+        for (n, triangle) in self.triangles.iter().enumerate() {
+            if let Some(&v) = triangle.iter().find(|&&v| v as usize >= count) {
+                return Err(MeshError::IndexOutOfRange { face: n + 1, index: i64::from(v) + 1, count });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,74 @@
+//! Wavefront OBJ, the geometry only: `v` and `f` lines. Everything else is passed over.
+//!
+//! Faces may be written `v`, `v/vt`, `v//vn` or `v/vt/vn`; a negative index counts back from the last vertex read;
+//! a polygon becomes a fan around its first corner.
+
+use super::TriMesh;
+use crate::{MeshError, Vec3};
+
+impl TriMesh {
+    /// Reads the text of an OBJ file. Errors name the line (from 1), and the vertex or face (from 1).
+    pub fn from_obj(text: &str) -> Result<TriMesh, MeshError> {
+        let mut mesh = TriMesh::default();
+        let mut faces = Vec::new();
+        for (n, line) in text.lines().enumerate() {
+            let mut words = line.split_whitespace();
+            match words.next() {
+                Some("v") => {
+                    let number = mesh.vertices.len() + 1;
+                    mesh.vertices.push(vertex(words, n + 1, number)?);
+                }
+                Some("f") => {
+                    let corners = face(words, n + 1, mesh.vertices.len())?;
+                    faces.push((n + 1, corners));
+                }
+                _ => {}
+            }
+        }
+        for (number, (line, corners)) in faces.iter().enumerate() {
+            push_fan(&mut mesh, corners, *line, number + 1)?;
+        }
+        if mesh.triangles.is_empty() { Err(MeshError::Empty) } else { Ok(mesh) }
+    }
+}
+
+fn vertex<'a>(mut words: impl Iterator<Item = &'a str>, line: usize, vertex: usize) -> Result<Vec3, MeshError> {
+    let mut v = Vec3::zeros();
+    for k in 0..3 {
+        let word = words.next().ok_or(MeshError::Syntax { line, what: "a vertex of fewer than 3 numbers".into() })?;
+        v[k] = word.parse().map_err(|_| MeshError::Syntax { line, what: format!("`{word}` where a coordinate should be") })?;
+    }
+    if v.iter().all(|x| x.is_finite()) {
+        return Ok(v);
+    }
+    Err(MeshError::At { line, error: Box::new(MeshError::NotFinite { vertex, x: v.x, y: v.y, z: v.z }) })
+}
+
+/// Corner indices as 1-based numbers; range is checked once all vertices are known.
+fn face<'a>(words: impl Iterator<Item = &'a str>, line: usize, so_far: usize) -> Result<Vec<i64>, MeshError> {
+    let mut corners = Vec::new();
+    for word in words {
+        if word.starts_with('#') {
+            break;
+        }
+        let first = word.split('/').next().unwrap_or(word);
+        let index: i64 = first
+            .parse()
+            .map_err(|_| MeshError::Syntax { line, what: format!("`{word}` where a vertex number should be") })?;
+        corners.push(if index < 0 { index.saturating_add(so_far as i64 + 1) } else { index });
+    }
+    if corners.len() < 3 {
+        return Err(MeshError::Syntax { line, what: format!("a face of {} corners, but it needs at least 3", corners.len()) });
+    }
+    Ok(corners)
+}
+
+fn push_fan(mesh: &mut TriMesh, corners: &[i64], line: usize, face: usize) -> Result<(), MeshError> {
+    let count = mesh.vertices.len();
+    if let Some(&index) = corners.iter().find(|&&c| c < 1 || c > count as i64 || c > i64::from(u32::MAX)) {
+        return Err(MeshError::At { line, error: Box::new(MeshError::IndexOutOfRange { face, index, count }) });
+    }
+    let index = |k: usize| (corners[k] - 1) as u32;
+    mesh.triangles.extend((1..corners.len() - 1).map(|k| [index(0), index(k), index(k + 1)]));
+    Ok(())
+}

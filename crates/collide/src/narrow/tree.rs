@@ -1,0 +1,107 @@
+//! Sphere trees against each other and against primitives: the thesis's mode, where point and normal come from leaf balls.
+//!
+//! Source: thesis §IV.B.3.a–b. Two trees are walked together, the larger ball opened first. A primitive is asked for its signed distance at
+//! a ball's centre; it changes by at most 1 m per metre, so a ball that is further than `margin` hides no leaf within it.
+//! The feature of a contact is the pair of leaf indices.
+
+use super::reduce::Collector;
+use super::segment::closest_on_segment;
+use super::sphere::point_box;
+use crate::{Contact, NormalFrom, Pose, Shape, SphereTree, Vec3};
+use nalgebra::Point3;
+
+/// Both trees, seen from B's frame.
+struct Pair<'a> {
+    a: &'a SphereTree,
+    b: &'a SphereTree,
+    a_in_b: Pose,
+    margin: f64,
+}
+
+pub(super) fn tree_tree(a: &SphereTree, pose_a: &Pose, b: &SphereTree, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    let pair = Pair { a, b, a_in_b: pose_b.inv_mul(pose_a), margin };
+    let mut found = Collector::new(out);
+    pair.visit(0, 0, &mut found);
+    found.finish(pose_b);
+}
+
+impl Pair<'_> {
+    fn visit(&self, na: usize, nb: usize, found: &mut Collector) {
+        let (a, b) = (&self.a.nodes()[na], &self.b.nodes()[nb]);
+        let center_a = (self.a_in_b * Point3::from(a.center)).coords;
+        let reach = a.radius + b.radius + self.margin;
+        if (center_a - b.center).norm_squared() > reach * reach {
+            return;
+        }
+        if a.is_leaf() && b.is_leaf() {
+            let feature = (na as u64) << 32 | nb as u64;
+            found.push(Contact::between_cores((center_a, a.radius), (b.center, b.radius), feature));
+        } else if b.is_leaf() || (!a.is_leaf() && a.radius >= b.radius) {
+            a.child_range().for_each(|child| self.visit(child, nb, found));
+        } else {
+            b.child_range().for_each(|child| self.visit(na, child, found));
+        }
+    }
+}
+
+/// What a primitive says of a point in its own frame.
+struct Field {
+    distance: f64,
+    normal: Vec3,
+    core: f64,
+    face: bool,
+}
+
+/// Tree (A) against half-space, sphere, box or capsule (B).
+pub(super) fn tree_primitive(a: &SphereTree, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    let a_in_b = pose_b.inv_mul(pose_a);
+    let mut found = Collector::new(out);
+    visit(a, &a_in_b, b, 0, margin, &mut found);
+    found.finish(pose_b);
+}
+
+fn visit(tree: &SphereTree, pose: &Pose, primitive: &Shape, node: usize, margin: f64, found: &mut Collector) {
+    let ball = &tree.nodes()[node];
+    let center = (pose * Point3::from(ball.center)).coords;
+    let Some(field) = field(primitive, &center) else { return };
+    let gap = field.distance - ball.radius;
+    if gap > margin {
+        return;
+    }
+    if !ball.is_leaf() {
+        ball.child_range().for_each(|child| visit(tree, pose, primitive, child, margin, found));
+        return;
+    }
+    found.push(Contact {
+        point: center - field.normal * (ball.radius + 0.5 * gap),
+        normal: field.normal,
+        gap,
+        feature: (node as u64) << 32,
+        core_a: ball.radius,
+        core_b: field.core,
+        normal_from: if field.face { NormalFrom::FaceOfB } else { NormalFrom::CorePoints },
+    });
+}
+
+/// Signed distance and outward normal of a primitive at `p`; `None` for shapes that have no such formula here.
+fn field(primitive: &Shape, p: &Vec3) -> Option<Field> {
+    match primitive {
+        Shape::HalfSpace => Some(Field { distance: p.z, normal: Vec3::z(), core: 0.0, face: true }),
+        Shape::Sphere { radius } => Some(round_field(p, *radius)),
+        Shape::Capsule { radius, half_length } => {
+            let u = Vec3::z() * *half_length;
+            Some(round_field(&(p - u * closest_on_segment(p, &u)), *radius))
+        }
+        Shape::Box { half_extents } => {
+            point_box(p, half_extents).map(|f| Field { distance: f.distance, normal: f.normal, core: 0.0, face: f.face })
+        }
+        Shape::Cylinder(_) | Shape::Mesh(_) => None,
+    }
+}
+
+/// A ball about the core point that `offset` starts at; on it, x.
+fn round_field(offset: &Vec3, radius: f64) -> Field {
+    let length = offset.norm();
+    let normal = if length > 1e-300 { offset / length } else { Vec3::x() };
+    Field { distance: length - radius, normal, core: radius, face: false }
+}

@@ -1,0 +1,104 @@
+//! The shapes that carry a sphere tree: meshes and cylinders.
+
+use crate::{MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3};
+
+/// A closed mesh about its centre of mass, with its sphere tree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshShape {
+    mesh: TriMesh,
+    tree: SphereTree,
+    /// At density 1.
+    unit_mass: MassProperties,
+    bounding_radius: f64,
+}
+
+impl MeshShape {
+    /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the tree. Also returns
+    /// the offset that was subtracted from the vertices (metres).
+    pub fn new(mut mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
+        mesh.check_closed()?;
+        let offset = mesh.mass_properties(1.0).center_of_mass;
+        let mesh = mesh.translated(&-offset);
+        // what rounding left of the offset is not worth a second shift
+        let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mesh.mass_properties(1.0) };
+        let tree = SphereTree::build(&mesh, settings)?;
+        let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
+        Ok((MeshShape { mesh, tree, unit_mass, bounding_radius }, offset))
+    }
+
+    /// The surface; its centre of mass is the origin.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+
+    /// The balls around the surface.
+    pub fn tree(&self) -> &SphereTree {
+        &self.tree
+    }
+
+    /// Volume, m³.
+    pub fn volume(&self) -> f64 {
+        self.unit_mass.mass
+    }
+
+    /// Radius of the ball about the origin that holds the surface, metres.
+    pub fn bounding_radius(&self) -> f64 {
+        self.bounding_radius
+    }
+
+    /// At a uniform `density`, kg/m³.
+    pub(crate) fn mass_properties(&self, density: f64) -> MassProperties {
+        MassProperties { inertia: self.unit_mass.inertia * density, ..self.unit_mass.with_mass(self.unit_mass.mass * density) }
+    }
+}
+
+/// A cylinder along local z about the origin, with the sphere tree of a closed mesh around it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CylinderShape {
+    radius: f64,
+    half_length: f64,
+    mesh: TriMesh,
+    tree: SphereTree,
+}
+
+/// Sides of the prism that stands for a cylinder: its edges lie `1/cos(π/48)`, 0.2 % of the radius, outside.
+const SIDES: usize = 48;
+
+impl CylinderShape {
+    /// Radius and half length in metres.
+    pub fn new(radius: f64, half_length: f64) -> Result<CylinderShape, ShapeError> {
+        // the prism is around the cylinder, so that its tree covers the true surface
+        let outer = radius / nalgebra::ComplexField::cos(std::f64::consts::PI / SIDES as f64);
+        let mesh = TriMesh::cylinder(outer, half_length, SIDES);
+        let tree = SphereTree::build(&mesh, &TreeSettings::default())?;
+        Ok(CylinderShape { radius, half_length, mesh, tree })
+    }
+
+    /// Metres.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// From the centre to a flat face, metres.
+    pub fn half_length(&self) -> f64 {
+        self.half_length
+    }
+
+    /// The prism around the cylinder that the tree was made of.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+
+    /// The balls around the surface.
+    pub fn tree(&self) -> &SphereTree {
+        &self.tree
+    }
+}
+
+/// The box in world axes around the leaves of a tree at `pose`, as centre and half extents.
+pub(crate) fn tree_box(tree: &SphereTree, pose: &Pose) -> (Vec3, Vec3) {
+    let bounds = tree.bounds();
+    let center = pose * nalgebra::Point3::from(0.5 * (bounds.min + bounds.max));
+    let half = pose.rotation.to_rotation_matrix().matrix().abs() * (0.5 * (bounds.max - bounds.min));
+    (center.coords, half)
+}

@@ -1,0 +1,190 @@
+//! Sphere trees: a closed surface inside nested balls.
+//!
+//! Two promises are checked on every build and are an error if broken: every ball contains the balls of its children, and the
+//! leaves cover the surface. A third number is stated: how far the balls reach beyond the solid.
+//!
+//! **Outward error.** A ball `(c, r)` whose centre lies `d` below the surface reaches at most `r − d` beyond it: on the way from `c`
+//! to any outside point of the ball the surface is crossed, at `d` or later (`d` is negative for a centre outside).
+//!
+//! Two trees whose balls are `g` apart have solids that are between `g` and `g + e₁ + e₂` apart, `e` their outward errors: no contact
+//! is missed, and none is invented beyond `e₁ + e₂`.
+
+mod ball;
+mod octree;
+mod verify;
+
+use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
+use ball::Ball;
+
+/// How a tree is built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TreeSettings {
+    /// Which method.
+    pub builder: Builder,
+    /// Greatest number of subdivisions, 1 to 9.
+    pub depth: u32,
+    /// A cell is not divided further once its ball reaches at most this far outwards, as a part of the mesh's diagonal; 1e-4 to 1.
+    pub error: f64,
+}
+
+/// The methods there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Builder {
+    /// Cells of an octree that the surface passes through.
+    #[default]
+    Octree,
+}
+
+impl Default for TreeSettings {
+    /// Outward error of about 1 % of the diagonal.
+    fn default() -> TreeSettings {
+        TreeSettings { builder: Builder::Octree, depth: 7, error: 0.01 }
+    }
+}
+
+impl TreeSettings {
+    fn check(&self) -> Result<(), MeshError> {
+        if !(1..=9).contains(&self.depth) {
+            return Err(MeshError::Settings { what: "the depth of a sphere tree", value: f64::from(self.depth), allowed: "1 to 9" });
+        }
+        if !(1e-4..=1.0).contains(&self.error) {
+            return Err(MeshError::Settings { what: "the error of a sphere tree", value: self.error, allowed: "0.0001 to 1" });
+        }
+        Ok(())
+    }
+}
+
+/// One ball of a tree, in the mesh's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereNode {
+    /// Metres.
+    pub center: Vec3,
+    /// Metres.
+    pub radius: f64,
+    /// Upper bound of how far the ball reaches outside the solid, metres.
+    pub outward: f64,
+    /// Index of the first child; children are neighbours.
+    pub first_child: u32,
+    /// Number of children; 0 for a leaf.
+    pub children: u32,
+    /// 0 for the root.
+    pub level: u32,
+}
+
+impl SphereNode {
+    /// Whether the ball has no children.
+    pub fn is_leaf(&self) -> bool {
+        self.children == 0
+    }
+
+    /// Indices of the children.
+    pub fn child_range(&self) -> std::ops::Range<usize> {
+        self.first_child as usize..(self.first_child + self.children) as usize
+    }
+}
+
+/// What a builder hands over: nested cells, whose leaves have their balls.
+enum Cell {
+    Leaf(Ball),
+    Inner(Vec<Cell>),
+}
+
+/// A tree of balls around a closed surface; flat, breadth first, the root first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SphereTree {
+    nodes: Vec<SphereNode>,
+    bounds: Aabb,
+}
+
+impl SphereTree {
+    /// Builds and verifies a tree around a closed, outward-wound mesh (see [`TriMesh::check_closed`]).
+    pub fn build(mesh: &TriMesh, settings: &TreeSettings) -> Result<SphereTree, MeshError> {
+        settings.check()?;
+        mesh.check_data()?;
+        let distance = MeshDistance::new(mesh);
+        let root = match settings.builder {
+            Builder::Octree => octree::build(mesh, &distance, settings)?,
+        };
+        let tree = SphereTree::flatten(&root, &distance);
+        tree.check_nesting()?;
+        tree.check_coverage(mesh)?;
+        Ok(tree)
+    }
+
+    /// All balls, breadth first; the root is the first.
+    pub fn nodes(&self) -> &[SphereNode] {
+        &self.nodes
+    }
+
+    /// The balls that have no children.
+    pub fn leaves(&self) -> impl Iterator<Item = &SphereNode> {
+        self.nodes.iter().filter(|n| n.is_leaf())
+    }
+
+    /// Number of levels; the root alone is one.
+    pub fn levels(&self) -> u32 {
+        self.nodes.last().map_or(0, |n| n.level + 1)
+    }
+
+    /// The balls that stand for the solid when looked at to `level`: those of that level and the leaves above it.
+    pub fn at_level(&self, level: u32) -> impl Iterator<Item = &SphereNode> {
+        self.nodes.iter().filter(move |n| n.level == level || (n.level < level && n.is_leaf()))
+    }
+
+    /// Upper bound of how far the leaves reach outside the solid, metres.
+    pub fn outward_error(&self) -> f64 {
+        self.leaves().map(|n| n.outward).fold(0.0, f64::max)
+    }
+
+    /// The same for [`SphereTree::at_level`].
+    pub fn outward_error_at(&self, level: u32) -> f64 {
+        self.at_level(level).map(|n| n.outward).fold(0.0, f64::max)
+    }
+
+    /// Box around all leaves, in the mesh's frame.
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
+    /// Breadth first, so that children are neighbours; a cell with one child is replaced by it.
+    fn flatten(root: &Cell, distance: &MeshDistance) -> SphereTree {
+        let mut nodes = vec![empty_node(0)];
+        let mut cells = vec![skip_single(root)];
+        let mut next = 0;
+        while next < cells.len() {
+            if let Cell::Inner(children) = cells[next] {
+                nodes[next].first_child = cells.len() as u32;
+                nodes[next].children = children.len() as u32;
+                let level = nodes[next].level + 1;
+                cells.extend(children.iter().map(skip_single));
+                nodes.resize(cells.len(), empty_node(level));
+            }
+            next += 1;
+        }
+        for n in (0..nodes.len()).rev() {
+            let ball = match cells[n] {
+                Cell::Leaf(ball) => *ball,
+                Cell::Inner(_) => {
+                    let children: Vec<Ball> = nodes[nodes[n].child_range()].iter().map(|c| Ball { center: c.center, radius: c.radius }).collect();
+                    ball::around_balls(&children)
+                }
+            };
+            nodes[n].center = ball.center;
+            nodes[n].radius = ball.radius;
+            nodes[n].outward = ball.outward(distance);
+        }
+        let leaf_boxes = nodes.iter().filter(|n| n.is_leaf()).flat_map(|n| [n.center.add_scalar(-n.radius), n.center.add_scalar(n.radius)]);
+        SphereTree { bounds: Aabb::around(leaf_boxes), nodes }
+    }
+}
+
+fn empty_node(level: u32) -> SphereNode {
+    SphereNode { center: Vec3::zeros(), radius: 0.0, outward: 0.0, first_child: 0, children: 0, level }
+}
+
+fn skip_single(cell: &Cell) -> &Cell {
+    match cell {
+        Cell::Inner(children) if children.len() == 1 => skip_single(&children[0]),
+        other => other,
+    }
+}

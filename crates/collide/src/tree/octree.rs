@@ -1,0 +1,121 @@
+//! The octree builder: the surface is cut by the planes of an octree, and each cell's piece gets a tight ball.
+//!
+//! A piece's ball starts at the small enclosing ball of its corners and is moved inwards along the mean normal, growing so that it still
+//! holds the piece: a larger ball with its centre deeper in the solid bulges less (`δ²/2R` for a flat piece of radius `δ`). Of a few
+//! such balls the one with the least outward error is kept. A cell whose ball is good enough is a leaf; others are divided.
+//!
+//! Departs from the classic octree tree (balls around cells) in all of that; it keeps its robustness: any triangles will do.
+
+use super::ball::{Ball, around_points};
+use super::{Cell, TreeSettings};
+use crate::{MeshDistance, MeshError, TriMesh, Vec3};
+
+/// No tree gets more leaves than this.
+const MOST_LEAVES: usize = 400_000;
+/// How far the ball's centre is moved inwards, in radii of the starting ball.
+const SHIFTS: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.2, 3.2, 4.5, 6.5];
+/// Leaves are grown by this part of the starting radius, so that neighbours overlap by more than rounding.
+const OVERLAP: f64 = 0.01;
+
+/// A convex piece of one triangle.
+type Piece = Vec<Vec3>;
+
+struct Context<'a> {
+    distance: &'a MeshDistance,
+    /// Good enough: outward error in metres.
+    target: f64,
+    depth: u32,
+    leaves: usize,
+}
+
+pub(super) fn build(mesh: &TriMesh, distance: &MeshDistance, settings: &TreeSettings) -> Result<Cell, MeshError> {
+    let bounds = mesh.aabb();
+    let side = (bounds.max - bounds.min).max();
+    let pieces = (0..mesh.triangles.len()).map(|t| mesh.corners(t).to_vec()).collect();
+    let mut context = Context { distance, target: settings.error * mesh.diagonal(), depth: settings.depth, leaves: 0 };
+    let root = context.cell(pieces, 0.5 * (bounds.min + bounds.max), 0.5 * side, 0);
+    if context.leaves > MOST_LEAVES {
+        let (what, allowed) = ("the number of leaves of a sphere tree", "at most 400000: lower the depth or raise the error");
+        return Err(MeshError::Settings { what, value: context.leaves as f64, allowed });
+    }
+    Ok(root)
+}
+
+impl Context<'_> {
+    fn cell(&mut self, pieces: Vec<Piece>, center: Vec3, half: f64, depth: u32) -> Cell {
+        let (ball, outward) = self.tight_ball(&pieces);
+        if outward <= self.target || depth == self.depth || self.leaves > MOST_LEAVES {
+            self.leaves += 1;
+            return Cell::Leaf(ball);
+        }
+        let mut parts = vec![pieces];
+        for k in 0..3 {
+            parts = parts.into_iter().flat_map(|p| cut(p, k, center[k])).collect();
+        }
+        // bit 2 of the index is the side on x, bit 1 on y, bit 0 on z
+        let children = parts.into_iter().enumerate().filter(|(_, p)| !p.is_empty()).map(|(n, p)| {
+            let side = Vec3::from_fn(|k, _| if n >> (2 - k) & 1 == 1 { 0.5 } else { -0.5 });
+            self.cell(p, center + side * half, 0.5 * half, depth + 1)
+        });
+        Cell::Inner(children.collect())
+    }
+
+    /// The ball of least outward error among those tried, and that error.
+    fn tight_ball(&self, pieces: &[Piece]) -> (Ball, f64) {
+        let points: Vec<Vec3> = pieces.iter().flatten().copied().collect();
+        let start = around_points(&points);
+        let inward = -area_vector(pieces).try_normalize(0.0).unwrap_or_default();
+        let mut best: Option<(Ball, f64)> = None;
+        for shift in SHIFTS {
+            let mut ball = Ball::holding(start.center + inward * (shift * start.radius), &points);
+            ball.radius += OVERLAP * start.radius;
+            let outward = ball.outward(self.distance);
+            if best.is_none_or(|(_, least)| outward < least) {
+                best = Some((ball, outward));
+            }
+        }
+        best.unwrap_or((start, f64::INFINITY))
+    }
+}
+
+/// Sum of the pieces' areas times their normals (twice).
+fn area_vector(pieces: &[Piece]) -> Vec3 {
+    pieces.iter().map(|p| p.windows(2).skip(1).map(|w| (w[0] - p[0]).cross(&(w[1] - p[0]))).sum::<Vec3>()).sum()
+}
+
+/// Cuts all pieces at `x_k = at`: those below, those above. A corner made by a cut is the same number on both sides.
+fn cut(pieces: Vec<Piece>, k: usize, at: f64) -> [Vec<Piece>; 2] {
+    let (mut below, mut above) = (Vec::new(), Vec::new());
+    for piece in pieces {
+        if piece.iter().all(|p| p[k] <= at) {
+            below.push(piece);
+        } else if piece.iter().all(|p| p[k] >= at) {
+            above.push(piece);
+        } else {
+            let (low, high) = cut_one(&piece, k, at);
+            below.push(low);
+            above.push(high);
+        }
+    }
+    [below, above]
+}
+
+fn cut_one(piece: &Piece, k: usize, at: f64) -> (Piece, Piece) {
+    let (mut low, mut high) = (Piece::new(), Piece::new());
+    for n in 0..piece.len() {
+        let (p, q) = (piece[n], piece[(n + 1) % piece.len()]);
+        if p[k] <= at {
+            low.push(p);
+        }
+        if p[k] >= at {
+            high.push(p);
+        }
+        if (p[k] < at && q[k] > at) || (p[k] > at && q[k] < at) {
+            let mut crossing = p + (q - p) * ((at - p[k]) / (q[k] - p[k]));
+            crossing[k] = at;
+            low.push(crossing);
+            high.push(crossing);
+        }
+    }
+    (low, high)
+}

@@ -1,0 +1,62 @@
+//! The promises of a sphere tree, checked by code that shares nothing with the builders.
+
+use super::{SphereNode, SphereTree};
+use crate::{MeshError, TriMesh, Vec3};
+
+/// A piece of surface smaller than this part of the mesh's diagonal that lies across balls is covered if its corners are.
+const TINY: f64 = 1e-5;
+
+impl SphereTree {
+    /// Every parent contains its children: `|c − c'| + r' ≤ r`, to rounding.
+    pub fn check_nesting(&self) -> Result<(), MeshError> {
+        for (n, parent) in self.nodes.iter().enumerate() {
+            for child in parent.child_range() {
+                let c = &self.nodes[child];
+                let excess = (c.center - parent.center).norm() + c.radius - parent.radius;
+                if excess > 1e-12 * parent.radius {
+                    return Err(MeshError::Tree { what: format!("ball {child} sticks out of its parent {n} by {excess:e} m") });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The leaves cover the surface of `mesh`. A triangle lies in a ball iff its corners do, so each is split 1:4 until every piece
+    /// lies in one ball, or is tiny (1e-5 of the diagonal) and each of its corners lies in some ball.
+    pub fn check_coverage(&self, mesh: &TriMesh) -> Result<(), MeshError> {
+        let tiny = TINY * mesh.diagonal();
+        for t in 0..mesh.triangles.len() {
+            if let Err(point) = self.cover(&mesh.corners(t), tiny, 40) {
+                let what = format!("triangle {} is not covered near ({}, {}, {})", t + 1, point.x, point.y, point.z);
+                return Err(MeshError::Tree { what });
+            }
+        }
+        Ok(())
+    }
+
+    fn cover(&self, triangle: &[Vec3; 3], tiny: f64, splits: u32) -> Result<(), Vec3> {
+        if self.leaf_holding(0, triangle) {
+            return Ok(());
+        }
+        let [a, b, c] = *triangle;
+        let size = (a - b).norm().max((b - c).norm()).max((c - a).norm());
+        if size < tiny || splits == 0 {
+            return match triangle.iter().find(|p| !self.leaf_holding(0, &[**p])) {
+                Some(point) => Err(*point),
+                None => Ok(()),
+            };
+        }
+        let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
+        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].iter().try_for_each(|t| self.cover(t, tiny, splits - 1))
+    }
+
+    /// Whether one leaf below `node` holds all the points. Balls nest, so a node that does not hold them has no such leaf.
+    fn leaf_holding(&self, node: usize, points: &[Vec3]) -> bool {
+        let here = &self.nodes[node];
+        points.iter().all(|p| holds(here, p)) && (here.is_leaf() || here.child_range().any(|c| self.leaf_holding(c, points)))
+    }
+}
+
+fn holds(ball: &SphereNode, p: &Vec3) -> bool {
+    (p - ball.center).norm_squared() <= ball.radius * ball.radius * (1.0 + 1e-12)
+}
