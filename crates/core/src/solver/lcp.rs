@@ -37,6 +37,10 @@ pub const UNKNOWNS: usize = 3000;
 const DEAD: f64 = 1e-20;
 /// Sliding velocity that counts as none, as a part of the largest free value of the island.
 const STILL: f64 = 1e-13;
+/// Free value that is rounding and counts as 0, as a part of the same: scaled up, it could make rows contradict each other.
+const ROUNDING: f64 = 1e-13;
+/// The least that "the largest free value" is taken for, m/s or m/s².
+const SLOWEST: f64 = 1e-3;
 /// Velocity error of the equality rows that still counts as solved, as a part of the same.
 const ACCEPT: f64 = 1e-9;
 
@@ -165,7 +169,7 @@ struct Problem {
     k: Vec<f64>,
     /// Free values of the island's rows.
     c: Vec<f64>,
-    /// The largest of them, or 1e-300.
+    /// The largest of them, or [`SLOWEST`].
     scale: f64,
     /// Multipliers at `z = 0`: the lower ends of intervals.
     start: Vec<f64>,
@@ -181,7 +185,7 @@ impl Problem {
         let island = || blocks.iter().map(|&b| &rows.blocks[b as usize]);
         let k = rows.dense(blocks);
         let c: Vec<f64> = island().flat_map(|block| c[block.range()].iter().copied()).collect();
-        let scale = c.iter().fold(1e-300, |a: f64, c| a.max(c.abs()));
+        let scale = c.iter().fold(SLOWEST, |a: f64, c| a.max(c.abs()));
         let start = vec![0.0; c.len()];
         let equalities = Equalities::new(&[], 0);
         let mut problem = Problem { k, c, scale, start, columns: Vec::new(), bounds: Vec::new(), free: Vec::new(), equalities };
@@ -292,6 +296,7 @@ impl Problem {
         let coupling: Vec<Vec<f64>> = self.columns.iter().map(|z| self.free.iter().map(|&i| self.against(i, z)).collect()).collect();
         let free: Vec<f64> = self.free.iter().map(|&i| c[i]).collect();
         self.equalities.reduce(&coupling, &free, &mut m, n, &mut q[..columns]);
+        q.iter_mut().filter(|q| q.abs() <= ROUNDING * self.scale).for_each(|q| *q = 0.0);
         for (i, bound) in self.bounds.iter().enumerate() {
             let own = columns + i;
             q[own] = bound.constant;

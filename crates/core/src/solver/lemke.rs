@@ -59,6 +59,10 @@ const PIVOT: f64 = 1e-10;
 const FEASIBLE: f64 = 1e-11;
 /// Ties in the ratio test prefer pivots within this factor of the strongest.
 const WEAK: f64 = 1e-4;
+/// The dictionary is computed anew after this many pivots, or `n/8`.
+const REBUILD: usize = 50;
+/// And before a pivot under this.
+const DOUBTFUL: f64 = 1e-6;
 /// Numbers of the lexicographic rows closer than this are equal.
 const LEXICOGRAPHIC: f64 = 1e-9;
 /// Largest `|min(z, w)|` of the scaled problem that counts as solved.
@@ -78,7 +82,7 @@ pub fn lemke(m: &[f64], q: &[f64]) -> LcpResult {
     for spread in [0, 1] {
         let cover = covering(q.len(), spread);
         let mut dictionary = Dictionary::new(&problem, &cover);
-        let (end, taken) = walk(&mut dictionary, &cover, pivot_cap(q.len()));
+        let (end, taken) = walk(&mut dictionary, &problem, &cover, pivot_cap(q.len()));
         pivots += taken;
         if let Some(z) = best_solution(&problem, &cover, &dictionary) {
             return LcpResult::Solution { z: problem.unscale(z), pivots };
@@ -210,6 +214,46 @@ impl Dictionary {
         self.place[self.nonbasic[s]] = Place::Column(s);
     }
 
+    /// Computes the dictionary of this basis anew from the problem, without what pivoting accumulated; `false` where the basis is singular.
+    ///
+    /// With `R` the rows whose `w` is nonbasic, `Q` the others, `A` the basic `z` (`z₀` among them), `N` the nonbasic ones:
+    /// `z_A = M_RA⁻¹(w_R − q_R − M_RN·z_N)`, `w_Q = q_Q + M_QA·z_A + M_QN·z_N`.
+    fn rebuild(&mut self, problem: &Scaled, cover: &[f64]) -> bool {
+        let n = self.n;
+        let entry = |i: usize, v: usize| if v == 2 * n { cover[i] } else { problem.row(i)[v - n] };
+        let (tight, active) = self.basis();
+        let loose: Vec<usize> = (0..n).filter(|&i| matches!(self.place[i], Place::Row(_))).collect();
+        // Columns as in the dictionary, the constants last.
+        let given = |i: usize, s: usize| match self.nonbasic.get(s) {
+            None => problem.q[i],
+            Some(&v) if v < n => 0.0,
+            Some(&v) => entry(i, v),
+        };
+        let right = |i: usize, s: usize| if self.nonbasic.get(s) == Some(&i) { 1.0 } else { -given(i, s) };
+        let square = DMatrix::from_fn(tight.len(), active.len(), |i, j| entry(tight[i], active[j]));
+        let mut z = DMatrix::from_fn(tight.len(), n + 2, |i, s| right(tight[i], s));
+        if !active.is_empty() && !square.lu().solve_mut(&mut z) {
+            return false;
+        }
+        let below = DMatrix::from_fn(loose.len(), active.len(), |i, j| entry(loose[i], active[j]));
+        let w = below * &z + DMatrix::from_fn(loose.len(), n + 2, |i, s| given(loose[i], s));
+        for (values, variables) in [(&z, &active), (&w, &loose)] {
+            for (i, &v) in variables.iter().enumerate() {
+                let Place::Row(r) = self.place[v] else { return false };
+                (0..=n).for_each(|s| self.a[r * (n + 1) + s] = values[(i, s)]);
+                self.b[r] = values[(i, n + 1)];
+            }
+        }
+        self.a.iter().chain(&self.b).all(|x| x.is_finite())
+    }
+
+    /// The rows whose `w` is nonbasic, and the basic `z`; as many of one as of the other.
+    fn basis(&self) -> (Vec<usize>, Vec<usize>) {
+        let n = self.n;
+        let active = (n..=2 * n).filter(|&v| matches!(self.place[v], Place::Row(_))).collect();
+        ((0..n).filter(|&i| matches!(self.place[i], Place::Column(_))).collect(), active)
+    }
+
     /// The row that leaves when the variable of column `s` grows; `None` if nothing bounds it.
     fn leaving(&self, s: usize) -> Option<usize> {
         let largest = (0..self.n).map(|r| self.at(r, s).abs()).fold(1.0, f64::max);
@@ -262,8 +306,10 @@ enum End {
 }
 
 /// Scheme I: from the primary ray to a complementary dictionary or a secondary ray.
-fn walk(dictionary: &mut Dictionary, cover: &[f64], cap: u32) -> (End, u32) {
+fn walk(dictionary: &mut Dictionary, problem: &Scaled, cover: &[f64], cap: u32) -> (End, u32) {
     let n = dictionary.n;
+    let fresh_for = (n / 8).max(REBUILD);
+    let mut age = 0;
     // The row that needs z₀ most; of equals the last, whose εⁱ is the least.
     let need = |i: usize| -dictionary.b[i] / cover[i];
     let Some(first) = (0..n).reduce(|best, i| if need(i) >= need(best) { i } else { best }).filter(|&i| need(i) > 0.0) else {
@@ -274,7 +320,17 @@ fn walk(dictionary: &mut Dictionary, cover: &[f64], cap: u32) -> (End, u32) {
     for pivots in 1..cap {
         let entering = if left < n { left + n } else { left - n };
         let Place::Column(s) = dictionary.place[entering] else { return (End::Limit, pivots) };
-        let Some(r) = dictionary.leaving(s) else { return (End::Ray, pivots) };
+        let mut choice = dictionary.leaving(s);
+        let doubtful = choice.is_none_or(|r| -dictionary.at(r, s) < DOUBTFUL);
+        if age >= fresh_for || (doubtful && age > 0) {
+            if !dictionary.rebuild(problem, cover) {
+                return (End::Limit, pivots);
+            }
+            age = 0;
+            choice = dictionary.leaving(s);
+        }
+        let Some(r) = choice else { return (End::Ray, pivots) };
+        age += 1;
         left = dictionary.basic[r];
         dictionary.pivot(r, s);
         if left == 2 * n {
@@ -301,8 +357,7 @@ fn best_solution(problem: &Scaled, cover: &[f64], dictionary: &Dictionary) -> Op
 /// Solves `M_RA·z_A + d_R·z₀ = −q_R`, with `A` the basic `z` and `R` the rows whose `w` is nonbasic.
 fn solve_basis(problem: &Scaled, cover: &[f64], dictionary: &Dictionary) -> Option<Vec<f64>> {
     let n = problem.n;
-    let active: Vec<usize> = (n..=2 * n).filter(|&v| matches!(dictionary.place[v], Place::Row(_))).collect();
-    let tight: Vec<usize> = (0..n).filter(|&i| matches!(dictionary.place[i], Place::Column(_))).collect();
+    let (tight, active) = dictionary.basis();
     if active.is_empty() {
         return Some(vec![0.0; n]);
     }
