@@ -2,7 +2,7 @@
 
 use super::{Bodies, FAR, Random, Solved, UP, distance, free, solve};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, LcpPyramid, LcpSliding, RowSolver, residual};
+use crate::solver::{Accuracy, GaussSeidel, Islands, LcpPyramid, LcpSliding, RowSolver, residual};
 
 const WEIGHT: f64 = 9.81 / 60.0;
 
@@ -222,6 +222,30 @@ fn the_same_problem_gives_the_same_bits() {
     let ((rows, c), (again, c_again)) = (make(), make());
     let (a, b) = (solve(&LcpPyramid, &rows, &c, FAR), solve(LcpPyramid.fork().as_ref(), &again, &c_again, FAR));
     assert!(a.lambda.iter().zip(&b.lambda).all(|(a, b)| a.to_bits() == b.to_bits()));
+}
+
+/// Solved island by island, from a warm start, beside what other islands have already added to `du`: the same answer.
+#[test]
+fn islands_and_warm_starts_change_nothing() {
+    let mut pair = Bodies::cubes(vec![1.0, 2.0, 3.0], 1.0);
+    for (upper, x) in [(0, 0.5), (2, 0.3), (0, -0.5), (1, 0.2), (2, -0.1)] {
+        pair.push(RowSet::Cone { mu: 0.4 }, [(upper == 1).then_some((0, [x, 0.1, 0.5])), Some((upper, [x, 0.1, -0.5]))], UP);
+    }
+    let mut random = Random(15);
+    let u: Vec<f64> = (0..18).map(|_| random.real(-1.0, 0.2)).collect();
+    let (rows, c) = (&pair.rows, free(&pair.rows, &u));
+    let mut islands = Islands::default();
+    islands.build(rows, |_| true);
+    assert_eq!(islands.len(), 2);
+    for solver in [&LcpPyramid as &dyn RowSolver, &LcpSliding] {
+        let whole = solve(solver, rows, &c, FAR);
+        let (mut lambda, mut du) = (vec![0.25; rows.len], vec![0.0; rows.dof]);
+        for island in islands.iter() {
+            assert!(solver.solve(rows, island, &c, &mut lambda, &mut du, FAR).converged);
+        }
+        assert!(distance(&whole.du, &du) < 1e-12);
+        assert!(distance(&free(rows, &du), &free(rows, &whole.du)) < 1e-12);
+    }
 }
 
 /// A thousand contacts are beyond pivoting: relaxation takes over and says so.

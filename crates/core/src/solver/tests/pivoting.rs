@@ -126,12 +126,27 @@ fn beales_program_ends_at_its_optimum() {
 
 #[test]
 fn a_problem_without_solution_ends_on_a_ray() {
-    for (m, q) in [(vec![-1.0], vec![-1.0]), (vec![0.0], vec![-1.0]), (vec![1.0, -1.0, -1.0, 1.0], vec![-1.0, -1.0]), (vec![0.0, -1.0, 1.0, -2.0], vec![-1.0, -3.0])] {
+    let problems = [
+        (vec![-1.0], vec![-1.0]),
+        (vec![0.0], vec![-1.0]),
+        (vec![1.0, -1.0, -1.0, 1.0], vec![-1.0, -1.0]),
+        (vec![0.0, -1.0, 1.0, -2.0], vec![-1.0, -3.0]),
+    ];
+    for (m, q) in problems {
         let n = q.len();
         let matrix = DMatrix::from_row_slice(n, n, &m);
         assert!(enumerate(&matrix, &DVector::from_vec(q.clone())).is_empty(), "the problem has a solution: {m:?} {q:?}");
         assert!(matches!(lemke(&m, &q), LcpResult::Ray { .. }), "{m:?} {q:?}: {:?}", lemke(&m, &q));
     }
+}
+
+/// `M` is copositive but not copositive-plus: `w₁ = 2z₂ − 1`, `w₂ = z₁ − 2`, solved by `z = (2, 1/2)`, and yet a ray. What a ray proves
+/// depends on `M`.
+#[test]
+fn a_ray_may_end_a_problem_that_has_a_solution() {
+    let (m, q) = (DMatrix::from_row_slice(2, 2, &[0.0, 2.0, 1.0, 0.0]), DVector::from_vec(vec![-1.0, -2.0]));
+    assert_eq!(violation(&m, &q, &DVector::from_vec(vec![2.0, 0.5])), 0.0);
+    assert!(matches!(lemke(&row_major(&m), q.as_slice()), LcpResult::Ray { .. }));
 }
 
 /// Copies of copies: 200 rows of rank 6, every one of them eight times.
