@@ -146,7 +146,8 @@ impl Local {
             Step::Dead => 0.0,
             Step::Scalar { k, lo, hi } => {
                 let w = c[i] + rows.row_velocity(&self.block, 0, du);
-                let next = (lambda[i] - w / k).clamp(*lo, *hi);
+                // Not `clamp`, which panics where `lo > hi`.
+                let next = (lambda[i] - w / k).max(*lo).min(*hi);
                 let delta = next - lambda[i];
                 *against -= delta * (next - self.last[0]);
                 lambda[i] = next;

@@ -2,12 +2,19 @@
 //!
 //! Find `λ` in the rows' sets so that `w = c + K·λ` answers each set as [`RowSet`](crate::rows::RowSet) says.
 
+mod equality;
 mod gauss_seidel;
 mod island;
+mod lcp;
+mod lemke;
 mod residual;
+#[cfg(test)]
+mod tests;
 
 pub use gauss_seidel::GaussSeidel;
 pub use island::Islands;
+pub use lcp::{LcpPyramid, LcpSliding, UNKNOWNS};
+pub use lemke::{LcpResult, lemke};
 pub use residual::residual;
 
 use crate::rows::Rows;

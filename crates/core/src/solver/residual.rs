@@ -29,7 +29,8 @@ fn block_residual(rows: &Rows, block: &Block, c: &[f64], lambda: &[f64], du: &[f
 }
 
 fn scalar(lambda: f64, w: f64, d: f64, lo: f64, hi: f64) -> f64 {
-    (lambda - (lambda - w / d).clamp(lo, hi)).abs() * d
+    // Not `clamp`, which panics where `lo > hi`.
+    (lambda - (lambda - w / d).max(lo).min(hi)).abs() * d
 }
 
 fn cone(lambda: [f64; 3], w: [f64; 3], d: f64, mu: f64) -> f64 {
