@@ -87,7 +87,7 @@ impl BodySpec {
     /// Reads all keys of a body but does not finish the table: a grid has keys of its own.
     pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>) -> Option<BodySpec> {
         let name = read_name(f);
-        let mode = f.choice_or("mode", Mode::NAMES, Mode::Dynamic);
+        let mode = read_mode(f);
         let shape = ShapeSpec::read(f, &library.meshes);
         let mass = read_mass(f, mode);
         let material = read_material(f, library);
@@ -128,6 +128,14 @@ fn read_name(f: &mut Fields<'_>) -> Option<String> {
         f.wrong("name", value, wanted);
     }
     Some(name.to_owned())
+}
+
+/// The mode; one that is wrong stands for a mode that asks for nothing else.
+fn read_mode(f: &mut Fields<'_>) -> Mode {
+    match f.value("mode") {
+        Some(value) => f.as_choice("mode", value, Mode::NAMES).unwrap_or(Mode::Kinematic),
+        None => Mode::Dynamic,
+    }
 }
 
 fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {

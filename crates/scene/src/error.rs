@@ -158,7 +158,8 @@ impl Invalid {
             .finish()
             .write((name, source), &mut bytes)
             .ok()?;
-        String::from_utf8(bytes).ok()
+        let drawn = String::from_utf8(bytes).ok()?;
+        Some(drawn.lines().map(|line| line.trim_end().to_owned() + "\n").collect())
     }
 }
 

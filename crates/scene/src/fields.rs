@@ -29,6 +29,8 @@ pub(crate) struct Fields<'a> {
     pub(crate) span: Range<usize>,
     table: &'a DeTable<'a>,
     asked: Vec<&'static str>,
+    /// Required keys that are not there, with what was wanted.
+    missing: Vec<(&'static str, String)>,
 }
 
 impl<'a> Fields<'a> {
@@ -47,7 +49,7 @@ impl<'a> Fields<'a> {
 
     /// The same for a table already in hand.
     pub(crate) fn of_table(log: &'a Log<'a>, table: &'a DeTable<'a>, span: Range<usize>, what: impl Into<String>) -> Self {
-        Fields { log, what: what.into(), span, table, asked: Vec::new() }
+        Fields { log, what: what.into(), span, table, asked: Vec::new(), missing: Vec::new() }
     }
 
     /// The value of `key`, if it is there.
@@ -70,20 +72,9 @@ impl<'a> Fields<'a> {
         value
     }
 
-    /// Records that `key` is not there.
-    pub(crate) fn missing(&self, key: &str, wanted: &str) {
-        let near = self.unasked().and_then(|typed| nearest(typed, [key]).map(|_| typed));
-        let message = format!("{} has no `{key}`", self.what);
-        let wanted = match near {
-            Some(typed) => format!("wanted {wanted}; is `{typed}` meant to be `{key}`?"),
-            None => format!("wanted {wanted}"),
-        };
-        self.log.report(self.span.clone(), message, wanted);
-    }
-
-    /// Some key of the table that nobody asked for yet.
-    fn unasked(&self) -> Option<&'a str> {
-        self.entries().map(|(key, ..)| key).find(|key| !self.asked.contains(key))
+    /// Records that `key` is not there; told by [`Fields::finish`] or [`Fields::give_up`].
+    pub(crate) fn missing(&mut self, key: &'static str, wanted: &str) {
+        self.missing.push((key, wanted.to_owned()));
     }
 
     /// Records that the value of `key` is wrong.
@@ -98,17 +89,48 @@ impl<'a> Fields<'a> {
         self.log.report(value.span(), message, format!("wanted {wanted}"));
     }
 
-    /// Reports every key that was not asked for. Call it once all that can be asked has been.
-    pub(crate) fn finish(self) {
+    /// Tells of every key that nobody asked for and every required one that is not there. Call it
+    /// once all that can be asked has been.
+    pub(crate) fn finish(mut self) {
+        self.asked.sort_unstable();
+        self.asked.dedup();
+        let known = self.asked.clone();
+        self.tell_unknown(&known, true);
+    }
+
+    /// Tells only of the required keys that are not there: what else the table may hold was never asked,
+    /// because that depends on them.
+    pub(crate) fn give_up(mut self) {
+        let known: Vec<&'static str> = self.missing.iter().map(|(key, _)| *key).collect();
+        self.tell_unknown(&known, false);
+    }
+
+    /// Tells of unknown keys, those near a missing one instead of it (and the others only if `all`).
+    fn tell_unknown(&mut self, known: &[&'static str], all: bool) {
         for (key, span, _) in self.entries() {
-            if self.asked.contains(&key) {
+            if self.asked.contains(&key) || self.log.is_full() {
                 continue;
             }
-            let wanted = match nearest(key, self.asked.iter().copied()) {
+            let meant = nearest(key, known.iter().copied());
+            let wanted = match meant {
                 Some(known) => format!("did you mean `{known}`?"),
-                None => format!("known here: {}", listed(self.asked.iter().copied(), "and")),
+                None if all => self.known_here(known),
+                None => continue,
             };
+            self.missing.retain(|(missing, _)| Some(*missing) != meant);
             self.log.report(span, format!("unknown key `{}` in {}", shortened(key), self.what), wanted);
+        }
+        for (key, wanted) in &self.missing {
+            self.log.report(self.span.clone(), format!("{} has no `{key}`", self.what), format!("wanted {wanted}"));
+        }
+    }
+
+    /// The keys that could still be added.
+    fn known_here(&self, known: &[&'static str]) -> String {
+        let free: Vec<&str> = known.iter().copied().filter(|key| !self.table.contains_key(*key)).collect();
+        match free.is_empty() {
+            true => format!("known here are only {}", listed(known.iter().copied(), "and")),
+            false => format!("known here: {}", listed(free, "and")),
         }
     }
 
@@ -218,6 +240,14 @@ impl<'a> Fields<'a> {
             self.wrong(key, value, "a direction: a vector that is not zero");
         }
         default
+    }
+
+    /// A direction, made a unit vector.
+    pub(crate) fn direction(&mut self, key: &'static str) -> [f64; 3] {
+        if self.required(key, "a direction, such as [0, 0, -1]").is_none() {
+            return [f64::NAN; 3];
+        }
+        self.direction_or(key, [f64::NAN; 3])
     }
 
     // Words.

@@ -19,6 +19,8 @@ use crate::world::WorldSettings;
 
 /// Most bytes of a scene file: 16 MiB.
 pub const MOST_BYTES: u64 = 16 << 20;
+/// In a longer text only the first slip of syntax is told: the parser keeps every one it finds.
+const RECOVERED_BYTES: usize = 256 << 10;
 /// Most lights of a scene.
 const MOST_LIGHTS: usize = 64;
 
@@ -79,16 +81,8 @@ impl SceneFile {
             return Err(SceneError::TooLarge { file: file_name.into(), limit: MOST_BYTES });
         }
         let log = Log::new(text);
-        let (root, errors) = DeTable::parse_recoverable(text);
-        for error in &errors {
-            let (message, wanted) = in_our_words(error.message());
-            log.report(error.span().unwrap_or(0..0), message, wanted);
-        }
         // What follows a slip of syntax is guesswork: it is told alone.
-        let scene = match errors.is_empty() {
-            true => Some(SceneFile::read(&log, root.get_ref(), file_name)),
-            false => None,
-        };
+        let scene = parse_toml(&log, text).map(|root| SceneFile::read(&log, &root, file_name));
         match scene {
             Some(scene) if log.count() == 0 => Ok(scene),
             _ => Err(invalid(log, text, file_name)),
@@ -127,6 +121,22 @@ impl SceneFile {
     }
 }
 
+/// The tree of a TOML text; `None`, with the problems recorded, if it is no TOML.
+fn parse_toml<'a>(log: &Log<'_>, text: &'a str) -> Option<DeTable<'a>> {
+    let (root, errors) = match text.len() > RECOVERED_BYTES {
+        true => DeTable::parse(text).map_or_else(|error| (None, vec![error]), |root| (Some(root), Vec::new())),
+        false => {
+            let (root, errors) = DeTable::parse_recoverable(text);
+            (Some(root), errors)
+        }
+    };
+    for error in &errors {
+        let (message, wanted) = in_our_words(error.message());
+        log.report(error.span().unwrap_or(0..0), message, wanted);
+    }
+    root.filter(|_| errors.is_empty()).map(toml::Spanned::into_inner)
+}
+
 /// At most [`MOST_BYTES`] of a file.
 fn read_capped(path: &Path) -> Result<Vec<u8>, SceneError> {
     let unread = |source| SceneError::Read { file: path.to_path_buf(), source };
@@ -148,7 +158,7 @@ fn invalid(log: Log<'_>, text: &str, file_name: &str) -> SceneError {
 fn in_our_words(message: &str) -> (String, String) {
     let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
     match line.split_once(", expected ") {
-        Some((wrong, wanted)) if wanted == "nothing" => (format!("TOML: {wrong}"), "wanted nothing here".into()),
+        Some((wrong, "nothing")) => (format!("TOML: {wrong}"), "wanted nothing here".into()),
         Some((wrong, wanted)) => (format!("TOML: {wrong}"), format!("wanted {wanted}")),
         None if line == "duplicate key" => ("TOML: duplicate key".into(), "wanted each key once in its table".into()),
         None => (format!("TOML: {line}"), "wanted a TOML document".into()),

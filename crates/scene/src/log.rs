@@ -34,6 +34,11 @@ impl<'a> Log<'a> {
         self.found.borrow().len()
     }
 
+    /// Whether further problems would be dropped.
+    pub(crate) fn is_full(&self) -> bool {
+        self.count() >= KEPT_PROBLEMS
+    }
+
     /// What stands at `span`, on one line and not too long.
     pub(crate) fn quote(&self, span: Range<usize>) -> String {
         let text = self.text.get(span).unwrap_or("").trim();

@@ -103,7 +103,10 @@ const KINDS: Names<Kind> = &[
 impl MeshSpec {
     /// Reads a mesh; files are looked for beside `folder`.
     pub(crate) fn read(name: &str, mut f: Fields<'_>, folder: &Path) -> Option<Self> {
-        let kind = f.choice("type", KINDS)?;
+        let Some(kind) = f.choice("type", KINDS) else {
+            f.give_up();
+            return None;
+        };
         let sphere_tree_depth = f.value("sphere_tree_depth").map(|v| f.as_integer("sphere_tree_depth", v, 1..=10));
         let source = MeshSource::read(&mut f, kind, folder);
         f.finish();

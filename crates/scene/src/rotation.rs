@@ -43,8 +43,7 @@ fn read_axis_angle(f: &mut Fields<'_>) -> Option<[f64; 4]> {
     let value = f.value("rotation")?;
     let example = "{ axis = [0, 1, 0], angle_deg = 20 }";
     let mut turn = Fields::of(f.log, value, format!("the rotation of {}", f.what), example)?;
-    turn.value("axis").is_none().then(|| turn.missing("axis", "a direction, such as [0, 1, 0]"));
-    let axis = turn.direction_or("axis", [0.0, 0.0, 1.0]);
+    let axis = turn.direction("axis");
     let angle = turn.number("angle_deg", ANGLE).to_radians();
     turn.finish();
     Some(about(axis, angle))

@@ -66,7 +66,11 @@ impl ShapeSpec {
         let example = "{ type = \"sphere\", radius_m = 0.5 }";
         let value = body.required("shape", &format!("a shape, such as {example}"))?;
         let mut f = Fields::of(body.log, value, format!("the shape of {}", body.what), example)?;
-        let shape = match f.choice("type", KINDS)? {
+        let Some(kind) = f.choice("type", KINDS) else {
+            f.give_up();
+            return None;
+        };
+        let shape = match kind {
             Kind::Sphere => Some(ShapeSpec::Sphere { radius_m: f.number("radius_m", Bound::POSITIVE) }),
             Kind::Box => Some(ShapeSpec::Box { size_m: f.vector("size_m", Bound::POSITIVE) }),
             Kind::Capsule => Some(ShapeSpec::Capsule {

@@ -79,8 +79,10 @@ pub fn resolve_scene(name_or_path: &str, search_dirs: &[PathBuf]) -> Result<Scen
         return Ok(SceneSource::Path(path.to_path_buf()));
     }
     if like_a_path {
-        let source = std::io::Error::from(std::io::ErrorKind::NotFound);
-        return Err(SceneError::Read { file: path.to_path_buf(), source });
+        let file = if path.is_dir() { path.join("scene.toml") } else { path.to_path_buf() };
+        // The system's own words for why it cannot be opened, where it has any.
+        let source = std::fs::metadata(&file).err().unwrap_or(std::io::ErrorKind::InvalidInput.into());
+        return Err(SceneError::Read { file, source });
     }
     let in_folders = search_dirs.iter().map(|dir| dir.join(name_or_path).join("scene.toml")).find(|p| p.is_file());
     let built_in = || SHIPPED.iter().find(|scene| scene.name == name_or_path);

@@ -1,13 +1,15 @@
 //! "Did you mean": the known word nearest to a mistyped one.
 
-/// The word of `known` that `typed` most likely means: the least edit distance, at most a third of
-/// the length of the word typed (and at least one edit). Ties go to the earlier word.
+/// The word of `known` that `typed` most likely means: one that goes on after it, as `dt_s` does after
+/// `dt`, or else the least edit distance, at most a third of the length of the word typed (and at
+/// least one edit). Ties go to the earlier word.
 pub(crate) fn nearest<'k>(typed: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
     let letters: Vec<char> = typed.chars().take(64).collect();
     let allowed = (letters.len() / 3).max(1);
     let mut best: Option<(usize, &str)> = None;
     for word in known {
-        let distance = edit_distance(&letters, word);
+        let unit_left_out = word.strip_prefix(typed).is_some_and(|rest| !typed.is_empty() && rest.starts_with('_'));
+        let distance = if unit_left_out { 0 } else { edit_distance(&letters, word) };
         if distance <= allowed && best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, word));
         }
@@ -67,6 +69,12 @@ mod tests {
     fn far_words_are_not_suggested() {
         assert_eq!(nearest("frction", ["restitution", "friction"]), Some("friction"));
         assert_eq!(nearest("banana", ["restitution", "friction"]), None);
+        assert_eq!(nearest("", ["restitution"]), None);
+    }
+
+    #[test]
+    fn a_unit_left_out_is_found() {
+        assert_eq!(nearest("gravity", ["dt_s", "gravity_m_per_s2"]), Some("gravity_m_per_s2"));
     }
 
     #[test]

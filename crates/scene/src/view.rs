@@ -105,11 +105,12 @@ impl LightSpec {
     }
 
     pub(crate) fn read(mut f: Fields<'_>) -> Option<Self> {
-        let kind = match f.choice("type", KINDS)? {
-            Kind::Directional => {
-                f.value("direction").is_none().then(|| f.missing("direction", "the direction of the light, such as [0, 0, -1]"));
-                LightKind::Directional { direction: f.direction_or("direction", SUN) }
-            }
+        let Some(kind) = f.choice("type", KINDS) else {
+            f.give_up();
+            return None;
+        };
+        let kind = match kind {
+            Kind::Directional => LightKind::Directional { direction: f.direction("direction") },
             Kind::Point => LightKind::Point { position_m: f.vector("position_m", Bound::ANY) },
         };
         let directional = matches!(kind, LightKind::Directional { .. });
