@@ -1,1 +1,82 @@
-//! Files to worlds: scene TOML, meshes by path; every error names file, line and column.
+//! Scene files: TOML text to a typed, checked description of a world.
+//!
+//! A scene is read in one pass that finds all its problems. Each is told with file, line, column, the
+//! value and what would be right; see [`SceneError`]. What comes out, a [`SceneFile`], has no
+//! references left to resolve and no number that is not finite: meshes and materials are indices,
+//! defaults are filled in, grids are expanded to bodies.
+//!
+//! # The format
+//!
+//! SI units, radians except in keys that end in `_deg`, z up, right-handed. Quaternions are
+//! `[x, y, z, w]`. Every table and key but those marked *required* may be left out.
+//!
+//! ```toml
+//! description = "A ball on a plane"
+//!
+//! [world]                          # WorldSettings
+//! dt_s = 0.005
+//! stepper = "backtracking"
+//!
+//! [materials.rubber]               # MaterialSpec
+//! friction = 0.8
+//! restitution = 0.7
+//! color = "#c03028"
+//!
+//! [[body]]                         # BodySpec
+//! name = "floor"                   # required, unique
+//! mode = "static"
+//! shape = { type = "half_space" }  # required
+//!
+//! [[body]]
+//! name = "ball"
+//! shape = { type = "sphere", radius_m = 0.1 }
+//! mass_kg = 0.2                    # or density_kg_per_m3; one is required of what is dynamic
+//! position_m = [0, 0, 1]
+//! material = "rubber"
+//!
+//! [camera]                         # CameraSpec
+//! eye_m = [2, -3, 1]
+//! target_m = [0, 0, 0.3]
+//! ```
+//!
+//! `[meshes.NAME]` is [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its common keys;
+//! `[[light]]`, `[sky]` and `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]. The table of
+//! all keys is `scenes/README.md`.
+//!
+//! ```
+//! let scene = tumble_scene::resolve_scene("stack", &[])?.load()?;
+//! assert_eq!(scene.bodies.iter().filter(|b| b.mode == tumble_scene::Mode::Dynamic).count(), 10);
+//!
+//! let error = tumble_scene::SceneFile::parse("[world]\ndt = 0.1\n", "my.toml").unwrap_err();
+//! assert_eq!(error.to_string(), "my.toml:2:1: unknown key `dt` in [world]; did you mean `dt_s`?");
+//! # Ok::<(), tumble_scene::SceneError>(())
+//! ```
+
+mod body;
+mod bound;
+mod error;
+mod fields;
+mod file;
+mod grid;
+mod log;
+mod look;
+mod material;
+mod mesh;
+mod profile;
+mod rotation;
+mod shape;
+mod shipped;
+mod suggest;
+mod view;
+mod world;
+
+pub use body::{BodySpec, MassSpec, Mode};
+pub use error::{Invalid, Problem, SceneError};
+pub use file::{MOST_BYTES, SceneFile};
+pub use look::{Color, Look, Pattern};
+pub use material::MaterialSpec;
+pub use mesh::{MeshSource, MeshSpec};
+pub use shape::ShapeSpec;
+pub use shipped::{SceneSource, Shipped, resolve_scene, shipped};
+pub use view::{CameraSpec, GroundSpec, LightKind, LightSpec, SkySpec};
+pub use world::{Combine, Integrator, Solver, Stepper, WorldSettings};

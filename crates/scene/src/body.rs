@@ -1,0 +1,190 @@
+//! `[[body]]`: one rigid body.
+
+use std::collections::BTreeMap;
+
+use crate::bound::Bound;
+use crate::fields::{Fields, Names};
+use crate::look::Look;
+use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, MaterialSpec, RESTITUTION};
+use crate::rotation;
+use crate::shape::ShapeSpec;
+
+/// Most bytes of a body's name: 64 with the final zero in which it travels between processes.
+pub(crate) const MOST_NAME_BYTES: usize = 63;
+
+/// Who moves a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Forces and contacts do.
+    Dynamic,
+    /// Nobody: it stands still.
+    Static,
+    /// Its own given velocity does, whatever it meets.
+    Kinematic,
+}
+
+impl Mode {
+    const NAMES: Names<Self> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
+}
+
+/// How heavy a body is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MassSpec {
+    /// Spread evenly over the volume, kg.
+    Mass(f64),
+    /// kg/m³.
+    Density(f64),
+}
+
+/// One rigid body at the start, all references resolved and all defaults filled in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodySpec {
+    /// Unique in the scene; at most 63 bytes.
+    pub name: String,
+    /// Default `dynamic`.
+    pub mode: Mode,
+    /// The shape in body axes.
+    pub shape: ShapeSpec,
+    /// Always there if the body is dynamic.
+    pub mass: Option<MassSpec>,
+    /// Where the origin of the *shape* is, world axes, m. A mesh or a profile may have its centre
+    /// of mass elsewhere: that is then at `position_m` + R·(its place in the shape).
+    pub position_m: [f64; 3],
+    /// Body axes to world axes, unit quaternion `[x, y, z, w]`.
+    pub orientation_xyzw: [f64; 4],
+    /// Velocity of the centre of mass, world axes, m/s.
+    pub velocity_m_per_s: [f64; 3],
+    /// World axes, rad/s.
+    pub angular_velocity_rad_per_s: [f64; 3],
+    /// Index into [`SceneFile::materials`](crate::SceneFile::materials), where one is named.
+    pub material: Option<usize>,
+    /// The body's own, else its material's, else 0.5.
+    pub friction: f64,
+    /// The body's own, else its material's, else 0.
+    pub restitution: f64,
+    /// Rate at which velocity decays, 1/s: `dv/dt = −c v`. Default 0.
+    pub linear_damping_per_s: f64,
+    /// Rate at which angular velocity decays, 1/s. Default 0.
+    pub angular_damping_per_s: f64,
+    /// Takes part in contacts. Default true.
+    pub collides: bool,
+    /// Takes part in anything at all. Default true.
+    pub alive: bool,
+    /// Is drawn. Default true.
+    pub visible: bool,
+    /// The body's own look, on top of its material's.
+    pub look: Look,
+}
+
+/// Names a body can refer to. A name without an index stands for something that is itself wrong.
+pub(crate) struct Library<'a> {
+    pub(crate) meshes: BTreeMap<&'a str, Option<usize>>,
+    pub(crate) material_names: BTreeMap<&'a str, usize>,
+    pub(crate) materials: &'a [MaterialSpec],
+}
+
+impl BodySpec {
+    /// Reads all keys of a body but does not finish the table: a grid has keys of its own.
+    pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>) -> Option<BodySpec> {
+        let name = read_name(f);
+        let mode = read_mode(f);
+        let shape = ShapeSpec::read(f, &library.meshes);
+        let mass = read_mass(f, mode);
+        let material = read_material(f, library);
+        let base = material.map(|index| &library.materials[index]);
+        let (friction, restitution) = base.map_or((DEFAULT_FRICTION, DEFAULT_RESTITUTION), |m| (m.friction, m.restitution));
+        let look = base.map_or_else(Look::default, |m| m.look.clone());
+        let [linear, angular] = read_velocities(f, mode);
+        let body = BodySpec {
+            name: name.unwrap_or_default(),
+            mode,
+            shape: shape.clone().unwrap_or(ShapeSpec::HalfSpace),
+            mass,
+            position_m: f.vector_or("position_m", Bound::ANY, [0.0; 3]),
+            orientation_xyzw: rotation::read(f),
+            velocity_m_per_s: linear,
+            angular_velocity_rad_per_s: angular,
+            material,
+            friction: f.number_or("friction", FRICTION, friction),
+            restitution: f.number_or("restitution", RESTITUTION, restitution),
+            linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
+            angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
+            collides: f.flag_or("collides", true),
+            alive: f.flag_or("alive", true),
+            visible: f.flag_or("visible", true),
+            look: Look::read(f, &look),
+        };
+        let shape = shape?;
+        check_half_space(f, &shape, mode);
+        Some(BodySpec { shape, ..body })
+    }
+}
+
+fn read_name(f: &mut Fields<'_>) -> Option<String> {
+    let (name, value) = f.text("name", "a name of its own")?;
+    f.what = format!("{} \"{}\"", f.what.split(' ').next().unwrap_or("body"), f.log.quote(value.span()).trim_matches(['"', '\'']));
+    let wanted = "a name of 1 to 63 bytes without control characters";
+    if name.is_empty() || name.len() > MOST_NAME_BYTES || name.chars().any(char::is_control) {
+        f.wrong("name", value, wanted);
+    }
+    Some(name.to_owned())
+}
+
+/// The mode; one that is wrong stands for a mode that asks for nothing else.
+fn read_mode(f: &mut Fields<'_>) -> Mode {
+    match f.value("mode") {
+        Some(value) => f.as_choice("mode", value, Mode::NAMES).unwrap_or(Mode::Kinematic),
+        None => Mode::Dynamic,
+    }
+}
+
+fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {
+    let mass = f.optional_number("mass_kg", Bound::POSITIVE);
+    let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE);
+    match (mass, density) {
+        (Some(_), Some(_)) => {
+            let message = format!("{} has both `mass_kg` and `density_kg_per_m3`", f.what);
+            f.log.report(f.span.clone(), message, "wanted one of them");
+            None
+        }
+        (Some(mass), None) => Some(MassSpec::Mass(mass)),
+        (None, Some(density)) => Some(MassSpec::Density(density)),
+        (None, None) => {
+            if mode == Mode::Dynamic {
+                f.missing("mass_kg", "`mass_kg` or `density_kg_per_m3`, or mode = \"static\" for what never moves");
+            }
+            None
+        }
+    }
+}
+
+fn read_material(f: &mut Fields<'_>, library: &Library<'_>) -> Option<usize> {
+    let (name, value) = f.optional_text("material")?;
+    let found = library.material_names.get(name).copied();
+    if found.is_none() {
+        match library.material_names.is_empty() {
+            true => f.wrong("material", value, "the NAME of a table [materials.NAME], and the scene has none"),
+            false => f.unknown_name("material", value, name, library.material_names.keys().copied().collect()),
+        }
+    }
+    found
+}
+
+/// Linear and angular velocity; a static body has none.
+fn read_velocities(f: &mut Fields<'_>, mode: Mode) -> [[f64; 3]; 2] {
+    ["velocity_m_per_s", "angular_velocity_rad_per_s"].map(|key| {
+        let Some(value) = f.value(key) else { return [0.0; 3] };
+        let velocity = f.as_vector(key, value, Bound::ANY);
+        if mode == Mode::Static && velocity != [0.0; 3] {
+            f.wrong(key, value, "no velocity for a static body; mode = \"kinematic\" moves by itself");
+        }
+        velocity
+    })
+}
+
+fn check_half_space(f: &Fields<'_>, shape: &ShapeSpec, mode: Mode) {
+    if *shape == ShapeSpec::HalfSpace && mode == Mode::Dynamic {
+        let message = format!("{} is a dynamic half-space, which has no finite mass", f.what);
+        f.log.report(f.span.clone(), message, "wanted mode = \"static\" or \"kinematic\"");
+    }
+}

@@ -1,0 +1,173 @@
+//! What can be wrong with a scene file, and how it is told: one line per problem, or with the
+//! lines of the file drawn below it.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use ariadne::{CharSet, Config, IndexType, Label, Report, ReportKind, Source};
+use thiserror::Error;
+
+/// Problems told in full; the rest are counted.
+const SHOWN_PROBLEMS: usize = 40;
+/// A line longer than this many bytes is not drawn in a report.
+const DRAWN_LINE_BYTES: usize = 400;
+
+/// Why a scene could not be read.
+#[derive(Debug, Error)]
+pub enum SceneError {
+    /// The file could not be opened or read.
+    #[error("{}: cannot read the scene: {source}; give the path of a scene.toml or of its folder", file.display())]
+    Read {
+        /// The path that was tried.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is larger than any scene may be.
+    #[error("{}: the file is larger than {limit} bytes, the most a scene may have; keep meshes in files of their own", file.display())]
+    TooLarge {
+        /// The path that was tried.
+        file: PathBuf,
+        /// The most bytes allowed.
+        limit: u64,
+    },
+    /// The file is not text.
+    #[error("{}:{line}: byte {byte} of the file is not UTF-8; a scene is a UTF-8 text in TOML", file.display())]
+    NotUtf8 {
+        /// The path that was tried.
+        file: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// Offset of the first bad byte, from 0.
+        byte: usize,
+    },
+    /// Neither a path nor the name of a shipped scene.
+    #[error("no scene `{name}`: {hint}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// What there is instead.
+        hint: String,
+    },
+    /// The text was read, and is wrong in one or more places.
+    #[error("{0}")]
+    Invalid(Box<Invalid>),
+}
+
+impl SceneError {
+    /// The error as a full report for a person: the one line, and for each problem of the text
+    /// the lines of the file with the place marked. Escape codes for colour only if `color`.
+    pub fn report(&self, color: bool) -> String {
+        match self {
+            SceneError::Invalid(invalid) => invalid.report(color),
+            other => format!("Error: {other}\n"),
+        }
+    }
+
+    /// The problems of the text, in the order of the file; empty for the other kinds of error.
+    pub fn problems(&self) -> &[Problem] {
+        match self {
+            SceneError::Invalid(invalid) => &invalid.problems,
+            _ => &[],
+        }
+    }
+}
+
+/// A text with problems.
+#[derive(Debug)]
+pub struct Invalid {
+    /// The name of the file, as it is to be shown.
+    pub file: String,
+    /// The whole text.
+    pub text: String,
+    /// At least one, in the order of the file.
+    pub problems: Vec<Problem>,
+}
+
+/// One thing that is wrong at one place of a text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1, in characters.
+    pub column: usize,
+    /// The bytes of the text that are meant.
+    pub span: Range<usize>,
+    /// What is wrong, with the value.
+    pub message: String,
+    /// What would be right.
+    pub wanted: String,
+}
+
+impl fmt::Display for Invalid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, problem) in self.problems.iter().take(SHOWN_PROBLEMS).enumerate() {
+            let Problem { line, column, message, wanted, .. } = problem;
+            let newline = if index == 0 { "" } else { "\n" };
+            write!(f, "{newline}{}:{line}:{column}: {message}; {wanted}", self.file)?;
+        }
+        match self.problems.len().saturating_sub(SHOWN_PROBLEMS) {
+            0 => Ok(()),
+            more => write!(f, "\n{}: and {more} more", self.file),
+        }
+    }
+}
+
+impl Invalid {
+    fn report(&self, color: bool) -> String {
+        let source = Source::from(self.text.as_str());
+        let mut out = String::new();
+        for problem in self.problems.iter().take(SHOWN_PROBLEMS) {
+            out += &self.drawn(problem, &source, color).unwrap_or_else(|| self.plain(problem));
+        }
+        let shown = self.problems.len().min(SHOWN_PROBLEMS);
+        let (count, word) = (self.problems.len(), if self.problems.len() == 1 { "error" } else { "errors" });
+        out += &format!("{}: {count} {word}", self.file);
+        if shown < count {
+            out += &format!(", the first {shown} shown");
+        }
+        out.push('\n');
+        out
+    }
+
+    fn plain(&self, problem: &Problem) -> String {
+        let Problem { line, column, message, wanted, .. } = problem;
+        format!("Error: {message}\n  {}:{line}:{column}: {wanted}\n", self.file)
+    }
+
+    /// The problem with its line of the file; `None` where the line is too long to show.
+    fn drawn(&self, problem: &Problem, source: &Source<&str>, color: bool) -> Option<String> {
+        let text = self.text.as_str();
+        let start = floor_char(text, problem.span.start);
+        let line_end = text[start..].find('\n').map_or(text.len(), |at| start + at);
+        let line_start = text[..start].rfind('\n').map_or(0, |at| at + 1);
+        if line_end - line_start > DRAWN_LINE_BYTES {
+            return None;
+        }
+        // A span over several lines is marked on its first.
+        let end = floor_char(text, problem.span.end.min(line_end)).max(start);
+        let name = self.file.as_str();
+        let config = Config::default().with_color(color).with_index_type(IndexType::Byte).with_char_set(CharSet::Ascii);
+        let label = Label::new((name, start..end)).with_message(&problem.wanted).with_color(ariadne::Color::Red);
+        let mut bytes = Vec::new();
+        Report::build(ReportKind::Error, (name, start..end))
+            .with_config(config)
+            .with_message(&problem.message)
+            .with_label(label)
+            .finish()
+            .write((name, source), &mut bytes)
+            .ok()?;
+        let drawn = String::from_utf8(bytes).ok()?;
+        Some(drawn.lines().map(|line| line.trim_end().to_owned() + "\n").collect())
+    }
+}
+
+/// The largest boundary between characters of `text` that is at most `at`.
+fn floor_char(text: &str, at: usize) -> usize {
+    let mut at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at
+}

@@ -1,0 +1,254 @@
+//! A scene file as a whole: from text to a checked description.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use toml::de::{DeTable, DeValue};
+
+use crate::body::{BodySpec, Library};
+use crate::error::{Invalid, SceneError};
+use crate::fields::Fields;
+use crate::grid::{self, MOST_BODIES};
+use crate::log::Log;
+use crate::material::MaterialSpec;
+use crate::mesh::MeshSpec;
+use crate::view::{CameraSpec, GroundSpec, LightSpec, SkySpec};
+use crate::world::WorldSettings;
+
+/// Most bytes of a scene file: 16 MiB.
+pub const MOST_BYTES: u64 = 16 << 20;
+/// In a longer text only the first slip of syntax is told: the parser keeps every one it finds.
+const RECOVERED_BYTES: usize = 256 << 10;
+/// Most lights of a scene.
+const MOST_LIGHTS: usize = 64;
+
+/// A scene as its file describes it: checked, references resolved, grids expanded to bodies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneFile {
+    /// The name of the file, as errors show it.
+    pub file: String,
+    /// One line that says what the scene shows; may be empty.
+    pub description: String,
+    /// `[world]`.
+    pub world: WorldSettings,
+    /// `[materials.NAME]`, by name.
+    pub materials: Vec<MaterialSpec>,
+    /// `[meshes.NAME]`, by name.
+    pub meshes: Vec<MeshSpec>,
+    /// `[[body]]` in the order of the file, then the copies of each `[[grid]]`.
+    pub bodies: Vec<BodySpec>,
+    /// `[camera]`; `None` leaves the view to the renderer.
+    pub camera: Option<CameraSpec>,
+    /// `[[light]]`; a sun where there is none.
+    pub lights: Vec<LightSpec>,
+    /// `[sky]`.
+    pub sky: SkySpec,
+    /// `[ground]`; `None` draws no floor.
+    pub ground: Option<GroundSpec>,
+}
+
+impl SceneFile {
+    /// Reads the file at `path`, or `scene.toml` in the folder `path`.
+    ///
+    /// # Errors
+    /// [`SceneError`]: the file cannot be read, is larger than 16 MiB or not UTF-8, or has problems,
+    /// all of which are told at once.
+    pub fn load(path: impl AsRef<Path>) -> Result<SceneFile, SceneError> {
+        let mut path = path.as_ref().to_path_buf();
+        if path.is_dir() {
+            path.push("scene.toml");
+        }
+        let bytes = read_capped(&path)?;
+        match std::str::from_utf8(&bytes) {
+            Ok(text) => SceneFile::parse(text, &path.display().to_string()),
+            Err(error) => {
+                let byte = error.valid_up_to();
+                let line = 1 + bytes[..byte].iter().filter(|&&b| b == b'\n').count();
+                Err(SceneError::NotUtf8 { file: path, line, byte })
+            }
+        }
+    }
+
+    /// Reads a scene from its text. `file_name` is shown in errors, and mesh files are looked for in
+    /// its folder.
+    ///
+    /// # Errors
+    /// [`SceneError::TooLarge`] or [`SceneError::Invalid`].
+    pub fn parse(text: &str, file_name: &str) -> Result<SceneFile, SceneError> {
+        if text.len() as u64 > MOST_BYTES {
+            return Err(SceneError::TooLarge { file: file_name.into(), limit: MOST_BYTES });
+        }
+        let log = Log::new(text);
+        // What follows a slip of syntax is guesswork: it is told alone.
+        let scene = parse_toml(&log, text).map(|root| SceneFile::read(&log, &root, file_name));
+        match scene {
+            Some(scene) if log.count() == 0 => Ok(scene),
+            _ => Err(invalid(log, text, file_name)),
+        }
+    }
+
+    fn read(log: &Log<'_>, root: &DeTable<'_>, file_name: &str) -> SceneFile {
+        let folder = Path::new(file_name).parent().unwrap_or(Path::new(""));
+        let mut f = Fields::of_table(log, root, 0..0, "the scene");
+        let description = f.optional_text("description").map_or("", |(text, _)| text).to_owned();
+        let world = read_table(&mut f, "world", WorldSettings::read).unwrap_or_default();
+        let materials = read_named(&mut f, "materials", |name, table| Some(MaterialSpec::read(name, table)));
+        let meshes = read_named(&mut f, "meshes", |name, table| MeshSpec::read(name, table, folder));
+        let materials: Vec<MaterialSpec> = materials.into_iter().filter_map(|(_, material)| material).collect();
+        let bodies = read_bodies(&mut f, &library(&meshes, &materials));
+        let camera = read_table(&mut f, "camera", CameraSpec::read);
+        let mut lights: Vec<LightSpec> = f.tables("light", MOST_LIGHTS).into_iter().filter_map(LightSpec::read).collect();
+        if lights.is_empty() {
+            lights.push(LightSpec::sun());
+        }
+        let sky = read_table(&mut f, "sky", SkySpec::read).unwrap_or_default();
+        let ground = read_table(&mut f, "ground", GroundSpec::read);
+        f.finish();
+        SceneFile {
+            file: file_name.to_owned(),
+            description,
+            world,
+            materials,
+            meshes: meshes.into_iter().filter_map(|(_, mesh)| mesh).collect(),
+            bodies,
+            camera,
+            lights,
+            sky,
+            ground,
+        }
+    }
+}
+
+/// The tree of a TOML text; `None`, with the problems recorded, if it is no TOML.
+fn parse_toml<'a>(log: &Log<'_>, text: &'a str) -> Option<DeTable<'a>> {
+    let (root, errors) = match text.len() > RECOVERED_BYTES {
+        true => DeTable::parse(text).map_or_else(|error| (None, vec![error]), |root| (Some(root), Vec::new())),
+        false => {
+            let (root, errors) = DeTable::parse_recoverable(text);
+            (Some(root), errors)
+        }
+    };
+    for error in &errors {
+        let (message, wanted) = in_our_words(error.message());
+        log.report(error.span().unwrap_or(0..0), message, wanted);
+    }
+    root.filter(|_| errors.is_empty()).map(toml::Spanned::into_inner)
+}
+
+/// At most [`MOST_BYTES`] of a file.
+fn read_capped(path: &Path) -> Result<Vec<u8>, SceneError> {
+    let unread = |source| SceneError::Read { file: path.to_path_buf(), source };
+    let file = std::fs::File::open(path).map_err(unread)?;
+    let mut bytes = Vec::new();
+    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(SceneError::TooLarge { file: PathBuf::from(path), limit: MOST_BYTES });
+    }
+    Ok(bytes)
+}
+
+fn invalid(log: Log<'_>, text: &str, file_name: &str) -> SceneError {
+    let problems = log.into_problems();
+    SceneError::Invalid(Box::new(Invalid { file: file_name.to_owned(), text: text.to_owned(), problems }))
+}
+
+/// The parser's message as what is wrong and what is wanted.
+fn in_our_words(message: &str) -> (String, String) {
+    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.split_once(", expected ") {
+        Some((wrong, "nothing")) => (format!("TOML: {wrong}"), "wanted nothing here".into()),
+        Some((wrong, wanted)) => (format!("TOML: {wrong}"), format!("wanted {wanted}")),
+        None if line == "duplicate key" => ("TOML: duplicate key".into(), "wanted each key once in its table".into()),
+        None => (format!("TOML: {line}"), "wanted a TOML document".into()),
+    }
+}
+
+/// The table `[key]`, if it is there.
+fn read_table<'a, T>(f: &mut Fields<'a>, key: &'static str, read: impl FnOnce(Fields<'a>) -> T) -> Option<T> {
+    let value = f.value(key)?;
+    Fields::of(f.log, value, format!("[{key}]"), &format!("[{key}]")).map(read)
+}
+
+/// The tables `[key.NAME]` by name; `None` stands for one that is wrong.
+fn read_named<'a, T>(
+    f: &mut Fields<'a>,
+    key: &'static str,
+    read: impl Fn(&'a str, Fields<'a>) -> Option<T>,
+) -> Vec<(&'a str, Option<T>)> {
+    let Some(value) = f.value(key) else { return Vec::new() };
+    let example = format!("[{key}.NAME]");
+    let Some(tables) = Fields::of(f.log, value, format!("[{key}]"), &example) else { return Vec::new() };
+    let one = |(name, _, value)| {
+        let table = Fields::of(f.log, value, format!("[{key}.{name}]"), &example);
+        (name, table.and_then(|table| read(name, table)))
+    };
+    tables.entries().map(one).collect()
+}
+
+fn library<'a>(meshes: &[(&'a str, Option<MeshSpec>)], materials: &'a [MaterialSpec]) -> Library<'a> {
+    let mut right = 0..;
+    let meshes = meshes.iter().map(|(name, mesh)| (*name, mesh.as_ref().and_then(|_| right.next()))).collect();
+    let material_names = materials.iter().enumerate().map(|(index, m)| (m.name.as_str(), index)).collect();
+    Library { meshes, material_names, materials }
+}
+
+/// All bodies, those of grids included, each with a name of its own.
+fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>) -> Vec<BodySpec> {
+    let mut bodies = Vec::new();
+    let mut names: BTreeMap<String, Range<usize>> = BTreeMap::new();
+    for mut table in f.tables("body", MOST_BODIES) {
+        let place = name_span(&mut table);
+        if let Some(body) = BodySpec::read(&mut table, library) {
+            note_name(&table, &mut names, &body.name, &place);
+            bodies.push(body);
+        }
+        table.finish();
+    }
+    for mut table in f.tables("grid", MOST_BODIES) {
+        let place = name_span(&mut table);
+        let (log, what, first) = (table.log, table.what.clone(), bodies.len());
+        grid::read(table, library, MOST_BODIES.saturating_sub(first), &mut bodies);
+        for body in &bodies[first..] {
+            if !note_unique(log, &what, &mut names, &body.name, &place) {
+                break;
+            }
+        }
+    }
+    bodies
+}
+
+fn name_span(table: &mut Fields<'_>) -> Range<usize> {
+    table.value("name").map_or(table.span.clone(), |value| value.span())
+}
+
+fn note_name(table: &Fields<'_>, names: &mut BTreeMap<String, Range<usize>>, name: &str, place: &Range<usize>) {
+    if !name.is_empty() {
+        note_unique(table.log, "body", names, name, place);
+    }
+}
+
+/// Files `name`; `false`, with the problem recorded, where it is taken.
+fn note_unique(log: &Log<'_>, what: &str, names: &mut BTreeMap<String, Range<usize>>, name: &str, place: &Range<usize>) -> bool {
+    match names.insert(name.to_owned(), place.clone()) {
+        None => true,
+        Some(earlier) => {
+            let line = log.line(earlier.start);
+            let kind = what.split(' ').next().unwrap_or("body");
+            let message = format!("`name`: this {kind} makes a second body \"{name}\"; the first is at line {line}");
+            log.report(place.clone(), message, "wanted a name that no other body has");
+            names.insert(name.to_owned(), earlier);
+            false
+        }
+    }
+}
+
+/// The `description` of a scene's text, without reading the rest; empty where there is none.
+pub(crate) fn description(text: &str) -> String {
+    let (root, _) = DeTable::parse_recoverable(text);
+    match root.get_ref().get("description").map(|value| value.get_ref()) {
+        Some(DeValue::String(text)) => text.to_string(),
+        _ => String::new(),
+    }
+}

@@ -1,0 +1,130 @@
+//! How a surface looks: colours, a pattern, and how it shines. Nothing here moves a body.
+
+use crate::bound::Bound;
+use crate::fields::{Fields, Names, Value};
+
+/// Red, green and blue from 0 to 1, sRGB (as on a screen, not linear light).
+pub type Color = [f64; 3];
+
+/// A pattern drawn over the surface, in body axes, so that turning shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pattern {
+    /// One colour.
+    Plain,
+    /// Squares of the two colours.
+    Checker,
+    /// Lines of the second colour on the first.
+    Grid,
+    /// A billiard ball of one colour with spots of the second.
+    SolidBall,
+    /// A billiard ball of the second colour with a band of the first.
+    StripedBall,
+    /// Grain along the body's x axis.
+    Wood,
+    /// The nap of a billiard cloth.
+    Felt,
+}
+
+impl Pattern {
+    const NAMES: Names<Self> = &[
+        ("plain", Pattern::Plain),
+        ("checker", Pattern::Checker),
+        ("grid", Pattern::Grid),
+        ("solid_ball", Pattern::SolidBall),
+        ("striped_ball", Pattern::StripedBall),
+        ("wood", Pattern::Wood),
+        ("felt", Pattern::Felt),
+    ];
+}
+
+/// The look of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// Main colour. Default a light grey.
+    pub color: Color,
+    /// The other colour of a pattern. Default white.
+    pub second_color: Color,
+    /// Default `plain`.
+    pub pattern: Pattern,
+    /// Size of a cell of the pattern (a square, a ring of the grain), metres. Default 0.1.
+    pub pattern_scale_m: f64,
+    /// 0 mirror-like to 1 dull. Default 0.5.
+    pub roughness: f64,
+    /// 0 not metal to 1 metal. Default 0.
+    pub metallic: f64,
+    /// Strength of a clear varnish on top, 0 to 1. Default 0.
+    pub clearcoat: f64,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Look {
+            color: [0.72, 0.72, 0.74],
+            second_color: [1.0, 1.0, 1.0],
+            pattern: Pattern::Plain,
+            pattern_scale_m: 0.1,
+            roughness: 0.5,
+            metallic: 0.0,
+            clearcoat: 0.0,
+        }
+    }
+}
+
+impl Look {
+    /// The look whose keys stand in `f`; what is not there is as in `base`.
+    pub(crate) fn read(f: &mut Fields<'_>, base: &Look) -> Look {
+        Look {
+            color: read_color(f, "color", base.color),
+            second_color: read_color(f, "second_color", base.second_color),
+            pattern: f.choice_or("pattern", Pattern::NAMES, base.pattern),
+            pattern_scale_m: f.number_or("pattern_scale_m", Bound::POSITIVE, base.pattern_scale_m),
+            roughness: f.number_or("roughness", Bound::UNIT, base.roughness),
+            metallic: f.number_or("metallic", Bound::UNIT, base.metallic),
+            clearcoat: f.number_or("clearcoat", Bound::UNIT, base.clearcoat),
+        }
+    }
+}
+
+/// A colour, or `default` where the key is not there.
+pub(crate) fn read_color(f: &mut Fields<'_>, key: &'static str, default: Color) -> Color {
+    match f.value(key) {
+        Some(value) => as_color(f, key, value),
+        None => default,
+    }
+}
+
+/// A value as a colour: `"#rrggbb"` or `[r, g, b]` from 0 to 1.
+pub(crate) fn as_color(f: &Fields<'_>, key: &str, value: &Value<'_>) -> Color {
+    match value.get_ref().as_str() {
+        Some(text) => hex_color(text).unwrap_or_else(|| {
+            f.wrong(key, value, "a colour: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1");
+            [f64::NAN; 3]
+        }),
+        None => f.as_vector(key, value, Bound::UNIT),
+    }
+}
+
+/// A value as a pattern's name.
+pub(crate) fn as_pattern<'a>(f: &Fields<'a>, key: &str, value: &'a Value<'a>) -> Pattern {
+    f.as_choice(key, value, Pattern::NAMES).unwrap_or(Pattern::Plain)
+}
+
+fn hex_color(text: &str) -> Option<Color> {
+    let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
+    let number = u32::from_str_radix(digits, 16).ok()?;
+    Some([16, 8, 0].map(|shift| f64::from((number >> shift) & 0xff) / 255.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::hex_color;
+
+    #[test]
+    fn hex_colors() {
+        assert_eq!(hex_color("#ff8000"), Some([1.0, 128.0 / 255.0, 0.0]));
+        assert_eq!(hex_color("#ff80"), None);
+        assert_eq!(hex_color("ff8000"), None);
+        assert_eq!(hex_color("#+12345"), None);
+        assert_eq!(hex_color("#é1234"), None);
+    }
+}

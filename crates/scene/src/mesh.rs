@@ -1,0 +1,177 @@
+//! `[meshes.NAME]`: closed surfaces, from a file or made from a few numbers.
+
+use std::path::{Path, PathBuf};
+
+use crate::bound::Bound;
+use crate::fields::{Fields, Names};
+use crate::profile;
+
+/// A named mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshSpec {
+    /// The NAME of `[meshes.NAME]`.
+    pub name: String,
+    /// Where its triangles come from.
+    pub source: MeshSource,
+    /// Levels of its sphere tree, 1 to 10; `None` leaves the choice to the builder.
+    pub sphere_tree_depth: Option<u32>,
+}
+
+/// Where the triangles of a mesh come from. Generated meshes have z as their axis, are closed, and
+/// have the origin that is said here.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MeshSource {
+    /// An OBJ or STL file that was there when the scene was read.
+    File {
+        /// The path, with the folder of the scene in front.
+        path: PathBuf,
+        /// Metres per unit of the file.
+        scale: f64,
+    },
+    /// A profile turned about the z axis; the origin is that of the profile.
+    Lathe {
+        /// Radius and height `[r, z]` in metres, from the bottom of the axis to its top; the first
+        /// and the last radius are 0, all others positive, and the line does not cross itself.
+        profile_m: Vec<[f64; 2]>,
+        /// Sides around the axis.
+        segments: u32,
+    },
+    /// A ring about z, centred on the origin.
+    Torus {
+        /// From the axis to the middle of the tube, metres; more than the tube's radius.
+        radius_m: f64,
+        /// Radius of the tube, metres.
+        tube_radius_m: f64,
+        /// Sides around the axis.
+        segments: u32,
+        /// Sides around the tube.
+        tube_segments: u32,
+    },
+    /// An icosahedron whose triangles are quartered `subdivisions` times, on a sphere about the origin.
+    Icosphere {
+        /// Metres.
+        radius_m: f64,
+        /// 0 to 7.
+        subdivisions: u32,
+    },
+    /// A cylinder along z, centred on the origin.
+    Cylinder {
+        /// Metres.
+        radius_m: f64,
+        /// Whole height, metres.
+        height_m: f64,
+        /// Sides around the axis.
+        segments: u32,
+    },
+    /// A capsule along z, centred on the origin.
+    Capsule {
+        /// Metres.
+        radius_m: f64,
+        /// Length of the straight part, without the two caps, metres.
+        length_m: f64,
+        /// Sides around the axis.
+        segments: u32,
+    },
+    /// A box centred on the origin.
+    Box {
+        /// Whole edges along x, y and z, metres.
+        size_m: [f64; 3],
+    },
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    File,
+    Lathe,
+    Torus,
+    Icosphere,
+    Cylinder,
+    Capsule,
+    Box,
+}
+
+const KINDS: Names<Kind> = &[
+    ("file", Kind::File),
+    ("lathe", Kind::Lathe),
+    ("torus", Kind::Torus),
+    ("icosphere", Kind::Icosphere),
+    ("cylinder", Kind::Cylinder),
+    ("capsule", Kind::Capsule),
+    ("box", Kind::Box),
+];
+
+impl MeshSpec {
+    /// Reads a mesh; files are looked for beside `folder`.
+    pub(crate) fn read(name: &str, mut f: Fields<'_>, folder: &Path) -> Option<Self> {
+        let Some(kind) = f.choice("type", KINDS) else {
+            f.give_up();
+            return None;
+        };
+        let sphere_tree_depth = f.value("sphere_tree_depth").map(|v| f.as_integer("sphere_tree_depth", v, 1..=10));
+        let source = MeshSource::read(&mut f, kind, folder);
+        f.finish();
+        Some(MeshSpec { name: name.to_owned(), source: source?, sphere_tree_depth })
+    }
+}
+
+impl MeshSource {
+    fn read(f: &mut Fields<'_>, kind: Kind, folder: &Path) -> Option<Self> {
+        Some(match kind {
+            Kind::File => {
+                let scale = f.number_or("scale", Bound::POSITIVE, 1.0);
+                MeshSource::File { path: read_path(f, folder)?, scale }
+            }
+            Kind::Lathe => {
+                let segments = read_segments(f, "segments", 48);
+                MeshSource::Lathe { profile_m: profile::read(f, "profile_m")?, segments }
+            }
+            Kind::Torus => read_torus(f),
+            Kind::Icosphere => MeshSource::Icosphere {
+                radius_m: f.number("radius_m", Bound::POSITIVE),
+                subdivisions: f.integer_or("subdivisions", 0..=7, 3),
+            },
+            Kind::Cylinder => MeshSource::Cylinder {
+                radius_m: f.number("radius_m", Bound::POSITIVE),
+                height_m: f.number("height_m", Bound::POSITIVE),
+                segments: read_segments(f, "segments", 48),
+            },
+            Kind::Capsule => MeshSource::Capsule {
+                radius_m: f.number("radius_m", Bound::POSITIVE),
+                length_m: f.number("length_m", Bound::POSITIVE),
+                segments: read_segments(f, "segments", 48),
+            },
+            Kind::Box => MeshSource::Box { size_m: f.vector("size_m", Bound::POSITIVE) },
+        })
+    }
+}
+
+fn read_segments(f: &mut Fields<'_>, key: &'static str, default: u32) -> u32 {
+    f.integer_or(key, 3..=1024, default)
+}
+
+fn read_torus(f: &mut Fields<'_>) -> MeshSource {
+    let radius_m = f.number("radius_m", Bound::POSITIVE);
+    let tube_radius_m = f.number("tube_radius_m", Bound::POSITIVE);
+    if tube_radius_m >= radius_m && let Some(value) = f.value("tube_radius_m") {
+        f.wrong("tube_radius_m", value, format!("less than radius_m, {radius_m}, so that the ring has a hole"));
+    }
+    let (segments, tube_segments) = (read_segments(f, "segments", 48), read_segments(f, "tube_segments", 24));
+    MeshSource::Torus { radius_m, tube_radius_m, segments, tube_segments }
+}
+
+/// The path of a mesh's file: an OBJ or STL that exists.
+fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
+    let (text, value) = f.text("file", "the path of an .obj or .stl file")?;
+    let path = folder.join(text);
+    let known = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj") || e.eq_ignore_ascii_case("stl"));
+    if !known {
+        f.wrong("file", value, "the path of an .obj or .stl file");
+        return None;
+    }
+    if !path.is_file() {
+        let message = format!("`file` of {}: there is no file {}", f.what, path.display());
+        f.log.report(value.span(), message, "wanted a path relative to the folder of the scene");
+        return None;
+    }
+    Some(path)
+}

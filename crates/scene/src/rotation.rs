@@ -1,0 +1,67 @@
+//! Orientations as files write them, made unit quaternions `[x, y, z, w]`.
+//!
+//! A rotation by θ about the unit axis **a** is `[a sin θ/2, cos θ/2]`; the product `p q` turns by
+//! `q` first.
+
+use crate::bound::Bound;
+use crate::fields::{Fields, norm};
+
+const ANGLE: Bound = Bound::new(-36_000.0, 36_000.0, "an angle from -36000 to 36000 degrees");
+/// How far the length of a quaternion in a file may be from 1.
+const LENGTH_SLACK: f64 = 1e-3;
+
+/// The orientation of a body: at most one of `orientation_xyzw`, `rotation_deg` and `rotation`.
+pub(crate) fn read(f: &mut Fields<'_>) -> [f64; 4] {
+    let ways = [read_quaternion(f), read_roll_pitch_yaw(f), read_axis_angle(f)];
+    let given: Vec<[f64; 4]> = ways.into_iter().flatten().collect();
+    if given.len() > 1 {
+        let message = format!("{} has more than one orientation", f.what);
+        f.log.report(f.span.clone(), message, "wanted one of `orientation_xyzw`, `rotation_deg` and `rotation`");
+    }
+    given.first().copied().unwrap_or([0.0, 0.0, 0.0, 1.0])
+}
+
+fn read_quaternion(f: &mut Fields<'_>) -> Option<[f64; 4]> {
+    let value = f.value("orientation_xyzw")?;
+    let q: [f64; 4] = f.as_vector("orientation_xyzw", value, Bound::ANY);
+    let length = norm(&q);
+    if (length - 1.0).abs() > LENGTH_SLACK {
+        f.wrong("orientation_xyzw", value, format!("a quaternion [x, y, z, w] of length 1; this one has {length:.6}"));
+    }
+    Some(q.map(|x| x / length))
+}
+
+fn read_roll_pitch_yaw(f: &mut Fields<'_>) -> Option<[f64; 4]> {
+    let angles: [f64; 3] = f.optional_vector("rotation_deg", ANGLE)?;
+    let [x, y, z] = angles.map(f64::to_radians);
+    let [about_x, about_y, about_z] =
+        [about([1.0, 0.0, 0.0], x), about([0.0, 1.0, 0.0], y), about([0.0, 0.0, 1.0], z)];
+    Some(product(about_z, product(about_y, about_x)))
+}
+
+fn read_axis_angle(f: &mut Fields<'_>) -> Option<[f64; 4]> {
+    let value = f.value("rotation")?;
+    let example = "{ axis = [0, 1, 0], angle_deg = 20 }";
+    let mut turn = Fields::of(f.log, value, format!("the rotation of {}", f.what), example)?;
+    let axis = turn.direction("axis");
+    let angle = turn.number("angle_deg", ANGLE).to_radians();
+    turn.finish();
+    Some(about(axis, angle))
+}
+
+/// The rotation by `angle` radians about a unit `axis`, right-handed.
+fn about(axis: [f64; 3], angle: f64) -> [f64; 4] {
+    let (sin, cos) = libm::sincos(0.5 * angle);
+    [axis[0] * sin, axis[1] * sin, axis[2] * sin, cos]
+}
+
+/// The Hamilton product: turns by `q`, then by `p`.
+fn product(p: [f64; 4], q: [f64; 4]) -> [f64; 4] {
+    let ([px, py, pz, pw], [qx, qy, qz, qw]) = (p, q);
+    [
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+        pw * qw - px * qx - py * qy - pz * qz,
+    ]
+}

@@ -1,0 +1,103 @@
+//! The scenes that come with tumble, and finding a scene by path or by name.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::SceneError;
+use crate::file::{SceneFile, description};
+use crate::suggest::{listed, nearest};
+
+/// A scene that is built into the library.
+#[derive(Clone, Copy, Debug)]
+pub struct Shipped {
+    /// The name of its folder under `scenes/`.
+    pub name: &'static str,
+    /// The whole text of its `scene.toml`.
+    pub text: &'static str,
+}
+
+macro_rules! shipped_scenes {
+    ($($name:literal),* $(,)?) => {
+        &[$(Shipped { name: $name, text: include_str!(concat!("../../../scenes/", $name, "/scene.toml")) }),*]
+    };
+}
+
+const SHIPPED: &[Shipped] = shipped_scenes!["falling", "stack", "billiards", "bowling", "incline"];
+
+/// The scenes that come with tumble.
+pub fn shipped() -> &'static [Shipped] {
+    SHIPPED
+}
+
+impl Shipped {
+    /// One line that says what the scene shows.
+    pub fn description(&self) -> String {
+        description(self.text)
+    }
+
+    /// Reads the scene.
+    ///
+    /// # Errors
+    /// None for the scenes as they are; the type is that of [`SceneFile::parse`].
+    pub fn read(&self) -> Result<SceneFile, SceneError> {
+        SceneFile::parse(self.text, &format!("scenes/{}/scene.toml", self.name))
+    }
+}
+
+/// Where a scene was found.
+#[derive(Clone, Debug)]
+pub enum SceneSource {
+    /// A file.
+    Path(PathBuf),
+    /// Built in.
+    Shipped(Shipped),
+}
+
+impl SceneSource {
+    /// Reads the scene.
+    ///
+    /// # Errors
+    /// As [`SceneFile::load`].
+    pub fn load(&self) -> Result<SceneFile, SceneError> {
+        match self {
+            SceneSource::Path(path) => SceneFile::load(path),
+            SceneSource::Shipped(scene) => scene.read(),
+        }
+    }
+}
+
+/// Finds a scene: the path of a file, the path of a folder with a `scene.toml`, or a name, which is
+/// looked for as a folder in each of `search_dirs` and then among the shipped scenes. What looks like a
+/// path (it has a separator or ends in `.toml`) is never taken for a name.
+///
+/// # Errors
+/// [`SceneError::Unknown`] for a name that is found nowhere; [`SceneError::Read`] for a path where
+/// nothing is.
+pub fn resolve_scene(name_or_path: &str, search_dirs: &[PathBuf]) -> Result<SceneSource, SceneError> {
+    let path = Path::new(name_or_path);
+    let like_a_path = name_or_path.contains(['/', '\\']) || name_or_path.ends_with(".toml");
+    if path.is_file() || path.join("scene.toml").is_file() {
+        return Ok(SceneSource::Path(path.to_path_buf()));
+    }
+    if like_a_path {
+        let file = if path.is_dir() { path.join("scene.toml") } else { path.to_path_buf() };
+        // The system's own words for why it cannot be opened, where it has any.
+        let source = std::fs::metadata(&file).err().unwrap_or(std::io::ErrorKind::InvalidInput.into());
+        return Err(SceneError::Read { file, source });
+    }
+    let in_folders = search_dirs.iter().map(|dir| dir.join(name_or_path).join("scene.toml")).find(|p| p.is_file());
+    let built_in = || SHIPPED.iter().find(|scene| scene.name == name_or_path);
+    in_folders
+        .map(SceneSource::Path)
+        .or_else(|| built_in().map(|scene| SceneSource::Shipped(*scene)))
+        .ok_or_else(|| unknown(name_or_path))
+}
+
+fn unknown(name: &str) -> SceneError {
+    let names = SHIPPED.iter().map(|scene| scene.name);
+    let all = listed(names.clone(), "and");
+    let hint = match nearest(name, names) {
+        Some(near) => format!("did you mean `{near}`? Shipped are {all}"),
+        None => format!("shipped are {all}; or give the path of a scene.toml"),
+    };
+    SceneError::Unknown { name: name.to_owned(), hint }
+}

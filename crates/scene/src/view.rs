@@ -1,0 +1,190 @@
+//! `[camera]`, `[[light]]`, `[sky]`, `[ground]`: what the picture is taken with. Nothing here moves a body.
+
+use crate::bound::Bound;
+use crate::fields::{Fields, Names};
+use crate::look::{Color, Look, Pattern, read_color};
+
+/// A camera that stands still.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraSpec {
+    /// Where the eye is, m.
+    pub eye_m: [f64; 3],
+    /// The point in the middle of the picture, m.
+    pub target_m: [f64; 3],
+    /// A unit vector that is upright in the picture. Default z.
+    pub up: [f64; 3],
+    /// Angle between the lower and the upper edge, degrees, 1 to 170. Default 40.
+    pub vertical_fov_deg: f64,
+    /// Nearest depth drawn, m. Default 0.05.
+    pub near_m: f64,
+    /// Farthest depth drawn, m. Default 500.
+    pub far_m: f64,
+}
+
+const FOV: Bound = Bound::new(1.0, 170.0, "an angle from 1 to 170 degrees");
+
+impl CameraSpec {
+    pub(crate) fn read(mut f: Fields<'_>) -> Self {
+        let problems = f.log.count();
+        let camera = CameraSpec {
+            eye_m: f.vector("eye_m", Bound::ANY),
+            target_m: f.vector("target_m", Bound::ANY),
+            up: f.direction_or("up", [0.0, 0.0, 1.0]),
+            vertical_fov_deg: f.number_or("vertical_fov_deg", FOV, 40.0),
+            near_m: f.number_or("near_m", Bound::POSITIVE, 0.05),
+            far_m: f.number_or("far_m", Bound::POSITIVE, 500.0),
+        };
+        if f.log.count() == problems {
+            camera.check(&f);
+        }
+        f.finish();
+        camera
+    }
+
+    fn check(&self, f: &Fields<'_>) {
+        let ahead: [f64; 3] = std::array::from_fn(|k| self.target_m[k] - self.eye_m[k]);
+        let [[a, b, c], [x, y, z]] = [ahead, self.up];
+        let aside = [b * z - c * y, c * x - a * z, a * y - b * x];
+        let length = crate::fields::norm(&ahead);
+        if crate::fields::norm(&aside) <= 1e-6 * length || length == 0.0 {
+            let message = format!("{} looks along its own `up`, or from `eye_m` at itself", f.what);
+            f.log.report(f.span.clone(), message, "wanted a `target_m` away from `eye_m` and not along `up`");
+        }
+        if self.near_m >= self.far_m {
+            let message = format!("`near_m` of {} is {}, `far_m` {}", f.what, self.near_m, self.far_m);
+            f.log.report(f.span.clone(), message, "wanted near_m less than far_m");
+        }
+    }
+}
+
+/// A light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightSpec {
+    /// From everywhere in one direction, or from a point.
+    pub kind: LightKind,
+    /// sRGB, 0 to 1. Default white.
+    pub color: Color,
+    /// A directional light of intensity 1 on a white wall that faces it is white; a point light does
+    /// that at 1 m. Default 1.
+    pub intensity: f64,
+    /// Default true for a directional light, false for a point.
+    pub casts_shadow: bool,
+}
+
+/// Where a light comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightKind {
+    /// Like the sun.
+    Directional {
+        /// The unit direction in which the light travels, world axes.
+        direction: [f64; 3],
+    },
+    /// Like a bulb; falls off with the square of the distance.
+    Point {
+        /// World axes, m.
+        position_m: [f64; 3],
+    },
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Directional,
+    Point,
+}
+
+const KINDS: Names<Kind> = &[("directional", Kind::Directional), ("point", Kind::Point)];
+
+/// Where the sun of a scene without lights shines: from above, the left and the front.
+const SUN: [f64; 3] = [0.36, 0.48, -0.8];
+
+impl LightSpec {
+    /// The light of a scene that names none.
+    pub(crate) fn sun() -> Self {
+        let kind = LightKind::Directional { direction: SUN };
+        LightSpec { kind, color: [1.0, 1.0, 1.0], intensity: 1.0, casts_shadow: true }
+    }
+
+    pub(crate) fn read(mut f: Fields<'_>) -> Option<Self> {
+        let Some(kind) = f.choice("type", KINDS) else {
+            f.give_up();
+            return None;
+        };
+        let kind = match kind {
+            Kind::Directional => LightKind::Directional { direction: f.direction("direction") },
+            Kind::Point => LightKind::Point { position_m: f.vector("position_m", Bound::ANY) },
+        };
+        let directional = matches!(kind, LightKind::Directional { .. });
+        let light = LightSpec {
+            kind,
+            color: read_color(&mut f, "color", [1.0, 1.0, 1.0]),
+            intensity: f.number_or("intensity", Bound::NOT_NEGATIVE, 1.0),
+            casts_shadow: f.flag_or("casts_shadow", directional),
+        };
+        f.finish();
+        Some(light)
+    }
+}
+
+/// The sky: behind everything, and the light from everywhere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SkySpec {
+    /// Straight up.
+    pub zenith_color: Color,
+    /// At the horizon.
+    pub horizon_color: Color,
+    /// Below the horizon, as things reflect it.
+    pub nadir_color: Color,
+    /// Strength of the light from the sky. Default 1.
+    pub intensity: f64,
+}
+
+impl Default for SkySpec {
+    fn default() -> Self {
+        SkySpec {
+            zenith_color: [0.36, 0.54, 0.80],
+            horizon_color: [0.80, 0.86, 0.92],
+            nadir_color: [0.42, 0.40, 0.38],
+            intensity: 1.0,
+        }
+    }
+}
+
+impl SkySpec {
+    pub(crate) fn read(mut f: Fields<'_>) -> Self {
+        let usual = SkySpec::default();
+        let sky = SkySpec {
+            zenith_color: read_color(&mut f, "zenith_color", usual.zenith_color),
+            horizon_color: read_color(&mut f, "horizon_color", usual.horizon_color),
+            nadir_color: read_color(&mut f, "nadir_color", usual.nadir_color),
+            intensity: f.number_or("intensity", Bound::NOT_NEGATIVE, usual.intensity),
+        };
+        f.finish();
+        sky
+    }
+}
+
+/// A horizontal floor that is only drawn: bodies fall through it unless a half-space lies there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundSpec {
+    /// Height of the floor, m. Default 0.
+    pub height_m: f64,
+    /// Default a grey checker of 1 m.
+    pub look: Look,
+}
+
+impl GroundSpec {
+    pub(crate) fn read(mut f: Fields<'_>) -> Self {
+        let base = Look {
+            color: [0.52, 0.53, 0.55],
+            second_color: [0.60, 0.61, 0.63],
+            pattern: Pattern::Checker,
+            pattern_scale_m: 1.0,
+            roughness: 0.9,
+            ..Look::default()
+        };
+        let height_m = f.number_or("height_m", Bound::ANY, 0.0);
+        let ground = GroundSpec { height_m, look: Look::read(&mut f, &base) };
+        f.finish();
+        ground
+    }
+}

@@ -1,0 +1,164 @@
+//! `[world]`: gravity, time, and which algorithms step the scene.
+
+use crate::bound::Bound;
+use crate::fields::{Fields, Names};
+
+/// How the world is stepped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stepper {
+    /// One detection and one solve per step: a fixed cost.
+    TimeStepping,
+    /// Goes back to the instant of each collision (thesis, Algorithm 4).
+    Backtracking,
+}
+
+/// How free motion is integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Integrator {
+    /// Velocity Verlet: second order, one force evaluation per step.
+    Verlet,
+    /// Velocities first, then positions with the new velocities.
+    SymplecticEuler,
+    /// All from the state at the start of the step (the thesis's).
+    ExplicitEuler,
+    /// The classical Runge–Kutta method of fourth order.
+    Rk4,
+}
+
+/// How contact forces are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solver {
+    /// Sweeps over the friction cones.
+    GaussSeidel,
+    /// Pivoting on the four-sided friction pyramid (6m unknowns).
+    LcpPyramid,
+    /// Pivoting with one tangent, along the sliding direction (3m unknowns; the thesis's `K^F`).
+    LcpSliding,
+}
+
+/// What two bodies' coefficients make for the pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Combine {
+    /// The smaller.
+    Min,
+    /// The larger.
+    Max,
+    /// The arithmetic mean.
+    Average,
+    /// The product.
+    Product,
+    /// The square root of the product.
+    GeometricMean,
+}
+
+impl Stepper {
+    const NAMES: Names<Self> = &[("time_stepping", Stepper::TimeStepping), ("backtracking", Stepper::Backtracking)];
+}
+
+impl Integrator {
+    const NAMES: Names<Self> = &[
+        ("verlet", Integrator::Verlet),
+        ("symplectic_euler", Integrator::SymplecticEuler),
+        ("explicit_euler", Integrator::ExplicitEuler),
+        ("rk4", Integrator::Rk4),
+    ];
+}
+
+impl Solver {
+    const NAMES: Names<Self> = &[
+        ("gauss_seidel", Solver::GaussSeidel),
+        ("lcp_pyramid", Solver::LcpPyramid),
+        ("lcp_sliding", Solver::LcpSliding),
+    ];
+}
+
+impl Combine {
+    const NAMES: Names<Self> = &[
+        ("min", Combine::Min),
+        ("max", Combine::Max),
+        ("average", Combine::Average),
+        ("product", Combine::Product),
+        ("geometric_mean", Combine::GeometricMean),
+    ];
+
+    /// The coefficient of a pair of bodies with `a` and `b`, both at least 0.
+    pub fn of(self, a: f64, b: f64) -> f64 {
+        match self {
+            Combine::Min => a.min(b),
+            Combine::Max => a.max(b),
+            Combine::Average => 0.5 * (a + b),
+            Combine::Product => a * b,
+            Combine::GeometricMean => (a * b).sqrt(),
+        }
+    }
+}
+
+/// `[world]`. All keys have defaults.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorldSettings {
+    /// Acceleration of free fall, world axes, m/s². Default `[0, 0, -9.81]`.
+    pub gravity_m_per_s2: [f64; 3],
+    /// Length of a step, seconds, from 1e-6 to 1. Default 1/240.
+    pub dt_s: f64,
+    /// Parts each step is cut into, 1 to 1000. Default 1.
+    pub substeps: u32,
+    /// How long the scene runs when nothing else is said, seconds. Default 5.
+    pub seconds: f64,
+    /// Default `time_stepping`.
+    pub stepper: Stepper,
+    /// Default `verlet`.
+    pub integrator: Integrator,
+    /// Default `gauss_seidel`.
+    pub solver: Solver,
+    /// Most sweeps of an iterating solver per solve, 1 to 100 000. Default 100.
+    pub iterations: u32,
+    /// Overlap that counts as touching, metres. Default 1e-4.
+    pub contact_tolerance_m: f64,
+    /// Restitution of a pair from those of its bodies. Default `min`.
+    pub combine_restitution: Combine,
+    /// Friction of a pair from those of its bodies. Default `geometric_mean`.
+    pub combine_friction: Combine,
+}
+
+impl Default for WorldSettings {
+    fn default() -> Self {
+        WorldSettings {
+            gravity_m_per_s2: [0.0, 0.0, -9.81],
+            dt_s: 1.0 / 240.0,
+            substeps: 1,
+            seconds: 5.0,
+            stepper: Stepper::TimeStepping,
+            integrator: Integrator::Verlet,
+            solver: Solver::GaussSeidel,
+            iterations: 100,
+            contact_tolerance_m: 1e-4,
+            combine_restitution: Combine::Min,
+            combine_friction: Combine::GeometricMean,
+        }
+    }
+}
+
+const DT: Bound = Bound::new(1e-6, 1.0, "a time from 1e-6 to 1 s");
+const TOLERANCE: Bound = Bound::new(1e-9, 1.0, "a length from 1e-9 to 1 m");
+const SECONDS: Bound = Bound::new(0.0, 1e6, "a time from 0 to 1e6 s");
+
+impl WorldSettings {
+    pub(crate) fn read(mut f: Fields<'_>) -> Self {
+        let usual = WorldSettings::default();
+        let world = WorldSettings {
+            gravity_m_per_s2: f.vector_or("gravity_m_per_s2", Bound::ANY, usual.gravity_m_per_s2),
+            dt_s: f.number_or("dt_s", DT, usual.dt_s),
+            substeps: f.integer_or("substeps", 1..=1000, usual.substeps),
+            seconds: f.number_or("seconds", SECONDS, usual.seconds),
+            stepper: f.choice_or("stepper", Stepper::NAMES, usual.stepper),
+            integrator: f.choice_or("integrator", Integrator::NAMES, usual.integrator),
+            solver: f.choice_or("solver", Solver::NAMES, usual.solver),
+            iterations: f.integer_or("iterations", 1..=100_000, usual.iterations),
+            contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, usual.contact_tolerance_m),
+            combine_restitution: f.choice_or("combine_restitution", Combine::NAMES, usual.combine_restitution),
+            combine_friction: f.choice_or("combine_friction", Combine::NAMES, usual.combine_friction),
+        };
+        f.finish();
+        world
+    }
+}

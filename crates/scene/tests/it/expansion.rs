@@ -1,0 +1,164 @@
+//! What a right file comes out as: defaults, materials, orientations and grids.
+
+use tumble_scene::{
+    BodySpec, Combine, Integrator, LightKind, MassSpec, MeshSource, Mode, Pattern, SceneFile, ShapeSpec, Solver, Stepper,
+};
+
+fn read(text: &str) -> SceneFile {
+    SceneFile::parse(text, "s.toml").unwrap_or_else(|error| panic!("{}", error.report(false)))
+}
+
+/// The only body of a scene that has `lines` in it.
+fn body(lines: &str) -> BodySpec {
+    let text = format!("[[body]]\nname = \"b\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 2\n{lines}\n");
+    read(&text).bodies.remove(0)
+}
+
+fn close<const N: usize>(a: [f64; N], b: [f64; N]) {
+    assert!((0..N).all(|k| (a[k] - b[k]).abs() < 1e-15), "{a:?} is not {b:?}");
+}
+
+#[test]
+fn the_empty_scene_has_the_defaults_of_the_documentation() {
+    let scene = read("");
+    assert_eq!(scene.world.gravity_m_per_s2, [0.0, 0.0, -9.81]);
+    assert_eq!(scene.world.dt_s, 1.0 / 240.0);
+    assert_eq!((scene.world.substeps, scene.world.iterations), (1, 100));
+    assert_eq!((scene.world.seconds, scene.world.contact_tolerance_m), (5.0, 1e-4));
+    assert_eq!(scene.world.stepper, Stepper::TimeStepping);
+    assert_eq!(scene.world.integrator, Integrator::Verlet);
+    assert_eq!(scene.world.solver, Solver::GaussSeidel);
+    assert_eq!(scene.world.combine_restitution, Combine::Min);
+    assert_eq!(scene.world.combine_friction, Combine::GeometricMean);
+    assert!(scene.bodies.is_empty() && scene.camera.is_none() && scene.ground.is_none());
+    // One sun, its direction a unit vector.
+    let LightKind::Directional { direction: [x, y, z] } = scene.lights[0].kind else { panic!("a sun") };
+    assert!(scene.lights.len() == 1 && (x * x + y * y + z * z - 1.0).abs() < 1e-15 && z < 0.0);
+}
+
+#[test]
+fn every_word_of_the_world() {
+    let scene = read(
+        "[world]\nstepper = \"backtracking\"\nintegrator = \"rk4\"\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
+         seconds = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"max\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\n",
+    );
+    let world = scene.world;
+    assert_eq!((world.stepper, world.integrator, world.solver), (Stepper::Backtracking, Integrator::Rk4, Solver::LcpSliding));
+    assert_eq!((world.substeps, world.iterations, world.seconds), (4, 7, 2.0));
+    assert_eq!((world.contact_tolerance_m, world.gravity_m_per_s2), (1e-5, [1.0, 2.0, 3.0]));
+    assert_eq!((world.combine_restitution, world.combine_friction), (Combine::Max, Combine::Product));
+}
+
+#[test]
+fn combine_rules_by_hand() {
+    let rules = [Combine::Min, Combine::Max, Combine::Average, Combine::Product, Combine::GeometricMean];
+    assert_eq!(rules.map(|rule| rule.of(0.25, 1.0)), [0.25, 1.0, 0.625, 0.25, 0.5]);
+}
+
+#[test]
+fn a_body_takes_what_its_material_says_unless_it_says_otherwise() {
+    let text = "[materials.m]\nfriction = 0.9\nrestitution = 0.4\ncolor = \"#ff0000\"\nroughness = 0.1\n".to_owned();
+    let one = |lines: &str| {
+        let body = format!("[[body]]\nname = \"b\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 1\nmaterial = \"m\"\n{lines}\n");
+        read(&(text.clone() + &body)).bodies.remove(0)
+    };
+    let plain = one("");
+    assert_eq!((plain.friction, plain.restitution, plain.material), (0.9, 0.4, Some(0)));
+    assert_eq!((plain.look.color, plain.look.roughness), ([1.0, 0.0, 0.0], 0.1));
+    let other = one("friction = 0.2\ncolor = [0, 0.5, 1]\npattern = \"wood\"");
+    assert_eq!((other.friction, other.restitution), (0.2, 0.4));
+    assert_eq!((other.look.color, other.look.roughness, other.look.pattern), ([0.0, 0.5, 1.0], 0.1, Pattern::Wood));
+    let bare = body("");
+    assert_eq!((bare.friction, bare.restitution, bare.material), (0.5, 0.0, None));
+}
+
+#[test]
+fn a_body_with_every_key() {
+    let it = body(
+        "mode = \"kinematic\"\nposition_m = [1, 2, 3]\nvelocity_m_per_s = [4, 5, 6]\nangular_velocity_rad_per_s = [7, 8, 9]\n\
+         linear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\ncollides = false\nalive = false\nvisible = false\nclearcoat = 1\nmetallic = 0.5",
+    );
+    assert_eq!((it.mode, it.mass), (Mode::Kinematic, Some(MassSpec::Mass(2.0))));
+    assert_eq!((it.position_m, it.velocity_m_per_s), ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]));
+    assert_eq!(it.angular_velocity_rad_per_s, [7.0, 8.0, 9.0]);
+    assert_eq!((it.linear_damping_per_s, it.angular_damping_per_s), (0.1, 0.2));
+    assert!(!it.collides && !it.alive && !it.visible);
+    assert_eq!((it.look.clearcoat, it.look.metallic), (1.0, 0.5));
+}
+
+#[test]
+fn shapes_and_meshes() {
+    let scene = read(
+        "[meshes.c]\ntype = \"cylinder\"\nradius_m = 1\nheight_m = 2\nsphere_tree_depth = 4\n[meshes.b]\ntype = \"box\"\nsize_m = [1, 2, 3]\n\
+         [meshes.p]\ntype = \"capsule\"\nradius_m = 1\nlength_m = 2\nsegments = 12\n\
+         [[body]]\nname = \"1\"\ndensity_kg_per_m3 = 7800\nshape = { type = \"mesh\", mesh = \"c\" }\n\
+         [[body]]\nname = \"2\"\nmass_kg = 1\nshape = { type = \"capsule\", radius_m = 1, length_m = 2 }\n\
+         [[body]]\nname = \"3\"\nmass_kg = 1\nshape = { type = \"cylinder\", radius_m = 1, height_m = 2 }\n\
+         [[body]]\nname = \"4\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n",
+    );
+    let ShapeSpec::Mesh { mesh } = scene.bodies[0].shape else { panic!("a mesh") };
+    assert_eq!((scene.meshes[mesh].name.as_str(), scene.meshes[mesh].sphere_tree_depth), ("c", Some(4)));
+    assert_eq!(scene.meshes[mesh].source, MeshSource::Cylinder { radius_m: 1.0, height_m: 2.0, segments: 48 });
+    assert_eq!(scene.meshes[2].source, MeshSource::Capsule { radius_m: 1.0, length_m: 2.0, segments: 12 });
+    assert_eq!(scene.bodies[0].mass, Some(MassSpec::Density(7800.0)));
+    assert_eq!(scene.bodies[1].shape, ShapeSpec::Capsule { radius_m: 1.0, length_m: 2.0 });
+    assert_eq!(scene.bodies[2].shape, ShapeSpec::Cylinder { radius_m: 1.0, height_m: 2.0 });
+    assert_eq!((&scene.bodies[3].shape, scene.bodies[3].mass), (&ShapeSpec::HalfSpace, None));
+}
+
+#[test]
+fn orientations() {
+    let half = 0.5f64.sqrt();
+    close(body("").orientation_xyzw, [0.0, 0.0, 0.0, 1.0]);
+    close(body("orientation_xyzw = [0.0, 0.6, 0.0, 0.8]").orientation_xyzw, [0.0, 0.6, 0.0, 0.8]);
+    // 90 degrees about z, twice as long an axis.
+    close(body("rotation = { axis = [0, 0, 2], angle_deg = 90 }").orientation_xyzw, [0.0, 0.0, half, half]);
+    close(body("rotation_deg = [90, 0, 0]").orientation_xyzw, [half, 0.0, 0.0, half]);
+    // Roll first, then yaw, about fixed axes: x turned by 90 then z by 90 takes y to z to z, and x to y.
+    // That is the third of a turn about (1, 1, 1): x to y, y to z, z to x.
+    close(body("rotation_deg = [90, 0, 90]").orientation_xyzw, [0.5, 0.5, 0.5, 0.5]);
+    // A quaternion off by rounding is made a unit one.
+    let q = body("orientation_xyzw = [0.0, 0.6004, 0.0, 0.8]").orientation_xyzw;
+    assert!((q.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-15);
+}
+
+fn grid(lines: &str) -> Vec<BodySpec> {
+    read(&format!("[[grid]]\nname = \"g\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 1\n{lines}\n")).bodies
+}
+
+#[test]
+fn a_box_of_bodies_counts_along_x_then_y_then_z() {
+    let bodies = grid("position_m = [10, 0, 0]\ncount = [2, 3, 2]\nspacing_m = [1, 10, 100]");
+    assert_eq!(bodies.len(), 12);
+    assert_eq!((bodies[0].name.as_str(), bodies[0].position_m), ("g_1", [10.0, 0.0, 0.0]));
+    assert_eq!((bodies[1].name.as_str(), bodies[1].position_m), ("g_2", [11.0, 0.0, 0.0]));
+    assert_eq!(bodies[2].position_m, [10.0, 10.0, 0.0]);
+    assert_eq!((bodies[11].name.as_str(), bodies[11].position_m), ("g_12", [11.0, 20.0, 100.0]));
+    let centred = grid("count = [2, 3, 1]\nspacing_m = [1, 10, 100]\ncentered = true");
+    assert_eq!((centred[0].position_m, centred[5].position_m), ([-0.5, -10.0, 0.0], [0.5, 10.0, 0.0]));
+}
+
+#[test]
+fn a_triangle_is_numbered_from_its_apex_left_to_right() {
+    let bodies = grid("arrangement = \"triangle\"\nrows = 3\nspacing_m = 2\ntoward = [0, 1, 0]");
+    let root = 3f64.sqrt();
+    let wanted = [[0.0, 0.0], [-1.0, root], [1.0, root], [-2.0, 2.0 * root], [0.0, 2.0 * root], [2.0, 2.0 * root]];
+    assert_eq!(bodies.len(), wanted.len());
+    for (body, [x, y]) in bodies.iter().zip(wanted) {
+        assert!((body.position_m[0] - x).abs() < 1e-14 && (body.position_m[1] - y).abs() < 1e-14, "{:?}", body.position_m);
+    }
+}
+
+#[test]
+fn copies_take_colours_in_turn() {
+    let bodies = grid("count = [3, 1, 1]\nspacing_m = [2, 2, 2]\ncolors = [\"#000000\", \"#ffffff\"]\npatterns = [\"felt\"]");
+    let colors: Vec<f64> = bodies.iter().map(|body| body.look.color[0]).collect();
+    assert_eq!(colors, [0.0, 1.0, 0.0]);
+    assert!(bodies.iter().all(|body| body.look.pattern == Pattern::Felt));
+}
+
+#[test]
+fn the_most_bodies_there_may_be() {
+    let bodies = grid("count = [100, 100, 100]\nspacing_m = [2, 2, 2]");
+    assert_eq!((bodies.len(), bodies[999_999].name.as_str()), (1_000_000, "g_1000000"));
+}

@@ -1,0 +1,7 @@
+//! What `tumble-scene` promises of scene files.
+
+mod bad_input;
+mod expansion;
+mod finding;
+mod robust;
+mod shipped;

@@ -1,0 +1,65 @@
+//! Damaged files: an error or a scene, never a panic, and always with a report.
+
+use proptest::prelude::*;
+use tumble_scene::{SceneFile, shipped};
+
+/// Reads `text`; whatever it is, there is an answer, and an error can be told.
+fn read(text: &str) {
+    if let Err(error) = SceneFile::parse(text, "damaged.toml") {
+        assert!(!error.problems().is_empty());
+        let lines = text.split('\n').count();
+        for problem in error.problems() {
+            assert!((1..=lines).contains(&problem.line) && problem.column >= 1, "{problem:?}");
+        }
+        assert!(error.report(false).contains("damaged.toml"));
+    }
+}
+
+#[test]
+fn every_scene_cut_at_every_byte() {
+    for scene in shipped() {
+        for end in (0..scene.text.len()).filter(|&end| scene.text.is_char_boundary(end)) {
+            read(&scene.text[..end]);
+        }
+    }
+}
+
+#[test]
+fn deep_nesting_and_long_lines() {
+    read(&"[".repeat(100_000));
+    read(&format!("a = {}", "[".repeat(100_000)));
+    read(&format!("a = {}", "{a=".repeat(50_000)));
+    read(&format!("{} = 1", "a.".repeat(50_000)));
+    read(&"x".repeat(1_000_000));
+    read(&"\n\u{feff}é = 1\n".repeat(5_000));
+    read("\u{feff}description = \"é\u{301}\"\n\u{301}x = 1");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn flipped_bytes(which in 0usize..5, flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+        let mut bytes = shipped()[which].text.as_bytes().to_vec();
+        for (at, byte) in flips {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        read(&String::from_utf8_lossy(&bytes));
+    }
+
+    #[test]
+    fn values_swapped_for_others(which in 0usize..5, line in any::<prop::sample::Index>(), value in prop::sample::select(vec![
+        "nan", "-inf", "1e400", "9223372036854775807", "0xffffffffffffffff", "-1", "0", "[]", "[[[]]]", "{}", "\"\"", "true",
+        "1979-05-27", "[1, \"a\", {}]", "\"\\u0000\"", "99999999999999999999999999", "{ type = \"box\" }",
+    ])) {
+        let lines: Vec<&str> = shipped()[which].text.lines().collect();
+        let with_value: Vec<usize> = (0..lines.len()).filter(|&k| lines[k].contains(" = ")).collect();
+        let at = with_value[line.index(with_value.len())];
+        let changed: Vec<String> = lines.iter().enumerate().map(|(k, line)| match k == at {
+            true => format!("{} = {value}", line.split(" = ").next().unwrap_or("")),
+            false => (*line).to_owned(),
+        }).collect();
+        read(&changed.join("\n"));
+    }
+}
