@@ -34,13 +34,12 @@ fn billiards() -> DrawList {
     let (long, wide) = (2.54, 1.27);
     let slab = list.add_mesh(MeshData::cuboid([long / 2.0 + 0.1, wide / 2.0 + 0.1, 0.02]));
     list.add_instance(slab, Isometry3::translation(0.0, 0.0, -0.02), Material::felt()).casts_shadow = false;
-    let rails = [([long / 2.0 + 0.18, 0.07], [0.0, wide / 2.0 + 0.07]), ([0.07, wide / 2.0 + 0.02], [long / 2.0 + 0.07, 0.0])];
-    for ([hx, hy], [x, y]) in rails {
-        let rail = list.add_mesh(MeshData::rounded_cuboid([hx, hy, 0.045], 0.015, 4));
+    let wood = Material { clearcoat: 0.5, ..Material::walnut() };
+    let rails = [(long / 2.0 + 0.14, 0.0, wide / 2.0 + 0.07, 0.0), (wide / 2.0, long / 2.0 + 0.07, 0.0, std::f32::consts::FRAC_PI_2)];
+    for (half, x, y, angle) in rails {
+        let rail = list.add_mesh(MeshData::rounded_cuboid([half, 0.07, 0.045], 0.015, 4));
         for sign in [-1.0, 1.0] {
-            let mut wood = Material::walnut();
-            wood.clearcoat = 0.5;
-            list.add_instance(rail, Isometry3::translation(sign * x, sign * y, 0.0), wood);
+            list.add_instance(rail, Isometry3::new(Vector3::new(sign * x, sign * y, 0.0), Vector3::z() * angle), wood);
         }
     }
     let order = [1, 9, 2, 10, 8, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15];
@@ -57,15 +56,15 @@ fn billiards() -> DrawList {
     list.add_sphere(Point3::new(-0.12, 0.22, r), r, UnitQuaternion::from_euler_angles(0.2, 0.2, -2.2), Material::billiard_ball(3));
     list.lights.push(Light::lamp(Point3::new(0.1, 0.1, 1.1), 1.9, 1.1));
     list.lights.push(Light::lamp(Point3::new(-0.9, 0.1, 1.1), 0.9, 1.1));
-    list.sky = Sky::hall();
+    list.sky = Sky { ground: [0.10, 0.36, 0.22], ..Sky::hall() };
     list.camera = Camera::look_at(Point3::new(-0.85, -0.42, 0.42), Point3::new(0.1, 0.02, 0.0)).with_fov(0.62);
     list
 }
 
 /// The outline of a regulation pin: radius and height in metres.
-const PIN: [[f32; 2]; 15] = [
-    [0.0, 0.0], [0.0258, 0.0], [0.0290, 0.006], [0.0365, 0.045], [0.0495, 0.0925], [0.0605, 0.1143], [0.0560, 0.1480], [0.0440, 0.1850],
-    [0.0313, 0.2190], [0.0235, 0.2540], [0.0228, 0.2770], [0.0255, 0.3080], [0.0323, 0.3430], [0.0250, 0.3680], [0.0, 0.3810],
+const PIN: [[f32; 2]; 18] = [
+    [0.0, 0.0], [0.0258, 0.0], [0.0280, 0.003], [0.0359, 0.01905], [0.0496, 0.05715], [0.0573, 0.0857], [0.0605, 0.1143], [0.0580, 0.1492], [0.0470, 0.1842],
+    [0.0314, 0.2191], [0.0250, 0.2381], [0.0228, 0.2540], [0.0237, 0.2762], [0.0266, 0.2985], [0.0306, 0.3207], [0.0323, 0.3429], [0.0240, 0.3700], [0.0, 0.3810],
 ];
 
 fn bowling() -> DrawList {
@@ -84,7 +83,7 @@ fn bowling() -> DrawList {
         for k in 0..=row {
             let (x, y) = (4.0 + row as f32 * 0.264, (k as f32 - row as f32 / 2.0) * 0.3048);
             let pose = match i {
-                0 => Isometry3::new(Vector3::new(3.9, 0.22, 0.06), Vector3::new(1.3, 0.7, 0.0)),
+                0 => Isometry3::new(Vector3::new(3.9, 0.22, 0.06), Vector3::new(1.35, 0.7, 0.0)),
                 2 => Isometry3::new(Vector3::new(x, y + 0.05, 0.01), Vector3::new(0.25, 0.15, 0.0)),
                 _ => Isometry3::translation(x, y, 0.0),
             };
@@ -97,7 +96,7 @@ fn bowling() -> DrawList {
     list.add_sphere(Point3::new(3.45, -0.08, 0.1085), 0.1085, turn(3), ball);
     list.lights.push(Light::lamp(Point3::new(2.6, 0.8, 2.6), 1.6, 2.8));
     list.lights.push(Light::lamp(Point3::new(4.3, -0.3, 2.2), 1.0, 2.2));
-    list.sky = Sky::hall();
+    list.sky = Sky { ground: [0.52, 0.38, 0.24], ..Sky::hall() };
     list.camera = Camera::look_at(Point3::new(1.9, -0.75, 0.75), Point3::new(4.15, 0.02, 0.12)).with_fov(0.6);
     list
 }
@@ -140,7 +139,7 @@ fn boxes(debug: bool) -> DrawList {
     list.add_sphere(Point3::new(-1.1, 0.15, 0.2), 0.2, turn(2), Material::glossy([0.2, 0.35, 0.5]).with_pattern(Pattern::Checker { other: [0.9, 0.9, 0.88], size_m: 0.1 }));
     list.add_sphere(Point3::new(0.35, -1.35, 0.3), 0.3, turn(2), Material::metal([0.95, 0.93, 0.90]));
     list.ground = Some(Ground { height_m: 0.0, reach_m: 30.0, material: Material::checker(0.5) });
-    list.lights.push(Light::sun(Vector3::new(0.75, 0.45, -1.0), 2.2));
+    list.lights.push(Light::sun(Vector3::new(0.5, -0.75, -1.0), 2.0));
     list.camera = Camera::look_at(Point3::new(-4.3, -2.1, 2.0), Point3::new(0.0, -0.1, 0.72)).with_fov(0.62);
     if debug {
         add_debug(&mut list);

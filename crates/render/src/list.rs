@@ -114,14 +114,14 @@ pub struct Sky {
 
 impl Default for Sky {
     fn default() -> Self {
-        Sky { zenith: [0.36, 0.50, 0.70], horizon: [0.80, 0.84, 0.88], ground: [0.42, 0.40, 0.38], ambient: 1.0, softbox: 0.0, backdrop: None }
+        Sky { zenith: [0.42, 0.53, 0.68], horizon: [0.80, 0.84, 0.88], ground: [0.42, 0.40, 0.38], ambient: 1.0, softbox: 0.0, backdrop: None }
     }
 }
 
 impl Sky {
     /// A dim, warm hall: for tables and lanes under lamps.
     pub fn hall() -> Self {
-        Sky { zenith: [0.30, 0.27, 0.25], horizon: [0.42, 0.38, 0.35], ground: [0.20, 0.17, 0.15], ambient: 1.0, softbox: 2.0, backdrop: None }
+        Sky { zenith: [0.20, 0.18, 0.17], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 1.5, softbox: 7.0, backdrop: None }
     }
 
     /// No ambient light, a flat backdrop: for tests and plots.

@@ -165,9 +165,9 @@ impl Material {
 
     /// Light varnished maple in boards of 27 mm (a bowling lane has 39 of them).
     pub fn lane_wood() -> Self {
-        Material { roughness: 0.35, clearcoat: 0.7, ..Material::plastic([0.80, 0.58, 0.34]) }.with_pattern(Pattern::Wood {
-            dark: [0.62, 0.38, 0.18],
-            ring_m: 0.006,
+        Material { roughness: 0.35, clearcoat: 0.7, ..Material::plastic([0.80, 0.61, 0.41]) }.with_pattern(Pattern::Wood {
+            dark: [0.58, 0.38, 0.21],
+            ring_m: 0.005,
             board_m: 0.027,
         })
     }
@@ -183,7 +183,7 @@ impl Material {
 
     /// Green billiard cloth.
     pub fn felt() -> Self {
-        Material::matte([0.05, 0.36, 0.22]).with_pattern(Pattern::Felt { thread_m: 0.0015 })
+        Material::matte([0.04, 0.31, 0.19]).with_pattern(Pattern::Felt { thread_m: 0.0015 })
     }
 
     /// A bowling pin of the usual size (38.1 cm, its base at object z = −`base_m`): white lacquer, two red rings on the neck.

@@ -97,7 +97,8 @@ impl MeshData {
                 let first = mesh.positions.len() as u32;
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                 // the two edges of each strip are fillets of 45 degrees, the middle is flat
-                let stations: Vec<(f32, f32)> = (-n..=-1).chain(1..=n).map(|i| ((i as f32 - i.signum() as f32) / n as f32 * PI / 4.0, i.signum() as f32)).collect();
+                let fillet = |i: i32, side: f32| (i as f32 / n as f32 * PI / 4.0, side);
+                let stations: Vec<(f32, f32)> = (-n..=0).map(|i| fillet(i, -1.0)).chain((0..=n).map(|i| fillet(i, 1.0))).collect();
                 for &(a, side_u) in &stations {
                     for &(b, side_v) in &stations {
                         let mut dir = Vector3::zeros();
@@ -206,9 +207,11 @@ impl MeshData {
     fn revolve(profile: &[([f32; 2], [f32; 2])], segments: usize) -> Self {
         let segments = segments.clamp(3, 4096);
         let mut mesh = MeshData::default();
+        let widest = profile.iter().fold(0f32, |w, ([r, _], _)| w.max(r.abs()));
         for s in 0..=segments {
             let (sin, cos) = (TAU * (s % segments) as f32 / segments as f32).sin_cos();
             for ([r, z], [nr, nz]) in profile {
+                let r = if r.abs() < 1e-6 * widest { 0.0 } else { *r }; // poles meet exactly
                 mesh.push([r * cos, r * sin, *z], [nr * cos, nr * sin, *nz]);
             }
         }

@@ -26,6 +26,24 @@ pub fn floor(list: &DrawList) -> [f32; 4] {
     [middle[0], middle[1], list.ground.as_ref().map_or(1.0, |g| g.reach_m), 0.0]
 }
 
+/// Linear radiance that comes back from below, in units of the ambient factor: a floor returns its colour times the light that falls on it
+/// (sky and suns; lamps light it unevenly), without a floor it is the sky's ground colour.
+fn bounce(list: &DrawList) -> [f32; 3] {
+    let sky = &list.sky;
+    let Some(floor) = &list.ground else { return linear3(sky.ground) };
+    let (albedo, zenith, horizon) = (linear3(floor.material.color), linear3(sky.zenith), linear3(sky.horizon));
+    let mut light: [f32; 3] = std::array::from_fn(|k| 0.5 * zenith[k] + 0.5 * horizon[k]);
+    for light_source in &list.lights {
+        if let Light::Directional { direction, color, intensity, .. } = light_source {
+            let fall = (-direction.normalize().z).max(0.0) * intensity;
+            let color = linear3(*color);
+            // shade and occlusion below and around the objects take half
+            (0..3).for_each(|k| light[k] += 0.5 * fall * color[k]);
+        }
+    }
+    std::array::from_fn(|k| albedo[k] * light[k])
+}
+
 /// `struct Scene`.
 pub fn floats(list: &DrawList, shadows: &[(usize, Eye)], occlusion: bool) -> Vec<f32> {
     let mut out = Vec::new();
@@ -49,6 +67,8 @@ pub fn floats(list: &DrawList, shadows: &[(usize, Eye)], occlusion: bool) -> Vec
     color(sky.backdrop.unwrap_or_default(), flag(sky.backdrop.is_some()));
     out.extend([s.exposure, flag(s.tone_map), flag(occlusion), s.shadow_map_size as f32]);
     out.extend(floor(list));
+    let [r, g, b] = bounce(list);
+    out.extend([r, g, b, 0.0]);
     out
 }
 

@@ -23,6 +23,7 @@ struct Scene {
     backdrop: vec4f, // w: 1 for a flat backdrop
     tone: vec4f,     // exposure, 1 for the filmic curve, 1 for occlusion, side of the shadow maps
     floor: vec4f,    // middle x, y and reach of the ground
+    bounce: vec4f,   // radiance that comes back from below
 };
 @group(1) @binding(0) var<uniform> scene: Scene;
 @group(1) @binding(1) var shadow_maps: texture_depth_2d_array;
@@ -39,12 +40,14 @@ struct Surface {
 };
 
 const PI = 3.14159265;
+// Widest penumbra, as a share of the shadow map.
+const WIDEST = 0.08;
 
 // Radiance of the surroundings, blurred for rough reflections.
 fn sky_radiance(dir: vec3f, blur: f32) -> vec3f {
     let rise = clamp(dir.z, 0.0, 1.0);
     let above = mix(scene.horizon.xyz, scene.zenith.xyz, mix(1.0 - pow(1.0 - rise, 2.5), 0.5, 0.6 * blur));
-    let below = mix(scene.horizon.xyz * 0.55 + scene.ground.xyz * 0.45, scene.ground.xyz, smoothstep(0.0, 0.35, -dir.z));
+    let below = mix(mix(scene.bounce.xyz, scene.horizon.xyz, 0.4), scene.bounce.xyz, smoothstep(0.0, 0.35, -dir.z));
     let width = 0.015 + 0.6 * blur;
     var c = mix(below, above, smoothstep(-width, width, dir.z));
     if (scene.ground.w > 0.0 && dir.z > 0.02) {
@@ -53,20 +56,20 @@ fn sky_radiance(dir: vec3f, blur: f32) -> vec3f {
         let inside = (1.0 - smoothstep(0.75 - 0.5 * soft, 0.75 + soft, p.x)) * (1.0 - smoothstep(0.4 - 0.5 * soft, 0.4 + soft, p.y));
         c += scene.ground.w * inside / (1.0 + 6.0 * blur) * vec3f(1.0, 0.97, 0.92);
     }
-    return c * scene.horizon.w;
+    return c;
 }
 
 fn sky_irradiance(n: vec3f) -> vec3f {
     let up = 0.5 + 0.5 * n.z;
     let sky = 0.55 * scene.zenith.xyz + 0.45 * scene.horizon.xyz;
-    return mix(scene.ground.xyz, sky, up) * scene.horizon.w * (1.0 + 0.08 * scene.ground.w * max(n.z, 0.0));
+    return mix(scene.bounce.xyz, sky, up) * (1.0 + 0.03 * scene.ground.w * max(n.z, 0.0));
 }
 
 fn backdrop_at(dir: vec3f) -> vec3f {
     if (scene.backdrop.w > 0.5) { return scene.backdrop.xyz; }
     let rise = clamp(dir.z, 0.0, 1.0);
     let above = mix(scene.horizon.xyz, scene.zenith.xyz, 1.0 - pow(1.0 - rise, 2.5));
-    return mix(scene.ground.xyz, above, smoothstep(-0.12, 0.0, dir.z));
+    return mix(scene.ground.xyz, above, smoothstep(-0.7, 0.0, dir.z));
 }
 
 // The i-th of n points spread evenly over the unit disc.
@@ -90,7 +93,8 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     if (clip.w <= 0.0) { return 1.0; }
     let ndc = clip.xyz / clip.w;
     let uv = ndc.xy * vec2f(0.5, -0.5) + 0.5;
-    if (any(uv <= vec2f(0.0)) || any(uv >= vec2f(1.0))) { return 1.0; }
+    // penumbrae reach beyond the map, whose rim is empty
+    if (any(uv <= vec2f(-WIDEST)) || any(uv >= vec2f(1.0 + WIDEST))) { return 1.0; }
     // behind the map's far plane everything that throws shadows is in front
     let depth = clamp(ndc.z, 1e-6, 1.0);
     // depth along the surface's plane is affine in the map: its slope keeps wide filters free of acne
@@ -101,12 +105,12 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     let bias = 1e-5 + (abs(slope.x) + abs(slope.y)) * 0.75 / texels;
 
     let turn = 6.2831853 * fract(52.9829189 * fract(dot(floor(pixel), vec2f(0.06711056, 0.00583715))));
-    let s = shadow_depth_to_s(sh, depth);
+    let s = select(shadow_depth_to_s(sh, ndc.z), clip.w, sh.scale.z > 0.5);
     let per_metre = sh.scale.xy / mix(1.0, s, sh.scale.z);
     let s_near = shadow_depth_to_s(sh, 1.0);
     let reach = select(size * (s - s_near), size * (s - s_near) / s_near, sh.scale.z > 0.5);
     let smallest = vec2f(1.5 / texels);
-    let search = clamp(reach * per_metre, smallest, vec2f(0.05));
+    let search = clamp(reach * per_metre, smallest, vec2f(WIDEST));
     var sum = 0.0;
     var count = 0.0;
     for (var i = 0u; i < 16u; i++) {
@@ -199,7 +203,7 @@ fn shade(s: Surface) -> vec3f {
     let coat_env = coat * (0.04 + 0.96 * pow(1.0 - n_v, 5.0));
     let ambient = diffuse * sky_irradiance(n) * bounced * (1.0 + s.base.sheen * pow(1.0 - n_v, 3.0))
         + (f0 * env.x + env.y) * sky_radiance(mirror, rough) * horizon_open;
-    out += ambient * (1.0 - coat_env) + coat_env * sky_radiance(mirror, 0.02) * horizon_open;
+    out += (ambient * (1.0 - coat_env) + coat_env * sky_radiance(mirror, 0.02) * horizon_open) * scene.horizon.w;
     return out;
 }
 

@@ -77,6 +77,7 @@ fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> v
     var q = p;
     var tint = 0.0;
     var joint = 0.0;
+    var bold = 0.75;
     if (board > 0.0) {
         let row = floor(p.y / board);
         let id = i32(clamp(row, -1e9, 1e9));
@@ -84,6 +85,7 @@ fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> v
         q.y = p.y - (row + 0.5) * board + (hash3(vec3i(id, 3, 7)) - 0.5) * 6.0 * ring;
         q.x = p.x + hash3(vec3i(id, 1, 2)) * 40.0 * ring * 10.0;
         q.z = p.z + hash3(vec3i(id, 8, 2)) * 4.0 * ring;
+        bold = 0.38;
         joint = line_cover(p.y / board, 0.035, w / board);
     }
     // the pith lies below the cut and wanders slowly, so that rings open into long arches
@@ -97,7 +99,7 @@ fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> v
     let fibre_at = vec3f(q.x / (ring * 9.0), q.y / (ring * 0.12), q.z / (ring * 0.12));
     let fibre_visible = 1.0 - smoothstep(0.05, 0.5, w / ring);
     let fibre = (noise3(fibre_at) - 0.5) * fibre_visible;
-    let c = mix(color, dark, clamp(0.75 * late + 0.28 * fibre + 0.18 * rough * visible, 0.0, 1.0)) * (1.0 + 0.34 * tint);
+    let c = mix(color, dark, clamp(bold * late + 0.28 * fibre + 0.18 * rough * visible, 0.0, 1.0)) * (1.0 + 0.34 * tint);
     return mix(c, dark * 0.35, 0.75 * clamp(joint, 0.0, 1.0));
 }
 
