@@ -1,1 +1,46 @@
-//! A world to pixels: draw list without a GPU, wgpu passes, offscreen targets.
+//! A world to pixels.
+//!
+//! A [`DrawList`] is plain data: meshes, spheres, lights, debug strokes and a [`Camera`]. It is built, checked, printed and compared
+//! without a GPU. A [`Renderer`] turns it into an [`Image`] with wgpu, headless; on machines without a graphics card a software driver does it.
+//!
+//! ```no_run
+//! use tumble_render::{DrawList, Ground, Light, Material, Renderer};
+//! use nalgebra::{Point3, UnitQuaternion, Vector3};
+//! let mut list = DrawList::default();
+//! list.add_sphere(Point3::new(0.0, 0.0, 0.5), 0.5, UnitQuaternion::identity(), Material::billiard_ball(9));
+//! list.ground = Some(Ground::grid(0.0));
+//! list.lights.push(Light::sun(Vector3::new(0.5, 0.6, -1.0), 2.5));
+//! list.camera = list.framing_camera(Vector3::new(-1.0, 0.8, -0.5));
+//! Renderer::new()?.render(&list, 640, 480)?.write_png("ball.png")?;
+//! # Ok::<(), tumble_render::RenderError>(())
+//! ```
+//!
+//! Conventions: world z up, right-handed, metres, radians; colours in the list are sRGB from 0 to 1; `f32` throughout.
+//! The same list on the same adapter gives the same bytes.
+//!
+//! Passes: one depth map per shadow-throwing light; depth of the camera's view and ambient occlusion from it; then everything in
+//! one pass with four samples per pixel: backdrop, floor, meshes, spheres, lines, translucent shells, lines on top.
+
+mod camera;
+mod error;
+mod gpu;
+mod image;
+mod list;
+mod material;
+mod mesh;
+
+pub use camera::Camera;
+pub use error::RenderError;
+pub use gpu::Renderer;
+pub use image::Image;
+pub use list::{
+    DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MeshId, Settings, Sky, Sphere,
+    SphereStyle,
+};
+pub use material::{Material, Pattern, Shader};
+pub use mesh::{MAX_MESH_VERTICES, MeshData};
+
+/// The longest side of a picture, in pixels (the device may allow less).
+pub const MAX_SIDE: u32 = 16384;
+/// The most pixels of a picture: one of 7680 x 4320 fits.
+pub const MAX_PIXELS: u64 = 1 << 25;

@@ -1,0 +1,122 @@
+//! The renderer: a device without a window, and the order of its passes.
+
+mod data;
+mod pipelines;
+mod scene;
+mod shadow;
+mod targets;
+mod upload;
+
+use crate::{DrawList, Image, MAX_PIXELS, MAX_SIDE, RenderError};
+use pipelines::Pipelines;
+use std::sync::{Arc, Mutex, PoisonError};
+use targets::Targets;
+use upload::{Frame, MeshCache};
+
+/// A graphics device that draws into memory. Making one takes a moment; keep it for all pictures of a run.
+pub struct Renderer {
+    gpu: Gpu,
+    pipelines: Pipelines,
+    meshes: MeshCache,
+    targets: Option<Targets>,
+}
+
+/// The device, its queue, and the last thing it complained about.
+pub(crate) struct Gpu {
+    pub device: wgpu::Device,
+    pub queue: wgpu::Queue,
+    adapter: String,
+    complaint: Arc<Mutex<Option<String>>>,
+}
+
+impl Renderer {
+    /// Finds an adapter (a graphics card, or a software driver) and prepares it. Nothing global is changed.
+    ///
+    /// # Errors
+    /// [`RenderError::NoAdapter`] where the machine has none: the caller goes on without pictures. [`RenderError::Device`] where it has one that fails.
+    pub fn new() -> Result<Self, RenderError> {
+        let gpu = pollster::block_on(Gpu::open())?;
+        let pipelines = Pipelines::new(&gpu.device);
+        gpu.complaint()?;
+        Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), targets: None })
+    }
+
+    /// The adapter in use: its name, kind and interface.
+    pub fn adapter(&self) -> &str {
+        &self.gpu.adapter
+    }
+
+    /// Draws the list into a picture of `width` x `height` pixels.
+    ///
+    /// # Errors
+    /// A size or a list that cannot be drawn, or a device that fails. The renderer stays usable.
+    pub fn render(&mut self, list: &DrawList, width: u32, height: u32) -> Result<Image, RenderError> {
+        self.check_size(width, height)?;
+        list.validate()?;
+        let (view, projection) = list.camera.matrices(width as f32 / height as f32)?;
+        let fits = self.targets.as_ref().is_some_and(|t| t.fits(width, height, list.settings.shadow_map_size));
+        if !fits {
+            self.targets = None; // frees the old ones first
+        }
+        let targets = self.targets.get_or_insert_with(|| Targets::new(&self.gpu.device, width, height, list.settings.shadow_map_size));
+        let frame = Frame::new(&self.gpu, &self.pipelines, &mut self.meshes, targets, list, &view, &projection)?;
+        self.gpu.complaint()?;
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+        frame.draw_shadows(&mut encoder, &self.pipelines, targets);
+        if frame.occlusion {
+            frame.draw_occlusion(&mut encoder, &self.pipelines, targets);
+        }
+        frame.draw_picture(&mut encoder, &self.pipelines, targets);
+        targets.copy_out(&mut encoder);
+        self.gpu.queue.submit([encoder.finish()]);
+        let image = targets.read(&self.gpu);
+        self.gpu.complaint()?;
+        image
+    }
+
+    fn check_size(&self, width: u32, height: u32) -> Result<(), RenderError> {
+        let limits = self.gpu.device.limits();
+        let max_side = MAX_SIDE.min(limits.max_texture_dimension_2d);
+        let max_pixels = MAX_PIXELS.min(limits.max_buffer_size / 4);
+        let sides = 1..=max_side;
+        if sides.contains(&width) && sides.contains(&height) && u64::from(width.next_multiple_of(64)) * u64::from(height) <= max_pixels {
+            return Ok(());
+        }
+        Err(RenderError::BadSize { width, height, max_side, max_pixels })
+    }
+}
+
+impl Gpu {
+    async fn open() -> Result<Gpu, RenderError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::GL;
+        let instance = wgpu::Instance::new(descriptor);
+        let adapter = instance.request_adapter(&Default::default()).await.map_err(|e| RenderError::NoAdapter { reason: e.to_string() })?;
+        let info = adapter.get_info();
+        let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
+        let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
+        limits.max_buffer_size = adapter.limits().max_buffer_size;
+        let asked = adapter
+            .request_device(&wgpu::DeviceDescriptor { label: Some("tumble"), required_limits: limits, ..Default::default() })
+            .await
+            .map_err(|e| RenderError::Device { adapter: name.clone(), reason: e.to_string() })?;
+        let complaint = Arc::new(Mutex::new(None));
+        let note = complaint.clone();
+        asked.0.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
+        }));
+        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, complaint })
+    }
+
+    /// What went wrong on the device since the last call.
+    fn complaint(&self) -> Result<(), RenderError> {
+        match self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            Some(reason) => Err(self.failed(reason)),
+            None => Ok(()),
+        }
+    }
+
+    pub(crate) fn failed(&self, reason: String) -> RenderError {
+        RenderError::Device { adapter: self.adapter.clone(), reason }
+    }
+}

@@ -1,0 +1,114 @@
+//! What the shaders read, as flat numbers in the layout of the WGSL structs (all members are vec4 or mat4x4).
+
+use crate::list::debug::Stroke;
+use crate::material::linear3;
+use crate::{Instance, Material, Shader, Sphere};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
+
+/// Numbers per mesh instance, sphere and stroke.
+pub const INSTANCE_FLOATS: u64 = 24;
+pub const SPHERE_FLOATS: u64 = 20;
+pub const STROKE_FLOATS: u64 = 16;
+
+/// A point of view in the terms of `struct View` of the shaders; computed in f64, because far scenes cancel badly.
+pub struct Eye {
+    pub clip_from_world: Matrix4<f64>,
+    pub depth: [f64; 4],
+    pub perspective: bool,
+    origin: [Vector3<f64>; 3],
+    dir: [Vector3<f64>; 3],
+    per_pixel: f64,
+    per_ndc: [f64; 2],
+    size: [f64; 2],
+}
+
+impl Eye {
+    /// From view and projection (depth 0 near, 1 far) for a picture of the given size in pixels.
+    ///
+    /// With `A` the upper left 2 x 2 of the projection, `o` its last column and `s` the view depth, a perspective point of the picture `n` sees
+    /// `x(s) = A⁻¹(−o) + s A⁻¹(n + c)`, with `c` the third column; a parallel one sees `x(s) = A⁻¹(n − o) + s A⁻¹c`.
+    pub fn new(view: &Matrix4<f32>, projection: &Matrix4<f32>, width: u32, height: u32) -> Self {
+        let (view, p) = (view.cast::<f64>(), projection.cast::<f64>());
+        let perspective = p[(3, 3)] == 0.0;
+        let inverse = p.fixed_view::<2, 2>(0, 0).try_inverse().unwrap_or(Matrix2::identity());
+        let column = |j: usize| inverse * Vector2::new(p[(0, j)], p[(1, j)]);
+        let (c, o) = (column(2), column(3));
+        let rotation: Matrix3<f64> = view.fixed_view::<3, 3>(0, 0).transpose();
+        let at = -(rotation * view.fixed_view::<3, 1>(0, 3));
+        let plane = |v: Vector2<f64>| rotation * Vector3::new(v.x, v.y, 0.0);
+        let (ex, ey) = (plane(inverse.column(0).into_owned()), plane(inverse.column(1).into_owned()));
+        let forward = plane(c) - rotation.column(2);
+        let none = Vector3::zeros();
+        let (moving_origin, moving_dir) = if perspective { ([none; 2], [ex, ey]) } else { ([ex, ey], [none; 2]) };
+        let mut reversed = p;
+        reversed.set_row(2, &(p.row(3) - p.row(2)));
+        let depth = if perspective { [1.0 + p[(2, 2)], -p[(2, 3)], 1.0, 0.0] } else { [p[(2, 2)], 1.0 - p[(2, 3)], 0.0, 1.0] };
+        Eye {
+            clip_from_world: reversed * view,
+            depth,
+            perspective,
+            origin: [at - plane(o), moving_origin[0], moving_origin[1]],
+            dir: [forward, moving_dir[0], moving_dir[1]],
+            per_ndc: [ex.norm(), ey.norm()],
+            per_pixel: 2.0 * ey.norm() / f64::from(height),
+            size: [f64::from(width), f64::from(height)],
+        }
+    }
+
+    /// How many picture widths and heights a metre across the view covers (at view depth 1, where perspective).
+    pub fn map_widths_per_metre(&self) -> [f64; 2] {
+        self.per_ndc.map(|metres| 0.5 / metres)
+    }
+
+    /// `struct View`.
+    pub fn floats(&self) -> Vec<f32> {
+        let mut out: Vec<f32> = self.clip_from_world.iter().map(|&x| x as f32).collect();
+        for v in self.origin.iter().chain(&self.dir) {
+            out.extend([v.x as f32, v.y as f32, v.z as f32, 0.0]);
+        }
+        out.extend(self.depth.map(|x| x as f32));
+        let [w, h] = self.size;
+        out.extend([w, h, 1.0 / w, 1.0 / h].map(|x| x as f32));
+        let (slope, fixed) = if self.perspective { (self.per_pixel, 0.0) } else { (0.0, self.per_pixel) };
+        out.extend([f32::from(u8::from(self.perspective)), slope as f32, fixed as f32, 0.0]);
+        out
+    }
+}
+
+/// A mesh instance: three rows of object to world, then the material.
+pub fn instance(x: &Instance, out: &mut Vec<f32>) {
+    let r = x.pose.rotation.to_rotation_matrix().into_inner() * Matrix3::from_diagonal(&x.scale);
+    for i in 0..3 {
+        out.extend([r[(i, 0)], r[(i, 1)], r[(i, 2)], x.pose.translation.vector[i]]);
+    }
+    material(&x.material, out);
+}
+
+/// A sphere: centre and radius, turn, material.
+pub fn sphere(s: &Sphere, out: &mut Vec<f32>) {
+    let (c, q) = (s.center, s.orientation.coords);
+    out.extend([c.x, c.y, c.z, s.radius, q.x, q.y, q.z, q.w]);
+    material(&s.material, out);
+}
+
+/// A translucent sphere: its opacity takes the place of the roughness.
+pub fn shell(s: &crate::DebugSphere, out: &mut Vec<f32>) {
+    let [r, g, b] = linear3(s.style.color);
+    out.extend([s.center.x, s.center.y, s.center.z, s.radius, 0.0, 0.0, 0.0, 1.0]);
+    out.extend([r, g, b, s.style.opacity]);
+    out.extend([0.0; 8]);
+}
+
+/// A stroke: ends with widths, colour, kind.
+pub fn stroke(s: &Stroke, out: &mut Vec<f32>) {
+    let [r, g, b] = linear3(s.style.color);
+    out.extend([s.start.x, s.start.y, s.start.z, s.start_px, s.end.x, s.end.y, s.end.z, s.end_px]);
+    out.extend([r, g, b, s.style.opacity, f32::from(u8::from(s.round)), 0.0, 0.0, 0.0]);
+}
+
+fn material(m: &Material, out: &mut Vec<f32>) {
+    let (id, other, size) = m.pattern.packed();
+    let id = id + if m.shader == Shader::Unlit { 100 } else { 0 };
+    let ([r, g, b], [or, og, ob]) = (linear3(m.color), linear3(other));
+    out.extend([r, g, b, m.roughness, or, og, ob, m.metallic, m.clearcoat, id as f32, size[0], size[1]]);
+}

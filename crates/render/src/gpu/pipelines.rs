@@ -1,0 +1,215 @@
+//! Shaders, binding layouts and pipelines: made once per device.
+
+use super::data::{INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
+use wgpu::{BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline, ShaderModule, ShaderStages, TextureFormat, VertexFormat};
+
+/// Samples per pixel.
+pub const SAMPLES: u32 = 4;
+/// The picture: linear in the shader, sRGB in memory, averaged in linear light.
+pub const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
+/// Reversed depth wants floating point.
+pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
+/// Ambient occlusion.
+pub const OCCLUSION: TextureFormat = TextureFormat::R8Unorm;
+
+const PICTURE_WGSL: &str = concat!(
+    include_str!("../shaders/view.wgsl"),
+    include_str!("../shaders/noise.wgsl"),
+    include_str!("../shaders/pattern.wgsl"),
+    include_str!("../shaders/light.wgsl"),
+    include_str!("../shaders/surface.wgsl"),
+    include_str!("../shaders/mesh.wgsl"),
+    include_str!("../shaders/sphere.wgsl"),
+    include_str!("../shaders/line.wgsl"),
+    include_str!("../shaders/sky.wgsl"),
+);
+const OCCLUSION_WGSL: &str = concat!(include_str!("../shaders/view.wgsl"), include_str!("../shaders/occlusion.wgsl"));
+
+/// Everything that does not change from picture to picture.
+pub struct Pipelines {
+    pub view_layout: BindGroupLayout,
+    pub scene_layout: BindGroupLayout,
+    pub occlusion_layout: BindGroupLayout,
+    pub shadow_sampler: wgpu::Sampler,
+    pub sky: RenderPipeline,
+    pub ground: RenderPipeline,
+    pub mesh: RenderPipeline,
+    pub sphere: RenderPipeline,
+    pub shell: RenderPipeline,
+    pub line: RenderPipeline,
+    pub line_on_top: RenderPipeline,
+    pub mesh_depth: RenderPipeline,
+    pub sphere_depth: RenderPipeline,
+    pub occlusion: RenderPipeline,
+    pub blur: RenderPipeline,
+}
+
+impl Pipelines {
+    pub fn new(device: &Device) -> Self {
+        let view_layout = layout(device, "view", &[uniform(0)]);
+        let scene_layout = layout(
+            device,
+            "scene",
+            &[
+                uniform(0),
+                texture(1, wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array),
+                entry(2, BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
+                texture(3, wgpu::TextureSampleType::Float { filterable: false }, wgpu::TextureViewDimension::D2),
+            ],
+        );
+        let occlusion_layout = layout(
+            device,
+            "occlusion",
+            &[
+                texture(0, wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2),
+                uniform(1),
+                texture(2, wgpu::TextureSampleType::Float { filterable: false }, wgpu::TextureViewDimension::D2),
+            ],
+        );
+        let picture = shader(device, "picture", PICTURE_WGSL);
+        let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
+        let lit = [Some(&view_layout), Some(&scene_layout)];
+        let depth_only = [Some(&view_layout)];
+        let screen = [Some(&view_layout), Some(&occlusion_layout)];
+        let draw = |vs, fs, input, depth, blend| {
+            let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: SAMPLES };
+            plan.build(device, &picture, &lit)
+        };
+        let depth = |vs, fs, input| {
+            let plan = Plan { vs, fs, input, color: None, depth: Some(WRITE), blend: None, samples: 1 };
+            plan.build(device, &picture, &depth_only)
+        };
+        let whole = |fs| {
+            let plan = Plan { vs: "vs_whole", fs: Some(fs), input: Input::None, color: Some(OCCLUSION), depth: None, blend: None, samples: 1 };
+            plan.build(device, &occlusion, &screen)
+        };
+        let over = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+        Pipelines {
+            sky: draw("vs_sky", "fs_sky", Input::None, ALWAYS, None),
+            ground: draw("vs_mesh", "fs_ground", Input::Mesh, WRITE, None),
+            mesh: draw("vs_mesh", "fs_mesh", Input::Mesh, WRITE, None),
+            sphere: draw("vs_sphere", "fs_sphere", Input::Sphere, WRITE, None),
+            shell: draw("vs_sphere", "fs_shell", Input::Sphere, TEST, over),
+            line: draw("vs_line", "fs_line", Input::Stroke, TEST, over),
+            line_on_top: draw("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
+            mesh_depth: depth("vs_mesh_depth", None, Input::Mesh),
+            sphere_depth: depth("vs_sphere", Some("fs_sphere_depth"), Input::Sphere),
+            occlusion: whole("fs_occlusion"),
+            blur: whole("fs_blur"),
+            shadow_sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("shadow"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                compare: Some(CompareFunction::GreaterEqual),
+                ..Default::default()
+            }),
+            view_layout,
+            scene_layout,
+            occlusion_layout,
+        }
+    }
+}
+
+/// Depth test and write: nearer is greater.
+type DepthUse = (CompareFunction, bool);
+const WRITE: DepthUse = (CompareFunction::GreaterEqual, true);
+const TEST: DepthUse = (CompareFunction::GreaterEqual, false);
+const ALWAYS: DepthUse = (CompareFunction::Always, false);
+
+/// What the vertex stage reads.
+#[derive(Clone, Copy, PartialEq)]
+enum Input {
+    None,
+    Mesh,
+    Sphere,
+    Stroke,
+}
+
+struct Plan<'a> {
+    vs: &'a str,
+    fs: Option<&'a str>,
+    input: Input,
+    color: Option<TextureFormat>,
+    depth: Option<DepthUse>,
+    blend: Option<BlendState>,
+    samples: u32,
+}
+
+impl Plan<'_> {
+    fn build(&self, device: &Device, module: &ShaderModule, layouts: &[Option<&BindGroupLayout>]) -> RenderPipeline {
+        let pipeline_layout =
+            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some(self.vs), bind_group_layouts: layouts, immediate_size: 0 });
+        let vertex = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
+        let rows = attributes(if self.input == Input::Mesh { 2 } else { 0 }, self.input.floats());
+        let per_instance = wgpu::VertexBufferLayout { array_stride: 4 * self.input.floats(), step_mode: wgpu::VertexStepMode::Instance, attributes: &rows };
+        let per_vertex = wgpu::VertexBufferLayout { array_stride: 24, step_mode: wgpu::VertexStepMode::Vertex, attributes: &vertex };
+        let buffers = match self.input {
+            Input::None => vec![],
+            Input::Mesh => vec![Some(per_vertex), Some(per_instance)],
+            Input::Sphere | Input::Stroke => vec![Some(per_instance)],
+        };
+        let strip = matches!(self.input, Input::Sphere | Input::Stroke);
+        let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask: wgpu::ColorWrites::ALL })];
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(self.fs.unwrap_or(self.vs)),
+            layout: Some(&pipeline_layout),
+            vertex: wgpu::VertexState { module, entry_point: Some(self.vs), compilation_options: Default::default(), buffers: &buffers },
+            primitive: wgpu::PrimitiveState {
+                topology: if strip { wgpu::PrimitiveTopology::TriangleStrip } else { wgpu::PrimitiveTopology::TriangleList },
+                ..Default::default()
+            },
+            depth_stencil: self.depth.map(|(compare, write)| wgpu::DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(write),
+                depth_compare: Some(compare),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: wgpu::MultisampleState { count: self.samples, ..Default::default() },
+            fragment: self.fs.map(|fs| wgpu::FragmentState {
+                module,
+                entry_point: Some(fs),
+                compilation_options: Default::default(),
+                targets: if self.color.is_some() { &targets } else { &[] },
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}
+
+impl Input {
+    fn floats(self) -> u64 {
+        match self {
+            Input::None => 0,
+            Input::Mesh => INSTANCE_FLOATS,
+            Input::Sphere => SPHERE_FLOATS,
+            Input::Stroke => STROKE_FLOATS,
+        }
+    }
+}
+
+/// As many vec4 attributes as fill `floats`, from location `first` on.
+fn attributes(first: u32, floats: u64) -> Vec<wgpu::VertexAttribute> {
+    (0..floats / 4).map(|i| wgpu::VertexAttribute { format: VertexFormat::Float32x4, offset: 16 * i, shader_location: first + i as u32 }).collect()
+}
+
+fn shader(device: &Device, label: &str, source: &str) -> ShaderModule {
+    device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) })
+}
+
+fn layout(device: &Device, label: &str, entries: &[BindGroupLayoutEntry]) -> BindGroupLayout {
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+}
+
+fn entry(binding: u32, ty: BindingType) -> BindGroupLayoutEntry {
+    BindGroupLayoutEntry { binding, visibility: ShaderStages::VERTEX_FRAGMENT, ty, count: None }
+}
+
+fn uniform(binding: u32) -> BindGroupLayoutEntry {
+    entry(binding, BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: None })
+}
+
+fn texture(binding: u32, sample_type: wgpu::TextureSampleType, view_dimension: wgpu::TextureViewDimension) -> BindGroupLayoutEntry {
+    entry(binding, BindingType::Texture { sample_type, view_dimension, multisampled: false })
+}

@@ -1,0 +1,86 @@
+//! Lights, shadows, sky and settings as the shaders' `struct Scene`.
+
+use super::data::Eye;
+use super::shadow;
+use crate::material::linear3;
+use crate::{DrawList, Light, MAX_LIGHTS, MAX_SHADOWS};
+
+/// The views of the lights that throw shadows, with the light's number: one layer of the shadow maps each, in the list's order.
+pub fn shadow_eyes(list: &DrawList) -> Vec<(usize, Eye)> {
+    let size = list.settings.shadow_map_size;
+    list.lights.iter().enumerate().filter_map(|(i, light)| Some((i, shadow::eye_of(light, list, size)?))).take(MAX_SHADOWS).collect()
+}
+
+/// Reach of ambient occlusion in metres; 0 for none.
+pub fn occlusion_reach(list: &DrawList) -> f32 {
+    match (list.settings.occlusion_m, list.sky.ambient > 0.0) {
+        (_, false) => 0.0,
+        (Some(reach), _) => reach,
+        (None, _) => list.bounding_ball(false).map_or(0.0, |(_, radius)| radius / 15.0),
+    }
+}
+
+/// Middle x and y of the floor, and its reach.
+pub fn floor(list: &DrawList) -> [f32; 4] {
+    let middle = list.bounding_ball(false).map_or([0.0; 2], |(c, _)| [c.x, c.y]);
+    [middle[0], middle[1], list.ground.as_ref().map_or(1.0, |g| g.reach_m), 0.0]
+}
+
+/// Linear radiance that comes back from below, in units of the ambient factor: a floor returns its colour times the light that falls on it
+/// (sky and suns; lamps light it unevenly), without a floor it is the sky's ground colour.
+fn bounce(list: &DrawList) -> [f32; 3] {
+    let sky = &list.sky;
+    let Some(floor) = &list.ground else { return linear3(sky.ground) };
+    let (albedo, zenith, horizon) = (linear3(floor.material.color), linear3(sky.zenith), linear3(sky.horizon));
+    let mut light: [f32; 3] = std::array::from_fn(|k| 0.5 * zenith[k] + 0.5 * horizon[k]);
+    for light_source in &list.lights {
+        if let Light::Directional { direction, color, intensity, .. } = light_source {
+            let fall = (-direction.normalize().z).max(0.0) * intensity;
+            let color = linear3(*color);
+            // shade and occlusion below and around the objects take half
+            (0..3).for_each(|k| light[k] += 0.5 * fall * color[k]);
+        }
+    }
+    std::array::from_fn(|k| albedo[k] * light[k])
+}
+
+/// `struct Scene`.
+pub fn floats(list: &DrawList, shadows: &[(usize, Eye)], occlusion: bool) -> Vec<f32> {
+    let mut out = Vec::new();
+    for (i, light) in list.lights.iter().enumerate() {
+        let layer = shadows.iter().position(|(of, _)| *of == i).map_or(-1.0, |layer| layer as f32);
+        push_light(light, layer, &mut out);
+    }
+    out.resize(12 * MAX_LIGHTS, 0.0);
+    for (_, eye) in shadows {
+        out.extend(shadow::floats(eye, list.settings.shadow_map_size));
+    }
+    out.resize(12 * MAX_LIGHTS + 40 * MAX_SHADOWS, 0.0);
+    let (sky, s) = (&list.sky, &list.settings);
+    let mut color = |c: [f32; 3], w: f32| {
+        let [r, g, b] = linear3(c);
+        out.extend([r, g, b, w]);
+    };
+    color(sky.zenith, list.lights.len() as f32);
+    color(sky.horizon, sky.ambient);
+    color(sky.ground, sky.softbox);
+    color(sky.backdrop.unwrap_or_default(), flag(sky.backdrop.is_some()));
+    out.extend([s.exposure, flag(s.tone_map), flag(occlusion), s.shadow_map_size as f32]);
+    out.extend(floor(list));
+    let [r, g, b] = bounce(list);
+    out.extend([r, g, b, 0.0]);
+    out
+}
+
+fn push_light(light: &Light, layer: f32, out: &mut Vec<f32>) {
+    let (at, kind, color, intensity, size) = match light {
+        Light::Directional { direction, color, intensity, angular_radius_rad, .. } => (-direction.normalize(), 0.0, color, intensity, angular_radius_rad),
+        Light::Point { position, color, intensity, radius_m, .. } => (position.coords, 1.0, color, intensity, radius_m),
+    };
+    let [r, g, b] = linear3(*color).map(|c| c * intensity);
+    out.extend([at.x, at.y, at.z, kind, r, g, b, *size, layer, 0.0, 0.0, 0.0]);
+}
+
+fn flag(on: bool) -> f32 {
+    f32::from(u8::from(on))
+}

@@ -1,0 +1,95 @@
+//! Where a light looks from: the tightest view that holds everything that throws shadows.
+
+use super::data::Eye;
+use crate::camera::orthographic;
+use crate::{DrawList, Light};
+use nalgebra::{Matrix4, Point3, Vector3, Vector4};
+
+/// The view of a light onto what throws shadows, or `None` where it throws none: nothing is there, or the lamp hangs in the middle of it.
+pub fn eye_of(light: &Light, list: &DrawList, size: u32) -> Option<Eye> {
+    if !light.casts_shadow() {
+        return None;
+    }
+    let (lo, hi) = list.bounding_box(true)?;
+    match light {
+        Light::Directional { direction, .. } => Some(sun(direction, list, &lo, &hi, size)),
+        Light::Point { position, .. } => lamp(position, &lo, &hi, size),
+    }
+}
+
+/// Parallel view along `direction`. Its x axis follows the longer side of the scene and both axes are scaled by themselves,
+/// so that a long lane wastes no texels.
+fn sun(direction: &Vector3<f32>, list: &DrawList, lo: &Point3<f32>, hi: &Point3<f32>, size: u32) -> Eye {
+    let back = -direction.normalize();
+    let extent = hi - lo;
+    let long = if extent.x >= extent.y { Vector3::x() } else { Vector3::y() };
+    let along = if back.cross(&long).norm() > 1e-3 { long } else { Vector3::z() };
+    let side = (along - back * back.dot(&along)).normalize();
+    let up = back.cross(&side);
+    let view = view_matrix(&side, &up, &back, &nalgebra::center(lo, hi));
+    let see = |p: Point3<f32>| view.transform_point(&p).coords;
+    let instances = list.instances.iter().filter(|i| i.casts_shadow).flat_map(|i| list.corners(i)).map(|p| (see(p), 0.0));
+    let spheres = list.spheres.iter().filter(|s| s.casts_shadow).map(|s| (see(s.center), s.radius));
+    let far = Vector3::repeat(f32::MAX);
+    let (min, max) = instances.chain(spheres).fold((far, -far), |(min, max), (p, r)| (min.inf(&p.add_scalar(-r)), max.sup(&p.add_scalar(r))));
+    // room for the filter at the rim, and never without extent
+    let margin = (max - min) * 0.02 + Vector3::repeat(1e-3 + 1e-4 * extent.norm());
+    Eye::new(&view, &orthographic(min - margin, max + margin), size, size)
+}
+
+/// Perspective view from a lamp outside the box `lo`..`hi`, looking at the box's nearest point, with a frustum that just holds its corners.
+fn lamp(position: &Point3<f32>, lo: &Point3<f32>, hi: &Point3<f32>, size: u32) -> Option<Eye> {
+    let nearest = Point3::from(position.coords.sup(&lo.coords).inf(&hi.coords));
+    let forward = (nearest - position).try_normalize(1e-3 * (hi - lo).norm().max(1e-3))?;
+    let back = -forward;
+    let along = if back.z.abs() > 0.9 { Vector3::x() } else { Vector3::z() };
+    let side = along.cross(&back).normalize();
+    let up = back.cross(&side);
+    let view = view_matrix(&side, &up, &back, position);
+    let corners = (0..8).map(|k: usize| {
+        let pick = |axis: usize| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
+        view.transform_point(&Point3::new(pick(0), pick(1), pick(2)))
+    });
+    let (mut near, mut far, mut min, mut max) = (f32::MAX, 0f32, [f32::MAX; 2], [-f32::MAX; 2]);
+    for p in corners {
+        let s = -p.z;
+        near = near.min(s);
+        far = far.max(s);
+        for k in 0..2 {
+            // a flat frustum beyond 80 degrees to a side would leave no texels for the rest
+            let t = (p[k] / s.max(1e-6)).clamp(-5.7, 5.7);
+            (min[k], max[k]) = (min[k].min(t), max[k].max(t));
+        }
+    }
+    let (near, far) = ((near * 0.98).max(far * 1e-3), far * 1.02);
+    let row = |k: usize| {
+        let pad = 0.02 * (max[k] - min[k]) + 1e-3;
+        let (a, b) = (min[k] - pad, max[k] + pad);
+        (2.0 / (b - a), (b + a) / (b - a))
+    };
+    let ((sx, cx), (sy, cy)) = (row(0), row(1));
+    let projection = Matrix4::new(
+        sx, 0.0, cx, 0.0, //
+        0.0, sy, cy, 0.0, //
+        0.0, 0.0, far / (near - far), near * far / (near - far), //
+        0.0, 0.0, -1.0, 0.0,
+    );
+    Some(Eye::new(&view, &projection, size, size))
+}
+
+fn view_matrix(side: &Vector3<f32>, up: &Vector3<f32>, back: &Vector3<f32>, at: &Point3<f32>) -> Matrix4<f32> {
+    let row = |v: &Vector3<f32>| Vector4::new(v.x, v.y, v.z, -v.dot(&at.coords)).transpose();
+    Matrix4::from_rows(&[row(side), row(up), row(back), Vector4::w().transpose()])
+}
+
+/// `struct Shadow` of the shaders.
+pub fn floats(eye: &Eye, size: u32) -> Vec<f32> {
+    let m = eye.clip_from_world;
+    let inverse = m.try_inverse().unwrap_or(Matrix4::identity());
+    let mut out: Vec<f32> = m.iter().chain(inverse.iter()).map(|&x| x as f32).collect();
+    out.extend(eye.depth.map(|x| x as f32));
+    let [wide, high] = eye.map_widths_per_metre();
+    let texel = 1.0 / (wide.min(high) * f64::from(size));
+    out.extend([wide as f32, high as f32, f32::from(u8::from(eye.perspective)), texel as f32]);
+    out
+}

@@ -1,0 +1,67 @@
+//! A picture in memory, and its way to and from PNG.
+
+use crate::RenderError;
+use std::fs::File;
+use std::io::{BufReader, BufWriter};
+use std::path::Path;
+
+/// A picture: 8-bit sRGB with alpha, rows from the top, four bytes `r, g, b, a` per pixel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `4 * width * height` bytes.
+    pub rgba: Vec<u8>,
+}
+
+impl Image {
+    /// The four bytes of the pixel `x` to the right and `y` down from the top left corner; `None` outside the picture.
+    pub fn pixel(&self, x: u32, y: u32) -> Option<[u8; 4]> {
+        if x >= self.width || y >= self.height {
+            return None;
+        }
+        let at = 4 * (y as usize * self.width as usize + x as usize);
+        self.rgba.get(at..at + 4)?.try_into().ok()
+    }
+
+    /// Writes the picture as an 8-bit RGBA PNG marked as sRGB. Parent folders must exist.
+    ///
+    /// # Errors
+    /// [`RenderError::File`] names the path.
+    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<(), RenderError> {
+        let path = path.as_ref();
+        let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
+        let file = File::create(path).map_err(|e| fail(e.to_string()))?;
+        let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let mut writer = encoder.write_header().map_err(|e| fail(e.to_string()))?;
+        writer.write_image_data(&self.rgba).map_err(|e| fail(e.to_string()))?;
+        writer.finish().map_err(|e| fail(e.to_string()))
+    }
+
+    /// Reads an 8-bit RGBA PNG such as [`Image::write_png`] makes (golden pictures).
+    ///
+    /// # Errors
+    /// [`RenderError::File`] names the path and what is wrong; other PNG layouts are refused.
+    pub fn read_png(path: impl AsRef<Path>) -> Result<Image, RenderError> {
+        let path = path.as_ref();
+        let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
+        let file = File::open(path).map_err(|e| fail(e.to_string()))?;
+        let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|e| fail(e.to_string()))?;
+        let info = reader.info();
+        let (width, height) = (info.width, info.height);
+        if (info.color_type, info.bit_depth) != (png::ColorType::Rgba, png::BitDepth::Eight) {
+            return Err(fail("expected an 8-bit RGBA PNG".into()));
+        }
+        if width > crate::MAX_SIDE || height > crate::MAX_SIDE || u64::from(width) * u64::from(height) > crate::MAX_PIXELS {
+            return Err(fail(format!("{width} x {height} pixels are more than a picture may have")));
+        }
+        let mut rgba = vec![0; 4 * width as usize * height as usize];
+        reader.next_frame(&mut rgba).map_err(|e| fail(e.to_string()))?;
+        Ok(Image { width, height, rgba })
+    }
+}

@@ -1,0 +1,267 @@
+//! The draw list: everything a picture shows, as plain data. No GPU is needed to build, test, print or compare one.
+
+pub(crate) mod debug;
+mod text;
+mod validate;
+pub use validate::{MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS};
+
+pub use debug::{DebugLine, DebugPoint, DebugSphere, DebugStyle, SphereStyle};
+
+use crate::{Camera, Material, MeshData, Pattern};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use std::sync::Arc;
+
+/// A mesh of a [`DrawList`]: its place in [`DrawList::meshes`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MeshId(pub usize);
+
+/// A mesh placed in the world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instance {
+    /// Which mesh.
+    pub mesh: MeshId,
+    /// Pose of the mesh's frame in the world.
+    pub pose: Isometry3<f32>,
+    /// Factors along the mesh's own axes, applied before the pose; none may be 0.
+    pub scale: Vector3<f32>,
+    /// Its surface.
+    pub material: Material,
+    /// Whether it throws shadows. Turn off for what only receives them and is large (a floor slab): shadows are sharper then.
+    pub casts_shadow: bool,
+}
+
+/// A sphere, drawn by ray casting: round at every distance and cheap by the thousand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre in the world.
+    pub center: Point3<f32>,
+    /// Radius in metres, above 0.
+    pub radius: f32,
+    /// Object to world, for patterns that show rotation.
+    pub orientation: UnitQuaternion<f32>,
+    /// Its surface.
+    pub material: Material,
+    /// Whether it throws a shadow.
+    pub casts_shadow: bool,
+}
+
+/// A source of light. Colours are sRGB; intensity 1 with white is a well-lit surface at perpendicular light.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Light {
+    /// Parallel light, like the sun.
+    Directional {
+        /// The way the light travels (from the source into the scene); any length above 0.
+        direction: Vector3<f32>,
+        /// Colour.
+        color: [f32; 3],
+        /// Irradiance on a perpendicular surface, divided by π.
+        intensity: f32,
+        /// Half the angle under which the source is seen, in radians: the softness of shadows (sun 0.0047).
+        angular_radius_rad: f32,
+        /// Whether it throws shadows.
+        casts_shadow: bool,
+    },
+    /// A lamp. It throws shadows where it hangs outside the ball that bounds everything that throws them (one map), else none.
+    Point {
+        /// Where, in the world.
+        position: Point3<f32>,
+        /// Colour.
+        color: [f32; 3],
+        /// Irradiance at a distance of 1 m, divided by π.
+        intensity: f32,
+        /// Radius of the source in metres: the softness of shadows.
+        radius_m: f32,
+        /// Whether it throws shadows.
+        casts_shadow: bool,
+    },
+}
+
+impl Light {
+    /// A sun with soft shadows that travels along `direction`.
+    pub fn sun(direction: Vector3<f32>, intensity: f32) -> Self {
+        Light::Directional { direction, color: [1.0, 0.97, 0.92], intensity, angular_radius_rad: 0.02, casts_shadow: true }
+    }
+
+    /// A lamp at `position` that gives `intensity` at the distance `at_m`.
+    pub fn lamp(position: Point3<f32>, intensity: f32, at_m: f32) -> Self {
+        Light::Point { position, color: [1.0, 0.95, 0.87], intensity: intensity * at_m * at_m, radius_m: 0.05 * at_m, casts_shadow: true }
+    }
+
+    /// Whether it is meant to throw shadows.
+    pub fn casts_shadow(&self) -> bool {
+        match self {
+            Light::Directional { casts_shadow, .. } | Light::Point { casts_shadow, .. } => *casts_shadow,
+        }
+    }
+}
+
+/// What surrounds the scene: the background, the ambient light and what glossy surfaces reflect. Colours are sRGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sky {
+    /// Straight up.
+    pub zenith: [f32; 3],
+    /// At eye level.
+    pub horizon: [f32; 3],
+    /// Straight down: what comes back from below.
+    pub ground: [f32; 3],
+    /// Factor of the light that the sky gives (not of the background).
+    pub ambient: f32,
+    /// A bright panel overhead that only glossy surfaces see, as photographers use; 0 for none.
+    pub softbox: f32,
+    /// One flat sRGB background colour instead of the gradient (light and reflections stay).
+    pub backdrop: Option<[f32; 3]>,
+}
+
+impl Default for Sky {
+    fn default() -> Self {
+        Sky { zenith: [0.42, 0.53, 0.68], horizon: [0.80, 0.84, 0.88], ground: [0.42, 0.40, 0.38], ambient: 1.0, softbox: 0.0, backdrop: None }
+    }
+}
+
+impl Sky {
+    /// A dim, warm hall: for tables and lanes under lamps.
+    pub fn hall() -> Self {
+        Sky { zenith: [0.20, 0.18, 0.17], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 1.5, softbox: 7.0, backdrop: None }
+    }
+
+    /// No ambient light, a flat backdrop: for tests and plots.
+    pub fn flat(backdrop: [f32; 3]) -> Self {
+        Sky { zenith: [0.0; 3], horizon: [0.0; 3], ground: [0.0; 3], ambient: 0.0, softbox: 0.0, backdrop: Some(backdrop) }
+    }
+}
+
+/// A floor that fades into the horizon. It receives shadows and throws none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ground {
+    /// Height of its plane, world z.
+    pub height_m: f32,
+    /// How far it reaches from the middle of the scene before it has faded away.
+    pub reach_m: f32,
+    /// Its surface; patterns run in world coordinates.
+    pub material: Material,
+}
+
+impl Ground {
+    /// A grey floor at the height with a grid of 1 m.
+    pub fn grid(height_m: f32) -> Self {
+        let pattern = Pattern::Grid { line: [0.46, 0.47, 0.49], size_m: 1.0, width_m: 0.02 };
+        Ground { height_m, reach_m: 60.0, material: Material::matte([0.60, 0.61, 0.63]).with_pattern(pattern) }
+    }
+}
+
+
+/// Numbers of the picture as a whole.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Factor on all light before tone mapping.
+    pub exposure: f32,
+    /// Side of a shadow map in texels (256 to 8192).
+    pub shadow_map_size: u32,
+    /// Reach of ambient occlusion in metres: `None` for a fifteenth of the scene's radius; `Some(0.0)` turns it off.
+    pub occlusion_m: Option<f32>,
+    /// Filmic tone curve; without it light above 1 is cut off (tests and plots).
+    pub tone_map: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { exposure: 1.0, shadow_map_size: 2048, occlusion_m: None, tone_map: true }
+    }
+}
+
+/// Everything a picture shows.
+///
+/// ```
+/// use tumble_render::{DrawList, Instance, Light, Material, MeshData};
+/// let mut list = DrawList::default();
+/// let cube = list.add_mesh(MeshData::unit_box());
+/// list.add_instance(cube, nalgebra::Isometry3::translation(0.0, 0.0, 0.5), Material::plastic([0.8, 0.3, 0.2]));
+/// list.lights.push(Light::sun(nalgebra::Vector3::new(0.4, 0.5, -1.0), 2.5));
+/// list.camera = list.framing_camera(nalgebra::Vector3::new(-1.0, 1.5, -0.8));
+/// assert!(list.to_text().contains("instance 0: mesh 0"));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DrawList {
+    /// Meshes by [`MeshId`]. Shared, so that a list per frame copies nothing and the renderer uploads each once.
+    pub meshes: Vec<Arc<MeshData>>,
+    /// Placed meshes.
+    pub instances: Vec<Instance>,
+    /// Spheres.
+    pub spheres: Vec<Sphere>,
+    /// Debug: lines and arrows.
+    pub lines: Vec<DebugLine>,
+    /// Debug: points.
+    pub points: Vec<DebugPoint>,
+    /// Debug: wire or translucent spheres.
+    pub debug_spheres: Vec<DebugSphere>,
+    /// Lights, at most [`crate::MAX_LIGHTS`]; the first [`crate::MAX_SHADOWS`] that throw shadows do.
+    pub lights: Vec<Light>,
+    /// Point of view.
+    pub camera: Camera,
+    /// Surroundings.
+    pub sky: Sky,
+    /// Floor.
+    pub ground: Option<Ground>,
+    /// Numbers of the picture as a whole.
+    pub settings: Settings,
+}
+
+impl DrawList {
+    /// Adds a mesh to place with [`DrawList::add_instance`].
+    pub fn add_mesh(&mut self, mesh: impl Into<Arc<MeshData>>) -> MeshId {
+        self.meshes.push(mesh.into());
+        MeshId(self.meshes.len() - 1)
+    }
+
+    /// Places a mesh, at its own size, throwing shadows.
+    pub fn add_instance(&mut self, mesh: MeshId, pose: Isometry3<f32>, material: Material) -> &mut Instance {
+        self.instances.push(Instance { mesh, pose, scale: Vector3::repeat(1.0), material, casts_shadow: true });
+        let last = self.instances.len() - 1;
+        &mut self.instances[last]
+    }
+
+    /// Adds a sphere that throws a shadow.
+    pub fn add_sphere(&mut self, center: Point3<f32>, radius: f32, orientation: UnitQuaternion<f32>, material: Material) -> &mut Sphere {
+        self.spheres.push(Sphere { center, radius, orientation, material, casts_shadow: true });
+        let last = self.spheres.len() - 1;
+        &mut self.spheres[last]
+    }
+
+    /// A ball `(center, radius)` around all instances and spheres (those that throw shadows, if `casters` is set); `None` when there are none.
+    /// The ground and debug drawings do not count.
+    pub fn bounding_ball(&self, casters: bool) -> Option<(Point3<f32>, f32)> {
+        let (lo, hi) = self.bounding_box(casters)?;
+        Some((nalgebra::center(&lo, &hi), (hi - lo).norm() / 2.0))
+    }
+
+    /// The box `(min, max)` around all instances and spheres, as for [`DrawList::bounding_ball`].
+    pub fn bounding_box(&self, casters: bool) -> Option<(Point3<f32>, Point3<f32>)> {
+        let instances = self.instances.iter().filter(|i| i.casts_shadow || !casters).flat_map(|i| self.corners(i));
+        let spheres = self.spheres.iter().filter(|s| s.casts_shadow || !casters).flat_map(|s| {
+            let r = Vector3::repeat(s.radius);
+            [s.center - r, s.center + r]
+        });
+        instances.chain(spheres).fold(None, |found, p| match found {
+            None => Some((p, p)),
+            Some((lo, hi)) => Some((lo.inf(&p), hi.sup(&p))),
+        })
+    }
+
+    /// A camera that looks along `direction` and shows everything.
+    pub fn framing_camera(&self, direction: Vector3<f32>) -> Camera {
+        let (center, radius) = self.bounding_ball(false).unwrap_or((Point3::origin(), 1.0));
+        Camera::framing(center, radius, direction, 0.9)
+    }
+
+    /// The eight world corners of an instance's box; none for an unknown or empty mesh.
+    pub(crate) fn corners(&self, instance: &Instance) -> Vec<Point3<f32>> {
+        let Some((lo, hi)) = self.meshes.get(instance.mesh.0).and_then(|m| m.bounds()) else { return Vec::new() };
+        (0..8)
+            .map(|k| {
+                let pick = |axis: usize| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
+                let local = Vector3::new(pick(0), pick(1), pick(2)).component_mul(&instance.scale);
+                instance.pose * Point3::from(local)
+            })
+            .collect()
+    }
+}

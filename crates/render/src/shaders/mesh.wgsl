@@ -1,0 +1,68 @@
+struct MeshIn {
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) row_x: vec4f, // rows of the 3 x 4 matrix from object to world
+    @location(3) row_y: vec4f,
+    @location(4) row_z: vec4f,
+    @location(5) color_rough: vec4f,
+    @location(6) other_metal: vec4f,
+    @location(7) pattern: vec4f,
+};
+struct MeshOut {
+    @builtin(position) clip: vec4f,
+    @location(0) world: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) object: vec3f,
+    @location(3) object_normal: vec3f,
+    @location(4) @interpolate(flat) color_rough: vec4f,
+    @location(5) @interpolate(flat) other_metal: vec4f,
+    @location(6) @interpolate(flat) pattern: vec4f,
+    @location(7) @interpolate(flat) side: f32,
+};
+
+fn world_of(in: MeshIn) -> vec3f {
+    let p = vec4f(in.position, 1.0);
+    return vec3f(dot(in.row_x, p), dot(in.row_y, p), dot(in.row_z, p));
+}
+
+@vertex fn vs_mesh(in: MeshIn) -> MeshOut {
+    var out: MeshOut;
+    out.world = world_of(in);
+    out.clip = view.clip_from_world * vec4f(out.world, 1.0);
+    let cx = vec3f(in.row_x.x, in.row_y.x, in.row_z.x);
+    let cy = vec3f(in.row_x.y, in.row_y.y, in.row_z.y);
+    let cz = vec3f(in.row_x.z, in.row_y.z, in.row_z.z);
+    // normals turn by the cofactor matrix
+    let side = sign(dot(cx, cross(cy, cz)));
+    out.normal = (cross(cy, cz) * in.normal.x + cross(cz, cx) * in.normal.y + cross(cx, cy) * in.normal.z) * side;
+    out.object = in.position * vec3f(length(cx), length(cy), length(cz));
+    out.object_normal = in.normal;
+    out.color_rough = in.color_rough;
+    out.other_metal = in.other_metal;
+    out.pattern = in.pattern;
+    out.side = side;
+    return out;
+}
+
+@vertex fn vs_mesh_depth(in: MeshIn) -> @builtin(position) vec4f {
+    return view.clip_from_world * vec4f(world_of(in), 1.0);
+}
+
+fn mesh_color(in: MeshOut, front: bool) -> vec3f {
+    let facing = select(-1.0, 1.0, front) * in.side;
+    let s = view_depth_of(in.clip.z);
+    let to_eye = -normalize(ray_at(in.clip.xy).dir);
+    return pixel_color(in.world, normalize(in.normal) * facing, to_eye, in.object, normalize(in.object_normal), s, in.clip.xy,
+        Look(in.color_rough, in.other_metal, in.pattern));
+}
+
+@fragment fn fs_mesh(in: MeshOut, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    return vec4f(mesh_color(in, front), 1.0);
+}
+
+// The floor fades into what lies behind it.
+@fragment fn fs_ground(in: MeshOut, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let away = length(in.world.xy - scene.floor.xy) / scene.floor.z;
+    let fade = smoothstep(0.15, 0.95, away);
+    return vec4f(mix(mesh_color(in, front), backdrop_at(normalize(ray_at(in.clip.xy).dir)), fade), 1.0);
+}

@@ -1,0 +1,145 @@
+// Procedural patterns over a base colour, in the object's frame. `w` is the width of a pixel there, for filtering.
+struct Base { color: vec3f, roughness: f32, coat: f32, sheen: f32 };
+
+// Integral of a square wave that is -1 and 1 over halves of its period of 2.
+fn triangle_wave(x: f32) -> f32 {
+    return abs(fract(x * 0.5) * 2.0 - 1.0);
+}
+
+// The square wave averaged over [x - w/2, x + w/2].
+fn square_wave(x: f32, w: f32) -> f32 {
+    let h = max(w, 1e-5);
+    return (triangle_wave(x - 0.5 * h) - triangle_wave(x + 0.5 * h)) / h;
+}
+
+// Share of [x - w/2, x + w/2] covered by lines of `width` centred on the integers.
+fn line_cover(x: f32, width: f32, w: f32) -> f32 {
+    let h = max(w, 1e-5);
+    let a = x - 0.5 * h + 0.5 * width;
+    let b = x + 0.5 * h + 0.5 * width;
+    return (floor(b) * width + min(fract(b), width) - floor(a) * width - min(fract(a), width)) / h;
+}
+
+fn checker(p: vec3f, w: vec3f) -> f32 {
+    return 0.5 + 0.5 * square_wave(p.x, w.x) * square_wave(p.y, w.y) * square_wave(p.z, w.z);
+}
+
+fn segment_distance(p: vec2f, a: vec2f, b: vec2f) -> f32 {
+    let d = b - a;
+    return length(p - a - d * clamp(dot(p - a, d) / dot(d, d), 0.0, 1.0));
+}
+
+// Distance to a digit of strokes in a box of 1 x 2 around the origin.
+fn digit_distance(p: vec2f, digit: u32) -> f32 {
+    var masks = array<u32, 10>(63u, 6u, 91u, 79u, 102u, 109u, 125u, 7u, 127u, 111u);
+    let bits = masks[min(digit, 9u)];
+    let x = 0.5;
+    var d = 1e9;
+    if ((bits & 1u) != 0u) { d = min(d, segment_distance(p, vec2f(-x, 1.0), vec2f(x, 1.0))); }
+    if ((bits & 2u) != 0u) { d = min(d, segment_distance(p, vec2f(x, 1.0), vec2f(x, 0.0))); }
+    if ((bits & 4u) != 0u) { d = min(d, segment_distance(p, vec2f(x, 0.0), vec2f(x, -1.0))); }
+    if ((bits & 8u) != 0u) { d = min(d, segment_distance(p, vec2f(-x, -1.0), vec2f(x, -1.0))); }
+    if ((bits & 16u) != 0u) { d = min(d, segment_distance(p, vec2f(-x, 0.0), vec2f(-x, -1.0))); }
+    if ((bits & 32u) != 0u) { d = min(d, segment_distance(p, vec2f(-x, 1.0), vec2f(-x, 0.0))); }
+    if ((bits & 64u) != 0u) { d = min(d, segment_distance(p, vec2f(-x, 0.0), vec2f(x, 0.0))); }
+    return d;
+}
+
+fn number_distance(p: vec2f, number: u32) -> f32 {
+    if (number < 10u) { return digit_distance(p, number); }
+    let wide = p * 1.15;
+    return min(digit_distance(wide + vec2f(0.85, 0.0), number / 10u), digit_distance(wide - vec2f(0.85, 0.0), number % 10u));
+}
+
+const IVORY = vec3f(0.87, 0.84, 0.76);
+const INK = vec3f(0.012, 0.012, 0.014);
+
+// Solid, striped or cue ball; `d` is the direction from the centre, `w` the angle of a pixel.
+fn ball(color: vec3f, d: vec3f, w: f32, number: u32, stripe: bool) -> vec3f {
+    if (number == 0u && !stripe) {
+        let off = 1.0 - max(max(abs(d.x), abs(d.y)), abs(d.z));
+        let r = 0.0135;
+        return mix(vec3f(0.55, 0.02, 0.02), color, smoothstep(r - 0.15 * w - 0.002, r + 0.15 * w + 0.002, off));
+    }
+    var c = color;
+    if (stripe) { c = mix(color, IVORY, smoothstep(-w, w, abs(asin(clamp(d.z, -1.0, 1.0))) - 0.56)); }
+    if (number == 0u) { return c; }
+    let angle = acos(clamp(abs(d.x), 0.0, 1.0));
+    let spot = 0.40;
+    let flat_d = vec2f(select(-d.y, d.y, d.x > 0.0), d.z);
+    let ink = number_distance(flat_d / spot * 2.3, number) * spot / 2.3;
+    let face = mix(INK, IVORY, smoothstep(-w, w, ink - 0.030));
+    return mix(face, c, smoothstep(-w, w, angle - spot));
+}
+
+// Rings of growth around an axis along x, seen in boards `board` wide; `dark` shares the late wood.
+fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> vec3f {
+    var q = p;
+    var tint = 0.0;
+    var joint = 0.0;
+    var bold = 0.75;
+    if (board > 0.0) {
+        let row = floor(p.y / board);
+        let id = i32(clamp(row, -1e9, 1e9));
+        tint = hash3(vec3i(id, 11, 5)) - 0.5;
+        q.y = p.y - (row + 0.5) * board + (hash3(vec3i(id, 3, 7)) - 0.5) * 6.0 * ring;
+        q.x = p.x + hash3(vec3i(id, 1, 2)) * 40.0 * ring * 10.0;
+        q.z = p.z + hash3(vec3i(id, 8, 2)) * 4.0 * ring;
+        bold = 0.38;
+        joint = line_cover(p.y / board, 0.035, w / board);
+    }
+    // the pith lies below the cut and wanders slowly, so that rings open into long arches
+    let wander = vec2f(noise3(vec3f(q.x / (ring * 60.0), 3.5, 0.5)), noise3(vec3f(q.x / (ring * 45.0), 7.5, 0.5))) - 0.5;
+    let radial = vec2f(q.y * 0.8, q.z + ring * 3.0) + wander * ring * 7.0;
+    let rough = noise3(vec3f(q.x / (ring * 25.0), q.y / (ring * 2.0), q.z / (ring * 2.0))) - 0.5;
+    let phase = length(radial) / ring + rough * 0.9;
+    let saw = fract(phase);
+    let visible = 1.0 - smoothstep(0.25, 1.2, w / ring);
+    let late = mix(0.35, smoothstep(0.15, 0.85, saw) * (1.0 - smoothstep(0.88, 1.0, saw)), visible);
+    let fibre_at = vec3f(q.x / (ring * 9.0), q.y / (ring * 0.12), q.z / (ring * 0.12));
+    let fibre_visible = 1.0 - smoothstep(0.05, 0.5, w / ring);
+    let fibre = (noise3(fibre_at) - 0.5) * fibre_visible;
+    let c = mix(color, dark, clamp(bold * late + 0.28 * fibre + 0.18 * rough * visible, 0.0, 1.0)) * (1.0 + 0.34 * tint);
+    return mix(c, dark * 0.35, 0.75 * clamp(joint, 0.0, 1.0));
+}
+
+fn base_of(p: vec3f, n: vec3f, w: f32, color_rough: vec4f, other: vec3f, pattern: vec4f) -> Base {
+    var base = Base(color_rough.xyz, color_rough.w, pattern.x, 0.0);
+    let size = max(pattern.zw, vec2f(1e-6));
+    switch u32(pattern.y) % 100u {
+        case 1u: {
+            // a face that lies in a plane of the lattice would flicker: sample slightly inside
+            let q = (p - n * 1e-3 * size.x) / size.x;
+            base.color = mix(other, color_rough.xyz, checker(q, vec3f(w / size.x) * (1.0 - n * n * 0.999)));
+        }
+        case 2u: {
+            let q = p.xy / size.x;
+            let h = w / size.x;
+            let fine = max(line_cover(q.x, size.y / size.x, h), line_cover(q.y, size.y / size.x, h));
+            let tenth = max(line_cover(q.x * 0.1, 0.2 * size.y / size.x, h * 0.1), line_cover(q.y * 0.1, 0.2 * size.y / size.x, h * 0.1));
+            base.color = mix(color_rough.xyz, other, clamp(max(0.7 * fine, tenth), 0.0, 1.0));
+        }
+        case 3u: {
+            base.color = ball(color_rough.xyz, normalize(p), w / max(length(p), 1e-6), u32(pattern.z), pattern.w > 0.5);
+        }
+        case 4u: {
+            base.color = wood(color_rough.xyz, other, p, size.x, pattern.w, w);
+        }
+        case 5u: {
+            let q = p / size.x;
+            let visible = 1.0 - smoothstep(0.3, 1.5, w / size.x);
+            let weave = (noise3(q * vec3f(1.0, 0.25, 1.0)) + noise3(q * vec3f(0.25, 1.0, 1.0) + 17.0) - 1.0) * visible;
+            let worn = noise3(p * 9.0) + 0.5 * noise3(p * 31.0) - 0.75;
+            base.color = color_rough.xyz * (1.0 + 0.55 * weave + 0.10 * worn);
+            base.sheen = 0.35;
+        }
+        case 6u: {
+            let width = pattern.w - pattern.z;
+            let one = smoothstep(-w, w, 0.5 * width - abs(p.z - pattern.z - 0.5 * width));
+            let two = smoothstep(-w, w, 0.5 * width - abs(p.z - pattern.z - 2.0 * width));
+            base.color = mix(color_rough.xyz, other, max(one, two));
+        }
+        default: {}
+    }
+    return base;
+}

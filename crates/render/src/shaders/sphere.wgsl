@@ -1,0 +1,130 @@
+// Spheres by ray casting inside a square that just covers them. Each sample of a pixel is tested against the exact outline,
+// so edges are as smooth as those of triangles; colour and depth are those of the pixel's middle.
+struct SphereIn {
+    @location(0) ball: vec4f, // centre, radius
+    @location(1) turn: vec4f, // quaternion x, y, z, w: object to world
+    @location(2) color_rough: vec4f,
+    @location(3) other_metal: vec4f,
+    @location(4) pattern: vec4f,
+};
+struct SphereOut {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) ball: vec4f,
+    @location(1) @interpolate(flat) turn: vec4f,
+    @location(2) @interpolate(flat) color_rough: vec4f,
+    @location(3) @interpolate(flat) other_metal: vec4f,
+    @location(4) @interpolate(flat) pattern: vec4f,
+};
+struct Hit { s: f32, position: vec3f, normal: vec3f };
+
+fn corner_of(index: u32) -> vec2f {
+    return vec2f(select(-1.0, 1.0, (index & 1u) != 0u), select(-1.0, 1.0, (index & 2u) != 0u));
+}
+
+// A square around the sphere's outline; the whole picture where the eye is too near for one.
+fn cover(ball: vec4f, index: u32) -> vec4f {
+    let corner = corner_of(index);
+    let whole = vec4f(corner, 0.5, 1.0);
+    var axis = view.dir_0.xyz;
+    var half = ball.w;
+    if (view.lens.x > 0.5) {
+        axis = ball.xyz - view.origin_0.xyz;
+        let d2 = dot(axis, axis);
+        let r2 = ball.w * ball.w;
+        if (d2 < 2.0 * r2) { return whole; }
+        half = ball.w * sqrt(d2 / (d2 - r2));
+    }
+    axis = normalize(axis);
+    let side = normalize(cross(axis, select(vec3f(0.0, 0.0, 1.0), vec3f(1.0, 0.0, 0.0), abs(axis.z) > 0.9)));
+    let up = cross(side, axis);
+    // w is affine in the corner: its least value decides whether a corner lies behind the eye
+    let row = vec3f(view.clip_from_world[0].w, view.clip_from_world[1].w, view.clip_from_world[2].w);
+    let middle = view.clip_from_world * vec4f(ball.xyz, 1.0);
+    let least = middle.w - half * (abs(dot(row, side)) + abs(dot(row, up)));
+    if (view.lens.x > 0.5 && least < 1e-3 * half) {
+        if (middle.w < -1.5 * half) { return vec4f(0.0, 0.0, 2.0, 1.0); }
+        return whole;
+    }
+    let reach = half * 1.002;
+    let clip = view.clip_from_world * vec4f(ball.xyz + (side * corner.x + up * corner.y) * reach, 1.0);
+    return vec4f(clip.xy / clip.w, 0.5, 1.0);
+}
+
+@vertex fn vs_sphere(in: SphereIn, @builtin(vertex_index) index: u32) -> SphereOut {
+    return SphereOut(cover(in.ball, index), in.ball, in.turn, in.color_rough, in.other_metal, in.pattern);
+}
+
+// Square of the radius less the square of the ray's distance from the centre.
+fn inside(ball: vec4f, pixel: vec2f) -> f32 {
+    let ray = ray_at(pixel);
+    let d = normalize(ray.dir);
+    let to = ball.xyz - ray.origin;
+    let miss = to - dot(to, d) * d;
+    return ball.w * ball.w - dot(miss, miss);
+}
+
+fn hit(ball: vec4f, pixel: vec2f) -> Hit {
+    let ray = ray_at(pixel);
+    let len = length(ray.dir);
+    let d = ray.dir / len;
+    let to = ball.xyz - ray.origin;
+    let along = dot(to, d);
+    let miss = along * d - to;
+    let back = sqrt(max(ball.w * ball.w - dot(miss, miss), 0.0));
+    let n = normalize(miss - back * d);
+    return Hit((along - back) / len, ball.xyz + n * ball.w, n);
+}
+
+fn sample_mask(ball: vec4f, pixel: vec2f) -> u32 {
+    // the four standard sample positions
+    var mask = 0u;
+    if (inside(ball, pixel + vec2f(-0.125, -0.375)) >= 0.0) { mask |= 1u; }
+    if (inside(ball, pixel + vec2f(0.375, -0.125)) >= 0.0) { mask |= 2u; }
+    if (inside(ball, pixel + vec2f(-0.375, 0.125)) >= 0.0) { mask |= 4u; }
+    if (inside(ball, pixel + vec2f(0.125, 0.375)) >= 0.0) { mask |= 8u; }
+    return mask;
+}
+
+fn unturn(q: vec4f, v: vec3f) -> vec3f {
+    let t = 2.0 * cross(-q.xyz, v);
+    return v + q.w * t + cross(-q.xyz, t);
+}
+
+struct SpherePixel {
+    @location(0) color: vec4f,
+    @builtin(frag_depth) depth: f32,
+    @builtin(sample_mask) mask: u32,
+};
+
+@fragment fn fs_sphere(in: SphereOut) -> SpherePixel {
+    let pixel = in.clip.xy;
+    let mask = sample_mask(in.ball, pixel);
+    let h = hit(in.ball, pixel);
+    let depth = depth_of(h.s);
+    if (mask == 0u || h.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
+    let to_eye = -normalize(ray_at(pixel).dir);
+    let object_normal = unturn(in.turn, h.normal);
+    let color = pixel_color(h.position, h.normal, to_eye, object_normal * in.ball.w, object_normal, h.s, pixel,
+        Look(in.color_rough, in.other_metal, in.pattern));
+    return SpherePixel(vec4f(color, 1.0), depth, mask);
+}
+
+@fragment fn fs_sphere_depth(in: SphereOut) -> @builtin(frag_depth) f32 {
+    if (inside(in.ball, in.clip.xy) < 0.0) { discard; }
+    let h = hit(in.ball, in.clip.xy);
+    let depth = depth_of(h.s);
+    if ((view.lens.x > 0.5 && h.s <= 0.0) || depth > 1.0 || depth < 0.0) { discard; }
+    return depth;
+}
+
+// A translucent shell: clear in the middle, denser at the rim.
+@fragment fn fs_shell(in: SphereOut) -> SpherePixel {
+    let pixel = in.clip.xy;
+    let mask = sample_mask(in.ball, pixel);
+    let h = hit(in.ball, pixel);
+    let depth = depth_of(h.s);
+    if (mask == 0u || h.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
+    let rim = 1.0 - clamp(dot(h.normal, -normalize(ray_at(pixel).dir)), 0.0, 1.0);
+    let alpha = in.color_rough.w * mix(0.3, 1.0, rim * rim * rim);
+    return SpherePixel(vec4f(in.color_rough.xyz * alpha, alpha), depth, mask);
+}

@@ -1,0 +1,41 @@
+// One point of view: the camera or a light. Depth is reversed: 1 at the near plane, 0 at the far plane.
+struct View {
+    clip_from_world: mat4x4f,
+    // The ray through a point of the picture (normalized device coordinates): origin and direction are affine in it.
+    // The direction has view depth 1, so a ray parameter is a view depth.
+    origin_0: vec4f, origin_x: vec4f, origin_y: vec4f,
+    dir_0: vec4f, dir_x: vec4f, dir_y: vec4f,
+    // depth = (x s + y) / (z s + w) at view depth s
+    depth: vec4f,
+    // width, height, and their inverses, in pixels
+    size: vec4f,
+    // x: 1 for perspective, 0 for parallel; y: metres per pixel per metre of view depth; z: metres per pixel (parallel)
+    lens: vec4f,
+};
+@group(0) @binding(0) var<uniform> view: View;
+
+struct Ray { origin: vec3f, dir: vec3f };
+
+fn ndc_of(pixel: vec2f) -> vec2f {
+    return vec2f(2.0, -2.0) * pixel * view.size.zw + vec2f(-1.0, 1.0);
+}
+
+fn ray_at(pixel: vec2f) -> Ray {
+    let n = ndc_of(pixel);
+    return Ray(
+        view.origin_0.xyz + n.x * view.origin_x.xyz + n.y * view.origin_y.xyz,
+        view.dir_0.xyz + n.x * view.dir_x.xyz + n.y * view.dir_y.xyz,
+    );
+}
+
+fn depth_of(s: f32) -> f32 {
+    return (view.depth.x * s + view.depth.y) / (view.depth.z * s + view.depth.w);
+}
+
+fn view_depth_of(depth: f32) -> f32 {
+    return (view.depth.y - depth * view.depth.w) / (depth * view.depth.z - view.depth.x);
+}
+
+fn footprint_at(s: f32) -> f32 {
+    return view.lens.y * s + view.lens.z;
+}

@@ -1,0 +1,91 @@
+//! Draw lists without a GPU: text form, checks, bounds.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use tumble_render::{DebugStyle, DrawList, Ground, Light, MAX_LIGHTS, Material, MeshData, MeshId, RenderError};
+
+fn sample() -> DrawList {
+    let mut list = DrawList::default();
+    let cube = list.add_mesh(MeshData::unit_box());
+    list.add_instance(cube, Isometry3::translation(1.0, -0.00001, 0.5), Material::plastic([0.8, 0.3, 0.2])).casts_shadow = false;
+    list.add_sphere(Point3::new(0.0, 0.0, 0.25), 0.25, UnitQuaternion::identity(), Material::billiard_ball(11));
+    list.arrow(Point3::origin(), Vector3::z(), DebugStyle::new([1.0, 0.0, 0.0]).on_top());
+    list.line(Point3::origin(), Point3::new(1.0, 2.0, 3.0), DebugStyle::new([0.0, 1.0, 0.0]));
+    list.point(Point3::new(0.12345678, 0.0, 0.0), DebugStyle::new([0.0, 0.0, 1.0]).width(8.0));
+    list.wire_sphere(Point3::origin(), 2.0, DebugStyle::new([1.0, 1.0, 0.0]));
+    list.shell(Point3::origin(), 1.0, DebugStyle::new([1.0, 1.0, 0.0]).opacity(0.25));
+    list.lights.push(Light::sun(Vector3::new(0.0, 0.0, -1.0), 2.0));
+    list.lights.push(Light::lamp(Point3::new(0.0, 0.0, 3.0), 1.0, 2.0));
+    list.ground = Some(Ground::grid(0.0));
+    list
+}
+
+#[test]
+fn text_form_is_stable_and_rounded() {
+    let expected = "\
+camera: eye (4 -4 3) target (0 0 0) up (0 0 1) fov 0.6981 near 0.05 far 500
+settings: exposure 1 shadow map 2048 occlusion auto tone map true
+sky: zenith (0.42 0.53 0.68) horizon (0.8 0.84 0.88) ground (0.42 0.4 0.38) ambient 1 softbox 0 backdrop none
+ground: height 0 reach 60 color (0.6 0.61 0.63) rough 0.9 metal 0 coat 0 pattern grid (0.46 0.47 0.49) (1 0.02)
+light 0: directional along (0 0 -1) color (1 0.97 0.92) intensity 2 radius 0.02 rad
+light 1: point at (0 0 3) color (1 0.95 0.87) intensity 4 radius 0.1
+mesh 0: 24 vertices 12 triangles from (-0.5 -0.5 -0.5) to (0.5 0.5 0.5)
+instance 0: mesh 0 at (1 0 0.5) turned (0 0 0 1) scale (1 1 1) color (0.8 0.3 0.2) rough 0.45 metal 0 coat 0 no shadow
+sphere 0: at (0 0 0.25) radius 0.25 turned (0 0 0 1) color (0.82 0.08 0.07) rough 0.25 metal 0 coat 1 pattern ball (0 0 0) (11 1)
+arrow 0: from (0 0 0) to (0 0 1) color (1 0 0) opacity 1 width 2 on top
+line 1: from (0 0 0) to (1 2 3) color (0 1 0) opacity 1 width 2
+point 0: at (0.1235 0 0) color (0 0 1) opacity 1 width 8
+rings 0: at (0 0 0) radius 2 color (1 1 0) opacity 1 width 2
+shell 1: at (0 0 0) radius 1 color (1 1 0) opacity 0.25 width 2
+";
+    assert_eq!(sample().to_text(), expected);
+}
+
+#[test]
+fn faults_are_named() {
+    sample().validate().expect("the sample is good");
+    let fault = |spoil: &dyn Fn(&mut DrawList)| {
+        let mut list = sample();
+        spoil(&mut list);
+        list.validate().expect_err("spoiled").to_string()
+    };
+    assert!(fault(&|l| l.instances[0].mesh = MeshId(7)).starts_with("instance 0: mesh is 7"));
+    assert!(fault(&|l| l.instances[0].pose.translation.x = f32::NAN).starts_with("instance 0: pose is [NaN"));
+    assert!(fault(&|l| l.instances[0].scale.y = 0.0).starts_with("instance 0: scale"));
+    assert!(fault(&|l| l.spheres[0].radius = -1.0).starts_with("sphere 0: radius is -1"));
+    assert!(fault(&|l| l.spheres[0].material.roughness = 1.5).starts_with("sphere 0: roughness is 1.5, expected 0 to 1"));
+    assert!(fault(&|l| l.spheres[0].material.color[1] = f32::INFINITY).starts_with("sphere 0: color"));
+    assert!(fault(&|l| l.lines[1].end.z = f32::NAN).starts_with("line 1: end"));
+    assert!(fault(&|l| l.lights[0] = Light::sun(Vector3::zeros(), 1.0)).starts_with("light 0: direction"));
+    assert!(fault(&|l| l.settings.shadow_map_size = 1 << 20).starts_with("settings 0: shadow_map_size is 1048576"));
+    assert!(fault(&|l| l.ground.as_mut().expect("has one").reach_m = 0.0).starts_with("ground 0: reach_m"));
+    let mut crowded = sample();
+    crowded.lights = vec![Light::sun(Vector3::z(), 1.0); MAX_LIGHTS + 1];
+    assert!(matches!(crowded.validate(), Err(RenderError::TooMany { what: "lights", count: 9, cap: 8 })));
+}
+
+#[test]
+fn bounds_follow_poses_and_scales() {
+    let mut list = DrawList::default();
+    assert_eq!(list.bounding_box(false), None);
+    let cube = list.add_mesh(MeshData::unit_box());
+    // an eighth of a turn about z: the half diagonal of the square is 1/sqrt 2, scaled by 2 along z
+    let placed = list.add_instance(cube, Isometry3::new(Vector3::new(3.0, 0.0, 0.0), Vector3::z() * std::f32::consts::FRAC_PI_4), Material::default());
+    placed.scale.z = 2.0;
+    placed.casts_shadow = false;
+    list.add_sphere(Point3::new(-1.0, 0.0, 0.0), 0.5, UnitQuaternion::identity(), Material::default());
+    let (lo, hi) = list.bounding_box(false).expect("not empty");
+    let d = 0.5f32.sqrt();
+    assert!((lo - Point3::new(-1.5, -d, -1.0)).norm() < 1e-5, "{lo}");
+    assert!((hi - Point3::new(3.0 + d, d, 1.0)).norm() < 1e-5, "{hi}");
+    let (lo, hi) = list.bounding_box(true).expect("the sphere throws a shadow");
+    assert_eq!((lo, hi), (Point3::new(-1.5, -0.5, -0.5), Point3::new(-0.5, 0.5, 0.5)));
+}
+
+#[test]
+fn every_preset_is_known_and_others_are_not() {
+    for name in Material::PRESETS {
+        let own = Material::preset(name, None).expect(name);
+        assert_eq!(Material::preset(name, Some([0.1, 0.2, 0.3])).expect(name), Material { color: [0.1, 0.2, 0.3], ..own });
+    }
+    assert_eq!(Material::preset("velvet", None), None);
+}
