@@ -39,7 +39,7 @@ pub use rigid::{BodyError, RigidBody};
 pub use row_builder::RowBuilder;
 pub use settings::{Integrator, Settings, SettingsError, StepReport};
 pub use site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
-pub use step::{Backtracking, Frame, Stepper, TimeStepping};
+pub use step::{Backtracking, Frame, STEPPERS, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
 pub use view::{Mode, ObjectId, Status, WorldView};
 pub use world::{ContactPoint, SnapshotError, StepError, World, WorldError};

@@ -54,6 +54,19 @@ pub struct Outcome {
     pub ray: bool,
 }
 
+/// Names of all solvers, as files and the command line take them; `lcp` is short for `lcp_pyramid`.
+pub const NAMES: [&str; 3] = ["gauss_seidel", "lcp_pyramid", "lcp_sliding"];
+
+/// The solver of that name; `None` for a name that is not in [`NAMES`] and is not `lcp`.
+pub fn by_name(name: &str) -> Option<Box<dyn RowSolver>> {
+    match name {
+        "gauss_seidel" => Some(Box::new(GaussSeidel)),
+        "lcp_pyramid" | "lcp" => Some(Box::new(LcpPyramid)),
+        "lcp_sliding" => Some(Box::new(LcpSliding)),
+        _ => None,
+    }
+}
+
 /// A way to solve rows.
 ///
 /// `lambda` comes in as the warm start and goes out as the answer; `du = Y·λ` of **these blocks** is added to `du`,

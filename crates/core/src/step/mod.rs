@@ -22,6 +22,18 @@ pub trait Stepper: Send + Sync {
     fn fork(&self) -> Box<dyn Stepper>;
 }
 
+/// Names of all steppers, as files and the command line take them.
+pub const STEPPERS: [&str; 2] = ["time_stepping", "backtracking"];
+
+/// The stepper of that name; `None` for a name that is not in [`STEPPERS`].
+pub fn stepper_by_name(name: &str) -> Option<Box<dyn Stepper>> {
+    match name {
+        "time_stepping" => Some(Box::<TimeStepping>::default()),
+        "backtracking" => Some(Box::<Backtracking>::default()),
+        _ => None,
+    }
+}
+
 /// The inside of a world, lent to a stepper for one frame.
 pub struct Frame<'a> {
     pub(crate) core: &'a mut Core,

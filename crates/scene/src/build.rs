@@ -1,0 +1,228 @@
+//! From a description to a world: shapes made, meshes read and checked, bodies placed.
+
+use std::path::PathBuf;
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use thiserror::Error;
+use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::solver::{self, Accuracy};
+use tumble_core::{Look as CoreLook, Mode as CoreMode, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
+
+use crate::body::{BodySpec, MassSpec, Mode};
+use crate::file::SceneFile;
+use crate::look::Look;
+use crate::mesh::{MeshSource, MeshSpec};
+use crate::shape::ShapeSpec;
+
+/// Most bytes of a mesh file: 1 GiB.
+const MOST_MESH_BYTES: u64 = 1 << 30;
+
+/// Why a checked scene did not become a world.
+#[derive(Debug, Error)]
+pub enum BuildError {
+    /// A mesh file could not be read.
+    #[error("{scene}: mesh \"{mesh}\": cannot read {}: {source}", file.display())]
+    MeshFile {
+        /// The scene.
+        scene: String,
+        /// The mesh.
+        mesh: String,
+        /// Its file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A mesh is no closed solid, or holds bad numbers.
+    #[error("{scene}: mesh \"{mesh}\"{}: {why}", file.as_ref().map_or(String::new(), |f| format!(" ({})", f.display())))]
+    Mesh {
+        /// The scene.
+        scene: String,
+        /// The mesh.
+        mesh: String,
+        /// Its file, if it has one.
+        file: Option<PathBuf>,
+        /// From the reader or the check; it names the line, the vertex or the triangle.
+        why: String,
+    },
+    /// A body's shape or constants are wrong.
+    #[error("{scene}: body \"{body}\": {why}")]
+    Body {
+        /// The scene.
+        scene: String,
+        /// The body.
+        body: String,
+        /// From the shape or the body.
+        why: String,
+    },
+    /// The world refused a setting.
+    #[error("{scene}: {source}")]
+    World {
+        /// The scene.
+        scene: String,
+        /// From the world.
+        source: WorldError,
+    },
+}
+
+/// What was mended in a mesh, to be said aloud.
+pub type Notes = Vec<String>;
+
+impl SceneFile {
+    /// The world at time 0, and what was mended in its meshes.
+    ///
+    /// # Errors
+    /// [`BuildError`]: a mesh is unreadable or open, a body has no volume, a constant is refused.
+    pub fn build(&self) -> Result<(World, Notes), BuildError> {
+        let mut notes = Notes::new();
+        let world = |source| BuildError::World { scene: self.file.clone(), source };
+        let meshes = self.meshes.iter().map(|mesh| self.solid(mesh, &mut notes)).collect::<Result<Vec<_>, _>>()?;
+        let mut built = World::new(self.settings()).map_err(world)?;
+        stepper_by_name(self.world.stepper.name()).into_iter().for_each(|s| built.set_stepper(s));
+        solver::by_name(self.world.solver.name()).into_iter().for_each(|s| built.set_solver(s));
+        for spec in &self.bodies {
+            let body = self.body(spec, &meshes)?;
+            let id = built.add_boxed(Box::new(body), mode(spec.mode)).map_err(|e| self.body_error(spec, e))?;
+            built.set_collidable(id, spec.collides).map_err(world)?;
+            built.set_alive(id, spec.alive).map_err(world)?;
+        }
+        Ok((built, notes))
+    }
+
+    fn settings(&self) -> Settings {
+        let (w, base) = (&self.world, Settings::default());
+        Settings {
+            gravity: Vec3::from(w.gravity_m_per_s2),
+            dt: w.dt_s,
+            substeps: w.substeps,
+            integrator: w.integrator.into(),
+            accuracy: Accuracy { sweeps: w.iterations, ..base.accuracy },
+            contact_tolerance: w.contact_tolerance_m,
+            drift_tolerance: base.drift_tolerance.max(w.contact_tolerance_m),
+            combine_friction: w.combine_friction.into(),
+            combine_restitution: w.combine_restitution.into(),
+            ..base
+        }
+    }
+
+    /// A mesh as a solid about its centre of mass, with the place of that centre in the mesh's own axes.
+    fn solid(&self, spec: &MeshSpec, notes: &mut Notes) -> Result<(Shape, Vec3), BuildError> {
+        let file = match &spec.source {
+            MeshSource::File { path, .. } => Some(path.clone()),
+            _ => None,
+        };
+        let wrong = |why: String| BuildError::Mesh { scene: self.file.clone(), mesh: spec.name.clone(), file: file.clone(), why };
+        let mut mesh = self.triangles(spec, &wrong)?;
+        let report = mesh.check_closed().map_err(|e| wrong(e.to_string()))?;
+        notes.extend(report.notes().into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
+        let mut settings = TreeSettings::default();
+        settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
+        Shape::mesh(mesh, &settings).map_err(|e| wrong(e.to_string()))
+    }
+
+    fn triangles(&self, spec: &MeshSpec, wrong: &impl Fn(String) -> BuildError) -> Result<TriMesh, BuildError> {
+        Ok(match &spec.source {
+            MeshSource::File { path, scale } => self.read_mesh(spec, path, wrong)?.scaled(*scale),
+            MeshSource::Lathe { profile_m, segments } => {
+                let profile: Vec<(f64, f64)> = profile_m.iter().map(|[r, z]| (*r, *z)).collect();
+                TriMesh::lathe(&profile, *segments as usize).map_err(|e| wrong(e.to_string()))?
+            }
+            MeshSource::Torus { radius_m, tube_radius_m, segments, tube_segments } => {
+                TriMesh::torus(*radius_m, *tube_radius_m, *segments as usize, *tube_segments as usize)
+            }
+            MeshSource::Icosphere { radius_m, subdivisions } => TriMesh::icosphere(*radius_m, *subdivisions),
+            MeshSource::Cylinder { radius_m, height_m, segments } => TriMesh::cylinder(*radius_m, 0.5 * height_m, *segments as usize),
+            MeshSource::Capsule { radius_m, length_m, segments } => {
+                TriMesh::capsule(*radius_m, 0.5 * length_m, *segments as usize, (*segments as usize / 4).max(2))
+            }
+            MeshSource::Box { size_m } => TriMesh::box_(0.5 * Vec3::from(*size_m)),
+        })
+    }
+
+    fn read_mesh(&self, spec: &MeshSpec, path: &PathBuf, wrong: &impl Fn(String) -> BuildError) -> Result<TriMesh, BuildError> {
+        let unread = |source| BuildError::MeshFile { scene: self.file.clone(), mesh: spec.name.clone(), file: path.clone(), source };
+        let size = std::fs::metadata(path).map_err(unread)?.len();
+        if size > MOST_MESH_BYTES {
+            return Err(wrong(format!("the file has {size} bytes; the most that is read is {MOST_MESH_BYTES}")));
+        }
+        let bytes = std::fs::read(path).map_err(unread)?;
+        read_triangles(path, &bytes).map_err(wrong)
+    }
+
+    fn body(&self, spec: &BodySpec, meshes: &[(Shape, Vec3)]) -> Result<RigidBody, BuildError> {
+        let (shape, center) = self.shape(spec, meshes)?;
+        let body = match spec.mass {
+            Some(MassSpec::Mass(mass)) => RigidBody::with_mass(&spec.name, shape.clone(), mass),
+            Some(MassSpec::Density(density)) => RigidBody::with_density(&spec.name, shape.clone(), density),
+            None => Ok(RigidBody::fixture(&spec.name, shape.clone())),
+        };
+        let [x, y, z, w] = spec.orientation_xyzw;
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m) + rotation * center), rotation);
+        let mut body = body
+            .map_err(|e| self.body_error(spec, e))?
+            .at(pose)
+            .moving(Vec3::from(spec.velocity_m_per_s), Vec3::from(spec.angular_velocity_rad_per_s))
+            .surface(spec.restitution, spec.friction)
+            .drawn_as(visuals(spec, shape));
+        body.linear_damping = spec.linear_damping_per_s;
+        body.angular_damping = spec.angular_damping_per_s;
+        Ok(body)
+    }
+
+    /// The shape in body axes, and where its centre of mass is in the axes of the description.
+    fn shape(&self, spec: &BodySpec, meshes: &[(Shape, Vec3)]) -> Result<(Shape, Vec3), BuildError> {
+        let shape = match spec.shape {
+            ShapeSpec::Mesh { mesh } => return Ok(meshes[mesh].clone()),
+            ShapeSpec::HalfSpace => Ok(Shape::half_space()),
+            ShapeSpec::Sphere { radius_m } => Shape::sphere(radius_m),
+            ShapeSpec::Box { size_m } => Shape::cuboid(0.5 * Vec3::from(size_m)),
+            ShapeSpec::Capsule { radius_m, length_m } => Shape::capsule(radius_m, 0.5 * length_m),
+            ShapeSpec::Cylinder { radius_m, height_m } => Shape::cylinder(radius_m, 0.5 * height_m),
+        };
+        Ok((shape.map_err(|e| self.body_error(spec, e))?, Vec3::zeros()))
+    }
+
+    fn body_error(&self, spec: &BodySpec, why: impl ToString) -> BuildError {
+        BuildError::Body { scene: self.file.clone(), body: spec.name.clone(), why: why.to_string() }
+    }
+}
+
+/// Reads OBJ or STL by the file's extension; anything else is told apart by its content.
+pub fn read_triangles(path: &std::path::Path, bytes: &[u8]) -> Result<TriMesh, String> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    match extension.as_str() {
+        "stl" => TriMesh::from_stl(bytes).map_err(|e| e.to_string()),
+        "obj" => {
+            let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is not UTF-8; an OBJ file is text", e.valid_up_to()))?;
+            TriMesh::from_obj(text).map_err(|e| e.to_string())
+        }
+        other => Err(format!("the extension is '{other}'; meshes are read from .obj and .stl")),
+    }
+}
+
+fn visuals(spec: &BodySpec, shape: Shape) -> Vec<Visual> {
+    if !spec.visible {
+        return Vec::new();
+    }
+    vec![Visual { part: 0, pose: Pose::identity(), shape, look: look(&spec.look) }]
+}
+
+fn look(look: &Look) -> CoreLook {
+    let [r, g, b] = look.second_color;
+    let named = [("second_r", r), ("second_g", g), ("second_b", b), ("scale_m", look.pattern_scale_m), ("clearcoat", look.clearcoat)];
+    CoreLook {
+        color: look.color.map(|c| c as f32),
+        roughness: look.roughness as f32,
+        metallic: look.metallic as f32,
+        shader: look.pattern.name().into(),
+        properties: named.map(|(name, value)| (name.to_string(), value)).to_vec(),
+    }
+}
+
+fn mode(mode: Mode) -> CoreMode {
+    match mode {
+        Mode::Dynamic => CoreMode::Dynamic,
+        Mode::Static => CoreMode::Static,
+        Mode::Kinematic => CoreMode::Kinematic,
+    }
+}
