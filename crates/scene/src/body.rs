@@ -92,7 +92,8 @@ impl BodySpec {
         let mass = read_mass(f, mode);
         let material = read_material(f, library);
         let base = material.map(|index| &library.materials[index]);
-        let (friction, restitution) = base.map_or((DEFAULT_FRICTION, DEFAULT_RESTITUTION), |m| (m.friction, m.restitution));
+        let (friction, restitution) =
+            base.map_or((DEFAULT_FRICTION, DEFAULT_RESTITUTION), |m| (m.friction, m.restitution));
         let look = base.map_or_else(Look::default, |m| m.look.clone());
         let [linear, angular] = read_velocities(f, mode);
         let body = BodySpec {
@@ -122,7 +123,11 @@ impl BodySpec {
 
 fn read_name(f: &mut Fields<'_>) -> Option<String> {
     let (name, value) = f.text("name", "a name of its own")?;
-    f.what = format!("{} \"{}\"", f.what.split(' ').next().unwrap_or("body"), f.log.quote(value.span()).trim_matches(['"', '\'']));
+    f.what = format!(
+        "{} \"{}\"",
+        f.what.split(' ').next().unwrap_or("body"),
+        f.log.quote(value.span()).trim_matches(['"', '\''])
+    );
     let wanted = "a name of 1 to 63 bytes without control characters";
     if name.is_empty() || name.len() > MOST_NAME_BYTES || name.chars().any(char::is_control) {
         f.wrong("name", value, wanted);
@@ -173,7 +178,9 @@ fn read_material(f: &mut Fields<'_>, library: &Library<'_>) -> Option<usize> {
 /// Linear and angular velocity; a static body has none.
 fn read_velocities(f: &mut Fields<'_>, mode: Mode) -> [[f64; 3]; 2] {
     ["velocity_m_per_s", "angular_velocity_rad_per_s"].map(|key| {
-        let Some(value) = f.value(key) else { return [0.0; 3] };
+        let Some(value) = f.value(key) else {
+            return [0.0; 3];
+        };
         let velocity = f.as_vector(key, value, Bound::ANY);
         if mode == Mode::Static && velocity != [0.0; 3] {
             f.wrong(key, value, "no velocity for a static body; mode = \"kinematic\" moves by itself");

@@ -48,7 +48,12 @@ impl<'a> Fields<'a> {
     }
 
     /// The same for a table already in hand.
-    pub(crate) fn of_table(log: &'a Log<'a>, table: &'a DeTable<'a>, span: Range<usize>, what: impl Into<String>) -> Self {
+    pub(crate) fn of_table(
+        log: &'a Log<'a>,
+        table: &'a DeTable<'a>,
+        span: Range<usize>,
+        what: impl Into<String>,
+    ) -> Self {
         Fields { log, what: what.into(), span, table, asked: Vec::new(), missing: Vec::new() }
     }
 
@@ -177,7 +182,8 @@ impl<'a> Fields<'a> {
         let wanted = format!("a whole number from {} to {}", range.start(), range.end());
         match value.get_ref() {
             DeValue::Integer(digits) => {
-                let number = i64::from_str_radix(digits.as_str(), digits.radix()).ok().and_then(|n| u32::try_from(n).ok());
+                let number =
+                    i64::from_str_radix(digits.as_str(), digits.radix()).ok().and_then(|n| u32::try_from(n).ok());
                 match number.filter(|n| range.contains(n)) {
                     Some(n) => return n,
                     None => self.wrong(key, value, wanted),
@@ -219,7 +225,8 @@ impl<'a> Fields<'a> {
                 }
             }
             DeValue::Array(items) => {
-                let message = format!("`{key}` of {} has {} entries: {}", self.what, items.len(), self.log.quote(value.span()));
+                let message =
+                    format!("`{key}` of {} has {} entries: {}", self.what, items.len(), self.log.quote(value.span()));
                 self.log.report(value.span(), message, format!("wanted a list of {N} numbers"));
             }
             _ => self.wrong_type(key, value, format!("a list of {N} numbers")),

@@ -99,7 +99,8 @@ impl SceneFile {
         let materials: Vec<MaterialSpec> = materials.into_iter().filter_map(|(_, material)| material).collect();
         let bodies = read_bodies(&mut f, &library(&meshes, &materials));
         let camera = read_table(&mut f, "camera", CameraSpec::read);
-        let mut lights: Vec<LightSpec> = f.tables("light", MOST_LIGHTS).into_iter().filter_map(LightSpec::read).collect();
+        let mut lights: Vec<LightSpec> =
+            f.tables("light", MOST_LIGHTS).into_iter().filter_map(LightSpec::read).collect();
         if lights.is_empty() {
             lights.push(LightSpec::sun());
         }
@@ -177,9 +178,13 @@ fn read_named<'a, T>(
     key: &'static str,
     read: impl Fn(&'a str, Fields<'a>) -> Option<T>,
 ) -> Vec<(&'a str, Option<T>)> {
-    let Some(value) = f.value(key) else { return Vec::new() };
+    let Some(value) = f.value(key) else {
+        return Vec::new();
+    };
     let example = format!("[{key}.NAME]");
-    let Some(tables) = Fields::of(f.log, value, format!("[{key}]"), &example) else { return Vec::new() };
+    let Some(tables) = Fields::of(f.log, value, format!("[{key}]"), &example) else {
+        return Vec::new();
+    };
     let one = |(name, _, value)| {
         let table = Fields::of(f.log, value, format!("[{key}.{name}]"), &example);
         (name, table.and_then(|table| read(name, table)))
@@ -230,7 +235,13 @@ fn note_name(table: &Fields<'_>, names: &mut BTreeMap<String, Range<usize>>, nam
 }
 
 /// Files `name`; `false`, with the problem recorded, where it is taken.
-fn note_unique(log: &Log<'_>, what: &str, names: &mut BTreeMap<String, Range<usize>>, name: &str, place: &Range<usize>) -> bool {
+fn note_unique(
+    log: &Log<'_>,
+    what: &str,
+    names: &mut BTreeMap<String, Range<usize>>,
+    name: &str,
+    place: &Range<usize>,
+) -> bool {
     match names.insert(name.to_owned(), place.clone()) {
         None => true,
         Some(earlier) => {

@@ -32,9 +32,13 @@ pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, room: usize, out: &
     };
     let colors = read_cycle(&mut f, "colors", as_color);
     let patterns = read_cycle(&mut f, "patterns", as_pattern);
-    let (Some(template), Some(offsets)) = (template, offsets) else { return f.finish() };
+    let (Some(template), Some(offsets)) = (template, offsets) else {
+        return f.finish();
+    };
     let longest = template.name.len() + 1 + offsets.len().to_string().len();
-    if longest > MOST_NAME_BYTES && let Some(value) = f.value("name") {
+    if longest > MOST_NAME_BYTES
+        && let Some(value) = f.value("name")
+    {
         f.wrong("name", value, format!("a name that has at most {MOST_NAME_BYTES} bytes with its number behind it"));
     }
     f.finish();
@@ -92,7 +96,9 @@ fn read_triangle(f: &mut Fields<'_>, room: usize) -> Option<Vec<[f64; 3]>> {
     let rows = f.as_integer("rows", value, 1..=MOST_BODIES as u32) as usize;
     let spacing = f.number("spacing_m", Bound::POSITIVE);
     let toward = f.direction_or("toward", [1.0, 0.0, 0.0]);
-    if toward[2] != 0.0 && let Some(value) = f.value("toward") {
+    if toward[2] != 0.0
+        && let Some(value) = f.value("toward")
+    {
         f.wrong("toward", value, "a horizontal direction: its third number 0");
     }
     if f.log.count() > problems {
@@ -126,7 +132,9 @@ fn check_total(f: &Fields<'_>, value: &Value<'_>, total: Option<usize>, room: us
 
 /// A list whose entries the copies take in turn; empty where the key is not there.
 fn read_cycle<'a, T>(f: &mut Fields<'a>, key: &'static str, read: fn(&Fields<'a>, &str, &'a Value<'a>) -> T) -> Vec<T> {
-    let Some(value) = f.value(key) else { return Vec::new() };
+    let Some(value) = f.value(key) else {
+        return Vec::new();
+    };
     match value.get_ref() {
         DeValue::Array(items) if !items.is_empty() => items.iter().map(|item| read(f, key, item)).collect(),
         _ => {

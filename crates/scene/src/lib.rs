@@ -79,4 +79,4 @@ pub use mesh::{MeshSource, MeshSpec};
 pub use shape::ShapeSpec;
 pub use shipped::{SceneSource, Shipped, resolve_scene, shipped};
 pub use view::{CameraSpec, GroundSpec, LightKind, LightSpec, SkySpec};
-pub use world::{Combine, Integrator, Solver, Stepper, WorldSettings};
+pub use world::{Combine, Integrator, Solver, Stepper, UnknownName, WorldSettings};

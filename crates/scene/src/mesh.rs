@@ -152,7 +152,9 @@ fn read_segments(f: &mut Fields<'_>, key: &'static str, default: u32) -> u32 {
 fn read_torus(f: &mut Fields<'_>) -> MeshSource {
     let radius_m = f.number("radius_m", Bound::POSITIVE);
     let tube_radius_m = f.number("tube_radius_m", Bound::POSITIVE);
-    if tube_radius_m >= radius_m && let Some(value) = f.value("tube_radius_m") {
+    if tube_radius_m >= radius_m
+        && let Some(value) = f.value("tube_radius_m")
+    {
         f.wrong("tube_radius_m", value, format!("less than radius_m, {radius_m}, so that the ring has a hole"));
     }
     let (segments, tube_segments) = (read_segments(f, "segments", 48), read_segments(f, "tube_segments", 24));

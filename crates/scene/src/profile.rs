@@ -7,7 +7,8 @@ use crate::fields::Fields;
 
 /// Most points of a profile.
 const MOST_POINTS: usize = 1000;
-const WANTED: &str = "a list of 3 to 1000 points [r, z] in metres, from the bottom of the axis (r = 0) to its top (r = 0)";
+const WANTED: &str =
+    "a list of 3 to 1000 points [r, z] in metres, from the bottom of the axis (r = 0) to its top (r = 0)";
 
 /// Reads a profile and checks that it bounds a solid; `None`, with the problem recorded, if not.
 pub(crate) fn read(f: &mut Fields<'_>, key: &'static str) -> Option<Vec<[f64; 2]>> {
@@ -52,7 +53,8 @@ fn fault(points: &[[f64; 2]]) -> Option<(usize, String)> {
     if signed_area(points) <= 0.0 {
         return Some((0, "the points from the bottom of the axis to its top: these run the other way".into()));
     }
-    crossing(points).map(|(i, j)| (j, format!("a line that does not cross itself: the side after point {} meets it", i + 1)))
+    crossing(points)
+        .map(|(i, j)| (j, format!("a line that does not cross itself: the side after point {} meets it", i + 1)))
 }
 
 /// Area between the profile and the axis, positive if it runs upwards: `½ Σ (rᵢ zᵢ₊₁ − rᵢ₊₁ zᵢ)`.
@@ -76,9 +78,8 @@ fn crossing(points: &[[f64; 2]]) -> Option<(usize, usize)> {
 /// Whether segments `ab` and `cd` share a point.
 fn meet(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
     let side = |p: [f64; 2], q: [f64; 2], s: [f64; 2]| (q[0] - p[0]) * (s[1] - p[1]) - (q[1] - p[1]) * (s[0] - p[0]);
-    let within = |p: [f64; 2], q: [f64; 2], s: [f64; 2]| {
-        (0..2).all(|k| p[k].min(q[k]) <= s[k] && s[k] <= p[k].max(q[k]))
-    };
+    let within =
+        |p: [f64; 2], q: [f64; 2], s: [f64; 2]| (0..2).all(|k| p[k].min(q[k]) <= s[k] && s[k] <= p[k].max(q[k]));
     let (ca, cb, da, db) = (side(c, d, a), side(c, d, b), side(a, b, c), side(a, b, d));
     (ca * cb < 0.0 && da * db < 0.0)
         || (ca == 0.0 && within(c, d, a))

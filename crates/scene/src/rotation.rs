@@ -34,8 +34,7 @@ fn read_quaternion(f: &mut Fields<'_>) -> Option<[f64; 4]> {
 fn read_roll_pitch_yaw(f: &mut Fields<'_>) -> Option<[f64; 4]> {
     let angles: [f64; 3] = f.optional_vector("rotation_deg", ANGLE)?;
     let [x, y, z] = angles.map(f64::to_radians);
-    let [about_x, about_y, about_z] =
-        [about([1.0, 0.0, 0.0], x), about([0.0, 1.0, 0.0], y), about([0.0, 0.0, 1.0], z)];
+    let [about_x, about_y, about_z] = [about([1.0, 0.0, 0.0], x), about([0.0, 1.0, 0.0], y), about([0.0, 0.0, 1.0], z)];
     Some(product(about_z, product(about_y, about_x)))
 }
 

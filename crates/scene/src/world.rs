@@ -1,7 +1,13 @@
 //! `[world]`: gravity, time, and which algorithms step the scene.
 
+use std::fmt;
+use std::str::FromStr;
+
+use thiserror::Error;
+
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
+use crate::suggest::{listed, nearest};
 
 /// How the world is stepped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,6 +98,53 @@ impl Combine {
         }
     }
 }
+
+/// A word that is not among those a choice has.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("`{typed}` is not known; {wanted}")]
+pub struct UnknownName {
+    /// The word.
+    pub typed: String,
+    /// What would be right.
+    pub wanted: String,
+}
+
+/// The meaning of a word that stands outside of a scene file, as on a command line.
+fn by_name<T: Copy>(typed: &str, names: Names<T>) -> Result<T, UnknownName> {
+    let words = || names.iter().map(|(name, _)| *name);
+    let found = names.iter().find(|(name, _)| *name == typed).map(|(_, meaning)| *meaning);
+    found.ok_or_else(|| UnknownName {
+        typed: typed.to_owned(),
+        wanted: match nearest(typed, words()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("wanted {}", listed(words(), "or")),
+        },
+    })
+}
+
+/// The words of files for each choice, in both directions.
+macro_rules! written_by_name {
+    ($($choice:ident),*) => {
+        $(
+            impl FromStr for $choice {
+                type Err = UnknownName;
+
+                fn from_str(typed: &str) -> Result<Self, UnknownName> {
+                    by_name(typed, Self::NAMES)
+                }
+            }
+
+            impl fmt::Display for $choice {
+                fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                    let word = Self::NAMES.iter().find(|(_, meaning)| meaning == self).map_or("", |(name, _)| *name);
+                    f.write_str(word)
+                }
+            }
+        )*
+    };
+}
+
+written_by_name!(Stepper, Integrator, Solver, Combine);
 
 /// `[world]`. All keys have defaults.
 #[derive(Clone, Debug, PartialEq)]

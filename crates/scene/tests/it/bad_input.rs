@@ -34,11 +34,17 @@ fn the_frames_used_here_are_right() {
 
 #[test]
 fn toml_that_is_not() {
-    told("[world]\ndt_s = = 1\n", &[
-        "s.toml:2:8: TOML: extra `=`; wanted nothing here",
-        "s.toml:2:10: TOML: unexpected key or value; wanted newline, `#`",
-    ]);
-    told("[world]\nseconds = 1\nseconds = 2\n", &["s.toml:3:1: TOML: duplicate key; wanted each key once in its table"]);
+    told(
+        "[world]\ndt_s = = 1\n",
+        &[
+            "s.toml:2:8: TOML: extra `=`; wanted nothing here",
+            "s.toml:2:10: TOML: unexpected key or value; wanted newline, `#`",
+        ],
+    );
+    told(
+        "[world]\nseconds = 1\nseconds = 2\n",
+        &["s.toml:3:1: TOML: duplicate key; wanted each key once in its table"],
+    );
     told("[materials.a]\n[materials.a]\n", &["s.toml:2:12: TOML: duplicate key; wanted each key once in its table"]);
 }
 
@@ -47,72 +53,102 @@ fn unknown_keys() {
     told("[wrold]\n", &["s.toml:1:2: unknown key `wrold` in the scene; did you mean `world`?"]);
     told("[world]\ndt = 0.1\n", &["s.toml:2:1: unknown key `dt` in [world]; did you mean `dt_s`?"]);
     told(&body_with("frction = 0.1"), &["s.toml:5:1: unknown key `frction` in body \"b\"; did you mean `friction`?"]);
-    told(&shape("{ type = \"sphere\", radius_m = 1, colour = 3 }"), &[
-        "s.toml:2:42: unknown key `colour` in the shape of body \"b\"; known here are only `radius_m` and `type`",
-    ]);
-    told("[sky]\nbanana = 1\nintensity = 1\n", &[
-        "s.toml:2:1: unknown key `banana` in [sky]; known here: `horizon_color`, `nadir_color` and `zenith_color`",
-    ]);
+    told(
+        &shape("{ type = \"sphere\", radius_m = 1, colour = 3 }"),
+        &["s.toml:2:42: unknown key `colour` in the shape of body \"b\"; known here are only `radius_m` and `type`"],
+    );
+    told(
+        "[sky]\nbanana = 1\nintensity = 1\n",
+        &["s.toml:2:1: unknown key `banana` in [sky]; known here: `horizon_color`, `nadir_color` and `zenith_color`"],
+    );
 }
 
 #[test]
 fn wrong_types() {
     told("description = 3\n", &["s.toml:1:15: `description` of the scene is an integer: 3; wanted a text in quotes"]);
-    told("[world]\nseconds = \"ten\"\n", &[
-        "s.toml:2:11: `seconds` of [world] is a string: \"ten\"; wanted a time from 0 to 1e6 s",
-    ]);
-    told("[world]\nsubsteps = 1.5\n", &["s.toml:2:12: `substeps` of [world] is a float: 1.5; wanted a whole number from 1 to 1000"]);
-    told("[world]\ngravity_m_per_s2 = -9.81\n", &[
-        "s.toml:2:20: `gravity_m_per_s2` of [world] is a float: -9.81; wanted a list of 3 numbers",
-    ]);
-    told("[world]\ngravity_m_per_s2 = [0, -9.81]\n", &[
-        "s.toml:2:20: `gravity_m_per_s2` of [world] has 2 entries: [0, -9.81]; wanted a list of 3 numbers",
-    ]);
+    told(
+        "[world]\nseconds = \"ten\"\n",
+        &["s.toml:2:11: `seconds` of [world] is a string: \"ten\"; wanted a time from 0 to 1e6 s"],
+    );
+    told(
+        "[world]\nsubsteps = 1.5\n",
+        &["s.toml:2:12: `substeps` of [world] is a float: 1.5; wanted a whole number from 1 to 1000"],
+    );
+    told(
+        "[world]\ngravity_m_per_s2 = -9.81\n",
+        &["s.toml:2:20: `gravity_m_per_s2` of [world] is a float: -9.81; wanted a list of 3 numbers"],
+    );
+    told(
+        "[world]\ngravity_m_per_s2 = [0, -9.81]\n",
+        &["s.toml:2:20: `gravity_m_per_s2` of [world] has 2 entries: [0, -9.81]; wanted a list of 3 numbers"],
+    );
     told(&body_with("collides = 1"), &["s.toml:5:12: `collides` of body \"b\" is an integer: 1; wanted true or false"]);
     told("world = 1\n", &["s.toml:1:9: [world] is an integer 1; wanted a table, such as [world]"]);
-    told("[body]\n", &["s.toml:1:1: `body` of the scene is a table: [body]; wanted tables, each under a line [[body]]"]);
-    told("materials = { a = 2 }\n", &["s.toml:1:19: [materials.a] is an integer 2; wanted a table, such as [materials.NAME]"]);
-    told(&shape("\"sphere\""), &[
-        "s.toml:2:9: the shape of body \"b\" is a string \"sphere\"; wanted a table, such as { type = \"sphere\", radius_m = 0.5 }",
-    ]);
+    told(
+        "[body]\n",
+        &["s.toml:1:1: `body` of the scene is a table: [body]; wanted tables, each under a line [[body]]"],
+    );
+    told(
+        "materials = { a = 2 }\n",
+        &["s.toml:1:19: [materials.a] is an integer 2; wanted a table, such as [materials.NAME]"],
+    );
+    told(
+        &shape("\"sphere\""),
+        &[
+            "s.toml:2:9: the shape of body \"b\" is a string \"sphere\"; wanted a table, such as { type = \"sphere\", radius_m = 0.5 }",
+        ],
+    );
 }
 
 #[test]
 fn missing_keys() {
-    told("[[body]]\nname = \"b\"\nmass_kg = 1\n", &[
-        "s.toml:1:1: body \"b\" has no `shape`; wanted a shape, such as { type = \"sphere\", radius_m = 0.5 }",
-    ]);
-    told("[[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 1 }\n", &[
-        "s.toml:1:1: body \"b\" has no `mass_kg`; wanted `mass_kg` or `density_kg_per_m3`, or mode = \"static\" for what never moves",
-    ]);
-    told("[[body]]\nmass_kg = 1\nshape = { type = \"sphere\", radius_m = 1 }\n", &[
-        "s.toml:1:1: body 1 has no `name`; wanted a name of its own",
-    ]);
-    told(&shape("{ radius_m = 1 }"), &[
-        "s.toml:2:9: the shape of body \"b\" has no `type`; wanted `sphere`, `box`, `capsule`, `cylinder`, `half_space` or `mesh`",
-    ]);
+    told(
+        "[[body]]\nname = \"b\"\nmass_kg = 1\n",
+        &["s.toml:1:1: body \"b\" has no `shape`; wanted a shape, such as { type = \"sphere\", radius_m = 0.5 }"],
+    );
+    told(
+        "[[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 1 }\n",
+        &[
+            "s.toml:1:1: body \"b\" has no `mass_kg`; wanted `mass_kg` or `density_kg_per_m3`, or mode = \"static\" for what never moves",
+        ],
+    );
+    told(
+        "[[body]]\nmass_kg = 1\nshape = { type = \"sphere\", radius_m = 1 }\n",
+        &["s.toml:1:1: body 1 has no `name`; wanted a name of its own"],
+    );
+    told(
+        &shape("{ radius_m = 1 }"),
+        &[
+            "s.toml:2:9: the shape of body \"b\" has no `type`; wanted `sphere`, `box`, `capsule`, `cylinder`, `half_space` or `mesh`",
+        ],
+    );
     told("[camera]\neye_m = [1, 1, 1]\n", &["s.toml:1:1: [camera] has no `target_m`; wanted a list of 3 numbers"]);
-    told("[[light]]\ntype = \"directional\"\n", &[
-        "s.toml:1:1: light 1 has no `direction`; wanted a direction, such as [0, 0, -1]",
-    ]);
+    told(
+        "[[light]]\ntype = \"directional\"\n",
+        &["s.toml:1:1: light 1 has no `direction`; wanted a direction, such as [0, 0, -1]"],
+    );
     // A required key that is only mistyped is told once, where it stands.
-    told(&shape("{ type = \"sphere\", raduis_m = 1 }"), &[
-        "s.toml:2:28: unknown key `raduis_m` in the shape of body \"b\"; did you mean `radius_m`?",
-    ]);
-    told(&shape("{ tpye = \"sphere\", radius_m = 1 }"), &[
-        "s.toml:2:11: unknown key `tpye` in the shape of body \"b\"; did you mean `type`?",
-    ]);
+    told(
+        &shape("{ type = \"sphere\", raduis_m = 1 }"),
+        &["s.toml:2:28: unknown key `raduis_m` in the shape of body \"b\"; did you mean `radius_m`?"],
+    );
+    told(
+        &shape("{ tpye = \"sphere\", radius_m = 1 }"),
+        &["s.toml:2:11: unknown key `tpye` in the shape of body \"b\"; did you mean `type`?"],
+    );
 }
 
 #[test]
 fn numbers_that_are_not_finite() {
     told("[world]\nseconds = nan\n", &["s.toml:2:11: `seconds` of [world] is nan; wanted a time from 0 to 1e6 s"]);
-    told(&body_with("position_m = [0, inf, 0]"), &[
-        "s.toml:5:18: `position_m` of body \"b\" is inf; wanted a finite number from -1e12 to 1e12",
-    ]);
-    told(&body_with("position_m = [0, 0, -1e400]"), &[
-        "s.toml:5:21: `position_m` of body \"b\" is -1e400; wanted a finite number from -1e12 to 1e12",
-    ]);
+    told(
+        &body_with("position_m = [0, inf, 0]"),
+        &["s.toml:5:18: `position_m` of body \"b\" is inf; wanted a finite number from -1e12 to 1e12"],
+    );
+    told(
+        &body_with("position_m = [0, 0, -1e400]"),
+        &["s.toml:5:21: `position_m` of body \"b\" is -1e400; wanted a finite number from -1e12 to 1e12"],
+    );
 }
 
 #[test]
@@ -122,46 +158,80 @@ fn numbers_out_of_range() {
         let text = body_with("").replace("mass_kg = 1", &format!("mass_kg = {mass}"));
         told(&text, &[&format!("s.toml:4:11: `mass_kg` of body \"b\" is {name}; {positive}")]);
     }
-    told(&body_with("friction = -0.1"), &["s.toml:5:12: `friction` of body \"b\" is -0.1; wanted a friction coefficient from 0 to 100"]);
-    told("[materials.m]\nrestitution = 1.2\n", &[
-        "s.toml:2:15: `restitution` of [materials.m] is 1.2; wanted a restitution from 0 (no bounce) to 1 (no loss)",
-    ]);
-    told(&shape("{ type = \"sphere\", radius_m = 0 }"), &[
-        &format!("s.toml:2:39: `radius_m` of the shape of body \"b\" is 0; {positive}"),
-    ]);
-    told(&shape("{ type = \"box\", size_m = [1, -2, 3] }"), &[
-        &format!("s.toml:2:38: `size_m` of the shape of body \"b\" is -2; {positive}"),
-    ]);
+    told(
+        &body_with("friction = -0.1"),
+        &["s.toml:5:12: `friction` of body \"b\" is -0.1; wanted a friction coefficient from 0 to 100"],
+    );
+    told(
+        "[materials.m]\nrestitution = 1.2\n",
+        &["s.toml:2:15: `restitution` of [materials.m] is 1.2; wanted a restitution from 0 (no bounce) to 1 (no loss)"],
+    );
+    told(
+        &shape("{ type = \"sphere\", radius_m = 0 }"),
+        &[&format!("s.toml:2:39: `radius_m` of the shape of body \"b\" is 0; {positive}")],
+    );
+    told(
+        &shape("{ type = \"box\", size_m = [1, -2, 3] }"),
+        &[&format!("s.toml:2:38: `size_m` of the shape of body \"b\" is -2; {positive}")],
+    );
     told("[world]\ndt_s = 0\n", &["s.toml:2:8: `dt_s` of [world] is 0; wanted a time from 1e-6 to 1 s"]);
-    told("[world]\niterations = -4\n", &["s.toml:2:14: `iterations` of [world] is -4; wanted a whole number from 1 to 100000"]);
-    told("[world]\niterations = 99999999999999999999\n", &[
-        "s.toml:2:14: `iterations` of [world] is 99999999999999999999; wanted a whole number from 1 to 100000",
-    ]);
-    told("[sky]\nzenith_color = \"blue\"\n", &[
-        "s.toml:2:16: `zenith_color` of [sky] is \"blue\"; wanted a colour: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1",
-    ]);
-    told("[sky]\nzenith_color = [0, 0, 255]\n", &["s.toml:2:23: `zenith_color` of [sky] is 255; wanted a number from 0 to 1"]);
+    told(
+        "[world]\niterations = -4\n",
+        &["s.toml:2:14: `iterations` of [world] is -4; wanted a whole number from 1 to 100000"],
+    );
+    told(
+        "[world]\niterations = 99999999999999999999\n",
+        &["s.toml:2:14: `iterations` of [world] is 99999999999999999999; wanted a whole number from 1 to 100000"],
+    );
+    told(
+        "[sky]\nzenith_color = \"blue\"\n",
+        &[
+            "s.toml:2:16: `zenith_color` of [sky] is \"blue\"; wanted a colour: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1",
+        ],
+    );
+    told(
+        "[sky]\nzenith_color = [0, 0, 255]\n",
+        &["s.toml:2:23: `zenith_color` of [sky] is 255; wanted a number from 0 to 1"],
+    );
 }
 
 #[test]
 fn words_that_are_not_among_the_known() {
-    told("[world]\nstepper = \"backtrack\"\n", &["s.toml:2:11: `stepper` of [world] is \"backtrack\"; did you mean `backtracking`?"]);
-    told("[world]\nsolver = \"magic\"\n", &[
-        "s.toml:2:10: `solver` of [world] is \"magic\"; wanted `gauss_seidel`, `lcp_pyramid` or `lcp_sliding`",
-    ]);
-    told(&body_with("mode = \"fixed\""), &["s.toml:5:8: `mode` of body \"b\" is \"fixed\"; wanted `dynamic`, `static` or `kinematic`"]);
-    told(&shape("{ type = \"shpere\", radius_m = 1 }"), &[
-        "s.toml:2:18: `type` of the shape of body \"b\" is \"shpere\"; did you mean `sphere`?",
-    ]);
+    told(
+        "[world]\nstepper = \"backtrack\"\n",
+        &["s.toml:2:11: `stepper` of [world] is \"backtrack\"; did you mean `backtracking`?"],
+    );
+    told(
+        "[world]\nsolver = \"magic\"\n",
+        &["s.toml:2:10: `solver` of [world] is \"magic\"; wanted `gauss_seidel`, `lcp_pyramid` or `lcp_sliding`"],
+    );
+    told(
+        &body_with("mode = \"fixed\""),
+        &["s.toml:5:8: `mode` of body \"b\" is \"fixed\"; wanted `dynamic`, `static` or `kinematic`"],
+    );
+    told(
+        &shape("{ type = \"shpere\", radius_m = 1 }"),
+        &["s.toml:2:18: `type` of the shape of body \"b\" is \"shpere\"; did you mean `sphere`?"],
+    );
 }
 
 #[test]
 fn names_used_twice() {
     let again = body_with("") + "\n" + &body_with("");
-    told(&again, &["s.toml:8:8: `name`: this body makes a second body \"b\"; the first is at line 2; wanted a name that no other body has"]);
+    told(
+        &again,
+        &[
+            "s.toml:8:8: `name`: this body makes a second body \"b\"; the first is at line 2; wanted a name that no other body has",
+        ],
+    );
     let grid = body_with("").replace("\"b\"", "\"g_2\"")
         + "[[grid]]\nname = \"g\"\nshape = { type = \"sphere\", radius_m = 1 }\nmass_kg = 1\ncount = [1, 1, 3]\nspacing_m = [0, 0, 2]\n";
-    told(&grid, &["s.toml:7:8: `name`: this grid makes a second body \"g_2\"; the first is at line 2; wanted a name that no other body has"]);
+    told(
+        &grid,
+        &[
+            "s.toml:7:8: `name`: this grid makes a second body \"g_2\"; the first is at line 2; wanted a name that no other body has",
+        ],
+    );
 }
 
 #[test]
@@ -176,101 +246,162 @@ fn names_that_do_not_fit() {
 
 #[test]
 fn references_to_nothing() {
-    told(&body_with("material = \"felt\""), &[
-        "s.toml:5:12: `material` of body \"b\" is \"felt\"; wanted the NAME of a table [materials.NAME], and the scene has none",
-    ]);
-    told(&("[materials.rubber]\n".to_owned() + &body_with("material = \"ruber\"")), &[
-        "s.toml:6:12: `material` of body \"b\" is \"ruber\"; did you mean `rubber`?",
-    ]);
-    told(&shape("{ type = \"mesh\", mesh = \"pin\" }"), &[
-        "s.toml:2:33: `mesh` of the shape of body \"b\" is \"pin\"; wanted the NAME of a table [meshes.NAME], and the scene has none",
-    ]);
+    told(
+        &body_with("material = \"felt\""),
+        &[
+            "s.toml:5:12: `material` of body \"b\" is \"felt\"; wanted the NAME of a table [materials.NAME], and the scene has none",
+        ],
+    );
+    told(
+        &("[materials.rubber]\n".to_owned() + &body_with("material = \"ruber\"")),
+        &["s.toml:6:12: `material` of body \"b\" is \"ruber\"; did you mean `rubber`?"],
+    );
+    told(
+        &shape("{ type = \"mesh\", mesh = \"pin\" }"),
+        &[
+            "s.toml:2:33: `mesh` of the shape of body \"b\" is \"pin\"; wanted the NAME of a table [meshes.NAME], and the scene has none",
+        ],
+    );
     let two = "[meshes.vase]\ntype = \"icosphere\"\nradius_m = 1\n[meshes.bowl]\ntype = \"icosphere\"\nradius_m = 1\n";
-    told(&(two.to_owned() + &shape("{ type = \"mesh\", mesh = \"pin\" }")), &[
-        "s.toml:8:33: `mesh` of the shape of body \"b\" is \"pin\"; wanted `bowl` or `vase`",
-    ]);
+    told(
+        &(two.to_owned() + &shape("{ type = \"mesh\", mesh = \"pin\" }")),
+        &["s.toml:8:33: `mesh` of the shape of body \"b\" is \"pin\"; wanted `bowl` or `vase`"],
+    );
     // A mesh that is itself wrong is told once, not again where it is used.
-    let wrong = "[meshes.vase]\ntype = \"icosphere\"\nradius_m = 0\n".to_owned() + &shape("{ type = \"mesh\", mesh = \"vase\" }");
+    let wrong = "[meshes.vase]\ntype = \"icosphere\"\nradius_m = 0\n".to_owned()
+        + &shape("{ type = \"mesh\", mesh = \"vase\" }");
     assert_eq!(SceneFile::parse(&wrong, "s.toml").unwrap_err().problems().len(), 1);
 }
 
 #[test]
 fn mesh_files() {
     let mesh = |file: &str| format!("[meshes.m]\ntype = \"file\"\nfile = \"{file}\"\n");
-    told(&mesh("no/bunny.obj"), &[
-        "s.toml:3:8: `file` of [meshes.m]: there is no file no/bunny.obj; wanted a path relative to the folder of the scene",
-    ]);
-    told(&mesh("bunny.ply"), &["s.toml:3:8: `file` of [meshes.m] is \"bunny.ply\"; wanted the path of an .obj or .stl file"]);
+    told(
+        &mesh("no/bunny.obj"),
+        &[
+            "s.toml:3:8: `file` of [meshes.m]: there is no file no/bunny.obj; wanted a path relative to the folder of the scene",
+        ],
+    );
+    told(
+        &mesh("bunny.ply"),
+        &["s.toml:3:8: `file` of [meshes.m] is \"bunny.ply\"; wanted the path of an .obj or .stl file"],
+    );
 }
 
 #[test]
 fn meshes_that_bound_no_solid() {
     let lathe = |points: &str| format!("[meshes.m]\ntype = \"lathe\"\nprofile_m = {points}\n");
-    told(&lathe("[[0, 0], [1, 1], [0.5, 2]]"), &[
-        "s.toml:3:30: `profile_m` of [meshes.m] is [0.5, 2]; wanted r = 0 at both ends, so that the solid is closed",
-    ]);
-    told(&lathe("[[0, 0], [-1, 1], [0, 2]]"), &[
-        "s.toml:3:22: `profile_m` of [meshes.m] is [-1, 1]; wanted r greater than 0 between the ends",
-    ]);
-    told(&lathe("[[0, 2], [1, 1], [0, 0]]"), &[
-        "s.toml:3:14: `profile_m` of [meshes.m] is [0, 2]; wanted the points from the bottom of the axis to its top: these run the other way",
-    ]);
-    told(&lathe("[[0, 0]]"), &[
-        "s.toml:3:13: `profile_m` of [meshes.m] is [[0, 0]]; wanted a list of 3 to 1000 points [r, z] in metres, from the bottom of the axis (r = 0) to its top (r = 0)",
-    ]);
-    told("[meshes.m]\ntype = \"torus\"\nradius_m = 1\ntube_radius_m = 1\n", &[
-        "s.toml:4:17: `tube_radius_m` of [meshes.m] is 1; wanted less than radius_m, 1, so that the ring has a hole",
-    ]);
-    told("[meshes.m]\ntype = \"icosphere\"\nradius_m = 1\nsubdivisions = 12\n", &[
-        "s.toml:4:16: `subdivisions` of [meshes.m] is 12; wanted a whole number from 0 to 7",
-    ]);
+    told(
+        &lathe("[[0, 0], [1, 1], [0.5, 2]]"),
+        &["s.toml:3:30: `profile_m` of [meshes.m] is [0.5, 2]; wanted r = 0 at both ends, so that the solid is closed"],
+    );
+    told(
+        &lathe("[[0, 0], [-1, 1], [0, 2]]"),
+        &["s.toml:3:22: `profile_m` of [meshes.m] is [-1, 1]; wanted r greater than 0 between the ends"],
+    );
+    told(
+        &lathe("[[0, 2], [1, 1], [0, 0]]"),
+        &[
+            "s.toml:3:14: `profile_m` of [meshes.m] is [0, 2]; wanted the points from the bottom of the axis to its top: these run the other way",
+        ],
+    );
+    told(
+        &lathe("[[0, 0]]"),
+        &[
+            "s.toml:3:13: `profile_m` of [meshes.m] is [[0, 0]]; wanted a list of 3 to 1000 points [r, z] in metres, from the bottom of the axis (r = 0) to its top (r = 0)",
+        ],
+    );
+    told(
+        "[meshes.m]\ntype = \"torus\"\nradius_m = 1\ntube_radius_m = 1\n",
+        &["s.toml:4:17: `tube_radius_m` of [meshes.m] is 1; wanted less than radius_m, 1, so that the ring has a hole"],
+    );
+    told(
+        "[meshes.m]\ntype = \"icosphere\"\nradius_m = 1\nsubdivisions = 12\n",
+        &["s.toml:4:16: `subdivisions` of [meshes.m] is 12; wanted a whole number from 0 to 7"],
+    );
 }
 
 #[test]
 fn things_that_contradict_each_other() {
-    told(&body_with("density_kg_per_m3 = 1"), &["s.toml:1:1: body \"b\" has both `mass_kg` and `density_kg_per_m3`; wanted one of them"]);
-    told(&shape("{ type = \"half_space\" }"), &[
-        "s.toml:1:1: body \"b\" is a dynamic half-space, which has no finite mass; wanted mode = \"static\" or \"kinematic\"",
-    ]);
-    told(&body_with("mode = \"static\"\nvelocity_m_per_s = [1, 0, 0]"), &[
-        "s.toml:6:20: `velocity_m_per_s` of body \"b\" is [1, 0, 0]; wanted no velocity for a static body; mode = \"kinematic\" moves by itself",
-    ]);
-    told(&body_with("rotation_deg = [0, 0, 9]\norientation_xyzw = [0, 0, 0, 1]"), &[
-        "s.toml:1:1: body \"b\" has more than one orientation; wanted one of `orientation_xyzw`, `rotation_deg` and `rotation`",
-    ]);
-    told(&body_with("orientation_xyzw = [1, 0, 0, 1]"), &[
-        "s.toml:5:20: `orientation_xyzw` of body \"b\" is [1, 0, 0, 1]; wanted a quaternion [x, y, z, w] of length 1; this one has 1.414214",
-    ]);
-    told(&body_with("rotation = { axis = [0, 0, 0], angle_deg = 3 }"), &[
-        "s.toml:5:21: `axis` of the rotation of body \"b\" is [0, 0, 0]; wanted a direction: a vector that is not zero",
-    ]);
-    told("[camera]\neye_m = [0, 0, 5]\ntarget_m = [0, 0, 1]\n", &[
-        "s.toml:1:1: [camera] looks along its own `up`, or from `eye_m` at itself; wanted a `target_m` away from `eye_m` and not along `up`",
-    ]);
+    told(
+        &body_with("density_kg_per_m3 = 1"),
+        &["s.toml:1:1: body \"b\" has both `mass_kg` and `density_kg_per_m3`; wanted one of them"],
+    );
+    told(
+        &shape("{ type = \"half_space\" }"),
+        &[
+            "s.toml:1:1: body \"b\" is a dynamic half-space, which has no finite mass; wanted mode = \"static\" or \"kinematic\"",
+        ],
+    );
+    told(
+        &body_with("mode = \"static\"\nvelocity_m_per_s = [1, 0, 0]"),
+        &[
+            "s.toml:6:20: `velocity_m_per_s` of body \"b\" is [1, 0, 0]; wanted no velocity for a static body; mode = \"kinematic\" moves by itself",
+        ],
+    );
+    told(
+        &body_with("rotation_deg = [0, 0, 9]\norientation_xyzw = [0, 0, 0, 1]"),
+        &[
+            "s.toml:1:1: body \"b\" has more than one orientation; wanted one of `orientation_xyzw`, `rotation_deg` and `rotation`",
+        ],
+    );
+    told(
+        &body_with("orientation_xyzw = [1, 0, 0, 1]"),
+        &[
+            "s.toml:5:20: `orientation_xyzw` of body \"b\" is [1, 0, 0, 1]; wanted a quaternion [x, y, z, w] of length 1; this one has 1.414214",
+        ],
+    );
+    told(
+        &body_with("rotation = { axis = [0, 0, 0], angle_deg = 3 }"),
+        &[
+            "s.toml:5:21: `axis` of the rotation of body \"b\" is [0, 0, 0]; wanted a direction: a vector that is not zero",
+        ],
+    );
+    told(
+        "[camera]\neye_m = [0, 0, 5]\ntarget_m = [0, 0, 1]\n",
+        &[
+            "s.toml:1:1: [camera] looks along its own `up`, or from `eye_m` at itself; wanted a `target_m` away from `eye_m` and not along `up`",
+        ],
+    );
 }
 
 #[test]
 fn too_many_bodies() {
-    let grid = |count: &str| shape("{ type = \"sphere\", radius_m = 1 }").replace("[[body]]", "[[grid]]") + &format!("count = {count}\nspacing_m = [2, 2, 2]\n");
-    told(&grid("[1000, 1000, 2]"), &["s.toml:5:9: grid \"b\" makes 2000000 bodies; wanted at most 1000000 bodies in the whole scene"]);
-    told(&grid("[1000000, 1000000, 1000000]"), &[
-        "s.toml:5:9: grid \"b\" makes 1000000000000000000 bodies; wanted at most 1000000 bodies in the whole scene",
-    ]);
+    let grid = |count: &str| {
+        shape("{ type = \"sphere\", radius_m = 1 }").replace("[[body]]", "[[grid]]")
+            + &format!("count = {count}\nspacing_m = [2, 2, 2]\n")
+    };
+    told(
+        &grid("[1000, 1000, 2]"),
+        &["s.toml:5:9: grid \"b\" makes 2000000 bodies; wanted at most 1000000 bodies in the whole scene"],
+    );
+    told(
+        &grid("[1000000, 1000000, 1000000]"),
+        &["s.toml:5:9: grid \"b\" makes 1000000000000000000 bodies; wanted at most 1000000 bodies in the whole scene"],
+    );
     told(&grid("[0, 1, 1]"), &["s.toml:5:10: `count` of grid \"b\" is 0; wanted a whole number from 1 to 1000000"]);
-    let triangle = grid("[1, 1, 1]").replace("count = [1, 1, 1]\nspacing_m = [2, 2, 2]", "arrangement = \"triangle\"\nrows = 5000\nspacing_m = 2");
-    told(&triangle, &["s.toml:6:8: grid \"b\" makes 12502500 bodies; wanted at most 1000000 bodies in the whole scene"]);
+    let triangle = grid("[1, 1, 1]")
+        .replace("count = [1, 1, 1]\nspacing_m = [2, 2, 2]", "arrangement = \"triangle\"\nrows = 5000\nspacing_m = 2");
+    told(
+        &triangle,
+        &["s.toml:6:8: grid \"b\" makes 12502500 bodies; wanted at most 1000000 bodies in the whole scene"],
+    );
 }
 
 #[test]
 fn all_problems_of_a_file_in_its_order_with_columns_in_characters() {
-    told("description = \"é\" \n[world]\ndt_s = 3\nstepper = 1\n[materials.\"é\"]\nfriction = [1]\n", &[
-        "s.toml:3:8: `dt_s` of [world] is 3; wanted a time from 1e-6 to 1 s",
-        "s.toml:4:11: `stepper` of [world] is an integer: 1; wanted a text in quotes",
-        "s.toml:6:12: `friction` of [materials.é] is an array: [1]; wanted a friction coefficient from 0 to 100",
-    ]);
-    told("materials = { \"é\" = { friction = -1 } }\n", &[
-        "s.toml:1:34: `friction` of [materials.é] is -1; wanted a friction coefficient from 0 to 100",
-    ]);
+    told(
+        "description = \"é\" \n[world]\ndt_s = 3\nstepper = 1\n[materials.\"é\"]\nfriction = [1]\n",
+        &[
+            "s.toml:3:8: `dt_s` of [world] is 3; wanted a time from 1e-6 to 1 s",
+            "s.toml:4:11: `stepper` of [world] is an integer: 1; wanted a text in quotes",
+            "s.toml:6:12: `friction` of [materials.é] is an array: [1]; wanted a friction coefficient from 0 to 100",
+        ],
+    );
+    told(
+        "materials = { \"é\" = { friction = -1 } }\n",
+        &["s.toml:1:34: `friction` of [materials.é] is -1; wanted a friction coefficient from 0 to 100"],
+    );
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! What a right file comes out as: defaults, materials, orientations and grids.
 
 use tumble_scene::{
-    BodySpec, Combine, Integrator, LightKind, MassSpec, MeshSource, Mode, Pattern, SceneFile, ShapeSpec, Solver, Stepper,
+    BodySpec, Combine, Integrator, LightKind, MassSpec, MeshSource, Mode, Pattern, SceneFile, ShapeSpec, Solver,
+    Stepper,
 };
 
 fn read(text: &str) -> SceneFile {
@@ -43,10 +44,23 @@ fn every_word_of_the_world() {
          seconds = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"max\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\n",
     );
     let world = scene.world;
-    assert_eq!((world.stepper, world.integrator, world.solver), (Stepper::Backtracking, Integrator::Rk4, Solver::LcpSliding));
+    assert_eq!(
+        (world.stepper, world.integrator, world.solver),
+        (Stepper::Backtracking, Integrator::Rk4, Solver::LcpSliding)
+    );
     assert_eq!((world.substeps, world.iterations, world.seconds), (4, 7, 2.0));
     assert_eq!((world.contact_tolerance_m, world.gravity_m_per_s2), (1e-5, [1.0, 2.0, 3.0]));
     assert_eq!((world.combine_restitution, world.combine_friction), (Combine::Max, Combine::Product));
+}
+
+#[test]
+fn words_outside_of_files() {
+    assert_eq!("backtracking".parse(), Ok(Stepper::Backtracking));
+    for solver in ["gauss_seidel", "lcp_pyramid", "lcp_sliding"] {
+        assert_eq!(solver.parse::<Solver>().unwrap().to_string(), solver);
+    }
+    let error = "rk5".parse::<Integrator>().unwrap_err();
+    assert_eq!(error.to_string(), "`rk5` is not known; did you mean `rk4`?");
 }
 
 #[test]
@@ -59,7 +73,9 @@ fn combine_rules_by_hand() {
 fn a_body_takes_what_its_material_says_unless_it_says_otherwise() {
     let text = "[materials.m]\nfriction = 0.9\nrestitution = 0.4\ncolor = \"#ff0000\"\nroughness = 0.1\n".to_owned();
     let one = |lines: &str| {
-        let body = format!("[[body]]\nname = \"b\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 1\nmaterial = \"m\"\n{lines}\n");
+        let body = format!(
+            "[[body]]\nname = \"b\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 1\nmaterial = \"m\"\n{lines}\n"
+        );
         read(&(text.clone() + &body)).bodies.remove(0)
     };
     let plain = one("");
@@ -123,7 +139,8 @@ fn orientations() {
 }
 
 fn grid(lines: &str) -> Vec<BodySpec> {
-    read(&format!("[[grid]]\nname = \"g\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 1\n{lines}\n")).bodies
+    read(&format!("[[grid]]\nname = \"g\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 1\n{lines}\n"))
+        .bodies
 }
 
 #[test]
@@ -145,13 +162,18 @@ fn a_triangle_is_numbered_from_its_apex_left_to_right() {
     let wanted = [[0.0, 0.0], [-1.0, root], [1.0, root], [-2.0, 2.0 * root], [0.0, 2.0 * root], [2.0, 2.0 * root]];
     assert_eq!(bodies.len(), wanted.len());
     for (body, [x, y]) in bodies.iter().zip(wanted) {
-        assert!((body.position_m[0] - x).abs() < 1e-14 && (body.position_m[1] - y).abs() < 1e-14, "{:?}", body.position_m);
+        assert!(
+            (body.position_m[0] - x).abs() < 1e-14 && (body.position_m[1] - y).abs() < 1e-14,
+            "{:?}",
+            body.position_m
+        );
     }
 }
 
 #[test]
 fn copies_take_colours_in_turn() {
-    let bodies = grid("count = [3, 1, 1]\nspacing_m = [2, 2, 2]\ncolors = [\"#000000\", \"#ffffff\"]\npatterns = [\"felt\"]");
+    let bodies =
+        grid("count = [3, 1, 1]\nspacing_m = [2, 2, 2]\ncolors = [\"#000000\", \"#ffffff\"]\npatterns = [\"felt\"]");
     let colors: Vec<f64> = bodies.iter().map(|body| body.look.color[0]).collect();
     assert_eq!(colors, [0.0, 1.0, 0.0]);
     assert!(bodies.iter().all(|body| body.look.pattern == Pattern::Felt));

@@ -76,7 +76,10 @@ fn bytes_that_are_not_text_and_files_that_are_too_large() {
     let folder = Folder::new("bytes");
     let path = folder.write("latin.toml", b"[world]\n# caf\xe9\n");
     let error = SceneFile::load(&path).unwrap_err();
-    assert_eq!(error.to_string(), format!("{}:2: byte 13 of the file is not UTF-8; a scene is a UTF-8 text in TOML", path.display()));
+    assert_eq!(
+        error.to_string(),
+        format!("{}:2: byte 13 of the file is not UTF-8; a scene is a UTF-8 text in TOML", path.display())
+    );
     let path = folder.write("large.toml", "#".repeat(MOST_BYTES as usize + 1).as_bytes());
     assert!(matches!(SceneFile::load(&path), Err(SceneError::TooLarge { limit: 16_777_216, .. })));
     let path = folder.write("just.toml", "#".repeat(MOST_BYTES as usize).as_bytes());

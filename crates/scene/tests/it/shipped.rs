@@ -65,7 +65,10 @@ fn falling_has_a_dozen_solids_apart_from_each_other_above_a_box_of_five() {
     assert_eq!(walls.count(), 5);
     for (i, a) in solids.iter().enumerate() {
         // Clear of the floor and the walls: inside 1.2 m of the middle by its own size.
-        assert!(a.position_m[2] > reach(&scene, a) && a.position_m[0].abs().max(a.position_m[1].abs()) + reach(&scene, a) < 1.2);
+        assert!(
+            a.position_m[2] > reach(&scene, a)
+                && a.position_m[0].abs().max(a.position_m[1].abs()) + reach(&scene, a) < 1.2
+        );
         for b in &solids[i + 1..] {
             let apart = distance(a.position_m, b.position_m) - reach(&scene, a) - reach(&scene, b);
             assert!(apart > 0.0, "{} and {} may overlap by {} m", a.name, b.name, -apart);
@@ -185,7 +188,8 @@ fn check_cushions(scene: &SceneFile) {
 #[test]
 fn bowling_is_regulation() {
     let scene = scene("bowling");
-    let pins: Vec<&BodySpec> = scene.bodies.iter().filter(|body| body.name.starts_with("pin_") && body.mode == Mode::Dynamic).collect();
+    let pins: Vec<&BodySpec> =
+        scene.bodies.iter().filter(|body| body.name.starts_with("pin_") && body.mode == Mode::Dynamic).collect();
     assert_eq!(pins.len(), 10);
     assert_eq!(pins[0].position_m, [18.288, 0.0, 0.0]);
     // Pin 2 stands to the left (+y), 3 to the right; 7 and 10 end the last row, 3 x 12 in apart.
@@ -217,7 +221,8 @@ fn check_hook(scene: &SceneFile) {
     let rolls_at = 2.0 * speed / (7.0 * mu * g);
     let at = |t: f64| {
         let (slipping, rolling) = (t.min(rolls_at), (t - rolls_at).max(0.0));
-        let path = |x0: f64, v: f64, a: f64| x0 + v * slipping + 0.5 * a * slipping * slipping + (v + a * slipping) * rolling;
+        let path =
+            |x0: f64, v: f64, a: f64| x0 + v * slipping + 0.5 * a * slipping * slipping + (v + a * slipping) * rolling;
         [path(ball.position_m[0], vx, push[0]), path(ball.position_m[1], vy, push[1])]
     };
     // Ball and pin touch 0.1085 m above the lane, where the pin's radius is 0.0600 m.
@@ -227,4 +232,44 @@ fn check_hook(scene: &SceneFile) {
     // It never leaves the lane on its way.
     assert!((0..2600).map(|k| at(k as f64 * 1e-3)).all(|p| p[1].abs() < 0.527));
     assert_eq!(scene.world.stepper, Stepper::Backtracking);
+}
+
+/// Asks each table what it knows, by a key that is near nothing, and looks for the answer in the README.
+#[test]
+fn the_reference_names_every_key() {
+    let readme = include_str!("../../../../scenes/README.md");
+    let sphere = "name = \"b\"\nshape = { type = \"sphere\", radius_m = 1 }\nmass_kg = 1\n";
+    let mesh = |kind: &str| format!("[meshes.m]\ntype = \"{kind}\"\n");
+    let shape = |kind: &str| {
+        format!("[[body]]\nname = \"b\"\nmode = \"static\"\nshape = {{ type = \"{kind}\", qqqqqqqqqqqq = 1 }}\n")
+    };
+    let mut texts = vec![
+        "qqqqqqqqqqqq = 1\n".to_owned(),
+        "[world]\n".to_owned(),
+        "[materials.m]\n".to_owned(),
+        "[camera]\neye_m = [1, 1, 1]\ntarget_m = [0, 0, 0]\n".to_owned(),
+        "[[light]]\ntype = \"point\"\n".to_owned(),
+        "[[light]]\ntype = \"directional\"\n".to_owned(),
+        "[sky]\n".to_owned(),
+        "[ground]\n".to_owned(),
+        format!("[[body]]\n{sphere}"),
+        format!("[[grid]]\n{sphere}count = [1, 1, 1]\nspacing_m = [1, 1, 1]\n"),
+        format!("[[grid]]\n{sphere}arrangement = \"triangle\"\nrows = 1\nspacing_m = 1\n"),
+    ];
+    texts.extend(["file", "lathe", "torus", "icosphere", "cylinder", "capsule", "box"].map(mesh));
+    texts.extend(["sphere", "box", "capsule", "cylinder", "half_space", "mesh"].map(shape));
+    let mut seen = 0;
+    for mut text in texts {
+        if !text.contains("qqqqqqqqqqqq") {
+            text += "qqqqqqqqqqqq = 1\n";
+        }
+        let error = SceneFile::parse(&text, "s.toml").unwrap_err();
+        let answer =
+            error.problems().iter().find(|problem| problem.message.contains("qqqqqqqqqqqq")).expect("it is unknown");
+        for key in answer.wanted.split('`').skip(1).step_by(2) {
+            assert!(readme.contains(key), "scenes/README.md does not name `{key}`");
+            seen += 1;
+        }
+    }
+    assert!(seen > 80, "{seen}");
 }
