@@ -39,11 +39,13 @@ impl Default for Material {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Combine {
     /// The smaller of the two.
-    Minimum,
+    Min,
     /// The larger of the two.
-    Maximum,
+    Max,
     /// Half the sum.
     Average,
+    /// The product.
+    Product,
     /// The square root of the product: 0 if either is 0.
     #[default]
     GeometricMean,
@@ -53,9 +55,10 @@ impl Combine {
     /// The pair's constant.
     pub fn of(self, a: f64, b: f64) -> f64 {
         match self {
-            Combine::Minimum => a.min(b),
-            Combine::Maximum => a.max(b),
+            Combine::Min => a.min(b),
+            Combine::Max => a.max(b),
             Combine::Average => 0.5 * (a + b),
+            Combine::Product => a * b,
             Combine::GeometricMean => (a * b).sqrt(),
         }
     }

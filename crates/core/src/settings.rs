@@ -69,7 +69,7 @@ impl Default for Settings {
             drift_tolerance: 1e-4,
             recovery_speed: 3.0,
             combine_friction: Combine::GeometricMean,
-            combine_restitution: Combine::Minimum,
+            combine_restitution: Combine::Min,
         }
     }
 }

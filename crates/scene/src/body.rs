@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use tumble_core::Mode;
+
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
 use crate::look::Look;
@@ -12,20 +14,7 @@ use crate::shape::ShapeSpec;
 /// Most bytes of a body's name: 64 with the final zero in which it travels between processes.
 pub(crate) const MOST_NAME_BYTES: usize = 63;
 
-/// Who moves a body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Forces and contacts do.
-    Dynamic,
-    /// Nobody: it stands still.
-    Static,
-    /// Its own given velocity does, whatever it meets.
-    Kinematic,
-}
-
-impl Mode {
-    const NAMES: Names<Self> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
-}
+const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
 
 /// How heavy a body is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,7 +127,7 @@ fn read_name(f: &mut Fields<'_>) -> Option<String> {
 /// The mode; one that is wrong stands for a mode that asks for nothing else.
 fn read_mode(f: &mut Fields<'_>) -> Mode {
     match f.value("mode") {
-        Some(value) => f.as_choice("mode", value, Mode::NAMES).unwrap_or(Mode::Kinematic),
+        Some(value) => f.as_choice("mode", value, MODES).unwrap_or(Mode::Kinematic),
         None => Mode::Dynamic,
     }
 }

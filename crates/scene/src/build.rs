@@ -6,9 +6,9 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
 use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::solver::{self, Accuracy};
-use tumble_core::{Look as CoreLook, Mode as CoreMode, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
+use tumble_core::{Look as CoreLook, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
 
-use crate::body::{BodySpec, MassSpec, Mode};
+use crate::body::{BodySpec, MassSpec};
 use crate::file::SceneFile;
 use crate::look::Look;
 use crate::mesh::{MeshSource, MeshSpec};
@@ -77,11 +77,11 @@ impl SceneFile {
         let world = |source| BuildError::World { scene: self.file.clone(), source };
         let meshes = self.meshes.iter().map(|mesh| self.solid(mesh, &mut notes)).collect::<Result<Vec<_>, _>>()?;
         let mut built = World::new(self.settings()).map_err(world)?;
-        stepper_by_name(self.world.stepper.name()).into_iter().for_each(|s| built.set_stepper(s));
-        solver::by_name(self.world.solver.name()).into_iter().for_each(|s| built.set_solver(s));
+        stepper_by_name(&self.world.stepper.to_string()).into_iter().for_each(|s| built.set_stepper(s));
+        solver::by_name(&self.world.solver.to_string()).into_iter().for_each(|s| built.set_solver(s));
         for spec in &self.bodies {
             let body = self.body(spec, &meshes)?;
-            let id = built.add_boxed(Box::new(body), mode(spec.mode)).map_err(|e| self.body_error(spec, e))?;
+            let id = built.add_boxed(Box::new(body), spec.mode).map_err(|e| self.body_error(spec, e))?;
             built.set_collidable(id, spec.collides).map_err(world)?;
             built.set_alive(id, spec.alive).map_err(world)?;
         }
@@ -98,8 +98,8 @@ impl SceneFile {
             accuracy: Accuracy { sweeps: w.iterations, ..base.accuracy },
             contact_tolerance: w.contact_tolerance_m,
             drift_tolerance: base.drift_tolerance.max(w.contact_tolerance_m),
-            combine_friction: w.combine_friction.into(),
-            combine_restitution: w.combine_restitution.into(),
+            combine_friction: w.combine_friction,
+            combine_restitution: w.combine_restitution,
             ..base
         }
     }
@@ -216,13 +216,5 @@ fn look(look: &Look) -> CoreLook {
         metallic: look.metallic as f32,
         shader: look.pattern.name().into(),
         properties: named.map(|(name, value)| (name.to_string(), value)).to_vec(),
-    }
-}
-
-fn mode(mode: Mode) -> CoreMode {
-    match mode {
-        Mode::Dynamic => CoreMode::Dynamic,
-        Mode::Static => CoreMode::Static,
-        Mode::Kinematic => CoreMode::Kinematic,
     }
 }

@@ -53,6 +53,7 @@
 //! ```
 
 mod body;
+mod build;
 mod bound;
 mod error;
 mod fields;
@@ -70,7 +71,8 @@ mod suggest;
 mod view;
 mod world;
 
-pub use body::{BodySpec, MassSpec, Mode};
+pub use body::{BodySpec, MassSpec};
+pub use build::{BuildError, Notes, read_triangles};
 pub use error::{Invalid, Problem, SceneError};
 pub use file::{MOST_BYTES, SceneFile};
 pub use look::{Color, Look, Pattern};
@@ -79,4 +81,5 @@ pub use mesh::{MeshSource, MeshSpec};
 pub use shape::ShapeSpec;
 pub use shipped::{SceneSource, Shipped, resolve_scene, shipped};
 pub use view::{CameraSpec, GroundSpec, LightKind, LightSpec, SkySpec};
-pub use world::{Combine, Integrator, Solver, Stepper, UnknownName, WorldSettings};
+pub use tumble_core::{Combine, Mode};
+pub use world::{Integrator, Solver, Stepper, UnknownName, WorldSettings};

@@ -37,6 +37,13 @@ impl Pattern {
     ];
 }
 
+impl Pattern {
+    /// The word for it in files; also the name of its shader.
+    pub fn name(self) -> &'static str {
+        Pattern::NAMES.iter().find(|(_, pattern)| *pattern == self).map_or("plain", |(name, _)| *name)
+    }
+}
+
 /// The look of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {

@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use thiserror::Error;
+use tumble_core::Combine;
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
@@ -42,21 +43,6 @@ pub enum Solver {
     LcpSliding,
 }
 
-/// What two bodies' coefficients make for the pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Combine {
-    /// The smaller.
-    Min,
-    /// The larger.
-    Max,
-    /// The arithmetic mean.
-    Average,
-    /// The product.
-    Product,
-    /// The square root of the product.
-    GeometricMean,
-}
-
 impl Stepper {
     const NAMES: Names<Self> = &[("time_stepping", Stepper::TimeStepping), ("backtracking", Stepper::Backtracking)];
 }
@@ -78,23 +64,21 @@ impl Solver {
     ];
 }
 
-impl Combine {
-    const NAMES: Names<Self> = &[
-        ("min", Combine::Min),
-        ("max", Combine::Max),
-        ("average", Combine::Average),
-        ("product", Combine::Product),
-        ("geometric_mean", Combine::GeometricMean),
-    ];
+const COMBINE: Names<Combine> = &[
+    ("min", Combine::Min),
+    ("max", Combine::Max),
+    ("average", Combine::Average),
+    ("product", Combine::Product),
+    ("geometric_mean", Combine::GeometricMean),
+];
 
-    /// The coefficient of a pair of bodies with `a` and `b`, both at least 0.
-    pub fn of(self, a: f64, b: f64) -> f64 {
-        match self {
-            Combine::Min => a.min(b),
-            Combine::Max => a.max(b),
-            Combine::Average => 0.5 * (a + b),
-            Combine::Product => a * b,
-            Combine::GeometricMean => (a * b).sqrt(),
+impl From<Integrator> for tumble_core::Integrator {
+    fn from(integrator: Integrator) -> Self {
+        match integrator {
+            Integrator::Verlet => Self::Verlet,
+            Integrator::SymplecticEuler => Self::SymplecticEuler,
+            Integrator::ExplicitEuler => Self::ExplicitEuler,
+            Integrator::Rk4 => Self::Rk4,
         }
     }
 }
@@ -144,7 +128,7 @@ macro_rules! written_by_name {
     };
 }
 
-written_by_name!(Stepper, Integrator, Solver, Combine);
+written_by_name!(Stepper, Integrator, Solver);
 
 /// `[world]`. All keys have defaults.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,9 +147,9 @@ pub struct WorldSettings {
     pub integrator: Integrator,
     /// Default `gauss_seidel`.
     pub solver: Solver,
-    /// Most sweeps of an iterating solver per solve, 1 to 100 000. Default 100.
+    /// Most sweeps of an iterating solver per solve, 1 to 100 000. Default 200.
     pub iterations: u32,
-    /// Overlap that counts as touching, metres. Default 1e-4.
+    /// `backtracking`: surfaces closer than this touch, and a rebound lower than this rests, metres. Default 1e-7.
     pub contact_tolerance_m: f64,
     /// Restitution of a pair from those of its bodies. Default `min`.
     pub combine_restitution: Combine,
@@ -183,8 +167,8 @@ impl Default for WorldSettings {
             stepper: Stepper::TimeStepping,
             integrator: Integrator::Verlet,
             solver: Solver::GaussSeidel,
-            iterations: 100,
-            contact_tolerance_m: 1e-4,
+            iterations: 200,
+            contact_tolerance_m: 1e-7,
             combine_restitution: Combine::Min,
             combine_friction: Combine::GeometricMean,
         }
@@ -208,8 +192,8 @@ impl WorldSettings {
             solver: f.choice_or("solver", Solver::NAMES, usual.solver),
             iterations: f.integer_or("iterations", 1..=100_000, usual.iterations),
             contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, usual.contact_tolerance_m),
-            combine_restitution: f.choice_or("combine_restitution", Combine::NAMES, usual.combine_restitution),
-            combine_friction: f.choice_or("combine_friction", Combine::NAMES, usual.combine_friction),
+            combine_restitution: f.choice_or("combine_restitution", COMBINE, usual.combine_restitution),
+            combine_friction: f.choice_or("combine_friction", COMBINE, usual.combine_friction),
         };
         f.finish();
         world

@@ -24,8 +24,8 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
     let scene = read("");
     assert_eq!(scene.world.gravity_m_per_s2, [0.0, 0.0, -9.81]);
     assert_eq!(scene.world.dt_s, 1.0 / 240.0);
-    assert_eq!((scene.world.substeps, scene.world.iterations), (1, 100));
-    assert_eq!((scene.world.seconds, scene.world.contact_tolerance_m), (5.0, 1e-4));
+    assert_eq!((scene.world.substeps, scene.world.iterations), (1, 200));
+    assert_eq!((scene.world.seconds, scene.world.contact_tolerance_m), (5.0, 1e-7));
     assert_eq!(scene.world.stepper, Stepper::TimeStepping);
     assert_eq!(scene.world.integrator, Integrator::Verlet);
     assert_eq!(scene.world.solver, Solver::GaussSeidel);
