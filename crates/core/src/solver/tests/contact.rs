@@ -74,7 +74,7 @@ fn a_cone_without_friction_is_a_half_line() {
     }
 }
 
-/// What a pyramid solution is: `|λ·d₁| + |λ·d₂| ≤ μλ_n` is shown by the bound on every component and on the sum; work is never done.
+/// What a pyramid solution is, seen from the cone around it: inside it, and dissipating as much as the square within it must.
 fn check_pyramid(rows: &Rows, solved: &Solved) {
     for block in &rows.blocks {
         let RowSet::Cone { mu } = block.set else { continue };
