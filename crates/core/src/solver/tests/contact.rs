@@ -74,7 +74,7 @@ fn a_cone_without_friction_is_a_half_line() {
     }
 }
 
-/// What a pyramid solution is: `|λ·d₁| + |λ·d₂| ≤ μλ_n` is shown by the bound on every component and on the sum; work is never done.
+/// What a pyramid solution is, seen from the cone around it: inside it, and dissipating as much as the square within it must.
 fn check_pyramid(rows: &Rows, solved: &Solved) {
     for block in &rows.blocks {
         let RowSet::Cone { mu } = block.set else { continue };
@@ -123,6 +123,38 @@ fn the_sliding_form_holds_on_random_frictional_contacts() {
             assert!(along <= 0.0 || push.abs().min(along) < 1e-9, "pushes past rest: {push} {along}");
         }
     }
+}
+
+/// Welds, stops, motors and contacts in one problem: each row answers its own set.
+#[test]
+fn all_kinds_of_rows_are_solved_together() {
+    let mut random = Random(16);
+    let mut at_an_end = 0;
+    for _ in 0..200 {
+        let (rows, c) = mess(&mut random, |r| match r.index(8) {
+            0 => RowSet::Equality,
+            1 => RowSet::HalfLine,
+            2 | 3 => RowSet::Interval { lo: r.real(-0.5, 0.0), hi: r.real(0.0, 0.5) },
+            _ => RowSet::Cone { mu: r.real(0.0, 1.5) },
+        });
+        for solver in [&LcpPyramid as &dyn RowSolver, &LcpSliding] {
+            let solved = solve(solver, &rows, &c, FAR);
+            assert!(solved.outcome.converged && !solved.outcome.ray, "{} {:?}", solver.name(), solved.outcome);
+            for block in &rows.blocks {
+                let (l, w) = (solved.lambda[block.row as usize], solved.w[block.row as usize]);
+                let wrong = match block.set {
+                    RowSet::Equality => w.abs(),
+                    RowSet::HalfLine | RowSet::Cone { .. } => l.min(w).abs(),
+                    RowSet::Interval { lo, .. } if w > 1e-9 => (l - lo).abs(),
+                    RowSet::Interval { hi, .. } if w < -1e-9 => (l - hi).abs(),
+                    RowSet::Interval { lo, hi } => (lo - l).max(l - hi).max(0.0),
+                };
+                assert!(wrong < 1e-9, "{} {:?}: {l} {w}", solver.name(), block.set);
+                at_an_end += (matches!(block.set, RowSet::Interval { .. }) && w.abs() > 1e-6) as u32;
+            }
+        }
+    }
+    assert!(at_an_end > 50, "only {at_an_end} motors at an end");
 }
 
 /// A tower of cubes of 1 m, four contacts per face.

@@ -91,9 +91,10 @@ fn a_degenerate_problem_does_not_cycle() {
         let q = DVector::from_fn(n, |_, _| random.index(3) as f64 - 1.0);
         let expected = enumerate(&m, &q);
         match lemke(&row_major(&m), q.as_slice()) {
-            LcpResult::Solution { z, .. } => {
+            LcpResult::Solution { z, pivots } => {
                 let z = DVector::from_vec(z);
                 assert!(violation(&m, &q, &z) < 1e-10);
+                assert!(pivots <= 3 * n as u32, "{pivots} pivots of n = {n}");
                 assert!((&m * (z - &expected[0])).amax() < 1e-8);
                 solved += 1;
             }
@@ -103,6 +104,19 @@ fn a_degenerate_problem_does_not_cycle() {
         }
     }
     assert!((100..400).contains(&solved), "{solved} of 400 have a solution: the test wants both kinds");
+}
+
+/// Kostreva's example, on which Lemke's method cycles with a careless choice among ties; `z = (1/3, 1/3, 1/3)`. With the lexicographic
+/// rule no dictionary comes twice, and there are at most 2³ complementary ones, each with three that hold `z₀`.
+#[test]
+fn kostrevas_example_is_left_in_a_few_pivots() {
+    let m = [1.0, 2.0, 0.0, 0.0, 1.0, 2.0, 2.0, 0.0, 1.0];
+    for q in [[-1.0; 3], [-1.0, -1.0, -0.5], [0.0, -1.0, -1.0]] {
+        let LcpResult::Solution { z, pivots } = lemke(&m, &q) else { panic!("no solution for {q:?}") };
+        assert!(pivots <= 10, "{pivots} pivots for {q:?}");
+        let (m, q) = (DMatrix::from_row_slice(3, 3, &m), DVector::from_row_slice(&q));
+        assert!((DVector::from_vec(z) - &enumerate(&m, &q)[0]).amax() < 1e-12);
+    }
 }
 
 /// Beale's linear program, on which the simplex method cycles without a rule against it; optimum −1/20 at x = (1/25, 0, 1, 0).

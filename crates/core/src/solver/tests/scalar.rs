@@ -88,6 +88,29 @@ fn a_stop_on_what_cannot_move_does_nothing() {
     }
 }
 
+/// Eight equalities on three freedoms: solved, and by multipliers of an ordinary size.
+#[test]
+fn redundant_equalities_do_not_blow_up() {
+    let mut random = Random(32);
+    for _ in 0..100 {
+        let mut rows = Rows::default();
+        rows.clear(3);
+        let (mut c, v) = (Vec::new(), [1.0, -0.5, 0.7]);
+        for _ in 0..8 {
+            rows.push_block(RowSet::Equality);
+            let y = rows.side(0, 3).expect("first side");
+            y.iter_mut().for_each(|y| *y = random.real(-1.0, 1.0));
+            c.push(y.iter().zip(v).map(|(y, v)| y * v).sum());
+        }
+        let solved = solve(&LcpPyramid, &rows, &c, FAR);
+        assert!(solved.outcome.converged);
+        // All three freedoms are stopped.
+        assert!(distance(&solved.du, &v.map(|v| -v)) < 1e-12, "{:?}", solved.du);
+        let largest = solved.lambda.iter().fold(0.0, |a: f64, l| a.max(l.abs()));
+        assert!(largest < 100.0 && solved.lambda.iter().filter(|l| **l != 0.0).count() == 3, "{:?}", solved.lambda);
+    }
+}
+
 /// Equalities that contradict each other are reported.
 #[test]
 fn contradicting_welds_do_not_pass_for_solved() {
