@@ -121,7 +121,7 @@ impl Default for Sky {
 impl Sky {
     /// A dim, warm hall: for tables and lanes under lamps.
     pub fn hall() -> Self {
-        Sky { zenith: [0.20, 0.18, 0.17], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 1.5, softbox: 7.0, backdrop: None }
+        Sky { zenith: [0.20, 0.18, 0.17], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 2.4, softbox: 5.0, backdrop: None }
     }
 
     /// No ambient light, a flat backdrop: for tests and plots.
@@ -157,7 +157,7 @@ pub struct Settings {
     pub exposure: f32,
     /// Side of a shadow map in texels (256 to 8192).
     pub shadow_map_size: u32,
-    /// Reach of ambient occlusion in metres: `None` for a fifteenth of the scene's radius; `Some(0.0)` turns it off.
+    /// Reach of ambient occlusion in metres: `None` for a twelfth of the scene's radius; `Some(0.0)` turns it off.
     pub occlusion_m: Option<f32>,
     /// Filmic tone curve; without it light above 1 is cut off (tests and plots).
     pub tone_map: bool,

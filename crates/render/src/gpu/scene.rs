@@ -16,7 +16,7 @@ pub fn occlusion_reach(list: &DrawList) -> f32 {
     match (list.settings.occlusion_m, list.sky.ambient > 0.0) {
         (_, false) => 0.0,
         (Some(reach), _) => reach,
-        (None, _) => list.bounding_ball(false).map_or(0.0, |(_, radius)| radius / 15.0),
+        (None, _) => list.bounding_ball(false).map_or(0.0, |(_, radius)| radius / 12.0),
     }
 }
 

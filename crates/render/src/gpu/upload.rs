@@ -122,6 +122,7 @@ impl Frame {
             BindingResource::TextureView(&targets.shadow_array),
             BindingResource::Sampler(&pipelines.shadow_sampler),
             BindingResource::TextureView(&targets.occlusion),
+            BindingResource::TextureView(&targets.shadow_array),
         ];
         let (spheres, casting_spheres) = sphere_batch(gpu, list)?;
         Ok(Frame {

@@ -11,7 +11,7 @@ fn ball(list: &mut DrawList, center: [f32; 3], radius: f32, color: [f32; 3]) {
     list.add_sphere(center.into(), radius, UnitQuaternion::identity(), Material::unlit(color));
 }
 
-fn block<'l>(list: &'l mut DrawList, half: [f32; 3], at: [f32; 3], color: [f32; 3]) -> &'l mut Instance {
+fn block(list: &mut DrawList, half: [f32; 3], at: [f32; 3], color: [f32; 3]) -> &mut Instance {
     let mesh = list.add_mesh(MeshData::cuboid(half));
     list.add_instance(mesh, Isometry3::translation(at[0], at[1], at[2]), Material::unlit(color))
 }
