@@ -1,4 +1,4 @@
-//! Draws a test composition to a PNG: `cargo run --release -p tumble-render --example showcase -- out.png [billiards|bowling|boxes|debug] [width height]`.
+//! Draws a test composition to a PNG: `cargo run --release -p tumble-render --example showcase -- out.png [billiards|bowling|boxes|debug|many] [width height]`.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tumble_render::{Camera, DebugStyle, DrawList, Ground, Light, Material, MeshData, Pattern, RenderError, Renderer, Sky};
@@ -13,12 +13,16 @@ fn main() -> Result<(), RenderError> {
         "bowling" => bowling(),
         "boxes" => boxes(false),
         "debug" => boxes(true),
+        "many" => many(),
         _ => billiards(),
     };
     let mut renderer = Renderer::new()?;
     println!("{}", renderer.adapter());
-    renderer.render(&list, width, height)?.write_png(&path)?;
-    println!("{path}");
+    renderer.render(&list, width, height)?; // warms up: shaders, uploads
+    let start = std::time::Instant::now();
+    let image = renderer.render(&list, width, height)?;
+    println!("{path}: {width} x {height} in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
+    image.write_png(&path)?;
     Ok(())
 }
 
@@ -117,6 +121,20 @@ fn smooth(points: &[[f32; 2]]) -> Vec<[f32; 2]> {
     }
     out.push(points[points.len() - 1]);
     out
+}
+
+/// A heap of a thousand balls.
+fn many() -> DrawList {
+    let mut list = DrawList::default();
+    for i in 0..1000 {
+        let (layer, k) = (i / 100, i % 100);
+        let at = Point3::new((k % 10) as f32 * 0.21 + 0.02 * (i as f32).sin(), (k / 10) as f32 * 0.21 + 0.02 * (i as f32 * 1.3).cos(), 0.1 + layer as f32 * 0.19);
+        list.add_sphere(at, 0.1, turn(i), Material::billiard_ball((i % 16) as u8));
+    }
+    list.ground = Some(Ground::grid(0.0));
+    list.lights.push(Light::sun(Vector3::new(0.5, 0.75, -1.0), 2.0));
+    list.camera = list.framing_camera(Vector3::new(1.0, 0.6, -0.45));
+    list
 }
 
 fn boxes(debug: bool) -> DrawList {

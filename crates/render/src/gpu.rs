@@ -26,6 +26,7 @@ pub(crate) struct Gpu {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     adapter: String,
+    sample_masks: bool,
     complaint: Arc<Mutex<Option<String>>>,
 }
 
@@ -36,7 +37,7 @@ impl Renderer {
     /// [`RenderError::NoAdapter`] where the machine has none: the caller goes on without pictures. [`RenderError::Device`] where it has one that fails.
     pub fn new() -> Result<Self, RenderError> {
         let gpu = pollster::block_on(Gpu::open())?;
-        let pipelines = Pipelines::new(&gpu.device);
+        let pipelines = Pipelines::new(&gpu.device, gpu.sample_masks);
         gpu.complaint()?;
         Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), targets: None })
     }
@@ -96,6 +97,7 @@ impl Gpu {
         let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
         let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
         limits.max_buffer_size = adapter.limits().max_buffer_size;
+        let sample_masks = info.backend != wgpu::Backend::Gl;
         let asked = adapter
             .request_device(&wgpu::DeviceDescriptor { label: Some("tumble"), required_limits: limits, ..Default::default() })
             .await
@@ -105,7 +107,7 @@ impl Gpu {
         asked.0.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
         }));
-        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, complaint })
+        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, sample_masks, complaint })
     }
 
     /// What went wrong on the device since the last call.

@@ -1,5 +1,6 @@
 //! The draw list: everything a picture shows, as plain data. No GPU is needed to build, test, print or compare one.
 
+pub(crate) mod bounds;
 pub(crate) mod debug;
 mod text;
 mod validate;
@@ -61,7 +62,7 @@ pub enum Light {
         /// Whether it throws shadows.
         casts_shadow: bool,
     },
-    /// A lamp. It throws shadows where it hangs outside the ball that bounds everything that throws them (one map), else none.
+    /// A lamp. It throws shadows where it hangs outside the box around everything that throws them (one map), else none.
     Point {
         /// Where, in the world.
         position: Point3<f32>,
@@ -121,7 +122,7 @@ impl Default for Sky {
 impl Sky {
     /// A dim, warm hall: for tables and lanes under lamps.
     pub fn hall() -> Self {
-        Sky { zenith: [0.20, 0.18, 0.17], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 1.5, softbox: 7.0, backdrop: None }
+        Sky { zenith: [0.20, 0.18, 0.17], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 2.4, softbox: 5.0, backdrop: None }
     }
 
     /// No ambient light, a flat backdrop: for tests and plots.
@@ -135,7 +136,7 @@ impl Sky {
 pub struct Ground {
     /// Height of its plane, world z.
     pub height_m: f32,
-    /// How far it reaches from the middle of the scene before it has faded away.
+    /// How far it reaches from the middle of what is seen before it has faded away.
     pub reach_m: f32,
     /// Its surface; patterns run in world coordinates.
     pub material: Material,
@@ -157,7 +158,7 @@ pub struct Settings {
     pub exposure: f32,
     /// Side of a shadow map in texels (256 to 8192).
     pub shadow_map_size: u32,
-    /// Reach of ambient occlusion in metres: `None` for a fifteenth of the scene's radius; `Some(0.0)` turns it off.
+    /// Reach of ambient occlusion in metres: `None` for a twelfth of the radius of what is seen; `Some(0.0)` turns it off.
     pub occlusion_m: Option<f32>,
     /// Filmic tone curve; without it light above 1 is cut off (tests and plots).
     pub tone_map: bool,
@@ -225,43 +226,5 @@ impl DrawList {
         self.spheres.push(Sphere { center, radius, orientation, material, casts_shadow: true });
         let last = self.spheres.len() - 1;
         &mut self.spheres[last]
-    }
-
-    /// A ball `(center, radius)` around all instances and spheres (those that throw shadows, if `casters` is set); `None` when there are none.
-    /// The ground and debug drawings do not count.
-    pub fn bounding_ball(&self, casters: bool) -> Option<(Point3<f32>, f32)> {
-        let (lo, hi) = self.bounding_box(casters)?;
-        Some((nalgebra::center(&lo, &hi), (hi - lo).norm() / 2.0))
-    }
-
-    /// The box `(min, max)` around all instances and spheres, as for [`DrawList::bounding_ball`].
-    pub fn bounding_box(&self, casters: bool) -> Option<(Point3<f32>, Point3<f32>)> {
-        let instances = self.instances.iter().filter(|i| i.casts_shadow || !casters).flat_map(|i| self.corners(i));
-        let spheres = self.spheres.iter().filter(|s| s.casts_shadow || !casters).flat_map(|s| {
-            let r = Vector3::repeat(s.radius);
-            [s.center - r, s.center + r]
-        });
-        instances.chain(spheres).fold(None, |found, p| match found {
-            None => Some((p, p)),
-            Some((lo, hi)) => Some((lo.inf(&p), hi.sup(&p))),
-        })
-    }
-
-    /// A camera that looks along `direction` and shows everything.
-    pub fn framing_camera(&self, direction: Vector3<f32>) -> Camera {
-        let (center, radius) = self.bounding_ball(false).unwrap_or((Point3::origin(), 1.0));
-        Camera::framing(center, radius, direction, 0.9)
-    }
-
-    /// The eight world corners of an instance's box; none for an unknown or empty mesh.
-    pub(crate) fn corners(&self, instance: &Instance) -> Vec<Point3<f32>> {
-        let Some((lo, hi)) = self.meshes.get(instance.mesh.0).and_then(|m| m.bounds()) else { return Vec::new() };
-        (0..8)
-            .map(|k| {
-                let pick = |axis: usize| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
-                let local = Vector3::new(pick(0), pick(1), pick(2)).component_mul(&instance.scale);
-                instance.pose * Point3::from(local)
-            })
-            .collect()
     }
 }

@@ -12,6 +12,10 @@ pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 /// Ambient occlusion.
 pub const OCCLUSION: TextureFormat = TextureFormat::R8Unorm;
 
+/// Textures that are read, not sampled; depth textures too.
+const NUMBERS: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
+
+/// All but the edges of spheres.
 const PICTURE_WGSL: &str = concat!(
     include_str!("../shaders/view.wgsl"),
     include_str!("../shaders/noise.wgsl"),
@@ -23,6 +27,8 @@ const PICTURE_WGSL: &str = concat!(
     include_str!("../shaders/line.wgsl"),
     include_str!("../shaders/sky.wgsl"),
 );
+const EDGE_SAMPLES_WGSL: &str = include_str!("../shaders/edge_samples.wgsl");
+const EDGE_PIXELS_WGSL: &str = include_str!("../shaders/edge_pixels.wgsl");
 const OCCLUSION_WGSL: &str = concat!(include_str!("../shaders/view.wgsl"), include_str!("../shaders/occlusion.wgsl"));
 
 /// Everything that does not change from picture to picture.
@@ -45,7 +51,8 @@ pub struct Pipelines {
 }
 
 impl Pipelines {
-    pub fn new(device: &Device) -> Self {
+    /// `sample_masks`: whether shaders can write which samples of a pixel they cover.
+    pub fn new(device: &Device, sample_masks: bool) -> Self {
         let view_layout = layout(device, "view", &[uniform(0)]);
         let scene_layout = layout(
             device,
@@ -54,19 +61,20 @@ impl Pipelines {
                 uniform(0),
                 texture(1, wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array),
                 entry(2, BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
-                texture(3, wgpu::TextureSampleType::Float { filterable: false }, wgpu::TextureViewDimension::D2),
+                texture(3, NUMBERS, wgpu::TextureViewDimension::D2),
+                texture(4, NUMBERS, wgpu::TextureViewDimension::D2Array),
             ],
         );
         let occlusion_layout = layout(
             device,
             "occlusion",
             &[
-                texture(0, wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2),
+                texture(0, NUMBERS, wgpu::TextureViewDimension::D2),
                 uniform(1),
-                texture(2, wgpu::TextureSampleType::Float { filterable: false }, wgpu::TextureViewDimension::D2),
+                texture(2, NUMBERS, wgpu::TextureViewDimension::D2),
             ],
         );
-        let picture = shader(device, "picture", PICTURE_WGSL);
+        let picture = shader(device, "picture", &[PICTURE_WGSL, if sample_masks { EDGE_SAMPLES_WGSL } else { EDGE_PIXELS_WGSL }].concat());
         let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
         let lit = [Some(&view_layout), Some(&scene_layout)];
         let depth_only = [Some(&view_layout)];

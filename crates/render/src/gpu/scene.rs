@@ -2,27 +2,29 @@
 
 use super::data::Eye;
 use super::shadow;
+use crate::list::bounds::{Bounds, ball_of};
 use crate::material::linear3;
 use crate::{DrawList, Light, MAX_LIGHTS, MAX_SHADOWS};
 
 /// The views of the lights that throw shadows, with the light's number: one layer of the shadow maps each, in the list's order.
-pub fn shadow_eyes(list: &DrawList) -> Vec<(usize, Eye)> {
+pub fn shadow_eyes(list: &DrawList, seen: Option<&Bounds>) -> Vec<(usize, Eye)> {
+    let Some(seen) = seen else { return Vec::new() };
     let size = list.settings.shadow_map_size;
-    list.lights.iter().enumerate().filter_map(|(i, light)| Some((i, shadow::eye_of(light, list, size)?))).take(MAX_SHADOWS).collect()
+    list.lights.iter().enumerate().filter_map(|(i, light)| Some((i, shadow::eye_of(light, list, seen, size)?))).take(MAX_SHADOWS).collect()
 }
 
 /// Reach of ambient occlusion in metres; 0 for none.
-pub fn occlusion_reach(list: &DrawList) -> f32 {
+pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>) -> f32 {
     match (list.settings.occlusion_m, list.sky.ambient > 0.0) {
         (_, false) => 0.0,
         (Some(reach), _) => reach,
-        (None, _) => list.bounding_ball(false).map_or(0.0, |(_, radius)| radius / 15.0),
+        (None, _) => seen.map_or(0.0, |b| ball_of(b).1 / 12.0),
     }
 }
 
 /// Middle x and y of the floor, and its reach.
-pub fn floor(list: &DrawList) -> [f32; 4] {
-    let middle = list.bounding_ball(false).map_or([0.0; 2], |(c, _)| [c.x, c.y]);
+pub fn floor(list: &DrawList, seen: Option<&Bounds>) -> [f32; 4] {
+    let middle = seen.map_or([0.0; 2], |b| ball_of(b).0.xy().into());
     [middle[0], middle[1], list.ground.as_ref().map_or(1.0, |g| g.reach_m), 0.0]
 }
 
@@ -45,7 +47,7 @@ fn bounce(list: &DrawList) -> [f32; 3] {
 }
 
 /// `struct Scene`.
-pub fn floats(list: &DrawList, shadows: &[(usize, Eye)], occlusion: bool) -> Vec<f32> {
+pub fn floats(list: &DrawList, seen: Option<&Bounds>, shadows: &[(usize, Eye)], occlusion: bool) -> Vec<f32> {
     let mut out = Vec::new();
     for (i, light) in list.lights.iter().enumerate() {
         let layer = shadows.iter().position(|(of, _)| *of == i).map_or(-1.0, |layer| layer as f32);
@@ -66,7 +68,7 @@ pub fn floats(list: &DrawList, shadows: &[(usize, Eye)], occlusion: bool) -> Vec
     color(sky.ground, sky.softbox);
     color(sky.backdrop.unwrap_or_default(), flag(sky.backdrop.is_some()));
     out.extend([s.exposure, flag(s.tone_map), flag(occlusion), s.shadow_map_size as f32]);
-    out.extend(floor(list));
+    out.extend(floor(list, seen));
     let [r, g, b] = bounce(list);
     out.extend([r, g, b, 0.0]);
     out

@@ -2,24 +2,25 @@
 
 use super::data::Eye;
 use crate::camera::orthographic;
+use crate::list::bounds::{Bounds, corners_of, union};
 use crate::{DrawList, Light};
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
-/// The view of a light onto what throws shadows, or `None` where it throws none: nothing is there, or the lamp hangs in the middle of it.
-pub fn eye_of(light: &Light, list: &DrawList, size: u32) -> Option<Eye> {
+/// The view of a light onto what throws shadows near the `seen` box, or `None` where it throws none: nothing is there, or the lamp hangs amidst it.
+pub fn eye_of(light: &Light, list: &DrawList, seen: &Bounds, size: u32) -> Option<Eye> {
     if !light.casts_shadow() {
         return None;
     }
-    let (lo, hi) = list.bounding_box(true)?;
+    let casters = union(list.casters_near(seen).map(|c| c.2))?;
     match light {
-        Light::Directional { direction, .. } => Some(sun(direction, list, &lo, &hi, size)),
-        Light::Point { position, .. } => lamp(position, &lo, &hi, size),
+        Light::Directional { direction, .. } => Some(sun(direction, list, seen, &casters, size)),
+        Light::Point { position, .. } => lamp(position, &casters, size),
     }
 }
 
 /// Parallel view along `direction`. Its x axis follows the longer side of the scene and both axes are scaled by themselves,
 /// so that a long lane wastes no texels.
-fn sun(direction: &Vector3<f32>, list: &DrawList, lo: &Point3<f32>, hi: &Point3<f32>, size: u32) -> Eye {
+fn sun(direction: &Vector3<f32>, list: &DrawList, seen: &Bounds, (lo, hi): &Bounds, size: u32) -> Eye {
     let back = -direction.normalize();
     let extent = hi - lo;
     let long = if extent.x >= extent.y { Vector3::x() } else { Vector3::y() };
@@ -27,18 +28,21 @@ fn sun(direction: &Vector3<f32>, list: &DrawList, lo: &Point3<f32>, hi: &Point3<
     let side = (along - back * back.dot(&along)).normalize();
     let up = back.cross(&side);
     let view = view_matrix(&side, &up, &back, &nalgebra::center(lo, hi));
-    let see = |p: Point3<f32>| view.transform_point(&p).coords;
-    let instances = list.instances.iter().filter(|i| i.casts_shadow).flat_map(|i| list.corners(i)).map(|p| (see(p), 0.0));
-    let spheres = list.spheres.iter().filter(|s| s.casts_shadow).map(|s| (see(s.center), s.radius));
     let far = Vector3::repeat(f32::MAX);
-    let (min, max) = instances.chain(spheres).fold((far, -far), |(min, max), (p, r)| (min.inf(&p.add_scalar(-r)), max.sup(&p.add_scalar(r))));
+    let (mut min, mut max) = (far, -far);
+    for (points, radius, _) in list.casters_near(seen) {
+        for p in points.iter().map(|p| view.transform_point(p).coords) {
+            (min, max) = (min.inf(&p.add_scalar(-radius)), max.sup(&p.add_scalar(radius)));
+        }
+    }
     // room for the filter at the rim, and never without extent
     let margin = (max - min) * 0.02 + Vector3::repeat(1e-3 + 1e-4 * extent.norm());
     Eye::new(&view, &orthographic(min - margin, max + margin), size, size)
 }
 
-/// Perspective view from a lamp outside the box `lo`..`hi`, looking at the box's nearest point, with a frustum that just holds its corners.
-fn lamp(position: &Point3<f32>, lo: &Point3<f32>, hi: &Point3<f32>, size: u32) -> Option<Eye> {
+/// Perspective view from a lamp outside the box around what throws shadows, looking at the box's nearest point, with a frustum that just holds its corners.
+fn lamp(position: &Point3<f32>, casters: &Bounds, size: u32) -> Option<Eye> {
+    let (lo, hi) = casters;
     let nearest = Point3::from(position.coords.sup(&lo.coords).inf(&hi.coords));
     let forward = (nearest - position).try_normalize(1e-3 * (hi - lo).norm().max(1e-3))?;
     let back = -forward;
@@ -46,10 +50,7 @@ fn lamp(position: &Point3<f32>, lo: &Point3<f32>, hi: &Point3<f32>, size: u32) -
     let side = along.cross(&back).normalize();
     let up = back.cross(&side);
     let view = view_matrix(&side, &up, &back, position);
-    let corners = (0..8).map(|k: usize| {
-        let pick = |axis: usize| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
-        view.transform_point(&Point3::new(pick(0), pick(1), pick(2)))
-    });
+    let corners = corners_of(casters).map(|p| view.transform_point(&p));
     let (mut near, mut far, mut min, mut max) = (f32::MAX, 0f32, [f32::MAX; 2], [-f32::MAX; 2]);
     for p in corners {
         let s = -p.z;

@@ -4,6 +4,7 @@ use super::data::{self, Eye};
 use super::pipelines::Pipelines;
 use super::targets::Targets;
 use super::{Gpu, scene};
+use crate::list::bounds::Bounds;
 use crate::list::debug::strokes;
 use crate::{DebugSphere, DrawList, MAX_SHADOWS, MeshData, RenderError, SphereStyle};
 use nalgebra::Matrix4;
@@ -102,8 +103,10 @@ impl Frame {
         projection: &Matrix4<f32>,
     ) -> Result<Self, RenderError> {
         let eye = Eye::new(view, projection, targets.width, targets.height);
-        let shadows = scene::shadow_eyes(list);
-        let reach = scene::occlusion_reach(list);
+        let seen = list.visible_box(&(projection * view));
+        let seen = seen.as_ref();
+        let shadows = scene::shadow_eyes(list, seen);
+        let reach = scene::occlusion_reach(list, seen);
         let occlusion = reach > 0.0;
         let buffers = meshes.sync(gpu, &list.meshes)?;
         let (groups, instances) = group_instances(gpu, list, &buffers)?;
@@ -116,12 +119,13 @@ impl Frame {
             let entries = [BindingResource::TextureView(&targets.view_depth), reach_uniform.as_entire_binding(), BindingResource::TextureView(raw)];
             bind(gpu, &pipelines.occlusion_layout, &entries)
         };
-        let scene_uniform = buffer(gpu, bytemuck::cast_slice(&scene::floats(list, &shadows, occlusion)), BufferUsages::UNIFORM, "scene")?;
+        let scene_uniform = buffer(gpu, bytemuck::cast_slice(&scene::floats(list, seen, &shadows, occlusion)), BufferUsages::UNIFORM, "scene")?;
         let scene_entries = [
             scene_uniform.as_entire_binding(),
             BindingResource::TextureView(&targets.shadow_array),
             BindingResource::Sampler(&pipelines.shadow_sampler),
             BindingResource::TextureView(&targets.occlusion),
+            BindingResource::TextureView(&targets.shadow_array),
         ];
         let (spheres, casting_spheres) = sphere_batch(gpu, list)?;
         Ok(Frame {
@@ -133,7 +137,7 @@ impl Frame {
             occlusion_blur: bind_occlusion(&targets.occlusion_raw),
             groups,
             instances,
-            ground: ground(gpu, list)?,
+            ground: ground(gpu, list, seen)?,
             spheres,
             casting_spheres,
             shells: shell_batch(gpu, list, view)?,
@@ -238,9 +242,9 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
     Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
 }
 
-fn ground(gpu: &Gpu, list: &DrawList) -> Result<Option<(MeshBuffers, Buffer)>, RenderError> {
+fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<(MeshBuffers, Buffer)>, RenderError> {
     let Some(ground) = &list.ground else { return Ok(None) };
-    let [x, y, reach, _] = scene::floor(list);
+    let [x, y, reach, _] = scene::floor(list, seen);
     let mut quad = MeshData::ground_quad(reach);
     quad.positions.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, ground.height_m]);
     let mut floats = Vec::new();

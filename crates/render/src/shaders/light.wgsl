@@ -29,6 +29,7 @@ struct Scene {
 @group(1) @binding(1) var shadow_maps: texture_depth_2d_array;
 @group(1) @binding(2) var shadow_sampler: sampler_comparison;
 @group(1) @binding(3) var occlusion: texture_2d<f32>;
+@group(1) @binding(4) var shadow_depths: texture_2d_array<f32>; // the same maps, to be read as numbers (OpenGL reads no depth texture)
 
 struct Surface {
     position: vec3f,
@@ -116,7 +117,7 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     for (var i = 0u; i < 16u; i++) {
         let d = disc_point(i, 16.0, turn) * search;
         let at = vec2i(clamp((uv + d) * texels, vec2f(0.0), vec2f(texels - 1.0)));
-        let z = textureLoad(shadow_maps, at, index, 0);
+        let z = textureLoad(shadow_depths, at, index, 0).x;
         if (z > depth + dot(slope, d) + bias) { sum += z; count += 1.0; }
     }
     if (count == 0.0) { return 1.0; }

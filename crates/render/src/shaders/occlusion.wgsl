@@ -1,6 +1,6 @@
 // Ambient occlusion in screen space, after McGuire, Mara and Luebke, "Scalable Ambient Obscurance", 2012:
 // A = max(0, 1 - 5 k / (r^6 n) * sum max(0, r^2 - v.v)^3 max(0, (v.n - b) / (v.v + e))), v from the point to its neighbours.
-@group(1) @binding(0) var depth_map: texture_depth_2d;
+@group(1) @binding(0) var depth_map: texture_2d<f32>;
 @group(1) @binding(1) var<uniform> reach: vec4f; // x: radius in metres
 @group(1) @binding(2) var raw: texture_2d<f32>;
 
@@ -11,13 +11,13 @@ const TAPS = 20u;
 }
 
 fn depth_at(p: vec2i) -> f32 {
-    return textureLoad(depth_map, clamp(p, vec2i(0), vec2i(view.size.xy) - 1), 0);
+    return textureLoad(depth_map, clamp(p, vec2i(0), vec2i(view.size.xy) - 1), 0).x;
 }
 
 fn point_at(p: vec2i) -> vec3f {
     let q = clamp(p, vec2i(0), vec2i(view.size.xy) - 1);
     let ray = ray_at(vec2f(q) + 0.5);
-    return ray.origin + ray.dir * view_depth_of(textureLoad(depth_map, q, 0));
+    return ray.origin + ray.dir * view_depth_of(textureLoad(depth_map, q, 0).x);
 }
 
 // The shorter of the two differences along one axis: the one that stays on the surface.

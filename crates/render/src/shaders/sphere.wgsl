@@ -75,26 +75,10 @@ fn hit(ball: vec4f, pixel: vec2f) -> Hit {
     return Hit((along - back) / len, ball.xyz + n * ball.w, n);
 }
 
-fn sample_mask(ball: vec4f, pixel: vec2f) -> u32 {
-    // the four standard sample positions
-    var mask = 0u;
-    if (inside(ball, pixel + vec2f(-0.125, -0.375)) >= 0.0) { mask |= 1u; }
-    if (inside(ball, pixel + vec2f(0.375, -0.125)) >= 0.0) { mask |= 2u; }
-    if (inside(ball, pixel + vec2f(-0.375, 0.125)) >= 0.0) { mask |= 4u; }
-    if (inside(ball, pixel + vec2f(0.125, 0.375)) >= 0.0) { mask |= 8u; }
-    return mask;
-}
-
 fn unturn(q: vec4f, v: vec3f) -> vec3f {
     let t = 2.0 * cross(-q.xyz, v);
     return v + q.w * t + cross(-q.xyz, t);
 }
-
-struct SpherePixel {
-    @location(0) color: vec4f,
-    @builtin(frag_depth) depth: f32,
-    @builtin(sample_mask) mask: u32,
-};
 
 @fragment fn fs_sphere(in: SphereOut) -> SpherePixel {
     let pixel = in.clip.xy;
@@ -106,7 +90,7 @@ struct SpherePixel {
     let object_normal = unturn(in.turn, h.normal);
     let color = pixel_color(h.position, h.normal, to_eye, object_normal * in.ball.w, object_normal, h.s, pixel,
         Look(in.color_rough, in.other_metal, in.pattern));
-    return SpherePixel(vec4f(color, 1.0), depth, mask);
+    return sphere_pixel(vec4f(color, 1.0), depth, mask);
 }
 
 @fragment fn fs_sphere_depth(in: SphereOut) -> @builtin(frag_depth) f32 {
@@ -126,5 +110,5 @@ struct SpherePixel {
     if (mask == 0u || h.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
     let rim = 1.0 - clamp(dot(h.normal, -normalize(ray_at(pixel).dir)), 0.0, 1.0);
     let alpha = in.color_rough.w * mix(0.3, 1.0, rim * rim * rim);
-    return SpherePixel(vec4f(in.color_rough.xyz * alpha, alpha), depth, mask);
+    return sphere_pixel(vec4f(in.color_rough.xyz * alpha, alpha), depth, mask);
 }

@@ -1,6 +1,6 @@
 //! Outlines, depth and determinism, measured on pictures against the projection's closed forms.
 
-use crate::support::{area, bare, from_above, linear, moments, picture, renderer};
+use crate::support::{area, bare, exact_edges, from_above, linear, moments, picture, renderer};
 use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use tumble_render::{Camera, DebugStyle, DrawList, Image, Instance, Material, MeshData, RenderError};
@@ -11,7 +11,7 @@ fn ball(list: &mut DrawList, center: [f32; 3], radius: f32, color: [f32; 3]) {
     list.add_sphere(center.into(), radius, UnitQuaternion::identity(), Material::unlit(color));
 }
 
-fn block<'l>(list: &'l mut DrawList, half: [f32; 3], at: [f32; 3], color: [f32; 3]) -> &'l mut Instance {
+fn block(list: &mut DrawList, half: [f32; 3], at: [f32; 3], color: [f32; 3]) -> &mut Instance {
     let mesh = list.add_mesh(MeshData::cuboid(half));
     list.add_instance(mesh, Isometry3::translation(at[0], at[1], at[2]), Material::unlit(color))
 }
@@ -71,6 +71,9 @@ fn a_box_covers_its_projected_face() {
 
 #[test]
 fn a_cast_ball_and_a_tessellated_one_agree() {
+    if !exact_edges() {
+        return;
+    }
     let pictures = [true, false].map(|cast| {
         let mut list = bare(Camera::look_at(Point3::new(3.0, -2.0, 2.0), Point3::new(0.3, 0.1, 0.0)));
         if cast {
@@ -92,6 +95,9 @@ fn a_cast_ball_and_a_tessellated_one_agree() {
 
 #[test]
 fn edges_have_quarter_steps() {
+    if !exact_edges() {
+        return;
+    }
     let mut list = bare(from_above(5.0));
     ball(&mut list, [0.0; 3], 1.0, WHITE);
     block(&mut list, [0.25, 0.25, 0.1], [1.5, 0.0, 0.0], WHITE).pose.rotation = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.3);
@@ -146,6 +152,9 @@ fn a_ball_sinks_into_a_floor_at_its_waterline() {
 
 #[test]
 fn off_axis_projection_shifts_the_picture() {
+    if !exact_edges() {
+        return;
+    }
     // a frustum through the window x 0..2, y -1..1 at distance 1: the point straight ahead lies on the left edge
     let mut projection = Matrix4::zeros();
     (projection[(0, 0)], projection[(0, 2)], projection[(1, 1)]) = (1.0, 1.0, 1.0);
@@ -211,6 +220,26 @@ fn the_same_list_gives_the_same_bytes() {
     one.render(&bare(from_above(3.0)), 64, 64).expect("valid");
     assert_eq!(first, one.render(&list, 320, 200).expect("valid"), "after another picture");
     assert!(first.rgba.chunks(4).any(|p| p[0] > 200) && first.rgba.chunks(4).any(|p| p[0] < 60), "the picture has light and dark");
+}
+
+#[test]
+fn a_body_that_fell_away_changes_nothing_for_the_rest() {
+    let mut list = DrawList::default();
+    ball(&mut list, [0.0, 0.0, 0.5], 0.5, WHITE);
+    block(&mut list, [0.3, 0.3, 0.3], [1.0, 0.2, 0.3], WHITE).material = Material::plastic([0.8, 0.2, 0.1]);
+    list.ground = Some(tumble_render::Ground::grid(0.0));
+    list.lights.push(tumble_render::Light::sun(Vector3::new(0.4, 0.5, -1.0), 2.0));
+    list.lights.push(tumble_render::Light::lamp(Point3::new(0.0, 1.0, 4.0), 1.0, 3.0));
+    list.camera = Camera::look_at(Point3::new(5.0, -4.0, 3.0), Point3::origin());
+    let Some(before) = picture(&list, 300, 200) else { return };
+    ball(&mut list, [300.0, 20.0, -9000.0], 0.5, WHITE);
+    assert_eq!(picture(&list, 300, 200).expect("an adapter"), before);
+}
+
+#[test]
+fn a_missing_adapter_names_the_packages() {
+    let message = RenderError::NoAdapter { reason: "none".into() }.to_string();
+    assert!(message.contains("apt-get install mesa-vulkan-drivers libvulkan1"), "{message}");
 }
 
 #[test]

@@ -1,0 +1,96 @@
+//! Where the things of a list are: for cameras, for fitting shadow maps, for the reach of effects.
+
+use super::{DrawList, Instance};
+use crate::Camera;
+use nalgebra::{Matrix4, Point3, Vector3};
+
+/// Corners `(min, max)` of a box along the world axes.
+pub(crate) type Bounds = (Point3<f32>, Point3<f32>);
+
+/// Things farther from the middle of what is seen than this many times its radius are not fitted into shadow maps: a body that fell off
+/// the floor long ago must not blur the shadows of the rest.
+const FAR_AWAY: f32 = 4.0;
+
+impl DrawList {
+    /// A ball `(center, radius)` around all instances and spheres (those that throw shadows, if `casters` is set); `None` when there are none.
+    /// The ground and debug drawings do not count.
+    pub fn bounding_ball(&self, casters: bool) -> Option<(Point3<f32>, f32)> {
+        self.bounding_box(casters).map(|b| ball_of(&b))
+    }
+
+    /// The box `(min, max)` around all instances and spheres, as for [`DrawList::bounding_ball`].
+    pub fn bounding_box(&self, casters: bool) -> Option<(Point3<f32>, Point3<f32>)> {
+        union(self.items(casters).map(|item| item.1))
+    }
+
+    /// A camera that looks along `direction` and shows everything.
+    pub fn framing_camera(&self, direction: Vector3<f32>) -> Camera {
+        let (center, radius) = self.bounding_ball(false).unwrap_or((Point3::origin(), 1.0));
+        Camera::framing(center, radius, direction, 0.9)
+    }
+
+    /// The box around what a view shows at least a part of (by bounding balls); around everything where it shows nothing.
+    pub(crate) fn visible_box(&self, clip_from_world: &Matrix4<f32>) -> Option<Bounds> {
+        let planes = planes(clip_from_world);
+        let seen = |b: &Bounds| {
+            let (center, radius) = ball_of(b);
+            planes.iter().all(|p| p.dot(&center.to_homogeneous()) >= -radius)
+        };
+        union(self.items(false).map(|item| item.1).filter(seen)).or_else(|| self.bounding_box(false))
+    }
+
+    /// What throws shadows near the `seen` box: each one's corners in the world, as points to be transformed, with a radius around them.
+    pub(crate) fn casters_near(&self, seen: &Bounds) -> impl Iterator<Item = (Vec<Point3<f32>>, f32, Bounds)> {
+        let (middle, radius) = ball_of(seen);
+        self.items(true).filter_map(move |(points, bounds, around)| {
+            let (center, own) = ball_of(&bounds);
+            ((center - middle).norm() - own <= FAR_AWAY * radius).then_some((points, around, bounds))
+        })
+    }
+
+    /// Points and a radius around them that hold each item, and its box.
+    fn items(&self, casters: bool) -> impl Iterator<Item = (Vec<Point3<f32>>, Bounds, f32)> {
+        let meshes: Vec<_> = self.meshes.iter().map(|m| m.bounds()).collect();
+        let instances = self.instances.iter().filter(move |i| i.casts_shadow || !casters).filter_map(move |i| {
+            let corners = world_corners(i, *meshes.get(i.mesh.0)?)?;
+            let bounds = union(corners.iter().map(|&p| (p, p)))?;
+            Some((corners, bounds, 0.0))
+        });
+        let spheres = self.spheres.iter().filter(move |s| s.casts_shadow || !casters).map(|s| {
+            let r = Vector3::repeat(s.radius);
+            (vec![s.center], (s.center - r, s.center + r), s.radius)
+        });
+        instances.chain(spheres)
+    }
+}
+
+/// The eight world corners of an instance's box; none for an empty mesh.
+fn world_corners(instance: &Instance, local: Option<([f32; 3], [f32; 3])>) -> Option<Vec<Point3<f32>>> {
+    let (lo, hi) = local?;
+    Some(corners_of(&(lo.into(), hi.into())).map(|p| instance.pose * Point3::from(p.coords.component_mul(&instance.scale))).to_vec())
+}
+
+/// The smallest box around boxes.
+pub(crate) fn union(boxes: impl Iterator<Item = Bounds>) -> Option<Bounds> {
+    boxes.reduce(|(lo, hi), (a, b)| (lo.inf(&a), hi.sup(&b)))
+}
+
+/// The ball around a box.
+pub(crate) fn ball_of((lo, hi): &Bounds) -> (Point3<f32>, f32) {
+    (nalgebra::center(lo, hi), (hi - lo).norm() / 2.0)
+}
+
+/// The eight corners of a box.
+pub(crate) fn corners_of((lo, hi): &Bounds) -> [Point3<f32>; 8] {
+    std::array::from_fn(|k| {
+        let pick = |axis: usize| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
+        Point3::new(pick(0), pick(1), pick(2))
+    })
+}
+
+/// The six planes of a view, as rows whose product with a homogeneous point is its distance inside (Gribb and Hartmann, 2001).
+fn planes(clip_from_world: &Matrix4<f32>) -> [nalgebra::Vector4<f32>; 6] {
+    let row = |i: usize| clip_from_world.row(i).transpose();
+    let (x, y, z, w) = (row(0), row(1), row(2), row(3));
+    [w + x, w - x, w + y, w - y, z, w - z].map(|p| p / p.xyz().norm().max(1e-12))
+}

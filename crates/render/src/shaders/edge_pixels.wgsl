@@ -1,0 +1,13 @@
+// Edges of cast spheres where the interface cannot write a sample mask (OpenGL): whole pixels.
+struct SpherePixel {
+    @location(0) color: vec4f,
+    @builtin(frag_depth) depth: f32,
+};
+
+fn sphere_pixel(color: vec4f, depth: f32, mask: u32) -> SpherePixel {
+    return SpherePixel(color, depth);
+}
+
+fn sample_mask(ball: vec4f, pixel: vec2f) -> u32 {
+    return select(0u, 15u, inside(ball, pixel) >= 0.0);
+}
