@@ -4,3 +4,4 @@
 //! the exact state. Nothing here ever steps a world.
 
 pub mod record;
+pub mod world;

@@ -22,6 +22,7 @@
 //! one pass with four samples per pixel: backdrop, floor, meshes, spheres, lines, translucent shells, lines on top.
 
 mod camera;
+mod draw;
 mod error;
 mod gpu;
 mod image;
@@ -30,6 +31,7 @@ mod material;
 mod mesh;
 
 pub use camera::Camera;
+pub use draw::{DebugDraw, Drawing, UnknownOverlay};
 pub use error::RenderError;
 pub use gpu::Renderer;
 pub use image::Image;

@@ -1,0 +1,53 @@
+//! What of a world goes into a recording.
+
+use crate::record::{Entity, Pose, Shape, VisualPart};
+use tumble_collide::Shape as Solid;
+use tumble_core::{ObjectId, World};
+
+/// Half the side of the square that stands for a half-space, metres.
+const PLANE_M: f64 = 20.0;
+
+/// Every part that can be drawn as an entity of its own: the object's name, with `/part` behind it where an object has several.
+pub fn entities(world: &World) -> Vec<Entity> {
+    sites(world).map(|(id, part)| entity(world, id, part)).collect()
+}
+
+/// The poses of the same parts in the same order.
+pub fn poses(world: &World) -> Vec<Pose> {
+    sites(world).filter_map(|(id, part)| world.site(id, part)).map(|site| pose(&site.pose)).collect()
+}
+
+fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {
+    let parts = |id: ObjectId| world.view().span(id).map_or(0, |span| span.site.len());
+    world.ids().iter().flat_map(move |&id| (0..parts(id)).map(move |part| (id, part)))
+}
+
+fn entity(world: &World, id: ObjectId, part: usize) -> Entity {
+    let object = world.object(id);
+    let name = object.map_or(String::new(), |o| o.name().to_string());
+    let several = world.view().span(id).is_some_and(|span| span.site.len() > 1);
+    let visuals = object.and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
+    let parts = visuals.iter().filter(|v| v.part == part).map(|v| {
+        let [r, g, b] = v.look.color;
+        VisualPart { shape: shape(&v.shape), pose: pose(&v.pose), color: [r, g, b, 1.0].map(f64::from).map(|c| c as _) }
+    });
+    Entity { name: if several { format!("{name}/{part}") } else { name }, parts: parts.collect() }
+}
+
+fn pose(pose: &tumble_collide::Pose) -> Pose {
+    Pose { position: pose.translation.vector.into(), rotation: pose.rotation.coords.into() }
+}
+
+fn shape(shape: &Solid) -> Shape {
+    match shape {
+        Solid::HalfSpace => Shape::Plane { half_size: PLANE_M },
+        Solid::Sphere { radius } => Shape::Sphere { radius: *radius },
+        Solid::Box { half_extents } => Shape::Box { half_extents: (*half_extents).into() },
+        Solid::Capsule { radius, half_length } => Shape::Capsule { radius: *radius, half_height: *half_length },
+        Solid::Cylinder(c) => Shape::Cylinder { radius: c.radius(), half_height: c.half_length() },
+        Solid::Mesh(mesh) => Shape::Mesh {
+            vertices: mesh.mesh().vertices.iter().map(|v| (*v).into()).collect(),
+            triangles: mesh.mesh().triangles.clone(),
+        },
+    }
+}

@@ -1,0 +1,55 @@
+//! Looks, as objects and scene files give them, made materials.
+
+use crate::{Material, Pattern};
+use tumble_core::Look;
+
+/// The material of a look. A ball's number is the one at the end of the body's name (`ball_12`); none leaves the spots blank.
+pub(super) fn of_look(look: &Look, name: &str) -> Material {
+    let property = |key: &str, usual: f64| look.properties.iter().find(|(k, _)| k == key).map_or(usual, |(_, v)| *v) as f32;
+    let second = [property("second_r", 1.0), property("second_g", 1.0), property("second_b", 1.0)];
+    let numbers = Numbers { second, scale_m: property("scale_m", 0.1), number: number(name) };
+    Material {
+        color: look.color,
+        roughness: look.roughness,
+        metallic: look.metallic,
+        clearcoat: property("clearcoat", 0.0),
+        pattern: pattern(&look.shader, &numbers),
+        ..Material::default()
+    }
+}
+
+/// The material of a look in a scene file.
+pub(super) fn of_spec(look: &tumble_scene::Look) -> Material {
+    let numbers = Numbers { second: look.second_color.map(|c| c as f32), scale_m: look.pattern_scale_m as f32, number: 0 };
+    Material {
+        color: look.color.map(|c| c as f32),
+        roughness: look.roughness as f32,
+        metallic: look.metallic as f32,
+        clearcoat: look.clearcoat as f32,
+        pattern: pattern(look.pattern.name(), &numbers),
+        ..Material::default()
+    }
+}
+
+struct Numbers {
+    second: [f32; 3],
+    scale_m: f32,
+    number: u8,
+}
+
+fn pattern(name: &str, n: &Numbers) -> Pattern {
+    match name {
+        "checker" => Pattern::Checker { other: n.second, size_m: n.scale_m },
+        "grid" => Pattern::Grid { line: n.second, size_m: n.scale_m, width_m: 0.02 * n.scale_m },
+        "solid_ball" => Pattern::Ball { number: n.number, stripe: false },
+        "striped_ball" => Pattern::Ball { number: n.number, stripe: true },
+        "wood" => Pattern::Wood { dark: n.second, ring_m: 0.3 * n.scale_m, board_m: n.scale_m },
+        "felt" => Pattern::Felt { thread_m: 0.1 * n.scale_m },
+        _ => Pattern::Plain,
+    }
+}
+
+fn number(name: &str) -> u8 {
+    let digits = name.len() - name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    name[name.len() - digits..].parse().ok().filter(|n| *n < 100).unwrap_or(0)
+}
