@@ -13,8 +13,11 @@ pub struct MeshSpec {
     pub name: String,
     /// Where its triangles come from.
     pub source: MeshSource,
-    /// Levels of its sphere tree, 1 to 10; `None` leaves the choice to the builder.
+    /// Most levels of its sphere tree, 1 to 9; `None` leaves the choice to the builder.
     pub sphere_tree_depth: Option<u32>,
+    /// How far the spheres may reach beyond the surface, as a part of the mesh's diagonal, 1e-4 to 1; `None`
+    /// leaves the choice to the builder.
+    pub sphere_tree_error: Option<f64>,
 }
 
 /// Where the triangles of a mesh come from. Generated meshes have z as their axis, are closed, and
@@ -79,6 +82,8 @@ pub enum MeshSource {
     },
 }
 
+const TREE_ERROR: Bound = Bound::new(1e-4, 1.0, "a part of the mesh's diagonal, from 1e-4 to 1");
+
 #[derive(Clone, Copy)]
 enum Kind {
     File,
@@ -107,10 +112,11 @@ impl MeshSpec {
             f.give_up();
             return None;
         };
-        let sphere_tree_depth = f.value("sphere_tree_depth").map(|v| f.as_integer("sphere_tree_depth", v, 1..=10));
+        let sphere_tree_depth = f.value("sphere_tree_depth").map(|v| f.as_integer("sphere_tree_depth", v, 1..=9));
+        let sphere_tree_error = f.optional_number("sphere_tree_error", TREE_ERROR);
         let source = MeshSource::read(&mut f, kind, folder);
         f.finish();
-        Some(MeshSpec { name: name.to_owned(), source: source?, sphere_tree_depth })
+        Some(MeshSpec { name: name.to_owned(), source: source?, sphere_tree_depth, sphere_tree_error })
     }
 }
 

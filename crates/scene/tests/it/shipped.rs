@@ -191,7 +191,7 @@ fn bowling_is_regulation() {
     let pins: Vec<&BodySpec> =
         scene.bodies.iter().filter(|body| body.name.starts_with("pin_") && body.mode == Mode::Dynamic).collect();
     assert_eq!(pins.len(), 10);
-    assert_eq!(pins[0].position_m, [18.288, 0.0, 0.0]);
+    assert_eq!(pins[0].position_m, [18.288, 0.0, 0.0008]);
     // Pin 2 stands to the left (+y), 3 to the right; 7 and 10 end the last row, 3 x 12 in apart.
     assert!(pins[1].position_m[1] > 0.0 && pins[2].position_m[1] < 0.0);
     assert!((distance(pins[6].position_m, pins[9].position_m) - 3.0 * 0.3048).abs() < 1e-12);
