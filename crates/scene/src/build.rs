@@ -116,6 +116,7 @@ impl SceneFile {
         notes.extend(report.notes().into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
         let mut settings = TreeSettings::default();
         settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
+        settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
         Shape::mesh(mesh, &settings).map_err(|e| wrong(e.to_string()))
     }
 

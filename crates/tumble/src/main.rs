@@ -1,1 +1,37 @@
-fn main() {}
+//! The `tumble` command: run scenes, check files, list what is shipped.
+//!
+//! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
+
+mod args;
+mod check;
+mod failure;
+mod progress;
+mod run;
+mod summary;
+
+use args::{Command, Tumble};
+use clap::Parser;
+use failure::Failure;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let outcome = match Tumble::parse().command {
+        Command::Run(options) => run::run(&options),
+        Command::Check(options) => check::check(&options),
+        Command::Scenes => scenes(),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprint!("{}", failure.report());
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+fn scenes() -> Result<(), Failure> {
+    for scene in tumble::scene::shipped() {
+        println!("{:<12} {}", scene.name, scene.description());
+    }
+    Ok(())
+}

@@ -1,0 +1,114 @@
+//! What can be typed.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+use tumble::render::DebugDraw;
+use tumble::scene::{Integrator, Solver, Stepper};
+
+/// Real-time dynamics for interactive and immersive environments.
+#[derive(Parser)]
+#[command(version, name = "tumble")]
+pub struct Tumble {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Simulate a scene; record it, sum it up, take a picture of its end.
+    Run(RunOptions),
+    /// Check scene and mesh files; nothing is run.
+    Check(CheckOptions),
+    /// List the scenes that are shipped.
+    Scenes,
+}
+
+#[derive(Args)]
+pub struct RunOptions {
+    /// A scene file, a folder that holds a scene.toml, or the name of a shipped scene.
+    pub scene: String,
+    /// Simulated time to run for, s (default: what the scene says).
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// Length of a frame, s (default: what the scene says).
+    #[arg(long, value_name = "S", value_parser = frame)]
+    pub dt: Option<f64>,
+    /// time_stepping or backtracking.
+    #[arg(long, value_name = "NAME")]
+    pub stepper: Option<Stepper>,
+    /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
+    #[arg(long, value_name = "NAME", value_parser = solver)]
+    pub solver: Option<Solver>,
+    /// verlet, symplectic_euler, explicit_euler or rk4; time_stepping is the midpoint rule whatever is chosen.
+    #[arg(long, value_name = "NAME")]
+    pub integrator: Option<Integrator>,
+    /// Write a recording (MCAP; opens in Foxglove).
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Write a summary (JSON).
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
+    /// Write a picture of the last frame (PNG).
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Size of the picture, pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    pub size: (u32, u32),
+    /// Draw over the picture: contacts, normals, velocities, forces, tree=LEVEL, all; with commas between them.
+    #[arg(long, value_name = "WHAT", default_value = "")]
+    pub debug_draw: Overlays,
+    /// Restore a saved state before the first step.
+    #[arg(long, value_name = "FILE")]
+    pub restore: Option<PathBuf>,
+    /// Save the state after the last step.
+    #[arg(long, value_name = "FILE")]
+    pub save: Option<PathBuf>,
+    /// Say nothing but errors.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+#[derive(Args)]
+pub struct CheckOptions {
+    /// Scene files, folders, names of shipped scenes; .obj and .stl meshes.
+    #[arg(required = true)]
+    pub files: Vec<String>,
+}
+
+/// Overlays, or none for an empty word.
+#[derive(Clone, Copy, Default)]
+pub struct Overlays(pub DebugDraw);
+
+impl std::str::FromStr for Overlays {
+    type Err = tumble::render::UnknownOverlay;
+
+    fn from_str(words: &str) -> Result<Overlays, Self::Err> {
+        Ok(Overlays(if words.is_empty() { DebugDraw::default() } else { words.parse()? }))
+    }
+}
+
+fn number(text: &str, from: f64, to: f64) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (from..=to).contains(&x) => Ok(x),
+        _ => Err(format!("wanted a number from {from} to {to}")),
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    number(text, 0.0, 1e6)
+}
+
+fn frame(text: &str) -> Result<f64, String> {
+    number(text, 1e-6, 1.0)
+}
+
+fn solver(text: &str) -> Result<Solver, String> {
+    let name = if text == "lcp" { "lcp_pyramid" } else { text };
+    name.parse().map_err(|e: tumble::scene::UnknownName| e.to_string())
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let fits = |side: u32| (1..=tumble::render::MAX_SIDE).contains(&side);
+    parsed.filter(|(w, h)| fits(*w) && fits(*h)).ok_or_else(|| format!("wanted WIDTHxHEIGHT in pixels, each 1 to {}", tumble::render::MAX_SIDE))
+}

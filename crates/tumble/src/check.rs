@@ -1,0 +1,56 @@
+//! `tumble check`: reads and builds, runs nothing.
+
+use crate::args::CheckOptions;
+use crate::failure::Failure;
+use std::path::Path;
+use tumble::collide::{Shape, TreeSettings};
+use tumble::scene::{read_triangles, resolve_scene};
+
+/// Checks every file; all are looked at, and the first failure's code is kept.
+pub fn check(options: &CheckOptions) -> Result<(), Failure> {
+    let mut outcome = Ok(());
+    for file in &options.files {
+        match one(file) {
+            Ok(said) => println!("{file}: {said}"),
+            Err(failure) => {
+                if let Err(earlier) = std::mem::replace(&mut outcome, Err(failure)) {
+                    eprint!("{}", earlier.report());
+                }
+            }
+        }
+    }
+    outcome
+}
+
+fn one(file: &str) -> Result<String, Failure> {
+    let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    if extension == "obj" || extension == "stl" { mesh(Path::new(file)) } else { scene(file) }
+}
+
+fn scene(name: &str) -> Result<String, Failure> {
+    let scene = resolve_scene(name, &[])?.load()?;
+    let (world, notes) = scene.build().map_err(Failure::input)?;
+    notes.iter().for_each(|note| println!("{note}"));
+    Ok(format!("a scene of {} bodies, {} degrees of freedom", world.ids().len(), degrees(&world)))
+}
+
+fn degrees(world: &tumble::core::World) -> usize {
+    let view = world.view();
+    let moving = world.ids().iter().filter(|id| view.status(**id).is_some_and(|s| s.moves()));
+    moving.filter_map(|id| view.span(*id)).map(|span| span.v.len()).sum()
+}
+
+fn mesh(path: &Path) -> Result<String, Failure> {
+    let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
+    let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let mut mesh = read_triangles(path, &bytes).map_err(wrong)?;
+    let report = mesh.check_closed().map_err(|e| wrong(e.to_string()))?;
+    report.notes().iter().for_each(|note| println!("{}: {note}", path.display()));
+    let (triangles, diagonal) = (mesh.triangles.len(), mesh.diagonal());
+    let (shape, center) = Shape::mesh(mesh, &TreeSettings::default()).map_err(|e| wrong(e.to_string()))?;
+    let error = shape.tree().map_or(0.0, |tree| tree.outward_error());
+    Ok(format!(
+        "a closed mesh of {triangles} triangles, volume {:.6e} m³, centre of mass ({:.6}, {:.6}, {:.6}) m, sphere tree within {:.3} % of its diagonal",
+        shape.volume(), center.x, center.y, center.z, 100.0 * error / diagonal
+    ))
+}

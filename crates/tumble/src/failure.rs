@@ -1,0 +1,45 @@
+//! How the command fails: one clear message and an exit code.
+
+use std::io::IsTerminal;
+use tumble::scene::SceneError;
+
+/// Why the command stopped.
+pub enum Failure {
+    /// Bad usage or input: exit code 2.
+    Input(String),
+    /// A failure while running: exit code 1.
+    Run(String),
+}
+
+impl Failure {
+    /// Bad input.
+    pub fn input(why: impl ToString) -> Failure {
+        Failure::Input(format!("Error: {}\n", why.to_string()))
+    }
+
+    /// Failure at run time, with what was being done.
+    pub fn run(doing: &str, why: impl ToString) -> Failure {
+        Failure::Run(format!("Error: {doing}: {}\n", why.to_string()))
+    }
+
+    /// The whole message, ending in a line feed.
+    pub fn report(&self) -> &str {
+        match self {
+            Failure::Input(report) | Failure::Run(report) => report,
+        }
+    }
+
+    /// The exit code.
+    pub fn code(&self) -> u8 {
+        match self {
+            Failure::Input(_) => 2,
+            Failure::Run(_) => 1,
+        }
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Failure {
+        Failure::Input(error.report(std::io::stderr().is_terminal()))
+    }
+}

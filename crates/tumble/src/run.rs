@@ -1,0 +1,123 @@
+//! `tumble run`: simulate, record, sum up, take a picture.
+
+use crate::args::RunOptions;
+use crate::failure::Failure;
+use crate::progress::Progress;
+use crate::summary::{State, Summary, Tally};
+use std::path::Path;
+use std::time::Instant;
+use tumble::core::World;
+use tumble::net::record::{Recorder, RecorderOptions};
+use tumble::net::world::{entities, poses};
+use tumble::render::{Drawing, RenderError, Renderer};
+use tumble::scene::{SceneFile, resolve_scene};
+
+/// Runs a scene.
+pub fn run(options: &RunOptions) -> Result<(), Failure> {
+    let scene = described(options)?;
+    let (mut world, notes) = scene.build().map_err(Failure::input)?;
+    notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
+    restore(&mut world, options)?;
+    let mut recorder = recorder(&world, &scene, options)?;
+    let start = State::of(&world);
+    let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), &scene, options)?;
+    finish_recording(recorder, options)?;
+    if let Some(path) = &options.save {
+        write(path, &world.save())?;
+    }
+    let summary = tally.summary(&scene.file, &world, start, simulated, wall);
+    if !options.quiet {
+        print!("{}", summary.lines());
+    }
+    write_summary(&summary, options)?;
+    picture(&world, &scene, options)
+}
+
+/// The scene with what the command line says instead.
+fn described(options: &RunOptions) -> Result<SceneFile, Failure> {
+    let mut scene = resolve_scene(&options.scene, &[])?.load()?;
+    let w = &mut scene.world;
+    w.seconds = options.seconds.unwrap_or(w.seconds);
+    w.dt_s = options.dt.unwrap_or(w.dt_s);
+    w.stepper = options.stepper.unwrap_or(w.stepper);
+    w.solver = options.solver.unwrap_or(w.solver);
+    w.integrator = options.integrator.unwrap_or(w.integrator);
+    Ok(scene)
+}
+
+fn restore(world: &mut World, options: &RunOptions) -> Result<(), Failure> {
+    let Some(path) = &options.restore else { return Ok(()) };
+    let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
+    let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    world.restore(&bytes).map_err(|e| wrong(e.to_string()))
+}
+
+fn recorder(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<Option<Recorder>, Failure> {
+    let Some(path) = &options.record else { return Ok(None) };
+    let recorder = Recorder::create(path, &scene.file, &entities(world), RecorderOptions::default());
+    recorder.map(Some).map_err(|e| Failure::run("recording", e))
+}
+
+/// Steps to the end; what was tallied, simulated seconds, and seconds of the clock spent in steps.
+fn simulate(world: &mut World, mut recorder: Option<&mut Recorder>, scene: &SceneFile, options: &RunOptions) -> Result<(Tally, f64, f64), Failure> {
+    let frames = (scene.world.seconds / scene.world.dt_s).round() as u64;
+    let (begin, mut tally, mut wall) = (world.time(), Tally::default(), 0.0);
+    let mut progress = Progress::new(frames, options.quiet);
+    let mut record = |world: &World| match &mut recorder {
+        Some(r) => r.frame(world.time(), world.frame(), &poses(world), &world.save()).map_err(|e| Failure::run("recording", e)),
+        None => Ok(()),
+    };
+    record(world)?;
+    for frame in 1..=frames {
+        let clock = Instant::now();
+        tally.add(world.step().map_err(|e| Failure::run("the simulation stopped", e))?);
+        wall += clock.elapsed().as_secs_f64();
+        record(world)?;
+        progress.at(frame, world.time());
+    }
+    progress.done();
+    Ok((tally, world.time() - begin, wall))
+}
+
+fn finish_recording(recorder: Option<Recorder>, options: &RunOptions) -> Result<(), Failure> {
+    let (Some(recorder), Some(path)) = (recorder, &options.record) else { return Ok(()) };
+    recorder.finish().map_err(|e| Failure::run("recording", e))?;
+    say(options, "recording", path);
+    Ok(())
+}
+
+fn write_summary(summary: &Summary, options: &RunOptions) -> Result<(), Failure> {
+    let Some(path) = &options.summary else { return Ok(()) };
+    let text = serde_json::to_string_pretty(summary).map_err(|e| Failure::run("the summary", e))?;
+    write(path, (text + "\n").as_bytes())?;
+    say(options, "summary", path);
+    Ok(())
+}
+
+/// Renders the last frame. Without a graphics adapter everything else still counts, and the message says what brings one.
+fn picture(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<(), Failure> {
+    let Some(path) = &options.picture else { return Ok(()) };
+    let list = Drawing::new(scene).list(world, &options.debug_draw.0).map_err(|e| Failure::run("the picture", e))?;
+    let mut renderer = match Renderer::new() {
+        Ok(renderer) => renderer,
+        Err(error @ RenderError::NoAdapter { .. }) => {
+            eprintln!("No picture: {error}");
+            return Ok(());
+        }
+        Err(error) => return Err(Failure::run("the picture", error)),
+    };
+    let image = renderer.render(&list, options.size.0, options.size.1).map_err(|e| Failure::run("the picture", e))?;
+    image.write_png(path).map_err(|e| Failure::run("the picture", e))?;
+    say(options, "picture", path);
+    Ok(())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
+}
+
+fn say(options: &RunOptions, what: &str, path: &Path) {
+    if !options.quiet {
+        println!("{what}: {}", path.display());
+    }
+}

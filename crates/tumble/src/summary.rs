@@ -1,0 +1,151 @@
+//! `--summary`: what a run took and how well it went, as JSON.
+
+use serde::Serialize;
+use tumble::core::{Energy, StepReport, World};
+
+/// The whole summary. Units stand in the names; quaternions are `x, y, z, w`.
+#[derive(Serialize)]
+pub struct Summary {
+    scene: String,
+    stepper: &'static str,
+    solver: &'static str,
+    dt_s: f64,
+    steps: u64,
+    simulated_s: f64,
+    wall_s: f64,
+    real_time_factor: f64,
+    contacts_mean: f64,
+    contacts_max: u32,
+    solver_residual_max_m_per_s: f64,
+    unconverged_solves: u64,
+    rays: u64,
+    max_penetration_m: f64,
+    tries_mean: f64,
+    tries_max: u32,
+    floor_hits: u64,
+    start: State,
+    end: State,
+    bodies: Vec<Body>,
+}
+
+/// Sums at one moment, over everything that moves.
+#[derive(Serialize)]
+pub struct State {
+    kinetic_energy_j: f64,
+    potential_energy_j: f64,
+    linear_momentum_n_s: [f64; 3],
+    angular_momentum_n_m_s: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct Body {
+    name: String,
+    position_m: [f64; 3],
+    orientation_xyzw: [f64; 4],
+}
+
+/// Adds up the reports of a run.
+#[derive(Default)]
+pub struct Tally {
+    steps: u64,
+    contacts: u64,
+    contacts_max: u32,
+    residual: f64,
+    unconverged: u64,
+    rays: u64,
+    penetration: f64,
+    tries: u64,
+    tries_max: u32,
+    floor_hits: u64,
+}
+
+impl Tally {
+    /// One frame's report.
+    pub fn add(&mut self, report: &StepReport) {
+        self.steps += 1;
+        self.contacts += report.contacts as u64;
+        self.contacts_max = self.contacts_max.max(report.contacts);
+        self.residual = self.residual.max(report.residual);
+        self.unconverged += report.unconverged as u64;
+        self.rays += report.rays as u64;
+        self.penetration = self.penetration.max(report.max_penetration);
+        self.tries += report.tries as u64;
+        self.tries_max = self.tries_max.max(report.tries);
+        self.floor_hits += report.floor_hits as u64;
+    }
+
+    fn per_step(&self, sum: u64) -> f64 {
+        sum as f64 / self.steps.max(1) as f64
+    }
+
+    /// The summary at the end of a run that took `wall_s` seconds of the clock.
+    pub fn summary(&self, scene: &str, world: &World, start: State, simulated_s: f64, wall_s: f64) -> Summary {
+        let (stepper, solver) = world.methods();
+        Summary {
+            scene: scene.to_string(),
+            stepper,
+            solver,
+            dt_s: world.settings().dt,
+            steps: self.steps,
+            simulated_s,
+            wall_s,
+            real_time_factor: simulated_s / wall_s.max(1e-9),
+            contacts_mean: self.per_step(self.contacts),
+            contacts_max: self.contacts_max,
+            solver_residual_max_m_per_s: self.residual,
+            unconverged_solves: self.unconverged,
+            rays: self.rays,
+            max_penetration_m: self.penetration,
+            tries_mean: self.per_step(self.tries),
+            tries_max: self.tries_max,
+            floor_hits: self.floor_hits,
+            start,
+            end: State::of(world),
+            bodies: bodies(world),
+        }
+    }
+}
+
+impl State {
+    /// The sums now.
+    pub fn of(world: &World) -> State {
+        let (Energy { kinetic, potential }, momentum) = (world.energy(), world.momentum());
+        State {
+            kinetic_energy_j: kinetic,
+            potential_energy_j: potential,
+            linear_momentum_n_s: momentum.linear.into(),
+            angular_momentum_n_m_s: momentum.angular.into(),
+        }
+    }
+}
+
+impl Summary {
+    /// The few lines for a person.
+    pub fn lines(&self) -> String {
+        let mut text = format!(
+            "{}: {:.3} s in {} frames by {} and {}; {:.1} times real time\n",
+            self.scene, self.simulated_s, self.steps, self.stepper, self.solver, self.real_time_factor
+        );
+        text += &format!(
+            "contacts {:.1} a frame (at most {}); residual at most {:.1e} m/s ({} solves unconverged, {} rays); penetration at most {:.2e} m\n",
+            self.contacts_mean, self.contacts_max, self.solver_residual_max_m_per_s, self.unconverged_solves, self.rays, self.max_penetration_m
+        );
+        if self.tries_max > 0 {
+            text += &format!("tries {:.1} a frame (at most {}); {} floor hits\n", self.tries_mean, self.tries_max, self.floor_hits);
+        }
+        let total = |s: &State| s.kinetic_energy_j + s.potential_energy_j;
+        text + &format!("energy {:.6} J at the start, {:.6} J at the end\n", total(&self.start), total(&self.end))
+    }
+}
+
+fn bodies(world: &World) -> Vec<Body> {
+    let body = |&id| {
+        let (object, site) = (world.object(id)?, world.site(id, 0)?);
+        Some(Body {
+            name: object.name().to_string(),
+            position_m: site.position().into(),
+            orientation_xyzw: site.pose.rotation.coords.into(),
+        })
+    };
+    world.ids().iter().filter_map(body).collect()
+}
