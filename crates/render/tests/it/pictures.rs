@@ -240,6 +240,20 @@ fn balls_at_behind_and_around_the_eye() {
 }
 
 #[test]
+fn what_lies_in_the_plane_of_the_ground_is_seen() {
+    let mut list = bare(Camera::look_at(Point3::new(3.0, -2.0, 1.0), Point3::origin()));
+    list.ground = Some(tumble_render::Ground { height_m: 0.0, reach_m: 80.0, material: Material::unlit([1.0, 0.0, 0.0]) });
+    let quad = list.add_mesh(MeshData::ground_quad(60.0));
+    list.add_instance(quad, Isometry3::rotation(Vector3::z() * 0.3), Material::unlit([0.0, 0.0, 1.0])).casts_shadow = false;
+    let Some(image) = picture(&list, 300, 200) else { return };
+    for y in 60..200 {
+        for x in 0..300 {
+            assert_eq!(image.pixel(x, y), Some([0, 0, 255, 255]), "at {x} {y}");
+        }
+    }
+}
+
+#[test]
 fn a_body_that_fell_away_changes_nothing_for_the_rest() {
     let mut list = DrawList::default();
     ball(&mut list, [0.0, 0.0, 0.5], 0.5, WHITE);
