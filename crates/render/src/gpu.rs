@@ -123,12 +123,12 @@ impl Gpu {
 /// A Vulkan adapter, else one of OpenGL. Asked one after the other, so that OpenGL's libraries are loaded only where needed.
 async fn first_adapter() -> Result<wgpu::Adapter, RenderError> {
     let mut reasons = Vec::new();
-    for backends in [wgpu::Backends::VULKAN, wgpu::Backends::GL] {
+    for (name, backends) in [("Vulkan", wgpu::Backends::VULKAN), ("OpenGL", wgpu::Backends::GL)] {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = backends;
         match wgpu::Instance::new(descriptor).request_adapter(&Default::default()).await {
             Ok(adapter) => return Ok(adapter),
-            Err(wgpu::RequestAdapterError::NotFound { .. }) => reasons.push(format!("no driver for {backends:?}")),
+            Err(wgpu::RequestAdapterError::NotFound { .. }) => reasons.push(format!("no {name} driver")),
             Err(e) => reasons.push(e.to_string()),
         }
     }

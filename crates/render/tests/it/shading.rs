@@ -182,7 +182,7 @@ fn a_wide_floor_that_throws_shadows_shades_itself_nowhere() {
         for j in -35..=35 {
             let (x, y) = (f64::from(i) * 0.1, f64::from(j) * 0.1);
             // the shadow reaches from the box to x = 0.2 + 0.4 / tan 20 degrees = 1.3
-            let beside = x < -0.3 || x > 1.4 || y.abs() > 0.3;
+            let beside = !(-0.3..=1.4).contains(&x) || y.abs() > 0.3;
             let within = x > 0.3 && x < 1.2 && y.abs() < 0.15;
             let got = brightness(&image, x, y);
             assert!(!beside || (got / open - 1.0).abs() < 0.02, "acne at {x} {y}: {got} of {open}");
