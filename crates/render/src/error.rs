@@ -6,7 +6,7 @@
 pub enum RenderError {
     /// The machine has no graphics adapter, not even a software one. Simulating and recording need none: go on without a picture.
     #[error(
-        "no graphics adapter found ({reason}); pictures need Vulkan or OpenGL. On Debian or Ubuntu the software driver is enough: \
+        "no graphics adapter found ({reason}); a picture needs Vulkan or OpenGL. On Debian and Ubuntu the software driver is enough: \
          apt-get install mesa-vulkan-drivers libvulkan1"
     )]
     NoAdapter {

@@ -89,10 +89,7 @@ impl Renderer {
 
 impl Gpu {
     async fn open() -> Result<Gpu, RenderError> {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::GL;
-        let instance = wgpu::Instance::new(descriptor);
-        let adapter = instance.request_adapter(&Default::default()).await.map_err(|e| RenderError::NoAdapter { reason: e.to_string() })?;
+        let adapter = first_adapter().await?;
         let info = adapter.get_info();
         let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
         let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
@@ -121,4 +118,19 @@ impl Gpu {
     pub(crate) fn failed(&self, reason: String) -> RenderError {
         RenderError::Device { adapter: self.adapter.clone(), reason }
     }
+}
+
+/// A Vulkan adapter, else one of OpenGL. Asked one after the other, so that OpenGL's libraries are loaded only where needed.
+async fn first_adapter() -> Result<wgpu::Adapter, RenderError> {
+    let mut reasons = Vec::new();
+    for (name, backends) in [("Vulkan", wgpu::Backends::VULKAN), ("OpenGL", wgpu::Backends::GL)] {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = backends;
+        match wgpu::Instance::new(descriptor).request_adapter(&Default::default()).await {
+            Ok(adapter) => return Ok(adapter),
+            Err(wgpu::RequestAdapterError::NotFound { .. }) => reasons.push(format!("no {name} driver")),
+            Err(e) => reasons.push(e.to_string()),
+        }
+    }
+    Err(RenderError::NoAdapter { reason: reasons.join(", ") })
 }

@@ -122,7 +122,7 @@ impl Default for Sky {
 impl Sky {
     /// A dim, warm hall: for tables and lanes under lamps.
     pub fn hall() -> Self {
-        Sky { zenith: [0.20, 0.18, 0.17], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 2.4, softbox: 5.0, backdrop: None }
+        Sky { zenith: [0.27, 0.25, 0.24], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 2.4, softbox: 5.0, backdrop: None }
     }
 
     /// No ambient light, a flat backdrop: for tests and plots.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use std::f32::consts::{PI, TAU};
 
 /// Most vertices, and most indices, a single mesh may have.
-pub const MAX_MESH_VERTICES: usize = 1 << 25;
+pub const MAX_MESH_VERTICES: usize = 1 << 24;
 
 /// Triangles with a normal per vertex, in the mesh's own frame, metres. Counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]

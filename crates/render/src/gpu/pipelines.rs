@@ -94,7 +94,7 @@ impl Pipelines {
         let over = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         Pipelines {
             sky: draw("vs_sky", "fs_sky", Input::None, ALWAYS, None),
-            ground: draw("vs_mesh", "fs_ground", Input::Mesh, WRITE, None),
+            ground: draw("vs_mesh", "fs_ground", Input::Mesh, WRITE_BEHIND, None),
             mesh: draw("vs_mesh", "fs_mesh", Input::Mesh, WRITE, None),
             sphere: draw("vs_sphere", "fs_sphere", Input::Sphere, WRITE, None),
             shell: draw("vs_sphere", "fs_shell", Input::Sphere, TEST, over),
@@ -119,10 +119,17 @@ impl Pipelines {
 }
 
 /// Depth test and write: nearer is greater.
-type DepthUse = (CompareFunction, bool);
-const WRITE: DepthUse = (CompareFunction::GreaterEqual, true);
-const TEST: DepthUse = (CompareFunction::GreaterEqual, false);
-const ALWAYS: DepthUse = (CompareFunction::Always, false);
+#[derive(Clone, Copy)]
+struct DepthUse {
+    compare: CompareFunction,
+    write: bool,
+    bias: i32,
+}
+const WRITE: DepthUse = DepthUse { compare: CompareFunction::GreaterEqual, write: true, bias: 0 };
+/// A hair farther than it is: what lies on the floor in its plane is seen.
+const WRITE_BEHIND: DepthUse = DepthUse { bias: -1, ..WRITE };
+const TEST: DepthUse = DepthUse { write: false, ..WRITE };
+const ALWAYS: DepthUse = DepthUse { compare: CompareFunction::Always, write: false, bias: 0 };
 
 /// What the vertex stage reads.
 #[derive(Clone, Copy, PartialEq)]
@@ -166,12 +173,12 @@ impl Plan<'_> {
                 topology: if strip { wgpu::PrimitiveTopology::TriangleStrip } else { wgpu::PrimitiveTopology::TriangleList },
                 ..Default::default()
             },
-            depth_stencil: self.depth.map(|(compare, write)| wgpu::DepthStencilState {
+            depth_stencil: self.depth.map(|depth| wgpu::DepthStencilState {
                 format: DEPTH,
-                depth_write_enabled: Some(write),
-                depth_compare: Some(compare),
+                depth_write_enabled: Some(depth.write),
+                depth_compare: Some(depth.compare),
                 stencil: Default::default(),
-                bias: Default::default(),
+                bias: wgpu::DepthBiasState { constant: 64 * depth.bias, slope_scale: 2.0 * depth.bias as f32, clamp: 0.0 },
             }),
             multisample: wgpu::MultisampleState { count: self.samples, ..Default::default() },
             fragment: self.fs.map(|fs| wgpu::FragmentState {

@@ -23,20 +23,21 @@ impl DrawList {
         union(self.items(casters).map(|item| item.1))
     }
 
-    /// A camera that looks along `direction` and shows everything.
+    /// A camera that looks along `direction` and shows all that throws shadows (everything, where nothing does): a wide floor does not count.
     pub fn framing_camera(&self, direction: Vector3<f32>) -> Camera {
-        let (center, radius) = self.bounding_ball(false).unwrap_or((Point3::origin(), 1.0));
+        let ball = self.bounding_ball(true).or_else(|| self.bounding_ball(false));
+        let (center, radius) = ball.unwrap_or((Point3::origin(), 1.0));
         Camera::framing(center, radius, direction, 0.9)
     }
 
-    /// The box around what a view shows at least a part of (by bounding balls); around everything where it shows nothing.
+    /// The box around what throws shadows and lies at least in part in a view (by bounding balls); around everything where there is no such thing.
     pub(crate) fn visible_box(&self, clip_from_world: &Matrix4<f32>) -> Option<Bounds> {
         let planes = planes(clip_from_world);
         let seen = |b: &Bounds| {
             let (center, radius) = ball_of(b);
             planes.iter().all(|p| p.dot(&center.to_homogeneous()) >= -radius)
         };
-        union(self.items(false).map(|item| item.1).filter(seen)).or_else(|| self.bounding_box(false))
+        union(self.items(true).map(|item| item.1).filter(seen)).or_else(|| self.bounding_box(false))
     }
 
     /// What throws shadows near the `seen` box: each one's corners in the world, as points to be transformed, with a radius around them.

@@ -121,6 +121,7 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
         if (z > depth + dot(slope, d) + bias) { sum += z; count += 1.0; }
     }
     if (count == 0.0) { return 1.0; }
+    if (count == 16.0) { return 0.0; }
     let s_block = shadow_depth_to_s(sh, sum / count);
     let gap = max(s - s_block, 0.0);
     let width = select(size * gap, size * gap / max(s_block, 1e-6), sh.scale.z > 0.5);

@@ -82,6 +82,16 @@ fn bounds_follow_poses_and_scales() {
 }
 
 #[test]
+fn a_wide_floor_does_not_widen_the_framing() {
+    let mut list = DrawList::default();
+    list.add_sphere(Point3::new(1.0, 2.0, 3.0), 0.5, UnitQuaternion::identity(), Material::default());
+    let alone = list.framing_camera(Vector3::y());
+    let floor = list.add_mesh(MeshData::ground_quad(60.0));
+    list.add_instance(floor, Isometry3::identity(), Material::default()).casts_shadow = false;
+    assert_eq!(list.framing_camera(Vector3::y()), alone);
+}
+
+#[test]
 fn every_preset_is_known_and_others_are_not() {
     for name in Material::PRESETS {
         let own = Material::preset(name, None).expect(name);

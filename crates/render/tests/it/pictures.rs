@@ -223,6 +223,37 @@ fn the_same_list_gives_the_same_bytes() {
 }
 
 #[test]
+fn balls_at_behind_and_around_the_eye() {
+    let white_share = |center: [f32; 3]| {
+        let mut list = bare(from_above(5.0));
+        ball(&mut list, center, 1.0, WHITE);
+        picture(&list, 100, 100).map(|image| area(&image, 0) / 1e4)
+    };
+    // 1.2 radii before the eye a ball spans asin(1/1.2) = 0.985 rad to each side: more than the 0.4 of the picture and the 0.54 of its corners
+    let Some(close) = white_share([0.0, 0.0, 3.8]) else { return };
+    assert_eq!(close, 1.0);
+    assert_eq!(white_share([0.0, 0.0, 6.5]), Some(0.0), "behind the eye");
+    assert_eq!(white_share([0.0, 0.0, 4.9]), Some(0.0), "around the eye: its back is not drawn");
+    // abreast of the eye, its nearest direction pi/2 - asin(1/1.05) = 0.31 rad off the axis: only pixels beyond tan 0.31 to that side
+    let share = white_share([1.05, 0.0, 5.0]).expect("an adapter");
+    assert!(share > 0.05 && share < 0.14, "{share}");
+}
+
+#[test]
+fn what_lies_in_the_plane_of_the_ground_is_seen() {
+    let mut list = bare(Camera::look_at(Point3::new(3.0, -2.0, 1.0), Point3::origin()));
+    list.ground = Some(tumble_render::Ground { height_m: 0.0, reach_m: 80.0, material: Material::unlit([1.0, 0.0, 0.0]) });
+    let quad = list.add_mesh(MeshData::ground_quad(60.0));
+    list.add_instance(quad, Isometry3::rotation(Vector3::z() * 0.3), Material::unlit([0.0, 0.0, 1.0])).casts_shadow = false;
+    let Some(image) = picture(&list, 300, 200) else { return };
+    for y in 60..200 {
+        for x in 0..300 {
+            assert_eq!(image.pixel(x, y), Some([0, 0, 255, 255]), "at {x} {y}");
+        }
+    }
+}
+
+#[test]
 fn a_body_that_fell_away_changes_nothing_for_the_rest() {
     let mut list = DrawList::default();
     ball(&mut list, [0.0, 0.0, 0.5], 0.5, WHITE);

@@ -165,6 +165,33 @@ fn smooth_surfaces_show_no_acne_and_feet_touch_their_shadows() {
 }
 
 #[test]
+fn a_wide_floor_that_throws_shadows_shades_itself_nowhere() {
+    // 20 m of floor in one shadow map (a texel is 1 cm), under a sun 20 degrees high: light sin 20 degrees everywhere, but in the box's shadow
+    let mut list = bare(from_above(10.0));
+    let slab = list.add_mesh(MeshData::cuboid([10.0, 10.0, 0.1]));
+    let dull = Material { roughness: 1.0, ..Material::matte([1.0; 3]) };
+    list.add_instance(slab, Isometry3::translation(0.0, 0.0, -0.1), dull);
+    let cube = list.add_mesh(MeshData::cuboid([0.2; 3]));
+    list.add_instance(cube, Isometry3::translation(0.0, 0.0, 0.2), Material::unlit([0.0; 3]));
+    let high = 20f64.to_radians();
+    list.lights.push(white_sun([high.cos() as f32, 0.0, -high.sin() as f32], 2.0, true));
+    let Some(image) = picture(&list, 400, 400) else { return };
+    let open = brightness(&image, -2.0, 0.0);
+    assert!((open / (2.0 * high.sin()) - 1.0).abs() < 0.08, "{open}");
+    for i in -35..=35 {
+        for j in -35..=35 {
+            let (x, y) = (f64::from(i) * 0.1, f64::from(j) * 0.1);
+            // the shadow reaches from the box to x = 0.2 + 0.4 / tan 20 degrees = 1.3
+            let beside = !(-0.3..=1.4).contains(&x) || y.abs() > 0.3;
+            let within = x > 0.3 && x < 1.2 && y.abs() < 0.15;
+            let got = brightness(&image, x, y);
+            assert!(!beside || (got / open - 1.0).abs() < 0.02, "acne at {x} {y}: {got} of {open}");
+            assert!(!within || got < 0.02, "light leaks at {x} {y}: {got}");
+        }
+    }
+}
+
+#[test]
 fn ambient_occlusion_darkens_creases_and_leaves_open_ground() {
     let mut list = bare(Camera::look_at(Point3::new(6.0, 0.0, 4.0), Point3::new(0.5, 0.0, 0.0)));
     list.sky = Sky { zenith: [0.7; 3], horizon: [0.7; 3], ground: [0.7; 3], ambient: 1.0, ..Sky::flat([0.0; 3]) };
