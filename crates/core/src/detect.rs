@@ -6,6 +6,9 @@ use crate::site::Site;
 use crate::view::{Entry, Mode, ObjectId, Table};
 use tumble_collide::{Aabb, BroadPhase, Contact, NormalFrom, Vec3};
 
+/// How far two sphere trees look ahead, as a share of the smaller one's radius.
+const TREE_REACH: f64 = 0.02;
+
 /// Who owns a row of the site table.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Owner {
@@ -132,7 +135,12 @@ impl Detector<'_> {
         let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
         let (site_a, site_b) = (&self.sites[a as usize], &self.sites[b as usize]);
-        let margin = self.scratch.reach[i] + self.scratch.reach[j];
+        let mut margin = self.scratch.reach[i] + self.scratch.reach[j];
+        if let (Some(_), Some(_)) = (body_a.shape(part_a).tree(), body_b.shape(part_b).tree()) {
+            // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
+            let size = body_a.shape(part_a).bounding_radius().min(body_b.shape(part_b).bounding_radius());
+            margin = margin.min(2.0 * self.settings.drift_tolerance + TREE_REACH * size);
+        }
         let found = &mut self.scratch.found;
         found.clear();
         tumble_collide::contacts(body_a.shape(part_a), &site_a.pose, body_b.shape(part_b), &site_b.pose, margin, found);

@@ -12,10 +12,14 @@
 //! Between sweeps the iterate is extrapolated, `y = λ_k + β_k(λ_k − λ_{k−1})`, with Nesterov's weights `β_k = (θ_k − 1)/θ_{k+1}`,
 //! `θ_{k+1} = ½(1 + √(1 + 4θ_k²))`, and a restart whenever the sweep goes against the last move, `(y − λ_{k+1})·(λ_{k+1} − λ_k) > 0`
 //! (O'Donoghue and Candès, *Adaptive restart for accelerated gradient schemes*, 2015). Plain sweeps carry a load down a stack one
-//! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. High mass ratios stay slow; the residual says how far.
+//! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. With friction the problem is not convex and the
+//! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. High mass ratios stay slow; the residual says how far.
 
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{Block, RowSet, Rows, Side};
+
+/// Sweeps with extrapolation between them.
+const ACCELERATED: u32 = 200;
 
 /// The block Gauss–Seidel solver, `gauss_seidel`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,7 +46,7 @@ impl RowSolver for GaussSeidel {
             if change <= accuracy.tolerance {
                 return Outcome { iterations: sweep, converged: true, ray: false };
             }
-            if sweep < sweeps {
+            if sweep < sweeps.min(ACCELERATED) {
                 momentum.extrapolate(&mut locals, against > 0.0, lambda, du);
             }
         }

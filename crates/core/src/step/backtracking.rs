@@ -39,8 +39,12 @@ pub struct Backtracking {
 const TRIES: u32 = 200;
 /// Least sub-step, as a share of the frame.
 const FLOOR: f64 = 1.0 / 16384.0;
+/// A margin of at least this is not measured, metres.
+const FAR: f64 = 1e-4;
 /// Passes of the impact phase at most.
-const IMPACT_PASSES: u32 = 1000;
+const IMPACT_PASSES: u32 = 200;
+/// A touching contact slower than this may drift like one that lasts, m/s.
+const SLOW: f64 = 1e-3;
 
 /// A touch's part in the sub-step that begins.
 #[derive(Clone, Copy)]
@@ -68,6 +72,7 @@ impl Stepper for Backtracking {
             self.gather(core, left)?;
             let roles = self.roles(core);
             self.resolve_impacts(core, &roles);
+            let roles = self.roles(core);
             let held = self.resolve_contacts(core, &roles, left)?;
             left -= self.advance(core, &roles, &held, left)?;
         }
@@ -103,7 +108,8 @@ impl Backtracking {
         let role = |touch: &Touch| {
             let lasts = core.warm.carries(&touch.key) && touch.contact.gap <= s.drift_tolerance;
             let touches = lasts || touch.contact.gap <= s.contact_tolerance;
-            let allowed = if lasts { s.drift_tolerance } else { s.contact_tolerance };
+            let speed = touch.velocity(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).dot(&touch.contact.normal);
+            let allowed = if lasts || (touches && speed.abs() < SLOW) { s.drift_tolerance } else { s.contact_tolerance };
             Role { lasts, touches, allowed: allowed.max(-touch.contact.gap + s.contact_tolerance) }
         };
         self.work.touches.iter().map(role).collect()
@@ -116,7 +122,7 @@ impl Backtracking {
         let candidates: Vec<Candidate> = work.touches.iter().zip(roles).map(|(touch, role)| {
             let pressing = (-touch.acceleration(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).x).max(0.0);
             let rebound = (2.0 * pressing * if role.lasts { s.drift_tolerance } else { s.contact_tolerance }).sqrt();
-            let rest_speed = (rebound / touch.restitution.max(1e-3)).min(pressing * s.dt) + 1e-9;
+            let rest_speed = (rebound / touch.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
             Candidate { takes_part: role.touches, rest_speed, restitution: touch.restitution }
         }).collect();
         let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);
@@ -159,7 +165,8 @@ impl Backtracking {
         warm_start(core, work, 1.0);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         let s = core.settings.accuracy;
-        let ray = solve(core, work, Accuracy { sweeps: s.sweeps.max(2000), relaxations: s.relaxations.max(1_000_000), tolerance: s.tolerance }, |b| keep[b]);
+        let accuracy = Accuracy { sweeps: s.sweeps.max(2000), relaxations: s.relaxations.max(1_000_000), tolerance: s.tolerance / left };
+        let ray = solve(core, work, accuracy, left, |b| keep[b]);
         let mut held = vec![0.0; core.dof];
         if ray {
             // no force at the acceleration level keeps the contacts: an impulse without collision does
@@ -178,7 +185,7 @@ impl Backtracking {
         let start = core.x.clone();
         let floor = core.settings.dt * FLOOR;
         let tolerance = core.settings.contact_tolerance;
-        let (mut low, mut high): (Bracket, Option<Bracket>) = (Bracket { h: 0.0, f: self.nearest(roles, tolerance) }, None);
+        let mut bracket = Bracket { low: (0.0, self.nearest(roles, tolerance)), high: None, same_side: 0 };
         let mut h = self.first_guess(core, roles, left).clamp(floor.min(left), left);
         loop {
             core.x.copy_from_slice(&start);
@@ -204,8 +211,7 @@ impl Backtracking {
                 core.motion().refresh();
                 return Ok(0.0);
             }
-            if f < -tolerance { high = Some(Bracket { h, f }) } else { low = Bracket { h, f } }
-            h = high.as_ref().map_or(left, |high| between(&low, high)).max(floor.min(left));
+            h = bracket.narrow(h, f, f < -tolerance).unwrap_or(left).max(floor.min(left));
         }
     }
 
@@ -235,7 +241,7 @@ impl Backtracking {
     /// Least gap of what does not touch yet, at the start of the sub-step.
     fn nearest(&self, roles: &[Role], tolerance: f64) -> f64 {
         let gaps = self.work.touches.iter().zip(roles).filter(|(_, r)| !r.touches).map(|(t, _)| t.contact.gap);
-        gaps.fold(f64::INFINITY, f64::min).max(tolerance).min(1.0)
+        gaps.fold(FAR, f64::min).max(tolerance)
     }
 
     /// How far the tried state is from the first crossing: gap, less the depth that its pair is allowed.
@@ -247,21 +253,39 @@ impl Backtracking {
             let allowed = same.map(|(_, r)| r.allowed).fold(tolerance, f64::max);
             touch.contact.gap + allowed - tolerance
         };
-        self.after.iter().map(value).fold(f64::INFINITY, f64::min).min(1.0)
+        self.after.iter().map(value).fold(FAR, f64::min)
     }
 }
 
-/// A tried sub-step and the margin it ended with.
+/// The moment of a crossing, between a sub-step that ended before it and one that ended after: (length, margin) each.
 struct Bracket {
-    h: f64,
-    f: f64,
+    low: (f64, f64),
+    high: Option<(f64, f64)>,
+    /// How often in a row the low end moved (positive) or the high end (negative).
+    same_side: i32,
 }
 
-/// The next try: false position, kept away from both ends.
-fn between(low: &Bracket, high: &Bracket) -> f64 {
-    let width = high.h - low.h;
-    let s = low.f / (low.f - high.f);
-    low.h + width * if s.is_finite() { s.clamp(0.02, 0.98) } else { 0.5 }
+impl Bracket {
+    /// Takes a try in; the next one, or `None` while nothing has crossed yet. False position by the Illinois rule (an end that stays twice
+    /// counts half), bisection every fourth time and wherever the margin before the crossing is only known to be large.
+    fn narrow(&mut self, h: f64, f: f64, crossed: bool) -> Option<f64> {
+        if crossed {
+            self.same_side = self.same_side.min(0) - 1;
+            self.high = Some((h, f));
+        } else {
+            self.same_side = self.same_side.max(0) + 1;
+            self.low = (h, f);
+        }
+        let high = self.high.as_mut()?;
+        match self.same_side {
+            2.. => high.1 *= 0.5,
+            ..=-2 => self.low.1 *= 0.5,
+            _ => {}
+        }
+        let (width, share) = (high.0 - self.low.0, self.low.1 / (self.low.1 - high.1));
+        let bisect = self.low.1 >= FAR || self.same_side.abs() % 4 == 3 || !share.is_finite();
+        Some(self.low.0 + width * if bisect { 0.5 } else { share.clamp(1e-3, 1.0 - 1e-3) })
+    }
 }
 
 /// Makes the whitened velocity `after` where it was `before`, and refreshes what readers see.

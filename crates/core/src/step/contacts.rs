@@ -127,15 +127,16 @@ pub(crate) fn row_velocities(rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f
     rows.add_velocity(u, c);
 }
 
-/// Solves the blocks that `keep` names, island by island, from `work.c` and the warm start in `work.lambda`, into `work.du`.
-pub(crate) fn solve(core: &mut Core, work: &mut Workspace, accuracy: Accuracy, keep: impl Fn(usize) -> bool) -> bool {
+/// Solves the blocks that `keep` names, island by island, from `work.c` and the warm start in `work.lambda`, into `work.du`. `unit` is what
+/// one unit of `c` is in m/s, for the report: 1, or the step's length where `c` holds accelerations. Whether any solve ended on a ray.
+pub(crate) fn solve(core: &mut Core, work: &mut Workspace, accuracy: Accuracy, unit: f64, keep: impl Fn(usize) -> bool) -> bool {
     work.du.clear();
     work.du.resize(core.dof, 0.0);
     work.islands.build(&work.rows, keep);
     let mut ray = false;
     for blocks in work.islands.iter() {
         let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, accuracy);
-        core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
+        core.report.solved(outcome, unit * residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
         ray |= outcome.ray;
     }
     ray

@@ -29,13 +29,16 @@ pub(crate) struct Candidate {
     pub restitution: f64,
 }
 
+/// Impacts are solved to this share of the fastest row velocity, so that a reflection keeps energy to about this share.
+const PRECISION: f64 = 1e-13;
 /// An approach slower than this is none, m/s.
-const APPROACH: f64 = 1e-10;
+const APPROACH: f64 = 1e-9;
+/// An impact slower than this never bounces, m/s: bodies wedged between others would chatter for ever.
+pub(crate) const SLOWEST_BOUNCE: f64 = 1e-4;
 
 /// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`.
 pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candidate], cap: u32, u: &mut [f64], total: &mut [f64]) {
     let set = core.settings.accuracy;
-    let accuracy = Accuracy { sweeps: set.sweeps.max(2000), relaxations: set.relaxations.max(100_000), tolerance: set.tolerance.min(1e-14) };
     let guard = !something_is_led(core);
     let mut c = Vec::new();
     for pass in 0..=cap {
@@ -47,6 +50,8 @@ pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candi
             return;
         }
         core.report.impact_passes += 1;
+        let fastest = c.iter().fold(0.0, |f: f64, c| f.max(c.abs()));
+        let accuracy = Accuracy { sweeps: set.sweeps.max(1000), relaxations: set.relaxations.max(100_000), tolerance: PRECISION * fastest };
         let last = pass == cap || !(0..candidates.len()).any(bounces);
         let member: Vec<bool> = (0..candidates.len()).map(|i| if last { candidates[i].takes_part } else { approach(i) }).collect();
         let bounce: Vec<f64> = (0..candidates.len()).map(|i| if !last && bounces(i) { candidates[i].restitution } else { 0.0 }).collect();

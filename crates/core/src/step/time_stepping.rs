@@ -94,7 +94,7 @@ impl TimeStepping {
         self.candidates.clear();
         for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
             let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], touch.contact.gap);
-            let rest_speed = (-dv).max(0.0) + 1e-9;
+            let rest_speed = (-dv).max(impact::SLOWEST_BOUNCE);
             let share = if touch.restitution > 0.0 { meeting(gap / h, v, dv).filter(|s| -(v + s * dv) > rest_speed) } else { None };
             for i in block.sides().iter().flat_map(|s| s.u..s.u + s.dof) {
                 let slot = &mut self.share[i as usize];
@@ -131,7 +131,7 @@ impl TimeStepping {
             work.c[block.row as usize] += reach - target.velocity;
         }
         warm_start(core, work, h);
-        solve(core, work, core.settings.accuracy, |b| keep[b]);
+        solve(core, work, core.settings.accuracy, 1.0, |b| keep[b]);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
     }
