@@ -1,6 +1,6 @@
 //! The shapes that carry a sphere tree: meshes and cylinders.
 
-use crate::{MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3};
+use crate::{ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3};
 
 /// A closed mesh about its centre of mass, with its sphere tree.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,20 +10,21 @@ pub struct MeshShape {
     /// At density 1.
     unit_mass: MassProperties,
     bounding_radius: f64,
+    report: ClosedReport,
 }
 
 impl MeshShape {
     /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the tree. Also returns
     /// the offset that was subtracted from the vertices (metres).
     pub fn new(mut mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
-        mesh.check_closed()?;
+        let report = mesh.check_closed()?;
         let offset = mesh.mass_properties(1.0).center_of_mass;
         let mesh = mesh.translated(&-offset);
         // what rounding left of the offset is not worth a second shift
         let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mesh.mass_properties(1.0) };
         let tree = SphereTree::build(&mesh, settings)?;
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
-        Ok((MeshShape { mesh, tree, unit_mass, bounding_radius }, offset))
+        Ok((MeshShape { mesh, tree, unit_mass, bounding_radius, report }, offset))
     }
 
     /// The surface; its centre of mass is the origin.
@@ -34,6 +35,11 @@ impl MeshShape {
     /// The balls around the surface.
     pub fn tree(&self) -> &SphereTree {
         &self.tree
+    }
+
+    /// What was found and mended when the mesh was read; its notes are for the user.
+    pub fn report(&self) -> &ClosedReport {
+        &self.report
     }
 
     /// Volume, m³.

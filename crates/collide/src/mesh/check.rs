@@ -116,7 +116,8 @@ impl TriMesh {
         self.triangles.retain(|&[a, b, c]| {
             let repeated = a == b || b == c || c == a;
             let [u, v] = [b, c].map(|k| vertices[k as usize] - vertices[a as usize]);
-            !repeated && !(collinear_too && u.cross(&v).norm() <= 1e-14 * u.norm_squared().max(v.norm_squared()))
+            let collinear = u.cross(&v).norm() <= 1e-14 * u.norm_squared().max(v.norm_squared());
+            !(repeated || (collinear_too && collinear))
         });
         before - self.triangles.len()
     }

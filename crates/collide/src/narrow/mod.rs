@@ -18,8 +18,11 @@ use crate::{Contact, Pose, Shape};
 /// Normals point from B towards A. Exact among half-space, sphere, box and capsule, and for a cylinder on a half-space. Elsewhere a mesh or
 /// cylinder stands for itself by the leaves of its sphere tree: no contact is missed, and gaps are too small by at most the trees'
 /// outward errors ([`crate::SphereTree::outward_error`]). Manifolds are reduced to the few points that matter. Does not allocate beyond the
-/// growth of `out`.
+/// growth of `out`. A pose that is not finite touches nothing.
 pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    if !(is_finite(pose_a) && is_finite(pose_b)) {
+        return;
+    }
     let start = out.len();
     if rank(a) <= rank(b) {
         ordered(a, pose_a, b, pose_b, margin, out);
@@ -27,6 +30,11 @@ pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64,
         ordered(b, pose_b, a, pose_a, margin, out);
         out[start..].iter_mut().for_each(|c| *c = c.flipped());
     }
+}
+
+/// A sum is finite only if all its terms are.
+fn is_finite(pose: &Pose) -> bool {
+    (pose.translation.vector.sum() + pose.rotation.coords.sum()).is_finite()
 }
 
 /// Pairs are handled with the lower rank first.

@@ -25,6 +25,9 @@ pub struct TreeSettings {
     pub depth: u32,
     /// A cell is not divided further once its ball reaches at most this far outwards, as a part of the mesh's diagonal; 1e-4 to 1.
     pub error: f64,
+    /// Grow every leaf to the same stand-off, `error`: flat faces stay flat, so that what stands on them stands upright and at rest.
+    /// Otherwise each leaf is as tight as it can be.
+    pub even: bool,
 }
 
 /// The methods there are.
@@ -36,9 +39,9 @@ pub enum Builder {
 }
 
 impl Default for TreeSettings {
-    /// Outward error of about 1 % of the diagonal.
+    /// Outward error of 1 % of the diagonal, evenly.
     fn default() -> TreeSettings {
-        TreeSettings { builder: Builder::Octree, depth: 7, error: 0.01 }
+        TreeSettings { builder: Builder::Octree, depth: 7, error: 0.01, even: true }
     }
 }
 
