@@ -14,8 +14,8 @@ pub struct MeshShape {
 }
 
 impl MeshShape {
-    /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the tree. Also returns
-    /// the offset that was subtracted from the vertices (metres).
+    /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
+    /// tree. Also returns the offset that was subtracted from the vertices (metres).
     pub fn new(mut mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
         let report = mesh.check_closed()?;
         let offset = mesh.mass_properties(1.0).center_of_mass;
@@ -54,7 +54,10 @@ impl MeshShape {
 
     /// At a uniform `density`, kg/m³.
     pub(crate) fn mass_properties(&self, density: f64) -> MassProperties {
-        MassProperties { inertia: self.unit_mass.inertia * density, ..self.unit_mass.with_mass(self.unit_mass.mass * density) }
+        MassProperties {
+            inertia: self.unit_mass.inertia * density,
+            ..self.unit_mass.with_mass(self.unit_mass.mass * density)
+        }
     }
 }
 

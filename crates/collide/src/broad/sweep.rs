@@ -37,7 +37,8 @@ impl Entry {
         Entry { min: turned(&bounds.min), max: turned(&bounds.max), index, moving }
     }
 
-    /// On the two axes that are not swept; `&`, not `&&`: four comparisons cost less than one branch that is guessed wrong.
+    /// On the two axes that are not swept; `&`, not `&&`: four comparisons cost less than one branch that is guessed
+    /// wrong.
     fn overlaps_across(&self, other: &Entry) -> bool {
         (self.min[1] <= other.max[1])
             & (other.min[1] <= self.max[1])

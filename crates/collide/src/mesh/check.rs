@@ -1,7 +1,7 @@
 //! Is the mesh a solid? Harmless defects are mended and told; the rest is an error that names where.
 //!
-//! A surface is closed and consistently wound iff every directed edge `u→v` is met by as many `v→u`. More than one of each is a
-//! non-manifold edge with a well-defined volume, which is accepted and told.
+//! A surface is closed and consistently wound iff every directed edge `u→v` is met by as many `v→u`. More than one of
+//! each is a non-manifold edge with a well-defined volume, which is accepted and told.
 
 use super::TriMesh;
 use crate::{MeshError, Vec3};
@@ -37,21 +37,26 @@ impl ClosedReport {
             (self.flipped_faces, "faces were reversed to agree with their neighbours"),
             (self.nonmanifold_edges, "edges have four or more faces (accepted: the volume is well defined)"),
         ];
-        let mut notes: Vec<String> = counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        let mut notes: Vec<String> =
+            counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
         if self.turned {
             notes.push("the mesh was inside out and was turned".into());
         }
         if self.shells > 1 {
-            notes.push(format!("the surface has {} separate shells; where they overlap the mass counts more than once", self.shells));
+            notes.push(format!(
+                "the surface has {} separate shells; where they overlap the mass counts more than once",
+                self.shells
+            ));
         }
         notes
     }
 }
 
 impl TriMesh {
-    /// Makes sure that the mesh is a closed, outward-wound solid. Welds equal vertices, drops zero-area and duplicate faces, makes
-    /// the winding consistent and turns an inside-out mesh, all in place and told in the report. An open or dangling surface, or one
-    /// without volume, is an error, and the mesh is then left as it was. Vertex numbers in errors are those after welding.
+    /// Makes sure that the mesh is a closed, outward-wound solid. Welds equal vertices, drops zero-area and duplicate
+    /// faces, makes the winding consistent and turns an inside-out mesh, all in place and told in the report. An open
+    /// or dangling surface, or one without volume, is an error, and the mesh is then left as it was. Vertex numbers
+    /// in errors are those after welding.
     pub fn check_closed(&mut self) -> Result<ClosedReport, MeshError> {
         self.check_data()?;
         // zero-area faces are first dropped; where that opens a seam that they close, they stay
@@ -76,7 +81,7 @@ impl TriMesh {
         report.nonmanifold_edges = groups.iter().filter(|g| g.len() > 2).count();
         report.shells = shell_of_faces(&mesh, &groups).1;
         report.volume = mesh.signed_volume();
-        if report.volume.abs() < 1e-12 * mesh.diagonal().powi(3) {
+        if report.volume.abs() <= 1e-12 * mesh.diagonal().powi(3) {
             return Err(MeshError::NoVolume { volume: report.volume });
         }
         if report.volume < 0.0 {
@@ -86,14 +91,17 @@ impl TriMesh {
         Ok((mesh, report))
     }
 
-    /// Merges vertices at exactly the same place (`-0` equals `0`) and drops those not in use; also returns how many were merged.
+    /// Merges vertices at exactly the same place (`-0` equals `0`) and drops those not in use; also returns how many
+    /// were merged.
     pub(crate) fn welded(&self) -> (TriMesh, usize) {
         let mut order: Vec<u32> = self.triangles.iter().flatten().copied().collect();
         order.sort_unstable();
         order.dedup();
         let used = order.len();
         let key = |v: u32| self.vertices[v as usize].map(|x| x + 0.0);
-        let compare = |a: &Vec3, b: &Vec3| (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal);
+        let compare = |a: &Vec3, b: &Vec3| {
+            (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+        };
         order.sort_by(|&u, &v| compare(&key(u), &key(v)).then(u.cmp(&v)));
         // each vertex stands for the first of its place
         let mut stands_for: Vec<u32> = (0..self.vertices.len() as u32).collect();
@@ -129,7 +137,8 @@ impl TriMesh {
             let k = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
             [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
         };
-        let mut order: Vec<([u32; 3], usize)> = self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
+        let mut order: Vec<([u32; 3], usize)> =
+            self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
         order.sort_unstable();
         order.dedup_by_key(|(t, _)| *t);
         order.sort_unstable_by_key(|(_, n)| *n);
@@ -137,7 +146,8 @@ impl TriMesh {
         before - self.triangles.len()
     }
 
-    /// Spreads the winding of each shell's first face over edges of two faces, then turns each shell that was changed outwards.
+    /// Spreads the winding of each shell's first face over edges of two faces, then turns each shell that was changed
+    /// outwards.
     fn unify_winding(&mut self) -> usize {
         let groups = edge_groups(self);
         let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.triangles.len()];
@@ -174,11 +184,14 @@ impl TriMesh {
             return;
         }
         let origin = self.corners(seed)[0];
-        let volume: f64 = shell.iter().map(|&(t, flip)| {
-            let [a, b, c] = self.corners(t).map(|p| p - origin);
-            let d = a.dot(&b.cross(&c));
-            if flip { -d } else { d }
-        }).sum();
+        let volume: f64 = shell
+            .iter()
+            .map(|&(t, flip)| {
+                let [a, b, c] = self.corners(t).map(|p| p - origin);
+                let d = a.dot(&b.cross(&c));
+                if flip { -d } else { d }
+            })
+            .sum();
         for (t, flip) in shell {
             if flip ^ (volume < 0.0) {
                 self.triangles[t].swap(1, 2);
@@ -245,8 +258,8 @@ fn touches(a: &EdgeUse, b: &EdgeUse) -> bool {
     [a.low, a.high].iter().any(|v| *v == b.low || *v == b.high)
 }
 
-/// Groups `0..count` by a relation; each item gets the least member of its group. Quadratic, but open edges are few or the
-/// answer's wording does not matter; beyond 2000 all count as one group.
+/// Groups `0..count` by a relation; each item gets the least member of its group. Quadratic, but open edges are few
+/// or the answer's wording does not matter; beyond 2000 all count as one group.
 fn joined(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     if count > 2000 {
         return vec![0; count];

@@ -55,9 +55,15 @@ fn any_perpendicular(e: &Vec3) -> Vec3 {
     e.cross(&Vec3::ith(e.iamin(), 1.0)).normalize()
 }
 
-/// Contacts at both ends of the stretch where the two run side by side; false if there is none, or if the closest points, at gap
-/// `least`, lie inside it and so tell more.
-fn push_overlap_ends(a: (Vec3, Vec3, f64), b: (Vec3, Vec3, f64), least: f64, margin: f64, out: &mut Vec<Contact>) -> bool {
+/// Contacts at both ends of the stretch where the two run side by side; false if there is none, or if the closest
+/// points, at gap `least`, lie inside it and so tell more.
+fn push_overlap_ends(
+    a: (Vec3, Vec3, f64),
+    b: (Vec3, Vec3, f64),
+    least: f64,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) -> bool {
     let ((ca, ua, ra), (cb, ub, rb)) = (a, b);
     let uu = ua.norm_squared();
     let ends = [(cb - ub - ca).dot(&ua) / uu, (cb + ub - ca).dot(&ua) / uu];
@@ -147,10 +153,17 @@ fn separated_cores(core: &Core, s: f64, half: &Vec3, margin: f64, out: &mut Vec<
 }
 
 fn end_code(s: f64) -> u64 {
-    if s <= -1.0 { 0 } else if s >= 1.0 { 2 } else { 1 }
+    if s <= -1.0 {
+        0
+    } else if s >= 1.0 {
+        2
+    } else {
+        1
+    }
 }
 
-/// Contacts at both ends of the part of the segment that is over the face across axis `k` on side `sign`; returns the least gap.
+/// Contacts at both ends of the part of the segment that is over the face across axis `k` on side `sign`; returns the
+/// least gap.
 fn push_on_face(core: &Core, half: &Vec3, (k, sign): (usize, f64), margin: f64, out: &mut Vec<Contact>) -> f64 {
     let (slop, radius) = (1e-3 * half.min(), core.radius);
     let Some((low, high)) = clip_to_prism(&core.c, &core.u, &half.add_scalar(slop), k) else { return f64::INFINITY };
@@ -164,7 +177,15 @@ fn push_on_face(core: &Core, half: &Vec3, (k, sign): (usize, f64), margin: f64, 
             let normal = Vec3::ith(k, sign);
             let feature = 10 * k as u64 + if sign > 0.0 { 5 } else { 0 } + n as u64;
             let point = p - normal * (radius + 0.5 * gap);
-            out.push(Contact { point, normal, gap, feature, core_a: radius, core_b: 0.0, normal_from: NormalFrom::FaceOfB });
+            out.push(Contact {
+                point,
+                normal,
+                gap,
+                feature,
+                core_a: radius,
+                core_b: 0.0,
+                normal_from: NormalFrom::FaceOfB,
+            });
         }
     }
     least
@@ -175,16 +196,25 @@ fn crossing_cores(core: &Core, half: &Vec3, margin: f64, out: &mut Vec<Contact>)
     let Core { c, u, radius } = core;
     let face = c.abs() - u.abs() - half;
     let k = face.imax();
-    let edge = (0..3).filter_map(|j| edge_separation(c, u, half, j)).fold(None, |best: Option<(f64, usize, Vec3)>, new| {
-        if best.is_none_or(|b| new.0 > b.0) { Some(new) } else { best }
-    });
+    let edge =
+        (0..3).filter_map(|j| edge_separation(c, u, half, j)).fold(None, |best: Option<(f64, usize, Vec3)>, new| {
+            if best.is_none_or(|b| new.0 > b.0) { Some(new) } else { best }
+        });
     let bias = 1e-3 * half.min() - 0.05 * face[k];
     match edge {
         Some((separation, j, normal)) if separation > face[k] + bias => {
             let gap = separation - radius;
             let point = crossing_point(c, u, half, j, &normal) - normal * (0.5 * (separation + radius));
             let feature = 2000 + j as u64;
-            out.push(Contact { point, normal, gap, feature, core_a: *radius, core_b: 0.0, normal_from: NormalFrom::Edges });
+            out.push(Contact {
+                point,
+                normal,
+                gap,
+                feature,
+                core_a: *radius,
+                core_b: 0.0,
+                normal_from: NormalFrom::Edges,
+            });
         }
         _ => {
             let sign = if c[k] < 0.0 { -1.0 } else { 1.0 };

@@ -1,7 +1,7 @@
 //! Manifold reduction: few points that keep the deepest one and the area.
 //!
-//! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from it; the one that makes
-//! the greatest triangle; the one furthest out on the other side of it. Ties go to the earlier point.
+//! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from it; the one that
+//! makes the greatest triangle; the one furthest out on the other side of it. Ties go to the earlier point.
 
 use crate::{Contact, Pose, Vec3};
 
@@ -46,7 +46,10 @@ fn best(count: usize, score: impl Fn(usize) -> f64) -> usize {
 
 /// The greatest area that `p` adds to a triangle beyond one of its sides.
 fn outside_triangle([a, b, c]: [Vec3; 3], side: f64, normal: &Vec3, p: Vec3) -> f64 {
-    [(a, b), (b, c), (c, a)].iter().map(|(u, v)| -side * (v - u).cross(&(p - u)).dot(normal)).fold(f64::NEG_INFINITY, f64::max)
+    [(a, b), (b, c), (c, a)]
+        .iter()
+        .map(|(u, v)| -side * (v - u).cross(&(p - u)).dot(normal))
+        .fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Contacts whose normals are within this cosine of the deepest one's belong together.
@@ -60,8 +63,9 @@ const TILT: f64 = 0.03;
 
 /// Gathers the many contacts of leaf balls in B's frame at the end of `out` and keeps few.
 ///
-/// Contacts are clustered by normal, the deepest first. Of each cluster are kept the deepest, and for each of five directions the
-/// point that would touch first if A tilted a little that way: the vertices of the manifold's lower hull, which is what it can rest on.
+/// Contacts are clustered by normal, the deepest first. Of each cluster are kept the deepest, and for each of five
+/// directions the point that would touch first if A tilted a little that way: the vertices of the manifold's lower
+/// hull, which is what it can rest on.
 pub(super) struct Collector<'a> {
     out: &'a mut Vec<Contact>,
     start: usize,
@@ -113,7 +117,8 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Moves all of `found[first..]` that face the way of `found[first]` next to it, both parts staying in order; returns their end.
+/// Moves all of `found[first..]` that face the way of `found[first]` next to it, both parts staying in order; returns
+/// their end.
 fn gather_cluster(found: &mut [Contact], first: usize) -> usize {
     let normal = found[first].normal;
     let tail = &mut found[first..];
@@ -131,7 +136,8 @@ fn gather_cluster(found: &mut [Contact], first: usize) -> usize {
     first + end
 }
 
-/// Moves to the front the deepest contact of a cluster and its support points in five tilted directions; returns how many.
+/// Moves to the front the deepest contact of a cluster and its support points in five tilted directions; returns how
+/// many.
 fn keep_hull(cluster: &mut [Contact]) -> usize {
     let normal = cluster[0].normal;
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();

@@ -1,8 +1,9 @@
-//! Sphere trees against each other and against primitives: the thesis's mode, where point and normal come from leaf balls.
+//! Sphere trees against each other and against primitives: the thesis's mode, where point and normal come from leaf
+//! balls.
 //!
-//! Source: thesis §IV.B.3.a–b. Two trees are walked together, the larger ball opened first. A primitive is asked for its signed distance at
-//! a ball's centre; it changes by at most 1 m per metre, so a ball that is further than `margin` hides no leaf within it.
-//! The feature of a contact is the pair of leaf indices.
+//! Source: thesis §IV.B.3.a–b. Two trees are walked together, the larger ball opened first. A primitive is asked for
+//! its signed distance at a ball's centre; it changes by at most 1 m per metre, so a ball that is further than
+//! `margin` hides no leaf within it. The feature of a contact is the pair of leaf indices.
 
 use super::reduce::Collector;
 use super::segment::closest_on_segment;
@@ -18,7 +19,14 @@ struct Pair<'a> {
     margin: f64,
 }
 
-pub(super) fn tree_tree(a: &SphereTree, pose_a: &Pose, b: &SphereTree, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+pub(super) fn tree_tree(
+    a: &SphereTree,
+    pose_a: &Pose,
+    b: &SphereTree,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     let pair = Pair { a, b, a_in_b: pose_b.inv_mul(pose_a), margin };
     let mut found = Collector::new(out);
     pair.visit(0, 0, &mut found);
@@ -53,7 +61,14 @@ struct Field {
 }
 
 /// Tree (A) against half-space, sphere, box or capsule (B).
-pub(super) fn tree_primitive(a: &SphereTree, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+pub(super) fn tree_primitive(
+    a: &SphereTree,
+    pose_a: &Pose,
+    b: &Shape,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     let a_in_b = pose_b.inv_mul(pose_a);
     let mut found = Collector::new(out);
     visit(a, &a_in_b, b, 0, margin, &mut found);
@@ -92,9 +107,12 @@ fn field(primitive: &Shape, p: &Vec3) -> Option<Field> {
             let u = Vec3::z() * *half_length;
             Some(round_field(&(p - u * closest_on_segment(p, &u)), *radius))
         }
-        Shape::Box { half_extents } => {
-            point_box(p, half_extents).map(|f| Field { distance: f.distance, normal: f.normal, core: 0.0, face: f.face })
-        }
+        Shape::Box { half_extents } => point_box(p, half_extents).map(|f| Field {
+            distance: f.distance,
+            normal: f.normal,
+            core: 0.0,
+            face: f.face,
+        }),
         Shape::Cylinder(_) | Shape::Mesh(_) => None,
     }
 }

@@ -1,9 +1,9 @@
 //! Contacts against parry's distances and penetration depths, over thousands of seeded random poses.
 //!
-//! Tolerances. Parry's GJK and EPA end at about 1e-6 of the size, so exact pairs are compared to 1e-5 m on shapes of about 1 m,
-//! and normals to 1e-2, since a distance that is good to ε has a normal that is good to √ε. Box on
-//! box (and a capsule's core inside a box) prefers a face over a pair of edges by `1e-3 · least half extent + 5 %`, so there the
-//! depth may be that much greater than the least one.
+//! Tolerances. Parry's GJK and EPA end at about 1e-6 of the size, so exact pairs are compared to 1e-5 m on shapes of
+//! about 1 m, and normals to 1e-2, since a distance that is good to ε has a normal that is good to √ε. Box on
+//! box (and a capsule's core inside a box) prefers a face over a pair of edges by `1e-3 · least half extent + 5 %`,
+//! so there the depth may be that much greater than the least one.
 
 use crate::rng::Rng;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
@@ -46,7 +46,8 @@ fn random_primitive(rng: &mut Rng, kind: usize) -> Both {
     }
 }
 
-/// A pose of the second shape: any, nearly aligned or exactly aligned with the axes, the cases that stacks are made of.
+/// A pose of the second shape: any, nearly aligned or exactly aligned with the axes, the cases that stacks are made
+/// of.
 fn related_pose(rng: &mut Rng, case: usize) -> Pose {
     let any = rng.pose(1.2);
     let turn = match case % 3 {
@@ -63,7 +64,10 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
     let mut out = Vec::new();
     contacts(a, pa, b, pb, MARGIN, &mut out);
     for c in &out {
-        assert!((c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= MARGIN && c.point.iter().all(|x| x.is_finite()), "{c:?}");
+        assert!(
+            (c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= MARGIN && c.point.iter().all(|x| x.is_finite()),
+            "{c:?}"
+        );
     }
     out
 }
@@ -72,8 +76,8 @@ fn deepest(found: &[Contact]) -> Option<&Contact> {
     found.iter().min_by(|a, b| a.gap.total_cmp(&b.gap))
 }
 
-/// Signed distance and normal (towards A) by parry: GJK where separate, EPA where not; for a half-space the support point (its
-/// `contact` of a ball with a half-space is wrong once the centre is inside).
+/// Signed distance and normal (towards A) by parry: GJK where separate, EPA where not; for a half-space the support
+/// point (its `contact` of a ball with a half-space is wrong once the centre is inside).
 fn reference(a: &Both, pa: &Pose, b: &Both, pb: &Pose) -> (f64, Option<Vec3>) {
     if matches!(a.ours, Shape::HalfSpace) {
         let (distance, normal) = reference(b, pb, a, pa);
@@ -125,7 +129,11 @@ fn compare(a: &Both, pa: &Pose, b: &Both, pb: &Pose, ka: usize, kb: usize, case:
     };
     let clipped = ka.max(kb) == 2 && ka.min(kb) >= 1;
     let bias = if clipped { 1e-3 * a.least.min(b.least) + 0.05 * distance.abs() } else { 0.0 };
-    assert!((contact.gap - distance).abs() < 1e-5 + 1.2 * bias, "gap {} but {distance}: {label}\n{found:?}", contact.gap);
+    assert!(
+        (contact.gap - distance).abs() < 1e-5 + 1.2 * bias,
+        "gap {} but {distance}: {label}\n{found:?}",
+        contact.gap
+    );
     if distance > 1e-4 {
         counts[1] += 1;
         let exact = normal.filter(|_| !clipped);
@@ -182,13 +190,16 @@ fn points_are_midway_between_the_surfaces() {
         for c in found.iter().filter(|c| c.gap.abs() < 0.05) {
             let (on_a, on_b) = (c.point + c.normal * (0.5 * c.gap), c.point - c.normal * (0.5 * c.gap));
             let (off_a, off_b) = (off_surface(&a, &pa, &on_a), off_surface(&b, &pb, &on_b));
-            // one side is exact; the other may stand beyond the edge of a face by the clipping's slop, or be the plane of a face that
-            // a slightly tilted edge or end crosses
+            // one side is exact; the other may stand beyond the edge of a face by the clipping's slop, or be the
+            // plane of a face that a slightly tilted edge or end crosses
             // (the end of the part of a tilted capsule that is over a face is neither)
             let exact = if (ka, kb) == (1, 2) || (ka, kb) == (2, 1) { 2e-3 } else { 1e-6 };
             assert!(off_a.min(off_b) < exact, "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}");
             // a capsule's upper end is a ball within the tube, so only the deepest contact must lie on both surfaces
-            assert!(c.gap > least || off_a.max(off_b) < 2e-3 + 0.2 * c.gap.abs(), "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}");
+            assert!(
+                c.gap > least || off_a.max(off_b) < 2e-3 + 0.2 * c.gap.abs(),
+                "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}"
+            );
             let (core_a, core_b) = (on_a + c.normal * c.core_a, on_b - c.normal * c.core_b);
             let axis_of = |shape: &Both, pose: &Pose, p: &Vec3| match shape.ours {
                 Shape::Sphere { .. } => (p - pose.translation.vector).norm(),
@@ -198,7 +209,10 @@ fn points_are_midway_between_the_surfaces() {
                 }
                 _ => 0.0,
             };
-            assert!(axis_of(&a, &pa, &core_a) < 1e-9 && axis_of(&b, &pb, &core_b) < 1e-9, "kinds {ka} {kb}, case {case}: {c:?}");
+            assert!(
+                axis_of(&a, &pa, &core_a) < 1e-9 && axis_of(&b, &pb, &core_b) < 1e-9,
+                "kinds {ka} {kb}, case {case}: {c:?}"
+            );
             met += 1;
         }
     }

@@ -1,4 +1,5 @@
-//! Contacts of sphere trees against parry's distance to the mesh itself: none missed, none invented beyond the stated error.
+//! Contacts of sphere trees against parry's distance to the mesh itself: none missed, none invented beyond the stated
+//! error.
 
 use crate::against_parry::{to_parry, vector};
 use crate::rng::Rng;
@@ -44,7 +45,11 @@ fn bodies() -> Vec<Both> {
         solid("ring", TriMesh::torus(1.0, 0.3, 48, 24)),
         Both { name: "cylinder", ours: cylinder, theirs: Box::new(theirs), error, size },
         primitive("ball", Shape::sphere(0.3).unwrap(), Box::new(Ball::new(0.3))),
-        primitive("box", Shape::cuboid(Vec3::new(0.3, 0.2, 0.4)).unwrap(), Box::new(Cuboid::new(vector(&Vec3::new(0.3, 0.2, 0.4))))),
+        primitive(
+            "box",
+            Shape::cuboid(Vec3::new(0.3, 0.2, 0.4)).unwrap(),
+            Box::new(Cuboid::new(vector(&Vec3::new(0.3, 0.2, 0.4)))),
+        ),
         primitive("capsule", Shape::capsule(0.1, 0.4).unwrap(), Box::new(Capsule::new_z(0.4, 0.1))),
     ];
     for (name, file) in [("bunny", "bunny.obj"), ("spot", "spot.obj"), ("link", "panda_link5.obj")] {
@@ -59,7 +64,10 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> 
     let mut out = Vec::new();
     contacts(a, pa, b, pb, margin, &mut out);
     for c in &out {
-        assert!((c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= margin && c.point.iter().all(|x| x.is_finite()), "{c:?}");
+        assert!(
+            (c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= margin && c.point.iter().all(|x| x.is_finite()),
+            "{c:?}"
+        );
     }
     assert!(out.len() <= 48, "{} contacts", out.len());
     out
@@ -80,7 +88,8 @@ fn tree_contacts_agree_with_the_distance_to_the_mesh() {
                 let away = rng.direction() * (a.size + b.size) * rng.between(0.3, 1.0);
                 let (pa, pb) = (rng.pose(0.5), rng.pose(0.5));
                 let pa = Pose::from_parts((pb.translation.vector + away).into(), pa.rotation);
-                let distance = query::distance(&to_parry(&pa), &*a.theirs, &to_parry(&pb), &*b.theirs).unwrap().distance;
+                let distance =
+                    query::distance(&to_parry(&pa), &*a.theirs, &to_parry(&pb), &*b.theirs).unwrap().distance;
                 let found = ask(&a.ours, &pa, &b.ours, &pb, MARGIN);
                 let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
                 let label = format!("{} on {}, case {case}: {least} but {distance}", a.name, b.name);
@@ -107,8 +116,8 @@ fn a_ring_hangs_on_a_peg_through_its_hole_without_contact() {
     assert!(ask(&ring, &here, &peg, &here, 0.0).is_empty(), "the hole is 0.75 wide");
     let touching = ask(&ring, &Pose::translation(0.3, 0.0, 0.0), &peg, &here, 0.0);
     let deepest = touching.iter().min_by(|a, b| a.gap.total_cmp(&b.gap)).unwrap();
-    // the ring's left inner side leans on the peg's left: the ring is pushed towards −x. An error e of the gap turns the deepest
-    // normal by θ with 0.3 (1 − cos θ) < e = 0.036
+    // the ring's left inner side leans on the peg's left: the ring is pushed towards −x. An error e of the gap turns
+    // the deepest normal by θ with 0.3 (1 − cos θ) < e = 0.036
     assert!(deepest.normal.x < -0.88 && deepest.point.x < -0.4 && deepest.gap < -0.15, "{deepest:?}");
 }
 
@@ -118,7 +127,12 @@ fn a_box_mesh_lies_flat_on_a_wide_base() {
     let error = shape.tree().unwrap().outward_error();
     let found = ask(&shape, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.005);
     assert!((4..=6).contains(&found.len()), "{found:?}");
-    assert!(found.iter().all(|c| c.gap >= -error && c.gap <= 0.005 && c.normal == Vec3::z() && c.normal_from == NormalFrom::FaceOfB));
+    assert!(
+        found.iter().all(|c| c.gap >= -error
+            && c.gap <= 0.005
+            && c.normal == Vec3::z()
+            && c.normal_from == NormalFrom::FaceOfB)
+    );
     let low = found.iter().fold(Vec3::repeat(9.0), |m, c| m.inf(&c.point));
     let high = found.iter().fold(Vec3::repeat(-9.0), |m, c| m.sup(&c.point));
     assert!((high - low).x > 0.7 && (high - low).y > 0.7, "{low:?} {high:?}");
@@ -129,10 +143,21 @@ fn a_box_mesh_lies_flat_on_a_wide_base() {
 #[test]
 fn a_pin_stands_upright_on_its_base() {
     // a bowling pin's lower half is enough: base of radius 26 mm, belly of 60 mm at 114 mm, 381 mm high
-    let profile = [(0.0, 0.0), (0.026, 0.0), (0.045, 0.05), (0.06, 0.114), (0.05, 0.18), (0.025, 0.25), (0.032, 0.34), (0.015, 0.375), (0.0, 0.381)];
+    let profile = [
+        (0.0, 0.0),
+        (0.026, 0.0),
+        (0.045, 0.05),
+        (0.06, 0.114),
+        (0.05, 0.18),
+        (0.025, 0.25),
+        (0.032, 0.34),
+        (0.015, 0.375),
+        (0.0, 0.381),
+    ];
     let (pin, offset) = Shape::mesh(TriMesh::lathe(&profile, 32).unwrap(), &TreeSettings::default()).unwrap();
     let error = pin.tree().unwrap().outward_error();
-    let found = ask(&pin, &Pose::translation(0.0, 0.0, offset.z + error), &Shape::half_space(), &Pose::identity(), 0.001);
+    let found =
+        ask(&pin, &Pose::translation(0.0, 0.0, offset.z + error), &Shape::half_space(), &Pose::identity(), 0.001);
     let standing: Vec<_> = found.iter().filter(|c| c.gap.abs() < 1e-9).collect();
     assert!(standing.len() >= 3, "{found:?}");
     // its support reaches at least 15 mm from the axis in every direction
@@ -151,9 +176,14 @@ fn a_ball_lies_in_a_cup() {
     let (cup, offset) = Shape::mesh(cup, &TreeSettings::default()).unwrap();
     let error = cup.tree().unwrap().outward_error();
     let ball = Shape::sphere(0.4).unwrap();
-    let at_height = |above: f64| ask(&ball, &Pose::translation(0.3, 0.2, 0.5 + 0.4 + above - offset.z), &cup, &Pose::identity(), 0.0);
+    let at_height = |above: f64| {
+        ask(&ball, &Pose::translation(0.3, 0.2, 0.5 + 0.4 + above - offset.z), &cup, &Pose::identity(), 0.0)
+    };
     let touching = at_height(0.0);
-    assert!(!touching.is_empty() && touching.iter().all(|c| c.gap >= -error - 1e-9 && c.normal.z > 0.9), "{touching:?}");
+    assert!(
+        !touching.is_empty() && touching.iter().all(|c| c.gap >= -error - 1e-9 && c.normal.z > 0.9),
+        "{touching:?}"
+    );
     assert!(at_height(1.01 * error).is_empty());
 }
 
@@ -167,7 +197,14 @@ fn poses_that_are_not_numbers_do_no_harm() {
                 out.clear();
                 contacts(&a.ours, &Pose::translation(bad, 0.0, 0.0), &b.ours, &Pose::identity(), 0.1, &mut out);
                 contacts(&b.ours, &Pose::identity(), &a.ours, &Pose::translation(0.0, bad, 0.0), 0.1, &mut out);
-                contacts(&a.ours, &Pose::translation(bad, 0.0, 0.0), &Shape::half_space(), &Pose::identity(), 0.1, &mut out);
+                contacts(
+                    &a.ours,
+                    &Pose::translation(bad, 0.0, 0.0),
+                    &Shape::half_space(),
+                    &Pose::identity(),
+                    0.1,
+                    &mut out,
+                );
                 assert!(out.iter().all(|c| c.gap <= 0.1), "{} {}: {out:?}", a.name, b.name);
             }
         }
@@ -191,7 +228,10 @@ fn cylinder_on_a_half_space_is_exact() {
     }
     let standing = ask(&shape, &Pose::translation(0.0, 0.0, 0.999), &Shape::half_space(), &Pose::identity(), 0.01);
     assert_eq!(standing.len(), 4);
-    let lying = Pose::from_parts(Vec3::new(0.0, 0.0, 0.499).into(), Quat::from_scaled_axis(Vec3::x() * std::f64::consts::FRAC_PI_2));
+    let lying = Pose::from_parts(
+        Vec3::new(0.0, 0.0, 0.499).into(),
+        Quat::from_scaled_axis(Vec3::x() * std::f64::consts::FRAC_PI_2),
+    );
     let lying = ask(&shape, &lying, &Shape::half_space(), &Pose::identity(), 0.01);
     assert_eq!(lying.len(), 2);
     assert!(lying.iter().all(|c| (c.gap + 0.001).abs() < 1e-12 && c.core_a == radius));
@@ -206,9 +246,17 @@ fn boxes_around_shapes_hold_their_balls_and_vertices() {
             let bounds = body.ours.aabb(&pose);
             let theirs = body.theirs.compute_aabb(&to_parry(&pose));
             for k in 0..3 {
-                assert!(bounds.min[k] <= theirs.mins[k] + 1e-9 && bounds.max[k] >= theirs.maxs[k] - 1e-9, "{}", body.name);
+                assert!(
+                    bounds.min[k] <= theirs.mins[k] + 1e-9 && bounds.max[k] >= theirs.maxs[k] - 1e-9,
+                    "{}",
+                    body.name
+                );
                 // ours may be wider by the leaves and by the turning of a box, never by more than that
-                assert!(bounds.max[k] - bounds.min[k] <= 2.0 * 3.0_f64.sqrt() * (body.size + 2.0 * body.error), "{}", body.name);
+                assert!(
+                    bounds.max[k] - bounds.min[k] <= 2.0 * 3.0_f64.sqrt() * (body.size + 2.0 * body.error),
+                    "{}",
+                    body.name
+                );
             }
         }
     }
