@@ -58,14 +58,12 @@ const SAME_SIDE: f64 = 0.85;
 const PENDING: usize = 512;
 /// At most this many sides.
 const MOST_CLUSTERS: usize = 8;
-/// Tilt (radians, its tangent) for which a support point is kept.
-const TILT: f64 = 0.03;
 
 /// Gathers the many contacts of leaf balls in B's frame at the end of `out` and keeps few.
 ///
 /// Contacts are clustered by normal, the deepest first. Of each cluster are kept the deepest, and for each of five
 /// directions the point that would touch first if A tilted a little that way: the vertices of the manifold's lower
-/// hull, which is what it can rest on.
+/// hull, which is what it can rest on. Three more stand for a wider tilt, if they are others.
 pub(super) struct Collector<'a> {
     out: &'a mut Vec<Contact>,
     start: usize,
@@ -94,17 +92,13 @@ impl<'a> Collector<'a> {
 
     fn reduce(&mut self) {
         let found = &mut self.out[self.start..];
-        if found.len() < 2 {
-            return;
-        }
-        found.sort_unstable_by(|a, b| a.gap.total_cmp(&b.gap).then(a.feature.cmp(&b.feature)));
-        // `rest` is what no cluster has taken yet, deepest first; kept contacts gather at the front
+        // `found[..kept]` are kept, `found[rest..]` are in no cluster yet
         let (mut kept, mut rest) = (0, 0);
         for _ in 0..MOST_CLUSTERS {
             if rest == found.len() {
                 break;
             }
-            let end = gather_cluster(found, rest);
+            let end = rest + gather_cluster(&mut found[rest..]);
             let count = keep_hull(&mut found[rest..end]);
             for n in 0..count {
                 found.swap(kept + n, rest + n);
@@ -117,34 +111,31 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Moves all of `found[first..]` that face the way of `found[first]` next to it, both parts staying in order; returns
-/// their end.
-fn gather_cluster(found: &mut [Contact], first: usize) -> usize {
-    let normal = found[first].normal;
-    let tail = &mut found[first..];
-    // a stable partition in place: order within the tail is by gap and feature, restored by a sort of each half
-    let mut end = 0;
-    for n in 0..tail.len() {
-        if tail[n].normal.dot(&normal) >= SAME_SIDE {
-            tail.swap(end, n);
+/// Moves the deepest contact to the front and all that face its way next to it; returns how many those are.
+fn gather_cluster(found: &mut [Contact]) -> usize {
+    let deeper = |a: &Contact, b: &Contact| a.gap < b.gap || (a.gap == b.gap && a.feature < b.feature);
+    let deepest = (1..found.len()).fold(0, |best, n| if deeper(&found[n], &found[best]) { n } else { best });
+    found.swap(0, deepest);
+    let normal = found[0].normal;
+    let mut end = 1;
+    for n in 1..found.len() {
+        if found[n].normal.dot(&normal) >= SAME_SIDE {
+            found.swap(end, n);
             end += 1;
         }
     }
-    let by_depth = |a: &Contact, b: &Contact| a.gap.total_cmp(&b.gap).then(a.feature.cmp(&b.feature));
-    tail[..end].sort_unstable_by(by_depth);
-    tail[end..].sort_unstable_by(by_depth);
-    first + end
+    end
 }
 
-/// Moves to the front the deepest contact of a cluster and its support points in five tilted directions; returns how
-/// many.
+/// Moves to the front the deepest contact of a cluster (its first) and its support points; returns how many.
 fn keep_hull(cluster: &mut [Contact]) -> usize {
     let normal = cluster[0].normal;
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let v = normal.cross(&u);
     let mut kept = 1;
-    for (x, y) in DIRECTIONS {
-        let way = (u * x + v * y) * TILT;
+    for (tilt, n) in SUPPORTS {
+        let (x, y) = DIRECTIONS[n];
+        let way = (u * x + v * y) * tilt;
         let support = best(cluster.len(), |n| way.dot(&cluster[n].point) - cluster[n].gap);
         if support >= kept {
             cluster.swap(kept, support);
@@ -154,6 +145,10 @@ fn keep_hull(cluster: &mut [Contact]) -> usize {
     kept
 }
 
+/// Tilts (tangents of their angles) and directions for which a cluster's support point is kept: all five for what the body rests on, three
+/// for what it may swing onto within a step. On a flat base the wide ones find the same points again.
+const SUPPORTS: [(f64, usize); 8] =
+    [(0.02, 0), (0.02, 1), (0.02, 2), (0.02, 3), (0.02, 4), (0.15, 0), (0.15, 2), (0.15, 3)];
 /// Corners of a regular pentagon.
 const DIRECTIONS: [(f64, f64); 5] = [
     (1.0, 0.0),

@@ -69,7 +69,7 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> 
             "{c:?}"
         );
     }
-    assert!(out.len() <= 48, "{} contacts", out.len());
+    assert!(out.len() <= 72, "{} contacts", out.len());
     out
 }
 
@@ -126,7 +126,7 @@ fn a_box_mesh_lies_flat_on_a_wide_base() {
     let (shape, _) = Shape::mesh(TriMesh::box_(Vec3::new(0.5, 0.5, 0.25)), &TreeSettings::default()).unwrap();
     let error = shape.tree().unwrap().outward_error();
     let found = ask(&shape, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.005);
-    assert!((4..=6).contains(&found.len()), "{found:?}");
+    assert!((4..=9).contains(&found.len()), "{found:?}");
     assert!(
         found.iter().all(|c| c.gap >= -error
             && c.gap <= 0.005
