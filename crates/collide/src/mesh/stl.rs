@@ -31,7 +31,7 @@ impl TriMesh {
             return Err(MeshError::NotFiniteInFace { face: (vertex - 1) / 3 + 1, x, y, z });
         }
         mesh.check_data()?;
-        Ok(mesh.welded().0)
+        Ok(mesh.welded())
     }
 }
 

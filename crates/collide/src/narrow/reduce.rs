@@ -145,8 +145,9 @@ fn keep_hull(cluster: &mut [Contact]) -> usize {
     kept
 }
 
-/// Tilts (tangents of their angles) and directions for which a cluster's support point is kept: all five for what the body rests on, three
-/// for what it may swing onto within a step. On a flat base the wide ones find the same points again.
+/// Tilts (tangents of their angles) and directions for which a cluster's support point is kept: all five for what the
+/// body rests on, three for what it may swing onto within a step. On a flat base the wide ones find the same points
+/// again.
 const SUPPORTS: [(f64, usize); 8] =
     [(0.02, 0), (0.02, 1), (0.02, 2), (0.02, 3), (0.02, 4), (0.15, 0), (0.15, 2), (0.15, 3)];
 /// Corners of a regular pentagon.

@@ -258,3 +258,17 @@ fn damaged_files_are_read_or_refused() {
     }
     assert!(read > 100 && refused > 1000, "{read} {refused}");
 }
+
+#[test]
+fn errors_number_faces_as_the_user_sees_them() {
+    // an unused vertex, a degenerate face and a doubled vertex come before the box that lacks its last face
+    let mut mesh = TriMesh::box_(Vec3::repeat(1.0));
+    mesh.triangles.pop();
+    mesh.triangles.iter_mut().flatten().for_each(|v| *v += 2);
+    mesh.triangles.insert(0, [2, 2, 3]);
+    mesh.vertices.splice(0..0, [Vec3::repeat(9.0), Vec3::repeat(-1.0)]);
+    let error = mesh.check_closed().unwrap_err();
+    let MeshError::Open { edges: 3, holes: 1, from, to, face, .. } = error else { panic!("{error}") };
+    let corners = mesh.triangles[face - 1];
+    assert!(corners.contains(&(from - 1)) && corners.contains(&(to - 1)), "{error}");
+}
