@@ -64,19 +64,35 @@ const MOST_CLUSTERS: usize = 8;
 /// Contacts are clustered by normal, the deepest first. Of each cluster are kept the deepest, and for each of five
 /// directions the point that would touch first if A tilted a little that way: the vertices of the manifold's lower
 /// hull, which is what it can rest on. Three more stand for a wider tilt, if they are others.
+///
+/// Once more than a few hundred were gathered the overlap is wide; if it is also deep (by more than a band below the
+/// deepest), the shallow ones tell nothing that the deep ones do not, and are no longer asked for.
 pub(super) struct Collector<'a> {
     out: &'a mut Vec<Contact>,
     start: usize,
+    limit: f64,
+    band: f64,
 }
 
+/// The band, as a part of the smaller body's radius.
+const BAND: f64 = 0.05;
+
 impl<'a> Collector<'a> {
-    pub fn new(out: &'a mut Vec<Contact>) -> Collector<'a> {
-        Collector { start: out.len(), out }
+    /// `radius` is that of the smaller body.
+    pub fn new(margin: f64, radius: f64, out: &'a mut Vec<Contact>) -> Collector<'a> {
+        Collector { start: out.len(), out, limit: margin, band: BAND * radius }
+    }
+
+    /// Only contacts with a gap up to this are wanted.
+    pub fn limit(&self) -> f64 {
+        self.limit
     }
 
     pub fn push(&mut self, contact: Contact) {
         if self.out.len() - self.start >= PENDING {
             self.reduce();
+            // the first one kept is the deepest
+            self.limit = self.limit.min(self.out[self.start].gap + self.band);
         }
         self.out.push(contact);
     }

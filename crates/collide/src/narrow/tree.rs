@@ -16,7 +16,6 @@ struct Pair<'a> {
     a: &'a SphereTree,
     b: &'a SphereTree,
     a_in_b: Pose,
-    margin: f64,
 }
 
 pub(super) fn tree_tree(
@@ -27,8 +26,9 @@ pub(super) fn tree_tree(
     margin: f64,
     out: &mut Vec<Contact>,
 ) {
-    let pair = Pair { a, b, a_in_b: pose_b.inv_mul(pose_a), margin };
-    let mut found = Collector::new(out);
+    let pair = Pair { a, b, a_in_b: pose_b.inv_mul(pose_a) };
+    let smaller = a.nodes()[0].radius.min(b.nodes()[0].radius);
+    let mut found = Collector::new(margin, smaller, out);
     pair.visit(0, 0, &mut found);
     found.finish(pose_b);
 }
@@ -37,7 +37,8 @@ impl Pair<'_> {
     fn visit(&self, na: usize, nb: usize, found: &mut Collector) {
         let (a, b) = (&self.a.nodes()[na], &self.b.nodes()[nb]);
         let center_a = (self.a_in_b * Point3::from(a.center)).coords;
-        let reach = a.radius + b.radius + self.margin;
+        // a deep limit leaves nothing of balls that are too small to reach it
+        let reach = (a.radius + b.radius + found.limit()).max(0.0);
         if (center_a - b.center).norm_squared() > reach * reach {
             return;
         }
@@ -70,21 +71,21 @@ pub(super) fn tree_primitive(
     out: &mut Vec<Contact>,
 ) {
     let a_in_b = pose_b.inv_mul(pose_a);
-    let mut found = Collector::new(out);
-    visit(a, &a_in_b, b, 0, margin, &mut found);
+    let mut found = Collector::new(margin, a.nodes()[0].radius.min(b.bounding_radius()), out);
+    visit(a, &a_in_b, b, 0, &mut found);
     found.finish(pose_b);
 }
 
-fn visit(tree: &SphereTree, pose: &Pose, primitive: &Shape, node: usize, margin: f64, found: &mut Collector) {
+fn visit(tree: &SphereTree, pose: &Pose, primitive: &Shape, node: usize, found: &mut Collector) {
     let ball = &tree.nodes()[node];
     let center = (pose * Point3::from(ball.center)).coords;
     let Some(field) = field(primitive, &center) else { return };
     let gap = field.distance - ball.radius;
-    if gap > margin {
+    if gap > found.limit() {
         return;
     }
     if !ball.is_leaf() {
-        ball.child_range().for_each(|child| visit(tree, pose, primitive, child, margin, found));
+        ball.child_range().for_each(|child| visit(tree, pose, primitive, child, found));
         return;
     }
     found.push(Contact {
