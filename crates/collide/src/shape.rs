@@ -1,6 +1,5 @@
 //! The shapes that a body's part can have.
 
-use crate::solid::tree_box;
 use crate::{
     Aabb, CylinderShape, MassProperties, MeshShape, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3, mass,
 };
@@ -90,14 +89,14 @@ impl Shape {
     /// is bounded on that side; any other is unbounded on all sides. Meshes and cylinders include the leaves of their
     /// trees.
     pub fn aabb(&self, pose: &Pose) -> Aabb {
-        let here = pose.translation.vector;
-        let (center, half) = match self {
+        let center = pose.translation.vector;
+        let half = match self {
             Shape::HalfSpace => return half_space_aabb(pose),
-            Shape::Sphere { radius } => (here, Vec3::repeat(*radius)),
-            Shape::Box { half_extents } => (here, pose.rotation.to_rotation_matrix().matrix().abs() * half_extents),
-            Shape::Capsule { radius, half_length } => (here, (axis(pose).abs() * *half_length).add_scalar(*radius)),
-            Shape::Cylinder(cylinder) => tree_box(cylinder.tree(), pose),
-            Shape::Mesh(mesh) => tree_box(mesh.tree(), pose),
+            Shape::Sphere { radius } => Vec3::repeat(*radius),
+            Shape::Box { half_extents } => pose.rotation.to_rotation_matrix().matrix().abs() * half_extents,
+            Shape::Capsule { radius, half_length } => (axis(pose).abs() * *half_length).add_scalar(*radius),
+            Shape::Cylinder(cylinder) => return cylinder.aabb(pose),
+            Shape::Mesh(mesh) => return mesh.aabb(pose),
         };
         Aabb { min: center - half, max: center + half }
     }
