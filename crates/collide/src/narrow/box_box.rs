@@ -75,7 +75,7 @@ fn in_frame_of_a(f: &Frames, margin: f64, out: &mut Vec<Contact>) {
     }
     let start = out.len();
     let least = face_manifold(f, &face, margin, out);
-    if least > greatest + bias || face.separation < greatest - bias {
+    if least > (greatest + bias).min(margin) || face.separation < greatest - bias {
         out.truncate(start);
         match box_closest::closest(f) {
             Some(contact) if contact.gap <= margin => out.push(contact),

@@ -138,7 +138,7 @@ fn separated_cores(core: &Core, s: f64, half: &Vec3, margin: f64, out: &mut Vec<
         least = push_on_face(core, half, (k, normal[k].signum()), margin, out);
     }
     let gap = distance - radius;
-    if least > gap + 1e-3 * radius {
+    if least > (gap + 1e-3 * radius).min(margin) {
         let edge_on_edge = s.abs() < 1.0 && offset.iter().filter(|d| **d != 0.0).count() == 2;
         out.push(Contact {
             point: p - normal * (radius + 0.5 * gap),

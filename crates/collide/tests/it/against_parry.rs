@@ -8,7 +8,7 @@
 use crate::rng::Rng;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d_f64::query;
-use parry3d_f64::shape::{Ball, Capsule, Cuboid, HalfSpace, Shape as ParryShape};
+use parry3d_f64::shape::{Ball, Capsule, Cuboid, HalfSpace, Segment, Shape as ParryShape};
 use tumble_collide::{Contact, Pose, Quat, Shape, Vec3, contacts};
 
 pub fn to_parry(pose: &Pose) -> ParryPose {
@@ -89,6 +89,12 @@ fn reference(a: &Both, pa: &Pose, b: &Both, pb: &Pose) -> (f64, Option<Vec3>) {
         return (normal.dot(&(Vec3::new(lowest.x, lowest.y, lowest.z) - pb.translation.vector)), Some(normal));
     }
     let (pa, pb) = (to_parry(pa), to_parry(pb));
+    if let (Shape::Capsule { radius: ra, half_length: la }, Shape::Capsule { radius: rb, half_length: lb }) =
+        (&a.ours, &b.ours)
+    {
+        let core = |l: f64| Segment::new(Vector::Z * -l, Vector::Z * l);
+        return (query::distance(&pa, &core(*la), &pb, &core(*lb)).unwrap().distance - ra - rb, None);
+    }
     let separate = query::distance(&pa, &*a.theirs, &pb, &*b.theirs).unwrap().distance;
     let contact = query::contact(&pa, &*a.theirs, &pb, &*b.theirs, MARGIN).unwrap();
     match contact {

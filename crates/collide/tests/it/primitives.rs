@@ -150,3 +150,23 @@ fn half_space_boxes_are_bounded_only_along_an_axis() {
     let tilted = Shape::half_space().aabb(&turned(0.0, 0.0, 3.0, Vec3::x() * 0.3));
     assert_eq!((tilted.min.z, tilted.max.z), (f64::NEG_INFINITY, f64::INFINITY));
 }
+
+/// The clipped face reached beyond the margin while an edge was within it, and nothing was told.
+#[test]
+fn an_edge_just_within_the_margin_is_not_missed() {
+    let a = Shape::cuboid(Vec3::new(0.7084363941525877, 0.31168860079970623, 0.6147508599287879)).unwrap();
+    let b = Shape::cuboid(Vec3::new(0.5587402072637294, 0.26632436260223613, 0.4442867410980149)).unwrap();
+    let pose = |t: [f64; 3], q: [f64; 4]| {
+        let turn = tumble_collide::Quat::from_quaternion(nalgebra::Quaternion::new(q[3], q[0], q[1], q[2]));
+        Pose::from_parts(Vec3::from(t).into(), turn)
+    };
+    let half = 0.5_f64.sqrt();
+    let pa = pose([-0.28506705895931617, -0.8226228327209517, 0.8337004198232256], [0.0, half, 0.0, half]);
+    let pb = pose(
+        [1.1246411521982, -0.858834330925359, 0.5933296584661905],
+        [-0.15076780093591483, 0.7528104013401922, -0.07687487866034155, 0.6361099141389992],
+    );
+    let found = query(&a, &pa, &b, &pb, 0.25);
+    // parry: 0.24936547
+    assert!(found.len() == 1 && (found[0].gap - 0.24936547).abs() < 1e-6, "{found:?}");
+}
