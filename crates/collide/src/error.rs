@@ -58,6 +58,14 @@ pub enum MeshError {
         /// As read.
         z: f64,
     },
+    /// A vertex absurdly far away.
+    #[error("vertex {vertex} has a coordinate of {value:e} m, but at most 1e9 m is taken; is the unit right?")]
+    TooFar {
+        /// From 1.
+        vertex: usize,
+        /// Its greatest coordinate, metres.
+        value: f64,
+    },
     /// A corner of an STL facet that is NaN or infinite.
     #[error("facet {face} has the vertex ({x}, {y}, {z}), but coordinates must be finite")]
     NotFiniteInFace {
@@ -97,8 +105,10 @@ pub enum MeshError {
         size: usize,
     },
     /// Edges with a face on one side only.
-    #[error("the mesh is open: {edges} edges have a face on one side only, in {holes} hole(s); the first hole has {first_hole} edges and \
-             begins at edge {from}–{to} of face {face}; close it")]
+    #[error(
+        "the mesh is open: {edges} edges have a face on one side only, in {holes} hole(s); the first hole has {first_hole} edges and \
+             begins at edge {from}–{to} of face {face}; close it"
+    )]
     Open {
         /// How many such edges there are.
         edges: usize,
@@ -114,8 +124,10 @@ pub enum MeshError {
         face: usize,
     },
     /// An edge whose faces do not pair up (a fin, or a Möbius band).
-    #[error("edge {from}–{to} of face {face} is shared by {faces} faces that do not pair up ({edges} such edge(s), {open} open edge(s)): \
-             remove the dangling face or split the edge")]
+    #[error(
+        "edge {from}–{to} of face {face} is shared by {faces} faces that do not pair up ({edges} such edge(s), {open} open edge(s)): \
+             remove the dangling face or split the edge"
+    )]
     NonManifold {
         /// How many such edges there are.
         edges: usize,

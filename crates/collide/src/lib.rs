@@ -1,8 +1,23 @@
 //! Geometry for tumble: meshes, shapes, sphere trees, broad and narrow phase. Poses in, contacts out.
 //!
-//! - [`Shape`]: what a body is made of; its [`Aabb`], volume and [`MassProperties`].
-//! - [`contacts`]: the narrow phase, one small file per family of pairs.
+//! - [`Shape`]: what a body's part is made of; its [`Aabb`], volume and [`MassProperties`].
+//! - [`contacts`]: the narrow phase, one small file per family of pairs; what it says is a [`Contact`].
 //! - [`BroadPhase`]: which pairs are worth asking about.
+//! - [`TriMesh`]: triangle meshes, read from OBJ and STL, checked, generated, integrated.
+//! - [`SphereTree`]: nested balls around a mesh, by which it collides.
+//!
+//! What holds throughout: no velocity and no time here; the same input gives the same bits; nothing that comes from a
+//! file or a user panics; metres, world axes unless a line says otherwise.
+//!
+//! ```
+//! use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, contacts};
+//!
+//! let (ring, _offset) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::default())?;
+//! let mut found = Vec::new();
+//! contacts(&ring, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.001, &mut found);
+//! assert!(found.len() >= 3 && found.iter().all(|c| c.normal.z == 1.0));
+//! # Ok::<(), tumble_collide::ShapeError>(())
+//! ```
 
 mod broad;
 mod contact;

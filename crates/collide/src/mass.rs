@@ -64,7 +64,10 @@ pub(crate) fn capsule(radius: f64, half_length: f64, density: f64) -> MassProper
     let (r, l) = (radius, half_length);
     // both halves: 2/5 m r² about the cap's flat centre, shifted to the middle of the capsule
     let across = ball.mass * (0.4 * r * r + l * l + 0.75 * r * l);
-    MassProperties::centred(tube.mass + ball.mass, tube.inertia.diagonal() + Vec3::new(across, across, ball.inertia[(2, 2)]))
+    MassProperties::centred(
+        tube.mass + ball.mass,
+        tube.inertia.diagonal() + Vec3::new(across, across, ball.inertia[(2, 2)]),
+    )
 }
 
 pub(crate) fn sphere_volume(radius: f64) -> f64 {

@@ -1,7 +1,8 @@
 //! The shapes that a body's part can have.
 
-use crate::solid::tree_box;
-use crate::{Aabb, CylinderShape, MassProperties, MeshShape, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3, mass};
+use crate::{
+    Aabb, CylinderShape, MassProperties, MeshShape, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3, mass,
+};
 use std::sync::Arc;
 
 /// A solid in its own frame. Primitives are centred on the origin.
@@ -46,7 +47,9 @@ impl Shape {
 
     /// A block; half extents in metres.
     pub fn cuboid(half_extents: Vec3) -> Result<Shape, ShapeError> {
-        for (k, what) in ["half extent x of a box", "half extent y of a box", "half extent z of a box"].into_iter().enumerate() {
+        for (k, what) in
+            ["half extent x of a box", "half extent y of a box", "half extent z of a box"].into_iter().enumerate()
+        {
             length(what, half_extents[k])?;
         }
         Ok(Shape::Box { half_extents })
@@ -66,8 +69,8 @@ impl Shape {
         Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, half_length)?)))
     }
 
-    /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its centre of mass is the origin. Also
-    /// returns the offset that was subtracted from its vertices, metres.
+    /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its centre of mass
+    /// is the origin. Also returns the offset that was subtracted from its vertices, metres.
     pub fn mesh(mesh: TriMesh, settings: &TreeSettings) -> Result<(Shape, Vec3), ShapeError> {
         let (shape, offset) = MeshShape::new(mesh, settings)?;
         Ok((Shape::Mesh(Arc::new(shape)), offset))
@@ -83,16 +86,17 @@ impl Shape {
     }
 
     /// The box in world axes around the shape at `pose`. A half-space that faces along an axis
-    /// is bounded on that side; any other is unbounded on all sides. Meshes and cylinders include the leaves of their trees.
+    /// is bounded on that side; any other is unbounded on all sides. Meshes and cylinders include the leaves of their
+    /// trees.
     pub fn aabb(&self, pose: &Pose) -> Aabb {
-        let here = pose.translation.vector;
-        let (center, half) = match self {
+        let center = pose.translation.vector;
+        let half = match self {
             Shape::HalfSpace => return half_space_aabb(pose),
-            Shape::Sphere { radius } => (here, Vec3::repeat(*radius)),
-            Shape::Box { half_extents } => (here, pose.rotation.to_rotation_matrix().matrix().abs() * half_extents),
-            Shape::Capsule { radius, half_length } => (here, (axis(pose).abs() * *half_length).add_scalar(*radius)),
-            Shape::Cylinder(cylinder) => tree_box(cylinder.tree(), pose),
-            Shape::Mesh(mesh) => tree_box(mesh.tree(), pose),
+            Shape::Sphere { radius } => Vec3::repeat(*radius),
+            Shape::Box { half_extents } => pose.rotation.to_rotation_matrix().matrix().abs() * half_extents,
+            Shape::Capsule { radius, half_length } => (axis(pose).abs() * *half_length).add_scalar(*radius),
+            Shape::Cylinder(cylinder) => return cylinder.aabb(pose),
+            Shape::Mesh(mesh) => return mesh.aabb(pose),
         };
         Aabb { min: center - half, max: center + half }
     }

@@ -1,6 +1,7 @@
 //! The shapes that carry a sphere tree: meshes and cylinders.
 
-use crate::{MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3};
+use crate::shape::axis;
+use crate::{Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3};
 
 /// A closed mesh about its centre of mass, with its sphere tree.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,20 +11,24 @@ pub struct MeshShape {
     /// At density 1.
     unit_mass: MassProperties,
     bounding_radius: f64,
+    /// The same for the leaves.
+    leaf_radius: f64,
+    report: ClosedReport,
 }
 
 impl MeshShape {
-    /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the tree. Also returns
-    /// the offset that was subtracted from the vertices (metres).
+    /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
+    /// tree. Also returns the offset that was subtracted from the vertices (metres).
     pub fn new(mut mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
-        mesh.check_closed()?;
+        let report = mesh.check_closed()?;
         let offset = mesh.mass_properties(1.0).center_of_mass;
         let mesh = mesh.translated(&-offset);
         // what rounding left of the offset is not worth a second shift
         let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mesh.mass_properties(1.0) };
         let tree = SphereTree::build(&mesh, settings)?;
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
-        Ok((MeshShape { mesh, tree, unit_mass, bounding_radius }, offset))
+        let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);
+        Ok((MeshShape { mesh, tree, unit_mass, bounding_radius, leaf_radius, report }, offset))
     }
 
     /// The surface; its centre of mass is the origin.
@@ -36,6 +41,11 @@ impl MeshShape {
         &self.tree
     }
 
+    /// What was found and mended when the mesh was read; its notes are for the user.
+    pub fn report(&self) -> &ClosedReport {
+        &self.report
+    }
+
     /// Volume, m³.
     pub fn volume(&self) -> f64 {
         self.unit_mass.mass
@@ -46,9 +56,23 @@ impl MeshShape {
         self.bounding_radius
     }
 
+    /// The box in world axes around the leaves: the turned local box, cut by the ball about the centre.
+    pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
+        let (bounds, here) = (self.tree.bounds(), pose.translation.vector);
+        let center = pose.rotation * (0.5 * (bounds.min + bounds.max)) + here;
+        let half = pose.rotation.to_rotation_matrix().matrix().abs() * (0.5 * (bounds.max - bounds.min));
+        Aabb {
+            min: (center - half).sup(&here.add_scalar(-self.leaf_radius)),
+            max: (center + half).inf(&here.add_scalar(self.leaf_radius)),
+        }
+    }
+
     /// At a uniform `density`, kg/m³.
     pub(crate) fn mass_properties(&self, density: f64) -> MassProperties {
-        MassProperties { inertia: self.unit_mass.inertia * density, ..self.unit_mass.with_mass(self.unit_mass.mass * density) }
+        MassProperties {
+            inertia: self.unit_mass.inertia * density,
+            ..self.unit_mass.with_mass(self.unit_mass.mass * density)
+        }
     }
 }
 
@@ -59,6 +83,9 @@ pub struct CylinderShape {
     half_length: f64,
     mesh: TriMesh,
     tree: SphereTree,
+    /// Of a cylinder around prism and leaves, metres.
+    outer_radius: f64,
+    outer_half_length: f64,
 }
 
 /// Sides of the prism that stands for a cylinder: its edges lie `1/cos(π/48)`, 0.2 % of the radius, outside.
@@ -71,7 +98,9 @@ impl CylinderShape {
         let outer = radius / nalgebra::ComplexField::cos(std::f64::consts::PI / SIDES as f64);
         let mesh = TriMesh::cylinder(outer, half_length, SIDES);
         let tree = SphereTree::build(&mesh, &TreeSettings::default())?;
-        Ok(CylinderShape { radius, half_length, mesh, tree })
+        let error = tree.outward_error();
+        let (outer_radius, outer_half_length) = (outer + error, half_length + error);
+        Ok(CylinderShape { radius, half_length, mesh, tree, outer_radius, outer_half_length })
     }
 
     /// Metres.
@@ -84,6 +113,15 @@ impl CylinderShape {
         self.half_length
     }
 
+    /// The box in world axes around the leaves.
+    pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
+        let here = pose.translation.vector;
+        // a disc reaches r·sin of the angle between its axis and the direction asked for
+        let half =
+            axis(pose).map(|e| self.outer_half_length * e.abs() + self.outer_radius * (1.0 - e * e).max(0.0).sqrt());
+        Aabb { min: here - half, max: here + half }
+    }
+
     /// The prism around the cylinder that the tree was made of.
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
@@ -93,12 +131,4 @@ impl CylinderShape {
     pub fn tree(&self) -> &SphereTree {
         &self.tree
     }
-}
-
-/// The box in world axes around the leaves of a tree at `pose`, as centre and half extents.
-pub(crate) fn tree_box(tree: &SphereTree, pose: &Pose) -> (Vec3, Vec3) {
-    let bounds = tree.bounds();
-    let center = pose * nalgebra::Point3::from(0.5 * (bounds.min + bounds.max));
-    let half = pose.rotation.to_rotation_matrix().matrix().abs() * (0.5 * (bounds.max - bounds.min));
-    (center.coords, half)
 }

@@ -7,7 +7,7 @@
 //! they would overlap everything on the axis.
 
 use super::BroadPhase;
-use crate::Aabb;
+use crate::{Aabb, Vec3};
 
 /// Sorted-axis broad phase. What it remembers changes its speed only, never its answer.
 #[derive(Clone, Debug, Default)]
@@ -18,6 +18,33 @@ pub struct SweepAndPrune {
     unbounded: Vec<u32>,
     axis: usize,
     calls: u32,
+    /// This call's bounded boxes in that order, side by side in memory: the sweep reads nothing else.
+    sorted: Vec<Entry>,
+}
+
+/// A bounded box, the sweep's axis first, and whose it is.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    min: [f64; 3],
+    max: [f64; 3],
+    index: u32,
+    moving: bool,
+}
+
+impl Entry {
+    fn new(bounds: &Aabb, axis: usize, index: u32, moving: bool) -> Entry {
+        let turned = |v: &Vec3| [v[axis], v[(axis + 1) % 3], v[(axis + 2) % 3]];
+        Entry { min: turned(&bounds.min), max: turned(&bounds.max), index, moving }
+    }
+
+    /// On the two axes that are not swept; `&`, not `&&`: four comparisons cost less than one branch that is guessed
+    /// wrong.
+    fn overlaps_across(&self, other: &Entry) -> bool {
+        (self.min[1] <= other.max[1])
+            & (other.min[1] <= self.max[1])
+            & (self.min[2] <= other.max[2])
+            & (other.min[2] <= self.max[2])
+    }
 }
 
 /// The axis is chosen anew once in so many calls.
@@ -28,8 +55,8 @@ impl BroadPhase for SweepAndPrune {
         out.clear();
         self.update_members(boxes);
         self.update_axis(boxes);
-        self.sort(boxes);
-        self.sweep(boxes, moving, out);
+        self.sort(boxes, moving);
+        self.sweep(out);
         self.meet_unbounded(boxes, moving, out);
         out.sort_unstable();
     }
@@ -61,28 +88,28 @@ impl SweepAndPrune {
         self.calls = self.calls % AXIS_PERIOD + 1;
     }
 
-    /// Insertion sort: linear when the order is nearly right.
-    fn sort(&mut self, boxes: &[Aabb]) {
-        let axis = self.axis;
-        let key = |i: u32| boxes[i as usize].min[axis];
-        for n in 1..self.order.len() {
-            let (item, mut hole) = (self.order[n], n);
-            while hole > 0 && key(self.order[hole - 1]) > key(item) {
-                self.order[hole] = self.order[hole - 1];
+    /// Insertion sort of the old order: linear when it is nearly right.
+    fn sort(&mut self, boxes: &[Aabb], moving: &[bool]) {
+        let (axis, sorted) = (self.axis, &mut self.sorted);
+        sorted.clear();
+        sorted.extend(self.order.iter().map(|&i| Entry::new(&boxes[i as usize], axis, i, moving[i as usize])));
+        for n in 1..sorted.len() {
+            let (item, mut hole) = (sorted[n], n);
+            while hole > 0 && sorted[hole - 1].min[0] > item.min[0] {
+                sorted[hole] = sorted[hole - 1];
                 hole -= 1;
             }
-            self.order[hole] = item;
+            sorted[hole] = item;
         }
+        self.order.iter_mut().zip(sorted).for_each(|(i, entry)| *i = entry.index);
     }
 
-    fn sweep(&self, boxes: &[Aabb], moving: &[bool], out: &mut Vec<[u32; 2]>) {
-        for (n, &i) in self.order.iter().enumerate() {
-            let end = boxes[i as usize].max[self.axis];
-            for &j in &self.order[n + 1..] {
-                if boxes[j as usize].min[self.axis] > end {
-                    break;
+    fn sweep(&self, out: &mut Vec<[u32; 2]>) {
+        for (n, a) in self.sorted.iter().enumerate() {
+            for b in self.sorted[n + 1..].iter().take_while(|b| b.min[0] <= a.max[0]) {
+                if a.overlaps_across(b) & (a.moving | b.moving) {
+                    out.push([a.index.min(b.index), a.index.max(b.index)]);
                 }
-                push_if_overlapping(boxes, moving, i, j, out);
             }
         }
     }
@@ -110,7 +137,7 @@ fn push_if_overlapping(boxes: &[Aabb], moving: &[bool], i: u32, j: u32, out: &mu
 fn widest_axis(boxes: &[Aabb], order: &[u32]) -> usize {
     let n = order.len().max(1) as f64;
     let centers = || order.iter().map(|&i| boxes[i as usize].min + boxes[i as usize].max);
-    let mean = centers().sum::<crate::Vec3>() / n;
-    let variance = centers().map(|c| (c - mean).component_mul(&(c - mean))).sum::<crate::Vec3>();
+    let mean = centers().sum::<Vec3>() / n;
+    let variance = centers().map(|c| (c - mean).component_mul(&(c - mean))).sum::<Vec3>();
     (0..3).fold(0, |best, k| if variance[k] > variance[best] { k } else { best })
 }

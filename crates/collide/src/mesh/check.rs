@@ -1,7 +1,7 @@
 //! Is the mesh a solid? Harmless defects are mended and told; the rest is an error that names where.
 //!
-//! A surface is closed and consistently wound iff every directed edge `u→v` is met by as many `v→u`. More than one of each is a
-//! non-manifold edge with a well-defined volume, which is accepted and told.
+//! A surface is closed and consistently wound iff every directed edge `u→v` is met by as many `v→u`. More than one of
+//! each is a non-manifold edge with a well-defined volume, which is accepted and told.
 
 use super::TriMesh;
 use crate::{MeshError, Vec3};
@@ -37,21 +37,26 @@ impl ClosedReport {
             (self.flipped_faces, "faces were reversed to agree with their neighbours"),
             (self.nonmanifold_edges, "edges have four or more faces (accepted: the volume is well defined)"),
         ];
-        let mut notes: Vec<String> = counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        let mut notes: Vec<String> =
+            counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
         if self.turned {
             notes.push("the mesh was inside out and was turned".into());
         }
         if self.shells > 1 {
-            notes.push(format!("the surface has {} separate shells; where they overlap the mass counts more than once", self.shells));
+            notes.push(format!(
+                "the surface has {} separate shells; where they overlap the mass counts more than once",
+                self.shells
+            ));
         }
         notes
     }
 }
 
 impl TriMesh {
-    /// Makes sure that the mesh is a closed, outward-wound solid. Welds equal vertices, drops zero-area and duplicate faces, makes
-    /// the winding consistent and turns an inside-out mesh, all in place and told in the report. An open or dangling surface, or one
-    /// without volume, is an error, and the mesh is then left as it was. Vertex numbers in errors are those after welding.
+    /// Makes sure that the mesh is a closed, outward-wound solid. Welds equal vertices, drops zero-area and duplicate
+    /// faces, makes the winding consistent and turns an inside-out mesh, all in place and told in the report. An open
+    /// or dangling surface, or one without volume, is an error, and the mesh is then left as it was. Errors number
+    /// vertices and faces as they stand in this mesh, from 1.
     pub fn check_closed(&mut self) -> Result<ClosedReport, MeshError> {
         self.check_data()?;
         // zero-area faces are first dropped; where that opens a seam that they close, they stay
@@ -61,10 +66,12 @@ impl TriMesh {
     }
 
     fn mended(&self, drop_collinear: bool) -> Result<(TriMesh, ClosedReport), MeshError> {
-        let (mut mesh, welded_vertices) = self.welded();
+        let (mut mesh, welded_vertices) = self.with_shared_vertices();
         let mut report = ClosedReport { welded_vertices, ..ClosedReport::default() };
-        report.degenerate_faces = mesh.drop_degenerate(drop_collinear);
-        report.duplicate_faces = mesh.drop_duplicates();
+        // the number that each face of `mesh` has in `self`
+        let mut face_of: Vec<usize> = (0..self.triangles.len()).collect();
+        report.degenerate_faces = mesh.drop_degenerate(drop_collinear, &mut face_of);
+        report.duplicate_faces = mesh.drop_duplicates(&mut face_of);
         if mesh.triangles.is_empty() {
             return Err(MeshError::Empty);
         }
@@ -72,11 +79,12 @@ impl TriMesh {
             report.flipped_faces = mesh.unify_winding();
         }
         let groups = edge_groups(&mesh);
-        refuse_unbalanced(&groups)?;
+        refuse_unbalanced(&groups, &face_of)?;
         report.nonmanifold_edges = groups.iter().filter(|g| g.len() > 2).count();
-        report.shells = shell_of_faces(&mesh, &groups).1;
+        report.shells = count_shells(&mesh, &groups);
+        mesh = mesh.compacted();
         report.volume = mesh.signed_volume();
-        if report.volume.abs() < 1e-12 * mesh.diagonal().powi(3) {
+        if report.volume.abs() <= 1e-12 * mesh.diagonal().powi(3) {
             return Err(MeshError::NoVolume { volume: report.volume });
         }
         if report.volume < 0.0 {
@@ -86,57 +94,80 @@ impl TriMesh {
         Ok((mesh, report))
     }
 
-    /// Merges vertices at exactly the same place (`-0` equals `0`) and drops those not in use; also returns how many were merged.
-    pub(crate) fn welded(&self) -> (TriMesh, usize) {
+    /// Merges vertices at exactly the same place (`-0` equals `0`) and drops those not in use.
+    pub(crate) fn welded(&self) -> TriMesh {
+        self.with_shared_vertices().0.compacted()
+    }
+
+    /// Lets every triangle name the first in use of the vertices at the same place; also returns how many others
+    /// there were. The vertices stay.
+    fn with_shared_vertices(&self) -> (TriMesh, usize) {
         let mut order: Vec<u32> = self.triangles.iter().flatten().copied().collect();
         order.sort_unstable();
         order.dedup();
-        let used = order.len();
         let key = |v: u32| self.vertices[v as usize].map(|x| x + 0.0);
-        let compare = |a: &Vec3, b: &Vec3| (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal);
+        let compare = |a: &Vec3, b: &Vec3| {
+            (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+        };
         order.sort_by(|&u, &v| compare(&key(u), &key(v)).then(u.cmp(&v)));
-        // each vertex stands for the first of its place
         let mut stands_for: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        for w in 1..order.len() {
-            let (before, here) = (order[w - 1], order[w]);
-            if key(before) == key(here) {
-                stands_for[here as usize] = stands_for[before as usize];
+        let mut merged = 0;
+        for pair in order.windows(2) {
+            if key(pair[0]) == key(pair[1]) {
+                stands_for[pair[1] as usize] = stands_for[pair[0] as usize];
+                merged += 1;
             }
         }
-        let mut kept: Vec<u32> = order.iter().copied().filter(|&v| stands_for[v as usize] == v).collect();
-        kept.sort_unstable();
-        let index = |v: u32| kept.partition_point(|&k| k < stands_for[v as usize]) as u32;
-        let triangles = self.triangles.iter().map(|t| t.map(index)).collect();
-        (TriMesh { vertices: kept.iter().map(|&v| self.vertices[v as usize]).collect(), triangles }, used - kept.len())
+        let triangles = self.triangles.iter().map(|t| t.map(|v| stands_for[v as usize])).collect();
+        (TriMesh { vertices: self.vertices.clone(), triangles }, merged)
     }
 
-    fn drop_degenerate(&mut self, collinear_too: bool) -> usize {
+    /// Without the vertices that no triangle uses; the others keep their order.
+    fn compacted(&self) -> TriMesh {
+        let mut kept: Vec<u32> = self.triangles.iter().flatten().copied().collect();
+        kept.sort_unstable();
+        kept.dedup();
+        let index = |v: u32| kept.partition_point(|&k| k < v) as u32;
+        let triangles = self.triangles.iter().map(|t| t.map(index)).collect();
+        TriMesh { vertices: kept.iter().map(|&v| self.vertices[v as usize]).collect(), triangles }
+    }
+
+    /// Keeps the triangles of which `keep` says so, and their numbers in `face_of`; returns how many went.
+    fn retain_faces(&mut self, face_of: &mut Vec<usize>, keep: impl Fn(usize) -> bool) -> usize {
         let before = self.triangles.len();
-        let vertices = &self.vertices;
-        self.triangles.retain(|&[a, b, c]| {
-            let repeated = a == b || b == c || c == a;
-            let [u, v] = [b, c].map(|k| vertices[k as usize] - vertices[a as usize]);
-            !repeated && !(collinear_too && u.cross(&v).norm() <= 1e-14 * u.norm_squared().max(v.norm_squared()))
-        });
-        before - self.triangles.len()
+        let kept: Vec<usize> = (0..before).filter(|&t| keep(t)).collect();
+        self.triangles = kept.iter().map(|&t| self.triangles[t]).collect();
+        *face_of = kept.iter().map(|&t| face_of[t]).collect();
+        before - kept.len()
+    }
+
+    fn drop_degenerate(&mut self, collinear_too: bool, face_of: &mut Vec<usize>) -> usize {
+        let before = self.clone();
+        self.retain_faces(face_of, |t| {
+            let ([i, j, k], [a, b, c]) = (before.triangles[t], before.corners(t));
+            let repeated = i == j || j == k || k == i;
+            let (u, v) = (b - a, c - a);
+            let collinear = u.cross(&v).norm() <= 1e-14 * u.norm_squared().max(v.norm_squared());
+            !(repeated || (collinear_too && collinear))
+        })
     }
 
     /// Drops a face that has the same corners in the same sense as an earlier one.
-    fn drop_duplicates(&mut self) -> usize {
-        let before = self.triangles.len();
+    fn drop_duplicates(&mut self, face_of: &mut Vec<usize>) -> usize {
         let smallest_first = |t: [u32; 3]| {
             let k = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
             [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
         };
-        let mut order: Vec<([u32; 3], usize)> = self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
+        let mut order: Vec<([u32; 3], usize)> =
+            self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
         order.sort_unstable();
-        order.dedup_by_key(|(t, _)| *t);
-        order.sort_unstable_by_key(|(_, n)| *n);
-        self.triangles = order.iter().map(|&(_, n)| self.triangles[n]).collect();
-        before - self.triangles.len()
+        let mut repeats = vec![false; order.len()];
+        order.windows(2).filter(|w| w[0].0 == w[1].0).for_each(|w| repeats[w[1].1] = true);
+        self.retain_faces(face_of, |t| !repeats[t])
     }
 
-    /// Spreads the winding of each shell's first face over edges of two faces, then turns each shell that was changed outwards.
+    /// Spreads the winding of each shell's first face over edges of two faces, then turns each shell that was changed
+    /// outwards.
     fn unify_winding(&mut self) -> usize {
         let groups = edge_groups(self);
         let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.triangles.len()];
@@ -173,11 +204,14 @@ impl TriMesh {
             return;
         }
         let origin = self.corners(seed)[0];
-        let volume: f64 = shell.iter().map(|&(t, flip)| {
-            let [a, b, c] = self.corners(t).map(|p| p - origin);
-            let d = a.dot(&b.cross(&c));
-            if flip { -d } else { d }
-        }).sum();
+        let volume: f64 = shell
+            .iter()
+            .map(|&(t, flip)| {
+                let [a, b, c] = self.corners(t).map(|p| p - origin);
+                let d = a.dot(&b.cross(&c));
+                if flip { -d } else { d }
+            })
+            .sum();
         for (t, flip) in shell {
             if flip ^ (volume < 0.0) {
                 self.triangles[t].swap(1, 2);
@@ -213,7 +247,8 @@ fn unbalanced(groups: &[Vec<EdgeUse>]) -> impl Iterator<Item = &Vec<EdgeUse>> {
     groups.iter().filter(|g| 2 * g.iter().filter(|u| u.forward).count() != g.len())
 }
 
-fn refuse_unbalanced(groups: &[Vec<EdgeUse>]) -> Result<(), MeshError> {
+/// `face_of` gives the numbers that faces have for the user.
+fn refuse_unbalanced(groups: &[Vec<EdgeUse>], face_of: &[usize]) -> Result<(), MeshError> {
     let bad: Vec<&Vec<EdgeUse>> = unbalanced(groups).collect();
     let Some(first) = bad.first() else { return Ok(()) };
     let open: Vec<EdgeUse> = bad.iter().filter(|g| g.len() == 1).map(|g| g[0]).collect();
@@ -226,7 +261,7 @@ fn refuse_unbalanced(groups: &[Vec<EdgeUse>]) -> Result<(), MeshError> {
             faces: shared.len(),
             from: shared[0].low + 1,
             to: shared[0].high + 1,
-            face: fin.face + 1,
+            face: face_of[fin.face] + 1,
         });
     }
     let loops = joined(open.len(), |a, b| touches(&open[a], &open[b]));
@@ -236,7 +271,7 @@ fn refuse_unbalanced(groups: &[Vec<EdgeUse>]) -> Result<(), MeshError> {
         first_hole: loops.iter().filter(|l| **l == loops[0]).count(),
         from: first[0].low + 1,
         to: first[0].high + 1,
-        face: first[0].face + 1,
+        face: face_of[first[0].face] + 1,
     })
 }
 
@@ -244,8 +279,8 @@ fn touches(a: &EdgeUse, b: &EdgeUse) -> bool {
     [a.low, a.high].iter().any(|v| *v == b.low || *v == b.high)
 }
 
-/// Groups `0..count` by a relation; each item gets the least member of its group. Quadratic, but open edges are few or the
-/// answer's wording does not matter; beyond 2000 all count as one group.
+/// Groups `0..count` by a relation; each item gets the least member of its group. Quadratic, but open edges are few
+/// or the answer's wording does not matter; beyond 2000 all count as one group.
 fn joined(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     if count > 2000 {
         return vec![0; count];
@@ -262,8 +297,8 @@ fn joined(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     group
 }
 
-/// The shell that each face belongs to (connected over edges), and how many there are.
-fn shell_of_faces(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> (Vec<usize>, usize) {
+/// How many pieces the surface has, connected over edges.
+fn count_shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> usize {
     let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
     fn root(parent: &mut [usize], mut f: usize) -> usize {
         while parent[f] != f {
@@ -278,7 +313,5 @@ fn shell_of_faces(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> (Vec<usize>, usize
             parent[a.max(b)] = a.min(b);
         }
     }
-    let roots: Vec<usize> = (0..parent.len()).map(|f| root(&mut parent, f)).collect();
-    let count = roots.iter().enumerate().filter(|(f, r)| f == *r).count();
-    (roots, count)
+    (0..parent.len()).filter(|&f| parent[f] == f).count()
 }

@@ -1,12 +1,12 @@
 //! Signed distance to a closed mesh.
 //!
-//! A binary tree of boxes finds the closest triangle; the sign comes from the angle-weighted pseudonormal of the closest feature.
-//! Source: Baerentzen and Aanaes, *Signed distance computation using the angle weighted pseudonormal* (2005); closest point on a
-//! triangle: Ericson, *Real-Time Collision Detection* (2005), §5.1.5. Where shells overlap, a point within the union may count as
-//! outside, never the other way round.
+//! A binary tree of boxes finds the closest triangle; the sign comes from the angle-weighted pseudonormal of the
+//! closest feature. Source: Baerentzen and Aanaes, *Signed distance computation using the angle weighted
+//! pseudonormal* (2005); closest point on a triangle: Ericson, *Real-Time Collision Detection* (2005), §5.1.5. Where
+//! shells overlap, a point within the union may count as outside, never the other way round.
 
-use super::check::edge_groups;
 use super::TriMesh;
+use super::check::edge_groups;
 use crate::{Aabb, Vec3};
 use nalgebra::ComplexField;
 
@@ -82,7 +82,8 @@ impl MeshDistance {
             }
             return;
         }
-        let mut children = [node + 1, here.second as usize].map(|c| (box_distance_squared(&self.nodes[c].bounds, p), c));
+        let mut children =
+            [node + 1, here.second as usize].map(|c| (box_distance_squared(&self.nodes[c].bounds, p), c));
         if children[1].0 < children[0].0 {
             children.swap(0, 1);
         }
@@ -118,10 +119,12 @@ fn box_distance_squared(b: &Aabb, p: &Vec3) -> f64 {
 
 /// Face (0), edges (1–3) and vertices (4–6) of every triangle.
 fn pseudonormals(mesh: &TriMesh) -> Vec<[Vec3; 7]> {
-    let face: Vec<Vec3> = (0..mesh.triangles.len()).map(|t| {
-        let [a, b, c] = mesh.corners(t);
-        (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
-    }).collect();
+    let face: Vec<Vec3> = (0..mesh.triangles.len())
+        .map(|t| {
+            let [a, b, c] = mesh.corners(t);
+            (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
+        })
+        .collect();
     let mut all: Vec<[Vec3; 7]> = face.iter().map(|n| [*n; 7]).collect();
     for group in edge_groups(mesh) {
         let sum: Vec3 = group.iter().map(|u| face[u.face]).sum();

@@ -67,8 +67,9 @@ impl TriMesh {
         mesh
     }
 
-    /// A closed solid of revolution about z. `profile` holds `(r, z)` in metres, first and last on the axis (`r = 0`), all between
-    /// off it, no two neighbours equal; either direction. The profile must not cross itself (not checked here).
+    /// A closed solid of revolution about z. `profile` holds `(r, z)` in metres, first and last on the axis (`r =
+    /// 0`), all between off it, no two neighbours equal; either direction. The profile must not cross itself (not
+    /// checked here).
     pub fn lathe(profile: &[(f64, f64)], segments: usize) -> Result<TriMesh, MeshError> {
         let bad = |what: &str| Err(MeshError::Profile { what: what.into() });
         let [first, middle @ .., last] = profile else { return bad("has fewer than 3 points") };
@@ -111,7 +112,8 @@ impl TriMesh {
         edges.sort_unstable();
         edges.dedup();
         let base = vertices.len() as u32;
-        vertices.extend(edges.iter().map(|(u, v)| (self.vertices[*u as usize] + self.vertices[*v as usize]).normalize()));
+        vertices
+            .extend(edges.iter().map(|(u, v)| (self.vertices[*u as usize] + self.vertices[*v as usize]).normalize()));
         // every edge of a face is in the list that was made from the faces
         let middle = |u, v| base + edges.partition_point(|e| *e < edge(u, v)) as u32;
         let triangles = self.triangles.iter().flat_map(|&[a, b, c]| {
@@ -130,7 +132,8 @@ fn signs(n: u32) -> Vec3 {
     Vec3::from_fn(|k, _| if n >> k & 1 == 1 { 1.0 } else { -1.0 })
 }
 
-/// The point of a half circle of `radius` about `(0, z)`, `angle` from its lowest point. Exactly on the axis at both ends.
+/// The point of a half circle of `radius` about `(0, z)`, `angle` from its lowest point. Exactly on the axis at both
+/// ends.
 fn on_arc(radius: f64, z: f64, angle: f64) -> (f64, f64) {
     let (sin, cos) = ComplexField::sin_cos(angle);
     (if sin.abs() < 1e-12 { 0.0 } else { radius * sin }, z - radius * cos)
@@ -140,7 +143,8 @@ fn on_arc(radius: f64, z: f64, angle: f64) -> (f64, f64) {
 fn revolve(profile: &[(f64, f64)], segments: usize) -> TriMesh {
     let segments = segments.clamp(3, MOST_SEGMENTS);
     let rings = profile.len() - 2;
-    let mut mesh = TriMesh { vertices: vec![Vec3::z() * profile[0].1, Vec3::z() * profile[rings + 1].1], triangles: Vec::new() };
+    let mut mesh =
+        TriMesh { vertices: vec![Vec3::z() * profile[0].1, Vec3::z() * profile[rings + 1].1], triangles: Vec::new() };
     for &(r, z) in &profile[1..=rings] {
         for n in 0..segments {
             let (sin, cos) = ComplexField::sin_cos(2.0 * PI * n as f64 / segments as f64);
@@ -162,10 +166,15 @@ fn icosahedron() -> TriMesh {
     let g = 0.5 * (1.0 + 5.0_f64.sqrt());
     let mut vertices = Vec::new();
     for (s, t) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-        vertices.extend([Vec3::new(0.0, s, t * g), Vec3::new(s, t * g, 0.0), Vec3::new(t * g, 0.0, s)].map(|v| v.normalize()));
+        vertices.extend(
+            [Vec3::new(0.0, s, t * g), Vec3::new(s, t * g, 0.0), Vec3::new(t * g, 0.0, s)].map(|v| v.normalize()),
+        );
     }
     // faces are the triples at the least mutual distance, wound outwards
-    let side = (0..12).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| (vertices[i] - vertices[j]).norm()).fold(9.0, f64::min);
+    let side = (0..12)
+        .flat_map(|i| (0..i).map(move |j| (i, j)))
+        .map(|(i, j)| (vertices[i] - vertices[j]).norm())
+        .fold(9.0, f64::min);
     let near = |i: usize, j: usize| (vertices[i] - vertices[j]).norm() < 1.1 * side;
     let mut triangles = Vec::new();
     for i in 0..12 {
@@ -173,7 +182,11 @@ fn icosahedron() -> TriMesh {
             for k in j + 1..12 {
                 if near(i, j) && near(j, k) && near(i, k) {
                     let outward = vertices[i].dot(&vertices[j].cross(&vertices[k])) > 0.0;
-                    triangles.push(if outward { [i as u32, j as u32, k as u32] } else { [i as u32, k as u32, j as u32] });
+                    triangles.push(if outward {
+                        [i as u32, j as u32, k as u32]
+                    } else {
+                        [i as u32, k as u32, j as u32]
+                    });
                 }
             }
         }

@@ -1,13 +1,14 @@
 //! Exact volume integrals over a closed mesh, by signed tetrahedra.
 //!
-//! Each triangle `(a, b, c)` and a reference point `o` span a tetrahedron of signed volume `D/6`, `D = a·(b × c)` with `o` as origin.
-//! Over it, `∫ x = D/24 s` and `∫ x xᵀ = D/120 (s sᵀ + a aᵀ + b bᵀ + c cᵀ)` with `s = a + b + c`. Sums over a closed surface are exact for
-//! the solid. The reference is the middle of the bounding box, so that a mesh far from the origin loses no digits.
-//! Source: Mirtich, *Fast and accurate computation of polyhedral mass properties* (1996) for the problem; the tetrahedral form is in
-//! Blow and Binstock, *How to find the inertia tensor of a 3D solid body* (2004).
+//! Each triangle `(a, b, c)` and a reference point `o` span a tetrahedron of signed volume `D/6`, `D = a·(b × c)`
+//! with `o` as origin. Over it, `∫ x = D/24 s` and `∫ x xᵀ = D/120 (s sᵀ + a aᵀ + b bᵀ + c cᵀ)` with `s = a + b + c`.
+//! Sums over a closed surface are exact for the solid. The reference is the middle of the bounding box, so that a
+//! mesh far from the origin loses no digits. Source: Mirtich, *Fast and accurate computation of polyhedral mass
+//! properties* (1996) for the problem; the tetrahedral form is in Blow and Binstock, *How to find the inertia tensor
+//! of a 3D solid body* (2004).
 
 use super::TriMesh;
-use crate::{Mat3, MassProperties, Vec3};
+use crate::{MassProperties, Mat3, Vec3};
 
 impl TriMesh {
     /// Signed volume, m³: positive if the triangles are wound outwards. Means something only for a closed mesh.
@@ -15,7 +16,8 @@ impl TriMesh {
         self.moments().0
     }
 
-    /// Mass, centre of mass and inertia of the solid at a uniform `density` (kg/m³). The mesh must be closed and wound outwards.
+    /// Mass, centre of mass and inertia of the solid at a uniform `density` (kg/m³). The mesh must be closed and
+    /// wound outwards.
     pub fn mass_properties(&self, density: f64) -> MassProperties {
         let (volume, first, second) = self.moments();
         let center = first / volume;

@@ -12,6 +12,9 @@ pub use distance::{ClosestPoint, MeshDistance};
 
 use crate::{Aabb, MeshError, Vec3};
 
+/// Coordinates up to this are taken, metres: their products stay within what floating point can hold.
+const FARTHEST: f64 = 1e9;
+
 /// A surface made of triangles, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
@@ -49,8 +52,8 @@ impl TriMesh {
         self
     }
 
-    /// Refuses an empty mesh, vertices that are not finite and indices out of range, naming the first offender
-    /// (numbers count from 1, as in an OBJ file).
+    /// Refuses an empty mesh, vertices that are not finite or beyond 1e9 m, and indices out of range, naming the
+    /// first offender (numbers count from 1, as in an OBJ file).
     pub fn check_data(&self) -> Result<(), MeshError> {
         if self.triangles.is_empty() {
             return Err(MeshError::Empty);
@@ -58,6 +61,9 @@ impl TriMesh {
         if let Some(n) = self.vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
             let v = self.vertices[n];
             return Err(MeshError::NotFinite { vertex: n + 1, x: v.x, y: v.y, z: v.z });
+        }
+        if let Some(n) = self.vertices.iter().position(|v| v.amax() > FARTHEST) {
+            return Err(MeshError::TooFar { vertex: n + 1, value: self.vertices[n].amax() });
         }
         let count = self.vertices.len();
         for (n, triangle) in self.triangles.iter().enumerate() {

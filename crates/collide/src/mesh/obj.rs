@@ -36,7 +36,9 @@ fn vertex<'a>(mut words: impl Iterator<Item = &'a str>, line: usize, vertex: usi
     let mut v = Vec3::zeros();
     for k in 0..3 {
         let word = words.next().ok_or(MeshError::Syntax { line, what: "a vertex of fewer than 3 numbers".into() })?;
-        v[k] = word.parse().map_err(|_| MeshError::Syntax { line, what: format!("`{word}` where a coordinate should be") })?;
+        v[k] = word
+            .parse()
+            .map_err(|_| MeshError::Syntax { line, what: format!("`{word}` where a coordinate should be") })?;
     }
     if v.iter().all(|x| x.is_finite()) {
         return Ok(v);
@@ -58,7 +60,10 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, line: usize, so_far: usize) ->
         corners.push(if index < 0 { index.saturating_add(so_far as i64 + 1) } else { index });
     }
     if corners.len() < 3 {
-        return Err(MeshError::Syntax { line, what: format!("a face of {} corners, but it needs at least 3", corners.len()) });
+        return Err(MeshError::Syntax {
+            line,
+            what: format!("a face of {} corners, but it needs at least 3", corners.len()),
+        });
     }
     Ok(corners)
 }

@@ -9,22 +9,29 @@ const HEADER: usize = 84;
 const RECORD: usize = 50;
 
 impl TriMesh {
-    /// Reads the bytes of an STL file, text or binary. Nothing is allocated on the word of a header: the count must agree
-    /// with the file's size.
+    /// Reads the bytes of an STL file, text or binary. Nothing is allocated on the word of a header: the count must
+    /// agree with the file's size.
     pub fn from_stl(bytes: &[u8]) -> Result<TriMesh, MeshError> {
         let soup = match binary_count(bytes) {
             Some(count) if bytes.len() == HEADER + RECORD * count => read_binary(bytes),
             _ if looks_like_text(bytes) => read_text(&String::from_utf8_lossy(bytes))?,
-            Some(count) if bytes.len() > HEADER + RECORD * count && count > 0 => read_binary(&bytes[..HEADER + RECORD * count]),
-            Some(count) => return Err(MeshError::StlSize { count, needed: HEADER + RECORD * count, size: bytes.len() }),
+            Some(count) if bytes.len() > HEADER + RECORD * count && count > 0 => {
+                read_binary(&bytes[..HEADER + RECORD * count])
+            }
+            Some(count) => {
+                return Err(MeshError::StlSize { count, needed: HEADER + RECORD * count, size: bytes.len() });
+            }
             None => return Err(MeshError::StlShort { size: bytes.len() }),
         };
-        let mesh = TriMesh { triangles: (0..soup.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(), vertices: soup };
+        let mesh = TriMesh {
+            triangles: (0..soup.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+            vertices: soup,
+        };
         if let Err(MeshError::NotFinite { vertex, x, y, z }) = mesh.check_data() {
             return Err(MeshError::NotFiniteInFace { face: (vertex - 1) / 3 + 1, x, y, z });
         }
         mesh.check_data()?;
-        Ok(mesh.welded().0)
+        Ok(mesh.welded())
     }
 }
 
@@ -68,7 +75,9 @@ fn text_vertex<'a>(mut words: impl Iterator<Item = &'a str>, line: usize) -> Res
     let mut v = Vec3::zeros();
     for k in 0..3 {
         let word = words.next().ok_or(MeshError::Syntax { line, what: "a vertex of fewer than 3 numbers".into() })?;
-        v[k] = word.parse().map_err(|_| MeshError::Syntax { line, what: format!("`{word}` where a coordinate should be") })?;
+        v[k] = word
+            .parse()
+            .map_err(|_| MeshError::Syntax { line, what: format!("`{word}` where a coordinate should be") })?;
     }
     Ok(v)
 }

@@ -9,8 +9,8 @@
 //! | `a`, `b` | half extents |
 //! | separation on axis `n` | `|t·n| − Σ aᵢ|eᵢ·n| − Σ bⱼ|Rⱼ·n|`, a lower bound of the signed distance |
 //!
-//! A face is preferred over a pair of edges by a small bias, because it gives a manifold; where the boxes are apart and no
-//! face manifold reaches the least separation, the exact closest points are used (`box_closest.rs`).
+//! A face is preferred over a pair of edges by a small bias, because it gives a manifold; where the boxes are apart
+//! and no face manifold reaches the least separation, the exact closest points are used (`box_closest.rs`).
 
 use super::clip::Polygon;
 use super::{box_closest, reduce};
@@ -46,7 +46,12 @@ pub(super) fn box_box(a: &Vec3, pose_a: &Pose, b: &Vec3, pose_b: &Pose, margin: 
         return;
     }
     let rotation_b = pose_b.rotation.to_rotation_matrix();
-    let frames = Frames { a: *a, b: *b, r: rotation_a.matrix().tr_mul(rotation_b.matrix()), t: rotation_a.matrix().tr_mul(&offset) };
+    let frames = Frames {
+        a: *a,
+        b: *b,
+        r: rotation_a.matrix().tr_mul(rotation_b.matrix()),
+        t: rotation_a.matrix().tr_mul(&offset),
+    };
     let start = out.len();
     in_frame_of_a(&frames, margin, out);
     for contact in &mut out[start..] {
@@ -70,7 +75,7 @@ fn in_frame_of_a(f: &Frames, margin: f64, out: &mut Vec<Contact>) {
     }
     let start = out.len();
     let least = face_manifold(f, &face, margin, out);
-    if least > greatest + bias || face.separation < greatest - bias {
+    if least > (greatest + bias).min(margin) || face.separation < greatest - bias {
         out.truncate(start);
         match box_closest::closest(f) {
             Some(contact) if contact.gap <= margin => out.push(contact),
@@ -79,7 +84,8 @@ fn in_frame_of_a(f: &Frames, margin: f64, out: &mut Vec<Contact>) {
     }
 }
 
-/// The face axis of greatest separation (A's unless B's is greater by `bias`); `None` if some axis separates by more than `margin`.
+/// The face axis of greatest separation (A's unless B's is greater by `bias`); `None` if some axis separates by more
+/// than `margin`.
 fn best_face(f: &Frames, margin: f64, bias: f64) -> Option<FaceAxis> {
     let across_a = f.t.abs() - f.a - f.r.abs() * f.b;
     let across_b = f.r.tr_mul(&f.t).abs() - f.b - f.r.abs().tr_mul(&f.a);
@@ -97,7 +103,8 @@ fn first_greatest(v: &Vec3, bias: f64) -> usize {
     (1..3).fold(0, |best, k| if v[k] > v[best] + bias { k } else { best })
 }
 
-/// The pair of edges of greatest separation, if any is not parallel; outer `None` if one separates by more than `margin`.
+/// The pair of edges of greatest separation, if any is not parallel; outer `None` if one separates by more than
+/// `margin`.
 fn best_edge(f: &Frames, margin: f64) -> Option<Option<EdgeAxis>> {
     let mut best: Option<EdgeAxis> = None;
     for i in 0..3 {
@@ -132,10 +139,19 @@ fn edge_contact(f: &Frames, edge: &EdgeAxis) -> Contact {
     on_a[*i] = 0.0;
     on_b[*j] = 0.0;
     let middle_b = f.t + f.r * on_b;
-    let (s, t) = super::segment::segment_segment(&on_a, &Vec3::ith(*i, f.a[*i]), &middle_b, &(f.r.column(*j) * f.b[*j]));
+    let (s, t) =
+        super::segment::segment_segment(&on_a, &Vec3::ith(*i, f.a[*i]), &middle_b, &(f.r.column(*j) * f.b[*j]));
     let point = 0.5 * (on_a + Vec3::ith(*i, s * f.a[*i]) + middle_b + f.r.column(*j) * (t * f.b[*j]));
     let feature = (1 << 20) | ((i * 3 + j) as u64) << 8 | signs;
-    Contact { point, normal: *normal, gap: *separation, feature, core_a: 0.0, core_b: 0.0, normal_from: NormalFrom::Edges }
+    Contact {
+        point,
+        normal: *normal,
+        gap: *separation,
+        feature,
+        core_a: 0.0,
+        core_b: 0.0,
+        normal_from: NormalFrom::Edges,
+    }
 }
 
 fn sign_bits(v: &Vec3) -> u64 {
@@ -155,7 +171,8 @@ fn face_or_support(f: &Frames, face: &FaceAxis, margin: f64, out: &mut Vec<Conta
     }
 }
 
-/// Clips the incident face by the reference face's prism; appends up to 4 points with gap ≤ `margin`, returns the least gap.
+/// Clips the incident face by the reference face's prism; appends up to 4 points with gap ≤ `margin`, returns the
+/// least gap.
 fn face_manifold(f: &Frames, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) -> f64 {
     let view = FaceView::new(f, face);
     let slop = 1e-3 * view.half.min().min(view.other_half.min());

@@ -1,7 +1,7 @@
 //! Exact closest points of two separated boxes whose closest features are not a face manifold.
 //!
-//! The closest pair then has an edge or corner of B in it (a corner of A over a face of B belongs to the face case), so
-//! the least of the twelve exact distances from B's edges to A is the answer.
+//! The closest pair then has an edge or corner of B in it (a corner of A over a face of B belongs to the face case),
+//! so the least of the twelve exact distances from B's edges to A is the answer.
 
 use super::box_box::Frames;
 use super::segment::segment_box;

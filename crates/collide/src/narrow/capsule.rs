@@ -55,9 +55,15 @@ fn any_perpendicular(e: &Vec3) -> Vec3 {
     e.cross(&Vec3::ith(e.iamin(), 1.0)).normalize()
 }
 
-/// Contacts at both ends of the stretch where the two run side by side; false if there is none, or if the closest points, at gap
-/// `least`, lie inside it and so tell more.
-fn push_overlap_ends(a: (Vec3, Vec3, f64), b: (Vec3, Vec3, f64), least: f64, margin: f64, out: &mut Vec<Contact>) -> bool {
+/// Contacts at both ends of the stretch where the two run side by side; false if there is none, or if the closest
+/// points, at gap `least`, lie inside it and so tell more.
+fn push_overlap_ends(
+    a: (Vec3, Vec3, f64),
+    b: (Vec3, Vec3, f64),
+    least: f64,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) -> bool {
     let ((ca, ua, ra), (cb, ub, rb)) = (a, b);
     let uu = ua.norm_squared();
     let ends = [(cb - ub - ca).dot(&ua) / uu, (cb + ub - ca).dot(&ua) / uu];
@@ -79,6 +85,19 @@ fn push_overlap_ends(a: (Vec3, Vec3, f64), b: (Vec3, Vec3, f64), least: f64, mar
     pair[0].gap.min(pair[1].gap) <= least + 1e-9 * (ra + rb)
 }
 
+/// A capsule's segment `c + s·u`, `s ∈ [−1, 1]`, in the frame of the box that it meets.
+struct Core {
+    c: Vec3,
+    u: Vec3,
+    radius: f64,
+}
+
+impl Core {
+    fn at(&self, s: f64) -> Vec3 {
+        self.c + self.u * s
+    }
+}
+
 /// All in the box's frame until a contact is emitted.
 pub(super) fn capsule_box(
     (radius, half_length): (f64, f64),
@@ -89,19 +108,17 @@ pub(super) fn capsule_box(
     out: &mut Vec<Contact>,
 ) {
     let local = pose_b.inv_mul(pose_a);
-    let (c, u) = (local.translation.vector, axis(&local) * half_length);
-    let s = segment_box(&c, &u, half);
-    let p = c + u * s;
-    let q = clamp(&p, half);
-    let distance = (p - q).norm();
+    let core = Core { c: local.translation.vector, u: axis(&local) * half_length, radius };
+    let s = segment_box(&core.c, &core.u, half);
+    let distance = (core.at(s) - clamp(&core.at(s), half)).norm();
     if distance > radius + margin {
         return;
     }
     let start = out.len();
     if distance > 1e-9 * half.max() {
-        separated_cores(&c, &u, s, half, radius, margin, out);
+        separated_cores(&core, s, half, margin, out);
     } else {
-        crossing_cores(&c, &u, half, radius, margin, out);
+        crossing_cores(&core, half, margin, out);
     }
     for contact in &mut out[start..] {
         contact.point = (pose_b * nalgebra::Point3::from(contact.point)).coords;
@@ -110,18 +127,18 @@ pub(super) fn capsule_box(
 }
 
 /// The core segment is outside the box; `s` is its closest point.
-fn separated_cores(c: &Vec3, u: &Vec3, s: f64, half: &Vec3, radius: f64, margin: f64, out: &mut Vec<Contact>) {
-    let p = c + u * s;
+fn separated_cores(core: &Core, s: f64, half: &Vec3, margin: f64, out: &mut Vec<Contact>) {
+    let (p, radius) = (core.at(s), core.radius);
     let offset = p - clamp(&p, half);
     let distance = offset.norm();
     let normal = offset / distance;
     let k = normal.iamax();
     let mut least = f64::INFINITY;
     if normal[k].abs() > ON_FACE {
-        least = push_on_face(c, u, half, k, normal[k].signum(), radius, margin, out);
+        least = push_on_face(core, half, (k, normal[k].signum()), margin, out);
     }
     let gap = distance - radius;
-    if least > gap + 1e-3 * radius {
+    if least > (gap + 1e-3 * radius).min(margin) {
         let edge_on_edge = s.abs() < 1.0 && offset.iter().filter(|d| **d != 0.0).count() == 2;
         out.push(Contact {
             point: p - normal * (radius + 0.5 * gap),
@@ -136,47 +153,72 @@ fn separated_cores(c: &Vec3, u: &Vec3, s: f64, half: &Vec3, radius: f64, margin:
 }
 
 fn end_code(s: f64) -> u64 {
-    if s <= -1.0 { 0 } else if s >= 1.0 { 2 } else { 1 }
+    if s <= -1.0 {
+        0
+    } else if s >= 1.0 {
+        2
+    } else {
+        1
+    }
 }
 
-/// Contacts at both ends of the part of the segment that is over face `k` (side `sign`); returns the least gap.
-fn push_on_face(c: &Vec3, u: &Vec3, half: &Vec3, k: usize, sign: f64, radius: f64, margin: f64, out: &mut Vec<Contact>) -> f64 {
-    let slop = 1e-3 * half.min();
-    let Some((low, high)) = clip_to_prism(c, u, &half.add_scalar(slop), k) else { return f64::INFINITY };
-    let ends = if (high - low) * u.norm() < 1e-3 * radius { &[low][..] } else { &[low, high][..] };
+/// Contacts at both ends of the part of the segment that is over the face across axis `k` on side `sign`; returns the
+/// least gap.
+fn push_on_face(core: &Core, half: &Vec3, (k, sign): (usize, f64), margin: f64, out: &mut Vec<Contact>) -> f64 {
+    let (slop, radius) = (1e-3 * half.min(), core.radius);
+    let Some((low, high)) = clip_to_prism(&core.c, &core.u, &half.add_scalar(slop), k) else { return f64::INFINITY };
+    let ends = if (high - low) * core.u.norm() < 1e-3 * radius { &[low][..] } else { &[low, high][..] };
     let mut least = f64::INFINITY;
     for (n, &s) in ends.iter().enumerate() {
-        let p = c + u * s;
+        let p = core.at(s);
         let gap = sign * p[k] - half[k] - radius;
         least = least.min(gap);
         if gap <= margin {
             let normal = Vec3::ith(k, sign);
             let feature = 10 * k as u64 + if sign > 0.0 { 5 } else { 0 } + n as u64;
             let point = p - normal * (radius + 0.5 * gap);
-            out.push(Contact { point, normal, gap, feature, core_a: radius, core_b: 0.0, normal_from: NormalFrom::FaceOfB });
+            out.push(Contact {
+                point,
+                normal,
+                gap,
+                feature,
+                core_a: radius,
+                core_b: 0.0,
+                normal_from: NormalFrom::FaceOfB,
+            });
         }
     }
     least
 }
 
 /// The core segment passes through the box: least separation over the faces and the edges' cross products.
-fn crossing_cores(c: &Vec3, u: &Vec3, half: &Vec3, radius: f64, margin: f64, out: &mut Vec<Contact>) {
+fn crossing_cores(core: &Core, half: &Vec3, margin: f64, out: &mut Vec<Contact>) {
+    let Core { c, u, radius } = core;
     let face = c.abs() - u.abs() - half;
     let k = face.imax();
-    let edge = (0..3).filter_map(|j| edge_separation(c, u, half, j)).fold(None, |best: Option<(f64, usize, Vec3)>, new| {
-        if best.is_none_or(|b| new.0 > b.0) { Some(new) } else { best }
-    });
+    let edge =
+        (0..3).filter_map(|j| edge_separation(c, u, half, j)).fold(None, |best: Option<(f64, usize, Vec3)>, new| {
+            if best.is_none_or(|b| new.0 > b.0) { Some(new) } else { best }
+        });
     let bias = 1e-3 * half.min() - 0.05 * face[k];
     match edge {
         Some((separation, j, normal)) if separation > face[k] + bias => {
             let gap = separation - radius;
             let point = crossing_point(c, u, half, j, &normal) - normal * (0.5 * (separation + radius));
             let feature = 2000 + j as u64;
-            out.push(Contact { point, normal, gap, feature, core_a: radius, core_b: 0.0, normal_from: NormalFrom::Edges });
+            out.push(Contact {
+                point,
+                normal,
+                gap,
+                feature,
+                core_a: *radius,
+                core_b: 0.0,
+                normal_from: NormalFrom::Edges,
+            });
         }
         _ => {
             let sign = if c[k] < 0.0 { -1.0 } else { 1.0 };
-            push_on_face(c, u, half, k, sign, radius, margin, out);
+            push_on_face(core, half, (k, sign), margin, out);
         }
     }
 }

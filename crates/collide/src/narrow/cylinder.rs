@@ -1,19 +1,27 @@
 //! A cylinder (A) on a half-space (B), exactly.
 //!
-//! Each flat face gives its lowest rim point. A face that is near level also gives four rim points fixed in the body, so that a standing
-//! cylinder keeps the same contacts while it trembles. One that lies on its side rests on the two lowest points, whose core is the axis.
+//! Each flat face gives its lowest rim point. A face that is near level also gives four rim points fixed in the body,
+//! so that a standing cylinder keeps the same contacts while it trembles. One that lies on its side rests on the two
+//! lowest points, whose core is the axis.
 
 use crate::shape::axis;
 use crate::{Contact, NormalFrom, Pose, Vec3};
 
-/// Sine of the tilt below which the lowest rim point is not told apart from the fixed ones (it lies lower by 0.3 of this, in radii).
+/// Sine of the tilt below which the lowest rim point is not told apart from the fixed ones (it lies lower by 0.3 of
+/// this, in radii).
 const LEVEL: f64 = 1e-4;
 /// Sine of the tilt above which a face stands on one point.
 const STEEP: f64 = 0.2;
 /// Sine of the tilt above which the cylinder lies.
 const LYING: f64 = 0.99;
 
-pub(super) fn half_space((radius, half_length): (f64, f64), pose_a: &Pose, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+pub(super) fn half_space(
+    (radius, half_length): (f64, f64),
+    pose_a: &Pose,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     let (normal, origin) = (axis(pose_b), pose_b.translation.vector);
     let up = axis(pose_a);
     // the way down in the flat faces
@@ -27,7 +35,15 @@ pub(super) fn half_space((radius, half_length): (f64, f64), pose_a: &Pose, pose_
             let gap = normal.dot(&(rim - origin));
             if gap <= margin {
                 let (feature, point) = ((8 * face + n) as u64, rim - normal * (0.5 * gap));
-                out.push(Contact { point, normal, gap, feature, core_a, core_b: 0.0, normal_from: NormalFrom::FaceOfB });
+                out.push(Contact {
+                    point,
+                    normal,
+                    gap,
+                    feature,
+                    core_a,
+                    core_b: 0.0,
+                    normal_from: NormalFrom::FaceOfB,
+                });
             }
         };
         if tilt > LEVEL {

@@ -24,7 +24,13 @@ pub(super) fn sphere(radius: f64, pose_a: &Pose, pose_b: &Pose, margin: f64, out
     push(pose_a.translation.vector, radius, &axis(pose_b), &pose_b.translation.vector, 0, margin, out);
 }
 
-pub(super) fn capsule((radius, half_length): (f64, f64), pose_a: &Pose, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+pub(super) fn capsule(
+    (radius, half_length): (f64, f64),
+    pose_a: &Pose,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     let (normal, origin) = (axis(pose_b), pose_b.translation.vector);
     let half = axis(pose_a) * half_length;
     push(pose_a.translation.vector - half, radius, &normal, &origin, 0, margin, out);

@@ -15,11 +15,15 @@ use crate::{Contact, Pose, Shape};
 
 /// Appends to `out` all contacts between `a` and `b` whose gap is at most `margin` metres (`margin ≥ 0`).
 ///
-/// Normals point from B towards A. Exact among half-space, sphere, box and capsule, and for a cylinder on a half-space. Elsewhere a mesh or
-/// cylinder stands for itself by the leaves of its sphere tree: no contact is missed, and gaps are too small by at most the trees'
-/// outward errors ([`crate::SphereTree::outward_error`]). Manifolds are reduced to the few points that matter. Does not allocate beyond the
-/// growth of `out`.
+/// Normals point from B towards A. Exact among half-space, sphere, box and capsule, and for a cylinder on a
+/// half-space. Elsewhere a mesh or cylinder stands for itself by the leaves of its sphere tree: no contact is missed,
+/// and gaps are too small by at most the trees' outward errors ([`crate::SphereTree::outward_error`]). Manifolds are
+/// reduced to the few points that matter. Does not allocate beyond the growth of `out`. A pose that is not finite
+/// touches nothing.
 pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    if !(is_finite(pose_a) && is_finite(pose_b)) {
+        return;
+    }
     let start = out.len();
     if rank(a) <= rank(b) {
         ordered(a, pose_a, b, pose_b, margin, out);
@@ -27,6 +31,11 @@ pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64,
         ordered(b, pose_b, a, pose_a, margin, out);
         out[start..].iter_mut().for_each(|c| *c = c.flipped());
     }
+}
+
+/// A sum is finite only if all its terms are.
+fn is_finite(pose: &Pose) -> bool {
+    (pose.translation.vector.sum() + pose.rotation.coords.sum()).is_finite()
 }
 
 /// Pairs are handled with the lower rank first.
@@ -47,7 +56,9 @@ fn ordered(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out:
         (Sphere { radius }, Capsule { radius: rb, half_length }) => {
             sphere::sphere_capsule(*radius, pose_a, (*rb, *half_length), pose_b, margin, out)
         }
-        (Sphere { radius }, Box { half_extents }) => sphere::sphere_box(*radius, pose_a, half_extents, pose_b, margin, out),
+        (Sphere { radius }, Box { half_extents }) => {
+            sphere::sphere_box(*radius, pose_a, half_extents, pose_b, margin, out)
+        }
         (Sphere { radius }, HalfSpace) => half_space::sphere(*radius, pose_a, pose_b, margin, out),
         (Capsule { radius: ra, half_length: la }, Capsule { radius: rb, half_length: lb }) => {
             capsule::capsule_capsule((*ra, *la), pose_a, (*rb, *lb), pose_b, margin, out)

@@ -1,7 +1,7 @@
 //! Manifold reduction: few points that keep the deepest one and the area.
 //!
-//! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from it; the one that makes
-//! the greatest triangle; the one furthest out on the other side of it. Ties go to the earlier point.
+//! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from it; the one that
+//! makes the greatest triangle; the one furthest out on the other side of it. Ties go to the earlier point.
 
 use crate::{Contact, Pose, Vec3};
 
@@ -46,7 +46,10 @@ fn best(count: usize, score: impl Fn(usize) -> f64) -> usize {
 
 /// The greatest area that `p` adds to a triangle beyond one of its sides.
 fn outside_triangle([a, b, c]: [Vec3; 3], side: f64, normal: &Vec3, p: Vec3) -> f64 {
-    [(a, b), (b, c), (c, a)].iter().map(|(u, v)| -side * (v - u).cross(&(p - u)).dot(normal)).fold(f64::NEG_INFINITY, f64::max)
+    [(a, b), (b, c), (c, a)]
+        .iter()
+        .map(|(u, v)| -side * (v - u).cross(&(p - u)).dot(normal))
+        .fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Contacts whose normals are within this cosine of the deepest one's belong together.
@@ -55,26 +58,41 @@ const SAME_SIDE: f64 = 0.85;
 const PENDING: usize = 512;
 /// At most this many sides.
 const MOST_CLUSTERS: usize = 8;
-/// Tilt (radians, its tangent) for which a support point is kept.
-const TILT: f64 = 0.03;
 
 /// Gathers the many contacts of leaf balls in B's frame at the end of `out` and keeps few.
 ///
-/// Contacts are clustered by normal, the deepest first. Of each cluster are kept the deepest, and for each of five directions the
-/// point that would touch first if A tilted a little that way: the vertices of the manifold's lower hull, which is what it can rest on.
+/// Contacts are clustered by normal, the deepest first. Of each cluster are kept the deepest, and for each of five
+/// directions the point that would touch first if A tilted a little that way: the vertices of the manifold's lower
+/// hull, which is what it can rest on. Three more stand for a wider tilt, if they are others.
+///
+/// Once more than a few hundred were gathered the overlap is wide; if it is also deep (by more than a band below the
+/// deepest), the shallow ones tell nothing that the deep ones do not, and are no longer asked for.
 pub(super) struct Collector<'a> {
     out: &'a mut Vec<Contact>,
     start: usize,
+    limit: f64,
+    band: f64,
 }
 
+/// The band, as a part of the smaller body's radius.
+const BAND: f64 = 0.05;
+
 impl<'a> Collector<'a> {
-    pub fn new(out: &'a mut Vec<Contact>) -> Collector<'a> {
-        Collector { start: out.len(), out }
+    /// `radius` is that of the smaller body.
+    pub fn new(margin: f64, radius: f64, out: &'a mut Vec<Contact>) -> Collector<'a> {
+        Collector { start: out.len(), out, limit: margin, band: BAND * radius }
+    }
+
+    /// Only contacts with a gap up to this are wanted.
+    pub fn limit(&self) -> f64 {
+        self.limit
     }
 
     pub fn push(&mut self, contact: Contact) {
         if self.out.len() - self.start >= PENDING {
             self.reduce();
+            // the first one kept is the deepest
+            self.limit = self.limit.min(self.out[self.start].gap + self.band);
         }
         self.out.push(contact);
     }
@@ -90,17 +108,13 @@ impl<'a> Collector<'a> {
 
     fn reduce(&mut self) {
         let found = &mut self.out[self.start..];
-        if found.len() < 2 {
-            return;
-        }
-        found.sort_unstable_by(|a, b| a.gap.total_cmp(&b.gap).then(a.feature.cmp(&b.feature)));
-        // `rest` is what no cluster has taken yet, deepest first; kept contacts gather at the front
+        // `found[..kept]` are kept, `found[rest..]` are in no cluster yet
         let (mut kept, mut rest) = (0, 0);
         for _ in 0..MOST_CLUSTERS {
             if rest == found.len() {
                 break;
             }
-            let end = gather_cluster(found, rest);
+            let end = rest + gather_cluster(&mut found[rest..]);
             let count = keep_hull(&mut found[rest..end]);
             for n in 0..count {
                 found.swap(kept + n, rest + n);
@@ -113,32 +127,31 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Moves all of `found[first..]` that face the way of `found[first]` next to it, both parts staying in order; returns their end.
-fn gather_cluster(found: &mut [Contact], first: usize) -> usize {
-    let normal = found[first].normal;
-    let tail = &mut found[first..];
-    // a stable partition in place: order within the tail is by gap and feature, restored by a sort of each half
-    let mut end = 0;
-    for n in 0..tail.len() {
-        if tail[n].normal.dot(&normal) >= SAME_SIDE {
-            tail.swap(end, n);
+/// Moves the deepest contact to the front and all that face its way next to it; returns how many those are.
+fn gather_cluster(found: &mut [Contact]) -> usize {
+    let deeper = |a: &Contact, b: &Contact| a.gap < b.gap || (a.gap == b.gap && a.feature < b.feature);
+    let deepest = (1..found.len()).fold(0, |best, n| if deeper(&found[n], &found[best]) { n } else { best });
+    found.swap(0, deepest);
+    let normal = found[0].normal;
+    let mut end = 1;
+    for n in 1..found.len() {
+        if found[n].normal.dot(&normal) >= SAME_SIDE {
+            found.swap(end, n);
             end += 1;
         }
     }
-    let by_depth = |a: &Contact, b: &Contact| a.gap.total_cmp(&b.gap).then(a.feature.cmp(&b.feature));
-    tail[..end].sort_unstable_by(by_depth);
-    tail[end..].sort_unstable_by(by_depth);
-    first + end
+    end
 }
 
-/// Moves to the front the deepest contact of a cluster and its support points in five tilted directions; returns how many.
+/// Moves to the front the deepest contact of a cluster (its first) and its support points; returns how many.
 fn keep_hull(cluster: &mut [Contact]) -> usize {
     let normal = cluster[0].normal;
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let v = normal.cross(&u);
     let mut kept = 1;
-    for (x, y) in DIRECTIONS {
-        let way = (u * x + v * y) * TILT;
+    for (tilt, n) in SUPPORTS {
+        let (x, y) = DIRECTIONS[n];
+        let way = (u * x + v * y) * tilt;
         let support = best(cluster.len(), |n| way.dot(&cluster[n].point) - cluster[n].gap);
         if support >= kept {
             cluster.swap(kept, support);
@@ -148,6 +161,11 @@ fn keep_hull(cluster: &mut [Contact]) -> usize {
     kept
 }
 
+/// Tilts (tangents of their angles) and directions for which a cluster's support point is kept: all five for what the
+/// body rests on, three for what it may swing onto within a step. On a flat base the wide ones find the same points
+/// again.
+const SUPPORTS: [(f64, usize); 8] =
+    [(0.02, 0), (0.02, 1), (0.02, 2), (0.02, 3), (0.02, 4), (0.15, 0), (0.15, 2), (0.15, 3)];
 /// Corners of a regular pentagon.
 const DIRECTIONS: [(f64, f64); 5] = [
     (1.0, 0.0),

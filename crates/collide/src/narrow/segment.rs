@@ -30,10 +30,12 @@ pub(super) fn segment_segment(c1: &Vec3, u1: &Vec3, c2: &Vec3, u2: &Vec3) -> (f6
 /// Parameter of the point of `c + s·u` closest to the box `|x| ≤ half`; the first such if there are several.
 pub(super) fn segment_box(c: &Vec3, u: &Vec3, half: &Vec3) -> f64 {
     let slope = |s: f64| -> f64 {
-        (0..3).map(|k| {
-            let x = c[k] + s * u[k];
-            u[k] * (x - x.clamp(-half[k], half[k]))
-        }).sum()
+        (0..3)
+            .map(|k| {
+                let x = c[k] + s * u[k];
+                u[k] * (x - x.clamp(-half[k], half[k]))
+            })
+            .sum()
     };
     let mut breaks = [1.0; 8];
     let mut count = 0;

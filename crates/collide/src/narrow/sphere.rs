@@ -4,7 +4,14 @@ use super::segment::closest_on_segment;
 use crate::shape::axis;
 use crate::{Contact, NormalFrom, Pose, Vec3};
 
-pub(super) fn sphere_sphere(radius_a: f64, pose_a: &Pose, radius_b: f64, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+pub(super) fn sphere_sphere(
+    radius_a: f64,
+    pose_a: &Pose,
+    radius_b: f64,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     let (a, b) = (pose_a.translation.vector, pose_b.translation.vector);
     let reach = radius_a + radius_b + margin;
     if (a - b).norm_squared() <= reach * reach {
@@ -59,7 +66,8 @@ pub(super) struct PointBox {
     pub distance: f64,
     /// Outward unit normal at the closest surface point.
     pub normal: Vec3,
-    /// Which of the 27 regions (faces 1 clamped axis, edges 2, vertices 3): base 3, digit k is 0, 1, 2 for −, inside, +.
+    /// Which of the 27 regions (faces 1 clamped axis, edges 2, vertices 3): base 3, digit k is 0, 1, 2 for −, inside,
+    /// +.
     pub region: u64,
     /// Whether the closest feature is a face.
     pub face: bool,
@@ -81,7 +89,12 @@ pub(super) fn point_box(p: &Vec3, half: &Vec3) -> Option<PointBox> {
     let k = (0..3).fold(0, |best, k| if depth[k] < depth[best] { k } else { best });
     let sign = if p[k] < 0.0 { -1.0 } else { 1.0 };
     let normal = Vec3::ith(k, sign);
-    Some(PointBox { distance: -depth[k], normal, region: region(&normal.component_mul(&(half * 2.0)), half), face: true })
+    Some(PointBox {
+        distance: -depth[k],
+        normal,
+        region: region(&normal.component_mul(&(half * 2.0)), half),
+        face: true,
+    })
 }
 
 pub(super) fn clamp(p: &Vec3, half: &Vec3) -> Vec3 {
@@ -90,5 +103,14 @@ pub(super) fn clamp(p: &Vec3, half: &Vec3) -> Vec3 {
 
 /// The code of the region of space around the box that `p` is in.
 pub(super) fn region(p: &Vec3, half: &Vec3) -> u64 {
-    (0..3).rev().fold(0, |code, k| 3 * code + if p[k] < -half[k] { 0 } else if p[k] > half[k] { 2 } else { 1 })
+    (0..3).rev().fold(0, |code, k| {
+        3 * code
+            + if p[k] < -half[k] {
+                0
+            } else if p[k] > half[k] {
+                2
+            } else {
+                1
+            }
+    })
 }

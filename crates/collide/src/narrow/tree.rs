@@ -1,8 +1,9 @@
-//! Sphere trees against each other and against primitives: the thesis's mode, where point and normal come from leaf balls.
+//! Sphere trees against each other and against primitives: the thesis's mode, where point and normal come from leaf
+//! balls.
 //!
-//! Source: thesis §IV.B.3.a–b. Two trees are walked together, the larger ball opened first. A primitive is asked for its signed distance at
-//! a ball's centre; it changes by at most 1 m per metre, so a ball that is further than `margin` hides no leaf within it.
-//! The feature of a contact is the pair of leaf indices.
+//! Source: thesis §IV.B.3.a–b. Two trees are walked together, the larger ball opened first. A primitive is asked for
+//! its signed distance at a ball's centre; it changes by at most 1 m per metre, so a ball that is further than
+//! `margin` hides no leaf within it. The feature of a contact is the pair of leaf indices.
 
 use super::reduce::Collector;
 use super::segment::closest_on_segment;
@@ -15,12 +16,19 @@ struct Pair<'a> {
     a: &'a SphereTree,
     b: &'a SphereTree,
     a_in_b: Pose,
-    margin: f64,
 }
 
-pub(super) fn tree_tree(a: &SphereTree, pose_a: &Pose, b: &SphereTree, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
-    let pair = Pair { a, b, a_in_b: pose_b.inv_mul(pose_a), margin };
-    let mut found = Collector::new(out);
+pub(super) fn tree_tree(
+    a: &SphereTree,
+    pose_a: &Pose,
+    b: &SphereTree,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
+    let pair = Pair { a, b, a_in_b: pose_b.inv_mul(pose_a) };
+    let smaller = a.nodes()[0].radius.min(b.nodes()[0].radius);
+    let mut found = Collector::new(margin, smaller, out);
     pair.visit(0, 0, &mut found);
     found.finish(pose_b);
 }
@@ -29,7 +37,8 @@ impl Pair<'_> {
     fn visit(&self, na: usize, nb: usize, found: &mut Collector) {
         let (a, b) = (&self.a.nodes()[na], &self.b.nodes()[nb]);
         let center_a = (self.a_in_b * Point3::from(a.center)).coords;
-        let reach = a.radius + b.radius + self.margin;
+        // a deep limit leaves nothing of balls that are too small to reach it
+        let reach = (a.radius + b.radius + found.limit()).max(0.0);
         if (center_a - b.center).norm_squared() > reach * reach {
             return;
         }
@@ -53,23 +62,30 @@ struct Field {
 }
 
 /// Tree (A) against half-space, sphere, box or capsule (B).
-pub(super) fn tree_primitive(a: &SphereTree, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+pub(super) fn tree_primitive(
+    a: &SphereTree,
+    pose_a: &Pose,
+    b: &Shape,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     let a_in_b = pose_b.inv_mul(pose_a);
-    let mut found = Collector::new(out);
-    visit(a, &a_in_b, b, 0, margin, &mut found);
+    let mut found = Collector::new(margin, a.nodes()[0].radius.min(b.bounding_radius()), out);
+    visit(a, &a_in_b, b, 0, &mut found);
     found.finish(pose_b);
 }
 
-fn visit(tree: &SphereTree, pose: &Pose, primitive: &Shape, node: usize, margin: f64, found: &mut Collector) {
+fn visit(tree: &SphereTree, pose: &Pose, primitive: &Shape, node: usize, found: &mut Collector) {
     let ball = &tree.nodes()[node];
     let center = (pose * Point3::from(ball.center)).coords;
     let Some(field) = field(primitive, &center) else { return };
     let gap = field.distance - ball.radius;
-    if gap > margin {
+    if gap > found.limit() {
         return;
     }
     if !ball.is_leaf() {
-        ball.child_range().for_each(|child| visit(tree, pose, primitive, child, margin, found));
+        ball.child_range().for_each(|child| visit(tree, pose, primitive, child, found));
         return;
     }
     found.push(Contact {
@@ -92,9 +108,12 @@ fn field(primitive: &Shape, p: &Vec3) -> Option<Field> {
             let u = Vec3::z() * *half_length;
             Some(round_field(&(p - u * closest_on_segment(p, &u)), *radius))
         }
-        Shape::Box { half_extents } => {
-            point_box(p, half_extents).map(|f| Field { distance: f.distance, normal: f.normal, core: 0.0, face: f.face })
-        }
+        Shape::Box { half_extents } => point_box(p, half_extents).map(|f| Field {
+            distance: f.distance,
+            normal: f.normal,
+            core: 0.0,
+            face: f.face,
+        }),
         Shape::Cylinder(_) | Shape::Mesh(_) => None,
     }
 }

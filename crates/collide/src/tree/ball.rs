@@ -1,7 +1,8 @@
 //! Small enclosing balls of points and of balls.
 //!
-//! Source: Bădoiu and Clarkson, *Smaller core-sets for balls* (2003): step from the centre towards the farthest item, by a falling
-//! share of the way; after `n` steps the radius is within `1/√n` of the least. The ball returned encloses exactly.
+//! Source: Bădoiu and Clarkson, *Smaller core-sets for balls* (2003): step from the centre towards the farthest item,
+//! by a falling share of the way; after `n` steps the radius is within `1/√n` of the least. The ball returned
+//! encloses exactly.
 
 use crate::{MeshDistance, Vec3};
 
@@ -33,7 +34,9 @@ pub(super) fn around_points(points: &[Vec3]) -> Ball {
     let mut center = 0.5 * (bounds.min + bounds.max);
     let mut best = Ball::holding(center, points);
     for n in 0..STEPS {
-        let Some(far) = points.iter().max_by(|p, q| (*p - center).norm_squared().total_cmp(&(*q - center).norm_squared())) else {
+        let Some(far) =
+            points.iter().max_by(|p, q| (*p - center).norm_squared().total_cmp(&(*q - center).norm_squared()))
+        else {
             return Ball { center: Vec3::zeros(), radius: 0.0 };
         };
         center += (far - center) / (n + 2) as f64;
@@ -45,7 +48,8 @@ pub(super) fn around_points(points: &[Vec3]) -> Ball {
     best
 }
 
-/// A ball around balls, close to the smallest, grown by a rounding's worth so that containment holds in floating point.
+/// A ball around balls, close to the smallest, grown by a rounding's worth so that containment holds in floating
+/// point.
 pub(super) fn around_balls(balls: &[Ball]) -> Ball {
     let reach = |center: &Vec3, b: &Ball| (b.center - center).norm() + b.radius;
     let holding = |center: Vec3| Ball { center, radius: balls.iter().map(|b| reach(&center, b)).fold(0.0, f64::max) };

@@ -1,13 +1,14 @@
 //! Sphere trees: a closed surface inside nested balls.
 //!
-//! Two promises are checked on every build and are an error if broken: every ball contains the balls of its children, and the
-//! leaves cover the surface. A third number is stated: how far the balls reach beyond the solid.
+//! Two promises are checked on every build and are an error if broken: every ball contains the balls of its children,
+//! and the leaves cover the surface. A third number is stated: how far the balls reach beyond the solid.
 //!
-//! **Outward error.** A ball `(c, r)` whose centre lies `d` below the surface reaches at most `r − d` beyond it: on the way from `c`
-//! to any outside point of the ball the surface is crossed, at `d` or later (`d` is negative for a centre outside).
+//! **Outward error.** A ball `(c, r)` whose centre lies `d` below the surface reaches at most `r − d` beyond it: on
+//! the way from `c` to any outside point of the ball the surface is crossed, at `d` or later (`d` is negative for a
+//! centre outside).
 //!
-//! Two trees whose balls are `g` apart have solids that are between `g` and `g + e₁ + e₂` apart, `e` their outward errors: no contact
-//! is missed, and none is invented beyond `e₁ + e₂`.
+//! Two trees whose balls are `g` apart have solids that are between `g` and `g + e₁ + e₂` apart, `e` their outward
+//! errors: no contact is missed, and none is invented beyond `e₁ + e₂`.
 
 mod ball;
 mod octree;
@@ -23,8 +24,12 @@ pub struct TreeSettings {
     pub builder: Builder,
     /// Greatest number of subdivisions, 1 to 9.
     pub depth: u32,
-    /// A cell is not divided further once its ball reaches at most this far outwards, as a part of the mesh's diagonal; 1e-4 to 1.
+    /// A cell is not divided further once its ball reaches at most this far outwards, as a part of the mesh's
+    /// diagonal; 1e-4 to 1.
     pub error: f64,
+    /// Grow every leaf to the same stand-off, `error`: flat faces stay flat, so that what stands on them stands
+    /// upright and at rest. Otherwise each leaf is as tight as it can be.
+    pub even: bool,
 }
 
 /// The methods there are.
@@ -36,19 +41,27 @@ pub enum Builder {
 }
 
 impl Default for TreeSettings {
-    /// Outward error of about 1 % of the diagonal.
+    /// Outward error of 1 % of the diagonal, evenly.
     fn default() -> TreeSettings {
-        TreeSettings { builder: Builder::Octree, depth: 7, error: 0.01 }
+        TreeSettings { builder: Builder::Octree, depth: 7, error: 0.01, even: true }
     }
 }
 
 impl TreeSettings {
     fn check(&self) -> Result<(), MeshError> {
         if !(1..=9).contains(&self.depth) {
-            return Err(MeshError::Settings { what: "the depth of a sphere tree", value: f64::from(self.depth), allowed: "1 to 9" });
+            return Err(MeshError::Settings {
+                what: "the depth of a sphere tree",
+                value: f64::from(self.depth),
+                allowed: "1 to 9",
+            });
         }
         if !(1e-4..=1.0).contains(&self.error) {
-            return Err(MeshError::Settings { what: "the error of a sphere tree", value: self.error, allowed: "0.0001 to 1" });
+            return Err(MeshError::Settings {
+                what: "the error of a sphere tree",
+                value: self.error,
+                allowed: "0.0001 to 1",
+            });
         }
         Ok(())
     }
@@ -165,7 +178,10 @@ impl SphereTree {
             let ball = match cells[n] {
                 Cell::Leaf(ball) => *ball,
                 Cell::Inner(_) => {
-                    let children: Vec<Ball> = nodes[nodes[n].child_range()].iter().map(|c| Ball { center: c.center, radius: c.radius }).collect();
+                    let children: Vec<Ball> = nodes[nodes[n].child_range()]
+                        .iter()
+                        .map(|c| Ball { center: c.center, radius: c.radius })
+                        .collect();
                     ball::around_balls(&children)
                 }
             };
@@ -173,7 +189,10 @@ impl SphereTree {
             nodes[n].radius = ball.radius;
             nodes[n].outward = ball.outward(distance);
         }
-        let leaf_boxes = nodes.iter().filter(|n| n.is_leaf()).flat_map(|n| [n.center.add_scalar(-n.radius), n.center.add_scalar(n.radius)]);
+        let leaf_boxes = nodes
+            .iter()
+            .filter(|n| n.is_leaf())
+            .flat_map(|n| [n.center.add_scalar(-n.radius), n.center.add_scalar(n.radius)]);
         SphereTree { bounds: Aabb::around(leaf_boxes), nodes }
     }
 }

@@ -1,10 +1,15 @@
 //! The octree builder: the surface is cut by the planes of an octree, and each cell's piece gets a tight ball.
 //!
-//! A piece's ball starts at the small enclosing ball of its corners and is moved inwards along the mean normal, growing so that it still
-//! holds the piece: a larger ball with its centre deeper in the solid bulges less (`δ²/2R` for a flat piece of radius `δ`). Of a few
-//! such balls the one with the least outward error is kept. A cell whose ball is good enough is a leaf; others are divided.
+//! A piece's ball starts at the small enclosing ball of its corners and is moved inwards along the mean normal,
+//! growing so that it still holds the piece: a larger ball with its centre deeper in the solid bulges less (`δ²/2R`
+//! for a flat piece of radius `δ`). Of a few such balls the one with the least outward error is kept. A cell whose
+//! ball is good enough is a leaf; others are divided.
 //!
-//! Departs from the classic octree tree (balls around cells) in all of that; it keeps its robustness: any triangles will do.
+//! With `even`, each leaf is then grown until it reaches `target` outwards, no more and no less: the leaves' outer
+//! points lie on one offset surface, and a flat face stays flat.
+//!
+//! Departs from the classic octree tree (balls around cells) in all of that; it keeps its robustness: any triangles
+//! will do.
 
 use super::ball::{Ball, around_points};
 use super::{Cell, TreeSettings};
@@ -25,6 +30,7 @@ struct Context<'a> {
     /// Good enough: outward error in metres.
     target: f64,
     depth: u32,
+    even: bool,
     leaves: usize,
 }
 
@@ -32,10 +38,17 @@ pub(super) fn build(mesh: &TriMesh, distance: &MeshDistance, settings: &TreeSett
     let bounds = mesh.aabb();
     let side = (bounds.max - bounds.min).max();
     let pieces = (0..mesh.triangles.len()).map(|t| mesh.corners(t).to_vec()).collect();
-    let mut context = Context { distance, target: settings.error * mesh.diagonal(), depth: settings.depth, leaves: 0 };
+    let mut context = Context {
+        distance,
+        target: settings.error * mesh.diagonal(),
+        depth: settings.depth,
+        even: settings.even,
+        leaves: 0,
+    };
     let root = context.cell(pieces, 0.5 * (bounds.min + bounds.max), 0.5 * side, 0);
     if context.leaves > MOST_LEAVES {
-        let (what, allowed) = ("the number of leaves of a sphere tree", "at most 400000: lower the depth or raise the error");
+        let (what, allowed) =
+            ("the number of leaves of a sphere tree", "at most 400000: lower the depth or raise the error");
         return Err(MeshError::Settings { what, value: context.leaves as f64, allowed });
     }
     Ok(root)
@@ -43,9 +56,12 @@ pub(super) fn build(mesh: &TriMesh, distance: &MeshDistance, settings: &TreeSett
 
 impl Context<'_> {
     fn cell(&mut self, pieces: Vec<Piece>, center: Vec3, half: f64, depth: u32) -> Cell {
-        let (ball, outward) = self.tight_ball(&pieces);
+        let (mut ball, outward) = self.tight_ball(&pieces);
         if outward <= self.target || depth == self.depth || self.leaves > MOST_LEAVES {
             self.leaves += 1;
+            if self.even {
+                ball.radius += (self.target - outward).max(0.0);
+            }
             return Cell::Leaf(ball);
         }
         let mut parts = vec![pieces];

@@ -3,7 +3,8 @@
 use super::{SphereNode, SphereTree};
 use crate::{MeshError, TriMesh, Vec3};
 
-/// A piece of surface smaller than this part of the mesh's diagonal that lies across balls is covered if its corners are.
+/// A piece of surface smaller than this part of the mesh's diagonal that lies across balls is covered if its corners
+/// are.
 const TINY: f64 = 1e-5;
 
 impl SphereTree {
@@ -14,15 +15,18 @@ impl SphereTree {
                 let c = &self.nodes[child];
                 let excess = (c.center - parent.center).norm() + c.radius - parent.radius;
                 if excess > 1e-12 * parent.radius {
-                    return Err(MeshError::Tree { what: format!("ball {child} sticks out of its parent {n} by {excess:e} m") });
+                    return Err(MeshError::Tree {
+                        what: format!("ball {child} sticks out of its parent {n} by {excess:e} m"),
+                    });
                 }
             }
         }
         Ok(())
     }
 
-    /// The leaves cover the surface of `mesh`. A triangle lies in a ball iff its corners do, so each is split 1:4 until every piece
-    /// lies in one ball, or is tiny (1e-5 of the diagonal) and each of its corners lies in some ball.
+    /// The leaves cover the surface of `mesh`. A triangle lies in a ball iff its corners do, so each is split 1:4
+    /// until every piece lies in one ball, or is tiny (1e-5 of the diagonal) and each of its corners lies in some
+    /// ball.
     pub fn check_coverage(&self, mesh: &TriMesh) -> Result<(), MeshError> {
         let tiny = TINY * mesh.diagonal();
         for t in 0..mesh.triangles.len() {
@@ -50,10 +54,12 @@ impl SphereTree {
         [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].iter().try_for_each(|t| self.cover(t, tiny, splits - 1))
     }
 
-    /// Whether one leaf below `node` holds all the points. Balls nest, so a node that does not hold them has no such leaf.
+    /// Whether one leaf below `node` holds all the points. Balls nest, so a node that does not hold them has no such
+    /// leaf.
     fn leaf_holding(&self, node: usize, points: &[Vec3]) -> bool {
         let here = &self.nodes[node];
-        points.iter().all(|p| holds(here, p)) && (here.is_leaf() || here.child_range().any(|c| self.leaf_holding(c, points)))
+        points.iter().all(|p| holds(here, p))
+            && (here.is_leaf() || here.child_range().any(|c| self.leaf_holding(c, points)))
     }
 }
 

@@ -1,15 +1,15 @@
 //! Contacts against parry's distances and penetration depths, over thousands of seeded random poses.
 //!
-//! Tolerances. Parry's GJK and EPA end at about 1e-6 of the size, so exact pairs are compared to 1e-5 m on shapes of about 1 m,
-//! and normals to 1e-2, since a distance that is good to ε has a normal that is good to √ε. Box on
-//! box (and a capsule's core inside a box) prefers a face over a pair of edges by `1e-3 · least half extent + 5 %`, so there the
-//! depth may be that much greater than the least one.
+//! Tolerances. Parry's GJK and EPA end at about 1e-6 of the size, so exact pairs are compared to 1e-5 m on shapes of
+//! about 1 m, and normals to 1e-2, since a distance that is good to ε has a normal that is good to √ε. Box on
+//! box (and a capsule's core inside a box) prefers a face over a pair of edges by `1e-3 · least half extent + 5 %`,
+//! so there the depth may be that much greater than the least one.
 
 use crate::rng::Rng;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d_f64::query;
-use parry3d_f64::shape::{Ball, Capsule, Cuboid, HalfSpace, Shape as ParryShape};
-use tumble_collide::{Contact, Pose, Shape, Vec3, contacts};
+use parry3d_f64::shape::{Ball, Capsule, Cuboid, HalfSpace, Segment, Shape as ParryShape};
+use tumble_collide::{Contact, Pose, Quat, Shape, Vec3, contacts};
 
 pub fn to_parry(pose: &Pose) -> ParryPose {
     let (t, q) = (pose.translation.vector, pose.rotation.coords);
@@ -46,13 +46,14 @@ fn random_primitive(rng: &mut Rng, kind: usize) -> Both {
     }
 }
 
-/// A pose of the second shape: any, nearly aligned or exactly aligned with the axes, the cases that stacks are made of.
+/// A pose of the second shape: any, nearly aligned or exactly aligned with the axes, the cases that stacks are made
+/// of.
 fn related_pose(rng: &mut Rng, case: usize) -> Pose {
     let any = rng.pose(1.2);
     let turn = match case % 3 {
         0 => any.rotation,
-        1 => tumble_collide::Quat::from_scaled_axis(rng.direction() * 1e-3),
-        _ => tumble_collide::Quat::from_scaled_axis(Vec3::ith(rng.below(3), std::f64::consts::FRAC_PI_2)),
+        1 => Quat::from_scaled_axis(rng.direction() * 1e-3),
+        _ => Quat::from_scaled_axis(Vec3::ith(rng.below(3), std::f64::consts::FRAC_PI_2)),
     };
     Pose::from_parts(any.translation, turn)
 }
@@ -63,7 +64,10 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
     let mut out = Vec::new();
     contacts(a, pa, b, pb, MARGIN, &mut out);
     for c in &out {
-        assert!((c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= MARGIN && c.point.iter().all(|x| x.is_finite()), "{c:?}");
+        assert!(
+            (c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= MARGIN && c.point.iter().all(|x| x.is_finite()),
+            "{c:?}"
+        );
     }
     out
 }
@@ -72,8 +76,8 @@ fn deepest(found: &[Contact]) -> Option<&Contact> {
     found.iter().min_by(|a, b| a.gap.total_cmp(&b.gap))
 }
 
-/// Signed distance and normal (towards A) by parry: GJK where separate, EPA where not; for a half-space the support point (its
-/// `contact` of a ball with a half-space is wrong once the centre is inside).
+/// Signed distance and normal (towards A) by parry: GJK where separate, EPA where not; for a half-space the support
+/// point (its `contact` of a ball with a half-space is wrong once the centre is inside).
 fn reference(a: &Both, pa: &Pose, b: &Both, pb: &Pose) -> (f64, Option<Vec3>) {
     if matches!(a.ours, Shape::HalfSpace) {
         let (distance, normal) = reference(b, pb, a, pa);
@@ -85,6 +89,12 @@ fn reference(a: &Both, pa: &Pose, b: &Both, pb: &Pose) -> (f64, Option<Vec3>) {
         return (normal.dot(&(Vec3::new(lowest.x, lowest.y, lowest.z) - pb.translation.vector)), Some(normal));
     }
     let (pa, pb) = (to_parry(pa), to_parry(pb));
+    if let (Shape::Capsule { radius: ra, half_length: la }, Shape::Capsule { radius: rb, half_length: lb }) =
+        (&a.ours, &b.ours)
+    {
+        let core = |l: f64| Segment::new(Vector::Z * -l, Vector::Z * l);
+        return (query::distance(&pa, &core(*la), &pb, &core(*lb)).unwrap().distance - ra - rb, None);
+    }
     let separate = query::distance(&pa, &*a.theirs, &pb, &*b.theirs).unwrap().distance;
     let contact = query::contact(&pa, &*a.theirs, &pb, &*b.theirs, MARGIN).unwrap();
     match contact {
@@ -125,7 +135,11 @@ fn compare(a: &Both, pa: &Pose, b: &Both, pb: &Pose, ka: usize, kb: usize, case:
     };
     let clipped = ka.max(kb) == 2 && ka.min(kb) >= 1;
     let bias = if clipped { 1e-3 * a.least.min(b.least) + 0.05 * distance.abs() } else { 0.0 };
-    assert!((contact.gap - distance).abs() < 1e-5 + 1.2 * bias, "gap {} but {distance}: {label}\n{found:?}", contact.gap);
+    assert!(
+        (contact.gap - distance).abs() < 1e-5 + 1.2 * bias,
+        "gap {} but {distance}: {label}\n{found:?}",
+        contact.gap
+    );
     if distance > 1e-4 {
         counts[1] += 1;
         let exact = normal.filter(|_| !clipped);
@@ -156,4 +170,80 @@ fn exchanging_the_shapes_mirrors_the_contacts() {
             }
         }
     }
+}
+
+/// Distance from a shape's surface by parry, inside or out.
+fn off_surface(shape: &Both, pose: &Pose, point: &Vec3) -> f64 {
+    let local = pose.inverse_transform_point(&(*point).into()).coords;
+    if matches!(shape.ours, Shape::HalfSpace) {
+        return local.z.abs();
+    }
+    let projection = shape.theirs.project_local_point(vector(&local), false).point;
+    (Vec3::new(projection.x, projection.y, projection.z) - local).norm()
+}
+
+#[test]
+fn points_are_midway_between_the_surfaces() {
+    let mut rng = Rng::new(77);
+    let mut met = 0;
+    for case in 0..15_000 {
+        let (ka, kb) = (rng.below(4), rng.below(4));
+        let (a, b) = (random_primitive(&mut rng, ka), random_primitive(&mut rng, kb));
+        let (pa, pb) = (related_pose(&mut rng, 2 * (case % 2)), related_pose(&mut rng, case));
+        // shallow contacts: a deep one's far side may leave a face's extent
+        let found = ask(&a.ours, &pa, &b.ours, &pb);
+        let least = deepest(&found).map_or(0.0, |c| c.gap);
+        for c in found.iter().filter(|c| c.gap.abs() < 0.05) {
+            let (on_a, on_b) = (c.point + c.normal * (0.5 * c.gap), c.point - c.normal * (0.5 * c.gap));
+            let (off_a, off_b) = (off_surface(&a, &pa, &on_a), off_surface(&b, &pb, &on_b));
+            // one side is exact; the other may stand beyond the edge of a face by the clipping's slop, or be the
+            // plane of a face that a slightly tilted edge or end crosses
+            // (the end of the part of a tilted capsule that is over a face is neither)
+            let exact = if (ka, kb) == (1, 2) || (ka, kb) == (2, 1) { 2e-3 } else { 1e-6 };
+            assert!(off_a.min(off_b) < exact, "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}");
+            // a capsule's upper end is a ball within the tube, so only the deepest contact must lie on both surfaces
+            assert!(
+                c.gap > least || off_a.max(off_b) < 2e-3 + 0.2 * c.gap.abs(),
+                "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}"
+            );
+            let (core_a, core_b) = (on_a + c.normal * c.core_a, on_b - c.normal * c.core_b);
+            let axis_of = |shape: &Both, pose: &Pose, p: &Vec3| match shape.ours {
+                Shape::Sphere { .. } => (p - pose.translation.vector).norm(),
+                Shape::Capsule { half_length, .. } => {
+                    let q = pose.inverse_transform_point(&(*p).into()).coords;
+                    (q - Vec3::z() * q.z.clamp(-half_length, half_length)).norm()
+                }
+                _ => 0.0,
+            };
+            assert!(
+                axis_of(&a, &pa, &core_a) < 1e-9 && axis_of(&b, &pb, &core_b) < 1e-9,
+                "kinds {ka} {kb}, case {case}: {c:?}"
+            );
+            met += 1;
+        }
+    }
+    assert!(met > 1000, "{met}");
+}
+
+#[test]
+fn features_of_a_pair_are_distinct_and_last() {
+    let mut rng = Rng::new(31);
+    let (mut kept, mut total) = (0, 0);
+    for case in 0..3000 {
+        let (ka, kb) = (rng.below(3), rng.below(4));
+        let (a, b) = (random_primitive(&mut rng, ka), random_primitive(&mut rng, kb));
+        let (pa, pb) = (related_pose(&mut rng, 2 * (case % 2)), related_pose(&mut rng, case));
+        let before = ask(&a.ours, &pa, &b.ours, &pb);
+        let mut names: Vec<u64> = before.iter().map(|c| c.feature).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), before.len(), "kinds {ka} {kb}, case {case}: {before:?}");
+        // what a step of rest does to a body: a millionth of a metre and of a radian
+        let nudge = Quat::from_scaled_axis(rng.vec(1e-6));
+        let nudged = Pose::from_parts((pa.translation.vector + rng.vec(1e-6)).into(), nudge * pa.rotation);
+        let after = ask(&a.ours, &nudged, &b.ours, &pb);
+        total += before.len();
+        kept += after.iter().filter(|c| names.binary_search(&c.feature).is_ok()).count();
+    }
+    assert!(kept as f64 > 0.99 * total as f64, "{kept} of {total}");
 }

@@ -34,7 +34,10 @@ fn change(rng: &mut Rng, world: &mut Vec<(Aabb, bool)>) {
         let (center, half) = (rng.vec(4.0), rng.vec(1.0).abs());
         let mut b = Aabb { min: center - half, max: center + half };
         if rng.below(15) == 0 {
-            b = Aabb { min: Vec3::repeat(f64::NEG_INFINITY), max: Vec3::new(f64::INFINITY, f64::INFINITY, rng.vec(3.0).x) };
+            b = Aabb {
+                min: Vec3::repeat(f64::NEG_INFINITY),
+                max: Vec3::new(f64::INFINITY, f64::INFINITY, rng.vec(3.0).x),
+            };
         }
         let place = rng.below(world.len() + 1);
         world.insert(place, (b, rng.below(3) > 0));

@@ -2,6 +2,7 @@
 
 mod against_parry;
 mod broad;
+mod mesh_contacts;
 mod meshes;
 mod primitives;
 mod rng;

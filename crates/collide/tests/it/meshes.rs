@@ -1,5 +1,6 @@
 //! Readers, checks, generators and mass properties of meshes.
 
+use crate::rng::Rng;
 use crate::shared_meshes::text;
 use std::f64::consts::PI;
 use tumble_collide::{ClosedReport, Mat3, MeshDistance, MeshError, Pose, Quat, Shape, TriMesh, Vec3};
@@ -138,7 +139,10 @@ fn stl_that_lies_about_its_size_is_one_clear_error() {
     assert_eq!(message, "the STL header announces 42949672 triangles (2147483684 bytes), but the file has 684 bytes");
     assert!(matches!(TriMesh::from_stl(b"hello"), Err(MeshError::StlShort { size: 5 })));
     assert!(matches!(TriMesh::from_stl(b"solid x\nfacet\nvertex 1 2 x\n"), Err(MeshError::Syntax { line: 3, .. })));
-    assert!(matches!(TriMesh::from_stl(b"solid x\nfacet\nvertex 1 2 3\nendfacet\n"), Err(MeshError::Syntax { line: 4, .. })));
+    assert!(matches!(
+        TriMesh::from_stl(b"solid x\nfacet\nvertex 1 2 3\nendfacet\n"),
+        Err(MeshError::Syntax { line: 4, .. })
+    ));
     let mut nan = binary_stl(&TriMesh::box_(Vec3::repeat(1.0)));
     nan[84 + 50 + 12..84 + 50 + 16].copy_from_slice(&f32::NAN.to_le_bytes());
     assert!(matches!(TriMesh::from_stl(&nan), Err(MeshError::NotFiniteInFace { face: 2, .. })));
@@ -181,8 +185,16 @@ fn bad_meshes_are_mended_or_refused_with_a_reason() {
     assert!(error("inf_vertex").to_string().contains("vertex 18 "), "{}", error("inf_vertex"));
     assert!(error("index_out_of_range").to_string().contains("face 13 points at vertex 100, but there are 8"));
     // 36 faces around one point leave one hole
-    assert!(matches!(error("open_hole"), MeshError::Open { holes: 1, edges, first_hole, .. } if edges == first_hole), "{}", error("open_hole"));
-    assert!(matches!(error("nonmanifold_fin"), MeshError::NonManifold { faces: 3, open: 2, face: 13, .. }), "{}", error("nonmanifold_fin"));
+    assert!(
+        matches!(error("open_hole"), MeshError::Open { holes: 1, edges, first_hole, .. } if edges == first_hole),
+        "{}",
+        error("open_hole")
+    );
+    assert!(
+        matches!(error("nonmanifold_fin"), MeshError::NonManifold { faces: 3, open: 2, face: 13, .. }),
+        "{}",
+        error("nonmanifold_fin")
+    );
     for name in ["nan_vertex", "inf_vertex", "index_out_of_range", "open_hole", "nonmanifold_fin", "flat"] {
         eprintln!("{name}: {}", error(name));
     }
@@ -190,7 +202,9 @@ fn bad_meshes_are_mended_or_refused_with_a_reason() {
 
 #[test]
 fn good_meshes_are_closed_with_the_volume_that_trimesh_finds() {
-    for (name, volume) in [("bunny", 0.749334), ("torus", 1.21878), ("panda_link5", 0.0034191), ("cow", 53.5674), ("fertility", 432186.0)] {
+    for (name, volume) in
+        [("bunny", 0.749334), ("torus", 1.21878), ("panda_link5", 0.0034191), ("cow", 53.5674), ("fertility", 432186.0)]
+    {
         let Some(obj) = text(&format!("{name}.obj")) else { return };
         let mut mesh = TriMesh::from_obj(&obj).unwrap();
         assert_near(check(&mut mesh).volume, volume, 2e-5, name);
@@ -202,10 +216,59 @@ fn signed_distance_of_a_fine_ball_is_that_of_a_ball() {
     let ball = MeshDistance::new(&TriMesh::icosphere(1.0, 5));
     let box_mesh = MeshDistance::new(&TriMesh::box_(Vec3::repeat(1.0)));
     for n in 0..500 {
-        let p = Pose::rotation(Vec3::new(0.1, 0.2, 0.3) * f64::from(n)) * nalgebra::Point3::new(0.005 * f64::from(n), 0.3, 0.1);
+        let p = Pose::rotation(Vec3::new(0.1, 0.2, 0.3) * f64::from(n))
+            * nalgebra::Point3::new(0.005 * f64::from(n), 0.3, 0.1);
         assert!((ball.closest(&p.coords).signed_distance - (p.coords.norm() - 1.0)).abs() < 2e-3);
         let q = p.coords.abs().add_scalar(-1.0);
         let expected = q.map(|x| x.max(0.0)).norm() + q.max().min(0.0);
         assert!((box_mesh.closest(&p.coords).signed_distance - expected).abs() < 1e-12);
     }
+}
+
+/// Damage to any byte gives a mesh or an error, never a panic, and a mesh that passes the check has a volume.
+#[test]
+fn damaged_files_are_read_or_refused() {
+    let ball = TriMesh::icosphere(1.0, 1);
+    let mut obj: String = ball.vertices.iter().map(|v| format!("v {:.3} {:.3} {:.3}\n", v.x, v.y, v.z)).collect();
+    obj.extend(ball.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1)));
+    let (obj, stl) = (obj.into_bytes(), binary_stl(&ball));
+    let mut rng = Rng::new(9);
+    let (mut read, mut refused) = (0, 0);
+    for case in 0..6000 {
+        let mut bytes = if case % 2 == 0 { obj.clone() } else { stl.clone() };
+        for _ in 0..1 + rng.below(4) {
+            let place = rng.below(bytes.len());
+            bytes[place] = if case % 4 < 2 { b"0123456789-+.e/ \nvf"[rng.below(19)] } else { rng.below(256) as u8 };
+        }
+        if rng.below(8) == 0 {
+            bytes.truncate(rng.below(bytes.len()));
+        }
+        let mesh =
+            if case % 2 == 0 { TriMesh::from_obj(&String::from_utf8_lossy(&bytes)) } else { TriMesh::from_stl(&bytes) };
+        match mesh.and_then(|mut m| m.check_closed()) {
+            Ok(report) => {
+                assert!(report.volume > 0.0);
+                read += 1;
+            }
+            Err(error) => {
+                assert!(!error.to_string().is_empty());
+                refused += 1;
+            }
+        }
+    }
+    assert!(read > 100 && refused > 1000, "{read} {refused}");
+}
+
+#[test]
+fn errors_number_faces_as_the_user_sees_them() {
+    // an unused vertex, a degenerate face and a doubled vertex come before the box that lacks its last face
+    let mut mesh = TriMesh::box_(Vec3::repeat(1.0));
+    mesh.triangles.pop();
+    mesh.triangles.iter_mut().flatten().for_each(|v| *v += 2);
+    mesh.triangles.insert(0, [2, 2, 3]);
+    mesh.vertices.splice(0..0, [Vec3::repeat(9.0), Vec3::repeat(-1.0)]);
+    let error = mesh.check_closed().unwrap_err();
+    let MeshError::Open { edges: 3, holes: 1, from, to, face, .. } = error else { panic!("{error}") };
+    let corners = mesh.triangles[face - 1];
+    assert!(corners.contains(&(from - 1)) && corners.contains(&(to - 1)), "{error}");
 }

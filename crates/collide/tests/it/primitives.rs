@@ -24,7 +24,8 @@ fn sphere_on_half_space() {
     assert!((c.gap + 0.01).abs() < 1e-15 && (c.normal - Vec3::z()).norm() < 1e-15);
     assert!((c.point - Vec3::new(1.0, 2.0, -0.005)).norm() < 1e-15);
     assert_eq!((c.core_a, c.core_b, c.normal_from), (0.5, 0.0, NormalFrom::FaceOfB));
-    let swapped = query(&Shape::half_space(), &at(0.0, 0.0, 0.0), &Shape::sphere(0.5).unwrap(), &at(1.0, 2.0, 0.49), 0.0);
+    let swapped =
+        query(&Shape::half_space(), &at(0.0, 0.0, 0.0), &Shape::sphere(0.5).unwrap(), &at(1.0, 2.0, 0.49), 0.0);
     assert_eq!((swapped[0].normal, swapped[0].core_b, swapped[0].normal_from), (-c.normal, 0.5, NormalFrom::FaceOfA));
 }
 
@@ -54,7 +55,13 @@ fn crossed_edges_give_one_contact() {
     let quarter = std::f64::consts::FRAC_PI_4;
     for (gap, margin) in [(-0.02, 0.0), (0.02, 0.05)] {
         let height = 2.0 * 2.0_f64.sqrt() + gap;
-        let found = query(&shape, &turned(0.0, 0.0, height, Vec3::x() * quarter), &shape, &turned(0.0, 0.0, 0.0, Vec3::y() * quarter), margin);
+        let found = query(
+            &shape,
+            &turned(0.0, 0.0, height, Vec3::x() * quarter),
+            &shape,
+            &turned(0.0, 0.0, 0.0, Vec3::y() * quarter),
+            margin,
+        );
         assert_eq!(found.len(), 1, "{found:?}");
         assert!((found[0].gap - gap).abs() < 1e-12 && (found[0].normal - Vec3::z()).norm() < 1e-12);
         assert!((found[0].point - Vec3::z() * (2.0_f64.sqrt() + 0.5 * gap)).norm() < 1e-12);
@@ -78,7 +85,8 @@ fn capsules_lying_down_rest_on_two_points() {
     let lying = turned(0.0, 0.0, 0.699, Vec3::y() * std::f64::consts::FRAC_PI_2);
     let on_box = query(&capsule, &lying, &Shape::cuboid(Vec3::new(2.0, 2.0, 0.5)).unwrap(), &at(0.0, 0.0, 0.0), 0.0);
     assert_eq!(on_box.len(), 2);
-    let on_capsule = query(&capsule, &lying, &capsule, &turned(0.25, 0.0, 0.3, Vec3::y() * std::f64::consts::FRAC_PI_2), 0.0);
+    let on_capsule =
+        query(&capsule, &lying, &capsule, &turned(0.25, 0.0, 0.3, Vec3::y() * std::f64::consts::FRAC_PI_2), 0.0);
     assert_eq!(on_capsule.len(), 2);
     for c in on_box.iter().chain(&on_capsule) {
         assert!((c.gap + 0.001).abs() < 1e-12 && (c.normal - Vec3::z()).norm() < 1e-9, "{c:?}");
@@ -90,7 +98,12 @@ fn capsules_lying_down_rest_on_two_points() {
 
 #[test]
 fn coincident_centres_give_a_finite_normal() {
-    let shapes = [Shape::sphere(0.5).unwrap(), Shape::cuboid(Vec3::new(0.5, 0.5, 0.5)).unwrap(), Shape::capsule(0.3, 0.4).unwrap(), Shape::half_space()];
+    let shapes = [
+        Shape::sphere(0.5).unwrap(),
+        Shape::cuboid(Vec3::new(0.5, 0.5, 0.5)).unwrap(),
+        Shape::capsule(0.3, 0.4).unwrap(),
+        Shape::half_space(),
+    ];
     for a in &shapes {
         for b in &shapes {
             let found = query(a, &at(0.0, 0.0, 0.0), b, &at(0.0, 0.0, 0.0), 0.01);
@@ -98,7 +111,10 @@ fn coincident_centres_give_a_finite_normal() {
                 assert!(!found.is_empty(), "{a:?} {b:?}");
             }
             for c in found {
-                assert!(c.gap < 0.011 && (c.normal.norm() - 1.0).abs() < 1e-12 && c.point.norm() < 2.0, "{a:?} {b:?} {c:?}");
+                assert!(
+                    c.gap < 0.011 && (c.normal.norm() - 1.0).abs() < 1e-12 && c.point.norm() < 2.0,
+                    "{a:?} {b:?} {c:?}"
+                );
             }
         }
     }
@@ -117,7 +133,10 @@ fn mass_of_a_capsule_is_a_tube_and_a_ball() {
 #[test]
 fn bad_numbers_are_refused() {
     assert!(matches!(Shape::sphere(-1.0), Err(ShapeError::Length { .. })));
-    assert!(matches!(Shape::cuboid(Vec3::new(1.0, f64::NAN, 1.0)), Err(ShapeError::Length { what: "half extent y of a box", .. })));
+    assert!(matches!(
+        Shape::cuboid(Vec3::new(1.0, f64::NAN, 1.0)),
+        Err(ShapeError::Length { what: "half extent y of a box", .. })
+    ));
     assert!(matches!(Shape::capsule(1.0, f64::INFINITY), Err(ShapeError::Length { .. })));
     assert_eq!(Shape::half_space().mass_properties(1.0), Err(ShapeError::Unbounded));
     assert_eq!(Shape::sphere(1.0).unwrap().mass_properties(0.0), Err(ShapeError::Density(0.0)));
@@ -130,4 +149,24 @@ fn half_space_boxes_are_bounded_only_along_an_axis() {
     assert!((b.min.z - 3.0).abs() < 1e-12 && b.max.z == f64::INFINITY && b.max.x == f64::INFINITY);
     let tilted = Shape::half_space().aabb(&turned(0.0, 0.0, 3.0, Vec3::x() * 0.3));
     assert_eq!((tilted.min.z, tilted.max.z), (f64::NEG_INFINITY, f64::INFINITY));
+}
+
+/// The clipped face reached beyond the margin while an edge was within it, and nothing was told.
+#[test]
+fn an_edge_just_within_the_margin_is_not_missed() {
+    let a = Shape::cuboid(Vec3::new(0.7084363941525877, 0.31168860079970623, 0.6147508599287879)).unwrap();
+    let b = Shape::cuboid(Vec3::new(0.5587402072637294, 0.26632436260223613, 0.4442867410980149)).unwrap();
+    let pose = |t: [f64; 3], q: [f64; 4]| {
+        let turn = tumble_collide::Quat::from_quaternion(nalgebra::Quaternion::new(q[3], q[0], q[1], q[2]));
+        Pose::from_parts(Vec3::from(t).into(), turn)
+    };
+    let half = 0.5_f64.sqrt();
+    let pa = pose([-0.28506705895931617, -0.8226228327209517, 0.8337004198232256], [0.0, half, 0.0, half]);
+    let pb = pose(
+        [1.1246411521982, -0.858834330925359, 0.5933296584661905],
+        [-0.15076780093591483, 0.7528104013401922, -0.07687487866034155, 0.6361099141389992],
+    );
+    let found = query(&a, &pa, &b, &pb, 0.25);
+    // parry: 0.24936547
+    assert!(found.len() == 1 && (found[0].gap - 0.24936547).abs() < 1e-6, "{found:?}");
 }

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-/// The folder: `TUMBLE_MESHES`, else the nearest `shared/meshes` above this crate; says so on stderr if there is none.
+/// The folder: `TUMBLE_MESHES`, else the nearest `shared/meshes` above this crate; says so on stderr if there is
+/// none.
 pub fn folder() -> Option<PathBuf> {
     if let Some(path) = std::env::var_os("TUMBLE_MESHES") {
         return Some(path.into());
