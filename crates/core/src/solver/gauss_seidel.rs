@@ -3,8 +3,8 @@
 //! For each block in turn, with everything else held: `w = c + Yᵀ(Yλ)`, then
 //!
 //! - equality, half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K`;
-//! - contact, all three rows at once: `λ ← λ − K⁻¹w` where that lies in the cone (it sticks); otherwise
-//!   `λ_n ← max(0, λ_n − w_n/k_nn)`, then `λ_t ← Π_{|λ_t| ≤ μλ_n}(λ_t − ρ·w_t)` with `ρ = 1/λ_max(K_tt)` (it slides).
+//! - contact: its own three-row problem with `b = w − K·λ`, exactly: open (`b_n ≥ 0`, `λ = 0`), else sticking (`λ = −K⁻¹b` where that
+//!   lies in the cone), else sliding along `d`: `λ_t = −μ·λ_n·d` with `w_t` along `d` and `w_n = 0`.
 //!
 //! Its fixed points are the exact Coulomb solutions: `λ_n ⟂ w_n` without the dilation that a convex cone brings, and
 //! friction against the sliding velocity.
@@ -18,6 +18,8 @@
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{Block, RowSet, Rows, Side};
 
+/// Steps of Newton's method on the sliding direction.
+const SLIDE_STEPS: u32 = 12;
 /// Sweeps with extrapolation between them.
 const ACCELERATED: u32 = 200;
 
@@ -193,14 +195,59 @@ impl Contact {
         Contact { mu, k, inverse: if mu > 0.0 { invert(&k) } else { None }, rho }
     }
 
-    /// The multipliers that answer row velocities `w` found with multipliers `old`.
+    /// The multipliers that answer row velocities `w` found with multipliers `old`: the problem of this contact alone, with `b = w − K·old`.
     fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+        let k = &self.k;
+        let b: [f64; 3] = std::array::from_fn(|i| w[i] - (k[i][0] * old[0] + k[i][1] * old[1] + k[i][2] * old[2]));
+        if b[0] >= 0.0 {
+            return [0.0; 3];
+        }
         if let Some(inverse) = &self.inverse {
-            let full: [f64; 3] = std::array::from_fn(|i| old[i] - (0..3).map(|j| inverse[i][j] * w[j]).sum::<f64>());
-            if full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) && full[0] >= 0.0 {
+            let full: [f64; 3] = std::array::from_fn(|i| -(inverse[i][0] * b[0] + inverse[i][1] * b[1] + inverse[i][2] * b[2]));
+            let bound = self.mu * full[0];
+            if bound >= 0.0 && full[1] * full[1] + full[2] * full[2] <= bound * bound {
                 return full;
             }
         }
+        self.slide(old, b).unwrap_or_else(|| self.descend(old, w))
+    }
+
+    /// Sliding: the direction `d` of `w_t` by Newton's method on its angle, from the direction of the multipliers so far or else of `b_t`.
+    fn slide(&self, old: [f64; 3], b: [f64; 3]) -> Option<[f64; 3]> {
+        let starts = [[-old[1], -old[2]], [b[1], b[2]], [-b[2], b[1]], [b[2], -b[1]]];
+        starts.into_iter().find_map(|start| self.slide_from(unit(start)?, b))
+    }
+
+    /// `g(φ) = d × w_t = 0` with `d·w_t > 0`, where `λ_n = −b_n / r`, `r = k_nn − μ·k_nt·d`, `w_t = b_t + λ_n·(k_tn − μ·K_tt·d)`.
+    /// `None` where Newton's method ends elsewhere, or `r ≤ 0`: there friction alone would press the bodies together (Painlevé).
+    fn slide_from(&self, mut d: [f64; 2], b: [f64; 3]) -> Option<[f64; 3]> {
+        let (k, mu) = (&self.k, self.mu);
+        let row = |r: usize, v: [f64; 2]| k[r][1] * v[0] + k[r][2] * v[1];
+        for _ in 0..SLIDE_STEPS {
+            let across = [-d[1], d[0]];
+            let resistance = k[0][0] - mu * row(0, d);
+            if resistance <= 1e-6 * k[0][0] {
+                return None;
+            }
+            let normal = -b[0] / resistance;
+            let turn = normal * mu * row(0, across) / resistance;
+            let pull = [1, 2].map(|r| k[r][0] - mu * row(r, d));
+            let w: [f64; 2] = std::array::from_fn(|i| b[i + 1] + normal * pull[i]);
+            let rate: [f64; 2] = std::array::from_fn(|i| turn * pull[i] - normal * mu * row(i + 1, across));
+            let (along, g) = (d[0] * w[0] + d[1] * w[1], d[0] * w[1] - d[1] * w[0]);
+            if g.abs() <= 1e-14 * (b[1].abs() + b[2].abs() + normal * k[1][1]) {
+                return (along > 0.0).then_some([normal, -mu * normal * d[0], -mu * normal * d[1]]);
+            }
+            let slope = -along + d[0] * rate[1] - d[1] * rate[0];
+            let step = (-g / slope).clamp(-1.0, 1.0);
+            d = unit([d[0] + step * across[0], d[1] + step * across[1]]).filter(|_| slope != 0.0)?;
+        }
+        None
+    }
+
+    /// One projected step, where the contact's own problem has no sliding answer: `λ_n ← max(0, λ_n − w_n/k_nn)`, then
+    /// `λ_t ← Π(λ_t − ρ·w_t)` onto the disc of radius `μ·λ_n`.
+    fn descend(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let normal = (old[0] - w[0] / self.k[0][0]).max(0.0);
         let dn = normal - old[0];
         let t = [1, 2].map(|r| old[r] - self.rho * (w[r] + self.k[r][0] * dn));
@@ -241,6 +288,11 @@ fn add_impulse(rows: &Rows, side: &Side, delta: [f64; 3], u: &mut [f64]) {
     for k in 0..d {
         u[k] += y[k] * delta[0] + y[d + k] * delta[1] + y[2 * d + k] * delta[2];
     }
+}
+
+fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
+    let size = (v[0] * v[0] + v[1] * v[1]).sqrt();
+    (size > f64::MIN_POSITIVE).then(|| [v[0] / size, v[1] / size])
 }
 
 /// Inverse of a symmetric 3×3 matrix, `None` where it is singular to working precision.

@@ -4,15 +4,9 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::*;
 
 pub const G: f64 = 9.81;
-pub const STEPPERS: [&str; 2] = ["time_stepping", "backtracking"];
-
 pub fn world(stepper: &str, dt: f64) -> World {
     let mut world = World::new(Settings { dt, ..Settings::default() }).unwrap();
-    match stepper {
-        "time_stepping" => world.set_stepper(Box::<TimeStepping>::default()),
-        "backtracking" => world.set_stepper(Box::<Backtracking>::default()),
-        other => panic!("no stepper {other}"),
-    }
+    world.set_stepper(stepper_by_name(stepper).unwrap());
     world
 }
 

@@ -5,4 +5,5 @@ mod friction;
 mod impacts;
 mod stacks;
 mod common;
+mod paradox;
 mod state;
