@@ -11,7 +11,7 @@ use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{RowSet, Rows};
 
 /// As far as rounding lets an iteration go.
-pub(super) const FAR: Accuracy = Accuracy { sweeps: 200_000, tolerance: 1e-14 };
+pub(super) const FAR: Accuracy = Accuracy { sweeps: 200_000, relaxations: u32::MAX, tolerance: 1e-14 };
 
 /// A repeatable stream of numbers (splitmix64).
 pub(super) struct Random(pub u64);
