@@ -1,0 +1,28 @@
+//! tumble beside its peers: the same scenes, the same clock, the same measure of error.
+
+pub mod clock;
+pub mod measure;
+pub mod rapier;
+pub mod scene;
+pub mod tumble;
+
+/// Length of a frame, s.
+pub const DT: f64 = 1.0 / 60.0;
+/// Friction and restitution of every body and pair.
+pub const FRICTION: f64 = 0.5;
+/// See [`FRICTION`].
+pub const RESTITUTION: f64 = 0.0;
+/// Density of every body, kg/m³.
+pub const DENSITY: f64 = 1000.0;
+
+/// An engine with one scene loaded.
+pub trait Engine {
+    /// Advances by one frame of [`DT`].
+    fn step(&mut self);
+    /// Centre of body `i` (in the order of the scene), metres.
+    fn center(&self, i: usize) -> [f64; 3];
+    /// What the engine says of its last solve, m/s; `None` if it says nothing.
+    fn residual(&self) -> Option<f64> {
+        None
+    }
+}

@@ -1,0 +1,56 @@
+//! A scene in tumble: `time_stepping`, `gauss_seidel`, default settings.
+
+use crate::scene::{Body, EDGE, Plane, RADIUS, Scene};
+use crate::{DENSITY, DT, Engine, FRICTION, RESTITUTION};
+use tumble_collide::{Pose, Quat, Shape, Vec3};
+use tumble_core::{ObjectId, RigidBody, Settings, World};
+
+/// A tumble world with a scene in it.
+pub struct Tumble {
+    world: World,
+    ids: Vec<ObjectId>,
+}
+
+impl Tumble {
+    /// Builds the scene.
+    pub fn new(scene: &Scene) -> Tumble {
+        let mut world = World::new(Settings { dt: DT, ..Settings::default() }).expect("the default settings are valid");
+        for (i, plane) in scene.planes.iter().enumerate() {
+            let fixture = RigidBody::fixture(format!("plane{i}"), Shape::half_space()).surface(RESTITUTION, FRICTION).at(pose(plane));
+            world.add_static(fixture).expect("a fixture is valid");
+        }
+        let shape = match scene.body {
+            Body::Sphere => Shape::sphere(RADIUS),
+            Body::Box => Shape::cuboid(Vec3::repeat(0.5 * EDGE)),
+        };
+        let shape = shape.expect("the sizes are valid");
+        let mut add = |(i, c): (usize, &[f64; 3])| {
+            let body = RigidBody::with_density(format!("body{i}"), shape.clone(), DENSITY).expect("the density is valid");
+            let body = body.surface(RESTITUTION, FRICTION).at(Pose::translation(c[0], c[1], c[2]));
+            world.add(body).expect("names are unique")
+        };
+        let ids = scene.centers.iter().enumerate().map(&mut add).collect();
+        Tumble { world, ids }
+    }
+}
+
+impl Engine for Tumble {
+    fn step(&mut self) {
+        self.world.step().expect("all numbers are finite");
+    }
+
+    fn center(&self, i: usize) -> [f64; 3] {
+        self.world.site(self.ids[i], 0).expect("the body is there").position().into()
+    }
+
+    fn residual(&self) -> Option<f64> {
+        Some(self.world.report().residual)
+    }
+}
+
+/// The pose whose local z axis is the plane's normal.
+fn pose(plane: &Plane) -> Pose {
+    let normal = Vec3::from(plane.normal);
+    let turn = Quat::rotation_between(&Vec3::z(), &normal).unwrap_or_else(Quat::identity);
+    Pose::from_parts(Vec3::from(plane.point).into(), turn)
+}
