@@ -15,7 +15,7 @@
 //! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. High mass ratios stay slow; the residual says how far.
 
 use super::{Accuracy, Outcome, RowSolver};
-use crate::rows::{Block, RowSet, Rows, Side};
+use crate::rows::{Block, RowSet, Rows, Side, dot6};
 
 /// The block Gauss–Seidel solver, `gauss_seidel`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,26 +27,33 @@ impl RowSolver for GaussSeidel {
     }
 
     fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome {
-        let mut locals: Vec<Local> = blocks.iter().map(|&b| Local::new(rows, &rows.blocks[b as usize])).collect();
-        for local in &mut locals {
-            local.warm_start(rows, lambda, du);
+        let mut locals: Vec<Local> = Vec::with_capacity(blocks.len());
+        for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
+            locals.push(Local::new(rows, block, c, lambda));
         }
+        write_back(&locals, lambda);
+        apply(&locals, rows, lambda, du);
         let sweeps = accuracy.sweeps_of(blocks.len());
         let mut momentum = Momentum::new(&locals, du);
+        let mut outcome = Outcome { iterations: sweeps, converged: false, ray: false };
         for sweep in 1..=sweeps {
-            let mut against = 0.0;
-            let mut change = 0.0f64;
+            let mut progress = Progress::default();
             for local in &mut locals {
-                change = change.max(local.relax(rows, c, lambda, du, &mut against));
+                local.relax(rows, du, &mut progress);
             }
-            if change <= accuracy.tolerance {
-                return Outcome { iterations: sweep, converged: true, ray: false };
+            if progress.change <= accuracy.tolerance {
+                outcome = Outcome { iterations: sweep, converged: true, ray: false };
+                break;
             }
             if sweep < sweeps {
-                momentum.extrapolate(&mut locals, against > 0.0, lambda, du);
+                momentum.extrapolate(&mut locals, progress.against > 0.0, du);
+            }
+            if sweep % RENEW == 0 {
+                momentum.renew(&mut locals, rows, lambda, du);
             }
         }
-        Outcome { iterations: sweeps, converged: false, ray: false }
+        write_back(&locals, lambda);
+        outcome
     }
 
     fn fork(&self) -> Box<dyn RowSolver> {
@@ -54,122 +61,203 @@ impl RowSolver for GaussSeidel {
     }
 }
 
-/// A block with what its own diagonal block of `K` gives, and its multipliers of the sweep before.
-struct Local {
-    block: Block,
-    step: Step,
+/// Extrapolation carries the rounding errors of `du` on and on; after so many sweeps it is made anew from `λ`.
+const RENEW: u32 = 1000;
+
+fn write_back(locals: &[Local], lambda: &mut [f64]) {
+    for local in locals {
+        let range = local.block.range();
+        lambda[range.clone()].copy_from_slice(&local.lambda[..range.len()]);
+    }
+}
+
+/// `du += Y·λ` of the island.
+fn apply(locals: &[Local], rows: &Rows, lambda: &[f64], du: &mut [f64]) {
+    for local in locals.iter().filter(|l| l.lambda != [0.0; 3]) {
+        rows.apply_block(local.block, lambda, du);
+    }
+}
+
+/// A block as the sweeps read it; of a scalar block only the first of each three numbers counts.
+struct Local<'a> {
+    block: &'a Block,
+    c: [f64; 3],
+    lambda: [f64; 3],
+    /// `λ` of the sweep before.
     last: [f64; 3],
+    step: Step,
+}
+
+/// What a sweep did.
+#[derive(Default)]
+struct Progress {
+    /// Largest change of a row velocity by its own block.
+    change: f64,
+    /// How far the change from the extrapolated multipliers goes against the move since the last sweep.
+    against: f64,
+}
+
+impl Progress {
+    #[inline(always)]
+    fn note(&mut self, change: f64) {
+        // Not `max`, which spends several instructions on NaN.
+        if change > self.change {
+            self.change = change;
+        }
+    }
 }
 
 /// The extrapolation between sweeps, over the multipliers of the island and the stretches of `du` that they act on.
 struct Momentum {
     theta: f64,
-    /// First index and length of each object's stretch, and where its last value is kept.
+    /// First index and end of each stretch of `du`, one after the other; neighbours are joined.
     stretches: Vec<(u32, u32)>,
+    /// `du` of the sweep before, of all stretches.
     last: Vec<f64>,
 }
 
 impl Momentum {
     fn new(locals: &[Local], du: &[f64]) -> Momentum {
-        let mut stretches: Vec<(u32, u32)> = locals.iter().flat_map(|l| l.block.sides()).map(|s| (s.u, s.dof)).collect();
+        let mut stretches: Vec<(u32, u32)> = Vec::new();
+        for (i, local) in locals.iter().enumerate() {
+            // the contacts of a pair follow one another: one of them is enough
+            let same = |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));
+            if i == 0 || !same(&locals[i - 1]) {
+                stretches.extend(local.block.sides().iter().map(|s| (s.u, s.u + s.dof)));
+            }
+        }
         stretches.sort_unstable();
-        stretches.dedup();
-        let last = stretches.iter().flat_map(|&(u, dof)| &du[u as usize..(u + dof) as usize]).copied().collect();
+        stretches.dedup_by(|next, before| {
+            let joins = next.0 <= before.1;
+            if joins {
+                before.1 = before.1.max(next.1);
+            }
+            joins
+        });
+        let last = stretches.iter().flat_map(|&(start, end)| &du[start as usize..end as usize]).copied().collect();
         Momentum { theta: 1.0, stretches, last }
     }
 
-    fn extrapolate(&mut self, locals: &mut [Local], restart: bool, lambda: &mut [f64], du: &mut [f64]) {
+    fn extrapolate(&mut self, locals: &mut [Local], restart: bool, du: &mut [f64]) {
         let next = 0.5 * (1.0 + (1.0 + 4.0 * self.theta * self.theta).sqrt());
         let beta = if restart { 0.0 } else { (self.theta - 1.0) / next };
         self.theta = if restart { 1.0 } else { next };
         for local in locals {
-            for (row, last) in local.block.range().zip(&mut local.last) {
-                let now = lambda[row];
-                lambda[row] += beta * (now - *last);
-                *last = now;
+            for (lambda, last) in local.lambda.iter_mut().zip(&mut local.last) {
+                go_on(lambda, last, beta);
             }
         }
-        let mut last = self.last.iter_mut();
-        for &(u, dof) in &self.stretches {
-            for (du, last) in du[u as usize..(u + dof) as usize].iter_mut().zip(&mut last) {
-                let now = *du;
-                *du += beta * (now - *last);
-                *last = now;
-            }
+        let mut rest = &mut self.last[..];
+        for &(start, end) in &self.stretches {
+            let (last, after) = rest.split_at_mut((end - start) as usize);
+            du[start as usize..end as usize].iter_mut().zip(last).for_each(|(du, last)| go_on(du, last, beta));
+            rest = after;
         }
     }
+
+    /// Makes `du` anew, and starts from rest.
+    fn renew(&mut self, locals: &mut [Local], rows: &Rows, lambda: &mut [f64], du: &mut [f64]) {
+        write_back(locals, lambda);
+        for &(start, end) in &self.stretches {
+            du[start as usize..end as usize].fill(0.0);
+        }
+        apply(locals, rows, lambda, du);
+        self.extrapolate(locals, true, du);
+    }
+}
+
+/// `x ← x + β(x − x_last)`, `x_last ← x`.
+#[inline(always)]
+fn go_on(x: &mut f64, last: &mut f64, beta: f64) {
+    let now = *x;
+    *x += beta * (now - *last);
+    *last = now;
 }
 
 enum Step {
     /// No response: no impulse.
     Dead,
-    Scalar { k: f64, lo: f64, hi: f64 },
+    Scalar { k: f64, inverse: f64, lo: f64, hi: f64 },
     Contact(Contact),
 }
 
 struct Contact {
     mu: f64,
-    k: [[f64; 3]; 3],
+    k: Symmetric,
     /// `K⁻¹`, absent where a direction has no response.
-    inverse: Option<[[f64; 3]; 3]>,
+    inverse: Option<Symmetric>,
     /// `1/λ_max(K_tt)`; 0 where no tangent has a response.
     rho: f64,
 }
 
-impl Local {
-    fn new(rows: &Rows, block: &Block) -> Local {
-        let diagonal = rows.coupling(block, 0, block, 0);
-        let step = match block.set {
+/// A symmetric 3×3 matrix; 0 is the normal, 1 and 2 are the tangents.
+#[derive(Clone, Copy)]
+struct Symmetric {
+    m00: f64,
+    m10: f64,
+    m20: f64,
+    m11: f64,
+    m21: f64,
+    m22: f64,
+}
+
+impl Step {
+    fn new(rows: &Rows, block: &Block) -> Step {
+        let diagonal = rows.own(block, 0, 0);
+        match block.set {
             _ if diagonal <= f64::MIN_POSITIVE => Step::Dead,
-            RowSet::Equality => Step::Scalar { k: diagonal, lo: f64::NEG_INFINITY, hi: f64::INFINITY },
-            RowSet::HalfLine => Step::Scalar { k: diagonal, lo: 0.0, hi: f64::INFINITY },
-            RowSet::Interval { lo, hi } => Step::Scalar { k: diagonal, lo, hi },
+            RowSet::Equality => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo: f64::NEG_INFINITY, hi: f64::INFINITY },
+            RowSet::HalfLine => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo: 0.0, hi: f64::INFINITY },
+            RowSet::Interval { lo, hi } => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo, hi },
             RowSet::Cone { mu } => Step::Contact(Contact::new(rows, block, mu)),
-        };
-        Local { block: *block, step, last: [0.0; 3] }
-    }
-
-    fn warm_start(&mut self, rows: &Rows, lambda: &mut [f64], du: &mut [f64]) {
-        if let Step::Dead = self.step {
-            lambda[self.block.range()].fill(0.0);
-        } else {
-            rows.apply_block(&self.block, lambda, du);
         }
-        self.last[..self.block.set.rows()].copy_from_slice(&lambda[self.block.range()]);
+    }
+}
+
+impl<'a> Local<'a> {
+    fn new(rows: &Rows, block: &'a Block, c: &[f64], lambda: &[f64]) -> Local<'a> {
+        let step = Step::new(rows, block);
+        let numbers = |from: &[f64]| {
+            let mut three = [0.0; 3];
+            three[..block.set.rows()].copy_from_slice(&from[block.range()]);
+            three
+        };
+        let start = if matches!(step, Step::Dead) { [0.0; 3] } else { numbers(lambda) };
+        Local { block, c: numbers(c), lambda: start, last: start, step }
     }
 
-    /// Solves this block with the others held; the largest change of its own row velocities. Adds to `against` how far the change
-    /// from the extrapolated multipliers goes against the move since the last sweep.
-    fn relax(&mut self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64], against: &mut f64) -> f64 {
-        let i = self.block.row as usize;
+    /// Solves this block with the others held.
+    #[inline]
+    fn relax(&mut self, rows: &Rows, du: &mut [f64], progress: &mut Progress) {
         match &self.step {
-            Step::Dead => 0.0,
-            Step::Scalar { k, lo, hi } => {
-                let w = c[i] + rows.row_velocity(&self.block, 0, du);
-                // Not `clamp`, which panics where `lo > hi`.
-                let next = (lambda[i] - w / k).max(*lo).min(*hi);
-                let delta = next - lambda[i];
-                *against -= delta * (next - self.last[0]);
-                lambda[i] = next;
-                for side in self.block.sides() {
-                    let u = &mut du[side.u as usize..(side.u + side.dof) as usize];
-                    u.iter_mut().zip(rows.response(side, 0)).for_each(|(u, y)| *u += y * delta);
+            Step::Dead => {}
+            Step::Scalar { k, inverse, lo, hi } => {
+                let w = self.c[0] + rows.row_velocity(self.block, 0, du);
+                let next = clamp(self.lambda[0] - w * inverse, *lo, *hi);
+                let delta = next - self.lambda[0];
+                if delta != 0.0 {
+                    self.lambda[0] = next;
+                    for side in self.block.sides() {
+                        add_multiple(rows.response(side, 0), delta, &mut du[side.u as usize..(side.u + side.dof) as usize]);
+                    }
+                    progress.against -= delta * (next - self.last[0]);
+                    progress.note((delta * k).abs());
                 }
-                (delta * k).abs()
             }
             Step::Contact(contact) => {
-                let mut w = [c[i], c[i + 1], c[i + 2]];
+                let mut w = self.c;
                 self.block.sides().iter().for_each(|s| add_velocity(rows, s, du, &mut w));
-                let old = [lambda[i], lambda[i + 1], lambda[i + 2]];
-                let next = contact.solve(old, w);
-                let delta = [next[0] - old[0], next[1] - old[1], next[2] - old[2]];
-                if delta == [0.0; 3] {
-                    return 0.0;
+                let next = contact.solve(self.lambda, w);
+                let delta = [next[0] - self.lambda[0], next[1] - self.lambda[1], next[2] - self.lambda[2]];
+                if delta != [0.0; 3] {
+                    self.lambda = next;
+                    self.block.sides().iter().for_each(|s| add_impulse(rows, s, delta, du));
+                    let last = &self.last;
+                    progress.against -= delta[0] * (next[0] - last[0]) + delta[1] * (next[1] - last[1]) + delta[2] * (next[2] - last[2]);
+                    progress.note((delta[0] * contact.k.m00).abs());
+                    progress.note((delta[1] * contact.k.m11).abs());
+                    progress.note((delta[2] * contact.k.m22).abs());
                 }
-                *against -= (0..3).map(|r| delta[r] * (next[r] - self.last[r])).sum::<f64>();
-                lambda[i..i + 3].copy_from_slice(&next);
-                self.block.sides().iter().for_each(|s| add_impulse(rows, s, delta, du));
-                (0..3).map(|r| (delta[r] * contact.k[r][r]).abs()).fold(0.0, f64::max)
             }
         }
     }
@@ -177,75 +265,111 @@ impl Local {
 
 impl Contact {
     fn new(rows: &Rows, block: &Block, mu: f64) -> Contact {
-        let mut k = [[0.0; 3]; 3];
-        for (i, j) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
-            k[i][j] = rows.coupling(block, i, block, j);
-            k[j][i] = k[i][j];
-        }
-        let mean = 0.5 * (k[1][1] + k[2][2]);
-        let half = 0.5 * (k[1][1] - k[2][2]);
-        let largest = mean + (half * half + k[1][2] * k[1][2]).sqrt();
+        let own = |i, j| rows.own(block, i, j);
+        let k = Symmetric { m00: own(0, 0), m10: own(1, 0), m20: own(2, 0), m11: own(1, 1), m21: own(2, 1), m22: own(2, 2) };
+        let mean = 0.5 * (k.m11 + k.m22);
+        let half = 0.5 * (k.m11 - k.m22);
+        let largest = mean + (half * half + k.m21 * k.m21).sqrt();
         let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
-        Contact { mu, k, inverse: if mu > 0.0 { invert(&k) } else { None }, rho }
+        Contact { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho }
     }
 
     /// The multipliers that answer row velocities `w` found with multipliers `old`.
+    #[inline]
     fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         if let Some(inverse) = &self.inverse {
-            let full: [f64; 3] = std::array::from_fn(|i| old[i] - (0..3).map(|j| inverse[i][j] * w[j]).sum::<f64>());
+            let step = inverse.times(w);
+            let full = [old[0] - step[0], old[1] - step[1], old[2] - step[2]];
             if full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) && full[0] >= 0.0 {
                 return full;
             }
         }
-        let normal = (old[0] - w[0] / self.k[0][0]).max(0.0);
+        let normal = (old[0] - w[0] / self.k.m00).max(0.0);
         let dn = normal - old[0];
-        let t = [1, 2].map(|r| old[r] - self.rho * (w[r] + self.k[r][0] * dn));
-        let (size, bound) = ((t[0] * t[0] + t[1] * t[1]).sqrt(), self.mu * normal);
-        let scale = if size > bound { bound / size } else { 1.0 };
+        let t = [old[1] - self.rho * (w[1] + self.k.m10 * dn), old[2] - self.rho * (w[2] + self.k.m20 * dn)];
+        let (square, bound) = (t[0] * t[0] + t[1] * t[1], self.mu * normal);
+        let scale = if square > bound * bound { bound / square.sqrt() } else { 1.0 };
         [normal, scale * t[0], scale * t[1]]
     }
 }
 
-/// `w += Yᵀu` of one side of a contact.
-#[inline]
-fn add_velocity(rows: &Rows, side: &Side, u: &[f64], w: &mut [f64; 3]) {
-    let (d, y) = (side.dof as usize, &rows.y[side.y as usize..]);
-    if let (6, Some((y, _)), Some((u, _))) = (d, y.split_first_chunk::<18>(), u[side.u as usize..].split_first_chunk::<6>()) {
-        for r in 0..3 {
-            let y = &y[6 * r..6 * r + 6];
-            w[r] += (y[0] * u[0] + y[1] * u[1] + y[2] * u[2]) + (y[3] * u[3] + y[4] * u[4] + y[5] * u[5]);
-        }
-        return;
+impl Symmetric {
+    #[inline]
+    fn times(&self, v: [f64; 3]) -> [f64; 3] {
+        [
+            self.m00 * v[0] + self.m10 * v[1] + self.m20 * v[2],
+            self.m10 * v[0] + self.m11 * v[1] + self.m21 * v[2],
+            self.m20 * v[0] + self.m21 * v[1] + self.m22 * v[2],
+        ]
     }
-    let u = &u[side.u as usize..side.u as usize + d];
-    for r in 0..3 {
-        w[r] += y[r * d..(r + 1) * d].iter().zip(u).map(|(y, u)| y * u).sum::<f64>();
+
+    /// `None` where it is singular to working precision.
+    fn inverse(&self) -> Option<Symmetric> {
+        let Symmetric { m00, m10, m20, m11, m21, m22 } = *self;
+        let cofactors = Symmetric {
+            m00: m11 * m22 - m21 * m21,
+            m10: m20 * m21 - m10 * m22,
+            m20: m10 * m21 - m20 * m11,
+            m11: m00 * m22 - m20 * m20,
+            m21: m10 * m20 - m00 * m21,
+            m22: m00 * m11 - m10 * m10,
+        };
+        let determinant = m00 * cofactors.m00 + m10 * cofactors.m10 + m20 * cofactors.m20;
+        let scale = m00.max(m11).max(m22);
+        (determinant > 1e-12 * scale.powi(3)).then(|| cofactors.scaled(1.0 / determinant))
+    }
+
+    fn scaled(self, s: f64) -> Symmetric {
+        Symmetric { m00: s * self.m00, m10: s * self.m10, m20: s * self.m20, m11: s * self.m11, m21: s * self.m21, m22: s * self.m22 }
+    }
+}
+
+/// Not the standard one, which panics where `lo > hi`, nor `max` and `min`, which spend instructions on NaN.
+#[inline(always)]
+fn clamp(x: f64, lo: f64, hi: f64) -> f64 {
+    let above = if x < lo { lo } else { x };
+    if above > hi { hi } else { above }
+}
+
+/// The three rows of a side of six freedoms.
+#[inline(always)]
+fn six<'a>(rows: &'a Rows, side: &Side) -> Option<[&'a [f64; 6]; 3]> {
+    let [normal, first, second, ..] = rows.y[side.y as usize..].as_chunks::<6>().0 else { return None };
+    (side.dof == 6).then_some([normal, first, second])
+}
+
+/// `w += Yᵀu` of one side of a contact.
+#[inline(always)]
+fn add_velocity(rows: &Rows, side: &Side, u: &[f64], w: &mut [f64; 3]) {
+    let u = &u[side.u as usize..(side.u + side.dof) as usize];
+    if let (Some([y0, y1, y2]), Some(u)) = (six(rows, side), u.as_array::<6>()) {
+        w[0] += dot6(y0, u);
+        w[1] += dot6(y1, u);
+        w[2] += dot6(y2, u);
+    } else {
+        w.iter_mut().enumerate().for_each(|(r, w)| *w += crate::rows::dot(rows.response(side, r), u));
     }
 }
 
 /// `u += Y·δ` of one side of a contact.
-#[inline]
+#[inline(always)]
 fn add_impulse(rows: &Rows, side: &Side, delta: [f64; 3], u: &mut [f64]) {
-    let (d, y) = (side.dof as usize, &rows.y[side.y as usize..]);
-    let u = &mut u[side.u as usize..side.u as usize + d];
-    if let (6, Some((y, _))) = (d, y.split_first_chunk::<18>()) {
+    let u = &mut u[side.u as usize..(side.u + side.dof) as usize];
+    if let (Some([y0, y1, y2]), Some(u)) = (six(rows, side), u.as_mut_array::<6>()) {
         for k in 0..6 {
-            u[k] += y[k] * delta[0] + y[6 + k] * delta[1] + y[12 + k] * delta[2];
+            u[k] += y0[k] * delta[0] + y1[k] * delta[1] + y2[k] * delta[2];
         }
-        return;
-    }
-    for k in 0..d {
-        u[k] += y[k] * delta[0] + y[d + k] * delta[1] + y[2 * d + k] * delta[2];
+    } else {
+        (0..3).for_each(|r| add_multiple(rows.response(side, r), delta[r], u));
     }
 }
 
-/// Inverse of a symmetric 3×3 matrix, `None` where it is singular to working precision.
-fn invert(k: &[[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
-    let cofactor = |i: usize, j: usize| {
-        let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
-        k[a][c] * k[b][d] - k[a][d] * k[b][c]
-    };
-    let determinant: f64 = (0..3).map(|j| k[0][j] * cofactor(0, j)).sum();
-    let scale = k[0][0].max(k[1][1]).max(k[2][2]);
-    (determinant > 1e-12 * scale.powi(3)).then(|| std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i) / determinant)))
+/// `u += y·δ`.
+#[inline(always)]
+fn add_multiple(y: &[f64], delta: f64, u: &mut [f64]) {
+    if let (Some(y), Some(u)) = (y.as_array::<6>(), u.as_mut_array::<6>()) {
+        (0..6).for_each(|k| u[k] += y[k] * delta);
+    } else {
+        u.iter_mut().zip(y).for_each(|(u, y)| *u += y * delta);
+    }
 }

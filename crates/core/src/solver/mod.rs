@@ -32,7 +32,7 @@ pub struct Accuracy {
 }
 
 /// What an island gets however large it is.
-pub const FEWEST_SWEEPS: u32 = 20;
+pub const FEWEST_SWEEPS: u32 = 25;
 
 impl Accuracy {
     /// Sweeps for an island of that many blocks.
