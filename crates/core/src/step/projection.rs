@@ -31,19 +31,19 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, mean: &[f64], h: f6
     if worst <= least {
         return;
     }
-    let (rows, c) = normal_rows(work, h, recovery);
-    let mut lambda = vec![0.0; rows.len];
-    let mut du = vec![0.0; core.dof];
+    let mut p = std::mem::take(&mut work.projection);
+    p.fill(work, h, recovery);
     let targets = &work.targets;
     work.islands.build(&work.rows, |b| b < touches || !matches!(targets[b - touches].set, RowSet::Interval { .. }));
     for blocks in work.islands.iter() {
         let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
         if worst > least {
             let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, relaxations: u32::MAX, tolerance: 0.1 * least / h };
-            GaussSeidel.solve(&rows, blocks, &c, &mut lambda, &mut du, accuracy);
+            GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, accuracy);
         }
     }
-    displace(core, &du, h);
+    displace(core, &p.du, h);
+    work.projection = p;
 }
 
 fn allowed(gap: f64, recovery: f64) -> f64 {
@@ -51,27 +51,36 @@ fn allowed(gap: f64, recovery: f64) -> f64 {
 }
 
 /// The same blocks without friction, and the right-hand side that asks for no overlap.
-fn normal_rows(work: &Workspace, h: f64, recovery: f64) -> (Rows, Vec<f64>) {
-    let mut rows = Rows::default();
-    rows.clear(work.rows.dof);
-    rows.y.reserve(work.rows.blocks.len() * 12);
-    let mut c = Vec::with_capacity(work.rows.blocks.len());
-    for (b, block) in work.rows.blocks.iter().enumerate() {
-        let (set, error) = match work.touches.get(b) {
-            Some(touch) => (RowSet::HalfLine, allowed(touch.contact.gap, recovery)),
-            None => match work.targets[b - work.touches.len()] {
-                t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
-                t => (t.set, t.error),
-            },
-        };
-        rows.push_block(set);
-        for side in block.sides() {
-            let response = work.rows.response(side, 0);
-            if let Some(y) = rows.side(side.u as usize, side.dof as usize) {
-                y.copy_from_slice(response);
+#[derive(Default)]
+pub(crate) struct Projection {
+    rows: Rows,
+    c: Vec<f64>,
+    lambda: Vec<f64>,
+    du: Vec<f64>,
+}
+
+impl Projection {
+    fn fill(&mut self, work: &Workspace, h: f64, recovery: f64) {
+        self.rows.clear(work.rows.dof);
+        self.c.clear();
+        for (b, block) in work.rows.blocks.iter().enumerate() {
+            let (set, error) = match work.touches.get(b) {
+                Some(touch) => (RowSet::HalfLine, allowed(touch.contact.gap, recovery)),
+                None => match work.targets[b - work.touches.len()] {
+                    t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
+                    t => (t.set, t.error),
+                },
+            };
+            self.rows.push_block(set);
+            for side in block.sides() {
+                let response = work.rows.response(side, 0);
+                if let Some(y) = self.rows.side(side.u as usize, side.dof as usize) {
+                    y.copy_from_slice(response);
+                }
             }
+            self.c.push(work.c[block.row as usize] + error / h);
         }
-        c.push(work.c[block.row as usize] + error / h);
+        (self.lambda.clear(), self.lambda.resize(self.rows.len, 0.0));
+        (self.du.clear(), self.du.resize(work.rows.dof, 0.0));
     }
-    (rows, c)
 }
