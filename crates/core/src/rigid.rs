@@ -10,7 +10,7 @@
 //! Generalized velocity `v = [ω; v]`, world axes at the centre of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Whitening takes
 //! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`. Body origin = centre of mass (thesis §III.A.1).
 
-use crate::collidable::{Collidable, CollisionKind, Material, rigid_test_impulse};
+use crate::collidable::{Collidable, CollisionKind, Material};
 use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
 use crate::rotation;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
@@ -65,6 +65,8 @@ pub struct RigidBody {
     name: String,
     shape: Shape,
     mass: f64,
+    /// `√m`.
+    root_mass: f64,
     inertia: Inertia,
     /// Surface constants.
     pub material: Material,
@@ -117,7 +119,7 @@ impl RigidBody {
         let cache = Cache { respond: inertia.inverse_root, recover: inertia.root };
         let visuals = vec![Visual { part: 0, pose: Pose::identity(), shape: shape.clone(), look: Default::default() }];
         Ok(RigidBody {
-            name, shape, mass, inertia, material: Material::default(), linear_damping: 0.0, angular_damping: 0.0,
+            name, shape, mass, root_mass: mass.sqrt(), inertia, material: Material::default(), linear_damping: 0.0, angular_damping: 0.0,
             kind: CollisionKind::default(), meets: u64::MAX, initial_pose: Pose::identity(), initial_velocity: Vec3::zeros(),
             initial_angular_velocity: Vec3::zeros(), visuals, cache,
         })
@@ -390,19 +392,19 @@ impl Integratable for RigidBody {
     }
 
     fn whiten(&self, x: &[f64], u: &mut [f64]) {
-        write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.mass.sqrt()));
+        write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
     }
 
     fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
-        write6(v, &self.cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.mass.sqrt()));
+        write6(v, &self.cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.root_mass));
     }
 
     fn respond(&self, j: &[f64], y: &mut [f64]) {
-        write6(y, &(self.cache.respond * vec3(j)), &(vec3(&j[3..]) / self.mass.sqrt()));
+        write6(y, &(self.cache.respond * vec3(j)), &(vec3(&j[3..]) / self.root_mass));
     }
 
     fn recover(&self, du: &[f64], dp: &mut [f64]) {
-        write6(dp, &(self.cache.recover * vec3(du)), &(self.mass.sqrt() * vec3(&du[3..])));
+        write6(dp, &(self.cache.recover * vec3(du)), &(self.root_mass * vec3(&du[3..])));
     }
 
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
@@ -439,7 +441,15 @@ impl Collidable for RigidBody {
     }
 
     fn test_impulse(&self, _part: usize, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
-        rigid_test_impulse(self, site, point, axes, sign, y);
+        let r = point - site.position();
+        let linear = sign / self.root_mass;
+        for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
+            let angular = self.cache.respond * r.cross(axis);
+            for k in 0..3 {
+                y[k] += sign * angular[k];
+                y[k + 3] += linear * axis[k];
+            }
+        }
     }
 }
 
