@@ -6,7 +6,7 @@ use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, Islands, residual};
-use crate::view::{Mode, WorldView};
+use crate::view::WorldView;
 use crate::world::{Core, StepError};
 use tumble_collide::Vec3;
 
@@ -59,9 +59,9 @@ pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Res
         builder.rows.push_block(set);
         builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
         let axes = &touch.frame.axes[..set.rows()];
-        for (site, sign) in [(touch.a, 1.0), (touch.b, -1.0)] {
+        for (site, point, sign) in [(touch.a, touch.contact.point, 1.0), (touch.b, touch.point_b(), -1.0)] {
             let owner = core.owners[site as usize];
-            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &touch.contact.point, axes, sign);
+            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
         }
     }
     let view = WorldView { time: core.time, gravity: core.settings.gravity, x: &core.x, sites: &core.sites, table: &core.table };
@@ -163,9 +163,4 @@ pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Itera
     work.touches.iter().zip(&work.rows.blocks).map(|(touch, block)| {
         block.range().zip(&touch.frame.axes).map(|(row, axis)| lambda[row] * axis).sum()
     })
-}
-
-/// Whether anything that is led moves: then energy may rightly grow.
-pub(crate) fn something_is_led(core: &Core) -> bool {
-    core.table.iter().any(|e| e.status.alive && e.status.mode == Mode::Kinematic)
 }
