@@ -46,7 +46,7 @@ impl RowSolver for GaussSeidel {
                 break;
             }
             if sweep < sweeps {
-                momentum.extrapolate(&mut locals, progress.against > 0.0, du);
+                momentum.extrapolate(&mut locals, progress.against > 0.0 || sweep + SETTLE >= sweeps, du);
             }
             if sweep % RENEW == 0 {
                 momentum.renew(&mut locals, rows, lambda, du);
@@ -61,6 +61,8 @@ impl RowSolver for GaussSeidel {
     }
 }
 
+/// The last sweeps are plain: an extrapolated iterate may overshoot far just before it turns, and a solve cut off there would be worse than none.
+const SETTLE: u32 = 5;
 /// Extrapolation carries the rounding errors of `du` on and on; after so many sweeps it is made anew from `λ`.
 const RENEW: u32 = 1000;
 
