@@ -15,7 +15,7 @@
 //! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. High mass ratios stay slow; the residual says how far.
 
 use super::{Accuracy, Outcome, RowSolver};
-use crate::rows::{Block, RowSet, Rows, Side, dot6};
+use crate::rows::{Block, RowSet, Rows, Side, dot, dot6};
 
 /// The block Gauss–Seidel solver, `gauss_seidel`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -76,7 +76,10 @@ fn write_back(locals: &[Local], lambda: &mut [f64]) {
 /// `du += Y·λ` of the island.
 fn apply(locals: &[Local], rows: &Rows, lambda: &[f64], du: &mut [f64]) {
     for local in locals.iter().filter(|l| l.lambda != [0.0; 3]) {
-        rows.apply_block(local.block, lambda, du);
+        match local.step {
+            Step::Contact(_) => local.block.sides().iter().for_each(|s| add_impulse(rows, s, local.lambda, du)),
+            _ => rows.apply_block(local.block, lambda, du),
+        }
     }
 }
 
@@ -193,7 +196,7 @@ struct Contact {
 }
 
 /// A symmetric 3×3 matrix; 0 is the normal, 1 and 2 are the tangents.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Symmetric {
     m00: f64,
     m10: f64,
@@ -267,8 +270,16 @@ impl<'a> Local<'a> {
 
 impl Contact {
     fn new(rows: &Rows, block: &Block, mu: f64) -> Contact {
-        let own = |i, j| rows.own(block, i, j);
-        let k = Symmetric { m00: own(0, 0), m10: own(1, 0), m20: own(2, 0), m11: own(1, 1), m21: own(2, 1), m22: own(2, 2) };
+        let mut k = Symmetric::default();
+        for side in block.sides() {
+            let [n, t1, t2] = [0, 1, 2].map(|r| rows.response(side, r));
+            k.m00 += dot(n, n);
+            k.m10 += dot(t1, n);
+            k.m20 += dot(t2, n);
+            k.m11 += dot(t1, t1);
+            k.m21 += dot(t2, t1);
+            k.m22 += dot(t2, t2);
+        }
         let mean = 0.5 * (k.m11 + k.m22);
         let half = 0.5 * (k.m11 - k.m22);
         let largest = mean + (half * half + k.m21 * k.m21).sqrt();
@@ -349,7 +360,7 @@ fn add_velocity(rows: &Rows, side: &Side, u: &[f64], w: &mut [f64; 3]) {
         w[1] += dot6(y1, u);
         w[2] += dot6(y2, u);
     } else {
-        w.iter_mut().enumerate().for_each(|(r, w)| *w += crate::rows::dot(rows.response(side, r), u));
+        w.iter_mut().enumerate().for_each(|(r, w)| *w += dot(rows.response(side, r), u));
     }
 }
 
