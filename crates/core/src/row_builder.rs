@@ -1,6 +1,6 @@
 //! How constraints and contacts become rows.
 
-use crate::object::{Object, RowTarget};
+use crate::object::{Constraint, RowTarget};
 use crate::rows::Rows;
 use crate::site::Site;
 use crate::view::{Entry, ObjectId, Table};
@@ -21,9 +21,16 @@ pub struct RowBuilder<'a> {
     pub(crate) table: &'a Table,
     pub(crate) sites: &'a [Site],
     pub(crate) problem: &'a mut Option<String>,
+    /// Whose rows are being made.
+    pub(crate) owner: ObjectId,
 }
 
 impl RowBuilder<'_> {
+    /// The constraint whose rows are being made, for objects that constrain themselves.
+    pub fn owner(&self) -> ObjectId {
+        self.owner
+    }
+
     /// Starts a row. A `Cone` set is for contacts, which the world makes itself: it is refused here, and the step reports it.
     pub fn row(&mut self, target: RowTarget) -> &mut Self {
         if target.set.rows() != 1 || !(target.error.is_finite() && target.velocity.is_finite()) {
@@ -90,7 +97,8 @@ impl RowBuilder<'_> {
     }
 }
 
-/// Lets every constraint of the table add its rows.
-pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (&Entry, &dyn Object)> {
-    table.iter().filter(|e| e.status.alive && e.object.constraint().is_some()).map(|e| (e, e.object.as_ref()))
+/// The constraints of the table in the order in which they were added.
+pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (ObjectId, &Entry, &dyn Constraint)> {
+    let entries = table.order.iter().map(|&id| (id, &table.slots[id]));
+    entries.filter(|(_, e)| e.status.alive).filter_map(|(id, e)| Some((id, e, e.object.constraint()?)))
 }
