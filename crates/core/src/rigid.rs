@@ -11,7 +11,7 @@
 //! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`. Body origin = centre of mass (thesis §III.A.1).
 
 use crate::collidable::{Collidable, CollisionKind, Material, rigid_test_impulse};
-use crate::object::{Energy, Integratable, Momentum, Object, Renderable, Visual};
+use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
 use crate::rotation;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::view::WorldView;
@@ -295,6 +295,32 @@ impl Object for RigidBody {
 
     fn renderable(&self) -> Option<&dyn Renderable> {
         Some(self)
+    }
+
+    fn net_sync(&self) -> Option<&dyn NetSync> {
+        Some(self)
+    }
+}
+
+/// The whole state, 13 little-endian `f64`: exact, for replicas. What only draws can do with less.
+impl NetSync for RigidBody {
+    fn get_data(&self, me: &Span, view: &WorldView, out: &mut Vec<u8>) {
+        out.extend(view.x[me.x.clone()].iter().flat_map(|x| x.to_le_bytes()));
+    }
+
+    fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError> {
+        let wanted = 8 * x.len();
+        if data.len() != wanted {
+            return Err(SyncError::Length { got: data.len(), wanted });
+        }
+        let (numbers, _) = data.as_chunks::<8>();
+        let state: Vec<f64> = numbers.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let norm: f64 = state[3..7].iter().map(|q| q * q).sum();
+        if !(state.iter().all(|x| x.is_finite()) && (norm - 1.0).abs() < 1e-9) {
+            return Err(SyncError::Value);
+        }
+        x.copy_from_slice(&state);
+        Ok(())
     }
 }
 

@@ -18,16 +18,6 @@ pub enum Integrator {
     Rk4,
 }
 
-impl Integrator {
-    /// All of them with the names that files and the command line use.
-    pub const NAMES: [(&'static str, Integrator); 4] = [
-        ("verlet", Integrator::Verlet),
-        ("symplectic_euler", Integrator::SymplecticEuler),
-        ("explicit_euler", Integrator::ExplicitEuler),
-        ("rk4", Integrator::Rk4),
-    ];
-}
-
 /// A world's constants; they may be changed between steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
