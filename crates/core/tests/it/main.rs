@@ -5,5 +5,6 @@ mod friction;
 mod impacts;
 mod stacks;
 mod common;
+mod meshes;
 mod paradox;
 mod state;
