@@ -31,6 +31,8 @@ pub(crate) struct Touch {
     pub a: u32,
     pub b: u32,
     pub contact: Contact,
+    /// From A's contact point to B's, metres: not zero where the bodies meet only later in the step.
+    pub offset: Vec3,
     pub frame: ContactFrame,
     pub friction: f64,
     pub restitution: f64,
@@ -51,15 +53,24 @@ impl WarmStarts {
         self.entries.sort_by_key(|e| e.0);
     }
 
-    pub fn get(&self, key: &Key) -> Option<Vec3> {
-        let found = self.entries.binary_search_by_key(key, |e| e.0).ok()?;
-        Some(Vec3::from(self.entries[found].1))
+    /// What was filed under `key`. `place` is where the last search ended: keys that come in order are found in a step or two.
+    pub fn get(&self, key: &Key, place: &mut usize) -> Option<Vec3> {
+        let before = self.entries[..*place].last().is_some_and(|e| e.0 >= *key);
+        let from = if before { 0 } else { *place };
+        *place = from + gallop(&self.entries[from..], key);
+        let found = self.entries.get(*place).filter(|e| e.0 == *key)?;
+        Some(Vec3::from(found.1))
     }
 
     /// Whether any contact of the key's pair carried a force.
     pub fn carries(&self, key: &Key) -> bool {
         let first = self.entries.partition_point(|e| e.0.pair < key.pair);
         self.entries[first..].iter().take_while(|e| e.0.pair == key.pair).any(|e| e.1 != [0.0; 3])
+    }
+
+    /// Sorted by key, as the look-ups need it.
+    pub fn in_order(&self) -> bool {
+        self.entries.is_sorted_by(|a, b| a.0 < b.0)
     }
 
     pub fn finite(&self) -> bool {
@@ -69,6 +80,17 @@ impl WarmStarts {
     pub fn forget(&mut self, serial: u32) {
         self.entries.retain(|(k, _)| k.pair[0] != serial && k.pair[2] != serial);
     }
+}
+
+/// How many entries come before `key`, searched for at doubling distances from the start.
+fn gallop(entries: &[(Key, [f64; 3])], key: &Key) -> usize {
+    let (mut low, mut step) = (0, 1);
+    while entries.get(low + step - 1).is_some_and(|e| e.0 < *key) {
+        low += step;
+        step *= 2;
+    }
+    let high = (low + step).min(entries.len());
+    low + entries[low..high].partition_point(|e| e.0 < *key)
 }
 
 /// The detector's working memory.
@@ -112,10 +134,10 @@ impl Detector<'_> {
         for entry in self.table.iter().filter(|e| e.status.alive && e.status.collidable) {
             let Some(collidable) = entry.object.collidable() else { continue };
             for (part, index) in entry.span.site.clone().enumerate() {
-                let (shape, site) = (collidable.shape(part), entry.seen(&self.sites[index]));
+                let (shape, site) = (collidable.shape(part), &self.sites[index]);
                 let bound = shape.bounding_radius();
                 let turning = if bound.is_finite() { site.angular_velocity.norm() * bound } else { 0.0 };
-                let gain = 0.5 * horizon * horizon * self.settings.gravity.norm();
+                let gain = horizon * horizon * site.acceleration.norm();
                 let reach = self.settings.drift_tolerance + horizon * (site.velocity.norm() + turning) + gain;
                 s.proxies.push(index as u32);
                 s.boxes.push(shape.aabb(&site.pose).grown(reach));
@@ -148,11 +170,20 @@ impl Detector<'_> {
         let friction = self.settings.combine_friction.of(ma.friction, mb.friction);
         let restitution = self.settings.combine_restitution.of(ma.restitution, mb.restitution);
         let pair = [owner_a.serial, owner_a.part, owner_b.serial, owner_b.part];
+        found.sort_by_key(|contact| contact.feature);
+        let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
+        let mut frame_of = |contact: &Contact| {
+            if contact.normal != frame.axes[0] {
+                frame = ContactFrame::new(contact.point, contact.normal);
+            }
+            ContactFrame { point: contact.point, ..frame }
+        };
         out.extend(found.iter().map(|contact| Touch {
             a,
             b,
             contact: *contact,
-            frame: ContactFrame::new(contact.point, contact.normal),
+            offset: Vec3::zeros(),
+            frame: frame_of(contact),
             friction,
             restitution,
             key: Key { pair, feature: contact.feature },
@@ -173,9 +204,14 @@ fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize) -> bool {
 }
 
 impl Touch {
+    /// The contact point as B has it, metres.
+    pub fn point_b(&self) -> Vec3 {
+        self.contact.point + self.offset
+    }
+
     /// Relative velocity of A against B at the contact, m/s; negative along the normal where they approach.
     pub fn velocity(&self, a: &Site, b: &Site) -> Vec3 {
-        a.velocity_at(&self.contact.point) - b.velocity_at(&self.contact.point)
+        a.velocity_at(&self.contact.point) - b.velocity_at(&self.point_b())
     }
 
     /// Rate of the relative velocity along the contact's axes, as the *contact* moves, m/s²; the first is the second derivative of the gap.

@@ -10,7 +10,7 @@
 //! Generalized velocity `v = [ω; v]`, world axes at the centre of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Whitening takes
 //! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`. Body origin = centre of mass (thesis §III.A.1).
 
-use crate::collidable::{Collidable, CollisionKind, Material, rigid_test_impulse};
+use crate::collidable::{Collidable, CollisionKind, Material};
 use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
 use crate::rotation;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
@@ -65,10 +65,12 @@ pub struct RigidBody {
     name: String,
     shape: Shape,
     mass: f64,
+    /// `√m`.
+    root_mass: f64,
     inertia: Inertia,
     /// Surface constants.
     pub material: Material,
-    /// Linear damping, 1/s: a force `−c·P`.
+    /// Linear damping, 1/s: a force `−c·P`, taken at the stage's state like any other; keep `c·dt` below 1.
     pub linear_damping: f64,
     /// Angular damping, 1/s: a torque `−c·L`.
     pub angular_damping: f64,
@@ -82,6 +84,7 @@ pub struct RigidBody {
     pub initial_velocity: Vec3,
     /// Angular velocity at time 0, rad/s, world axes.
     pub initial_angular_velocity: Vec3,
+    fixture: bool,
     visuals: Vec<Visual>,
     cache: Cache,
 }
@@ -117,9 +120,9 @@ impl RigidBody {
         let cache = Cache { respond: inertia.inverse_root, recover: inertia.root };
         let visuals = vec![Visual { part: 0, pose: Pose::identity(), shape: shape.clone(), look: Default::default() }];
         Ok(RigidBody {
-            name, shape, mass, inertia, material: Material::default(), linear_damping: 0.0, angular_damping: 0.0,
+            name, shape, mass, root_mass: mass.sqrt(), inertia, material: Material::default(), linear_damping: 0.0, angular_damping: 0.0,
             kind: CollisionKind::default(), meets: u64::MAX, initial_pose: Pose::identity(), initial_velocity: Vec3::zeros(),
-            initial_angular_velocity: Vec3::zeros(), visuals, cache,
+            initial_angular_velocity: Vec3::zeros(), fixture: false, visuals, cache,
         })
     }
 
@@ -146,9 +149,14 @@ impl RigidBody {
     /// Geometry that is meant to stay static or kinematic: mass and inertia are 1 and never felt, so it may be unbounded.
     pub fn fixture(name: impl Into<String>, shape: Shape) -> RigidBody {
         match RigidBody::new(name, shape, 1.0, Mat3::identity()) {
-            Ok(body) => body,
+            Ok(body) => RigidBody { fixture: true, ..body },
             Err(_) => unreachable!("unit mass and inertia are valid"),
         }
+    }
+
+    /// Whether it was made as a fixture, with a mass that means nothing.
+    pub fn is_fixture(&self) -> bool {
+        self.fixture
     }
 
     /// Sets the pose at time 0.
@@ -315,8 +323,7 @@ impl NetSync for RigidBody {
         }
         let (numbers, _) = data.as_chunks::<8>();
         let state: Vec<f64> = numbers.iter().map(|b| f64::from_le_bytes(*b)).collect();
-        let norm: f64 = state[3..7].iter().map(|q| q * q).sum();
-        if !(state.iter().all(|x| x.is_finite()) && (norm - 1.0).abs() < 1e-9) {
+        if !self.accepts(&state) {
             return Err(SyncError::Value);
         }
         x.copy_from_slice(&state);
@@ -336,6 +343,11 @@ impl Integratable for RigidBody {
         write_orientation(x, &q);
         x[7..10].copy_from_slice((self.mass * self.initial_velocity).as_slice());
         x[10..13].copy_from_slice(l.as_slice());
+    }
+
+    fn accepts(&self, x: &[f64]) -> bool {
+        let norm: f64 = x[3..7].iter().map(|q| q * q).sum();
+        x.iter().all(|x| x.is_finite()) && (norm - 1.0).abs() < 1e-9
     }
 
     fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
@@ -368,6 +380,11 @@ impl Integratable for RigidBody {
         site.angular_acceleration = self.omega(&q, &(vec3(dp) - site.angular_velocity.cross(&l)));
     }
 
+    fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
+        let l = vec3(&x[10..]);
+        write6(out, &self.omega(&orientation(x), &l).cross(&l), &Vec3::zeros());
+    }
+
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
         add(&mut x[10..13], &vec3(dp), h);
         add(&mut x[7..10], &vec3(&dp[3..]), h);
@@ -390,19 +407,19 @@ impl Integratable for RigidBody {
     }
 
     fn whiten(&self, x: &[f64], u: &mut [f64]) {
-        write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.mass.sqrt()));
+        write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
     }
 
     fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
-        write6(v, &self.cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.mass.sqrt()));
+        write6(v, &self.cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.root_mass));
     }
 
     fn respond(&self, j: &[f64], y: &mut [f64]) {
-        write6(y, &(self.cache.respond * vec3(j)), &(vec3(&j[3..]) / self.mass.sqrt()));
+        write6(y, &(self.cache.respond * vec3(j)), &(vec3(&j[3..]) / self.root_mass));
     }
 
     fn recover(&self, du: &[f64], dp: &mut [f64]) {
-        write6(dp, &(self.cache.recover * vec3(du)), &(self.mass.sqrt() * vec3(&du[3..])));
+        write6(dp, &(self.cache.recover * vec3(du)), &(self.root_mass * vec3(&du[3..])));
     }
 
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
@@ -439,7 +456,15 @@ impl Collidable for RigidBody {
     }
 
     fn test_impulse(&self, _part: usize, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
-        rigid_test_impulse(self, site, point, axes, sign, y);
+        let r = point - site.position();
+        let linear = sign / self.root_mass;
+        for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
+            let angular = self.cache.respond * r.cross(axis);
+            for k in 0..3 {
+                y[k] += sign * angular[k];
+                y[k + 3] += linear * axis[k];
+            }
+        }
     }
 }
 

@@ -83,7 +83,7 @@ impl RowBuilder<'_> {
             let Some(y) = self.rows.side(entry.span.v.start, entry.span.v.len()) else { return false };
             collidable.test_impulse(part, site, p, axes, sign, y);
         } else {
-            let velocity = entry.seen(site).velocity_at(p);
+            let velocity = site.velocity_at(p);
             let first = self.bias.len() - axes.len();
             for (bias, axis) in self.bias[first..].iter_mut().zip(axes) {
                 *bias += sign * velocity.dot(axis);

@@ -53,7 +53,7 @@ impl Default for Settings {
             dt: 1.0 / 60.0,
             substeps: 1,
             integrator: Integrator::default(),
-            accuracy: Accuracy { sweeps: 200, relaxations: 40_000, tolerance: 1e-9 },
+            accuracy: Accuracy { sweeps: 200, relaxations: 20_000, tolerance: 1e-9 },
             projection_sweeps: 20,
             contact_tolerance: 1e-7,
             drift_tolerance: 1e-4,

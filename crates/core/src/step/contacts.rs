@@ -1,11 +1,12 @@
 //! From touches to rows, and from multipliers back to momentum: what both steppers share.
 
+use super::projection::Projection;
 use crate::detect::{Detector, Touch};
 use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, Islands, residual};
-use crate::view::{Mode, ObjectId, WorldView};
+use crate::view::{ObjectId, WorldView};
 use crate::world::{Core, StepError};
 use tumble_collide::Vec3;
 
@@ -28,6 +29,8 @@ pub(crate) struct Workspace {
     pub u: Vec<f64>,
     pub du_force: Vec<f64>,
     pub dp: Vec<f64>,
+    /// What the projection solves.
+    pub projection: Projection,
 }
 
 /// Finds the contacts within reach of the next `horizon` seconds.
@@ -57,9 +60,9 @@ pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Res
         builder.rows.push_block(set);
         builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
         let axes = &touch.frame.axes[..set.rows()];
-        for (site, sign) in [(touch.a, 1.0), (touch.b, -1.0)] {
+        for (site, point, sign) in [(touch.a, touch.contact.point, 1.0), (touch.b, touch.point_b(), -1.0)] {
             let owner = core.owners[site as usize];
-            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &touch.contact.point, axes, sign);
+            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
         }
     }
     let view = WorldView { time: core.time, gravity: core.settings.gravity, x: &core.x, sites: &core.sites, table: &core.table };
@@ -144,8 +147,9 @@ pub(crate) fn solve(core: &mut Core, work: &mut Workspace, accuracy: Accuracy, u
 
 /// Multipliers from last time, turned into the present contact frames and scaled; what is no longer allowed by the cone is left to the solver.
 pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
+    let mut place = 0;
     for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
-        if let Some(impulse) = core.warm.get(&touch.key) {
+        if let Some(impulse) = core.warm.get(&touch.key, &mut place) {
             for (row, axis) in block.range().zip(&touch.frame.axes) {
                 work.lambda[row] = scale * axis.dot(&impulse);
             }
@@ -159,9 +163,4 @@ pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Itera
     work.touches.iter().zip(&work.rows.blocks).map(|(touch, block)| {
         block.range().zip(&touch.frame.axes).map(|(row, axis)| lambda[row] * axis).sum()
     })
-}
-
-/// Whether anything that is led moves: then energy may rightly grow.
-pub(crate) fn something_is_led(core: &Core) -> bool {
-    core.table.iter().any(|e| e.status.alive && e.status.mode == Mode::Kinematic)
 }
