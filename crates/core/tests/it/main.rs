@@ -3,6 +3,7 @@
 mod free;
 mod friction;
 mod impacts;
+mod solvers;
 mod stacks;
 mod common;
 mod meshes;
