@@ -1,6 +1,6 @@
 //! How constraints and contacts become rows.
 
-use crate::object::{Integratable, Object, RowTarget};
+use crate::object::{Constraint, Integratable, RowTarget};
 use crate::rows::{RowSet, Rows};
 use crate::site::Site;
 use crate::view::{Entry, Mode, ObjectId, Table};
@@ -22,9 +22,16 @@ pub struct RowBuilder<'a> {
     pub(crate) x: &'a [f64],
     pub(crate) sites: &'a [Site],
     pub(crate) problem: &'a mut Option<String>,
+    /// Whose rows are being made.
+    pub(crate) owner: ObjectId,
 }
 
 impl RowBuilder<'_> {
+    /// The constraint whose rows are being made, for objects that constrain themselves.
+    pub fn owner(&self) -> ObjectId {
+        self.owner
+    }
+
     /// Starts a row. A `Cone` set is for contacts, which the world makes itself: it is refused here, and the step reports it.
     pub fn row(&mut self, target: RowTarget) -> &mut Self {
         let bounds = if let RowSet::Interval { lo, hi } = target.set { lo <= hi } else { true };
@@ -122,7 +129,8 @@ impl RowBuilder<'_> {
     }
 }
 
-/// Lets every constraint of the table add its rows.
-pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (&Entry, &dyn Object)> {
-    table.iter().filter(|e| e.status.alive && e.object.constraint().is_some()).map(|e| (e, e.object.as_ref()))
+/// The constraints of the table in the order in which they were added.
+pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (ObjectId, &Entry, &dyn Constraint)> {
+    let entries = table.order.iter().map(|&id| (id, &table.slots[id]));
+    entries.filter(|(_, e)| e.status.alive).filter_map(|(id, e)| Some((id, e, e.object.constraint()?)))
 }

@@ -6,7 +6,7 @@ use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, Islands, residual};
-use crate::view::WorldView;
+use crate::view::{ObjectId, WorldView};
 use crate::world::{Core, StepError};
 use tumble_collide::Vec3;
 
@@ -53,6 +53,7 @@ pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Res
     let mut problem = None;
     let mut builder = RowBuilder {
         rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
+        owner: ObjectId::default(),
     };
     for touch in &work.touches {
         let set = if touch.friction > 0.0 { RowSet::Cone { mu: touch.friction } } else { RowSet::HalfLine };
@@ -65,12 +66,11 @@ pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Res
         }
     }
     let view = WorldView { time: core.time, gravity: core.settings.gravity, x: &core.x, sites: &core.sites, table: &core.table };
-    for (entry, object) in constraints(&core.table) {
-        if let Some(constraint) = object.constraint() {
-            constraint.rows(&entry.span, &view, level, &mut builder);
-            if let Some(why) = builder.problem.take() {
-                return Err(StepError::Row { object: object.name().to_string(), why });
-            }
+    for (id, entry, constraint) in constraints(&core.table) {
+        builder.owner = id;
+        constraint.rows(&entry.span, &view, level, &mut builder);
+        if let Some(why) = builder.problem.take() {
+            return Err(StepError::Row { object: entry.object.name().to_string(), why });
         }
     }
     let n = work.rows.len;
