@@ -19,14 +19,18 @@ CODE = re.compile(r"`([^`\n]+)`")
 PATHLIKE = re.compile(r"^[\w.@-]+(?:/[\w.@*-]+)*/?$")
 RUN = re.compile(r"^(?:cargo run --release(?: --quiet)?(?: --locked)? -- |tumble |target/release/tumble )(.*)$")
 MADE = ("out/", "target/")  # what builds and runs leave behind
+BUILT = {".git", "target", "out", "__pycache__", ".venv"}
 
 
 def tracked():
     """Every file of the project, as paths relative to its root."""
-    listing = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"], cwd=ROOT, capture_output=True, check=True
-    )
-    names = [name for name in listing.stdout.decode().split("\0") if name]
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
+    try:
+        listing = subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout.decode()
+        names = [name for name in listing.split("\0") if name]
+    except (OSError, subprocess.CalledProcessError):  # no git, or not a clone
+        paths = [path.relative_to(ROOT) for path in ROOT.rglob("*")]
+        names = sorted(str(path) for path in paths if not BUILT.intersection(path.parts))
     return [name for name in names if (ROOT / name).is_file()]
 
 
