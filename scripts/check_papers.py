@@ -18,6 +18,7 @@ CODE = re.compile(r"`([^`\n]+)`")
 # What in backticks is meant as a path of this repository: it begins with one of its folders, or is one of its root files.
 PATHLIKE = re.compile(r"^[\w.@-]+(?:/[\w.@*-]+)*/?$")
 RUN = re.compile(r"^(?:cargo run --release(?: --quiet)?(?: --locked)? -- |tumble |target/release/tumble )(.*)$")
+TEST = re.compile(r"^\w+::([a-z0-9]+(?:_[a-z0-9]+){2,})$")
 MADE = ("out/", "target/")  # what builds and runs leave behind
 BUILT = {".git", "target", "out", "__pycache__", ".venv"}
 
@@ -88,6 +89,27 @@ def check_paths(name, lines, known, faults):
                 faults.append(f"{name}:{number}: there is no {code}")
 
 
+def check_tests(name, lines, functions, faults):
+    for number, line in enumerate(without_fences(lines), 1):
+        for code in CODE.findall(line):
+            found = TEST.match(code)
+            if found and found.group(1) not in functions:
+                faults.append(f"{name}:{number}: there is no test {code}")
+
+
+def check_rust(name, lines, pages, faults):
+    """Rust in a paper must stand, line for line, in the documentation of a crate, where it is compiled and run."""
+    for block in re.findall(r"^```rust\n(.*?)^```", "\n".join(lines) + "\n", re.S | re.M):
+        if not any(block in page for page in pages):
+            faults.append(f"{name}: this is in no crate's documentation, so nobody compiles it:\n{block}")
+
+
+def documentation(text):
+    """The `//!` page of a source file as a reader sees it, without hidden lines."""
+    page = [line[4:] for line in text.splitlines() if line.startswith("//!")]
+    return "".join(line + "\n" for line in page if not line.startswith("# "))
+
+
 def check_commands(name, lines, scenes, targets, subcommands, faults):
     for number, command in commands(lines):
         if command.startswith("make "):
@@ -117,6 +139,9 @@ def main():
     source = (ROOT / "crates/tumble/src/args.rs").read_text()
     enum = re.search(r"pub enum Command \{(.*?)\n\}", source, re.S)
     subcommands = {word.lower() for word in re.findall(r"^    (\w+)", enum.group(1), re.M)} if enum else set()
+    sources = [text for text in (text_of(name) for name in names if name.endswith(".rs")) if text]
+    functions = {found for text in sources for found in re.findall(r"\bfn (\w+)", text)}
+    pages = [documentation(text) for text in sources]
     papers = 0
     for name in names:
         text = text_of(name)
@@ -130,6 +155,8 @@ def main():
             papers += 1
             check_links(name, lines, faults)
             check_paths(name, lines, known, faults)
+            check_tests(name, lines, functions, faults)
+            check_rust(name, lines, pages, faults)
             check_commands(name, lines, scenes, targets, subcommands, faults)
     for scene in sorted(scenes):
         if not (ROOT / "scenes" / scene / "README.md").exists():
