@@ -51,9 +51,13 @@ impl WarmStarts {
         self.entries.sort_by_key(|e| e.0);
     }
 
-    pub fn get(&self, key: &Key) -> Option<Vec3> {
-        let found = self.entries.binary_search_by_key(key, |e| e.0).ok()?;
-        Some(Vec3::from(self.entries[found].1))
+    /// What was filed under `key`. `place` is where the last search ended: keys that come in order are found in a step or two.
+    pub fn get(&self, key: &Key, place: &mut usize) -> Option<Vec3> {
+        let before = self.entries[..*place].last().is_some_and(|e| e.0 >= *key);
+        let from = if before { 0 } else { *place };
+        *place = from + gallop(&self.entries[from..], key);
+        let found = self.entries.get(*place).filter(|e| e.0 == *key)?;
+        Some(Vec3::from(found.1))
     }
 
     /// Whether any contact of the key's pair carried a force.
@@ -69,6 +73,17 @@ impl WarmStarts {
     pub fn forget(&mut self, serial: u32) {
         self.entries.retain(|(k, _)| k.pair[0] != serial && k.pair[2] != serial);
     }
+}
+
+/// How many entries come before `key`, searched for at doubling distances from the start.
+fn gallop(entries: &[(Key, [f64; 3])], key: &Key) -> usize {
+    let (mut low, mut step) = (0, 1);
+    while entries.get(low + step - 1).is_some_and(|e| e.0 < *key) {
+        low += step;
+        step *= 2;
+    }
+    let high = (low + step).min(entries.len());
+    low + entries[low..high].partition_point(|e| e.0 < *key)
 }
 
 /// The detector's working memory.
@@ -148,11 +163,19 @@ impl Detector<'_> {
         let friction = self.settings.combine_friction.of(ma.friction, mb.friction);
         let restitution = self.settings.combine_restitution.of(ma.restitution, mb.restitution);
         let pair = [owner_a.serial, owner_a.part, owner_b.serial, owner_b.part];
+        found.sort_by_key(|contact| contact.feature);
+        let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
+        let mut frame_of = |contact: &Contact| {
+            if contact.normal != frame.axes[0] {
+                frame = ContactFrame::new(contact.point, contact.normal);
+            }
+            ContactFrame { point: contact.point, ..frame }
+        };
         out.extend(found.iter().map(|contact| Touch {
             a,
             b,
             contact: *contact,
-            frame: ContactFrame::new(contact.point, contact.normal),
+            frame: frame_of(contact),
             friction,
             restitution,
             key: Key { pair, feature: contact.feature },

@@ -33,7 +33,7 @@ mod world;
 
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use object::{
-    Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, Object, Renderable, RowTarget, Visual,
+    Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget, SyncError, Visual,
 };
 pub use rigid::{BodyError, RigidBody};
 pub use row_builder::RowBuilder;

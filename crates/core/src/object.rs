@@ -44,6 +44,10 @@ pub trait Object: Any + Send + Sync {
     fn renderable(&self) -> Option<&dyn Renderable> {
         None
     }
+    /// Whether it can be kept in step with copies of itself in other processes.
+    fn net_sync(&self) -> Option<&dyn NetSync> {
+        None
+    }
 }
 
 /// An object with a state (thesis `Integratable` and `SimulationState`, §IV.A.1–2).
@@ -162,6 +166,31 @@ impl RowTarget {
     pub fn new(set: RowSet, error: f64) -> RowTarget {
         RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0 }
     }
+}
+
+/// Can be kept in step over a network (thesis §IV.A.6): one side writes a message, the other applies it. The frame around the message (names,
+/// sizes, time) is not the object's business.
+pub trait NetSync {
+    /// Appends what the other side needs to show this object as it is in the view.
+    fn get_data(&self, me: &Span, view: &WorldView, out: &mut Vec<u8>);
+    /// Applies such a message to the object's slice of a state. `data` comes from outside and is not trusted: on an error `x` is unchanged.
+    fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError>;
+}
+
+/// Why a message was not applied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SyncError {
+    /// Wrong length.
+    #[error("the message has {got} bytes; this object's has {wanted}")]
+    Length {
+        /// Bytes in the message.
+        got: usize,
+        /// Bytes that it must have.
+        wanted: usize,
+    },
+    /// A number in it is not finite, or a quaternion not of unit length.
+    #[error("the message holds a number that is not finite, or an orientation that is not of unit length")]
+    Value,
 }
 
 /// Can be drawn (thesis `Renderable` and `SidRenderable`, §IV.A.5): says what, never how.

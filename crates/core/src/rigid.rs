@@ -10,8 +10,8 @@
 //! Generalized velocity `v = [ω; v]`, world axes at the centre of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Whitening takes
 //! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`. Body origin = centre of mass (thesis §III.A.1).
 
-use crate::collidable::{Collidable, CollisionKind, Material, rigid_test_impulse};
-use crate::object::{Energy, Integratable, Momentum, Object, Renderable, Visual};
+use crate::collidable::{Collidable, CollisionKind, Material};
+use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
 use crate::rotation;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::view::WorldView;
@@ -65,6 +65,8 @@ pub struct RigidBody {
     name: String,
     shape: Shape,
     mass: f64,
+    /// `√m`.
+    root_mass: f64,
     inertia: Inertia,
     /// Surface constants.
     pub material: Material,
@@ -117,7 +119,7 @@ impl RigidBody {
         let cache = Cache { respond: inertia.inverse_root, recover: inertia.root };
         let visuals = vec![Visual { part: 0, pose: Pose::identity(), shape: shape.clone(), look: Default::default() }];
         Ok(RigidBody {
-            name, shape, mass, inertia, material: Material::default(), linear_damping: 0.0, angular_damping: 0.0,
+            name, shape, mass, root_mass: mass.sqrt(), inertia, material: Material::default(), linear_damping: 0.0, angular_damping: 0.0,
             kind: CollisionKind::default(), meets: u64::MAX, initial_pose: Pose::identity(), initial_velocity: Vec3::zeros(),
             initial_angular_velocity: Vec3::zeros(), visuals, cache,
         })
@@ -296,6 +298,32 @@ impl Object for RigidBody {
     fn renderable(&self) -> Option<&dyn Renderable> {
         Some(self)
     }
+
+    fn net_sync(&self) -> Option<&dyn NetSync> {
+        Some(self)
+    }
+}
+
+/// The whole state, 13 little-endian `f64`: exact, for replicas. What only draws can do with less.
+impl NetSync for RigidBody {
+    fn get_data(&self, me: &Span, view: &WorldView, out: &mut Vec<u8>) {
+        out.extend(view.x[me.x.clone()].iter().flat_map(|x| x.to_le_bytes()));
+    }
+
+    fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError> {
+        let wanted = 8 * x.len();
+        if data.len() != wanted {
+            return Err(SyncError::Length { got: data.len(), wanted });
+        }
+        let (numbers, _) = data.as_chunks::<8>();
+        let state: Vec<f64> = numbers.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let norm: f64 = state[3..7].iter().map(|q| q * q).sum();
+        if !(state.iter().all(|x| x.is_finite()) && (norm - 1.0).abs() < 1e-9) {
+            return Err(SyncError::Value);
+        }
+        x.copy_from_slice(&state);
+        Ok(())
+    }
 }
 
 impl Integratable for RigidBody {
@@ -364,19 +392,19 @@ impl Integratable for RigidBody {
     }
 
     fn whiten(&self, x: &[f64], u: &mut [f64]) {
-        write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.mass.sqrt()));
+        write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
     }
 
     fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
-        write6(v, &self.cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.mass.sqrt()));
+        write6(v, &self.cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.root_mass));
     }
 
     fn respond(&self, j: &[f64], y: &mut [f64]) {
-        write6(y, &(self.cache.respond * vec3(j)), &(vec3(&j[3..]) / self.mass.sqrt()));
+        write6(y, &(self.cache.respond * vec3(j)), &(vec3(&j[3..]) / self.root_mass));
     }
 
     fn recover(&self, du: &[f64], dp: &mut [f64]) {
-        write6(dp, &(self.cache.recover * vec3(du)), &(self.mass.sqrt() * vec3(&du[3..])));
+        write6(dp, &(self.cache.recover * vec3(du)), &(self.root_mass * vec3(&du[3..])));
     }
 
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
@@ -413,7 +441,15 @@ impl Collidable for RigidBody {
     }
 
     fn test_impulse(&self, _part: usize, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
-        rigid_test_impulse(self, site, point, axes, sign, y);
+        let r = point - site.position();
+        let linear = sign / self.root_mass;
+        for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
+            let angular = self.cache.respond * r.cross(axis);
+            for k in 0..3 {
+                y[k] += sign * angular[k];
+                y[k + 3] += linear * axis[k];
+            }
+        }
     }
 }
 

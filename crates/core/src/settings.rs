@@ -18,16 +18,6 @@ pub enum Integrator {
     Rk4,
 }
 
-impl Integrator {
-    /// All of them with the names that files and the command line use.
-    pub const NAMES: [(&'static str, Integrator); 4] = [
-        ("verlet", Integrator::Verlet),
-        ("symplectic_euler", Integrator::SymplecticEuler),
-        ("explicit_euler", Integrator::ExplicitEuler),
-        ("rk4", Integrator::Rk4),
-    ];
-}
-
 /// A world's constants; they may be changed between steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -63,7 +53,7 @@ impl Default for Settings {
             dt: 1.0 / 60.0,
             substeps: 1,
             integrator: Integrator::default(),
-            accuracy: Accuracy { sweeps: 200, relaxations: 40_000, tolerance: 1e-9 },
+            accuracy: Accuracy { sweeps: 200, relaxations: 20_000, tolerance: 1e-9 },
             projection_sweeps: 20,
             contact_tolerance: 1e-7,
             drift_tolerance: 1e-4,

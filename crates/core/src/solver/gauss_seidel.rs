@@ -3,8 +3,7 @@
 //! For each block in turn, with everything else held: `w = c + Yᵀ(Yλ)`, then
 //!
 //! - equality, half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K`;
-//! - contact: its own three-row problem with `b = w − K·λ`, exactly: open (`b_n ≥ 0`, `λ = 0`), else sticking (`λ = −K⁻¹b` where that
-//!   lies in the cone), else sliding along `d`: `λ_t = −μ·λ_n·d` with `w_t` along `d` and `w_n = 0`.
+//! - contact: its own three-row problem, exactly (`one_contact.rs`).
 //!
 //! Its fixed points are the exact Coulomb solutions: `λ_n ⟂ w_n` without the dilation that a convex cone brings, and
 //! friction against the sliding velocity.
@@ -15,11 +14,10 @@
 //! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. With friction the problem is not convex and the
 //! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. High mass ratios stay slow; the residual says how far.
 
+use super::one_contact::Contact;
 use super::{Accuracy, Outcome, RowSolver};
-use crate::rows::{Block, RowSet, Rows, Side};
+use crate::rows::{Block, RowSet, Rows, Side, dot6};
 
-/// Steps of Newton's method on the sliding direction.
-const SLIDE_STEPS: u32 = 12;
 /// Sweeps with extrapolation between them.
 const ACCELERATED: u32 = 200;
 
@@ -33,26 +31,33 @@ impl RowSolver for GaussSeidel {
     }
 
     fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome {
-        let mut locals: Vec<Local> = blocks.iter().map(|&b| Local::new(rows, &rows.blocks[b as usize])).collect();
-        for local in &mut locals {
-            local.warm_start(rows, lambda, du);
+        let mut locals: Vec<Local> = Vec::with_capacity(blocks.len());
+        for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
+            locals.push(Local::new(rows, block, c, lambda));
         }
+        write_back(&locals, lambda);
+        apply(&locals, rows, lambda, du);
         let sweeps = accuracy.sweeps_of(blocks.len());
         let mut momentum = Momentum::new(&locals, du);
+        let mut outcome = Outcome { iterations: sweeps, converged: false, ray: false };
         for sweep in 1..=sweeps {
-            let mut against = 0.0;
-            let mut change = 0.0f64;
+            let mut progress = Progress::default();
             for local in &mut locals {
-                change = change.max(local.relax(rows, c, lambda, du, &mut against));
+                local.relax(rows, du, &mut progress);
             }
-            if change <= accuracy.tolerance {
-                return Outcome { iterations: sweep, converged: true, ray: false };
+            if progress.change <= accuracy.tolerance {
+                outcome = Outcome { iterations: sweep, converged: true, ray: false };
+                break;
             }
             if sweep < sweeps.min(ACCELERATED) {
-                momentum.extrapolate(&mut locals, against > 0.0, lambda, du);
+                momentum.extrapolate(&mut locals, progress.against > 0.0, du);
+            }
+            if sweep % RENEW == 0 {
+                momentum.renew(&mut locals, rows, lambda, du);
             }
         }
-        Outcome { iterations: sweeps, converged: false, ray: false }
+        write_back(&locals, lambda);
+        outcome
     }
 
     fn fork(&self) -> Box<dyn RowSolver> {
@@ -60,248 +65,234 @@ impl RowSolver for GaussSeidel {
     }
 }
 
-/// A block with what its own diagonal block of `K` gives, and its multipliers of the sweep before.
-struct Local {
-    block: Block,
-    step: Step,
+/// Extrapolation carries the rounding errors of `du` on and on; after so many sweeps it is made anew from `λ`.
+const RENEW: u32 = 1000;
+
+fn write_back(locals: &[Local], lambda: &mut [f64]) {
+    for local in locals {
+        let range = local.block.range();
+        lambda[range.clone()].copy_from_slice(&local.lambda[..range.len()]);
+    }
+}
+
+/// `du += Y·λ` of the island.
+fn apply(locals: &[Local], rows: &Rows, lambda: &[f64], du: &mut [f64]) {
+    for local in locals.iter().filter(|l| l.lambda != [0.0; 3]) {
+        rows.apply_block(local.block, lambda, du);
+    }
+}
+
+/// A block as the sweeps read it; of a scalar block only the first of each three numbers counts.
+struct Local<'a> {
+    block: &'a Block,
+    c: [f64; 3],
+    lambda: [f64; 3],
+    /// `λ` of the sweep before.
     last: [f64; 3],
+    step: Step,
+}
+
+/// What a sweep did.
+#[derive(Default)]
+struct Progress {
+    /// Largest change of a row velocity by its own block.
+    change: f64,
+    /// How far the change from the extrapolated multipliers goes against the move since the last sweep.
+    against: f64,
+}
+
+impl Progress {
+    #[inline(always)]
+    fn note(&mut self, change: f64) {
+        // Not `max`, which spends several instructions on NaN.
+        if change > self.change {
+            self.change = change;
+        }
+    }
 }
 
 /// The extrapolation between sweeps, over the multipliers of the island and the stretches of `du` that they act on.
 struct Momentum {
     theta: f64,
-    /// First index and length of each object's stretch, and where its last value is kept.
+    /// First index and end of each stretch of `du`, one after the other; neighbours are joined.
     stretches: Vec<(u32, u32)>,
+    /// `du` of the sweep before, of all stretches.
     last: Vec<f64>,
 }
 
 impl Momentum {
     fn new(locals: &[Local], du: &[f64]) -> Momentum {
-        let mut stretches: Vec<(u32, u32)> = locals.iter().flat_map(|l| l.block.sides()).map(|s| (s.u, s.dof)).collect();
+        let mut stretches: Vec<(u32, u32)> = Vec::new();
+        for (i, local) in locals.iter().enumerate() {
+            // the contacts of a pair follow one another: one of them is enough
+            let same = |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));
+            if i == 0 || !same(&locals[i - 1]) {
+                stretches.extend(local.block.sides().iter().map(|s| (s.u, s.u + s.dof)));
+            }
+        }
         stretches.sort_unstable();
-        stretches.dedup();
-        let last = stretches.iter().flat_map(|&(u, dof)| &du[u as usize..(u + dof) as usize]).copied().collect();
+        stretches.dedup_by(|next, before| {
+            let joins = next.0 <= before.1;
+            if joins {
+                before.1 = before.1.max(next.1);
+            }
+            joins
+        });
+        let last = stretches.iter().flat_map(|&(start, end)| &du[start as usize..end as usize]).copied().collect();
         Momentum { theta: 1.0, stretches, last }
     }
 
-    fn extrapolate(&mut self, locals: &mut [Local], restart: bool, lambda: &mut [f64], du: &mut [f64]) {
+    fn extrapolate(&mut self, locals: &mut [Local], restart: bool, du: &mut [f64]) {
         let next = 0.5 * (1.0 + (1.0 + 4.0 * self.theta * self.theta).sqrt());
         let beta = if restart { 0.0 } else { (self.theta - 1.0) / next };
         self.theta = if restart { 1.0 } else { next };
         for local in locals {
-            for (row, last) in local.block.range().zip(&mut local.last) {
-                let now = lambda[row];
-                lambda[row] += beta * (now - *last);
-                *last = now;
+            for (lambda, last) in local.lambda.iter_mut().zip(&mut local.last) {
+                go_on(lambda, last, beta);
             }
         }
-        let mut last = self.last.iter_mut();
-        for &(u, dof) in &self.stretches {
-            for (du, last) in du[u as usize..(u + dof) as usize].iter_mut().zip(&mut last) {
-                let now = *du;
-                *du += beta * (now - *last);
-                *last = now;
-            }
+        let mut rest = &mut self.last[..];
+        for &(start, end) in &self.stretches {
+            let (last, after) = rest.split_at_mut((end - start) as usize);
+            du[start as usize..end as usize].iter_mut().zip(last).for_each(|(du, last)| go_on(du, last, beta));
+            rest = after;
         }
     }
+
+    /// Makes `du` anew, and starts from rest.
+    fn renew(&mut self, locals: &mut [Local], rows: &Rows, lambda: &mut [f64], du: &mut [f64]) {
+        write_back(locals, lambda);
+        for &(start, end) in &self.stretches {
+            du[start as usize..end as usize].fill(0.0);
+        }
+        apply(locals, rows, lambda, du);
+        self.extrapolate(locals, true, du);
+    }
+}
+
+/// `x ← x + β(x − x_last)`, `x_last ← x`.
+#[inline(always)]
+fn go_on(x: &mut f64, last: &mut f64, beta: f64) {
+    let now = *x;
+    *x += beta * (now - *last);
+    *last = now;
 }
 
 enum Step {
     /// No response: no impulse.
     Dead,
-    Scalar { k: f64, lo: f64, hi: f64 },
+    Scalar { k: f64, inverse: f64, lo: f64, hi: f64 },
     Contact(Contact),
 }
 
-struct Contact {
-    mu: f64,
-    k: [[f64; 3]; 3],
-    /// `K⁻¹`, absent where a direction has no response.
-    inverse: Option<[[f64; 3]; 3]>,
-    /// `1/λ_max(K_tt)`; 0 where no tangent has a response.
-    rho: f64,
+impl Step {
+    fn new(rows: &Rows, block: &Block) -> Step {
+        let diagonal = rows.own(block, 0, 0);
+        match block.set {
+            _ if diagonal <= f64::MIN_POSITIVE => Step::Dead,
+            RowSet::Equality => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo: f64::NEG_INFINITY, hi: f64::INFINITY },
+            RowSet::HalfLine => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo: 0.0, hi: f64::INFINITY },
+            RowSet::Interval { lo, hi } => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo, hi },
+            RowSet::Cone { mu } => Step::Contact(Contact::new(rows, block, mu)),
+        }
+    }
 }
 
-impl Local {
-    fn new(rows: &Rows, block: &Block) -> Local {
-        let diagonal = rows.coupling(block, 0, block, 0);
-        let step = match block.set {
-            _ if diagonal <= f64::MIN_POSITIVE => Step::Dead,
-            RowSet::Equality => Step::Scalar { k: diagonal, lo: f64::NEG_INFINITY, hi: f64::INFINITY },
-            RowSet::HalfLine => Step::Scalar { k: diagonal, lo: 0.0, hi: f64::INFINITY },
-            RowSet::Interval { lo, hi } => Step::Scalar { k: diagonal, lo, hi },
-            RowSet::Cone { mu } => Step::Contact(Contact::new(rows, block, mu)),
+impl<'a> Local<'a> {
+    fn new(rows: &Rows, block: &'a Block, c: &[f64], lambda: &[f64]) -> Local<'a> {
+        let step = Step::new(rows, block);
+        let numbers = |from: &[f64]| {
+            let mut three = [0.0; 3];
+            three[..block.set.rows()].copy_from_slice(&from[block.range()]);
+            three
         };
-        Local { block: *block, step, last: [0.0; 3] }
+        let start = if matches!(step, Step::Dead) { [0.0; 3] } else { numbers(lambda) };
+        Local { block, c: numbers(c), lambda: start, last: start, step }
     }
 
-    fn warm_start(&mut self, rows: &Rows, lambda: &mut [f64], du: &mut [f64]) {
-        if let Step::Dead = self.step {
-            lambda[self.block.range()].fill(0.0);
-        } else {
-            rows.apply_block(&self.block, lambda, du);
-        }
-        self.last[..self.block.set.rows()].copy_from_slice(&lambda[self.block.range()]);
-    }
-
-    /// Solves this block with the others held; the largest change of its own row velocities. Adds to `against` how far the change
-    /// from the extrapolated multipliers goes against the move since the last sweep.
-    fn relax(&mut self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64], against: &mut f64) -> f64 {
-        let i = self.block.row as usize;
+    /// Solves this block with the others held.
+    #[inline]
+    fn relax(&mut self, rows: &Rows, du: &mut [f64], progress: &mut Progress) {
         match &self.step {
-            Step::Dead => 0.0,
-            Step::Scalar { k, lo, hi } => {
-                let w = c[i] + rows.row_velocity(&self.block, 0, du);
-                // Not `clamp`, which panics where `lo > hi`.
-                let next = (lambda[i] - w / k).max(*lo).min(*hi);
-                let delta = next - lambda[i];
-                *against -= delta * (next - self.last[0]);
-                lambda[i] = next;
-                for side in self.block.sides() {
-                    let u = &mut du[side.u as usize..(side.u + side.dof) as usize];
-                    u.iter_mut().zip(rows.response(side, 0)).for_each(|(u, y)| *u += y * delta);
+            Step::Dead => {}
+            Step::Scalar { k, inverse, lo, hi } => {
+                let w = self.c[0] + rows.row_velocity(self.block, 0, du);
+                let next = clamp(self.lambda[0] - w * inverse, *lo, *hi);
+                let delta = next - self.lambda[0];
+                if delta != 0.0 {
+                    self.lambda[0] = next;
+                    for side in self.block.sides() {
+                        add_multiple(rows.response(side, 0), delta, &mut du[side.u as usize..(side.u + side.dof) as usize]);
+                    }
+                    progress.against -= delta * (next - self.last[0]);
+                    progress.note((delta * k).abs());
                 }
-                (delta * k).abs()
             }
             Step::Contact(contact) => {
-                let mut w = [c[i], c[i + 1], c[i + 2]];
+                let mut w = self.c;
                 self.block.sides().iter().for_each(|s| add_velocity(rows, s, du, &mut w));
-                let old = [lambda[i], lambda[i + 1], lambda[i + 2]];
-                let next = contact.solve(old, w);
-                let delta = [next[0] - old[0], next[1] - old[1], next[2] - old[2]];
-                if delta == [0.0; 3] {
-                    return 0.0;
+                let next = contact.solve(self.lambda, w);
+                let delta = [next[0] - self.lambda[0], next[1] - self.lambda[1], next[2] - self.lambda[2]];
+                if delta != [0.0; 3] {
+                    self.lambda = next;
+                    self.block.sides().iter().for_each(|s| add_impulse(rows, s, delta, du));
+                    let last = &self.last;
+                    progress.against -= delta[0] * (next[0] - last[0]) + delta[1] * (next[1] - last[1]) + delta[2] * (next[2] - last[2]);
+                    progress.note((delta[0] * contact.k.m00).abs());
+                    progress.note((delta[1] * contact.k.m11).abs());
+                    progress.note((delta[2] * contact.k.m22).abs());
                 }
-                *against -= (0..3).map(|r| delta[r] * (next[r] - self.last[r])).sum::<f64>();
-                lambda[i..i + 3].copy_from_slice(&next);
-                self.block.sides().iter().for_each(|s| add_impulse(rows, s, delta, du));
-                (0..3).map(|r| (delta[r] * contact.k[r][r]).abs()).fold(0.0, f64::max)
             }
         }
     }
 }
 
-impl Contact {
-    fn new(rows: &Rows, block: &Block, mu: f64) -> Contact {
-        let mut k = [[0.0; 3]; 3];
-        for (i, j) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
-            k[i][j] = rows.coupling(block, i, block, j);
-            k[j][i] = k[i][j];
-        }
-        let mean = 0.5 * (k[1][1] + k[2][2]);
-        let half = 0.5 * (k[1][1] - k[2][2]);
-        let largest = mean + (half * half + k[1][2] * k[1][2]).sqrt();
-        let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
-        Contact { mu, k, inverse: if mu > 0.0 { invert(&k) } else { None }, rho }
-    }
+/// Not the standard one, which panics where `lo > hi`, nor `max` and `min`, which spend instructions on NaN.
+#[inline(always)]
+fn clamp(x: f64, lo: f64, hi: f64) -> f64 {
+    let above = if x < lo { lo } else { x };
+    if above > hi { hi } else { above }
+}
 
-    /// The multipliers that answer row velocities `w` found with multipliers `old`: the problem of this contact alone, with `b = w − K·old`.
-    fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
-        let k = &self.k;
-        let b: [f64; 3] = std::array::from_fn(|i| w[i] - (k[i][0] * old[0] + k[i][1] * old[1] + k[i][2] * old[2]));
-        if b[0] >= 0.0 {
-            return [0.0; 3];
-        }
-        if let Some(inverse) = &self.inverse {
-            let full: [f64; 3] = std::array::from_fn(|i| -(inverse[i][0] * b[0] + inverse[i][1] * b[1] + inverse[i][2] * b[2]));
-            let bound = self.mu * full[0];
-            if bound >= 0.0 && full[1] * full[1] + full[2] * full[2] <= bound * bound {
-                return full;
-            }
-        }
-        self.slide(old, b).unwrap_or_else(|| self.descend(old, w))
-    }
-
-    /// Sliding: the direction `d` of `w_t` by Newton's method on its angle, from the direction of the multipliers so far or else of `b_t`.
-    fn slide(&self, old: [f64; 3], b: [f64; 3]) -> Option<[f64; 3]> {
-        let starts = [[-old[1], -old[2]], [b[1], b[2]], [-b[2], b[1]], [b[2], -b[1]]];
-        starts.into_iter().find_map(|start| self.slide_from(unit(start)?, b))
-    }
-
-    /// `g(φ) = d × w_t = 0` with `d·w_t > 0`, where `λ_n = −b_n / r`, `r = k_nn − μ·k_nt·d`, `w_t = b_t + λ_n·(k_tn − μ·K_tt·d)`.
-    /// `None` where Newton's method ends elsewhere, or `r ≤ 0`: there friction alone would press the bodies together (Painlevé).
-    fn slide_from(&self, mut d: [f64; 2], b: [f64; 3]) -> Option<[f64; 3]> {
-        let (k, mu) = (&self.k, self.mu);
-        let row = |r: usize, v: [f64; 2]| k[r][1] * v[0] + k[r][2] * v[1];
-        for _ in 0..SLIDE_STEPS {
-            let across = [-d[1], d[0]];
-            let resistance = k[0][0] - mu * row(0, d);
-            if resistance <= 1e-6 * k[0][0] {
-                return None;
-            }
-            let normal = -b[0] / resistance;
-            let turn = normal * mu * row(0, across) / resistance;
-            let pull = [1, 2].map(|r| k[r][0] - mu * row(r, d));
-            let w: [f64; 2] = std::array::from_fn(|i| b[i + 1] + normal * pull[i]);
-            let rate: [f64; 2] = std::array::from_fn(|i| turn * pull[i] - normal * mu * row(i + 1, across));
-            let (along, g) = (d[0] * w[0] + d[1] * w[1], d[0] * w[1] - d[1] * w[0]);
-            if g.abs() <= 1e-14 * (b[1].abs() + b[2].abs() + normal * k[1][1]) {
-                return (along > 0.0).then_some([normal, -mu * normal * d[0], -mu * normal * d[1]]);
-            }
-            let slope = -along + d[0] * rate[1] - d[1] * rate[0];
-            let step = (-g / slope).clamp(-1.0, 1.0);
-            d = unit([d[0] + step * across[0], d[1] + step * across[1]]).filter(|_| slope != 0.0)?;
-        }
-        None
-    }
-
-    /// One projected step, where the contact's own problem has no sliding answer: `λ_n ← max(0, λ_n − w_n/k_nn)`, then
-    /// `λ_t ← Π(λ_t − ρ·w_t)` onto the disc of radius `μ·λ_n`.
-    fn descend(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
-        let normal = (old[0] - w[0] / self.k[0][0]).max(0.0);
-        let dn = normal - old[0];
-        let t = [1, 2].map(|r| old[r] - self.rho * (w[r] + self.k[r][0] * dn));
-        let (size, bound) = ((t[0] * t[0] + t[1] * t[1]).sqrt(), self.mu * normal);
-        let scale = if size > bound { bound / size } else { 1.0 };
-        [normal, scale * t[0], scale * t[1]]
-    }
+/// The three rows of a side of six freedoms.
+#[inline(always)]
+fn six<'a>(rows: &'a Rows, side: &Side) -> Option<[&'a [f64; 6]; 3]> {
+    let [normal, first, second, ..] = rows.y[side.y as usize..].as_chunks::<6>().0 else { return None };
+    (side.dof == 6).then_some([normal, first, second])
 }
 
 /// `w += Yᵀu` of one side of a contact.
-#[inline]
+#[inline(always)]
 fn add_velocity(rows: &Rows, side: &Side, u: &[f64], w: &mut [f64; 3]) {
-    let (d, y) = (side.dof as usize, &rows.y[side.y as usize..]);
-    if let (6, Some((y, _)), Some((u, _))) = (d, y.split_first_chunk::<18>(), u[side.u as usize..].split_first_chunk::<6>()) {
-        for r in 0..3 {
-            let y = &y[6 * r..6 * r + 6];
-            w[r] += (y[0] * u[0] + y[1] * u[1] + y[2] * u[2]) + (y[3] * u[3] + y[4] * u[4] + y[5] * u[5]);
-        }
-        return;
-    }
-    let u = &u[side.u as usize..side.u as usize + d];
-    for r in 0..3 {
-        w[r] += y[r * d..(r + 1) * d].iter().zip(u).map(|(y, u)| y * u).sum::<f64>();
+    let u = &u[side.u as usize..(side.u + side.dof) as usize];
+    if let (Some([y0, y1, y2]), Some(u)) = (six(rows, side), u.as_array::<6>()) {
+        w[0] += dot6(y0, u);
+        w[1] += dot6(y1, u);
+        w[2] += dot6(y2, u);
+    } else {
+        w.iter_mut().enumerate().for_each(|(r, w)| *w += crate::rows::dot(rows.response(side, r), u));
     }
 }
 
 /// `u += Y·δ` of one side of a contact.
-#[inline]
+#[inline(always)]
 fn add_impulse(rows: &Rows, side: &Side, delta: [f64; 3], u: &mut [f64]) {
-    let (d, y) = (side.dof as usize, &rows.y[side.y as usize..]);
-    let u = &mut u[side.u as usize..side.u as usize + d];
-    if let (6, Some((y, _))) = (d, y.split_first_chunk::<18>()) {
+    let u = &mut u[side.u as usize..(side.u + side.dof) as usize];
+    if let (Some([y0, y1, y2]), Some(u)) = (six(rows, side), u.as_mut_array::<6>()) {
         for k in 0..6 {
-            u[k] += y[k] * delta[0] + y[6 + k] * delta[1] + y[12 + k] * delta[2];
+            u[k] += y0[k] * delta[0] + y1[k] * delta[1] + y2[k] * delta[2];
         }
-        return;
-    }
-    for k in 0..d {
-        u[k] += y[k] * delta[0] + y[d + k] * delta[1] + y[2 * d + k] * delta[2];
+    } else {
+        (0..3).for_each(|r| add_multiple(rows.response(side, r), delta[r], u));
     }
 }
 
-fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
-    let size = (v[0] * v[0] + v[1] * v[1]).sqrt();
-    (size > f64::MIN_POSITIVE).then(|| [v[0] / size, v[1] / size])
-}
-
-/// Inverse of a symmetric 3×3 matrix, `None` where it is singular to working precision.
-fn invert(k: &[[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
-    let cofactor = |i: usize, j: usize| {
-        let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
-        k[a][c] * k[b][d] - k[a][d] * k[b][c]
-    };
-    let determinant: f64 = (0..3).map(|j| k[0][j] * cofactor(0, j)).sum();
-    let scale = k[0][0].max(k[1][1]).max(k[2][2]);
-    (determinant > 1e-12 * scale.powi(3)).then(|| std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i) / determinant)))
+/// `u += y·δ`.
+#[inline(always)]
+fn add_multiple(y: &[f64], delta: f64, u: &mut [f64]) {
+    if let (Some(y), Some(u)) = (y.as_array::<6>(), u.as_mut_array::<6>()) {
+        (0..6).for_each(|k| u[k] += y[k] * delta);
+    } else {
+        u.iter_mut().zip(y).for_each(|(u, y)| *u += y * delta);
+    }
 }

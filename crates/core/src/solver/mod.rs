@@ -7,6 +7,7 @@ mod gauss_seidel;
 mod island;
 mod lcp;
 mod lemke;
+mod one_contact;
 mod residual;
 #[cfg(test)]
 mod tests;
@@ -32,7 +33,7 @@ pub struct Accuracy {
 }
 
 /// What an island gets however large it is.
-pub const FEWEST_SWEEPS: u32 = 20;
+pub const FEWEST_SWEEPS: u32 = 25;
 
 impl Accuracy {
     /// Sweeps for an island of that many blocks.

@@ -14,7 +14,7 @@ pub fn residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f6
 
 fn block_residual(rows: &Rows, block: &Block, c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
     let n = block.set.rows();
-    let d = (0..n).map(|k| rows.coupling(block, k, block, k)).sum::<f64>() / n as f64;
+    let d = (0..n).map(|k| rows.own(block, k, k)).sum::<f64>() / n as f64;
     if d <= f64::MIN_POSITIVE {
         return 0.0;
     }

@@ -92,7 +92,7 @@ impl Backtracking {
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = self.work.targets.iter().any(|t| off(t.error) || (t.set == RowSet::Equality && off(-t.error)));
         if drifted || self.work.touches.iter().any(|t| off(t.contact.gap)) {
-            projection::project(core, &mut self.work, &vec![0.0; core.dof], 1.0, core.settings.recovery_speed * left);
+            projection::project(core, &mut self.work, &vec![0.0; core.dof], 1.0, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
         }

@@ -1,5 +1,6 @@
 //! From touches to rows, and from multipliers back to momentum: what both steppers share.
 
+use super::projection::Projection;
 use crate::detect::{Detector, Touch};
 use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
@@ -28,6 +29,8 @@ pub(crate) struct Workspace {
     pub u: Vec<f64>,
     pub du_force: Vec<f64>,
     pub dp: Vec<f64>,
+    /// What the projection solves.
+    pub projection: Projection,
 }
 
 /// Finds the contacts within reach of the next `horizon` seconds.
@@ -144,8 +147,9 @@ pub(crate) fn solve(core: &mut Core, work: &mut Workspace, accuracy: Accuracy, u
 
 /// Multipliers from last time, turned into the present contact frames and scaled; what is no longer allowed by the cone is left to the solver.
 pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
+    let mut place = 0;
     for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
-        if let Some(impulse) = core.warm.get(&touch.key) {
+        if let Some(impulse) = core.warm.get(&touch.key, &mut place) {
             for (row, axis) in block.range().zip(&touch.frame.axes) {
                 work.lambda[row] = scale * axis.dot(&impulse);
             }

@@ -6,41 +6,44 @@
 //!
 //! `v̄` is the displacement velocity of the step (0 for a projection in place, with `h = 1`). Existing depth is recovered at a bounded speed.
 
-use super::contacts::{Workspace, displace, row_velocities};
+use super::contacts::{Workspace, displace};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, GaussSeidel, RowSolver};
 use crate::world::Core;
 
-/// A violation smaller than this is left alone, metres.
-const SMALLEST: f64 = 1e-9;
-
 /// Corrects positions so that the step's displacement `h·mean` (whitened) ends without overlap. `recovery` bounds how much of the depth that
-/// was there before is undone, metres.
-pub(crate) fn project(core: &mut Core, work: &mut Workspace, mean: &[f64], h: f64, recovery: f64) {
-    row_velocities(&work.rows, &work.bias, mean, &mut work.c);
+/// was there before is undone, metres; an island that is wrong by no more than `least` metres is left alone.
+pub(crate) fn project(core: &mut Core, work: &mut Workspace, mean: &[f64], h: f64, recovery: f64, least: f64) {
+    for block in &work.rows.blocks {
+        work.c[block.row as usize] = work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean);
+    }
     let touches = work.touches.len();
-    let violated = |b: usize, c: &[f64]| -> bool {
+    let violation = |b: usize, c: &[f64]| -> f64 {
         let v = c[work.rows.blocks[b].row as usize];
         match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
-            (Some(touch), _) => allowed(touch.contact.gap, recovery) + h * v < -SMALLEST,
-            (None, Some(t)) if t.set == RowSet::Equality => (t.error + h * v).abs() > SMALLEST,
-            (None, Some(t)) if t.set == RowSet::HalfLine => allowed(t.error, recovery) + h * v < -SMALLEST,
-            _ => false,
+            (Some(touch), _) => -(allowed(touch.contact.gap, recovery) + h * v),
+            (None, Some(t)) if t.set == RowSet::Equality => (t.error + h * v).abs(),
+            (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
+            _ => 0.0,
         }
     };
-    if !(0..work.rows.blocks.len()).any(|b| violated(b, &work.c)) {
+    let worst = (0..work.rows.blocks.len()).map(|b| violation(b, &work.c)).fold(0.0, f64::max);
+    if worst <= least {
         return;
     }
-    let (rows, c) = normal_rows(work, h, recovery);
-    let mut lambda = vec![0.0; rows.len];
-    let mut du = vec![0.0; core.dof];
+    let mut p = std::mem::take(&mut work.projection);
+    p.fill(work, h, recovery);
     let targets = &work.targets;
     work.islands.build(&work.rows, |b| b < touches || !matches!(targets[b - touches].set, RowSet::Interval { .. }));
-    let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, relaxations: u32::MAX, tolerance: 0.1 * SMALLEST / h };
-    for blocks in work.islands.iter().filter(|blocks| blocks.iter().any(|&b| violated(b as usize, &work.c))) {
-        GaussSeidel.solve(&rows, blocks, &c, &mut lambda, &mut du, accuracy);
+    for blocks in work.islands.iter() {
+        let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
+        if worst > least {
+            let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, relaxations: u32::MAX, tolerance: 0.1 * least / h };
+            GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, accuracy);
+        }
     }
-    displace(core, &du, h);
+    displace(core, &p.du, h);
+    work.projection = p;
 }
 
 fn allowed(gap: f64, recovery: f64) -> f64 {
@@ -48,27 +51,36 @@ fn allowed(gap: f64, recovery: f64) -> f64 {
 }
 
 /// The same blocks without friction, and the right-hand side that asks for no overlap.
-fn normal_rows(work: &Workspace, h: f64, recovery: f64) -> (Rows, Vec<f64>) {
-    let mut rows = Rows::default();
-    rows.clear(work.rows.dof);
-    rows.y.reserve(work.rows.blocks.len() * 12);
-    let mut c = Vec::with_capacity(work.rows.blocks.len());
-    for (b, block) in work.rows.blocks.iter().enumerate() {
-        let (set, error) = match work.touches.get(b) {
-            Some(touch) => (RowSet::HalfLine, allowed(touch.contact.gap, recovery)),
-            None => match work.targets[b - work.touches.len()] {
-                t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
-                t => (t.set, t.error),
-            },
-        };
-        rows.push_block(set);
-        for side in block.sides() {
-            let response = work.rows.response(side, 0);
-            if let Some(y) = rows.side(side.u as usize, side.dof as usize) {
-                y.copy_from_slice(response);
+#[derive(Default)]
+pub(crate) struct Projection {
+    rows: Rows,
+    c: Vec<f64>,
+    lambda: Vec<f64>,
+    du: Vec<f64>,
+}
+
+impl Projection {
+    fn fill(&mut self, work: &Workspace, h: f64, recovery: f64) {
+        self.rows.clear(work.rows.dof);
+        self.c.clear();
+        for (b, block) in work.rows.blocks.iter().enumerate() {
+            let (set, error) = match work.touches.get(b) {
+                Some(touch) => (RowSet::HalfLine, allowed(touch.contact.gap, recovery)),
+                None => match work.targets[b - work.touches.len()] {
+                    t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
+                    t => (t.set, t.error),
+                },
+            };
+            self.rows.push_block(set);
+            for side in block.sides() {
+                let response = work.rows.response(side, 0);
+                if let Some(y) = self.rows.side(side.u as usize, side.dof as usize) {
+                    y.copy_from_slice(response);
+                }
             }
+            self.c.push(work.c[block.row as usize] + error / h);
         }
-        c.push(work.c[block.row as usize] + error / h);
+        (self.lambda.clear(), self.lambda.resize(self.rows.len, 0.0));
+        (self.du.clear(), self.du.resize(work.rows.dof, 0.0));
     }
-    (rows, c)
 }

@@ -86,12 +86,15 @@ impl TimeStepping {
     /// Times the impacts that free motion meets within the step and resolves them; the whitened velocity after them, forces not yet added.
     fn impacts(&mut self, core: &mut Core, h: f64, u: &[f64], du_force: &[f64]) -> Vec<f64> {
         let work = &mut self.work;
-        let (mut before, mut gain) = (Vec::new(), Vec::new());
-        row_velocities(&work.rows, &work.bias, u, &mut before);
-        row_velocities(&work.rows, &vec![0.0; work.rows.len], du_force, &mut gain);
         (self.share.clear(), self.share.resize(core.dof, -1.0));
         (self.impact.clear(), self.impact.resize(work.rows.len, 0.0));
         self.candidates.clear();
+        if work.touches.iter().all(|t| t.restitution <= 0.0) {
+            return u.to_vec();
+        }
+        let (mut before, mut gain) = (Vec::new(), Vec::new());
+        row_velocities(&work.rows, &work.bias, u, &mut before);
+        row_velocities(&work.rows, &vec![0.0; work.rows.len], du_force, &mut gain);
         for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
             let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], touch.contact.gap);
             let rest_speed = (-dv).max(impact::SLOWEST_BOUNCE);
@@ -153,7 +156,7 @@ impl TimeStepping {
         displace(core, &parabola, h);
         let mean: Vec<f64> = (0..core.dof).map(|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]).collect();
         let recovery = core.settings.recovery_speed * h;
-        projection::project(core, &mut self.work, &mean, h, recovery);
+        projection::project(core, &mut self.work, &mean, h, recovery, core.settings.contact_tolerance);
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
         core.check_finite(&dp)

@@ -145,3 +145,41 @@ fn a_state_that_is_not_finite_is_reported_with_its_object() {
     let error = world.step().unwrap_err();
     assert!(error.to_string().contains("'ball'"), "{error}");
 }
+
+#[test]
+fn kinds_that_do_not_meet_pass_through_each_other() {
+    let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
+    let ghost = CollisionKind::new(5).unwrap();
+    let mut add = |name: &str, x: f64, v: f64, kind: CollisionKind, meets: u64| {
+        let mut body = RigidBody::with_mass(name, sphere(0.5), 1.0).unwrap().surface(1.0, 0.0);
+        (body.kind, body.meets) = (kind, meets);
+        world.add(body.at(Pose::translation(x, 0.0, 0.0)).moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
+    };
+    let solid = CollisionKind::default();
+    let ids = [add("a", -2.0, 1.0, solid, !ghost.bit()), add("ghost", 0.0, 0.0, ghost, u64::MAX), add("b", 2.0, -1.0, solid, u64::MAX)];
+    run(&mut world, 180);
+    // b meets the ghost at t = 1 s, x = 1 and stops; the ghost flies off at -1 m/s through a; a meets b at t = 2 s, x = 0 and stops.
+    let x: Vec<f64> = ids.iter().map(|id| position(&world, *id).x).collect();
+    assert!(x.iter().zip([0.0, -2.0, 2.0]).all(|(x, e)| (x - e).abs() < 1e-9), "{x:?}");
+    assert!(CollisionKind::new(64).is_none());
+}
+
+#[test]
+fn a_body_in_another_process_is_kept_in_step_by_messages() {
+    let mut world = messy("time_stepping");
+    run(&mut world, 40);
+    let mut replica = messy("time_stepping");
+    for (&theirs, &ours) in world.ids().iter().zip(replica.ids().to_vec().iter()) {
+        let (view, mut message) = (world.view(), Vec::new());
+        world.object(theirs).unwrap().net_sync().unwrap().get_data(view.span(theirs).unwrap(), &view, &mut message);
+        let mut x = replica.state_of(ours).unwrap().to_vec();
+        let sync = replica.object(ours).unwrap().net_sync().unwrap();
+        assert_eq!(sync.read_data(&message[1..], &mut x), Err(SyncError::Length { got: 103, wanted: 104 }));
+        let mut bad = message.clone();
+        bad[24..32].copy_from_slice(&f64::NAN.to_le_bytes());
+        assert_eq!(sync.read_data(&bad, &mut x), Err(SyncError::Value));
+        sync.read_data(&message, &mut x).unwrap();
+        replica.write_state_of(ours, &x).unwrap();
+    }
+    assert_eq!(bits(&world), bits(&replica));
+}

@@ -1,0 +1,148 @@
+//! The problem of one contact alone: three rows, `w = b + K·λ`, answered exactly.
+//!
+//! ```text
+//! open      b_n ≥ 0                                           λ = 0
+//! stick     −K⁻¹b in the cone                                 λ = −K⁻¹b
+//! slide     w_n = 0, w_t along the unit direction d           λ_t = −μ·λ_n·d,  λ_n = −b_n / r,  r = k_nn − μ·k_nt·d
+//! ```
+//!
+//! The sliding direction is the root of `g(φ) = d × w_t` with `d·w_t > 0`, found by Newton's method on the angle `φ` of `d`. Alternating between
+//! the normal and the tangents instead diverges where `μ·|k_nt| > k_nn` (a leaning rod on rough ground).
+
+use crate::rows::{Block, Rows};
+
+/// Steps of Newton's method on the sliding direction.
+const SLIDE_STEPS: u32 = 12;
+
+/// A contact with what its own block of `K` gives.
+pub(super) struct Contact {
+    mu: f64,
+    /// Its own block of `K`.
+    pub k: Symmetric,
+    /// `K⁻¹`, absent where a direction has no response.
+    inverse: Option<Symmetric>,
+    /// `1/λ_max(K_tt)`; 0 where no tangent has a response.
+    rho: f64,
+}
+
+/// A symmetric 3×3 matrix; 0 is the normal, 1 and 2 are the tangents.
+#[derive(Clone, Copy)]
+pub(super) struct Symmetric {
+    pub m00: f64,
+    pub m10: f64,
+    pub m20: f64,
+    pub m11: f64,
+    pub m21: f64,
+    pub m22: f64,
+}
+
+impl Contact {
+    pub fn new(rows: &Rows, block: &Block, mu: f64) -> Contact {
+        let own = |i, j| rows.own(block, i, j);
+        let k = Symmetric { m00: own(0, 0), m10: own(1, 0), m20: own(2, 0), m11: own(1, 1), m21: own(2, 1), m22: own(2, 2) };
+        let mean = 0.5 * (k.m11 + k.m22);
+        let half = 0.5 * (k.m11 - k.m22);
+        let largest = mean + (half * half + k.m21 * k.m21).sqrt();
+        let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
+        Contact { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho }
+    }
+
+    /// The multipliers that answer row velocities `w` found with multipliers `old`: `b = w − K·old`.
+    #[inline]
+    pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+        let own = self.k.times(old);
+        let b = [w[0] - own[0], w[1] - own[1], w[2] - own[2]];
+        if b[0] >= 0.0 {
+            return [0.0; 3];
+        }
+        if let Some(inverse) = &self.inverse {
+            let full = inverse.times(b);
+            if full[0] <= 0.0 && full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) {
+                return [-full[0], -full[1], -full[2]];
+            }
+        }
+        self.slide(old, b).unwrap_or_else(|| self.descend(old, w))
+    }
+
+    /// The sliding answer, searched from the direction of the multipliers so far, from that of `b_t`, and from across it.
+    fn slide(&self, old: [f64; 3], b: [f64; 3]) -> Option<[f64; 3]> {
+        let starts = [[-old[1], -old[2]], [b[1], b[2]], [-b[2], b[1]], [b[2], -b[1]]];
+        starts.into_iter().find_map(|start| self.slide_from(unit(start)?, b))
+    }
+
+    /// `None` where Newton's method ends elsewhere, or `r ≤ 0`: there friction alone would press the bodies together (Painlevé).
+    fn slide_from(&self, mut d: [f64; 2], b: [f64; 3]) -> Option<[f64; 3]> {
+        let (k, mu) = (&self.k, self.mu);
+        let along_normal = |v: [f64; 2]| k.m10 * v[0] + k.m20 * v[1];
+        let tangents = |v: [f64; 2]| [k.m11 * v[0] + k.m21 * v[1], k.m21 * v[0] + k.m22 * v[1]];
+        for _ in 0..SLIDE_STEPS {
+            let across = [-d[1], d[0]];
+            let resistance = k.m00 - mu * along_normal(d);
+            if resistance <= 1e-6 * k.m00 {
+                return None;
+            }
+            let normal = -b[0] / resistance;
+            // dλ_n/dφ, then w_t and dw_t/dφ
+            let turn = normal * mu * along_normal(across) / resistance;
+            let (kd, ka) = (tangents(d), tangents(across));
+            let pull = [k.m10 - mu * kd[0], k.m20 - mu * kd[1]];
+            let w = [b[1] + normal * pull[0], b[2] + normal * pull[1]];
+            let rate = [turn * pull[0] - normal * mu * ka[0], turn * pull[1] - normal * mu * ka[1]];
+            let (along, g) = (d[0] * w[0] + d[1] * w[1], d[0] * w[1] - d[1] * w[0]);
+            if g.abs() <= 1e-14 * (b[1].abs() + b[2].abs() + normal * k.m11) {
+                return (along > 0.0).then_some([normal, -mu * normal * d[0], -mu * normal * d[1]]);
+            }
+            let slope = -along + d[0] * rate[1] - d[1] * rate[0];
+            let step = (-g / slope).clamp(-1.0, 1.0);
+            d = unit([d[0] + step * across[0], d[1] + step * across[1]]).filter(|_| slope != 0.0)?;
+        }
+        None
+    }
+
+    /// One projected step, where the contact alone has no sliding answer: `λ_n ← max(0, λ_n − w_n/k_nn)`, then
+    /// `λ_t ← Π(λ_t − ρ·w_t)` onto the disc of radius `μ·λ_n`.
+    fn descend(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+        let normal = (old[0] - w[0] / self.k.m00).max(0.0);
+        let dn = normal - old[0];
+        let t = [old[1] - self.rho * (w[1] + self.k.m10 * dn), old[2] - self.rho * (w[2] + self.k.m20 * dn)];
+        let (square, bound) = (t[0] * t[0] + t[1] * t[1], self.mu * normal);
+        let scale = if square > bound * bound { bound / square.sqrt() } else { 1.0 };
+        [normal, scale * t[0], scale * t[1]]
+    }
+}
+
+fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
+    let size = (v[0] * v[0] + v[1] * v[1]).sqrt();
+    (size > f64::MIN_POSITIVE).then(|| [v[0] / size, v[1] / size])
+}
+
+impl Symmetric {
+    #[inline]
+    pub fn times(&self, v: [f64; 3]) -> [f64; 3] {
+        [
+            self.m00 * v[0] + self.m10 * v[1] + self.m20 * v[2],
+            self.m10 * v[0] + self.m11 * v[1] + self.m21 * v[2],
+            self.m20 * v[0] + self.m21 * v[1] + self.m22 * v[2],
+        ]
+    }
+
+    /// `None` where it is singular to working precision.
+    fn inverse(&self) -> Option<Symmetric> {
+        let Symmetric { m00, m10, m20, m11, m21, m22 } = *self;
+        let cofactors = Symmetric {
+            m00: m11 * m22 - m21 * m21,
+            m10: m20 * m21 - m10 * m22,
+            m20: m10 * m21 - m20 * m11,
+            m11: m00 * m22 - m20 * m20,
+            m21: m10 * m20 - m00 * m21,
+            m22: m00 * m11 - m10 * m10,
+        };
+        let determinant = m00 * cofactors.m00 + m10 * cofactors.m10 + m20 * cofactors.m20;
+        let scale = m00.max(m11).max(m22);
+        (determinant > 1e-12 * scale.powi(3)).then(|| cofactors.scaled(1.0 / determinant))
+    }
+
+    fn scaled(self, s: f64) -> Symmetric {
+        Symmetric { m00: s * self.m00, m10: s * self.m10, m20: s * self.m20, m11: s * self.m11, m21: s * self.m21, m22: s * self.m22 }
+    }
+}
