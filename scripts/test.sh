@@ -18,10 +18,10 @@ stage set-up scripts/setup.sh
 # shellcheck disable=SC2086  # words, not one argument
 stage build cargo test $tests --no-run
 # shellcheck disable=SC2086
-stage tests cargo test $tests
+stage tests cargo test $tests --no-fail-fast
 # shellcheck disable=SC2086
-[ "${1:-}" != --slow ] || stage "slow tests" cargo test $tests slow -- --ignored
-stage "doc tests" cargo test --release --workspace --locked --doc
+[ "${1:-}" != --slow ] || stage "slow tests" cargo test $tests --no-fail-fast slow -- --ignored
+stage "doc tests" cargo test --no-fail-fast --release --workspace --locked --doc
 stage papers python3 scripts/check_papers.py
 
 echo
