@@ -18,6 +18,9 @@ const PLANE_M: f32 = 60.0;
 /// Edges sharper than this stay sharp, radians.
 const CREASE_RAD: f32 = 0.7;
 
+/// What the filmic curve shows as white is this much light.
+const LIGHT: f32 = 1.7;
+
 /// Makes draw lists of one scene; meshes are converted once and shared by all frames.
 pub struct Drawing {
     meshes: BTreeMap<String, Arc<MeshData>>,
@@ -138,10 +141,10 @@ fn light(spec: &LightSpec) -> Light {
     let (color, intensity, casts_shadow) = (spec.color.map(|c| c as f32), spec.intensity as f32, spec.casts_shadow);
     match spec.kind {
         LightKind::Directional { direction } => Light::Directional {
-            direction: Vector3::from(direction.map(|c| c as f32)), color, intensity: 2.2 * intensity, angular_radius_rad: 0.02, casts_shadow,
+            direction: Vector3::from(direction.map(|c| c as f32)), color, intensity: LIGHT * intensity, angular_radius_rad: 0.02, casts_shadow,
         },
         LightKind::Point { position_m } => Light::Point {
-            position: Point3::from(position_m.map(|c| c as f32)), color, intensity: 2.2 * intensity, radius_m: 0.1, casts_shadow,
+            position: Point3::from(position_m.map(|c| c as f32)), color, intensity: LIGHT * intensity, radius_m: 0.1, casts_shadow,
         },
     }
 }

@@ -60,10 +60,15 @@ fn sky_radiance(dir: vec3f, blur: f32) -> vec3f {
     return c;
 }
 
+// Clouds, walls and the eye's adaptation take colour out of the light of a sky: shade is not as blue as the zenith.
+fn greyed(c: vec3f) -> vec3f {
+    return mix(vec3f(dot(c, vec3f(0.2126, 0.7152, 0.0722))), c, 0.4);
+}
+
 fn sky_irradiance(n: vec3f) -> vec3f {
     let up = 0.5 + 0.5 * n.z;
     let sky = 0.55 * scene.zenith.xyz + 0.45 * scene.horizon.xyz;
-    return mix(scene.bounce.xyz, sky, up) * (1.0 + 0.03 * scene.ground.w * max(n.z, 0.0));
+    return mix(scene.bounce.xyz, greyed(sky), up) * (1.0 + 0.03 * scene.ground.w * max(n.z, 0.0));
 }
 
 fn backdrop_at(dir: vec3f) -> vec3f {

@@ -123,7 +123,9 @@ fn base_of(p: vec3f, n: vec3f, w: f32, color_rough: vec4f, other: vec3f, pattern
             base.color = ball(color_rough.xyz, normalize(p), w / max(length(p), 1e-6), u32(pattern.z), pattern.w > 0.5);
         }
         case 4u: {
-            base.color = wood(color_rough.xyz, other, p, size.x, pattern.w, w);
+            // boards run on over the sides that they would lie flat in
+            let beside = abs(n.y) > max(abs(n.x), abs(n.z));
+            base.color = wood(color_rough.xyz, other, select(p, p.xzy, beside), size.x, pattern.w, w);
         }
         case 5u: {
             let q = p / size.x;
