@@ -25,6 +25,8 @@ pub enum Pattern {
     Felt,
     /// Two rings of the second colour around the shape's z axis, as on the neck of a pin.
     Rings,
+    /// Veins of the second colour, as in a bowling ball.
+    Marble,
 }
 
 impl Pattern {
@@ -37,6 +39,7 @@ impl Pattern {
         ("wood", Pattern::Wood),
         ("felt", Pattern::Felt),
         ("rings", Pattern::Rings),
+        ("marble", Pattern::Marble),
     ];
 }
 

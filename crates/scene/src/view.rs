@@ -101,7 +101,7 @@ impl LightSpec {
     /// The light of a scene that names none.
     pub(crate) fn sun() -> Self {
         let kind = LightKind::Directional { direction: SUN };
-        LightSpec { kind, color: [1.0, 0.95, 0.87], intensity: 1.0, casts_shadow: true }
+        LightSpec { kind, color: [1.0, 0.97, 0.92], intensity: 1.0, casts_shadow: true }
     }
 
     pub(crate) fn read(mut f: Fields<'_>) -> Option<Self> {
@@ -134,7 +134,7 @@ pub struct SkySpec {
     pub horizon_color: Color,
     /// Below the horizon, as things reflect it.
     pub nadir_color: Color,
-    /// Strength of the light from the sky. Default 1.
+    /// Strength of the light from the sky. Default 1.3.
     pub intensity: f64,
 }
 
@@ -144,7 +144,7 @@ impl Default for SkySpec {
             zenith_color: [0.20, 0.36, 0.60],
             horizon_color: [0.74, 0.79, 0.84],
             nadir_color: [0.32, 0.31, 0.30],
-            intensity: 1.0,
+            intensity: 1.3,
         }
     }
 }

@@ -47,6 +47,7 @@ fn pattern(name: &str, n: &Numbers) -> Pattern {
         "wood" => Pattern::Wood { dark: n.second, ring_m: 0.3 * n.scale_m, board_m: n.scale_m },
         "felt" => Pattern::Felt { thread_m: 0.1 * n.scale_m },
         "rings" => Pattern::Rings { other: n.second, from_m: n.offset_m, to_m: n.offset_m + n.scale_m },
+        "marble" => Pattern::Marble { vein: n.second, size_m: n.scale_m },
         _ => Pattern::Plain,
     }
 }

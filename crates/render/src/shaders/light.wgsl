@@ -62,7 +62,7 @@ fn sky_radiance(dir: vec3f, blur: f32) -> vec3f {
 
 // Clouds, walls and the eye's adaptation take colour out of the light of a sky: shade is not as blue as the zenith.
 fn greyed(c: vec3f) -> vec3f {
-    return mix(vec3f(dot(c, vec3f(0.2126, 0.7152, 0.0722))), c, 0.4);
+    return mix(vec3f(dot(c, vec3f(0.2126, 0.7152, 0.0722))), c, 0.3);
 }
 
 fn sky_irradiance(n: vec3f) -> vec3f {
