@@ -22,7 +22,7 @@ const CREASE_RAD: f32 = 0.7;
 const LIGHT: f32 = 1.7;
 
 /// Edges of boxes are rounded by this share of the shortest half side.
-const ROUNDING: f32 = 0.03;
+const ROUNDING: f32 = 0.06;
 
 /// Makes draw lists of one scene; meshes are converted once and shared by all frames.
 pub struct Drawing {

@@ -117,13 +117,14 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     let reach = select(size * (s - s_near), size * (s - s_near) / s_near, sh.scale.z > 0.5);
     let smallest = vec2f(1.5 / texels);
     let search = clamp(reach * per_metre, smallest, vec2f(WIDEST));
+    // the empty map is at depth 0: no filter may reach below it
     var sum = 0.0;
     var count = 0.0;
     for (var i = 0u; i < 16u; i++) {
         let d = disc_point(i, 16.0, turn) * search;
         let at = vec2i(clamp((uv + d) * texels, vec2f(0.0), vec2f(texels - 1.0)));
         let z = textureLoad(shadow_depths, at, index, 0).x;
-        if (z > depth + dot(slope, d) + bias) { sum += z; count += 1.0; }
+        if (z > max(depth + dot(slope, d) + bias, 1e-6)) { sum += z; count += 1.0; }
     }
     if (count == 0.0) { return 1.0; }
     if (count == 16.0) { return 0.0; }
@@ -134,7 +135,7 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     var lit = 0.0;
     for (var i = 0u; i < 32u; i++) {
         let d = disc_point(i, 32.0, turn) * filter_uv;
-        lit += textureSampleCompareLevel(shadow_maps, shadow_sampler, uv + d, index, min(depth + dot(slope, d) + bias, 1.0));
+        lit += textureSampleCompareLevel(shadow_maps, shadow_sampler, uv + d, index, clamp(depth + dot(slope, d) + bias, 1e-6, 1.0));
     }
     return lit / 32.0;
 }
