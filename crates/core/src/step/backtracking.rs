@@ -40,7 +40,7 @@ pub struct Backtracking {
 /// Tries in a frame after which the rest of it is one time-stepping sub-step.
 const TRIES: u32 = 200;
 /// Least sub-step, as a share of the frame.
-const FLOOR: f64 = 1.0 / 16384.0;
+const FLOOR: f64 = 1.0 / (1 << 28) as f64;
 /// A margin of at least this is not measured, metres.
 const FAR: f64 = 1e-4;
 /// Passes of the impact phase at most.
