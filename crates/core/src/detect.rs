@@ -31,6 +31,8 @@ pub(crate) struct Touch {
     pub a: u32,
     pub b: u32,
     pub contact: Contact,
+    /// From A's contact point to B's, metres: not zero where the bodies meet only later in the step.
+    pub offset: Vec3,
     pub frame: ContactFrame,
     pub friction: f64,
     pub restitution: f64,
@@ -64,6 +66,11 @@ impl WarmStarts {
     pub fn carries(&self, key: &Key) -> bool {
         let first = self.entries.partition_point(|e| e.0.pair < key.pair);
         self.entries[first..].iter().take_while(|e| e.0.pair == key.pair).any(|e| e.1 != [0.0; 3])
+    }
+
+    /// Sorted by key, as the look-ups need it.
+    pub fn in_order(&self) -> bool {
+        self.entries.is_sorted_by(|a, b| a.0 < b.0)
     }
 
     pub fn finite(&self) -> bool {
@@ -127,10 +134,10 @@ impl Detector<'_> {
         for entry in self.table.iter().filter(|e| e.status.alive && e.status.collidable) {
             let Some(collidable) = entry.object.collidable() else { continue };
             for (part, index) in entry.span.site.clone().enumerate() {
-                let (shape, site) = (collidable.shape(part), entry.seen(&self.sites[index]));
+                let (shape, site) = (collidable.shape(part), &self.sites[index]);
                 let bound = shape.bounding_radius();
                 let turning = if bound.is_finite() { site.angular_velocity.norm() * bound } else { 0.0 };
-                let gain = 0.5 * horizon * horizon * self.settings.gravity.norm();
+                let gain = horizon * horizon * site.acceleration.norm();
                 let reach = self.settings.drift_tolerance + horizon * (site.velocity.norm() + turning) + gain;
                 s.proxies.push(index as u32);
                 s.boxes.push(shape.aabb(&site.pose).grown(reach));
@@ -175,12 +182,24 @@ impl Detector<'_> {
             a,
             b,
             contact: *contact,
+            offset: Vec3::zeros(),
             frame: frame_of(contact),
             friction,
             restitution,
             key: Key { pair, feature: contact.feature },
         }));
     }
+}
+
+/// Rate of a normal that points from B's core point to A's, for the relative velocity of the two.
+fn turning(c: &Contact, relative: Vec3) -> Vec3 {
+    let distance = c.core_a + c.core_b + c.gap;
+    if distance > 0.0 { across(relative, &c.normal) / distance } else { Vec3::zeros() }
+}
+
+/// The part of `v` across a unit direction.
+fn across(v: Vec3, along: &Vec3) -> Vec3 {
+    v - along * along.dot(&v)
 }
 
 /// Whether two parts are to be tested: one of them moves, and both kinds say yes.
@@ -196,9 +215,14 @@ fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize) -> bool {
 }
 
 impl Touch {
+    /// The contact point as B has it, metres.
+    pub fn point_b(&self) -> Vec3 {
+        self.contact.point + self.offset
+    }
+
     /// Relative velocity of A against B at the contact, m/s; negative along the normal where they approach.
     pub fn velocity(&self, a: &Site, b: &Site) -> Vec3 {
-        a.velocity_at(&self.contact.point) - b.velocity_at(&self.contact.point)
+        a.velocity_at(&self.contact.point) - b.velocity_at(&self.point_b())
     }
 
     /// Rate of the relative velocity along the contact's axes, as the *contact* moves, m/s²; the first is the second derivative of the gap.
@@ -224,8 +248,15 @@ impl Touch {
                 (n_rate, va - c.core_a * n_rate)
             }
             NormalFrom::CorePoints => {
-                let (relative, distance) = (va - vb, c.core_a + c.core_b + c.gap);
-                let n_rate = if distance > 0.0 { (relative - n * n.dot(&relative)) / distance } else { Vec3::zeros() };
+                let n_rate = turning(c, va - vb);
+                (n_rate, va - c.core_a * n_rate)
+            }
+            NormalFrom::LineOfA(along) => {
+                let n_rate = turning(c, across(va - vb, &along)) + along * along.dot(&a.angular_velocity.cross(n));
+                (n_rate, vb + c.core_b * n_rate)
+            }
+            NormalFrom::LineOfB(along) => {
+                let n_rate = turning(c, across(va - vb, &along)) + along * along.dot(&b.angular_velocity.cross(n));
                 (n_rate, va - c.core_a * n_rate)
             }
             NormalFrom::Edges => (Vec3::zeros(), 0.5 * (va + vb)),

@@ -26,10 +26,16 @@ pub(crate) struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// Writes sites and caches from the state.
+    /// Writes sites and caches from the state. What is static or not alive is at rest, whatever momentum it keeps.
     pub fn refresh(&mut self) {
         let (x, sites) = (&self.x[..], &mut *self.sites);
-        self.table.for_each_mut(|e| e.object.refresh(&x[e.span.x.clone()], &mut sites[e.span.site.clone()]));
+        self.table.for_each_mut(|e| {
+            let sites = &mut sites[e.span.site.clone()];
+            e.object.refresh(&x[e.span.x.clone()], sites);
+            if e.status.mode == Mode::Static || !e.status.alive {
+                sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
+            }
+        });
     }
 
     /// Forces at the present state and time `t`: rate of momentum of every object into `dp`, accelerations into the sites.

@@ -59,6 +59,10 @@ pub trait Integratable {
     fn dims(&self) -> Dims;
     /// Writes its state at time 0.
     fn write_initial(&self, x: &mut [f64]);
+    /// Whether these numbers, as many as its state has, are a state of it: finite, orientations of unit length.
+    fn accepts(&self, x: &[f64]) -> bool {
+        x.iter().all(|x| x.is_finite())
+    }
     /// Adds the forces that it feels of itself (gravity, damping) to its own rows of the force table.
     fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces);
     /// Generalized velocity at `x`.
@@ -69,6 +73,12 @@ pub trait Integratable {
     fn derivative(&self, x: &[f64], f: &ForceSlice, dp: &mut [f64]);
     /// Writes the accelerations of its sites for a rate of momentum `dp`.
     fn accelerations(&self, x: &[f64], dp: &[f64], sites: &mut [Site]);
+    /// Writes `dp − M·v̇`: what of the rate of momentum changes the velocity's direction in the body and not its size (`ω × L` of a rigid
+    /// body, Coriolis terms). Rows at the acceleration level need `v̇`. Zero where the mass matrix is constant.
+    fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
+        let _ = x;
+        out.fill(0.0);
+    }
     /// Momentum changes by `h·dp`; positions stay.
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64);
     /// Free motion for `h` seconds with the momentum held: exact or symmetric of second order at least.

@@ -70,7 +70,7 @@ pub struct RigidBody {
     inertia: Inertia,
     /// Surface constants.
     pub material: Material,
-    /// Linear damping, 1/s: a force `−c·P`.
+    /// Linear damping, 1/s: a force `−c·P`, taken at the stage's state like any other; keep `c·dt` below 1.
     pub linear_damping: f64,
     /// Angular damping, 1/s: a torque `−c·L`.
     pub angular_damping: f64,
@@ -84,6 +84,7 @@ pub struct RigidBody {
     pub initial_velocity: Vec3,
     /// Angular velocity at time 0, rad/s, world axes.
     pub initial_angular_velocity: Vec3,
+    fixture: bool,
     visuals: Vec<Visual>,
     cache: Cache,
 }
@@ -121,7 +122,7 @@ impl RigidBody {
         Ok(RigidBody {
             name, shape, mass, root_mass: mass.sqrt(), inertia, material: Material::default(), linear_damping: 0.0, angular_damping: 0.0,
             kind: CollisionKind::default(), meets: u64::MAX, initial_pose: Pose::identity(), initial_velocity: Vec3::zeros(),
-            initial_angular_velocity: Vec3::zeros(), visuals, cache,
+            initial_angular_velocity: Vec3::zeros(), fixture: false, visuals, cache,
         })
     }
 
@@ -148,9 +149,14 @@ impl RigidBody {
     /// Geometry that is meant to stay static or kinematic: mass and inertia are 1 and never felt, so it may be unbounded.
     pub fn fixture(name: impl Into<String>, shape: Shape) -> RigidBody {
         match RigidBody::new(name, shape, 1.0, Mat3::identity()) {
-            Ok(body) => body,
+            Ok(body) => RigidBody { fixture: true, ..body },
             Err(_) => unreachable!("unit mass and inertia are valid"),
         }
+    }
+
+    /// Whether it was made as a fixture, with a mass that means nothing.
+    pub fn is_fixture(&self) -> bool {
+        self.fixture
     }
 
     /// Sets the pose at time 0.
@@ -317,8 +323,7 @@ impl NetSync for RigidBody {
         }
         let (numbers, _) = data.as_chunks::<8>();
         let state: Vec<f64> = numbers.iter().map(|b| f64::from_le_bytes(*b)).collect();
-        let norm: f64 = state[3..7].iter().map(|q| q * q).sum();
-        if !(state.iter().all(|x| x.is_finite()) && (norm - 1.0).abs() < 1e-9) {
+        if !self.accepts(&state) {
             return Err(SyncError::Value);
         }
         x.copy_from_slice(&state);
@@ -338,6 +343,11 @@ impl Integratable for RigidBody {
         write_orientation(x, &q);
         x[7..10].copy_from_slice((self.mass * self.initial_velocity).as_slice());
         x[10..13].copy_from_slice(l.as_slice());
+    }
+
+    fn accepts(&self, x: &[f64]) -> bool {
+        let norm: f64 = x[3..7].iter().map(|q| q * q).sum();
+        x.iter().all(|x| x.is_finite()) && (norm - 1.0).abs() < 1e-9
     }
 
     fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
@@ -368,6 +378,11 @@ impl Integratable for RigidBody {
         site.acceleration = vec3(&dp[3..]) / self.mass;
         // α = I⁻¹(τ − ω × L)
         site.angular_acceleration = self.omega(&q, &(vec3(dp) - site.angular_velocity.cross(&l)));
+    }
+
+    fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
+        let l = vec3(&x[10..]);
+        write6(out, &self.omega(&orientation(x), &l).cross(&l), &Vec3::zeros());
     }
 
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {

@@ -60,14 +60,6 @@ impl Entry {
     pub fn moves(&self) -> bool {
         self.status.moves() && !self.span.v.is_empty()
     }
-
-    /// Its velocity as others meet it: zero for what is static.
-    pub fn seen(&self, site: &Site) -> Site {
-        if self.status.mode != Mode::Static && self.status.alive {
-            return *site;
-        }
-        Site { pose: site.pose, ..Site::default() }
-    }
 }
 
 impl Clone for Entry {

@@ -32,6 +32,8 @@ use crate::world::{Core, StepError};
 pub struct Backtracking {
     work: Workspace,
     after: Vec<Touch>,
+    /// Gap and its rate of every one-sided row of a constraint.
+    limits: Vec<(f64, f64)>,
     fallback: TimeStepping,
 }
 
@@ -71,8 +73,7 @@ impl Stepper for Backtracking {
             }
             self.gather(core, left)?;
             let roles = self.roles(core);
-            self.resolve_impacts(core, &roles);
-            let roles = self.roles(core);
+            let roles = if self.resolve_impacts(core, &roles) { self.gather(core, left).map(|_| self.roles(core))? } else { roles };
             let held = self.resolve_contacts(core, &roles, left)?;
             left -= self.advance(core, &roles, &held, left)?;
         }
@@ -92,7 +93,7 @@ impl Backtracking {
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = self.work.targets.iter().any(|t| off(t.error) || (t.set == RowSet::Equality && off(-t.error)));
         if drifted || self.work.touches.iter().any(|t| off(t.contact.gap)) {
-            projection::project(core, &mut self.work, &vec![0.0; core.dof], 1.0, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
+            projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
         }
@@ -115,8 +116,8 @@ impl Backtracking {
         self.work.touches.iter().map(role).collect()
     }
 
-    /// Thesis `ResolveImpacts`.
-    fn resolve_impacts(&mut self, core: &mut Core, roles: &[Role]) {
+    /// Thesis `ResolveImpacts`; whether anything was struck, so that other contacts may be near now.
+    fn resolve_impacts(&mut self, core: &mut Core, roles: &[Role]) -> bool {
         let work = &mut self.work;
         let s = core.settings;
         let candidates: Vec<Candidate> = work.touches.iter().zip(roles).map(|(touch, role)| {
@@ -129,9 +130,11 @@ impl Backtracking {
         whiten(core, &work.dp, 0.0, &mut u, &mut work.du_force);
         let before = u.clone();
         impact::resolve(core, work, &candidates, IMPACT_PASSES, &mut u, &mut total);
-        if total.iter().any(|l| *l != 0.0) {
+        let struck = total.iter().any(|l| *l != 0.0);
+        if struck {
             push(core, &u, &before, 1.0);
         }
+        struck
     }
 
     /// Thesis `ResolveContacts`: the generalized contact forces that hold over the sub-step.
@@ -145,7 +148,8 @@ impl Backtracking {
         work.dp = dp;
         let mut velocity = Vec::new();
         row_velocities(&work.rows, &work.bias, &u, &mut velocity);
-        row_velocities(&work.rows, &vec![0.0; work.rows.len], &work.du_force, &mut work.c);
+        let acceleration = without_gyroscopic(core, &work.dp, &work.du_force);
+        row_velocities(&work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
         let mut keep = vec![true; work.rows.blocks.len()];
         for (i, (touch, role)) in work.touches.iter().zip(roles).enumerate() {
             let range = work.rows.blocks[i].range();
@@ -157,10 +161,14 @@ impl Backtracking {
             keep[i] = role.touches && (role.lasts || velocity[range.start] < 1e-7);
         }
         let touches = work.touches.len();
+        self.limits.clear();
         for (i, target) in work.targets.iter().enumerate() {
             let row = work.rows.blocks[touches + i].row as usize;
             work.c[row] += target.bias_acceleration + (velocity[row] - target.velocity) / left;
-            keep[touches + i] = target.set != RowSet::HalfLine || target.error <= core.settings.contact_tolerance;
+            if target.set == RowSet::HalfLine {
+                self.limits.push((target.error, velocity[row]));
+                work.c[row] += target.error.max(0.0) / (left * left);
+            }
         }
         warm_start(core, work, 1.0);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
@@ -194,7 +202,7 @@ impl Backtracking {
             let deepest = std::mem::take(&mut core.report.max_penetration);
             detect(core, 0.0, &mut self.after);
             let f = self.margin(roles, tolerance);
-            let landed = f >= -tolerance && (f <= tolerance || h >= left);
+            let landed = f >= -tolerance && (f <= tolerance || bracket.high.is_none());
             let floored = f < -tolerance && h <= floor;
             let stuck = core.report.tries >= TRIES;
             if landed || floored || (stuck && f >= -tolerance) {
@@ -211,7 +219,7 @@ impl Backtracking {
                 core.motion().refresh();
                 return Ok(0.0);
             }
-            h = bracket.narrow(h, f, f < -tolerance).unwrap_or(left).max(floor.min(left));
+            h = bracket.narrow(h, f, f < -tolerance).max(floor.min(left));
         }
     }
 
@@ -222,7 +230,7 @@ impl Backtracking {
         core.check_finite(&self.work.dp)
     }
 
-    /// Where the parabola of the first nearing contact closes, s.
+    /// Where the parabola of the first nearing contact closes, or the first limit is reached, s.
     fn first_guess(&self, core: &Core, roles: &[Role], left: f64) -> f64 {
         let closing = |(touch, role): (&Touch, &Role)| -> Option<f64> {
             if role.touches {
@@ -235,7 +243,8 @@ impl Backtracking {
             let t = 2.0 * g / (-v + root.max(0.0).sqrt());
             (root >= 0.0 && t > 0.0 && t < left).then_some(t)
         };
-        self.work.touches.iter().zip(roles).filter_map(closing).fold(left, f64::min)
+        let limits = self.limits.iter().filter(|(gap, rate)| *gap > 0.0 && *rate < 0.0).map(|(gap, rate)| -gap / rate);
+        self.work.touches.iter().zip(roles).filter_map(closing).chain(limits).fold(left, f64::min)
     }
 
     /// Least gap of what does not touch yet, at the start of the sub-step.
@@ -266,9 +275,9 @@ struct Bracket {
 }
 
 impl Bracket {
-    /// Takes a try in; the next one, or `None` while nothing has crossed yet. False position by the Illinois rule (an end that stays twice
+    /// Takes a try in that did not land, and gives the next one. False position by the Illinois rule (an end that stays twice
     /// counts half), bisection every fourth time and wherever the margin before the crossing is only known to be large.
-    fn narrow(&mut self, h: f64, f: f64, crossed: bool) -> Option<f64> {
+    fn narrow(&mut self, h: f64, f: f64, crossed: bool) -> f64 {
         if crossed {
             self.same_side = self.same_side.min(0) - 1;
             self.high = Some((h, f));
@@ -276,7 +285,7 @@ impl Bracket {
             self.same_side = self.same_side.max(0) + 1;
             self.low = (h, f);
         }
-        let high = self.high.as_mut()?;
+        let high = self.high.get_or_insert((h, f));
         match self.same_side {
             2.. => high.1 *= 0.5,
             ..=-2 => self.low.1 *= 0.5,
@@ -284,8 +293,21 @@ impl Bracket {
         }
         let (width, share) = (high.0 - self.low.0, self.low.1 / (self.low.1 - high.1));
         let bisect = self.low.1 >= FAR || self.same_side.abs() % 4 == 3 || !share.is_finite();
-        Some(self.low.0 + width * if bisect { 0.5 } else { share.clamp(1e-3, 1.0 - 1e-3) })
+        self.low.0 + width * if bisect { 0.5 } else { share.clamp(1e-3, 1.0 - 1e-3) }
     }
+}
+
+/// `L·v̇` from `L⁻ᵀ·ṗ`: the rate of momentum less what turns it.
+fn without_gyroscopic(core: &Core, dp: &[f64], rate: &[f64]) -> Vec<f64> {
+    let mut out = rate.to_vec();
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        let mut turning = vec![0.0; dp[v.clone()].len()];
+        body.gyroscopic(&core.x[entry.span.x.clone()], &mut turning);
+        turning.iter_mut().zip(&dp[v.clone()]).for_each(|(t, dp)| *t = dp - *t);
+        body.respond(&turning, &mut out[v]);
+    }
+    out
 }
 
 /// Makes the whitened velocity `after` where it was `before`, and refreshes what readers see.

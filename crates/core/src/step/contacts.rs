@@ -6,7 +6,7 @@ use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, Islands, residual};
-use crate::view::{Mode, WorldView};
+use crate::view::{ObjectId, WorldView};
 use crate::world::{Core, StepError};
 use tumble_collide::Vec3;
 
@@ -52,25 +52,25 @@ pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Res
     work.targets.clear();
     let mut problem = None;
     let mut builder = RowBuilder {
-        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, sites: &core.sites, problem: &mut problem,
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
+        owner: ObjectId::default(),
     };
     for touch in &work.touches {
         let set = if touch.friction > 0.0 { RowSet::Cone { mu: touch.friction } } else { RowSet::HalfLine };
         builder.rows.push_block(set);
         builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
         let axes = &touch.frame.axes[..set.rows()];
-        for (site, sign) in [(touch.a, 1.0), (touch.b, -1.0)] {
+        for (site, point, sign) in [(touch.a, touch.contact.point, 1.0), (touch.b, touch.point_b(), -1.0)] {
             let owner = core.owners[site as usize];
-            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &touch.contact.point, axes, sign);
+            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
         }
     }
     let view = WorldView { time: core.time, gravity: core.settings.gravity, x: &core.x, sites: &core.sites, table: &core.table };
-    for (entry, object) in constraints(&core.table) {
-        if let Some(constraint) = object.constraint() {
-            constraint.rows(&entry.span, &view, level, &mut builder);
-            if let Some(why) = builder.problem.take() {
-                return Err(StepError::Row { object: object.name().to_string(), why });
-            }
+    for (id, entry, constraint) in constraints(&core.table) {
+        builder.owner = id;
+        constraint.rows(&entry.span, &view, level, &mut builder);
+        if let Some(why) = builder.problem.take() {
+            return Err(StepError::Row { object: entry.object.name().to_string(), why });
         }
     }
     let n = work.rows.len;
@@ -163,9 +163,4 @@ pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Itera
     work.touches.iter().zip(&work.rows.blocks).map(|(touch, block)| {
         block.range().zip(&touch.frame.axes).map(|(row, axis)| lambda[row] * axis).sum()
     })
-}
-
-/// Whether anything that is led moves: then energy may rightly grow.
-pub(crate) fn something_is_led(core: &Core) -> bool {
-    core.table.iter().any(|e| e.status.alive && e.status.mode == Mode::Kinematic)
 }

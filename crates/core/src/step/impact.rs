@@ -13,8 +13,9 @@
 //! `e = 0`, which ends the phase. With equal `e` on `A` and no friction the energy of a pass cannot grow; with friction or unequal `e` Newton's law can
 //! create energy, so a pass that does is blended with its `e = 0` solution just as far as the energy allows.
 
-use super::contacts::{Workspace, row_velocities, something_is_led};
-use crate::rows::{RowSet, Rows};
+use super::contacts::{Workspace, row_velocities};
+use crate::object::RowTarget;
+use crate::rows::{Block, RowSet, Rows};
 use crate::solver::{Accuracy, RowSolver, residual};
 use crate::world::Core;
 
@@ -31,6 +32,8 @@ pub(crate) struct Candidate {
 
 /// Impacts are solved to this share of the fastest row velocity, so that a reflection keeps energy to about this share.
 const PRECISION: f64 = 1e-13;
+/// A one-sided row of a constraint takes part when its gap is no larger, metres or radians.
+const AT_LIMIT: f64 = 1e-7;
 /// An approach slower than this is none, m/s.
 const APPROACH: f64 = 1e-9;
 /// An impact slower than this never bounces, m/s: bodies wedged between others would chatter for ever.
@@ -39,14 +42,15 @@ pub(crate) const SLOWEST_BOUNCE: f64 = 1e-4;
 /// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`.
 pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candidate], cap: u32, u: &mut [f64], total: &mut [f64]) {
     let set = core.settings.accuracy;
-    let guard = !something_is_led(core);
     let mut c = Vec::new();
     for pass in 0..=cap {
         row_velocities(&work.rows, &work.bias, u, &mut c);
         aim_constraints(work, &mut c);
         let approach = |i: usize| candidates[i].takes_part && c[work.rows.blocks[i].row as usize] < -APPROACH;
         let bounces = |i: usize| approach(i) && candidates[i].restitution > 0.0 && -c[work.rows.blocks[i].row as usize] > candidates[i].rest_speed;
-        if !(0..candidates.len()).any(approach) {
+        let limits = work.rows.blocks[candidates.len()..].iter().zip(&work.targets);
+        let at_limit = |(block, t): (&Block, &RowTarget)| t.set == RowSet::HalfLine && t.error <= AT_LIMIT && c[block.row as usize] < -APPROACH;
+        if !(0..candidates.len()).any(approach) && !limits.clone().any(at_limit) {
             return;
         }
         core.report.impact_passes += 1;
@@ -55,7 +59,7 @@ pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candi
         let last = pass == cap || !(0..candidates.len()).any(bounces);
         let member: Vec<bool> = (0..candidates.len()).map(|i| if last { candidates[i].takes_part } else { approach(i) }).collect();
         let bounce: Vec<f64> = (0..candidates.len()).map(|i| if !last && bounces(i) { candidates[i].restitution } else { 0.0 }).collect();
-        reflect(core, work, &c, &member, &bounce, accuracy, guard);
+        reflect(core, work, &c, &member, &bounce, accuracy);
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
         total.iter_mut().zip(&work.lambda).for_each(|(t, l)| *t += l);
         if last {
@@ -72,11 +76,12 @@ fn aim_constraints(work: &Workspace, c: &mut [f64]) {
 }
 
 /// One pass: leaves the multipliers in `work.lambda` and their effect in `work.du`.
-fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bounce: &[f64], accuracy: Accuracy, guard: bool) {
+fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bounce: &[f64], accuracy: Accuracy) {
     let touches = work.touches.len();
     let targets = &work.targets;
     work.islands.build(&work.rows, |b| {
-        if b < touches { member[b] } else { targets[b - touches].set == RowSet::Equality || targets[b - touches].error <= 0.0 }
+        let takes_part = |t: &RowTarget| t.set == RowSet::Equality || (t.set == RowSet::HalfLine && t.error <= AT_LIMIT);
+        if b < touches { member[b] } else { takes_part(&targets[b - touches]) }
     });
     work.c.copy_from_slice(c);
     for (block, bounce) in work.rows.blocks.iter().zip(bounce) {
@@ -88,6 +93,12 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bo
         let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, accuracy);
         core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
         let bounces = blocks.iter().any(|&b| bounce.get(b as usize).is_some_and(|e| *e > 0.0));
+        // Where something led or a motor takes part, energy may rightly grow.
+        let led = |&b: &u32| {
+            let target = (b as usize).checked_sub(touches).map_or(0.0, |i| targets[i].velocity);
+            target != 0.0 || work.rows.blocks[b as usize].range().any(|row| work.bias[row] != 0.0)
+        };
+        let guard = !blocks.iter().any(led);
         let scale: f64 = rows_of(&work.rows, blocks).map(|i| (work.lambda[i] * c[i]).abs()).sum();
         if guard && bounces && work_done(&work.rows, blocks, c, &work.lambda, &work.du) > 1e-12 * scale {
             blend(core.solver.as_ref(), &work.rows, blocks, c, &mut work.lambda, &mut work.du, accuracy);

@@ -2,6 +2,7 @@
 
 mod backtracking;
 mod contacts;
+mod flight;
 mod impact;
 mod projection;
 mod time_stepping;

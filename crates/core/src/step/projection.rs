@@ -4,25 +4,39 @@
 //! find Δ = M⁻¹Jᵀλ of least kinetic norm with   gap + h·n·(v̄ + Δ) ≥ 0 ⟂ λ ≥ 0   and, for equalities,   error + h·J(v̄ + Δ) = 0
 //! ```
 //!
-//! `v̄` is the displacement velocity of the step (0 for a projection in place, with `h = 1`). Existing depth is recovered at a bounded speed.
+//! `v̄` is the displacement velocity of the step, less what led bodies and motors are meant to move (0 for a projection in place, with
+//! `h = 1`). What was wrong before is recovered at a bounded speed.
 
 use super::contacts::{Workspace, displace};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, GaussSeidel, RowSolver};
 use crate::world::Core;
 
-/// Corrects positions so that the step's displacement `h·mean` (whitened) ends without overlap. `recovery` bounds how much of the depth that
-/// was there before is undone, metres; an island that is wrong by no more than `least` metres is left alone.
-pub(crate) fn project(core: &mut Core, work: &mut Workspace, mean: &[f64], h: f64, recovery: f64, least: f64) {
-    for block in &work.rows.blocks {
-        work.c[block.row as usize] = work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean);
+/// What is to be projected.
+pub(crate) enum Displacement<'a> {
+    /// The displacement `h·mean` (whitened) of a step that ends here; led bodies and motors move with their own velocities.
+    Step { mean: &'a [f64], h: f64 },
+    /// None: bodies are moved apart where they are.
+    InPlace,
+}
+
+/// Corrects positions so that the displacement ends without overlap. `recovery` bounds how much of the error that was there before is undone,
+/// metres; an island that is wrong by no more than `least` metres is left alone.
+pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displacement, recovery: f64, least: f64) {
+    let h = if let Displacement::Step { h, .. } = displacement { h } else { 1.0 };
+    for (b, block) in work.rows.blocks.iter().enumerate() {
+        let target = b.checked_sub(work.touches.len()).map_or(0.0, |i| work.targets[i].velocity);
+        work.c[block.row as usize] = match displacement {
+            Displacement::Step { mean, .. } => work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean) - target,
+            Displacement::InPlace => 0.0,
+        };
     }
     let touches = work.touches.len();
     let violation = |b: usize, c: &[f64]| -> f64 {
         let v = c[work.rows.blocks[b].row as usize];
         match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
             (Some(touch), _) => -(allowed(touch.contact.gap, recovery) + h * v),
-            (None, Some(t)) if t.set == RowSet::Equality => (t.error + h * v).abs(),
+            (None, Some(t)) if t.set == RowSet::Equality => (t.error.clamp(-recovery, recovery) + h * v).abs(),
             (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
             _ => 0.0,
         }
@@ -68,7 +82,7 @@ impl Projection {
                 Some(touch) => (RowSet::HalfLine, allowed(touch.contact.gap, recovery)),
                 None => match work.targets[b - work.touches.len()] {
                     t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
-                    t => (t.set, t.error),
+                    t => (t.set, t.error.clamp(-recovery, recovery)),
                 },
             };
             self.rows.push_block(set);
@@ -80,7 +94,9 @@ impl Projection {
             }
             self.c.push(work.c[block.row as usize] + error / h);
         }
-        (self.lambda.clear(), self.lambda.resize(self.rows.len, 0.0));
-        (self.du.clear(), self.du.resize(work.rows.dof, 0.0));
+        self.lambda.clear();
+        self.lambda.resize(self.rows.len, 0.0);
+        self.du.clear();
+        self.du.resize(work.rows.dof, 0.0);
     }
 }

@@ -17,7 +17,8 @@
 
 use super::contacts::{build_rows, detect, displace, impulses, kick, recover, row_velocities, solve, warm_start, whiten};
 use super::impact::{self, Candidate};
-use super::{Frame, Stepper, Workspace, projection};
+use super::projection::{self, Displacement};
+use super::{Frame, Stepper, Workspace, flight};
 use crate::motion::coast;
 use crate::object::Level;
 use crate::rows::RowSet;
@@ -59,6 +60,7 @@ impl TimeStepping {
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
         self.smooth_forces(core, h)?;
         detect(core, h, &mut self.work.touches);
+        flight::time_contacts(core, h, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Velocity { h })?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
@@ -92,7 +94,7 @@ impl TimeStepping {
         if work.touches.iter().all(|t| t.restitution <= 0.0) {
             return u.to_vec();
         }
-        let (mut before, mut gain) = (Vec::new(), Vec::new());
+        let (mut before, mut gain, mut meets) = (Vec::new(), Vec::new(), Vec::new());
         row_velocities(&work.rows, &work.bias, u, &mut before);
         row_velocities(&work.rows, &vec![0.0; work.rows.len], du_force, &mut gain);
         for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
@@ -103,16 +105,37 @@ impl TimeStepping {
                 let slot = &mut self.share[i as usize];
                 *slot = share.map_or(*slot, |s| if *slot < 0.0 { s } else { slot.min(s) });
             }
-            let takes_part = share.is_some() || gap <= core.settings.drift_tolerance;
-            self.candidates.push(Candidate { takes_part, rest_speed, restitution: touch.restitution });
+            meets.push(share);
+            self.candidates.push(Candidate { takes_part: gap <= core.settings.drift_tolerance, rest_speed, restitution: touch.restitution });
         }
         if self.share.iter().all(|s| *s < 0.0) {
             return u.to_vec();
         }
+        self.first_impacts(&meets);
+        let work = &mut self.work;
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.share[i].max(0.0) * du_force[i]).collect();
         let mut after = at_impact.clone();
         impact::resolve(core, work, &self.candidates, IMPACT_PASSES, &mut after, &mut self.impact);
         (0..u.len()).map(|i| u[i] + (after[i] - at_impact[i])).collect()
+    }
+
+    /// Who takes part in the impacts: those that are the first of both their bodies, and what touches them. A later one waits for the next
+    /// step; an island without an impact is left alone.
+    fn first_impacts(&mut self, meets: &[Option<f64>]) {
+        let work = &mut self.work;
+        let first = |i: usize| {
+            let sides = work.rows.blocks[i].sides();
+            meets[i].is_some_and(|s| sides.iter().all(|side| s <= self.share[side.u as usize] + 1e-9))
+        };
+        let strikes: Vec<bool> = (0..meets.len()).map(first).collect();
+        for (candidate, strikes) in self.candidates.iter_mut().zip(&strikes) {
+            candidate.takes_part |= strikes;
+        }
+        let (candidates, touches) = (&mut self.candidates, work.touches.len());
+        work.islands.build(&work.rows, |b| b >= touches || candidates[b].takes_part);
+        for blocks in work.islands.iter().filter(|blocks| !blocks.iter().any(|&b| strikes.get(b as usize) == Some(&true))) {
+            blocks.iter().map(|&b| b as usize).filter(|b| *b < touches).for_each(|b| candidates[b].takes_part = false);
+        }
     }
 
     /// Adds the forces and solves all contacts and constraints of the step: `u` becomes the velocity at its end.
@@ -156,7 +179,8 @@ impl TimeStepping {
         displace(core, &parabola, h);
         let mean: Vec<f64> = (0..core.dof).map(|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]).collect();
         let recovery = core.settings.recovery_speed * h;
-        projection::project(core, &mut self.work, &mean, h, recovery, core.settings.contact_tolerance);
+        let least = core.settings.contact_tolerance;
+        projection::project(core, &mut self.work, Displacement::Step { mean: &mean, h }, recovery, least);
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
         core.check_finite(&dp)

@@ -3,10 +3,9 @@
 use super::{World, WorldError};
 use crate::object::{Integratable, Object};
 use crate::rigid::{RigidBody, orientation, vec3};
-use crate::rotation::turn;
 use crate::site::Site;
 use crate::view::{Mode, ObjectId, Status};
-use tumble_collide::{Pose, Quat, Vec3};
+use tumble_collide::{Pose, Vec3};
 
 impl World {
     /// An object by id.
@@ -60,12 +59,12 @@ impl World {
         Some(&self.core.x[self.core.table.slots.get(id)?.span.x.clone()])
     }
 
-    /// Writes an object's slice of the state, all of it (see the object's type for what the numbers mean). Refused where a number is not
-    /// finite or the length is wrong.
+    /// Writes an object's slice of the state, all of it (see the object's type for what the numbers mean). Refused where it is no state of it.
     pub fn write_state_of(&mut self, id: ObjectId, x: &[f64]) -> Result<(), WorldError> {
         let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
-        if x.len() != entry.span.x.len() || x.iter().any(|x| !x.is_finite()) {
-            return Err(WorldError::NotFinite(entry.object.name().to_string()));
+        let accepted = |body: &dyn Integratable| x.len() == entry.span.x.len() && body.accepts(x);
+        if !entry.object.integratable().is_some_and(accepted) {
+            return Err(WorldError::BadState(entry.object.name().to_string()));
         }
         self.core.x[entry.span.x.clone()].copy_from_slice(x);
         self.core.motion().refresh();
@@ -92,9 +91,13 @@ impl World {
     /// Gives a kinematic body the velocity that brings it to `target` at the end of the next frame.
     pub fn move_to(&mut self, id: ObjectId, target: Pose) -> Result<(), WorldError> {
         let dt = self.core.settings.dt;
+        if !target.to_homogeneous().iter().all(|x| x.is_finite()) {
+            let name = self.object(id).ok_or(WorldError::Stale)?.name().to_string();
+            return Err(WorldError::NotFinite(name));
+        }
         self.edit_rigid(id, |body, x| {
             let v = (target.translation.vector - vec3(x)) / dt;
-            let w = rotation_vector(&(target.rotation * orientation(x).inverse())) / dt;
+            let w = (target.rotation * orientation(x).inverse()).scaled_axis() / dt;
             body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]);
         })
     }
@@ -132,7 +135,10 @@ impl World {
     }
 
     fn part(&self, id: ObjectId, part: usize, numbers: &[Vec3]) -> Result<usize, WorldError> {
-        let entry = self.core.table.slots.get(id).filter(|e| part < e.span.site.len()).ok_or(WorldError::Stale)?;
+        let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        if part >= entry.span.site.len() {
+            return Err(WorldError::NoPart { name: entry.object.name().to_string(), part });
+        }
         if numbers.iter().flat_map(|v| v.iter()).any(|x| !x.is_finite()) {
             return Err(WorldError::NotFinite(entry.object.name().to_string()));
         }
@@ -146,18 +152,11 @@ impl World {
         let body = any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.object.name().to_string()))?;
         let mut x = core.x[entry.span.x.clone()].to_vec();
         edit(body, &mut x);
-        if x.iter().any(|x| !x.is_finite()) {
-            return Err(WorldError::NotFinite(entry.object.name().to_string()));
+        if !body.accepts(&x) {
+            return Err(WorldError::BadState(entry.object.name().to_string()));
         }
         core.x[entry.span.x.clone()].copy_from_slice(&x);
         core.motion().refresh();
         Ok(())
     }
-}
-
-/// The rotation vector (axis times angle up to π) of a rotation: the inverse of [`turn`] by one second.
-fn rotation_vector(q: &Quat) -> Vec3 {
-    let v = q.scaled_axis();
-    debug_assert!((turn(&Quat::identity(), &v, 1.0).angle_to(q)) < 1e-6);
-    v
 }

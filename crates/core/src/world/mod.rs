@@ -38,6 +38,27 @@ pub enum WorldError {
     /// What was asked for needs a rigid body.
     #[error("'{0}' is not a rigid body")]
     NotRigid(String),
+    /// Every collidable part has one row in the site table.
+    #[error("'{name}' has {parts} collidable parts and {sites} sites; the numbers must be equal")]
+    Parts {
+        /// Object.
+        name: String,
+        /// Parts that its `Collidable` names.
+        parts: usize,
+        /// Sites that its `Dims` name.
+        sites: usize,
+    },
+    /// The object has no such part.
+    #[error("'{name}' has no part {part}")]
+    NoPart {
+        /// Object.
+        name: String,
+        /// Part asked for.
+        part: usize,
+    },
+    /// Numbers that are no state of this object: wrong length, not finite, or an orientation that is not of unit length.
+    #[error("'{0}': these numbers are no state of it (wrong length, not finite, or an orientation that is not of unit length)")]
+    BadState(String),
     /// A number given is not finite.
     #[error("'{0}': a number given is not finite")]
     NotFinite(String),
@@ -47,6 +68,8 @@ pub enum WorldError {
 pub struct World {
     core: Core,
     stepper: Box<dyn Stepper>,
+    /// State before the frame, for when it fails.
+    before: Vec<f64>,
 }
 
 impl World {
@@ -59,7 +82,7 @@ impl World {
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
             report: StepReport::default(), next_serial: 0,
         };
-        Ok(World { core, stepper: Box::<TimeStepping>::default() })
+        Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new() })
     }
 
     /// Replaces the stepper.
@@ -89,13 +112,23 @@ impl World {
         Ok(())
     }
 
-    /// Advances by one frame. On an error the world is as the last committed sub-step left it.
+    /// Advances by one frame. On an error state and time are as they were before it; the forces applied for the frame are spent either way.
     pub fn step(&mut self) -> Result<&StepReport, StepError> {
         let core = &mut self.core;
         core.report = StepReport::default();
-        self.stepper.step(Frame { core })?;
-        core.frame += 1;
+        core.held.fill(0.0);
+        self.before.clone_from(&core.x);
+        let (time, warm) = (core.time, core.warm.clone());
+        let outcome = self.stepper.step(Frame { core });
         core.applied.fill(Wrench::default());
+        if let Err(error) = outcome {
+            core.x.clone_from(&self.before);
+            (core.time, core.warm) = (time, warm);
+            core.sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
+            core.motion().refresh();
+            return Err(error);
+        }
+        core.frame += 1;
         Ok(&core.report)
     }
 
@@ -167,9 +200,11 @@ impl World {
         moving.filter_map(|e| Some((&self.core.x[e.span.x.clone()], e.object.integratable()?)))
     }
 
-    /// Adds an object; it moves unless [`set_mode`](Self::set_mode) says otherwise.
+    /// Adds an object; it moves unless it is a [fixture](RigidBody::fixture), which is static, or [`set_mode`](Self::set_mode) says otherwise.
     pub fn add(&mut self, object: impl Object) -> Result<ObjectId, WorldError> {
-        self.add_boxed(Box::new(object), Mode::Dynamic)
+        let any: &dyn std::any::Any = &object;
+        let fixture = any.downcast_ref::<RigidBody>().is_some_and(RigidBody::is_fixture);
+        self.add_boxed(Box::new(object), if fixture { Mode::Static } else { Mode::Dynamic })
     }
 
     /// Adds an object that never moves.
@@ -193,6 +228,9 @@ impl World {
         let core = &mut self.core;
         let parts = object.collidable().map_or(0, |c| c.parts());
         let dims = object.integratable().map_or(Dims { x: 0, dof: 0, sites: parts }, |i| i.dims());
+        if object.collidable().is_some() && dims.sites != parts {
+            return Err(WorldError::Parts { name, parts, sites: dims.sites });
+        }
         let span = Span {
             x: core.x.len()..core.x.len() + dims.x,
             v: core.dof..core.dof + dims.dof,
@@ -229,7 +267,7 @@ impl World {
         core.owners.drain(gone.span.site.clone());
         core.applied.drain(gone.span.site.clone());
         core.dof -= gone.span.v.len();
-        core.held.resize(core.dof, 0.0);
+        core.held.truncate(core.dof);
         let (dx, dv, ds) = (gone.span.x.len(), gone.span.v.len(), gone.span.site.len());
         for &other in &core.table.order {
             let span = &mut core.table.slots[other].span;
@@ -257,6 +295,7 @@ impl World {
                 contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial,
             },
             stepper: self.stepper.fork(),
+            before: Vec::new(),
         }
     }
 }

@@ -28,11 +28,13 @@ pub enum SnapshotError {
         ours: String,
     },
     /// A number in it is not finite.
-    #[error("the snapshot holds a number that is not finite")]
+    #[error("the snapshot holds a number that is not finite, or an orientation that is not of unit length")]
     NotFinite,
 }
 
 const MAGIC: [u8; 8] = *b"tumbleS1";
+/// Objects that a world may have seen, at most; frames are capped by its square.
+const MOST: u32 = 1 << 31;
 
 #[derive(Serialize, Deserialize)]
 struct Snapshot {
@@ -112,6 +114,7 @@ impl World {
             *wrench = Wrench { torque, force };
         }
         core.contacts.clear();
+        core.held.fill(0.0);
         core.motion().refresh();
         Ok(())
     }
@@ -141,6 +144,14 @@ impl World {
         }
         let numbers = saved.x.iter().chain(saved.accelerations.iter().flatten()).chain(saved.applied.iter().flatten());
         let finite = saved.time.is_finite() && numbers.copied().all(f64::is_finite) && saved.warm.finite();
-        if finite { Ok(()) } else { Err(SnapshotError::NotFinite) }
+        let states = c.table.iter().all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.span.x.clone()])));
+        if !(finite && states) {
+            return Err(SnapshotError::NotFinite);
+        }
+        let counts = saved.objects.is_sorted_by(|a, b| a.serial < b.serial) && saved.objects.iter().all(|o| o.serial < saved.next_serial);
+        if counts && saved.next_serial < MOST && saved.frame < MOST as u64 * MOST as u64 && saved.warm.in_order() {
+            return Ok(());
+        }
+        Err(SnapshotError::Format("its counters or its contacts are out of order".into()))
     }
 }

@@ -3,7 +3,9 @@
 mod free;
 mod friction;
 mod impacts;
+mod solvers;
 mod stacks;
 mod common;
+mod meshes;
 mod paradox;
 mod state;

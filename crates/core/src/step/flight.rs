@@ -1,0 +1,102 @@
+//! When and how bodies that are still apart meet within a step: conservative advancement along free motion.
+//!
+//! A speculative contact freezes the normal of the step's start. A ball that flies past another would be stopped by it, and one that
+//! strikes off centre would bounce along the wrong line. So a contact that closes within the step is followed to where the surfaces meet:
+//!
+//! ```text
+//! t ← 0;  repeat   t += root of  gap + v_n·τ + ½·a_n·τ² = 0,   then gap and normal anew by the narrow phase at the poses coasted by t
+//! ```
+//!
+//! Between convex bodies the gap along the present normal closes no later than the bodies meet, so no step overshoots. A contact that never
+//! closes is dropped. One that does takes the normal and the lever arms of that moment, and the gap that free motion closes by then.
+
+use crate::collidable::{Collidable, ContactFrame};
+use crate::detect::Touch;
+use crate::rotation::turn;
+use crate::site::Site;
+use crate::world::Core;
+use nalgebra::Translation3;
+use tumble_collide::{Contact, Pose, Shape, Vec3};
+
+/// Advances at most; what has not met by then is near enough.
+const ADVANCES: u32 = 12;
+
+/// Follows every touch that is apart by more than the drift tolerance and closes within `h`; drops those that miss.
+pub(super) fn time_contacts(core: &Core, h: f64, touches: &mut Vec<Touch>) {
+    let near = core.settings.drift_tolerance;
+    let mut found = Vec::new();
+    touches.retain_mut(|touch| {
+        let (a, b) = (&core.sites[touch.a as usize], &core.sites[touch.b as usize]);
+        if touch.contact.gap <= near || closing_time(touch.contact.gap, &touch.contact, a, b, 0.0).is_none_or(|t| t > h) {
+            return true;
+        }
+        let (Some(shape_a), Some(shape_b)) = (shape(core, touch.a), shape(core, touch.b)) else { return true };
+        if shape_a.tree().is_some() || shape_b.tree().is_some() {
+            return true; // a tree's contacts come and go with its leaves
+        }
+        match follow(touch, (shape_a, a), (shape_b, b), h, near, &mut found) {
+            Some((time, contact)) => {
+                meet(touch, &contact, a, b, time);
+                true
+            }
+            None => false,
+        }
+    });
+}
+
+fn shape(core: &Core, site: u32) -> Option<&Shape> {
+    let owner = core.owners[site as usize];
+    let body: &dyn Collidable = core.table.slots[owner.id].object.collidable()?;
+    Some(body.shape(owner.part as usize))
+}
+
+/// The moment at which the touch has closed to `near`, and the contact there; `None` where it does not within `h`.
+fn follow(touch: &Touch, a: (&Shape, &Site), b: (&Shape, &Site), h: f64, near: f64, found: &mut Vec<Contact>) -> Option<(f64, Contact)> {
+    let (mut time, mut contact) = (0.0, touch.contact);
+    for _ in 0..ADVANCES {
+        // aim at half the distance that counts as near, so that the last advance is not for ever short of it
+        time += closing_time(contact.gap - 0.5 * near, &contact, a.1, b.1, time)?;
+        if time > h {
+            return None;
+        }
+        let (pose_a, pose_b) = (coasted(a.1, time), coasted(b.1, time));
+        found.clear();
+        tumble_collide::contacts(a.0, &pose_a, b.0, &pose_b, touch.contact.gap + near, found);
+        let same = found.iter().find(|c| c.feature == touch.contact.feature);
+        let nearest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap));
+        contact = *same.or(nearest)?;
+        if contact.gap <= near {
+            break;
+        }
+    }
+    Some((time, contact))
+}
+
+/// Time from `t` on until `gap` closes along the contact's normal in free motion.
+fn closing_time(gap: f64, contact: &Contact, a: &Site, b: &Site, t: f64) -> Option<f64> {
+    let spin = |s: &Site| s.velocity_at(&contact.point) - s.velocity;
+    let v = contact.normal.dot(&(a.velocity - b.velocity + t * (a.acceleration - b.acceleration) + spin(a) - spin(b)));
+    let acceleration = contact.normal.dot(&(a.acceleration - b.acceleration));
+    if gap <= 0.0 {
+        return (v < 0.0).then_some(0.0);
+    }
+    let root = v * v - 2.0 * acceleration * gap;
+    let time = 2.0 * gap / (-v + root.max(0.0).sqrt());
+    (root >= 0.0 && time > 0.0).then_some(time)
+}
+
+/// A pose after `t` seconds of free motion.
+fn coasted(site: &Site, t: f64) -> Pose {
+    let position = site.position() + t * site.velocity + 0.5 * t * t * site.acceleration;
+    Pose::from_parts(Translation3::from(position), turn(&site.pose.rotation, &site.angular_velocity, t))
+}
+
+/// Gives the touch the contact of the moment `t`, seen from the start: lever arms of then, and the gap that free motion closes by then.
+fn meet(touch: &mut Touch, contact: &Contact, a: &Site, b: &Site, t: f64) {
+    let moved = |s: &Site| coasted(s, t).translation.vector - s.position();
+    let (move_a, move_b): (Vec3, Vec3) = (moved(a), moved(b));
+    let closed = contact.normal.dot(&(move_a - move_b));
+    touch.contact = Contact { point: contact.point - move_a, gap: contact.gap - closed, feature: touch.contact.feature, ..*contact };
+    touch.offset = move_a - move_b;
+    touch.frame = ContactFrame::new(contact.point, contact.normal);
+}

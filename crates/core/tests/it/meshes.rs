@@ -1,0 +1,75 @@
+//! Closed meshes at rest: on their sphere trees, through both steppers.
+
+use crate::common::*;
+use std::path::PathBuf;
+use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::*;
+
+/// The folder of the public test meshes: `TUMBLE_MESHES`, else the nearest `shared/meshes` above this crate.
+fn folder() -> Option<PathBuf> {
+    let named = std::env::var_os("TUMBLE_MESHES").map(PathBuf::from);
+    let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    named.or_else(|| here.ancestors().map(|a| a.join("shared/meshes")).find(|p| p.is_dir()))
+}
+
+/// Below this a body rests, m/s, at its furthest point. What carries a mesh changes from frame to frame among the spheres that are within a few
+/// micrometres of the plane, and a contact made or lost within a frame changes speeds by up to `g·h` = 41 mm/s: a quarter of it is left to that.
+const REST: f64 = 0.25 * G / 240.0;
+
+/// Drops a mesh of 1000 kg/m³ over a half-space and runs: in the last second it is slower than `REST` everywhere on it and stays within
+/// 0.5 mm of where it was, and it never was deeper than the stated outward error of its tree.
+fn comes_to_rest(name: &str, mesh: &TriMesh, turn: Vec3, height: f64, seconds: f64) {
+    for stepper in STEPPERS {
+        let (shape, _) = Shape::mesh(mesh.clone(), &TreeSettings::default()).unwrap();
+        let (error, reach) = (shape.tree().unwrap().outward_error(), shape.bounding_radius());
+        let mut world = world(stepper, 1.0 / 240.0);
+        ground(&mut world, 0.2, 0.6);
+        let body = RigidBody::with_density(name, shape, 1000.0).unwrap().surface(0.2, 0.6);
+        let id = world.add(body.at(Pose::new(Vec3::new(0.0, 0.0, height), turn))).unwrap();
+        let (mut deepest, mut touched, mut there) = (0.0f64, 0, Vec3::zeros());
+        let frames = (seconds * 240.0) as usize;
+        for frame in 0..frames {
+            let report = world.step().unwrap();
+            deepest = deepest.max(report.max_penetration);
+            touched += (report.contacts > 0) as usize;
+            let site = world.site(id, 0).unwrap();
+            if frame + 240 < frames {
+                there = site.position();
+                continue;
+            }
+            let speed = site.velocity.norm() + reach * site.angular_velocity.norm();
+            assert!(speed < REST, "{stepper}: '{name}' moves at {speed} m/s after {} s", world.time());
+            assert!((site.position() - there).norm() < 5e-4, "{stepper}: '{name}' wandered by {} m", (site.position() - there).norm());
+        }
+        assert!(touched > frames / 2 && position(&world, id).z > 0.0, "{stepper}: '{name}' is at {}", position(&world, id));
+        assert!(deepest < error, "{stepper}: '{name}' was {deepest} m deep, its tree's error is {error} m");
+        assert!(world.energy().kinetic < 1e-5 * world.get::<RigidBody>(id).unwrap().mass() * G * height);
+    }
+}
+
+const ASKEW: Vec3 = Vec3::new(0.3, 0.2, 0.1);
+
+#[test]
+fn the_bunny_comes_to_rest_on_a_plane() {
+    let Some(folder) = folder() else {
+        eprintln!("SKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set", env!("CARGO_MANIFEST_DIR"));
+        return;
+    };
+    let path = folder.join("bunny.obj");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    comes_to_rest("bunny", &TriMesh::from_obj(&text).unwrap().scaled(0.1), ASKEW, 0.4, 12.0);
+}
+
+#[test]
+fn a_torus_that_falls_askew_comes_to_lie_flat() {
+    let mesh = TriMesh::torus(0.1, 0.04, 32, 16);
+    comes_to_rest("torus", &mesh, ASKEW, 0.4, 4.0);
+}
+
+/// A turned pin lands on its foot and stands.
+#[test]
+fn a_turned_pin_stands() {
+    let profile = [(0.0, 0.0), (0.026, 0.0), (0.06, 0.11), (0.023, 0.25), (0.03, 0.34), (0.0, 0.38)];
+    let mesh = TriMesh::lathe(&profile, 24).unwrap();
+    comes_to_rest("pin", &mesh, Vec3::zeros(), 0.2, 3.0);
+}

@@ -1,0 +1,105 @@
+//! Every solver in the same worlds: friction that does not lift, stops where it should, and agreement where there is no friction.
+
+use crate::common::*;
+use tumble_core::collide::{Pose, Vec3};
+use tumble_core::solver::{Accuracy, NAMES, by_name};
+use tumble_core::*;
+
+fn set(world: &mut World, solver: &str) {
+    world.set_solver(by_name(solver).unwrap());
+}
+
+/// Slides a cube at 5 m/s, μ = 0.5; distance and time of its stop (time from the last two speeds), and the largest gap under it.
+fn slide(stepper: &str, solver: &str, dt: f64) -> (f64, f64, f64) {
+    let mut world = world(stepper, dt);
+    set(&mut world, solver);
+    ground(&mut world, 0.0, 0.5);
+    let body = RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.5);
+    let id = world.add(body.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(5.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+    let (mut stop, mut gap) = (f64::NAN, 0.0f64);
+    for _ in 0..(1.5 / dt) as usize {
+        let (before, start) = (velocity(&world, id).x, world.time());
+        world.step().unwrap();
+        gap = gap.max(position(&world, id).z - 0.1);
+        if stop.is_nan() && velocity(&world, id).x.abs() < 1e-9 {
+            stop = start + before / (0.5 * G);
+        }
+    }
+    (position(&world, id).x, stop, gap)
+}
+
+#[test]
+fn no_solver_lifts_a_box_that_slides_fast_at_60_hz() {
+    for stepper in STEPPERS {
+        for solver in NAMES {
+            let (_, _, gap) = slide(stepper, solver, 1.0 / 60.0);
+            assert!(gap < 1e-4, "{stepper}, {solver}: lifted by {gap} m");
+        }
+    }
+}
+
+#[test]
+fn a_sliding_box_stops_where_and_when_it_should_with_every_solver() {
+    for stepper in STEPPERS {
+        for solver in NAMES {
+            let (distance, time, _) = slide(stepper, solver, 1.0 / 240.0);
+            assert!((distance / 2.548420 - 1.0).abs() < 1e-4, "{stepper}, {solver}: stops after {distance} m");
+            assert!((time / 1.019368 - 1.0).abs() < 1e-4, "{stepper}, {solver}: stops after {time} s");
+        }
+    }
+}
+
+#[test]
+fn five_boxes_stand_with_every_solver() {
+    for stepper in STEPPERS {
+        for solver in NAMES {
+            let mut world = world(stepper, 1.0 / 60.0);
+            set(&mut world, solver);
+            ground(&mut world, 0.0, 0.5);
+            let ids: Vec<ObjectId> = (0..5).map(|i| {
+                let body = RigidBody::with_mass(format!("box{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
+                world.add(body.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
+            }).collect();
+            (0..60).for_each(|_| { world.step().unwrap(); });
+            for (i, id) in ids.iter().enumerate() {
+                let off = (position(&world, *id) - Vec3::new(0.0, 0.0, 0.25 + 0.5 * i as f64)).norm();
+                assert!(off < 1e-4 && velocity(&world, *id).norm() < 1e-3, "{stepper}, {solver}: box {i} is {off} m off at {} m/s", velocity(&world, *id).norm());
+            }
+        }
+    }
+}
+
+/// A frictionless pile in mid-fall: 20 spheres and boxes pressed against each other and the ground.
+fn pile(stepper: &str) -> World {
+    let mut world = world(stepper, 1.0 / 240.0);
+    world.set_settings(Settings { accuracy: Accuracy { sweeps: 200_000, relaxations: u32::MAX, tolerance: 1e-12 }, ..*world.settings() }).unwrap();
+    ground(&mut world, 0.0, 0.0);
+    for i in 0..20 {
+        let (x, y, z) = (0.19 * (i % 2) as f64, 0.19 * ((i / 2) % 2) as f64, 0.1 + 0.195 * (i / 4) as f64);
+        let shape = if i % 3 == 0 { sphere(0.1) } else { cube(0.19) };
+        let body = RigidBody::with_mass(format!("body{i}"), shape, 1.0 + 0.1 * i as f64).unwrap().surface(0.0, 0.0);
+        world.add(body.at(Pose::translation(x, y, z)).moving(Vec3::new(0.2 - 0.4 * (i % 2) as f64, 0.1 * (i % 3) as f64, -1.0), Vec3::zeros())).unwrap();
+    }
+    world
+}
+
+/// Without friction the problem is convex: the velocities after a step are unique, whatever the solver.
+#[test]
+fn pivoting_and_gauss_seidel_agree_on_a_frictionless_pile() {
+    for stepper in STEPPERS {
+        let start = pile(stepper);
+        let speeds = |solver: &str| -> Vec<Vec3> {
+            let mut world = start.fork();
+            set(&mut world, solver);
+            world.step().unwrap();
+            assert!(world.contacts().len() > 30, "{} contacts", world.contacts().len());
+            assert!(world.report().residual < 1e-8, "{stepper}, {solver}: residual {:e}", world.report().residual);
+            world.sites().iter().flat_map(|s| [s.velocity, s.angular_velocity]).collect()
+        };
+        let (pivoting, sweeping) = (speeds("lcp_pyramid"), speeds("gauss_seidel"));
+        let apart = pivoting.iter().zip(&sweeping).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(apart < 1e-6, "{stepper}: velocities differ by {apart:e}");
+        let moved = pivoting.iter().map(|v| v.norm()).fold(0.0, f64::max);
+        assert!(moved > 0.01, "something moves");
+    }
+}

@@ -1,0 +1,86 @@
+//! Runs the command, and gives each test a folder of its own that goes with it.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The shipped scenes.
+pub const SCENES: [&str; 5] = ["billiards", "bowling", "falling", "incline", "stack"];
+pub const STEPPERS: [&str; 2] = ["time_stepping", "backtracking"];
+
+/// A folder that is removed in the end.
+pub struct Folder(PathBuf);
+
+impl Folder {
+    pub fn new(test: &str) -> Folder {
+        let path = std::env::temp_dir().join(format!("tumble-{test}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Folder(path)
+    }
+
+    pub fn path(&self, file: &str) -> PathBuf {
+        self.0.join(file)
+    }
+
+    /// Writes a file and gives its path as text.
+    pub fn write(&self, file: &str, bytes: impl AsRef<[u8]>) -> String {
+        std::fs::write(self.path(file), bytes).unwrap();
+        text(&self.path(file))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+pub fn text(path: &Path) -> String {
+    path.to_str().unwrap().to_string()
+}
+
+/// The command, away from the repository: shipped scenes are inside it.
+pub fn command(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tumble"));
+    command.args(args).current_dir(std::env::temp_dir());
+    command
+}
+
+pub fn tumble(args: &[&str]) -> Output {
+    command(args).output().unwrap()
+}
+
+/// Runs, expects success, and gives what was said on stdout.
+pub fn succeed(args: &[&str]) -> String {
+    let out = tumble(args);
+    let (said, wrong) = (String::from_utf8(out.stdout).unwrap(), String::from_utf8(out.stderr).unwrap());
+    assert!(out.status.success(), "tumble {args:?} ended with {}: {wrong}", out.status);
+    said
+}
+
+/// Runs, expects failure with one message that does not look like a panic, and gives the message.
+pub fn fail(args: &[&str], code: i32) -> String {
+    let wrong = fail_often(args, code);
+    let messages = wrong.lines().filter(|line| line.to_lowercase().starts_with("error")).count();
+    assert_eq!(messages, 1, "tumble {args:?} gives {messages} messages:\n{wrong}");
+    assert!(wrong.lines().count() <= 12, "tumble {args:?} is long-winded:\n{wrong}");
+    wrong
+}
+
+/// As [`fail`], with at least one message.
+pub fn fail_often(args: &[&str], code: i32) -> String {
+    let out = tumble(args);
+    let wrong = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert_eq!(out.status.code(), Some(code), "tumble {args:?} says: {wrong}");
+    assert!(wrong.contains("rror") && !wrong.contains("panicked"), "tumble {args:?} says: {wrong}");
+    wrong
+}
+
+pub fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// A scene of one body that falls, with extra lines at the places named.
+pub fn scene(body: &str, rest: &str) -> String {
+    format!("description = \"A test\"\n[world]\nseconds = 0.1\n[[body]]\nname = \"ball\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\nmass_kg = 1.0\n{body}\n{rest}\n")
+}

@@ -1,0 +1,236 @@
+//! A bead that slides without friction on a wire bent to a cycloid (Huygens' pendulum): one freedom whose inertia changes with it.
+//!
+//! ```text
+//! r(φ) = R·(φ + sin φ, 0, 1 − cos φ)                    |r'|² = 4R²·cos²(φ/2)
+//! M(φ) = 4mR²·cos²(φ/2)     p = M·φ̇                     H = p²/2M + m·g·z
+//! ℓ(φ) = 4R·sin(φ/2)         σ = ℓ̇ = 2R·cos(φ/2)·φ̇      arc length from the lowest point, and speed along the wire
+//! ```
+//!
+//! Left alone the bead keeps `σ` while `p` changes with `M`: [`Bead::coast`](Integratable::coast) is exact. Under gravity
+//! `ℓ̈ = −(g/4R)·ℓ`: harmonic at *every* amplitude, with the period `4π√(R/g)` (Huygens, *Horologium Oscillatorium*, 1673).
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `X = [φ, p]` | state: angle (rad), and its canonical momentum (kg·m²/s) |
+//! | `R` | radius of the rolling circle, m |
+//! | `L = √M` | so that `u = p/√M = √m·σ` |
+
+use tumble_core::collide::{Pose, Shape, Vec3};
+use tumble_core::{
+    Collidable, CollisionKind, Constraint, Dims, Energy, ForceSlice, Forces, Integratable, Level, Material, Momentum, Object,
+    RowBuilder, RowTarget, Site, Span, WorldView, rows::RowSet,
+};
+
+/// A bead on a cycloid in the x–z plane, lowest at the origin; its ends are at `|φ| = π`.
+#[derive(Clone)]
+pub struct Bead {
+    name: String,
+    mass: f64,
+    radius: f64,
+    shape: Shape,
+    /// Surface constants.
+    pub material: Material,
+    /// Angle at time 0, rad.
+    pub angle: f64,
+    /// Speed along the wire at time 0, m/s.
+    pub speed: f64,
+    /// A stop: `φ` cannot go beyond it, rad.
+    pub stop: Option<f64>,
+    /// `√M` at the state last refreshed.
+    root: f64,
+    /// `r'` at the state last refreshed.
+    tangent: Vec3,
+}
+
+impl Bead {
+    /// A bead of `mass` kg and the given shape on the cycloid of a circle of `radius` m (both above 0).
+    pub fn new(name: impl Into<String>, mass: f64, radius: f64, shape: Shape) -> Bead {
+        let (root, tangent) = (2.0 * radius * mass.sqrt(), Vec3::new(2.0 * radius, 0.0, 0.0));
+        Bead { name: name.into(), mass, radius, shape, material: Material::default(), angle: 0.0, speed: 0.0, stop: None, root, tangent }
+    }
+
+    /// Sets the angle (rad, within ±π) and the speed along the wire (m/s) at time 0.
+    pub fn at(mut self, angle: f64, speed: f64) -> Bead {
+        (self.angle, self.speed) = (angle, speed);
+        self
+    }
+
+    /// Sets restitution and friction.
+    pub fn surface(mut self, restitution: f64, friction: f64) -> Bead {
+        self.material = Material { restitution, friction };
+        self
+    }
+
+    /// Sets a stop at an angle, rad.
+    pub fn stopped_at(mut self, angle: f64) -> Bead {
+        self.stop = Some(angle);
+        self
+    }
+
+    fn position(&self, phi: f64) -> Vec3 {
+        self.radius * Vec3::new(phi + phi.sin(), 0.0, 1.0 - phi.cos())
+    }
+
+    fn tangent(&self, phi: f64) -> Vec3 {
+        self.radius * Vec3::new(1.0 + phi.cos(), 0.0, phi.sin())
+    }
+
+    /// `|r'| = 2R·cos(φ/2)`.
+    fn stretch(&self, phi: f64) -> f64 {
+        2.0 * self.radius * (0.5 * phi).cos()
+    }
+
+    fn inertia(&self, phi: f64) -> f64 {
+        self.mass * self.stretch(phi).powi(2)
+    }
+}
+
+impl Object for Bead {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(self.clone())
+    }
+
+    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
+        self.root = self.inertia(x[0]).sqrt();
+        self.tangent = self.tangent(x[0]);
+        sites[0].pose = Pose::from_parts(self.position(x[0]).into(), tumble_core::collide::Quat::identity());
+        sites[0].velocity = self.tangent * (x[1] / self.root.powi(2));
+    }
+
+    fn integratable(&self) -> Option<&dyn Integratable> {
+        Some(self)
+    }
+
+    fn collidable(&self) -> Option<&dyn Collidable> {
+        Some(self)
+    }
+
+    fn constraint(&self) -> Option<&dyn Constraint> {
+        self.stop.map(|_| self as &dyn Constraint)
+    }
+}
+
+impl Integratable for Bead {
+    fn dims(&self) -> Dims {
+        Dims { x: 2, dof: 1, sites: 1 }
+    }
+
+    fn write_initial(&self, x: &mut [f64]) {
+        x.copy_from_slice(&[self.angle, self.mass * self.stretch(self.angle) * self.speed]);
+    }
+
+    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
+        out.wrenches[me.site.start].force += self.mass * view.gravity;
+    }
+
+    fn velocity(&self, x: &[f64], v: &mut [f64]) {
+        v[0] = x[1] / self.inertia(x[0]);
+    }
+
+    fn write_velocity(&self, x: &mut [f64], v: &[f64]) {
+        x[1] = self.inertia(x[0]) * v[0];
+    }
+
+    /// `Q = F·r'`; the part of `ṗ` that comes from `M'(φ)` belongs to free motion.
+    fn derivative(&self, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+        dp[0] = f.wrenches[0].force.dot(&self.tangent(x[0])) + f.generalized[0];
+    }
+
+    /// `r̈ = r'·φ̈ + r''·φ̇²` with `φ̈ = (Q + ½·M'·φ̇² − M'·φ̇²)/M`.
+    fn accelerations(&self, x: &[f64], dp: &[f64], sites: &mut [Site]) {
+        let (phi, m) = (x[0], self.inertia(x[0]));
+        let rate = x[1] / m;
+        let slope = -2.0 * self.mass * self.radius.powi(2) * phi.sin();
+        let second = (dp[0] - 0.5 * slope * rate * rate) / m;
+        let bend = self.radius * Vec3::new(-phi.sin(), 0.0, phi.cos());
+        sites[0].acceleration = self.tangent(phi) * second + bend * (rate * rate);
+    }
+
+    fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
+        x[1] += h * dp[0];
+    }
+
+    /// Exact: the arc length grows by `σ·h`, and `p` follows `M`.
+    fn coast(&self, x: &mut [f64], h: f64) {
+        let sigma = x[1] / (self.mass * self.stretch(x[0]));
+        let arc = 4.0 * self.radius * (0.5 * x[0]).sin() + sigma * h;
+        x[0] = 2.0 * (arc / (4.0 * self.radius)).clamp(-1.0, 1.0).asin();
+        x[1] = self.mass * self.stretch(x[0]) * sigma;
+    }
+
+    fn drift(&self, x: &mut [f64], v: &[f64], h: f64) {
+        x[0] += h * v[0];
+    }
+
+    fn whiten(&self, x: &[f64], u: &mut [f64]) {
+        u[0] = x[1] / self.root;
+    }
+
+    fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
+        v[0] = u[0] / self.root;
+    }
+
+    fn respond(&self, j: &[f64], y: &mut [f64]) {
+        y[0] = j[0] / self.root;
+    }
+
+    fn recover(&self, du: &[f64], dp: &mut [f64]) {
+        dp[0] = self.root * du[0];
+    }
+
+    fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
+        Energy { kinetic: 0.5 * x[1] * x[1] / self.inertia(x[0]), potential: -self.mass * gravity.dot(&self.position(x[0])) }
+    }
+
+    fn momentum(&self, x: &[f64]) -> Momentum {
+        let linear = self.mass * self.tangent(x[0]) * (x[1] / self.inertia(x[0]));
+        Momentum { linear, angular: self.position(x[0]).cross(&linear) }
+    }
+}
+
+impl Collidable for Bead {
+    fn parts(&self) -> usize {
+        1
+    }
+
+    fn shape(&self, _part: usize) -> &Shape {
+        &self.shape
+    }
+
+    fn material(&self, _part: usize) -> Material {
+        self.material
+    }
+
+    fn kind(&self, _part: usize) -> CollisionKind {
+        CollisionKind::default()
+    }
+
+    fn collides_with(&self, _part: usize, _other: CollisionKind) -> bool {
+        true
+    }
+
+    /// `J = axisᵀ·r'`.
+    fn test_impulse(&self, _part: usize, _site: &Site, _point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
+        for (axis, y) in axes.iter().zip(y) {
+            *y += sign * axis.dot(&self.tangent) / self.root;
+        }
+    }
+}
+
+/// The stop: `0 ≤ (φ_stop − φ) ⟂ λ ≥ 0`.
+impl Constraint for Bead {
+    fn rows(&self, me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+        let Some(stop) = self.stop else { return };
+        let x = &view.x[me.x.clone()];
+        let (rate, slope) = (x[1] / self.inertia(x[0]), -2.0 * self.mass * self.radius.powi(2) * x[0].sin());
+        // φ̈ without force: −½·M'·φ̇²/M; the row looks the other way
+        let bias = 0.5 * slope * rate * rate / self.inertia(x[0]);
+        let target = RowTarget { bias_acceleration: bias, ..RowTarget::new(RowSet::HalfLine, stop - x[0]) };
+        let me = out.owner();
+        out.row(target).on_coordinates(me, &[-1.0]);
+    }
+}

@@ -1,0 +1,18 @@
+//! New kinds of objects for tumble, made in a crate of their own by the public interface alone.
+//!
+//! | object | integrates | collides | constrains | acts |
+//! |---|---|---|---|---|
+//! | [`Particle`] | 3 freedoms, state `[x, P]` | a sphere that cannot turn | | |
+//! | [`Bead`] | 1 freedom on a cycloid, inertia depends on the angle | a sphere | itself: a stop on the wire | |
+//! | [`Rod`] | | | two objects, or one and a point: fixed distance, or a rope | |
+//! | [`Wind`] | | | | drag on everything it is told of |
+
+mod bead;
+mod particle;
+mod rod;
+mod wind;
+
+pub use bead::Bead;
+pub use particle::Particle;
+pub use rod::{End, Rod};
+pub use wind::Wind;

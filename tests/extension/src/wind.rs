@@ -1,0 +1,46 @@
+//! Wind: a force that follows what it blows on. Drag `F = −c·(v − w)` at the origin of every part of the objects it is told of.
+
+use tumble_core::collide::Vec3;
+use tumble_core::{ForceGenerator, Forces, Object, ObjectId, Span, WorldView};
+
+/// Linear drag towards a velocity of the air.
+#[derive(Clone, Debug)]
+pub struct Wind {
+    name: String,
+    /// Velocity of the air, m/s.
+    pub velocity: Vec3,
+    /// Drag coefficient, N·s/m, at least 0.
+    pub drag: f64,
+    /// What it blows on; ids of objects that are gone are passed over.
+    pub on: Vec<ObjectId>,
+}
+
+impl Wind {
+    /// A wind of that velocity (m/s) and drag (N·s/m).
+    pub fn new(name: impl Into<String>, velocity: Vec3, drag: f64, on: Vec<ObjectId>) -> Wind {
+        Wind { name: name.into(), velocity, drag, on }
+    }
+}
+
+impl Object for Wind {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(self.clone())
+    }
+
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        Some(self)
+    }
+}
+
+impl ForceGenerator for Wind {
+    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
+        for index in self.on.iter().filter_map(|id| view.span(*id)).flat_map(|span| span.site.clone()) {
+            let site = &view.sites[index];
+            out.add_at(index, site, -self.drag * (site.velocity - self.velocity), &site.position());
+        }
+    }
+}

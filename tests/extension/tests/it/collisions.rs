@@ -1,0 +1,1 @@
+//! New kinds meet rigid bodies.

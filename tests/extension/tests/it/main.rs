@@ -1,0 +1,7 @@
+//! The extension's objects in a world, through both steppers, against closed forms.
+
+mod bead;
+mod collisions;
+mod common;
+mod rods;
+mod wind;
