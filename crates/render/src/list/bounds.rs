@@ -11,6 +11,9 @@ pub(crate) type Bounds = (Point3<f32>, Point3<f32>);
 /// the floor long ago must not blur the shadows of the rest.
 const FAR_AWAY: f32 = 4.0;
 
+/// Things farther out than this many times the median do not count for a framing camera.
+const FLOWN_OFF: f32 = 20.0;
+
 impl DrawList {
     /// A ball `(center, radius)` around all instances and spheres (those that throw shadows, if `casters` is set); `None` when there are none.
     /// The ground and debug drawings do not count.
@@ -23,11 +26,22 @@ impl DrawList {
         union(self.items(casters).map(|item| item.1))
     }
 
-    /// A camera that looks along `direction` and shows all that throws shadows (everything, where nothing does): a wide floor does not count.
+    /// A camera that looks along `direction` and shows what throws shadows: a wide floor does not count, nor what flew off so far that the
+    /// rest would be a dot. Where nothing throws shadows it looks at the middle of what there is, from no farther than shows 5 m around it.
     pub fn framing_camera(&self, direction: Vector3<f32>) -> Camera {
-        let ball = self.bounding_ball(true).or_else(|| self.bounding_ball(false));
-        let (center, radius) = ball.unwrap_or((Point3::origin(), 1.0));
+        let floor = || self.bounding_ball(false).map(|(center, radius)| (center, radius.min(5.0)));
+        let (center, radius) = self.main_box().map(|b| ball_of(&b)).or_else(floor).unwrap_or((Point3::origin(), 1.0));
         Camera::framing(center, radius, direction, 0.9)
+    }
+
+    /// The box around what throws shadows, without what lies many times farther from their median than half of them do.
+    fn main_box(&self) -> Option<Bounds> {
+        let boxes: Vec<Bounds> = self.items(true).map(|item| item.1).collect();
+        let balls: Vec<_> = boxes.iter().map(ball_of).collect();
+        let middle = Point3::from(std::array::from_fn(|k| median(balls.iter().map(|(center, _)| center[k]))));
+        let reach: Vec<f32> = balls.iter().map(|(center, radius)| (center - middle).norm() + radius).collect();
+        let limit = FLOWN_OFF * median(reach.iter().copied());
+        union(boxes.into_iter().zip(reach).filter(|(_, r)| *r <= limit).map(|(b, _)| b))
     }
 
     /// The box around what throws shadows and lies at least in part in a view (by bounding balls); around everything where there is no such thing.
@@ -69,6 +83,13 @@ impl DrawList {
 fn world_corners(instance: &Instance, local: Option<([f32; 3], [f32; 3])>) -> Option<Vec<Point3<f32>>> {
     let (lo, hi) = local?;
     Some(corners_of(&(lo.into(), hi.into())).map(|p| instance.pose * Point3::from(p.coords.component_mul(&instance.scale))).to_vec())
+}
+
+/// The upper median; 0 of nothing.
+fn median(numbers: impl Iterator<Item = f32>) -> f32 {
+    let mut sorted: Vec<f32> = numbers.collect();
+    sorted.sort_by(f32::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The smallest box around boxes.

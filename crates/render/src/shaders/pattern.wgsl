@@ -65,10 +65,10 @@ fn ball(color: vec3f, d: vec3f, w: f32, number: u32, stripe: bool) -> vec3f {
     if (stripe) { c = mix(color, IVORY, smoothstep(-w, w, abs(asin(clamp(d.z, -1.0, 1.0))) - 0.56)); }
     if (number == 0u) { return c; }
     let angle = acos(clamp(abs(d.x), 0.0, 1.0));
-    let spot = 0.40;
+    let spot = 0.50;
     let flat_d = vec2f(select(-d.y, d.y, d.x > 0.0), d.z);
     let ink = number_distance(flat_d / spot * 2.3, number) * spot / 2.3;
-    let face = mix(INK, IVORY, smoothstep(-w, w, ink - 0.030));
+    let face = mix(INK, IVORY, smoothstep(-w, w, ink - 0.042));
     return mix(face, c, smoothstep(-w, w, angle - spot));
 }
 

@@ -1,7 +1,8 @@
 //! Draw lists without a GPU: text form, checks, bounds.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use tumble_render::{DebugStyle, DrawList, Ground, Light, MAX_LIGHTS, Material, MeshData, MeshId, RenderError};
+use tumble_render::{DebugDraw, DebugStyle, DrawList, Drawing, Ground, Light, MAX_LIGHTS, Material, MeshData, MeshId, Pattern, RenderError};
+use tumble_scene::SceneFile;
 
 fn sample() -> DrawList {
     let mut list = DrawList::default();
@@ -89,6 +90,31 @@ fn a_wide_floor_does_not_widen_the_framing() {
     let floor = list.add_mesh(MeshData::ground_quad(60.0));
     list.add_instance(floor, Isometry3::identity(), Material::default()).casts_shadow = false;
     assert_eq!(list.framing_camera(Vector3::y()), alone);
+}
+
+#[test]
+fn a_body_that_flew_off_does_not_make_the_rest_a_dot() {
+    let mut list = DrawList::default();
+    for x in [0.0, 1.5, 4.0] {
+        list.add_sphere(Point3::new(x, 0.0, 0.0), 0.5, UnitQuaternion::identity(), Material::default());
+    }
+    let before = list.framing_camera(Vector3::y());
+    list.add_sphere(Point3::new(0.0, 0.0, -1e6), 0.5, UnitQuaternion::identity(), Material::default());
+    assert_eq!(list.framing_camera(Vector3::y()), before);
+}
+
+#[test]
+fn rings_stand_where_the_scene_says_though_the_body_turns_about_its_centre_of_mass() {
+    let text = "[meshes.cone]\ntype = \"lathe\"\nprofile_m = [[0, 0], [1, 0], [0, 4]]\n\
+        [[body]]\nname = \"b\"\nmass_kg = 1\nshape = { type = \"mesh\", mesh = \"cone\" }\n\
+        pattern = \"rings\"\npattern_offset_m = 3\npattern_scale_m = 0.5\nsecond_color = \"#ff0000\"\n";
+    let scene = SceneFile::parse(text, "s.toml").expect("a right scene");
+    let (world, _) = scene.build().expect("a right world");
+    let list = Drawing::new(&scene).list(&world, &DebugDraw::default()).expect("a small mesh");
+    // the centre of mass of a cone is a quarter of its height above its base: 1 m
+    let Pattern::Rings { other, from_m, to_m } = list.instances[0].material.pattern else { panic!("rings, not {:?}", list.instances[0].material.pattern) };
+    assert_eq!(other, [1.0, 0.0, 0.0]);
+    assert!((from_m - 2.0).abs() < 1e-6 && (to_m - 2.5).abs() < 1e-6, "{from_m} to {to_m}");
 }
 
 #[test]

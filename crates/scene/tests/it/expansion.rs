@@ -84,7 +84,10 @@ fn a_body_takes_what_its_material_says_unless_it_says_otherwise() {
     let other = one("friction = 0.2\ncolor = [0, 0.5, 1]\npattern = \"wood\"");
     assert_eq!((other.friction, other.restitution), (0.2, 0.4));
     assert_eq!((other.look.color, other.look.roughness, other.look.pattern), ([0.0, 0.5, 1.0], 0.1, Pattern::Wood));
+    let ringed = one("pattern = \"rings\"\npattern_offset_m = -0.2");
+    assert_eq!((ringed.look.pattern, ringed.look.pattern_offset_m), (Pattern::Rings, -0.2));
     let bare = body("");
+    assert_eq!((bare.look.pattern, bare.look.pattern_scale_m, bare.look.pattern_offset_m), (Pattern::Plain, 0.1, 0.0));
     assert_eq!((bare.friction, bare.restitution, bare.material), (0.5, 0.0, None));
 }
 
