@@ -7,7 +7,7 @@ use tumble_core::{ObjectId, RigidBody, Settings, World};
 
 /// A tumble world with a scene in it.
 pub struct Tumble {
-    pub world: World,
+    world: World,
     ids: Vec<ObjectId>,
 }
 

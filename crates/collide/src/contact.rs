@@ -23,7 +23,7 @@ pub struct Contact {
 }
 
 /// What fixes a contact's normal, and so how it turns when the bodies move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NormalFrom {
     /// A flat face of A: the normal turns with A.
     FaceOfA,
@@ -31,6 +31,11 @@ pub enum NormalFrom {
     FaceOfB,
     /// The line from B's core point to A's (two rounded features, or a rounded one and a vertex or an edge).
     CorePoints,
+    /// The line from the nearest point of a straight edge or axis of A, along this unit direction (world), to B's core point: that nearest
+    /// point slides freely along the direction.
+    LineOfA(Vec3),
+    /// The same with a straight edge or axis of B and A's core point.
+    LineOfB(Vec3),
     /// Two edges: perpendicular to both.
     Edges,
 }
@@ -39,6 +44,8 @@ impl Contact {
     /// The same contact with A and B exchanged.
     pub(crate) fn flipped(self) -> Contact {
         let normal_from = match self.normal_from {
+            NormalFrom::LineOfA(along) => NormalFrom::LineOfB(along),
+            NormalFrom::LineOfB(along) => NormalFrom::LineOfA(along),
             NormalFrom::FaceOfA => NormalFrom::FaceOfB,
             NormalFrom::FaceOfB => NormalFrom::FaceOfA,
             other => other,

@@ -191,6 +191,17 @@ impl Detector<'_> {
     }
 }
 
+/// Rate of a normal that points from B's core point to A's, for the relative velocity of the two.
+fn turning(c: &Contact, relative: Vec3) -> Vec3 {
+    let distance = c.core_a + c.core_b + c.gap;
+    if distance > 0.0 { across(relative, &c.normal) / distance } else { Vec3::zeros() }
+}
+
+/// The part of `v` across a unit direction.
+fn across(v: Vec3, along: &Vec3) -> Vec3 {
+    v - along * along.dot(&v)
+}
+
 /// Whether two parts are to be tested: one of them moves, and both kinds say yes.
 fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize) -> bool {
     if !(a.moves() || b.moves()) {
@@ -237,8 +248,15 @@ impl Touch {
                 (n_rate, va - c.core_a * n_rate)
             }
             NormalFrom::CorePoints => {
-                let (relative, distance) = (va - vb, c.core_a + c.core_b + c.gap);
-                let n_rate = if distance > 0.0 { (relative - n * n.dot(&relative)) / distance } else { Vec3::zeros() };
+                let n_rate = turning(c, va - vb);
+                (n_rate, va - c.core_a * n_rate)
+            }
+            NormalFrom::LineOfA(along) => {
+                let n_rate = turning(c, across(va - vb, &along)) + along * along.dot(&a.angular_velocity.cross(n));
+                (n_rate, vb + c.core_b * n_rate)
+            }
+            NormalFrom::LineOfB(along) => {
+                let n_rate = turning(c, across(va - vb, &along)) + along * along.dot(&b.angular_velocity.cross(n));
                 (n_rate, va - c.core_a * n_rate)
             }
             NormalFrom::Edges => (Vec3::zeros(), 0.5 * (va + vb)),

@@ -1,9 +1,9 @@
 //! How constraints and contacts become rows.
 
-use crate::object::{Constraint, RowTarget};
-use crate::rows::Rows;
+use crate::object::{Constraint, Integratable, RowTarget};
+use crate::rows::{RowSet, Rows};
 use crate::site::Site;
-use crate::view::{Entry, ObjectId, Table};
+use crate::view::{Entry, Mode, ObjectId, Table};
 use tumble_collide::Vec3;
 
 /// Collects rows. A row is started with [`row`](Self::row) and then told what it acts on; its velocity is the sum of what it was told.
@@ -19,6 +19,7 @@ pub struct RowBuilder<'a> {
     pub(crate) bias: &'a mut Vec<f64>,
     pub(crate) targets: &'a mut Vec<RowTarget>,
     pub(crate) table: &'a Table,
+    pub(crate) x: &'a [f64],
     pub(crate) sites: &'a [Site],
     pub(crate) problem: &'a mut Option<String>,
     /// Whose rows are being made.
@@ -33,8 +34,10 @@ impl RowBuilder<'_> {
 
     /// Starts a row. A `Cone` set is for contacts, which the world makes itself: it is refused here, and the step reports it.
     pub fn row(&mut self, target: RowTarget) -> &mut Self {
-        if target.set.rows() != 1 || !(target.error.is_finite() && target.velocity.is_finite()) {
-            self.refuse("a constraint's row must be Equality, HalfLine or Interval, with finite error and velocity".into());
+        let bounds = if let RowSet::Interval { lo, hi } = target.set { lo <= hi } else { true };
+        let finite = [target.error, target.velocity, target.bias_acceleration].iter().all(|x| x.is_finite());
+        if target.set.rows() != 1 || !finite || !bounds {
+            self.refuse("a constraint's row must be Equality, HalfLine or Interval (lo ≤ hi), with finite error, velocity and bias".into());
             return self;
         }
         self.rows.push_block(target.set);
@@ -46,6 +49,9 @@ impl RowBuilder<'_> {
     /// Adds `sign ·` the velocity along `axis` of the material point of one part that is at world point `p`.
     pub fn on_point(&mut self, id: ObjectId, part: usize, p: &Vec3, axis: &Vec3, sign: f64) -> &mut Self {
         let table = self.table;
+        if !self.open(p.iter().chain(axis.iter())) {
+            return self;
+        }
         match table.slots.get(id) {
             Some(entry) if part < entry.span.site.len() && self.point_side(entry, part, p, &[*axis], sign) => {}
             Some(entry) => self.refuse(format!("'{}' has no part {part} that answers impulses, or the row names a third object", entry.object.name())),
@@ -57,12 +63,18 @@ impl RowBuilder<'_> {
     /// Adds `Σ j_k · v_k` over the generalized velocities of one object.
     pub fn on_coordinates(&mut self, id: ObjectId, jacobian: &[f64]) -> &mut Self {
         let table = self.table;
+        if !self.open(jacobian.iter()) {
+            return self;
+        }
         let Some(entry) = table.slots.get(id) else {
             self.refuse("a row names an object that is not in the world".into());
             return self;
         };
         let done = entry.object.integratable().filter(|i| i.dims().dof == jacobian.len()).is_some_and(|i| {
-            !entry.moves() || {
+            if !entry.moves() {
+                return self.led_coordinates(entry, i, jacobian);
+            }
+            {
                 let mut y = vec![0.0; jacobian.len()];
                 i.respond(jacobian, &mut y);
                 let side = self.rows.side(entry.span.v.start, y.len());
@@ -73,6 +85,26 @@ impl RowBuilder<'_> {
             self.refuse(format!("'{}': the row's Jacobian has {} numbers, or it names a third object", entry.object.name(), jacobian.len()));
         }
         self
+    }
+
+    /// Whether there is a row to add to, and the numbers given for it are finite; refuses them otherwise.
+    fn open<'n>(&mut self, mut numbers: impl Iterator<Item = &'n f64>) -> bool {
+        let finite = numbers.all(|x| x.is_finite());
+        if self.problem.is_none() && !(finite && !self.targets.is_empty()) {
+            self.refuse("a row's points, axes and Jacobians must be finite, and `row` comes first".into());
+        }
+        self.problem.is_none()
+    }
+
+    /// The velocity of something led along a row written in its coordinates.
+    fn led_coordinates(&mut self, entry: &Entry, body: &dyn Integratable, jacobian: &[f64]) -> bool {
+        if entry.status.mode == Mode::Kinematic && entry.status.alive {
+            let mut v = vec![0.0; jacobian.len()];
+            body.velocity(&self.x[entry.span.x.clone()], &mut v);
+            let led: f64 = v.iter().zip(jacobian).map(|(v, j)| v * j).sum();
+            self.bias.last_mut().into_iter().for_each(|bias| *bias += led);
+        }
+        true
     }
 
     /// One side of the last block: a test impulse where it moves, its velocity where it is led.

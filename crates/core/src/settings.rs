@@ -54,7 +54,7 @@ impl Default for Settings {
             substeps: 1,
             integrator: Integrator::default(),
             accuracy: Accuracy { sweeps: 200, relaxations: 20_000, tolerance: 1e-9 },
-            projection_sweeps: 20,
+            projection_sweeps: 15,
             contact_tolerance: 1e-7,
             drift_tolerance: 1e-4,
             recovery_speed: 3.0,

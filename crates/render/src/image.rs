@@ -37,6 +37,7 @@ impl Image {
         let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::High);
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
         let mut writer = encoder.write_header().map_err(|e| fail(e.to_string()))?;
         writer.write_image_data(&self.rgba).map_err(|e| fail(e.to_string()))?;

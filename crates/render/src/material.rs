@@ -72,6 +72,13 @@ pub enum Pattern {
         /// Distance of the threads.
         thread_m: f32,
     },
+    /// Marble: veins of `vein` colour, about `size_m` apart, in no regular order (bowling balls).
+    Marble {
+        /// Colour of the veins.
+        vein: [f32; 3],
+        /// Distance of the veins.
+        size_m: f32,
+    },
     /// Rings of `other` colour around the z axis, from `from_m` to `to_m` and as far again with the same gap between (the stripes of a pin's neck).
     Rings {
         /// Colour of the rings.
@@ -94,6 +101,7 @@ impl Pattern {
             Pattern::Wood { .. } => "wood",
             Pattern::Felt { .. } => "felt",
             Pattern::Rings { .. } => "rings",
+            Pattern::Marble { .. } => "marble",
         }
     }
 
@@ -107,6 +115,7 @@ impl Pattern {
             Pattern::Wood { dark, ring_m, board_m } => (4, dark, [ring_m, board_m]),
             Pattern::Felt { thread_m } => (5, [0.0; 3], [thread_m, 0.0]),
             Pattern::Rings { other, from_m, to_m } => (6, other, [from_m, to_m]),
+            Pattern::Marble { vein, size_m } => (7, vein, [size_m, 0.0]),
         }
     }
 }

@@ -164,7 +164,7 @@ impl SceneFile {
             .at(pose)
             .moving(Vec3::from(spec.velocity_m_per_s), Vec3::from(spec.angular_velocity_rad_per_s))
             .surface(spec.restitution, spec.friction)
-            .drawn_as(visuals(spec, shape));
+            .drawn_as(visuals(spec, shape, &center));
         body.linear_damping = spec.linear_damping_per_s;
         body.angular_damping = spec.angular_damping_per_s;
         Ok(body)
@@ -201,16 +201,24 @@ pub fn read_triangles(path: &std::path::Path, bytes: &[u8]) -> Result<TriMesh, S
     }
 }
 
-fn visuals(spec: &BodySpec, shape: Shape) -> Vec<Visual> {
+fn visuals(spec: &BodySpec, shape: Shape, center: &Vec3) -> Vec<Visual> {
     if !spec.visible {
         return Vec::new();
     }
-    vec![Visual { part: 0, pose: Pose::identity(), shape, look: look(&spec.look) }]
+    vec![Visual { part: 0, pose: Pose::identity(), shape, look: look(&spec.look, center) }]
 }
 
-fn look(look: &Look) -> CoreLook {
+/// The look in body axes, whose origin is the centre of mass.
+fn look(look: &Look, center: &Vec3) -> CoreLook {
     let [r, g, b] = look.second_color;
-    let named = [("second_r", r), ("second_g", g), ("second_b", b), ("scale_m", look.pattern_scale_m), ("clearcoat", look.clearcoat)];
+    let named = [
+        ("second_r", r),
+        ("second_g", g),
+        ("second_b", b),
+        ("scale_m", look.pattern_scale_m),
+        ("offset_m", look.pattern_offset_m - center.z),
+        ("clearcoat", look.clearcoat),
+    ];
     CoreLook {
         color: look.color.map(|c| c as f32),
         roughness: look.roughness as f32,

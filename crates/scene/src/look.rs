@@ -23,6 +23,10 @@ pub enum Pattern {
     Wood,
     /// The nap of a billiard cloth.
     Felt,
+    /// Two rings of the second colour around the shape's z axis, as on the neck of a pin.
+    Rings,
+    /// Veins of the second colour, as in a bowling ball.
+    Marble,
 }
 
 impl Pattern {
@@ -34,6 +38,8 @@ impl Pattern {
         ("striped_ball", Pattern::StripedBall),
         ("wood", Pattern::Wood),
         ("felt", Pattern::Felt),
+        ("rings", Pattern::Rings),
+        ("marble", Pattern::Marble),
     ];
 }
 
@@ -53,8 +59,10 @@ pub struct Look {
     pub second_color: Color,
     /// Default `plain`.
     pub pattern: Pattern,
-    /// Size of a cell of the pattern (a square, a ring of the grain), metres. Default 0.1.
+    /// Size of a cell of the pattern (a square, a board, the width of a ring), metres. Default 0.1.
     pub pattern_scale_m: f64,
+    /// Where along the shape's z axis the pattern begins (the lower edge of `rings`), metres. Default 0.
+    pub pattern_offset_m: f64,
     /// 0 mirror-like to 1 dull. Default 0.5.
     pub roughness: f64,
     /// 0 not metal to 1 metal. Default 0.
@@ -70,6 +78,7 @@ impl Default for Look {
             second_color: [1.0, 1.0, 1.0],
             pattern: Pattern::Plain,
             pattern_scale_m: 0.1,
+            pattern_offset_m: 0.0,
             roughness: 0.5,
             metallic: 0.0,
             clearcoat: 0.0,
@@ -85,6 +94,7 @@ impl Look {
             second_color: read_color(f, "second_color", base.second_color),
             pattern: f.choice_or("pattern", Pattern::NAMES, base.pattern),
             pattern_scale_m: f.number_or("pattern_scale_m", Bound::POSITIVE, base.pattern_scale_m),
+            pattern_offset_m: f.number_or("pattern_offset_m", Bound::ANY, base.pattern_offset_m),
             roughness: f.number_or("roughness", Bound::UNIT, base.roughness),
             metallic: f.number_or("metallic", Bound::UNIT, base.metallic),
             clearcoat: f.number_or("clearcoat", Bound::UNIT, base.clearcoat),

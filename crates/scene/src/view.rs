@@ -101,7 +101,7 @@ impl LightSpec {
     /// The light of a scene that names none.
     pub(crate) fn sun() -> Self {
         let kind = LightKind::Directional { direction: SUN };
-        LightSpec { kind, color: [1.0, 1.0, 1.0], intensity: 1.0, casts_shadow: true }
+        LightSpec { kind, color: [1.0, 0.97, 0.92], intensity: 1.0, casts_shadow: true }
     }
 
     pub(crate) fn read(mut f: Fields<'_>) -> Option<Self> {
@@ -134,17 +134,17 @@ pub struct SkySpec {
     pub horizon_color: Color,
     /// Below the horizon, as things reflect it.
     pub nadir_color: Color,
-    /// Strength of the light from the sky. Default 1.
+    /// Strength of the light from the sky. Default 1.3.
     pub intensity: f64,
 }
 
 impl Default for SkySpec {
     fn default() -> Self {
         SkySpec {
-            zenith_color: [0.36, 0.54, 0.80],
-            horizon_color: [0.80, 0.86, 0.92],
-            nadir_color: [0.42, 0.40, 0.38],
-            intensity: 1.0,
+            zenith_color: [0.20, 0.36, 0.60],
+            horizon_color: [0.74, 0.79, 0.84],
+            nadir_color: [0.32, 0.31, 0.30],
+            intensity: 1.3,
         }
     }
 }
@@ -175,8 +175,8 @@ pub struct GroundSpec {
 impl GroundSpec {
     pub(crate) fn read(mut f: Fields<'_>) -> Self {
         let base = Look {
-            color: [0.52, 0.53, 0.55],
-            second_color: [0.60, 0.61, 0.63],
+            color: [0.40, 0.41, 0.42],
+            second_color: [0.46, 0.47, 0.48],
             pattern: Pattern::Checker,
             pattern_scale_m: 1.0,
             roughness: 0.9,

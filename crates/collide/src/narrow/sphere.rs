@@ -29,8 +29,12 @@ pub(super) fn sphere_capsule(
 ) {
     let (center, direction) = (pose_b.translation.vector, axis(pose_b));
     let a = pose_a.translation.vector;
-    let core = center + direction * half_length * closest_on_segment(&(a - center), &(direction * half_length));
+    let along = closest_on_segment(&(a - center), &(direction * half_length));
+    let core = center + direction * half_length * along;
     let mut contact = Contact::between_cores((a, radius), (core, radius_b), 0);
+    if along.abs() < 1.0 {
+        contact.normal_from = NormalFrom::LineOfB(direction);
+    }
     if (a - core).norm_squared() < 1e-24 * radius_b * radius_b {
         // on the axis every direction across it is as good as the other
         contact = Contact { normal: pose_b.rotation * Vec3::x(), ..contact };
@@ -55,9 +59,20 @@ pub(super) fn sphere_box(radius: f64, pose_a: &Pose, half: &Vec3, pose_b: &Pose,
             feature: found.region,
             core_a: radius,
             core_b: 0.0,
-            normal_from: if found.face { NormalFrom::FaceOfB } else { NormalFrom::CorePoints },
+            normal_from: match (found.face, edge(found.region)) {
+                (true, _) => NormalFrom::FaceOfB,
+                (false, Some(k)) => NormalFrom::LineOfB(pose_b.rotation * Vec3::ith(k, 1.0)),
+                (false, None) => NormalFrom::CorePoints,
+            },
         });
     }
+}
+
+/// The axis along which the edge of an edge region runs: the one digit that is 1.
+fn edge(region: u64) -> Option<usize> {
+    let inside = |k: usize| region / 3u64.pow(k as u32) % 3 == 1;
+    let mut free = (0..3).filter(|k| inside(*k));
+    free.next().filter(|_| free.next().is_none())
 }
 
 /// What a box says of a point, in the box's frame.

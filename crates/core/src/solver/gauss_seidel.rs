@@ -16,7 +16,7 @@
 
 use super::one_contact::Contact;
 use super::{Accuracy, Outcome, RowSolver};
-use crate::rows::{Block, RowSet, Rows, Side, dot6};
+use crate::rows::{Block, RowSet, Rows, Side, dot, dot6};
 
 /// Sweeps with extrapolation between them.
 const ACCELERATED: u32 = 200;
@@ -49,8 +49,9 @@ impl RowSolver for GaussSeidel {
                 outcome = Outcome { iterations: sweep, converged: true, ray: false };
                 break;
             }
-            if sweep < sweeps.min(ACCELERATED) {
-                momentum.extrapolate(&mut locals, progress.against > 0.0, du);
+            if sweep < sweeps {
+                let plain = sweep > ACCELERATED || sweep + SETTLE >= sweeps;
+                momentum.extrapolate(&mut locals, progress.against > 0.0 || plain, du);
             }
             if sweep % RENEW == 0 {
                 momentum.renew(&mut locals, rows, lambda, du);
@@ -65,6 +66,8 @@ impl RowSolver for GaussSeidel {
     }
 }
 
+/// The last sweeps are plain: an extrapolated iterate may overshoot far just before it turns, and a solve cut off there would be worse than none.
+const SETTLE: u32 = 5;
 /// Extrapolation carries the rounding errors of `du` on and on; after so many sweeps it is made anew from `λ`.
 const RENEW: u32 = 1000;
 
@@ -78,7 +81,10 @@ fn write_back(locals: &[Local], lambda: &mut [f64]) {
 /// `du += Y·λ` of the island.
 fn apply(locals: &[Local], rows: &Rows, lambda: &[f64], du: &mut [f64]) {
     for local in locals.iter().filter(|l| l.lambda != [0.0; 3]) {
-        rows.apply_block(local.block, lambda, du);
+        match local.step {
+            Step::Contact(_) => local.block.sides().iter().for_each(|s| add_impulse(rows, s, local.lambda, du)),
+            _ => rows.apply_block(local.block, lambda, du),
+        }
     }
 }
 
@@ -270,7 +276,7 @@ fn add_velocity(rows: &Rows, side: &Side, u: &[f64], w: &mut [f64; 3]) {
         w[1] += dot6(y1, u);
         w[2] += dot6(y2, u);
     } else {
-        w.iter_mut().enumerate().for_each(|(r, w)| *w += crate::rows::dot(rows.response(side, r), u));
+        w.iter_mut().enumerate().for_each(|(r, w)| *w += dot(rows.response(side, r), u));
     }
 }
 

@@ -9,7 +9,7 @@
 //! The sliding direction is the root of `g(φ) = d × w_t` with `d·w_t > 0`, found by Newton's method on the angle `φ` of `d`. Alternating between
 //! the normal and the tangents instead diverges where `μ·|k_nt| > k_nn` (a leaning rod on rough ground).
 
-use crate::rows::{Block, Rows};
+use crate::rows::{Block, Rows, dot};
 
 /// Steps of Newton's method on the sliding direction.
 const SLIDE_STEPS: u32 = 12;
@@ -26,7 +26,7 @@ pub(super) struct Contact {
 }
 
 /// A symmetric 3×3 matrix; 0 is the normal, 1 and 2 are the tangents.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Symmetric {
     pub m00: f64,
     pub m10: f64,
@@ -38,8 +38,16 @@ pub(super) struct Symmetric {
 
 impl Contact {
     pub fn new(rows: &Rows, block: &Block, mu: f64) -> Contact {
-        let own = |i, j| rows.own(block, i, j);
-        let k = Symmetric { m00: own(0, 0), m10: own(1, 0), m20: own(2, 0), m11: own(1, 1), m21: own(2, 1), m22: own(2, 2) };
+        let mut k = Symmetric::default();
+        for side in block.sides() {
+            let [n, t1, t2] = [0, 1, 2].map(|r| rows.response(side, r));
+            k.m00 += dot(n, n);
+            k.m10 += dot(t1, n);
+            k.m20 += dot(t2, n);
+            k.m11 += dot(t1, t1);
+            k.m21 += dot(t2, t1);
+            k.m22 += dot(t2, t2);
+        }
         let mean = 0.5 * (k.m11 + k.m22);
         let half = 0.5 * (k.m11 - k.m22);
         let largest = mean + (half * half + k.m21 * k.m21).sqrt();

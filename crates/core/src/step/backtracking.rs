@@ -32,6 +32,8 @@ use crate::world::{Core, StepError};
 pub struct Backtracking {
     work: Workspace,
     after: Vec<Touch>,
+    /// Gap and its rate of every one-sided row of a constraint.
+    limits: Vec<(f64, f64)>,
     fallback: TimeStepping,
 }
 
@@ -159,10 +161,12 @@ impl Backtracking {
             keep[i] = role.touches && (role.lasts || velocity[range.start] < 1e-7);
         }
         let touches = work.touches.len();
+        self.limits.clear();
         for (i, target) in work.targets.iter().enumerate() {
             let row = work.rows.blocks[touches + i].row as usize;
             work.c[row] += target.bias_acceleration + (velocity[row] - target.velocity) / left;
             if target.set == RowSet::HalfLine {
+                self.limits.push((target.error, velocity[row]));
                 work.c[row] += target.error.max(0.0) / (left * left);
             }
         }
@@ -226,7 +230,7 @@ impl Backtracking {
         core.check_finite(&self.work.dp)
     }
 
-    /// Where the parabola of the first nearing contact closes, s.
+    /// Where the parabola of the first nearing contact closes, or the first limit is reached, s.
     fn first_guess(&self, core: &Core, roles: &[Role], left: f64) -> f64 {
         let closing = |(touch, role): (&Touch, &Role)| -> Option<f64> {
             if role.touches {
@@ -239,7 +243,8 @@ impl Backtracking {
             let t = 2.0 * g / (-v + root.max(0.0).sqrt());
             (root >= 0.0 && t > 0.0 && t < left).then_some(t)
         };
-        self.work.touches.iter().zip(roles).filter_map(closing).fold(left, f64::min)
+        let limits = self.limits.iter().filter(|(gap, rate)| *gap > 0.0 && *rate < 0.0).map(|(gap, rate)| -gap / rate);
+        self.work.touches.iter().zip(roles).filter_map(closing).chain(limits).fold(left, f64::min)
     }
 
     /// Least gap of what does not touch yet, at the start of the sub-step.

@@ -52,7 +52,7 @@ pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Res
     work.targets.clear();
     let mut problem = None;
     let mut builder = RowBuilder {
-        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, sites: &core.sites, problem: &mut problem,
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
         owner: ObjectId::default(),
     };
     for touch in &work.touches {

@@ -15,7 +15,7 @@
 
 use super::contacts::{Workspace, row_velocities};
 use crate::object::RowTarget;
-use crate::rows::{RowSet, Rows};
+use crate::rows::{Block, RowSet, Rows};
 use crate::solver::{Accuracy, RowSolver, residual};
 use crate::world::Core;
 
@@ -32,6 +32,8 @@ pub(crate) struct Candidate {
 
 /// Impacts are solved to this share of the fastest row velocity, so that a reflection keeps energy to about this share.
 const PRECISION: f64 = 1e-13;
+/// A one-sided row of a constraint takes part when its gap is no larger, metres or radians.
+const AT_LIMIT: f64 = 1e-7;
 /// An approach slower than this is none, m/s.
 const APPROACH: f64 = 1e-9;
 /// An impact slower than this never bounces, m/s: bodies wedged between others would chatter for ever.
@@ -46,7 +48,9 @@ pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candi
         aim_constraints(work, &mut c);
         let approach = |i: usize| candidates[i].takes_part && c[work.rows.blocks[i].row as usize] < -APPROACH;
         let bounces = |i: usize| approach(i) && candidates[i].restitution > 0.0 && -c[work.rows.blocks[i].row as usize] > candidates[i].rest_speed;
-        if !(0..candidates.len()).any(approach) {
+        let limits = work.rows.blocks[candidates.len()..].iter().zip(&work.targets);
+        let at_limit = |(block, t): (&Block, &RowTarget)| t.set == RowSet::HalfLine && t.error <= AT_LIMIT && c[block.row as usize] < -APPROACH;
+        if !(0..candidates.len()).any(approach) && !limits.clone().any(at_limit) {
             return;
         }
         core.report.impact_passes += 1;
@@ -76,7 +80,7 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bo
     let touches = work.touches.len();
     let targets = &work.targets;
     work.islands.build(&work.rows, |b| {
-        let takes_part = |t: &RowTarget| t.set == RowSet::Equality || (t.set == RowSet::HalfLine && t.error <= 0.0);
+        let takes_part = |t: &RowTarget| t.set == RowSet::Equality || (t.set == RowSet::HalfLine && t.error <= AT_LIMIT);
         if b < touches { member[b] } else { takes_part(&targets[b - touches]) }
     });
     work.c.copy_from_slice(c);

@@ -94,7 +94,9 @@ impl Projection {
             }
             self.c.push(work.c[block.row as usize] + error / h);
         }
-        (self.lambda.clear(), self.lambda.resize(self.rows.len, 0.0));
-        (self.du.clear(), self.du.resize(work.rows.dof, 0.0));
+        self.lambda.clear();
+        self.lambda.resize(self.rows.len, 0.0);
+        self.du.clear();
+        self.du.resize(work.rows.dof, 0.0);
     }
 }

@@ -91,6 +91,10 @@ impl World {
     /// Gives a kinematic body the velocity that brings it to `target` at the end of the next frame.
     pub fn move_to(&mut self, id: ObjectId, target: Pose) -> Result<(), WorldError> {
         let dt = self.core.settings.dt;
+        if !target.to_homogeneous().iter().all(|x| x.is_finite()) {
+            let name = self.object(id).ok_or(WorldError::Stale)?.name().to_string();
+            return Err(WorldError::NotFinite(name));
+        }
         self.edit_rigid(id, |body, x| {
             let v = (target.translation.vector - vec3(x)) / dt;
             let w = (target.rotation * orientation(x).inverse()).scaled_axis() / dt;

@@ -18,6 +18,12 @@ const PLANE_M: f32 = 60.0;
 /// Edges sharper than this stay sharp, radians.
 const CREASE_RAD: f32 = 0.7;
 
+/// What the filmic curve shows as white is this much light.
+const LIGHT: f32 = 1.7;
+
+/// Edges of boxes are rounded by this share of the shortest half side.
+const ROUNDING: f32 = 0.06;
+
 /// Makes draw lists of one scene; meshes are converted once and shared by all frames.
 pub struct Drawing {
     meshes: BTreeMap<String, Arc<MeshData>>,
@@ -116,7 +122,9 @@ fn mesh_of(shape: &Shape) -> Result<MeshData, RenderError> {
         Shape::Sphere { radius } => MeshData::uv_sphere(*radius as f32, 24),
         Shape::Box { half_extents } => {
             let half = small(half_extents);
-            MeshData::rounded_cuboid([half.x, half.y, half.z], 0.03 * half.min(), 2)
+            let (half, radius) = ([half.x, half.y, half.z], ROUNDING * half.min());
+            // on long thin boxes the rounding would be finer than a pixel, and glitter
+            if radius < 0.2 * ROUNDING * half[0].max(half[1]).max(half[2]) { MeshData::cuboid(half) } else { MeshData::rounded_cuboid(half, radius, 2) }
         }
         Shape::Capsule { radius, half_length } => MeshData::capsule(*radius as f32, *half_length as f32, 32),
         Shape::Cylinder(c) => MeshData::cylinder(c.radius() as f32, c.half_length() as f32, 48),
@@ -138,10 +146,10 @@ fn light(spec: &LightSpec) -> Light {
     let (color, intensity, casts_shadow) = (spec.color.map(|c| c as f32), spec.intensity as f32, spec.casts_shadow);
     match spec.kind {
         LightKind::Directional { direction } => Light::Directional {
-            direction: Vector3::from(direction.map(|c| c as f32)), color, intensity: 2.2 * intensity, angular_radius_rad: 0.02, casts_shadow,
+            direction: Vector3::from(direction.map(|c| c as f32)), color, intensity: LIGHT * intensity, angular_radius_rad: 0.02, casts_shadow,
         },
         LightKind::Point { position_m } => Light::Point {
-            position: Point3::from(position_m.map(|c| c as f32)), color, intensity: 2.2 * intensity, radius_m: 0.1, casts_shadow,
+            position: Point3::from(position_m.map(|c| c as f32)), color, intensity: LIGHT * intensity, radius_m: 0.1, casts_shadow,
         },
     }
 }

@@ -7,7 +7,7 @@ use tumble_core::Look;
 pub(super) fn of_look(look: &Look, name: &str) -> Material {
     let property = |key: &str, usual: f64| look.properties.iter().find(|(k, _)| k == key).map_or(usual, |(_, v)| *v) as f32;
     let second = [property("second_r", 1.0), property("second_g", 1.0), property("second_b", 1.0)];
-    let numbers = Numbers { second, scale_m: property("scale_m", 0.1), number: number(name) };
+    let numbers = Numbers { second, scale_m: property("scale_m", 0.1), offset_m: property("offset_m", 0.0), number: number(name) };
     Material {
         color: look.color,
         roughness: look.roughness,
@@ -20,7 +20,7 @@ pub(super) fn of_look(look: &Look, name: &str) -> Material {
 
 /// The material of a look in a scene file.
 pub(super) fn of_spec(look: &tumble_scene::Look) -> Material {
-    let numbers = Numbers { second: look.second_color.map(|c| c as f32), scale_m: look.pattern_scale_m as f32, number: 0 };
+    let numbers = Numbers { second: look.second_color.map(|c| c as f32), scale_m: look.pattern_scale_m as f32, offset_m: look.pattern_offset_m as f32, number: 0 };
     Material {
         color: look.color.map(|c| c as f32),
         roughness: look.roughness as f32,
@@ -34,6 +34,7 @@ pub(super) fn of_spec(look: &tumble_scene::Look) -> Material {
 struct Numbers {
     second: [f32; 3],
     scale_m: f32,
+    offset_m: f32,
     number: u8,
 }
 
@@ -45,6 +46,8 @@ fn pattern(name: &str, n: &Numbers) -> Pattern {
         "striped_ball" => Pattern::Ball { number: n.number, stripe: true },
         "wood" => Pattern::Wood { dark: n.second, ring_m: 0.3 * n.scale_m, board_m: n.scale_m },
         "felt" => Pattern::Felt { thread_m: 0.1 * n.scale_m },
+        "rings" => Pattern::Rings { other: n.second, from_m: n.offset_m, to_m: n.offset_m + n.scale_m },
+        "marble" => Pattern::Marble { vein: n.second, size_m: n.scale_m },
         _ => Pattern::Plain,
     }
 }

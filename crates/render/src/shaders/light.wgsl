@@ -60,10 +60,15 @@ fn sky_radiance(dir: vec3f, blur: f32) -> vec3f {
     return c;
 }
 
+// Clouds, walls and the eye's adaptation take colour out of the light of a sky: shade is not as blue as the zenith.
+fn greyed(c: vec3f) -> vec3f {
+    return mix(vec3f(dot(c, vec3f(0.2126, 0.7152, 0.0722))), c, 0.3);
+}
+
 fn sky_irradiance(n: vec3f) -> vec3f {
     let up = 0.5 + 0.5 * n.z;
     let sky = 0.55 * scene.zenith.xyz + 0.45 * scene.horizon.xyz;
-    return mix(scene.bounce.xyz, sky, up) * (1.0 + 0.03 * scene.ground.w * max(n.z, 0.0));
+    return mix(scene.bounce.xyz, greyed(sky), up) * (1.0 + 0.03 * scene.ground.w * max(n.z, 0.0));
 }
 
 fn backdrop_at(dir: vec3f) -> vec3f {
@@ -112,13 +117,14 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     let reach = select(size * (s - s_near), size * (s - s_near) / s_near, sh.scale.z > 0.5);
     let smallest = vec2f(1.5 / texels);
     let search = clamp(reach * per_metre, smallest, vec2f(WIDEST));
+    // the empty map is at depth 0: no filter may reach below it
     var sum = 0.0;
     var count = 0.0;
     for (var i = 0u; i < 16u; i++) {
         let d = disc_point(i, 16.0, turn) * search;
         let at = vec2i(clamp((uv + d) * texels, vec2f(0.0), vec2f(texels - 1.0)));
         let z = textureLoad(shadow_depths, at, index, 0).x;
-        if (z > depth + dot(slope, d) + bias) { sum += z; count += 1.0; }
+        if (z > max(depth + dot(slope, d) + bias, 1e-6)) { sum += z; count += 1.0; }
     }
     if (count == 0.0) { return 1.0; }
     if (count == 16.0) { return 0.0; }
@@ -129,7 +135,7 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     var lit = 0.0;
     for (var i = 0u; i < 32u; i++) {
         let d = disc_point(i, 32.0, turn) * filter_uv;
-        lit += textureSampleCompareLevel(shadow_maps, shadow_sampler, uv + d, index, min(depth + dot(slope, d) + bias, 1.0));
+        lit += textureSampleCompareLevel(shadow_maps, shadow_sampler, uv + d, index, clamp(depth + dot(slope, d) + bias, 1e-6, 1.0));
     }
     return lit / 32.0;
 }

@@ -8,12 +8,13 @@ struct MeshIn {
     @location(6) other_metal: vec4f,
     @location(7) pattern: vec4f,
 };
+// Taken at a point inside the triangle (centroid): at the middle of a pixel that a thin triangle only grazes they would run beyond it.
 struct MeshOut {
     @builtin(position) clip: vec4f,
-    @location(0) world: vec3f,
-    @location(1) normal: vec3f,
-    @location(2) object: vec3f,
-    @location(3) object_normal: vec3f,
+    @location(0) @interpolate(perspective, centroid) world: vec3f,
+    @location(1) @interpolate(perspective, centroid) normal: vec3f,
+    @location(2) @interpolate(perspective, centroid) object: vec3f,
+    @location(3) @interpolate(perspective, centroid) object_normal: vec3f,
     @location(4) @interpolate(flat) color_rough: vec4f,
     @location(5) @interpolate(flat) other_metal: vec4f,
     @location(6) @interpolate(flat) pattern: vec4f,
@@ -50,7 +51,7 @@ fn world_of(in: MeshIn) -> vec3f {
 
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     let facing = select(-1.0, 1.0, front) * in.side;
-    let s = view_depth_of(in.clip.z);
+    let s = view_depth_at(in.world);
     let to_eye = -normalize(ray_at(in.clip.xy).dir);
     return pixel_color(in.world, normalize(in.normal) * facing, to_eye, in.object, normalize(in.object_normal), s, in.clip.xy,
         Look(in.color_rough, in.other_metal, in.pattern));

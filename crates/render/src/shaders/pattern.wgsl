@@ -123,7 +123,9 @@ fn base_of(p: vec3f, n: vec3f, w: f32, color_rough: vec4f, other: vec3f, pattern
             base.color = ball(color_rough.xyz, normalize(p), w / max(length(p), 1e-6), u32(pattern.z), pattern.w > 0.5);
         }
         case 4u: {
-            base.color = wood(color_rough.xyz, other, p, size.x, pattern.w, w);
+            // boards run on over the sides that they would lie flat in
+            let beside = abs(n.y) > max(abs(n.x), abs(n.z));
+            base.color = wood(color_rough.xyz, other, select(p, p.xzy, beside), size.x, pattern.w, w);
         }
         case 5u: {
             let q = p / size.x;
@@ -138,6 +140,13 @@ fn base_of(p: vec3f, n: vec3f, w: f32, color_rough: vec4f, other: vec3f, pattern
             let one = smoothstep(-w, w, 0.5 * width - abs(p.z - pattern.z - 0.5 * width));
             let two = smoothstep(-w, w, 0.5 * width - abs(p.z - pattern.z - 2.0 * width));
             base.color = mix(color_rough.xyz, other, max(one, two));
+        }
+        case 7u: {
+            let q = p / size.x;
+            let bent = q + 1.6 * vec3f(noise3(q + 7.3), noise3(q + 19.1), noise3(q + 31.7));
+            let fine = (noise3(bent * 4.0) - 0.5) * (1.0 - smoothstep(0.1, 0.5, w / size.x));
+            let ridge = abs(noise3(bent) - 0.5) * 2.0 + 0.25 * fine;
+            base.color = mix(other, color_rough.xyz, smoothstep(0.0, 0.45, ridge));
         }
         default: {}
     }

@@ -109,6 +109,6 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
     let depth = depth_of(h.s);
     if (mask == 0u || h.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
     let rim = 1.0 - clamp(dot(h.normal, -normalize(ray_at(pixel).dir)), 0.0, 1.0);
-    let alpha = in.color_rough.w * mix(0.3, 1.0, rim * rim * rim);
+    let alpha = in.color_rough.w * mix(0.25, 1.0, rim * rim);
     return sphere_pixel(vec4f(in.color_rough.xyz * alpha, alpha), depth, mask);
 }

@@ -36,6 +36,11 @@ fn view_depth_of(depth: f32) -> f32 {
     return (view.depth.y - depth * view.depth.w) / (depth * view.depth.z - view.depth.x);
 }
 
+// View depth of a point; for a parallel view, whose footprints are all alike, 1.
+fn view_depth_at(p: vec3f) -> f32 {
+    return (view.clip_from_world * vec4f(p, 1.0)).w;
+}
+
 fn footprint_at(s: f32) -> f32 {
     return view.lens.y * s + view.lens.z;
 }

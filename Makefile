@@ -1,0 +1,31 @@
+# Short names for the scripts; each can be run by itself where there is no make.
+
+.PHONY: help demo test test-slow lint bench clean
+
+help:
+	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/"
+	@echo "make test       install what is missing, run all tests, check the papers"
+	@echo "make test-slow  the same and the slow tests"
+	@echo "make lint       clippy; warnings are errors"
+	@echo "make bench      step times beside Rapier (benches/peers, a workspace of its own)"
+	@echo "make clean      remove everything built"
+
+demo:
+	@scripts/demo.sh
+
+test:
+	@scripts/test.sh
+
+test-slow:
+	@scripts/test.sh --slow
+
+lint:
+	@scripts/lint.sh
+
+bench:
+	@scripts/setup.sh
+	cargo bench --locked --manifest-path benches/peers/Cargo.toml
+
+clean:
+	cargo clean
+	rm -rf out benches/peers/target

@@ -1,0 +1,29 @@
+#!/bin/sh
+# Everything that can fail, in the one profile that also runs: set-up, build, tests, doc tests, papers.
+#   scripts/test.sh          all of them
+#   scripts/test.sh --slow   and those that are #[ignore]d and have `slow` in their name
+. "$(dirname "$0")/env.sh"
+
+case "${1:-}" in
+    "" | --slow) ;;
+    *)
+        echo "usage: scripts/test.sh [--slow]" >&2
+        exit 2
+        ;;
+esac
+
+tests="--release --workspace --locked --lib --bins --tests --examples"
+
+stage set-up scripts/setup.sh
+# shellcheck disable=SC2086  # words, not one argument
+stage build cargo test $tests --no-run
+# shellcheck disable=SC2086
+stage tests cargo test $tests --no-fail-fast
+# shellcheck disable=SC2086
+[ "${1:-}" != --slow ] || stage "slow tests" cargo test $tests --no-fail-fast slow -- --ignored
+stage "doc tests" cargo test --no-fail-fast --release --workspace --locked --doc
+stage papers python3 scripts/check_papers.py
+
+echo
+stages
+echo "All tests passed."
