@@ -61,7 +61,7 @@ impl TimeStepping {
         self.smooth_forces(core, h)?;
         detect(core, h, &mut self.work.touches);
         flight::time_contacts(core, h, &mut self.work.touches);
-        build_rows(core, &mut self.work, Level::Velocity { h })?;
+        build_rows(core, &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
         whiten(core, &self.work.dp, h, &mut u, &mut du_force);
@@ -154,7 +154,9 @@ impl TimeStepping {
         }
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
-            work.c[block.row as usize] += reach - target.velocity;
+            // rows are those of the middle of the step, and go on turning for the other half
+            let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
+            work.c[block.row as usize] += reach + turning - target.velocity;
         }
         warm_start(core, work, h);
         solve(core, work, core.settings.accuracy, 1.0, |b| keep[b]);
