@@ -17,8 +17,8 @@ fn wind_carries_what_it_blows_on_as_its_equation_says() {
         let wind = Vec3::new(4.0, 0.0, -1.0);
         world.add(Wind::new("wind", wind, 1.5, vec![particle, ball])).unwrap();
         step(&mut world, 480);
-        for (id, mass) in [(particle, 2.0), (ball, 3.0)] {
-            let expected = wind * (1.0 - (-1.5 * 2.0 / mass as f64).exp());
+        for (id, mass) in [(particle, 2.0f64), (ball, 3.0)] {
+            let expected = wind * (1.0 - (-1.5 * 2.0 / mass).exp());
             // one evaluation per step where the force depends on the velocity: first order, h·c/2m of the speed at most
             let off = (velocity(&world, id) - expected).norm();
             assert!(off < DT * 1.5 / mass * wind.norm(), "{stepper}: {} m/s, by hand {expected}", velocity(&world, id));
