@@ -130,7 +130,10 @@ impl Detector<'_> {
     /// One grown box per part that can meet anything.
     fn gather(&mut self, horizon: f64) {
         let s = &mut *self.scratch;
-        (s.proxies.clear(), s.boxes.clear(), s.reach.clear(), s.moving.clear());
+        s.proxies.clear();
+        s.boxes.clear();
+        s.reach.clear();
+        s.moving.clear();
         for entry in self.table.iter().filter(|e| e.status.alive && e.status.collidable) {
             let Some(collidable) = entry.object.collidable() else { continue };
             for (part, index) in entry.span.site.clone().enumerate() {

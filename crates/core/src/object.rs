@@ -154,7 +154,8 @@ pub enum Level {
 
 /// Constrains itself or others: joint limits, loop closures, rods (thesis §IV.A.4). Its rows are solved together with all contacts.
 pub trait Constraint {
-    /// Adds its rows. See [`RowBuilder`] for how a row is made.
+    /// Adds its rows. See [`RowBuilder`] for how a row is made. The view shows the state that free motion makes by the middle of the step to
+    /// come: directions are right there to second order. Errors are those of that state too; the stepper takes them back to the present.
     fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder);
 }
 
@@ -167,7 +168,7 @@ pub struct RowTarget {
     pub error: f64,
     /// Velocity that the row aims at (0 but for motors), m/s or rad/s.
     pub velocity: f64,
-    /// The part of the row's acceleration that is there without any force or change of velocity (`J̇·v`); used at the acceleration level alone.
+    /// The part of the row's acceleration that is there without any force or change of velocity (`J̇·v`); 0 where the row's direction stays.
     pub bias_acceleration: f64,
 }
 

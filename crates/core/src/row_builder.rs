@@ -74,12 +74,10 @@ impl RowBuilder<'_> {
             if !entry.moves() {
                 return self.led_coordinates(entry, i, jacobian);
             }
-            {
-                let mut y = vec![0.0; jacobian.len()];
-                i.respond(jacobian, &mut y);
-                let side = self.rows.side(entry.span.v.start, y.len());
-                side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()
-            }
+            let mut y = vec![0.0; jacobian.len()];
+            i.respond(jacobian, &mut y);
+            let side = self.rows.side(entry.span.v.start, y.len());
+            side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()
         });
         if !done {
             self.refuse(format!("'{}': the row's Jacobian has {} numbers, or it names a third object", entry.object.name(), jacobian.len()));
@@ -90,7 +88,7 @@ impl RowBuilder<'_> {
     /// Whether there is a row to add to, and the numbers given for it are finite; refuses them otherwise.
     fn open<'n>(&mut self, mut numbers: impl Iterator<Item = &'n f64>) -> bool {
         let finite = numbers.all(|x| x.is_finite());
-        if self.problem.is_none() && !(finite && !self.targets.is_empty()) {
+        if self.problem.is_none() && (self.targets.is_empty() || !finite) {
             self.refuse("a row's points, axes and Jacobians must be finite, and `row` comes first".into());
         }
         self.problem.is_none()

@@ -89,7 +89,7 @@ impl Backtracking {
     /// Contacts, rows and smooth accelerations at the present state; overlap beyond the contact tolerance is projected out first.
     fn gather(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
         detect(core, left, &mut self.work.touches);
-        build_rows(core, &mut self.work, Level::Acceleration)?;
+        build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = self.work.targets.iter().any(|t| off(t.error) || (t.set == RowSet::Equality && off(-t.error)));
         if drifted || self.work.touches.iter().any(|t| off(t.contact.gap)) {
@@ -101,7 +101,7 @@ impl Backtracking {
         let time = core.time;
         core.motion().evaluate(time, &mut self.work.dp);
         core.check_finite(&self.work.dp)?;
-        build_rows(core, &mut self.work, Level::Acceleration)
+        build_rows(core, &mut self.work, Level::Acceleration, 0.5 * left)
     }
 
     fn roles(&self, core: &Core) -> Vec<Role> {
@@ -164,7 +164,8 @@ impl Backtracking {
         self.limits.clear();
         for (i, target) in work.targets.iter().enumerate() {
             let row = work.rows.blocks[touches + i].row as usize;
-            work.c[row] += target.bias_acceleration + (velocity[row] - target.velocity) / left;
+            // rows are those of the middle of the step, and go on turning for the other half
+            work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / left;
             if target.set == RowSet::HalfLine {
                 self.limits.push((target.error, velocity[row]));
                 work.c[row] += target.error.max(0.0) / (left * left);

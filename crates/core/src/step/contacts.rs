@@ -5,6 +5,7 @@ use crate::detect::{Detector, Touch};
 use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
 use crate::rows::{RowSet, Rows};
+use crate::site::Site;
 use crate::solver::{Accuracy, Islands, residual};
 use crate::view::{ObjectId, WorldView};
 use crate::world::{Core, StepError};
@@ -45,8 +46,22 @@ pub(crate) fn detect(core: &mut Core, horizon: f64, out: &mut Vec<Touch>) {
     core.report.contacts = out.len() as u32;
 }
 
-/// Makes the rows of all touches and constraints at the present state: the thesis's test impulses.
-pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Result<(), StepError> {
+/// State and sites as free motion makes them in `t` seconds; caches stay at the present.
+fn look_ahead(core: &mut Core, t: f64) -> (Vec<f64>, Vec<Site>) {
+    let start = core.x.clone();
+    core.motion().coast(t);
+    core.motion().refresh();
+    let ahead = (std::mem::replace(&mut core.x, start), core.sites.clone());
+    core.motion().refresh();
+    ahead
+}
+
+/// Makes the rows of all touches and constraints: the thesis's test impulses. Touches are as they were found; constraints are asked about the
+/// state that free motion makes in `ahead` seconds, half the step to come: a direction that turns is then right to second order, where one
+/// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Their errors are told for the present state all the same.
+pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ahead: f64) -> Result<(), StepError> {
+    let looked = (ahead > 0.0 && constraints(&core.table).next().is_some()).then(|| look_ahead(core, ahead));
+    let core = &*core;
     work.rows.clear(core.dof);
     work.bias.clear();
     work.targets.clear();
@@ -65,13 +80,18 @@ pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Res
             builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
         }
     }
-    let view = WorldView { time: core.time, gravity: core.settings.gravity, x: &core.x, sites: &core.sites, table: &core.table };
+    let (x, sites) = looked.as_ref().map_or((&core.x, &core.sites), |(x, sites)| (x, sites));
+    builder.sites = sites;
+    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, x, sites, table: &core.table };
     for (id, entry, constraint) in constraints(&core.table) {
         builder.owner = id;
         constraint.rows(&entry.span, &view, level, &mut builder);
         if let Some(why) = builder.problem.take() {
             return Err(StepError::Row { object: entry.object.name().to_string(), why });
         }
+    }
+    if looked.is_some() {
+        present_errors(core, work, ahead);
     }
     let n = work.rows.len;
     work.c.resize(n, 0.0);
@@ -80,16 +100,36 @@ pub(crate) fn build_rows(core: &Core, work: &mut Workspace, level: Level) -> Res
     Ok(())
 }
 
+/// Takes back from the errors of the constraints what free motion does to them in `ahead` seconds, to second order.
+fn present_errors(core: &Core, work: &mut Workspace, ahead: f64) {
+    let mut u = vec![0.0; core.dof];
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        if let Some(body) = entry.object.integratable() {
+            body.whiten(&core.x[entry.span.x.clone()], &mut u[entry.span.v.clone()]);
+        }
+    }
+    for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&mut work.targets) {
+        let velocity = work.bias[block.row as usize] + work.rows.row_velocity(block, 0, &u);
+        target.error += ahead * (0.5 * ahead * target.bias_acceleration - velocity);
+    }
+}
+
 /// Writes the whitened velocities and what `dp` (rate of momentum) adds to them in `h`, of everything that moves.
 pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut Vec<f64>) {
-    (u.clear(), u.resize(core.dof, 0.0));
-    (du.clear(), du.resize(core.dof, 0.0));
+    zero(u, core.dof);
+    zero(du, core.dof);
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
         body.whiten(&core.x[entry.span.x.clone()], &mut u[v.clone()]);
         body.respond(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
+}
+
+/// Makes `v` a vector of `n` zeros, keeping its memory.
+pub(crate) fn zero(v: &mut Vec<f64>, n: usize) {
+    v.clear();
+    v.resize(n, 0.0);
 }
 
 /// What a change `du` of whitened velocity means as momentum.
@@ -133,8 +173,7 @@ pub(crate) fn row_velocities(rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f
 /// Solves the blocks that `keep` names, island by island, from `work.c` and the warm start in `work.lambda`, into `work.du`. `unit` is what
 /// one unit of `c` is in m/s, for the report: 1, or the step's length where `c` holds accelerations. Whether any solve ended on a ray.
 pub(crate) fn solve(core: &mut Core, work: &mut Workspace, accuracy: Accuracy, unit: f64, keep: impl Fn(usize) -> bool) -> bool {
-    work.du.clear();
-    work.du.resize(core.dof, 0.0);
+    zero(&mut work.du, core.dof);
     work.islands.build(&work.rows, keep);
     let mut ray = false;
     for blocks in work.islands.iter() {

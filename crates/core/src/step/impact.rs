@@ -13,7 +13,7 @@
 //! `e = 0`, which ends the phase. With equal `e` on `A` and no friction the energy of a pass cannot grow; with friction or unequal `e` Newton's law can
 //! create energy, so a pass that does is blended with its `e = 0` solution just as far as the energy allows.
 
-use super::contacts::{Workspace, row_velocities};
+use super::contacts::{Workspace, row_velocities, zero};
 use crate::object::RowTarget;
 use crate::rows::{Block, RowSet, Rows};
 use crate::solver::{Accuracy, RowSolver, residual};
@@ -88,7 +88,7 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bo
         work.c[block.row as usize] *= 1.0 + bounce;
     }
     work.lambda.fill(0.0);
-    (work.du.clear(), work.du.resize(core.dof, 0.0));
+    zero(&mut work.du, core.dof);
     for blocks in work.islands.iter() {
         let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, accuracy);
         core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));

@@ -15,7 +15,7 @@
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, detect, displace, impulses, kick, recover, row_velocities, solve, warm_start, whiten};
+use super::contacts::{build_rows, detect, displace, impulses, kick, recover, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
@@ -61,7 +61,7 @@ impl TimeStepping {
         self.smooth_forces(core, h)?;
         detect(core, h, &mut self.work.touches);
         flight::time_contacts(core, h, &mut self.work.touches);
-        build_rows(core, &mut self.work, Level::Velocity { h })?;
+        build_rows(core, &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
         whiten(core, &self.work.dp, h, &mut u, &mut du_force);
@@ -88,8 +88,9 @@ impl TimeStepping {
     /// Times the impacts that free motion meets within the step and resolves them; the whitened velocity after them, forces not yet added.
     fn impacts(&mut self, core: &mut Core, h: f64, u: &[f64], du_force: &[f64]) -> Vec<f64> {
         let work = &mut self.work;
-        (self.share.clear(), self.share.resize(core.dof, -1.0));
-        (self.impact.clear(), self.impact.resize(work.rows.len, 0.0));
+        self.share.clear();
+        self.share.resize(core.dof, -1.0);
+        zero(&mut self.impact, work.rows.len);
         self.candidates.clear();
         if work.touches.iter().all(|t| t.restitution <= 0.0) {
             return u.to_vec();
@@ -154,7 +155,9 @@ impl TimeStepping {
         }
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
-            work.c[block.row as usize] += reach - target.velocity;
+            // rows are those of the middle of the step, and go on turning for the other half
+            let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
+            work.c[block.row as usize] += reach + turning - target.velocity;
         }
         warm_start(core, work, h);
         solve(core, work, core.settings.accuracy, 1.0, |b| keep[b]);

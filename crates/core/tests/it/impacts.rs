@@ -10,7 +10,7 @@ fn first_bounce(stepper: &str, e: f64, dt: f64) -> f64 {
     ground(&mut world, e, 0.0);
     let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(e, 0.0);
     let id = world.add(ball.at(Pose::translation(0.0, 0.0, 1.1))).unwrap();
-    let fall = (2.0 / G as f64).sqrt();
+    let fall = (2.0 / G).sqrt();
     (0..((fall + 0.05) / dt) as usize).for_each(|_| { world.step().unwrap(); });
     let (v, z) = (velocity(&world, id).z, position(&world, id).z - 0.1);
     (v * v + 2.0 * G * z).max(0.0).sqrt() / (2.0 * G).sqrt()

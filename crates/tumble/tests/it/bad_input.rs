@@ -25,7 +25,7 @@ fn table() -> Vec<(&'static str, String, Vec<&'static str>)> {
         ("unknown solver", "[world]\nsolver = \"magic\"\n".into(), vec![":2:", "magic", "gauss_seidel"]),
         ("zero dt", "[world]\ndt_s = 0\n".into(), vec![":2:", "dt_s"]),
         ("not TOML", "[world\n".into(), vec![":1:"]),
-        ("a million balls", format!("[[grid]]\nname = \"b\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\nmass_kg = 1\ncount = [1000, 1000, 1000]\nspacing_m = [1, 1, 1]\n"), vec![":5:", "count"]),
+        ("a million balls", "[[grid]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 1\ncount = [1000, 1000, 1000]\nspacing_m = [1, 1, 1]\n".into(), vec![":5:", "count"]),
         ("missing mesh", format!("[meshes.m]\ntype = \"file\"\nfile = \"nowhere.obj\"\n{}", bare("shape = { type = \"mesh\", mesh = \"m\" }\nmass_kg = 1")), vec!["nowhere.obj"]),
         ("unknown mesh", bare("shape = { type = \"mesh\", mesh = \"m\" }\nmass_kg = 1"), vec![":3:", "m"]),
     ]

@@ -15,9 +15,10 @@ fn state(folder: &Folder, name: &str, args: &[&str]) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// Seconds that a scene is run for: past its first contacts and into its piles.
+/// Seconds that a scene is run for: past its first contacts and into its piles; with `TUMBLE_SLOW=1` a minute.
 fn seconds(scene: &str) -> f64 {
     match scene {
+        _ if std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1") => 60.0,
         "bowling" => 3.2, // the ball meets the pins after 2.55 s
         "stack" => 0.5,
         _ => 2.0,

@@ -1,0 +1,18 @@
+//! A scene file's text: parsed, and where it is sound and small, built and stepped once.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tumble_scene::{MeshSource, SceneFile};
+
+fuzz_target!(|text: &str| {
+    match SceneFile::parse(text, "fuzz.toml") {
+        Err(error) => assert!(!error.report(false).is_empty()),
+        // files named in the text stay closed, and building stays cheap
+        Ok(scene) if scene.bodies.len() <= 50 && scene.meshes.iter().all(|m| !matches!(m.source, MeshSource::File { .. })) && scene.meshes.is_empty() => {
+            if let Ok((mut world, _)) = scene.build() {
+                let _ = world.step();
+            }
+        }
+        Ok(_) => {}
+    }
+});

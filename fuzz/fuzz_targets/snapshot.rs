@@ -1,0 +1,26 @@
+//! A snapshot: refused and nothing changed, or restored, and then the world steps and saves.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tumble_core::collide::{Pose, Shape};
+use tumble_core::{RigidBody, Settings, World};
+
+/// A ball on the ground: the world that `seeds/snapshot` was saved from.
+fn world() -> World {
+    let mut world = World::new(Settings::default()).expect("the default settings are sound");
+    world.add_static(RigidBody::fixture("ground", Shape::half_space())).expect("a new name");
+    let ball = RigidBody::with_mass("ball", Shape::sphere(0.1).expect("a radius"), 1.0).expect("a mass");
+    world.add(ball.at(Pose::translation(0.0, 0.0, 0.1))).expect("a new name");
+    world
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut world = world();
+    let before = world.save();
+    if world.restore(bytes).is_err() {
+        assert!(world.save() == before, "a snapshot that is refused changes nothing");
+        return;
+    }
+    let _ = world.step();
+    assert!(!world.save().is_empty());
+});
