@@ -3,7 +3,7 @@
 //! For each block in turn, with everything else held: `w = c + Yᵀ(Yλ)`, then
 //!
 //! - equality, half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K`;
-//! - contact: its own three-row problem, exactly (`one_contact.rs`).
+//! - contact: its own three-row problem (`one_contact.rs`).
 //!
 //! Its fixed points are the exact Coulomb solutions: `λ_n ⟂ w_n` without the dilation that a convex cone brings, and
 //! friction against the sliding velocity.

@@ -1,16 +1,20 @@
-//! The problem of one contact alone: three rows, `w = b + K·λ`, answered exactly.
+//! The problem of one contact alone: three rows, `w = b + K·λ`.
 //!
 //! ```text
-//! open      b_n ≥ 0                                           λ = 0
 //! stick     −K⁻¹b in the cone                                 λ = −K⁻¹b
+//! open      b_n ≥ 0                                           λ = 0
 //! slide     w_n = 0, w_t along the unit direction d           λ_t = −μ·λ_n·d,  λ_n = −b_n / r,  r = k_nn − μ·k_nt·d
 //! ```
 //!
-//! The sliding direction is the root of `g(φ) = d × w_t` with `d·w_t > 0`, found by Newton's method on the angle `φ` of `d`. Alternating between
-//! the normal and the tangents instead diverges where `μ·|k_nt| > k_nn` (a leaning rod on rough ground).
+//! Sticking comes first: where two answers hold it keeps piles from flickering between sweeps. Sliding is answered by one projected step, normal
+//! first: gentle, and enough where the normal and the tangents hardly couple. Where `μ·|k_nt|` comes near `k_nn` (a leaning rod on rough
+//! ground) that step diverges, and sliding is solved exactly: the direction is the root of `g(φ) = d × w_t` with `d·w_t > 0`, found by
+//! Newton's method on the angle `φ` of `d`. Both have the Coulomb solutions as their fixed points.
 
 use crate::rows::{Block, Rows, dot};
 
+/// Share of `k_nn` from which `μ·|k_nt|` makes the plain step too bold.
+const COUPLED: f64 = 0.5;
 /// Steps of Newton's method on the sliding direction.
 const SLIDE_STEPS: u32 = 12;
 
@@ -23,6 +27,8 @@ pub(super) struct Contact {
     inverse: Option<Symmetric>,
     /// `1/λ_max(K_tt)`; 0 where no tangent has a response.
     rho: f64,
+    /// Whether `μ·|k_nt|` comes near `k_nn`.
+    coupled: bool,
 }
 
 /// A symmetric 3×3 matrix; 0 is the normal, 1 and 2 are the tangents.
@@ -52,7 +58,8 @@ impl Contact {
         let half = 0.5 * (k.m11 - k.m22);
         let largest = mean + (half * half + k.m21 * k.m21).sqrt();
         let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
-        Contact { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho }
+        let coupled = mu * mu * (k.m10 * k.m10 + k.m20 * k.m20) > COUPLED * COUPLED * k.m00 * k.m00;
+        Contact { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho, coupled }
     }
 
     /// The multipliers that answer row velocities `w` found with multipliers `old`: `b = w − K·old`.
@@ -60,16 +67,17 @@ impl Contact {
     pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let own = self.k.times(old);
         let b = [w[0] - own[0], w[1] - own[1], w[2] - own[2]];
-        if b[0] >= 0.0 {
-            return [0.0; 3];
-        }
         if let Some(inverse) = &self.inverse {
             let full = inverse.times(b);
             if full[0] <= 0.0 && full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) {
                 return [-full[0], -full[1], -full[2]];
             }
         }
-        self.slide(old, b).unwrap_or_else(|| self.descend(old, w))
+        if b[0] >= 0.0 {
+            return [0.0; 3];
+        }
+        let slide = if self.coupled { self.slide(old, b) } else { None };
+        slide.unwrap_or_else(|| self.descend(old, w))
     }
 
     /// The sliding answer, searched from the direction of the multipliers so far, from that of `b_t`, and from across it.
@@ -107,7 +115,7 @@ impl Contact {
         None
     }
 
-    /// One projected step, where the contact alone has no sliding answer: `λ_n ← max(0, λ_n − w_n/k_nn)`, then
+    /// One projected step: `λ_n ← max(0, λ_n − w_n/k_nn)`, then
     /// `λ_t ← Π(λ_t − ρ·w_t)` onto the disc of radius `μ·λ_n`.
     fn descend(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let normal = (old[0] - w[0] / self.k.m00).max(0.0);

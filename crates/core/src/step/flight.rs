@@ -18,19 +18,25 @@ use crate::world::Core;
 use nalgebra::Translation3;
 use tumble_collide::{Contact, Pose, Shape, Vec3};
 
+/// A relative displacement of less than this share of the smaller body leaves the normal of the start good enough.
+const SHORT: f64 = 0.1;
 /// Advances at most; what has not met by then is near enough.
 const ADVANCES: u32 = 12;
 
-/// Follows every touch that is apart by more than the drift tolerance and closes within `h`; drops those that miss.
+/// Follows every touch of fast bodies that is apart by more than the drift tolerance and closes within `h`; drops those that miss.
 pub(super) fn time_contacts(core: &Core, h: f64, touches: &mut Vec<Touch>) {
     let near = core.settings.drift_tolerance;
     let mut found = Vec::new();
     touches.retain_mut(|touch| {
         let (a, b) = (&core.sites[touch.a as usize], &core.sites[touch.b as usize]);
-        if touch.contact.gap <= near || closing_time(touch.contact.gap, &touch.contact, a, b, 0.0).is_none_or(|t| t > h) {
+        let (Some(shape_a), Some(shape_b)) = (shape(core, touch.a), shape(core, touch.b)) else { return true };
+        let size = shape_a.bounding_radius().min(shape_b.bounding_radius());
+        if touch.contact.gap <= near || h * (a.velocity - b.velocity).norm() < SHORT * size {
             return true;
         }
-        let (Some(shape_a), Some(shape_b)) = (shape(core, touch.a), shape(core, touch.b)) else { return true };
+        if closing_time(touch.contact.gap, &touch.contact, a, b, 0.0).is_none_or(|t| t > h) {
+            return true;
+        }
         if shape_a.tree().is_some() || shape_b.tree().is_some() {
             return true; // a tree's contacts come and go with its leaves
         }
