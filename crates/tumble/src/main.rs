@@ -15,6 +15,7 @@ use failure::Failure;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    quiet_drivers();
     let outcome = match Tumble::parse().command {
         Command::Run(options) => run::run(&options),
         Command::Check(options) => check::check(&options),
@@ -26,6 +27,15 @@ fn main() -> ExitCode {
             eprint!("{}", failure.report());
             ExitCode::from(failure.code())
         }
+    }
+}
+
+/// Graphics drivers complain on stderr where no runtime directory is named, as over ssh or in a container; any folder satisfies them.
+#[allow(unsafe_code)]
+fn quiet_drivers() {
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // SAFETY: the first thing that the process does; no other thread exists that could read the environment.
+        unsafe { std::env::set_var("XDG_RUNTIME_DIR", std::env::temp_dir()) };
     }
 }
 
