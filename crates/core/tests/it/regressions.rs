@@ -168,6 +168,12 @@ fn a_shock_passes_through_separated_balls() {
 }
 
 #[test]
+fn a_ball_just_struck_does_not_tunnel_in_the_same_frame() {
+    assert_shock_passed("time_stepping", 1.0 / 60.0, 4.0, [0.001, 0.0048], 0.05);
+    assert_shock_passed("time_stepping", 1.0 / 60.0, 12.0, [0.0028, 0.02], 0.05);
+}
+
+#[test]
 fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
     // The contact moves with the ball, not with a material point of the capsule: no curvature along the axis, so the resting force is m·g = 9.81 N.
     for stepper in STEPPERS {
@@ -241,6 +247,11 @@ fn slide_over_a_seam(stepper: &str) {
 #[test]
 fn a_ball_does_not_trip_over_the_seam_of_two_boxes_in_backtracking() {
     slide_over_a_seam("backtracking");
+}
+
+#[test]
+fn a_ball_does_not_trip_over_the_seam_of_two_boxes_in_time_stepping() {
+    slide_over_a_seam("time_stepping");
 }
 
 #[test]

@@ -48,6 +48,25 @@ fn bits(world: &World) -> Vec<u64> {
 }
 
 #[test]
+fn a_velocity_motor_moves_by_velocity_times_time() {
+    // From rest the motor takes up to one frame to reach 1 m/s, in which 0 to h·v are covered: x = v·t less at most one frame's way;
+    // from frame to frame thereafter it is h·v exactly. The row's position error is 0: it holds no place.
+    let h = 1.0 / 60.0;
+    for stepper in STEPPERS {
+        let mut world = no_gravity(world(stepper, h));
+        let ball = unit_ball(&mut world, "ball", [0.0; 3], [0.0; 3]);
+        let target = RowTarget { velocity: 1.0, ..RowTarget::new(RowSet::Equality, 0.0) };
+        world.add(AlongX { body: ball, target }).unwrap();
+        for frame in 1..=60 {
+            world.step().unwrap();
+            let (x, t) = (position(&world, ball).x, frame as f64 * h);
+            assert!((velocity(&world, ball).x - 1.0).abs() < 1e-9, "{stepper} frame {frame}");
+            assert!((t - h - 1e-9..t + 1e-9).contains(&x), "{stepper} frame {frame}: x = {x}, v·t = {t}");
+        }
+    }
+}
+
+#[test]
 fn a_motor_of_6_newtons_gives_its_impulse_whatever_bounces_elsewhere() {
     // 6 N on 1 kg for 1/60 s: 0.1 m/s. The impacts of others are no time in which a force could act twice, or not at all.
     for stepper in STEPPERS {
@@ -170,6 +189,33 @@ fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
 }
 
 #[test]
+fn a_failed_step_names_the_body_whose_force_overflowed() {
+    // 1e308 N is a number, 1e308 N / 1 g is none. The ball that rests 5 m away has nothing to do with it.
+    for stepper in STEPPERS {
+        let mut world = world(stepper, 1.0 / 60.0);
+        ground(&mut world, 0.0, 0.5);
+        unit_ball(&mut world, "rests", [0.0, 0.0, 0.1], [0.0; 3]);
+        let light = RigidBody::with_mass("light", sphere(0.1), 1e-3).unwrap().at(Pose::translation(5.0, 0.0, 5.0));
+        let light = world.add(light).unwrap();
+        world.apply_force(light, 0, Vec3::new(1e308, 0.0, 0.0), &Vec3::new(5.0, 0.0, 5.0)).unwrap();
+        let error = world.step().unwrap_err();
+        assert!(matches!(&error, StepError::NotFinite { object, .. } if object == "light"), "{stepper}: {error}");
+    }
+}
+
+#[test]
+fn a_velocity_that_is_not_finite_is_no_state() {
+    // p = 1e308/60 N·s is a number, v = p/m = 1.7e309 m/s is none: the step fails, or its result can be read.
+    for stepper in STEPPERS {
+        let mut world = no_gravity(world(stepper, 1.0 / 60.0));
+        let light = world.add(RigidBody::with_mass("light", sphere(0.1), 1e-3).unwrap()).unwrap();
+        world.apply_force(light, 0, Vec3::new(1e308, 0.0, 0.0), &Vec3::zeros()).unwrap();
+        let outcome = world.step().copied();
+        assert!(outcome.is_err() || velocity(&world, light).norm().is_finite(), "{stepper}: {outcome:?}, v = {:?}", velocity(&world, light));
+    }
+}
+
+#[test]
 fn a_limit_is_not_passed_between_two_looks_at_it() {
     // x ≥ 0, from 50 mm at −10 m/s: 167 mm a frame. It stops at 0 and stays.
     for stepper in STEPPERS {
@@ -261,4 +307,9 @@ fn assert_pin_holds(stepper: &str) {
 #[test]
 fn a_pin_holds_a_spinning_rod_in_backtracking() {
     assert_pin_holds("backtracking");
+}
+
+#[test]
+fn a_pin_holds_a_spinning_rod_in_time_stepping() {
+    assert_pin_holds("time_stepping");
 }
