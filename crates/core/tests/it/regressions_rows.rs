@@ -293,9 +293,13 @@ fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
     worst
 }
 
-fn assert_pin_holds(stepper: &str) {
+/// `drift`: bound at 1/240 s, metres.
+fn assert_pin_holds(stepper: &str, drift: f64) {
     let [coarse, middle, fine] = [240.0, 480.0, 960.0].map(|rate| spin_pinned_rod(stepper, 1.0 / rate));
-    assert!(coarse.drift < 1e-4, "{stepper}: drift {:e} m at 1/240", coarse.drift);
+    assert!(coarse.drift < drift, "{stepper}: drift {:e} m at 1/240", coarse.drift);
+    // nothing does work: a thousandth in two seconds is far more than the 5e-5 that second order leaves at this step
+    assert!(coarse.energy < 1e-3, "{stepper}: energy off by {:e} at 1/240", coarse.energy);
+    assert!(coarse.speed < 5e-3, "{stepper}: the end moves at {:e} m/s at 1/240", coarse.speed);
     // first order at least: half the step, at most half the error (a tenth more for what is of higher order)
     for (quantity, of) in [("energy", (|s| s.energy) as fn(&Spun) -> f64), ("drift", |s| s.drift), ("pin speed", |s| s.speed)] {
         for (a, b) in [(&coarse, &middle), (&middle, &fine)] {
@@ -306,10 +310,11 @@ fn assert_pin_holds(stepper: &str) {
 
 #[test]
 fn a_pin_holds_a_spinning_rod_in_backtracking() {
-    assert_pin_holds("backtracking");
+    assert_pin_holds("backtracking", 1e-4);
 }
 
 #[test]
 fn a_pin_holds_a_spinning_rod_in_time_stepping() {
-    assert_pin_holds("time_stepping");
+    // the chord of a step leaves the arc by ½·h²·ω²·r at most: ω² = 72, r = 0.5, h = 1/240 s
+    assert_pin_holds("time_stepping", 0.5 * 72.0 * 0.5 / (240.0 * 240.0));
 }
