@@ -8,4 +8,6 @@ mod stacks;
 mod common;
 mod meshes;
 mod paradox;
+mod regressions;
+mod regressions_rows;
 mod state;
