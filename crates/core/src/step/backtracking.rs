@@ -18,7 +18,7 @@
 //! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is one time-stepping sub-step. Both are
 //!   counted as floor hits.
 
-use super::contacts::{build_rows, detect, impulses, kick, recover, row_velocities, solve, warm_start, whiten};
+use super::contacts::{build_rows, detect, gyroscopic, impulses, kick, recover, row_velocities, solve, warm_start, whiten};
 use super::impact::{self, Candidate};
 use super::{Frame, Stepper, TimeStepping, Workspace, projection};
 use crate::detect::Touch;
@@ -148,7 +148,7 @@ impl Backtracking {
         work.dp = dp;
         let mut velocity = Vec::new();
         row_velocities(&work.rows, &work.bias, &u, &mut velocity);
-        let acceleration = without_gyroscopic(core, &work.dp, &work.du_force);
+        let acceleration: Vec<f64> = gyroscopic(core).iter().zip(&work.du_force).map(|(g, rate)| rate - g).collect();
         row_velocities(&work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
         let mut keep = vec![true; work.rows.blocks.len()];
         for (i, (touch, role)) in work.touches.iter().zip(roles).enumerate() {
@@ -296,19 +296,6 @@ impl Bracket {
         let bisect = self.low.1 >= FAR || self.same_side.abs() % 4 == 3 || !share.is_finite();
         self.low.0 + width * if bisect { 0.5 } else { share.clamp(1e-3, 1.0 - 1e-3) }
     }
-}
-
-/// `L·v̇` from `L⁻ᵀ·ṗ`: the rate of momentum less what turns it.
-fn without_gyroscopic(core: &Core, dp: &[f64], rate: &[f64]) -> Vec<f64> {
-    let mut out = rate.to_vec();
-    for entry in core.table.iter().filter(|e| e.moves()) {
-        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
-        let mut turning = vec![0.0; dp[v.clone()].len()];
-        body.gyroscopic(&core.x[entry.span.x.clone()], &mut turning);
-        turning.iter_mut().zip(&dp[v.clone()]).for_each(|(t, dp)| *t = dp - *t);
-        body.respond(&turning, &mut out[v]);
-    }
-    out
 }
 
 /// Makes the whitened velocity `after` where it was `before`, and refreshes what readers see.

@@ -110,7 +110,7 @@ fn present_errors(core: &Core, work: &mut Workspace, ahead: f64) {
     }
     for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&mut work.targets) {
         let velocity = work.bias[block.row as usize] + work.rows.row_velocity(block, 0, &u);
-        target.error += ahead * (0.5 * ahead * target.bias_acceleration - velocity);
+        target.error += ahead * (0.5 * ahead * target.bias_acceleration - (velocity - target.velocity));
     }
 }
 
@@ -124,6 +124,18 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
         body.respond(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
+}
+
+/// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
+pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
+    let mut out = vec![0.0; core.dof];
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        let mut turning = vec![0.0; v.len()];
+        body.gyroscopic(&core.x[entry.span.x.clone()], &mut turning);
+        body.respond(&turning, &mut out[v]);
+    }
+    out
 }
 
 /// Makes `v` a vector of `n` zeros, keeping its memory.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! x_½  = x_0 coasted h/2;   a = forces at x_½                           (so that free motion is the Verlet step: symplectic, second order)
-//! detect at x_0 within reach of the step
+//! detect at x_0 within reach of the step; once more with the velocities after the impacts, if there are any
 //! u_f  = u_0 + Δu_impact + h·a                                            impacts by reflection, those that free motion meets within the step
 //! find λ:  w = Yᵀ(u_f + Yλ),   w_n + gap/h ≥ 0 ⟂ λ_n ≥ 0,   friction       (u_1 = u_f + Yλ)
 //! x_1  = x_0 coasted τ with u_0, then h − τ with u_1                        τ = the time of the body's first impact, else h/2
@@ -15,10 +15,11 @@
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, detect, displace, impulses, kick, recover, row_velocities, solve, warm_start, whiten, zero};
+use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, kick, recover, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
+use crate::detect::Touch;
 use crate::motion::coast;
 use crate::object::Level;
 use crate::rows::RowSet;
@@ -66,6 +67,7 @@ impl TimeStepping {
         let mut du_force = std::mem::take(&mut self.work.du_force);
         whiten(core, &self.work.dp, h, &mut u, &mut du_force);
         let mut after = self.impacts(core, h, &u, &du_force);
+        self.look_again(core, h, &u, &after)?;
         self.contacts(core, h, &mut after, &du_force);
         self.commit(core, h, &u, &after, &du_force)?;
         (self.work.u, self.work.du_force) = (u, du_force);
@@ -120,6 +122,43 @@ impl TimeStepping {
         (0..u.len()).map(|i| u[i] + (after[i] - at_impact[i])).collect()
     }
 
+    /// What was struck may now reach what it did not before: finds those contacts too, and lays the rows anew. They push this step (nothing is
+    /// passed through) and bounce in the next.
+    fn look_again(&mut self, core: &mut Core, h: f64, before: &[f64], after: &[f64]) -> Result<(), StepError> {
+        if self.impact.iter().all(|i| *i == 0.0) {
+            return Ok(());
+        }
+        let (change, mut dp): (Vec<f64>, Vec<f64>) = (after.iter().zip(before).map(|(a, b)| a - b).collect(), vec![0.0; core.dof]);
+        recover(core, &change, &mut dp);
+        kick(core, &dp, 1.0);
+        core.motion().refresh();
+        let mut found = Vec::new();
+        detect(core, h, &mut found);
+        core.x.copy_from_slice(&self.x0);
+        core.motion().refresh();
+        let work = &mut self.work;
+        let old: Vec<[u32; 4]> = work.touches.iter().map(|t| t.key.pair).collect();
+        found.retain(|t| old.binary_search(&t.key.pair).is_err());
+        if found.is_empty() {
+            return Ok(());
+        }
+        let mut filed: Vec<(Touch, Candidate, Vec<f64>)> = Vec::new();
+        for ((touch, candidate), block) in work.touches.drain(..).zip(&self.candidates).zip(&work.rows.blocks) {
+            filed.push((touch, *candidate, self.impact[block.range()].to_vec()));
+        }
+        let fresh = |t: &Touch| Candidate { takes_part: false, rest_speed: impact::SLOWEST_BOUNCE, restitution: t.restitution };
+        filed.extend(found.into_iter().map(|t| (t.clone(), fresh(&t), Vec::new())));
+        filed.sort_by_key(|(touch, ..)| touch.key.pair);
+        work.touches.extend(filed.iter().map(|(touch, ..)| touch.clone()));
+        self.candidates = filed.iter().map(|(_, candidate, _)| *candidate).collect();
+        build_rows(core, work, Level::Velocity { h }, 0.5 * h)?;
+        zero(&mut self.impact, work.rows.len);
+        for ((_, _, impulse), block) in filed.iter().zip(&work.rows.blocks).filter(|((.., i), _)| !i.is_empty()) {
+            self.impact[block.range()].copy_from_slice(impulse);
+        }
+        Ok(())
+    }
+
     /// Who takes part in the impacts: those that are the first of both their bodies, and what touches them. A later one waits for the next
     /// step; an island without an impact is left alone.
     fn first_impacts(&mut self, meets: &[Option<f64>]) {
@@ -153,7 +192,9 @@ impl TimeStepping {
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / h };
         }
+        let turning = if work.targets.is_empty() { Vec::new() } else { gyroscopic(core) };
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
+            work.c[block.row as usize] -= h * work.rows.row_velocity(block, 0, &turning);
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };

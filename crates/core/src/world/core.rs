@@ -5,7 +5,7 @@ use crate::motion::Motion;
 use crate::settings::{Settings, StepReport};
 use crate::site::{Forces, Site, Wrench};
 use crate::solver::RowSolver;
-use crate::view::{ObjectId, Table};
+use crate::view::{Entry, ObjectId, Table};
 use tumble_collide::{BroadPhase, Vec3};
 
 /// Why a step stopped. The world is as the last committed sub-step left it.
@@ -111,13 +111,17 @@ impl Core {
             }
         }
         self.motion().refresh();
-        let bad = self.table.iter().find(|e| self.x[e.span.x.clone()].iter().any(|x| !x.is_finite()));
+        let moves = |s: &Site| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
+        let fine = |e: &&Entry| self.x[e.span.x.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(moves);
+        let bad = self.table.iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
     }
 
     /// Stops forces and impulses that are not numbers.
     pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
-        let bad = self.table.iter().find(|e| dp[e.span.v.clone()].iter().any(|x| !x.is_finite()));
+        let accelerates = |s: &Site| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
+        let fine = |e: &&Entry| dp[e.span.v.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(accelerates);
+        let bad = self.table.iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "the force on it")))
     }
 
