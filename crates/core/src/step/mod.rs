@@ -17,7 +17,7 @@ use crate::world::{Core, StepError};
 pub trait Stepper: Send + Sync {
     /// The name that `--stepper` takes.
     fn name(&self) -> &'static str;
-    /// Advances by one frame. On an error the world is as the last committed sub-step left it.
+    /// Advances by one frame. On an error the world puts state and time back.
     fn step(&mut self, frame: Frame) -> Result<(), StepError>;
     /// An independent copy.
     fn fork(&self) -> Box<dyn Stepper>;

@@ -8,7 +8,7 @@ use crate::solver::RowSolver;
 use crate::view::{Entry, ObjectId, Table};
 use tumble_collide::{BroadPhase, Vec3};
 
-/// Why a step stopped. The world is as the last committed sub-step left it.
+/// Why a step stopped. [`World::step`](crate::World::step) puts state and time back to where they were before the frame.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
     /// A force, a momentum or a position is no longer a number.
