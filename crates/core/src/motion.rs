@@ -9,7 +9,7 @@
 
 use crate::settings::Integrator;
 use crate::site::{Forces, Site, Wrench};
-use crate::view::{Entry, Mode, Table, WorldView};
+use crate::view::{Entry, Mode, ObjectId, Table, WorldView};
 use tumble_collide::Vec3;
 
 /// What the integrators work on, borrowed from the world.
@@ -29,13 +29,14 @@ impl Motion<'_> {
     /// Writes sites and caches from the state. What is static or not alive is at rest, whatever momentum it keeps.
     pub fn refresh(&mut self) {
         let (x, sites) = (&self.x[..], &mut *self.sites);
-        self.table.for_each_mut(|e| {
-            let sites = &mut sites[e.span.site.clone()];
-            e.object.refresh(&x[e.span.x.clone()], sites);
-            if e.status.mode == Mode::Static || !e.status.alive {
-                sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
-            }
-        });
+        self.table.for_each_mut(|e| refresh(e, x, sites));
+    }
+
+    /// The same for one object.
+    pub fn refresh_one(&mut self, id: ObjectId) {
+        if let Some(entry) = self.table.slots.get_mut(id) {
+            refresh(entry, self.x, self.sites);
+        }
     }
 
     /// Forces at the present state and time `t`: rate of momentum of every object into `dp`, accelerations into the sites.
@@ -183,6 +184,14 @@ impl Motion<'_> {
             body.velocity(&start[entry.span.x.clone()], &mut v);
             body.write_velocity(&mut self.x[entry.span.x.clone()], &v);
         }
+    }
+}
+
+fn refresh(entry: &mut Entry, x: &[f64], sites: &mut [Site]) {
+    let sites = &mut sites[entry.span.site.clone()];
+    entry.object.refresh(&x[entry.span.x.clone()], sites);
+    if entry.status.mode == Mode::Static || !entry.status.alive {
+        sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
     }
 }
 

@@ -70,8 +70,10 @@ fn simulate(world: &mut World, mut recorder: Option<&mut Recorder>, scene: &Scen
     record(world)?;
     for frame in 1..=frames {
         let clock = Instant::now();
-        tally.add(world.step().map_err(|e| Failure::run("the simulation stopped", e))?);
-        wall += clock.elapsed().as_secs_f64();
+        let report = *world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
+        let taken = clock.elapsed().as_secs_f64();
+        tally.add(&report, taken);
+        wall += taken;
         record(world)?;
         progress.at(frame, world.time());
     }

@@ -14,6 +14,9 @@ pub struct Summary {
     simulated_s: f64,
     wall_s: f64,
     real_time_factor: f64,
+    /// 99 % of the frames took at most this.
+    frame_p99_ms: f64,
+    frame_max_ms: f64,
     contacts_mean: f64,
     contacts_max: u32,
     solver_residual_max_m_per_s: f64,
@@ -57,12 +60,14 @@ pub struct Tally {
     tries: u64,
     tries_max: u32,
     floor_hits: u64,
+    frames_s: Vec<f64>,
 }
 
 impl Tally {
-    /// One frame's report.
-    pub fn add(&mut self, report: &StepReport) {
+    /// One frame's report, and the seconds of the clock that it took.
+    pub fn add(&mut self, report: &StepReport, wall_s: f64) {
         self.steps += 1;
+        self.frames_s.push(wall_s);
         self.contacts += report.contacts as u64;
         self.contacts_max = self.contacts_max.max(report.contacts);
         self.residual = self.residual.max(report.residual);
@@ -72,6 +77,14 @@ impl Tally {
         self.tries += report.tries as u64;
         self.tries_max = self.tries_max.max(report.tries);
         self.floor_hits += report.floor_hits as u64;
+    }
+
+    /// What this share of the frames stayed within, ms.
+    fn frame_ms(&self, share: f64) -> f64 {
+        let mut sorted = self.frames_s.clone();
+        sorted.sort_by(f64::total_cmp);
+        let last = (share * sorted.len() as f64).ceil() as usize;
+        1e3 * sorted.get(last.saturating_sub(1)).copied().unwrap_or(0.0)
     }
 
     fn per_step(&self, sum: u64) -> f64 {
@@ -90,6 +103,8 @@ impl Tally {
             simulated_s,
             wall_s,
             real_time_factor: simulated_s / wall_s.max(1e-9),
+            frame_p99_ms: self.frame_ms(0.99),
+            frame_max_ms: self.frame_ms(1.0),
             contacts_mean: self.per_step(self.contacts),
             contacts_max: self.contacts_max,
             solver_residual_max_m_per_s: self.residual,
@@ -123,8 +138,8 @@ impl Summary {
     /// The few lines for a person.
     pub fn lines(&self) -> String {
         let mut text = format!(
-            "{}: {:.3} s in {} frames by {} and {}; {:.1} times real time\n",
-            self.scene, self.simulated_s, self.steps, self.stepper, self.solver, self.real_time_factor
+            "{}: {:.3} s in {} frames by {} and {}; {:.1} times real time; a frame at most {:.2} ms (99 %), {:.2} ms (all)\n",
+            self.scene, self.simulated_s, self.steps, self.stepper, self.solver, self.real_time_factor, self.frame_p99_ms, self.frame_max_ms
         );
         text += &format!(
             "contacts {:.1} a frame (at most {}); residual at most {:.1e} m/s ({} solves unconverged, {} rays); penetration at most {:.2e} m\n",

@@ -11,7 +11,8 @@ pub fn folder() -> Option<PathBuf> {
     let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let found = here.ancestors().map(|a| a.join("shared/meshes")).find(|p| p.is_dir());
     if found.is_none() {
-        eprintln!("SKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set", here.display());
+        // past the harness, which keeps what passing tests print
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set\n", here.display()));
     }
     found
 }

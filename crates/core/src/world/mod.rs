@@ -15,6 +15,7 @@ use crate::site::{Dims, Forces, Site, Span, Wrench};
 use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{Frame, Stepper, TimeStepping};
 use crate::view::{Entry, Mode, ObjectId, Status, Table, WorldView};
+use std::collections::BTreeMap;
 use tumble_collide::SweepAndPrune;
 
 /// Why an object was not added or found.
@@ -70,6 +71,7 @@ pub struct World {
     stepper: Box<dyn Stepper>,
     /// State before the frame, for when it fails.
     before: Vec<f64>,
+    names: BTreeMap<String, ObjectId>,
 }
 
 impl World {
@@ -82,7 +84,7 @@ impl World {
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
             report: StepReport::default(), next_serial: 0,
         };
-        Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new() })
+        Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new(), names: BTreeMap::new() })
     }
 
     /// Replaces the stepper.
@@ -175,7 +177,7 @@ impl World {
 
     /// The object of that name.
     pub fn find(&self, name: &str) -> Option<ObjectId> {
-        self.ids().iter().copied().find(|&id| self.core.table.slots[id].object.name() == name)
+        self.names.get(name).copied()
     }
 
     /// Mechanical energy of everything that moves, J.
@@ -253,7 +255,8 @@ impl World {
         let id = core.table.slots.insert(Entry { object, span: span.clone(), status: Status { mode, ..Status::default() }, serial });
         core.table.order.push(id);
         core.owners.extend((0..dims.sites).map(|part| Owner { id, part: part as u32, serial }));
-        core.motion().refresh();
+        core.motion().refresh_one(id);
+        self.names.insert(name, id);
         Ok(id)
     }
 
@@ -261,6 +264,7 @@ impl World {
     pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
         let core = &mut self.core;
         let gone = core.table.slots.remove(id).ok_or(WorldError::Stale)?;
+        self.names.remove(gone.object.name());
         core.table.order.retain(|&other| other != id);
         core.x.drain(gone.span.x.clone());
         core.sites.drain(gone.span.site.clone());
@@ -296,6 +300,7 @@ impl World {
             },
             stepper: self.stepper.fork(),
             before: Vec::new(),
+            names: self.names.clone(),
         }
     }
 }

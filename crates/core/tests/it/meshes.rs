@@ -52,7 +52,8 @@ const ASKEW: Vec3 = Vec3::new(0.3, 0.2, 0.1);
 #[test]
 fn the_bunny_comes_to_rest_on_a_plane() {
     let Some(folder) = folder() else {
-        eprintln!("SKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set", env!("CARGO_MANIFEST_DIR"));
+        // past the harness, which keeps what passing tests print
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set\n", env!("CARGO_MANIFEST_DIR")));
         return;
     };
     let path = folder.join("bunny.obj");

@@ -9,7 +9,8 @@ pub fn picture(list: &DrawList, width: u32, height: u32) -> Option<Image> {
     static SHARED: OnceLock<Option<Mutex<Renderer>>> = OnceLock::new();
     let shared = SHARED.get_or_init(|| renderer().map(Mutex::new));
     let Some(shared) = shared else {
-        println!("SKIPPED: no graphics adapter");
+        // past the harness, which keeps what passing tests print
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no graphics adapter\n"));
         return None;
     };
     let mut renderer = shared.lock().unwrap_or_else(PoisonError::into_inner);
@@ -20,7 +21,8 @@ pub fn picture(list: &DrawList, width: u32, height: u32) -> Option<Image> {
 pub fn exact_edges() -> bool {
     let exact = renderer().is_some_and(|r| !r.adapter().contains("Gl)"));
     if !exact {
-        println!("SKIPPED: no adapter with sample masks");
+        // past the harness, which keeps what passing tests print
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no adapter with sample masks\n"));
     }
     exact
 }
@@ -30,7 +32,8 @@ pub fn renderer() -> Option<Renderer> {
     match Renderer::new() {
         Ok(renderer) => Some(renderer),
         Err(RenderError::NoAdapter { reason }) => {
-            println!("SKIPPED: no graphics adapter ({reason})");
+            // past the harness, which keeps what passing tests print
+            let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no graphics adapter ({reason})\n"));
             None
         }
         Err(other) => panic!("an adapter exists and fails: {other}"),
