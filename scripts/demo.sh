@@ -12,7 +12,7 @@ stage run cargo run --release --locked --quiet -- run "$scene" --record "out/$sc
 
 echo
 echo "In $(pwd):"
-for made in mcap:"the recording, for Foxglove or Rerun" png:"the picture of the last frame" json:"the summary"; do
+for made in mcap:"the recording, for Foxglove" png:"the picture of the last frame" json:"the summary"; do
     file="out/$scene.${made%%:*}"
     if [ -s "$file" ]; then
         printf '  %-22s %s, %s kB\n' "$file" "${made#*:}" "$(($(wc -c <"$file") / 1024 + 1))"

@@ -41,3 +41,22 @@ pub fn position(world: &World, id: ObjectId) -> Vec3 {
 pub fn velocity(world: &World, id: ObjectId) -> Vec3 {
     world.site(id, 0).unwrap().velocity
 }
+
+/// Slides a cube at 5 m/s, μ = 0.5; distance and time of its stop (time from the last two speeds), and the largest gap under it.
+pub fn slide(stepper: &str, solver: &str, dt: f64) -> (f64, f64, f64) {
+    let mut world = world(stepper, dt);
+    world.set_solver(solver::by_name(solver).unwrap());
+    ground(&mut world, 0.0, 0.5);
+    let body = RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.5);
+    let id = world.add(body.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(5.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+    let (mut stop, mut gap) = (f64::NAN, 0.0f64);
+    for _ in 0..(1.5 / dt) as usize {
+        let (before, start) = (velocity(&world, id).x, world.time());
+        world.step().unwrap();
+        gap = gap.max(position(&world, id).z - 0.1);
+        if stop.is_nan() && velocity(&world, id).x.abs() < 1e-9 {
+            stop = start + before / (0.5 * G);
+        }
+    }
+    (position(&world, id).x, stop, gap)
+}
