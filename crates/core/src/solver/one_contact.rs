@@ -65,19 +65,27 @@ impl Contact {
     /// The multipliers that answer row velocities `w` found with multipliers `old`: `b = w − K·old`.
     #[inline]
     pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
-        let own = self.k.times(old);
-        let b = [w[0] - own[0], w[1] - own[1], w[2] - own[2]];
         if let Some(inverse) = &self.inverse {
-            let full = inverse.times(b);
-            if full[0] <= 0.0 && full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) {
-                return [-full[0], -full[1], -full[2]];
+            let step = inverse.times(w);
+            let full = [old[0] - step[0], old[1] - step[1], old[2] - step[2]];
+            if full[0] >= 0.0 && full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) {
+                return full;
             }
         }
+        self.open_or_slide(old, w)
+    }
+
+    /// The answers without sticking: the rarer ones in a pile.
+    fn open_or_slide(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+        if !self.coupled {
+            return self.descend(old, w);
+        }
+        let own = self.k.times(old);
+        let b = [w[0] - own[0], w[1] - own[1], w[2] - own[2]];
         if b[0] >= 0.0 {
             return [0.0; 3];
         }
-        let slide = if self.coupled { self.slide(old, b) } else { None };
-        slide.unwrap_or_else(|| self.descend(old, w))
+        self.slide(old, b).unwrap_or_else(|| self.descend(old, w))
     }
 
     /// The sliding answer, searched from the direction of the multipliers so far, from that of `b_t`, and from across it.
