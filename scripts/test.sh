@@ -1,7 +1,7 @@
 #!/bin/sh
 # Everything that can fail, in the one profile that also runs: set-up, build, tests, doc tests, papers.
 #   scripts/test.sh          all of them
-#   scripts/test.sh --slow   and those that are #[ignore]d and have `slow` in their name
+#   scripts/test.sh --slow   and again at their full length those that TUMBLE_SLOW=1 lengthens
 . "$(dirname "$0")/env.sh"
 
 case "${1:-}" in
@@ -20,7 +20,7 @@ stage build cargo test $tests --no-run
 # shellcheck disable=SC2086
 stage tests cargo test $tests --no-fail-fast
 # shellcheck disable=SC2086
-[ "${1:-}" != --slow ] || stage "slow tests" cargo test $tests --no-fail-fast slow -- --ignored
+[ "${1:-}" != --slow ] || stage "slow tests" env TUMBLE_SLOW=1 cargo test $tests --no-fail-fast determinism
 stage "doc tests" cargo test --no-fail-fast --release --workspace --locked --doc
 stage papers python3 scripts/check_papers.py
 
