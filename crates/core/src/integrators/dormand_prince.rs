@@ -47,7 +47,7 @@ const A: [[f64; STAGES - 1]; STAGES] = [
 /// Fifth order less fourth.
 const E: [f64; STAGES] = [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
-/// Inner steps in one call at most, refused ones included.
+/// Inner steps in one frame at most, refused ones included.
 const MOST_STEPS: u32 = 100_000;
 /// Least inner step, as a share of the frame.
 const FLOOR: f64 = 1e-12;
@@ -66,7 +66,7 @@ pub(crate) struct Adaptive {
     pub frame: f64,
     /// Inner step to begin with, s; the frame where it is 0. Afterwards the one to go on with.
     pub step: f64,
-    /// Inner steps of the last call, refused ones included.
+    /// Inner steps of the frame so far, refused ones included.
     pub steps: u32,
     /// The accepted inner steps of the last recorded call.
     pub path: Trajectory,
@@ -95,9 +95,10 @@ struct Worst {
 }
 
 impl Adaptive {
-    /// Before a call: the constants, and the inner step to begin with.
-    pub fn set(&mut self, settings: &Settings, step: f64) {
-        (self.tolerance, self.frame, self.step) = (settings.integrator_tolerance, settings.dt, step);
+    /// Before a call: the constants, the inner step to begin with, and how many the frame has had.
+    pub fn set(&mut self, settings: &Settings, step: f64, steps: u32) {
+        (self.tolerance, self.frame) = (settings.integrator_tolerance, settings.dt);
+        (self.step, self.steps) = (step, steps);
     }
 
     /// Integrates from time `t` over `h` exactly, as many inner steps as the tolerance asks for. With `record` the path is kept, and the call ends
@@ -110,7 +111,6 @@ impl Adaptive {
         }
         self.step = if self.step > 0.0 { self.step.clamp(FLOOR * self.frame, self.frame) } else { self.frame };
         let (mut done, mut grow) = (0.0, GROW);
-        self.steps = 0;
         while done < h && !(record && self.path.full()) {
             // equal parts of what is left, so that no sliver remains for the last
             let parts = ((h - done) / self.step).ceil();

@@ -4,3 +4,6 @@ mod dormand_prince;
 mod trajectory;
 
 pub(crate) use dormand_prince::Adaptive;
+
+#[cfg(test)]
+mod tests;

@@ -260,11 +260,11 @@ impl Backtracking {
         core.x.copy_from_slice(start);
         core.motion().refresh();
         let (time, integrator) = (core.time, core.settings.integrator);
-        self.adaptive.set(&core.settings, core.inner_step);
+        self.adaptive.set(&core.settings, core.inner_step, core.report.inner_steps);
         let came = core.motion().integrate(integrator, time, h, &mut self.work.dp, &mut self.adaptive)?;
         if integrator == Integrator::DormandPrince {
             core.inner_step = self.adaptive.step;
-            core.report.inner_steps += self.adaptive.steps;
+            core.report.inner_steps = self.adaptive.steps;
         }
         core.check_finite(&self.work.dp)?;
         Ok(came)
@@ -284,9 +284,9 @@ impl Backtracking {
                 break;
             }
             core.x.copy_from_slice(self.adaptive.path.before(h).1);
-            self.adaptive.set(&core.settings, length);
+            self.adaptive.set(&core.settings, length, core.report.inner_steps);
             self.adaptive.integrate(&mut core.motion(), time + from, at - from, &mut self.work.dp, false)?;
-            core.report.inner_steps += self.adaptive.steps;
+            core.report.inner_steps = self.adaptive.steps;
             core.check_finite(&self.work.dp)?;
             let off = self.margin(core, at)?;
             if off.abs() <= tolerance {

@@ -40,7 +40,7 @@ pub enum StepError {
         time: f64,
         /// Length of the last inner step tried, s.
         step: f64,
-        /// Inner steps of this call, refused ones included.
+        /// Inner steps of this frame, refused ones included.
         steps: u32,
         /// `Settings::integrator_tolerance`.
         tolerance: f64,
