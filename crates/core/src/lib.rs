@@ -19,6 +19,7 @@
 pub mod articulated;
 mod collidable;
 mod detect;
+mod integrators;
 mod motion;
 mod object;
 mod rigid;

@@ -4,6 +4,7 @@ mod backtracking;
 mod contacts;
 mod flight;
 mod impact;
+mod locate;
 mod projection;
 mod time_stepping;
 
