@@ -16,6 +16,7 @@
 //! # Ok::<(), tumble_core::WorldError>(())
 //! ```
 
+mod closure;
 mod collidable;
 mod detect;
 mod motion;
@@ -31,6 +32,7 @@ mod step;
 mod view;
 mod world;
 
+pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use object::{
     Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget, SyncError, Visual,

@@ -6,6 +6,7 @@ mod impacts;
 mod soft_rows;
 mod solvers;
 mod stacks;
+mod closures;
 mod common;
 mod meshes;
 mod paradox;
