@@ -16,6 +16,7 @@
 //! # Ok::<(), tumble_core::WorldError>(())
 //! ```
 
+pub mod articulated;
 mod closure;
 mod collidable;
 mod detect;
@@ -32,6 +33,7 @@ mod step;
 mod view;
 mod world;
 
+pub use articulated::{Joint, LinkMass, Model, ModelBuilder, ModelError};
 pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use object::{

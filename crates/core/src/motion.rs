@@ -76,6 +76,17 @@ impl Motion<'_> {
         }
     }
 
+    /// Leaves of the rates what the coasts of a splitting do not do by themselves.
+    pub fn take_off_coasting(&self, dp: &mut [f64]) {
+        let mut coasting = Vec::new();
+        for entry in self.table.iter().filter(|e| e.moves()) {
+            let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+            coasting.resize(entry.span.v.len(), 0.0);
+            body.coasting_rate(&self.x[entry.span.x.clone()], &mut coasting);
+            dp[entry.span.v.clone()].iter_mut().zip(&coasting).for_each(|(dp, c)| *dp -= c);
+        }
+    }
+
     fn kick(&mut self, dp: &[f64], h: f64) {
         for entry in self.table.iter().filter(|e| e.moves()) {
             if let Some(body) = entry.object.integratable() {
@@ -109,6 +120,7 @@ impl Motion<'_> {
             Integrator::Verlet => {
                 self.coast(0.5 * h);
                 self.evaluate(t + 0.5 * h, dp);
+                self.take_off_coasting(dp);
                 self.kick(dp, h);
                 self.coast(0.5 * h);
             }

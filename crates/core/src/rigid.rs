@@ -439,8 +439,8 @@ impl Collidable for RigidBody {
         1
     }
 
-    fn shape(&self, _part: usize) -> &Shape {
-        &self.shape
+    fn shape(&self, _part: usize) -> Option<&Shape> {
+        Some(&self.shape)
     }
 
     fn material(&self, _part: usize) -> Material {

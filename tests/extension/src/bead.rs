@@ -197,8 +197,8 @@ impl Collidable for Bead {
         1
     }
 
-    fn shape(&self, _part: usize) -> &Shape {
-        &self.shape
+    fn shape(&self, _part: usize) -> Option<&Shape> {
+        Some(&self.shape)
     }
 
     fn material(&self, _part: usize) -> Material {

@@ -18,7 +18,7 @@
 //! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is one time-stepping sub-step. Both are
 //!   counted as floor hits.
 
-use super::contacts::{build_rows, detect, gyroscopic, impulses, kick, recover, row_velocities, solve, warm_start, whiten};
+use super::contacts::{build_rows, detect, gyroscopic, impulses, push, recover, row_velocities, solve, warm_start, whiten};
 use super::impact::{self, Candidate};
 use super::{Frame, Stepper, TimeStepping, Workspace, projection};
 use crate::detect::Touch;
@@ -132,7 +132,7 @@ impl Backtracking {
         impact::resolve(core, work, &candidates, IMPACT_PASSES, &mut u, &mut total);
         let struck = total.iter().any(|l| *l != 0.0);
         if struck {
-            push(core, &u, &before, 1.0);
+            push_to(core, &u, &before);
         }
         struck
     }
@@ -180,7 +180,7 @@ impl Backtracking {
         if ray {
             // no force at the acceleration level keeps the contacts: an impulse without collision does
             let after: Vec<f64> = u.iter().zip(&work.du).map(|(u, du)| u + left * du).collect();
-            push(core, &after, &u, 1.0);
+            push_to(core, &after, &u);
         } else {
             recover(core, &work.du, &mut held);
         }
@@ -299,10 +299,8 @@ impl Bracket {
 }
 
 /// Makes the whitened velocity `after` where it was `before`, and refreshes what readers see.
-fn push(core: &mut Core, after: &[f64], before: &[f64], scale: f64) {
+fn push_to(core: &mut Core, after: &[f64], before: &[f64]) {
     let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
-    let mut dp = vec![0.0; core.dof];
-    recover(core, &change, &mut dp);
-    kick(core, &dp, scale);
+    push(core, &change);
     core.motion().refresh();
 }

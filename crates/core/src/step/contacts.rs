@@ -121,7 +121,7 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
         body.whiten(&core.x[entry.span.x.clone()], &mut u[v.clone()]);
-        body.respond(&dp[v.clone()], &mut du[v.clone()]);
+        body.whiten_rate(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
 }
@@ -133,7 +133,7 @@ pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
         let mut turning = vec![0.0; v.len()];
         body.gyroscopic(&core.x[entry.span.x.clone()], &mut turning);
-        body.respond(&turning, &mut out[v]);
+        body.whiten_rate(&turning, &mut out[v]);
     }
     out
 }
@@ -144,23 +144,25 @@ pub(crate) fn zero(v: &mut Vec<f64>, n: usize) {
     v.resize(n, 0.0);
 }
 
-/// What a change `du` of whitened velocity means as momentum.
-pub(crate) fn recover(core: &Core, du: &[f64], dp: &mut [f64]) {
-    dp.fill(0.0);
+/// The generalized impulse (or force) that a change `du` of whitened velocity (or acceleration) means.
+pub(crate) fn recover(core: &Core, du: &[f64], j: &mut [f64]) {
+    j.fill(0.0);
     for entry in core.table.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.recover(&du[entry.span.v.clone()], &mut dp[entry.span.v.clone()]);
+            body.recover(&du[entry.span.v.clone()], &mut j[entry.span.v.clone()]);
         }
     }
 }
 
-/// Adds momentum to the state.
-pub(crate) fn kick(core: &mut Core, dp: &[f64], h: f64) {
+/// Changes the whitened velocity of the state by `du`; the momentum (or velocity) that this is.
+pub(crate) fn push(core: &mut Core, du: &[f64]) -> Vec<f64> {
+    let mut dp = vec![0.0; core.dof];
     for entry in core.table.iter().filter(|e| e.moves()) {
-        if let Some(body) = entry.object.integratable() {
-            body.kick(&mut core.x[entry.span.x.clone()], &dp[entry.span.v.clone()], h);
-        }
+        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        body.unwhiten_rate(&du[v.clone()], &mut dp[v.clone()]);
+        body.kick(&mut core.x[entry.span.x.clone()], &dp[v], 1.0);
     }
+    dp
 }
 
 /// Moves positions by `h·L⁻¹u`.

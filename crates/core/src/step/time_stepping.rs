@@ -15,7 +15,7 @@
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, kick, recover, row_velocities, solve, warm_start, whiten, zero};
+use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
@@ -23,6 +23,7 @@ use crate::detect::Touch;
 use crate::motion::coast;
 use crate::object::Level;
 use crate::rows::RowSet;
+use crate::view::Entry;
 use crate::world::{Core, StepError};
 
 /// The default stepper, `time_stepping`.
@@ -30,6 +31,8 @@ use crate::world::{Core, StepError};
 pub struct TimeStepping {
     work: Workspace,
     x0: Vec<f64>,
+    /// State at the end of the free step, of objects whose state holds velocities.
+    free: Vec<f64>,
     /// Share of the step before the first impact, per coordinate; negative where there is none.
     share: Vec<f64>,
     candidates: Vec<Candidate>,
@@ -65,7 +68,7 @@ impl TimeStepping {
         build_rows(core, &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
-        whiten(core, &self.work.dp, h, &mut u, &mut du_force);
+        self.whiten(core, h, &mut u, &mut du_force);
         let mut after = self.impacts(core, h, &u, &du_force);
         self.look_again(core, h, &u, &after)?;
         self.contacts(core, h, &mut after, &du_force);
@@ -82,9 +85,37 @@ impl TimeStepping {
         let mut motion = core.motion();
         motion.coast(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
+        motion.take_off_coasting(&mut self.work.dp);
+        core.check_finite(&self.work.dp)?;
+        self.free_motion(core, h);
         core.x.copy_from_slice(&self.x0);
         core.motion().refresh();
-        core.check_finite(&self.work.dp)
+        Ok(())
+    }
+
+    /// From the midpoint, the end of the free step of every object whose state holds velocities, into `free`.
+    fn free_motion(&mut self, core: &mut Core, h: f64) {
+        self.free.clone_from(&core.x);
+        for entry in core.table.iter().filter(|e| e.moves()) {
+            let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+            let x = &mut self.free[entry.span.x.clone()];
+            body.kick(x, &self.work.dp[entry.span.v.clone()], h);
+            body.coast(x, 0.5 * h);
+        }
+    }
+
+    /// Whitened velocity at the start and its change in free motion.
+    fn whiten(&self, core: &Core, h: f64, u: &mut Vec<f64>, du: &mut Vec<f64>) {
+        whiten(core, &self.work.dp, h, u, du);
+        for entry in core.table.iter().filter(|e| e.moves()) {
+            let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+            let (x, v) = (entry.span.x.clone(), entry.span.v.clone());
+            let (mut before, mut after) = (vec![0.0; v.len()], vec![0.0; v.len()]);
+            body.velocity(&core.x[x.clone()], &mut before);
+            body.velocity(&self.free[x], &mut after);
+            after.iter_mut().zip(&before).for_each(|(a, b)| *a -= b);
+            body.whiten_rate(&after, &mut du[v]);
+        }
     }
 
     /// Times the impacts that free motion meets within the step and resolves them; the whitened velocity after them, forces not yet added.
@@ -128,9 +159,8 @@ impl TimeStepping {
         if self.impact.iter().all(|i| *i == 0.0) {
             return Ok(());
         }
-        let (change, mut dp): (Vec<f64>, Vec<f64>) = (after.iter().zip(before).map(|(a, b)| a - b).collect(), vec![0.0; core.dof]);
-        recover(core, &change, &mut dp);
-        kick(core, &dp, 1.0);
+        let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
+        push(core, &change);
         core.motion().refresh();
         let mut found = Vec::new();
         detect(core, h, &mut found);
@@ -209,18 +239,27 @@ impl TimeStepping {
     /// Writes the state at the end of the step.
     fn commit(&mut self, core: &mut Core, h: f64, u0: &[f64], u1: &[f64], du_force: &[f64]) -> Result<(), StepError> {
         let share = |i: usize| if self.share[i] < 0.0 { 0.5 } else { self.share[i] };
-        let change: Vec<f64> = u1.iter().zip(u0).map(|(a, b)| a - b).collect();
-        let mut dp = vec![0.0; core.dof];
-        recover(core, &change, &mut dp);
+        let free = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
+        let mut change: Vec<f64> = u1.iter().zip(u0).map(|(a, b)| a - b).collect();
+        let parabola: Vec<f64> = (0..core.dof).map(|i| (share(i) - 0.5) * du_force[i]).collect();
+        let mut extra = parabola.clone();
         for entry in core.table.iter() {
-            coast(entry, &mut core.x[entry.span.x.clone()], h * entry.span.v.clone().next().map_or(0.5, share));
+            let x = &mut core.x[entry.span.x.clone()];
+            if free(entry) {
+                x.copy_from_slice(&self.free[entry.span.x.clone()]);
+                for i in entry.span.v.clone() {
+                    change[i] -= du_force[i];
+                    extra[i] = (1.0 - share(i)) * change[i];
+                }
+            } else {
+                coast(entry, x, h * entry.span.v.clone().next().map_or(0.5, share));
+            }
         }
-        kick(core, &dp, 1.0);
-        for entry in core.table.iter() {
+        let dp = push(core, &change);
+        for entry in core.table.iter().filter(|e| !free(e)) {
             coast(entry, &mut core.x[entry.span.x.clone()], h * entry.span.v.clone().next().map_or(0.5, |i| 1.0 - share(i)));
         }
-        let parabola: Vec<f64> = (0..core.dof).map(|i| (share(i) - 0.5) * du_force[i]).collect();
-        displace(core, &parabola, h);
+        displace(core, &extra, h);
         let mean: Vec<f64> = (0..core.dof).map(|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]).collect();
         let recovery = core.settings.recovery_speed * h;
         let least = core.settings.contact_tolerance;

@@ -21,6 +21,16 @@ pub enum StepError {
         /// Simulated time, s.
         time: f64,
     },
+    /// An object's mass matrix has no inverse where it is.
+    #[error("'{object}' at t = {time} s: {why}")]
+    Singular {
+        /// Object.
+        object: String,
+        /// What is singular, and what helps.
+        why: String,
+        /// Simulated time, s.
+        time: f64,
+    },
     /// A constraint made a row that cannot be.
     #[error("constraint '{object}': {why}")]
     Row {
@@ -117,8 +127,12 @@ impl Core {
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
     }
 
-    /// Stops forces and impulses that are not numbers.
+    /// Stops forces and impulses that are not numbers, and objects that cannot move.
     pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
+        let trouble = |e: &Entry| Some((e.object.name().to_string(), e.object.integratable()?.trouble()?));
+        if let Some((object, why)) = self.table.iter().filter(|e| e.moves()).find_map(trouble) {
+            return Err(StepError::Singular { object, why, time: self.time });
+        }
         let accelerates = |s: &Site| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
         let fine = |e: &&Entry| dp[e.span.v.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(accelerates);
         let bad = self.table.iter().find(|e| !fine(e));
