@@ -20,7 +20,7 @@
 
 use super::contacts::{build_rows, detect, gyroscopic, impulses, push, recover, row_velocities, solve, warm_start, whiten};
 use super::impact::{self, Candidate};
-use super::{Frame, Stepper, TimeStepping, Workspace, projection};
+use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection};
 use crate::detect::Touch;
 use crate::object::Level;
 use crate::rows::RowSet;
@@ -34,6 +34,8 @@ pub struct Backtracking {
     after: Vec<Touch>,
     /// Gap and its rate of every one-sided row of a constraint.
     limits: Vec<(f64, f64)>,
+    /// Error of every constraint row that is not to be taken back in this sub-step.
+    kept: Vec<f64>,
     fallback: TimeStepping,
 }
 
@@ -97,6 +99,8 @@ impl Backtracking {
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
         }
+        let recovery = core.settings.recovery_speed * left;
+        self.kept = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
         core.motion().evaluate(time, &mut self.work.dp);
@@ -210,6 +214,8 @@ impl Backtracking {
                 core.report.floor_hits += floored as u32;
                 core.report.max_penetration = core.report.max_penetration.max(deepest);
                 core.held.fill(0.0);
+                closing::refresh_at(core, &start);
+                closing::close(core, &mut self.work, &start, h, &self.kept)?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }

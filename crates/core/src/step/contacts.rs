@@ -1,5 +1,6 @@
 //! From touches to rows, and from multipliers back to momentum: what both steppers share.
 
+use super::closing;
 use super::projection::Projection;
 use crate::detect::{Detector, Touch};
 use crate::object::{Level, RowTarget};
@@ -46,22 +47,50 @@ pub(crate) fn detect(core: &mut Core, horizon: f64, out: &mut Vec<Touch>) {
     core.report.contacts = out.len() as u32;
 }
 
-/// State and sites as free motion makes them in `t` seconds; caches stay at the present.
-fn look_ahead(core: &mut Core, t: f64) -> (Vec<f64>, Vec<Site>) {
+/// State and sites at another moment of the step.
+pub(crate) struct Moment {
+    pub x: Vec<f64>,
+    pub sites: Vec<Site>,
+    /// Seconds from the present.
+    pub ahead: f64,
+}
+
+/// What free motion makes in `ahead` seconds; caches stay at the present.
+fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
     let start = core.x.clone();
-    core.motion().coast(t);
+    core.motion().coast(ahead);
     core.motion().refresh();
-    let ahead = (std::mem::replace(&mut core.x, start), core.sites.clone());
+    let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
     core.motion().refresh();
-    ahead
+    moment
 }
 
 /// Makes the rows of all touches and constraints: the thesis's test impulses. Touches are as they were found; constraints are asked about the
 /// state that free motion makes in `ahead` seconds, half the step to come: a direction that turns is then right to second order, where one
-/// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Their errors are told for the present state all the same.
+/// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Where there are joints that state is brought back onto them first. The
+/// errors are told for the present state all the same.
 pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ahead: f64) -> Result<(), StepError> {
-    let looked = (ahead > 0.0 && constraints(&core.table).next().is_some()).then(|| look_ahead(core, ahead));
-    let core = &*core;
+    if ahead <= 0.0 || constraints(&core.table).next().is_none() {
+        return lay_rows(core, work, level, None);
+    }
+    let middle = look_ahead(core, ahead);
+    lay_rows(core, work, level, Some(&middle))?;
+    if !work.targets.iter().any(closing::is_joint) {
+        present_errors(core, work, ahead);
+        return Ok(());
+    }
+    let (errors, middle) = closing::middle(core, level, ahead)?;
+    lay_rows(core, work, level, Some(&middle))?;
+    if errors.len() == work.targets.len() {
+        work.targets.iter_mut().zip(errors).for_each(|(target, error)| target.error = error);
+    } else {
+        present_errors(core, work, ahead);
+    }
+    Ok(())
+}
+
+/// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment.
+pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<(), StepError> {
     work.rows.clear(core.dof);
     work.bias.clear();
     work.targets.clear();
@@ -80,7 +109,7 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
             builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
         }
     }
-    let (x, sites) = looked.as_ref().map_or((&core.x, &core.sites), |(x, sites)| (x, sites));
+    let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
     builder.sites = sites;
     let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, x, sites, table: &core.table };
     for (id, entry, constraint) in constraints(&core.table) {
@@ -89,9 +118,6 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
         if let Some(why) = builder.problem.take() {
             return Err(StepError::Row { object: entry.object.name().to_string(), why });
         }
-    }
-    if looked.is_some() {
-        present_errors(core, work, ahead);
     }
     let n = work.rows.len;
     work.c.resize(n, 0.0);
