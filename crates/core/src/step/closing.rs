@@ -27,8 +27,9 @@ use crate::world::{Core, StepError};
 const ROUNDS: usize = 8;
 /// A round that leaves more of the error than this is the last of its kind.
 const SLOW: f64 = 0.5;
-/// Compliance of rows that are not known to agree, as a share of their own response: what is redundant but for the error has far less.
-const SOFT: f64 = 1e-4;
+/// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
+/// responds with the square of it, far less, and is left alone; as the error goes so does the compliance (Levenberg and Marquardt).
+const SOFT: (f64, f64) = (10.0, 1e-3);
 /// Islands of at most so many rows are solved directly.
 const DIRECT: usize = 200;
 
@@ -63,10 +64,10 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
             return Ok(());
         }
         let off: Vec<f64> = probe.targets.iter().zip(errors).map(|(t, e)| if is_joint(t) { t.error - e } else { 0.0 }).collect();
-        if off.iter().all(|e| e.abs() <= least) {
+        if largest(&off) <= least {
             return Ok(());
         }
-        soften(probe);
+        soften(probe, largest(&off));
         islands(probe);
         let mut dx = vec![0.0; core.dof];
         probe.islands.iter().for_each(|blocks| solve(&probe.rows, blocks, &off, &mut dx, 0.1 * least));
@@ -96,7 +97,7 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64
             refresh_at(core, start);
             open.apply(core, work);
         } else {
-            soften(&mut probe);
+            soften(&mut probe, largest(&open.place));
             islands(&mut probe);
             open.apply(core, &mut probe);
         }
@@ -150,7 +151,6 @@ impl Open {
 
     /// The largest error, as a multiple of what counts as closed.
     fn worst(&self) -> f64 {
-        let largest = |v: &[f64]| v.iter().fold(0.0, |worst: f64, x| worst.max(x.abs()));
         (largest(&self.place) / self.least.0).max(largest(&self.speed) / self.least.1)
     }
 
@@ -188,16 +188,21 @@ fn pushed(work: &mut Workspace) -> Vec<bool> {
     pushed
 }
 
+fn largest(v: &[f64]) -> f64 {
+    v.iter().fold(0.0, |worst, x| worst.max(x.abs()))
+}
+
 /// Groups the joints alone.
 fn islands(work: &mut Workspace) {
     let (touches, targets) = (work.touches.len(), &work.targets);
     work.islands.build(&work.rows, |b| b >= touches && is_joint(&targets[b - touches]));
 }
 
-fn soften(probe: &mut Workspace) {
+fn soften(probe: &mut Workspace, error: f64) {
+    let share = (SOFT.0 * error).min(SOFT.1);
     for b in 0..probe.rows.blocks.len() {
         let own = probe.rows.own(&probe.rows.blocks[b], 0, 0);
-        probe.rows.blocks[b].compliance = SOFT * own;
+        probe.rows.blocks[b].compliance = share * own;
     }
 }
 
