@@ -17,6 +17,7 @@
 //! ```
 
 pub mod articulated;
+mod closure;
 mod collidable;
 mod detect;
 mod integrators;
@@ -35,6 +36,7 @@ mod view;
 mod world;
 
 pub use articulated::{Joint, LinkMass, Model, ModelBuilder, ModelError};
+pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use object::{
     Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget, SyncError, Visual,
