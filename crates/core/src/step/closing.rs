@@ -44,13 +44,14 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     let mut probe = Workspace::default();
     lay_rows(core, &mut probe, level, None)?;
     let errors: Vec<f64> = probe.targets.iter().map(|t| t.error).collect();
-    let (start, time) = (core.x.clone(), core.time);
+    let (start, time, pinned) = (core.x.clone(), core.time, core.unpin());
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
     let outcome = onto(core, &mut probe, level, &errors);
     core.time = time;
     let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
+    core.pin_again(pinned);
     core.motion().refresh();
     outcome.map(|_| (errors, moment))
 }
@@ -128,6 +129,13 @@ struct Open {
 impl Open {
     /// Sites and caches are left at the present, whose rows come in `probe`. Nothing is open where they are not those of `work`.
     fn measure(core: &mut Core, work: &Workspace, probe: &mut Workspace, h: f64, kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
+        let pinned = core.unpin();
+        let open = Open::measure_here(core, work, probe, h, kept, pushed);
+        core.pin_again(pinned);
+        open
+    }
+
+    fn measure_here(core: &mut Core, work: &Workspace, probe: &mut Workspace, h: f64, kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
         core.motion().refresh();
         let time = core.time;
         core.time += h;
