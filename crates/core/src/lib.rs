@@ -29,6 +29,7 @@ mod settings;
 mod site;
 pub mod solver;
 mod step;
+mod sync;
 mod view;
 mod world;
 

@@ -35,12 +35,16 @@ impl RowBuilder<'_> {
     /// Starts a row. A `Cone` set is for contacts, which the world makes itself: it is refused here, and the step reports it.
     pub fn row(&mut self, target: RowTarget) -> &mut Self {
         let bounds = if let RowSet::Interval { lo, hi } = target.set { lo <= hi } else { true };
+        if !(target.compliance.is_finite() && target.compliance >= 0.0) {
+            self.refuse(format!("a row's compliance is {}; it must be finite and at least 0", target.compliance));
+            return self;
+        }
         let finite = [target.error, target.velocity, target.bias_acceleration].iter().all(|x| x.is_finite());
         if target.set.rows() != 1 || !finite || !bounds {
             self.refuse("a constraint's row must be Equality, HalfLine or Interval (lo ≤ hi), with finite error, velocity and bias".into());
             return self;
         }
-        self.rows.push_block(target.set);
+        self.rows.push_soft(target.set, target.compliance);
         self.bias.push(0.0);
         self.targets.push(target);
         self

@@ -71,6 +71,7 @@ impl Stepper for Backtracking {
                 core.report.floor_hits += 1;
                 return self.fallback.substep(core, left);
             }
+            core.implicit = false;
             self.gather(core, left)?;
             let roles = self.roles(core);
             let roles = if self.resolve_impacts(core, &roles) { self.gather(core, left).map(|_| self.roles(core))? } else { roles };

@@ -82,7 +82,7 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
     }
     let (x, sites) = looked.as_ref().map_or((&core.x, &core.sites), |(x, sites)| (x, sites));
     builder.sites = sites;
-    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, x, sites, table: &core.table };
+    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
     for (id, entry, constraint) in constraints(&core.table) {
         builder.owner = id;
         constraint.rows(&entry.span, &view, level, &mut builder);

@@ -62,6 +62,7 @@ impl Stepper for TimeStepping {
 impl TimeStepping {
     /// One sub-step of `h` seconds.
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
+        core.implicit = true;
         self.smooth_forces(core, h)?;
         detect(core, h, &mut self.work.touches);
         flight::time_contacts(core, h, &mut self.work.touches);

@@ -3,6 +3,7 @@
 mod free;
 mod friction;
 mod impacts;
+mod soft_rows;
 mod solvers;
 mod stacks;
 mod articulated_closed;
