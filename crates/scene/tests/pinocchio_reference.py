@@ -3,7 +3,8 @@
     pinocchio_reference.py robots       prints the trees of some robots from example-robot-data (exit 77 where a package is missing)
     pinocchio_reference.py check        reads a tree and states of it from standard input, prints what Pinocchio computes
 
-A tree is lines `link parent kind axis(3) placement(3, quaternion x y z w) mass center(3) inertia(9)`, parent -1 for a root, kind one of revolute,
+A tree is either a line `urdf PATH fixed` or `urdf PATH floating`, which Pinocchio reads by itself, and then a line `name kind LINK` for each moving link
+in tumble's order; or it is lines `link parent kind axis(3) placement(3, quaternion x y z w) mass center(3) inertia(9)`, parent -1 for a root, kind one of revolute,
 prismatic, spherical, floating. A state is four lines `q`, `v`, `a`, `t` (positions, velocities, accelerations, torques) and a line `go`.
 Numbers are in SI units. Conventions of the numbers are tumble's: quaternions x y z w; a floating link has position and quaternion, and velocity
 [angular; linear] in world axes; a spherical joint has its angular velocity in the link's axes. Here they are turned into Pinocchio's and back.
@@ -23,41 +24,56 @@ except ImportError as error:
 class Tree:
     """A Pinocchio model, and where the numbers of each link lie on both sides."""
 
-    def __init__(self, lines):
-        self.model, self.kinds, self.joint = pin.Model(), [], []
-        parents = [int(line[0]) for line in lines]
-        self.kinds = [line[1] for line in lines]
-        self.joint = [None] * len(lines)
+    def __init__(self, model, kinds, joint):
+        self.model, self.data, self.kinds, self.joint = model, model.createData(), kinds, joint
+        sizes = {"revolute": (1, 1), "prismatic": (1, 1), "spherical": (4, 3), "floating": (7, 6)}
+        self.q_at = np.cumsum([0] + [sizes[kind][0] for kind in kinds])
+        self.v_at = np.cumsum([0] + [sizes[kind][1] for kind in kinds])
+        if self.v_at[-1] != model.nv:
+            sys.exit(f"tumble has {self.v_at[-1]} degrees of freedom, Pinocchio {model.nv}")
+
+    @staticmethod
+    def read(path, base, names):
+        model = pin.buildModelFromUrdf(path, pin.JointModelFreeFlyer()) if base == "floating" else pin.buildModelFromUrdf(path)
+        joints = [model.frames[model.getFrameId(name, pin.FrameType.BODY)].parentJoint for _, name in names]
+        return Tree(model, [kind for kind, _ in names], joints)
+
+    @staticmethod
+    def build(lines):
+        model, joint = pin.Model(), [None] * len(lines)
+        parents, kinds = [int(line[0]) for line in lines], [line[1] for line in lines]
         children = {i: [k for k, p in enumerate(parents) if p == i] for i in range(-1, len(lines))}
         # Pinocchio wants each subtree in one piece: depth first.
         todo = list(reversed(children[-1]))
         while todo:
             i = todo.pop()
-            self.add(i, parents[i], [float(x) for x in lines[i][2:]])
+            at = 0 if parents[i] < 0 else joint[parents[i]]
+            joint[i] = Tree.add(model, at, kinds[i], f"joint {i}", [float(x) for x in lines[i][2:]])
             todo.extend(reversed(children[i]))
-        self.data = self.model.createData()
-        sizes = {"revolute": (1, 1), "prismatic": (1, 1), "spherical": (4, 3), "floating": (7, 6)}
-        self.q_at = np.cumsum([0] + [sizes[kind][0] for kind in self.kinds])
-        self.v_at = np.cumsum([0] + [sizes[kind][1] for kind in self.kinds])
+        return Tree(model, kinds, joint)
 
-    def add(self, i, parent, x):
+    @staticmethod
+    def add(model, at, kind, name, x):
         axis, shift, turn = np.array(x[:3]), np.array(x[3:6]), pin.Quaternion(np.array(x[6:10])).normalized()
         made = {
             "revolute": lambda: pin.JointModelRevoluteUnaligned(axis),
             "prismatic": lambda: pin.JointModelPrismaticUnaligned(axis),
             "spherical": pin.JointModelSpherical,
             "floating": pin.JointModelFreeFlyer,
-        }[self.kinds[i]]()
-        placement = pin.SE3.Identity() if self.kinds[i] == "floating" else pin.SE3(turn.matrix(), shift)
-        at = 0 if parent < 0 else self.joint[parent]
-        self.joint[i] = self.model.addJoint(at, made, placement, f"joint {i}")
+        }[kind]()
+        placement = pin.SE3.Identity() if kind == "floating" else pin.SE3(turn.matrix(), shift)
+        joint = model.addJoint(at, made, placement, name)
         inertia = pin.Inertia(x[10], np.array(x[11:14]), np.array(x[14:23]).reshape(3, 3))
-        self.model.appendBodyToJoint(self.joint[i], inertia, pin.SE3.Identity())
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+        return joint
 
     def positions(self, q):
         out = pin.neutral(self.model)
         for i, j in enumerate(self.joint):
-            out[self.model.idx_qs[j] : self.model.idx_qs[j] + self.model.nqs[j]] = q[self.q_at[i] : self.q_at[i + 1]]
+            own = q[self.q_at[i] : self.q_at[i + 1]]
+            if self.kinds[i] == "revolute" and self.model.nqs[j] == 2:  # a continuous joint
+                own = [np.cos(own[0]), np.sin(own[0])]
+            out[self.model.idx_qs[j] : self.model.idx_qs[j] + self.model.nqs[j]] = own
         return out
 
     def turner(self, q):
@@ -112,16 +128,20 @@ def tell(name, numbers):
 
 
 def check():
-    lines, tree, state, gravity = [], None, {}, [0.0, 0.0, 0.0]
+    lines, names, urdf, tree, state, gravity = [], [], None, None, {}, [0.0, 0.0, 0.0]
     for line in sys.stdin:
         name, *rest = line.split()
         if name == "link":
             lines.append(rest)
+        elif name == "urdf":
+            urdf = line.split(" ", 1)[1].strip().rsplit(" ", 1)
+        elif name == "name":
+            names.append(line.strip().split(" ", 2)[1:])
         elif name == "gravity":
             gravity = [float(x) for x in rest]
         elif name == "go":
             if tree is None:
-                tree = Tree(lines)
+                tree = Tree.read(*urdf, names) if urdf else Tree.build(lines)
                 tree.model.gravity.linear = np.array(gravity)
             tree.answer(state["q"], state["v"], state["a"], state["t"])
         else:
