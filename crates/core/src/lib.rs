@@ -17,8 +17,10 @@
 //! ```
 
 pub mod articulated;
+mod closure;
 mod collidable;
 mod detect;
+mod integrators;
 mod motion;
 mod object;
 mod rigid;
@@ -34,6 +36,7 @@ mod view;
 mod world;
 
 pub use articulated::{Joint, LinkMass, Model, ModelBuilder, ModelError};
+pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use object::{
     Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget, SyncError, Visual,

@@ -397,6 +397,11 @@ impl Integratable for RigidBody {
         write_orientation(x, &turned);
     }
 
+    fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
+        let rate = rotation::pull_back(&vec3(displacement), &vec3(v));
+        v[..3].copy_from_slice(rate.as_slice());
+    }
+
     fn whiten(&self, x: &[f64], u: &mut [f64]) {
         write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
     }

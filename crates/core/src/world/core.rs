@@ -31,6 +31,20 @@ pub enum StepError {
         /// Simulated time, s.
         time: f64,
     },
+    /// The adaptive integrator cannot hold its tolerance.
+    #[error("'{object}' at t = {time} s: its error stays above the integrator's tolerance {tolerance} (inner step {steps}, of {step} s); soften what acts on it, or loosen the tolerance")]
+    Tolerance {
+        /// The object whose error is greatest.
+        object: String,
+        /// Simulated time, s.
+        time: f64,
+        /// Length of the last inner step tried, s.
+        step: f64,
+        /// Inner steps of this frame, refused ones included.
+        steps: u32,
+        /// `Settings::integrator_tolerance`.
+        tolerance: f64,
+    },
     /// A constraint made a row that cannot be.
     #[error("constraint '{object}': {why}")]
     Row {
@@ -89,6 +103,8 @@ pub struct Core {
     pub(crate) contacts: Vec<ContactPoint>,
     pub(crate) report: StepReport,
     pub(crate) next_serial: u32,
+    /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
+    pub(crate) inner_step: f64,
 }
 
 impl Core {

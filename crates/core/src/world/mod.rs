@@ -92,7 +92,7 @@ impl World {
             table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(),
             forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
-            report: StepReport::default(), next_serial: 0,
+            report: StepReport::default(), next_serial: 0, inner_step: 0.0,
         };
         Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new(), names: BTreeMap::new() })
     }
@@ -130,13 +130,13 @@ impl World {
         core.report = StepReport::default();
         core.held.fill(0.0);
         self.before.clone_from(&core.x);
-        let (time, warm) = (core.time, core.warm.clone());
+        let (time, warm, inner_step) = (core.time, core.warm.clone(), core.inner_step);
         let outcome = self.stepper.step(Frame { core });
         core.applied.fill(Wrench::default());
         core.applied_generalized.fill(0.0);
         if let Err(error) = outcome {
             core.x.clone_from(&self.before);
-            (core.time, core.warm) = (time, warm);
+            (core.time, core.warm, core.inner_step) = (time, warm, inner_step);
             core.sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
             core.motion().refresh();
             return Err(error);
@@ -309,7 +309,7 @@ impl World {
                 table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit,
                 held: c.held.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
-                contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial,
+                contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, inner_step: c.inner_step,
             },
             stepper: self.stepper.fork(),
             before: Vec::new(),

@@ -1,8 +1,8 @@
 //! Saving and restoring: everything that the next step reads, and nothing else.
 //!
 //! A snapshot is the state `X`, the switches, the sites' accelerations (objects may read them), the forces that users applied, the warm starts,
-//! time and frame. Shapes, masses and settings are the scene's and are not in it: it is restored into a world of the same objects, which is
-//! checked by their names and sizes. The sweep order of the broad phase is left out because its pairs come sorted: no result depends on it.
+//! time and frame, and the adaptive integrator's inner step. Shapes, masses and settings are the scene's and are not in it: it is restored into
+//! a world of the same objects, which is checked by their names and sizes. The sweep order of the broad phase is left out because its pairs come sorted: no result depends on it.
 
 use super::World;
 use crate::detect::WarmStarts;
@@ -50,6 +50,8 @@ struct Snapshot {
     applied: Vec<[f64; 6]>,
     applied_generalized: Vec<f64>,
     warm: WarmStarts,
+    /// Inner step of the adaptive integrator, s.
+    inner_step: f64,
 }
 
 #[derive(Serialize, Deserialize, PartialEq)]
@@ -89,6 +91,7 @@ impl World {
             applied: c.applied.iter().map(|w| six(&w.torque, &w.force)).collect(),
             applied_generalized: c.applied_generalized.clone(),
             warm: c.warm.clone(),
+            inner_step: c.inner_step,
         };
         postcard::to_stdvec(&snapshot).unwrap_or_default() // writing plain numbers to memory cannot fail
     }
@@ -102,6 +105,7 @@ impl World {
         self.check(&saved)?;
         let core = &mut self.core;
         (core.time, core.frame, core.next_serial, core.warm) = (saved.time, saved.frame, saved.next_serial, saved.warm);
+        core.inner_step = saved.inner_step;
         core.x = saved.x;
         for (i, object) in saved.objects.iter().enumerate() {
             let entry = &mut core.table.slots[core.table.order[i]];
@@ -147,7 +151,8 @@ impl World {
             return Err(SnapshotError::Format("its tables have the wrong lengths".into()));
         }
         let numbers = saved.x.iter().chain(&saved.applied_generalized).chain(saved.accelerations.iter().flatten()).chain(saved.applied.iter().flatten());
-        let finite = saved.time.is_finite() && numbers.copied().all(f64::is_finite) && saved.warm.finite();
+        let steps = saved.time.is_finite() && saved.inner_step.is_finite() && saved.inner_step >= 0.0;
+        let finite = steps && numbers.copied().all(f64::is_finite) && saved.warm.finite();
         let states = c.table.iter().all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.span.x.clone()])));
         if !(finite && states) {
             return Err(SnapshotError::NotFinite);

@@ -1,5 +1,6 @@
 //! Physics proved: closed forms, conservation laws, determinism.
 
+mod adaptive;
 mod free;
 mod friction;
 mod impacts;
@@ -9,6 +10,7 @@ mod stacks;
 mod articulated_closed;
 mod articulated_laws;
 mod articulated_random;
+mod closures;
 mod common;
 mod meshes;
 mod paradox;
