@@ -7,6 +7,7 @@ mod impacts;
 mod solvers;
 mod stacks;
 mod common;
+mod limits;
 mod meshes;
 mod paradox;
 mod regressions;

@@ -56,6 +56,9 @@ fn every_word_of_the_world() {
 #[test]
 fn words_outside_of_files() {
     assert_eq!("backtracking".parse(), Ok(Stepper::Backtracking));
+    for integrator in ["verlet", "symplectic_euler", "explicit_euler", "rk4", "dormand_prince"] {
+        assert_eq!(integrator.parse::<Integrator>().unwrap().to_string(), integrator);
+    }
     for solver in ["gauss_seidel", "lcp_pyramid", "lcp_sliding"] {
         assert_eq!(solver.parse::<Solver>().unwrap().to_string(), solver);
     }
