@@ -22,8 +22,12 @@ pub(crate) struct Motion<'a> {
     pub sites: &'a mut [Site],
     pub forces: &'a mut Forces,
     pub gravity: Vec3,
+    /// See [`WorldView::implicit`].
+    pub implicit: bool,
     /// Forces set by the user, per site.
     pub applied: &'a [Wrench],
+    /// Generalized forces set by the user, per coordinate.
+    pub applied_generalized: &'a [f64],
     /// Generalized contact forces that hold over the sub-step.
     pub held: &'a [f64],
 }
@@ -48,8 +52,8 @@ impl Motion<'_> {
         self.forces.wrenches.clear();
         self.forces.wrenches.extend_from_slice(self.applied);
         self.forces.generalized.clear();
-        self.forces.generalized.extend_from_slice(self.held);
-        let view = WorldView { time: t, gravity: self.gravity, x: self.x, sites: self.sites, table: self.table };
+        self.forces.generalized.extend(self.held.iter().zip(self.applied_generalized).map(|(held, applied)| held + applied));
+        let view = WorldView { time: t, gravity: self.gravity, implicit: self.implicit, x: self.x, sites: self.sites, table: self.table };
         for entry in self.table.iter().filter(|e| e.status.alive) {
             if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {
                 body.accumulate_forces(&entry.span, &view, self.forces);

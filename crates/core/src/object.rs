@@ -205,12 +205,18 @@ pub struct RowTarget {
     pub velocity: f64,
     /// The part of the row's acceleration that is there without any force or change of velocity (`J̇·v`); 0 where the row's direction stays.
     pub bias_acceleration: f64,
+    /// Compliance `R` of the row, at least 0: it gives way by `R` times its multiplier, `w = c + (K + R)·λ`. In (m/s)/(N·s); at the
+    /// acceleration level (m/s²)/N. 0 is rigid. A soft row is a spring: no impact and no position projection knows it.
+    ///
+    /// An implicit PD drive `F = kp·(q* − q⁺) + kd·(v* − v⁺)` with `q⁺ = q + h·v⁺` is `compliance = 1/(h·(kd + h·kp))` with the target
+    /// velocity `(kp·(q* − q) + kd·v*)/(kd + h·kp)`; the same at the acceleration level, for a sub-step of `h`.
+    pub compliance: f64,
 }
 
 impl RowTarget {
-    /// A row at rest with the given set and position error.
+    /// A rigid row at rest with the given set and position error.
     pub fn new(set: RowSet, error: f64) -> RowTarget {
-        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0 }
+        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0, compliance: 0.0 }
     }
 }
 

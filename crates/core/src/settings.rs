@@ -38,6 +38,8 @@ pub struct Settings {
     pub accuracy: Accuracy,
     /// Sweeps at most of the position projection.
     pub projection_sweeps: u32,
+    /// Whether the equality rows of constraints (joints) are held in place too, and not in velocity alone: off, they drift.
+    pub stabilize_positions: bool,
     /// `backtracking`: surfaces closer than this touch, metres; deeper than this, a new contact makes the step go back. A rebound
     /// lower than this rests.
     pub contact_tolerance: f64,
@@ -61,6 +63,7 @@ impl Default for Settings {
             integrator_tolerance: 1e-6,
             accuracy: Accuracy { sweeps: 200, relaxations: 20_000, tolerance: 1e-9 },
             projection_sweeps: 15,
+            stabilize_positions: true,
             contact_tolerance: 1e-7,
             drift_tolerance: 1e-4,
             recovery_speed: 3.0,

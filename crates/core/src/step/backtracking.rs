@@ -23,7 +23,7 @@
 use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten};
 use super::impact::{self, Candidate};
 use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
-use super::{Frame, Stepper, TimeStepping, Workspace, projection};
+use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection};
 use crate::detect::Touch;
 use crate::integrators::Adaptive;
 use crate::object::Level;
@@ -41,6 +41,8 @@ pub struct Backtracking {
     limits_after: Vec<Limit>,
     watch: Watch,
     adaptive: Adaptive,
+    /// Error of every constraint row that is not to be taken back in this sub-step.
+    kept: Vec<f64>,
     fallback: TimeStepping,
 }
 
@@ -68,6 +70,7 @@ impl Stepper for Backtracking {
                 self.fallback.substep(core, left)?;
                 break;
             }
+            core.implicit = false;
             self.gather(core, left)?;
             self.roles(core);
             if self.resolve_impacts(core) {
@@ -98,6 +101,8 @@ impl Backtracking {
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
         }
+        let recovery = core.settings.recovery_speed * left;
+        self.kept = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
         core.motion().evaluate(time, &mut self.work.dp);
@@ -239,6 +244,8 @@ impl Backtracking {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
                 core.held.fill(0.0);
+                closing::refresh_at(core, &start);
+                closing::close(core, &mut self.work, &start, h, &self.kept)?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }

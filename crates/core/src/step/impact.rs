@@ -48,7 +48,7 @@ pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candi
         let approach = |i: usize| candidates[i].takes_part && c[work.rows.blocks[i].row as usize] < -APPROACH;
         let bounces = |i: usize| approach(i) && candidates[i].restitution > 0.0 && -c[work.rows.blocks[i].row as usize] > candidates[i].rest_speed;
         let limits = work.rows.blocks[candidates.len()..].iter().zip(&work.targets);
-        let at_limit = |(block, t): (&Block, &RowTarget)| t.set == RowSet::HalfLine && t.error <= reach && c[block.row as usize] < -APPROACH;
+        let at_limit = |(block, t): (&Block, &RowTarget)| at_stop(t, reach) && c[block.row as usize] < -APPROACH;
         if !(0..candidates.len()).any(approach) && !limits.clone().any(at_limit) {
             return;
         }
@@ -67,6 +67,11 @@ pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candi
     }
 }
 
+/// Whether a row is a rigid stop that is within `reach`; springs do nothing in no time.
+fn at_stop(t: &RowTarget, reach: f64) -> bool {
+    t.set == RowSet::HalfLine && t.error <= reach && t.compliance == 0.0
+}
+
 /// Velocities of the constraints' rows against their targets.
 fn aim_constraints(work: &Workspace, c: &mut [f64]) {
     for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
@@ -79,7 +84,7 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bo
     let touches = work.touches.len();
     let (targets, reach) = (&work.targets, core.settings.contact_tolerance);
     work.islands.build(&work.rows, |b| {
-        let takes_part = |t: &RowTarget| t.set == RowSet::Equality || (t.set == RowSet::HalfLine && t.error <= reach);
+        let takes_part = |t: &RowTarget| (t.set == RowSet::Equality && t.compliance == 0.0) || at_stop(t, reach);
         if b < touches { member[b] } else { takes_part(&targets[b - touches]) }
     });
     work.c.copy_from_slice(c);

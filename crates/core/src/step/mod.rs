@@ -1,6 +1,7 @@
 //! One frame of simulated time, by either of two steppers.
 
 mod backtracking;
+mod closing;
 mod contacts;
 mod flight;
 mod impact;

@@ -88,6 +88,9 @@ pub struct Core {
     pub(crate) sites: Vec<Site>,
     pub(crate) owners: Vec<Owner>,
     pub(crate) applied: Vec<Wrench>,
+    pub(crate) applied_generalized: Vec<f64>,
+    /// See [`WorldView::implicit`](crate::WorldView::implicit).
+    pub(crate) implicit: bool,
     pub(crate) held: Vec<f64>,
     pub(crate) forces: Forces,
     pub(crate) settings: Settings,
@@ -108,7 +111,7 @@ impl Core {
     pub(crate) fn motion(&mut self) -> Motion<'_> {
         Motion {
             table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces,
-            gravity: self.settings.gravity, applied: &self.applied, held: &self.held,
+            gravity: self.settings.gravity, implicit: self.implicit, applied: &self.applied, applied_generalized: &self.applied_generalized, held: &self.held,
         }
     }
 

@@ -48,6 +48,7 @@ struct Snapshot {
     accelerations: Vec<[f64; 6]>,
     /// Torque, then force on every site.
     applied: Vec<[f64; 6]>,
+    applied_generalized: Vec<f64>,
     warm: WarmStarts,
     /// Inner step of the adaptive integrator, s.
     inner_step: f64,
@@ -88,6 +89,7 @@ impl World {
             x: c.x.clone(),
             accelerations: c.sites.iter().map(|s| six(&s.angular_acceleration, &s.acceleration)).collect(),
             applied: c.applied.iter().map(|w| six(&w.torque, &w.force)).collect(),
+            applied_generalized: c.applied_generalized.clone(),
             warm: c.warm.clone(),
             inner_step: c.inner_step,
         };
@@ -117,6 +119,7 @@ impl World {
             let (torque, force) = halves(w);
             *wrench = Wrench { torque, force };
         }
+        core.applied_generalized = saved.applied_generalized;
         core.contacts.clear();
         core.held.fill(0.0);
         core.motion().refresh();
@@ -143,11 +146,13 @@ impl World {
             }
         }
         let c = &self.core;
-        if (saved.x.len(), saved.accelerations.len(), saved.applied.len()) != (c.x.len(), c.sites.len(), c.sites.len()) {
+        let sizes = |s: &Snapshot| [s.x.len(), s.accelerations.len(), s.applied.len(), s.applied_generalized.len()];
+        if sizes(saved) != [c.x.len(), c.sites.len(), c.sites.len(), c.dof] {
             return Err(SnapshotError::Format("its tables have the wrong lengths".into()));
         }
-        let numbers = saved.x.iter().chain(saved.accelerations.iter().flatten()).chain(saved.applied.iter().flatten());
-        let finite = saved.time.is_finite() && saved.inner_step.is_finite() && saved.inner_step >= 0.0 && numbers.copied().all(f64::is_finite) && saved.warm.finite();
+        let numbers = saved.x.iter().chain(&saved.applied_generalized).chain(saved.accelerations.iter().flatten()).chain(saved.applied.iter().flatten());
+        let steps = saved.time.is_finite() && saved.inner_step.is_finite() && saved.inner_step >= 0.0;
+        let finite = steps && numbers.copied().all(f64::is_finite) && saved.warm.finite();
         let states = c.table.iter().all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.span.x.clone()])));
         if !(finite && states) {
             return Err(SnapshotError::NotFinite);
