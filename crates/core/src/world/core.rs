@@ -32,7 +32,7 @@ pub enum StepError {
         time: f64,
     },
     /// The adaptive integrator cannot hold its tolerance.
-    #[error("'{object}' at t = {time} s: its error stays above the integrator's tolerance {tolerance} (inner step {steps}, of {step} s); soften what acts on it, or loosen the tolerance")]
+    #[error("'{object}' at t = {time} s: its motion needs more than the {steps} inner steps of this frame (the last of {step} s) at the integrator's tolerance {tolerance}; soften what acts on it, or loosen the tolerance")]
     Tolerance {
         /// The object whose error is greatest.
         object: String,

@@ -13,6 +13,7 @@ mod articulated_random;
 mod articulated_world;
 mod closures;
 mod common;
+mod limits;
 mod meshes;
 mod paradox;
 mod regressions;
