@@ -1,5 +1,6 @@
 //! Physics proved: closed forms, conservation laws, determinism.
 
+mod chains;
 mod free;
 mod friction;
 mod impacts;
