@@ -20,6 +20,7 @@ pub mod articulated;
 mod closure;
 mod collidable;
 mod detect;
+mod integrators;
 mod motion;
 mod object;
 mod rigid;
@@ -30,6 +31,7 @@ mod settings;
 mod site;
 pub mod solver;
 mod step;
+mod sync;
 mod view;
 mod world;
 

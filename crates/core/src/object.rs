@@ -90,6 +90,11 @@ pub trait Integratable {
     fn coast(&self, x: &mut [f64], h: f64);
     /// Positions move with generalized velocity `v` for `h` seconds; exact on rotations. Momentum stays.
     fn drift(&self, x: &mut [f64], v: &[f64], h: f64);
+    /// Turns a velocity `v` at the displacement `displacement` from some state into the rate of that displacement: the inverse of the
+    /// differential of [`drift`](Self::drift)'s exponential map. Coordinates that simply add up leave `v` as it is, the default.
+    fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
+        let _ = (displacement, v);
+    }
     /// `u = L·v` of the momentum in `x`.
     fn whiten(&self, x: &[f64], u: &mut [f64]);
     /// `v = L⁻¹·u`.
@@ -181,6 +186,12 @@ pub trait Constraint {
     /// Adds its rows. See [`RowBuilder`] for how a row is made. The view shows the state that free motion makes by the middle of the step to
     /// come: directions are right there to second order. Errors are those of that state too; the stepper takes them back to the present.
     fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder);
+    /// Appends the errors of its one-sided rows ([`RowSet::HalfLine`]) at the view's state, one per row and in the order of the rows. What is told
+    /// here `backtracking` locates in time as it does contacts: the step ends where the limit is reached, and the limit acts from there on. Of a
+    /// constraint that tells nothing the limits act over the whole of the step in which they are reached.
+    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+        let _ = (me, view, out);
+    }
 }
 
 /// One row of a [`Constraint`]: what it may do and how far off it is.

@@ -22,6 +22,8 @@ pub(crate) struct Workspace {
     pub bias: Vec<f64>,
     /// Targets of the constraints' rows, after those of the touches.
     pub targets: Vec<RowTarget>,
+    /// One-sided rows that their constraints locate, at the present state.
+    pub limits: Vec<Limit>,
     /// Right-hand side of a solve.
     pub c: Vec<f64>,
     pub lambda: Vec<f64>,
@@ -33,6 +35,33 @@ pub(crate) struct Workspace {
     pub dp: Vec<f64>,
     /// What the projection solves.
     pub projection: Projection,
+}
+
+/// A one-sided row of a constraint, whose gap is told at any state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limit {
+    /// Place of the constraint in the order of constraints, and of the row among its one-sided ones.
+    pub key: [u32; 2],
+    /// Metres or radians; negative where violated.
+    pub gap: f64,
+    /// Its target, where the rows made match the gaps told.
+    pub target: Option<u32>,
+}
+
+/// The one-sided rows that constraints locate, at the present state and sites and at a given time; sorted by key.
+pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(), StepError> {
+    out.clear();
+    let view = WorldView { time, gravity: core.settings.gravity, implicit: core.implicit, x: &core.x, sites: &core.sites, table: &core.table };
+    let mut gaps = Vec::new();
+    for (place, (_, entry, constraint)) in constraints(&core.table).enumerate() {
+        gaps.clear();
+        constraint.gaps(&entry.span, &view, &mut gaps);
+        if gaps.iter().any(|gap| !gap.is_finite()) {
+            return Err(StepError::Row { object: entry.object.name().to_string(), why: "a gap that it tells is not finite".into() });
+        }
+        out.extend(gaps.iter().enumerate().map(|(row, gap)| Limit { key: [place as u32, row as u32], gap: *gap, target: None }));
+    }
+    Ok(())
 }
 
 /// Finds the contacts within reach of the next `horizon` seconds.
@@ -71,26 +100,28 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
 /// errors are told for the present state all the same.
 pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ahead: f64) -> Result<(), StepError> {
     if ahead <= 0.0 || constraints(&core.table).next().is_none() {
-        return lay_rows(core, work, level, None);
+        let first = lay_rows(core, work, level, None)?;
+        return locate_limits(core, work, &first);
     }
     let middle = look_ahead(core, ahead);
-    lay_rows(core, work, level, Some(&middle))?;
-    if !work.targets.iter().any(closing::is_joint) {
-        present_errors(core, work, ahead);
-        return Ok(());
+    let mut first = lay_rows(core, work, level, Some(&middle))?;
+    let mut errors = Vec::new();
+    if work.targets.iter().any(closing::is_joint) {
+        let middle;
+        (errors, middle) = closing::middle(core, level, ahead)?;
+        first = lay_rows(core, work, level, Some(&middle))?;
     }
-    let (errors, middle) = closing::middle(core, level, ahead)?;
-    lay_rows(core, work, level, Some(&middle))?;
     if errors.len() == work.targets.len() {
         work.targets.iter_mut().zip(errors).for_each(|(target, error)| target.error = error);
     } else {
         present_errors(core, work, ahead);
     }
-    Ok(())
+    locate_limits(core, work, &first)
 }
 
-/// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment.
-pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<(), StepError> {
+/// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment. The first
+/// target of each constraint, and the end.
+pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<Vec<usize>, StepError> {
     work.rows.clear(core.dof);
     work.bias.clear();
     work.targets.clear();
@@ -111,18 +142,38 @@ pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: 
     }
     let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
     builder.sites = sites;
-    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, x, sites, table: &core.table };
+    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
+    let mut first = Vec::new();
     for (id, entry, constraint) in constraints(&core.table) {
+        first.push(builder.targets.len());
         builder.owner = id;
         constraint.rows(&entry.span, &view, level, &mut builder);
         if let Some(why) = builder.problem.take() {
             return Err(StepError::Row { object: entry.object.name().to_string(), why });
         }
     }
+    first.push(work.targets.len());
     let n = work.rows.len;
     work.c.resize(n, 0.0);
     work.lambda.clear();
     work.lambda.resize(n, 0.0);
+    Ok(first)
+}
+
+/// Gives one-sided rows the gap that their constraint tells for the present state. `first` has the first target of each constraint, and the end.
+fn locate_limits(core: &Core, work: &mut Workspace, first: &[usize]) -> Result<(), StepError> {
+    limits(core, core.time, &mut work.limits)?;
+    for of_one in work.limits.chunk_by_mut(|a, b| a.key[0] == b.key[0]) {
+        let place = of_one[0].key[0] as usize;
+        let one_sided = (first[place]..first[place + 1]).filter(|&i| work.targets[i].set == RowSet::HalfLine);
+        let rows: Vec<usize> = one_sided.collect();
+        if rows.len() == of_one.len() {
+            for (limit, &row) in of_one.iter_mut().zip(&rows) {
+                limit.target = Some(row as u32);
+                work.targets[row].error = limit.gap;
+            }
+        }
+    }
     Ok(())
 }
 

@@ -5,6 +5,7 @@ mod closing;
 mod contacts;
 mod flight;
 mod impact;
+mod locate;
 mod projection;
 mod time_stepping;
 

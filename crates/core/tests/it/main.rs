@@ -1,5 +1,6 @@
 //! Physics proved: closed forms, conservation laws, determinism.
 
+mod adaptive;
 mod free;
 mod friction;
 mod impacts;
@@ -7,6 +8,9 @@ mod soft_rows;
 mod solvers;
 mod stacks;
 mod closures;
+mod articulated_closed;
+mod articulated_laws;
+mod articulated_random;
 mod common;
 mod meshes;
 mod paradox;
