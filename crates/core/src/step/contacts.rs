@@ -3,6 +3,7 @@
 use super::closing;
 use super::projection::Projection;
 use crate::detect::{Detector, Touch};
+use crate::motion::coast;
 use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
 use crate::rows::{RowSet, Rows};
@@ -24,6 +25,8 @@ pub(crate) struct Workspace {
     pub targets: Vec<RowTarget>,
     /// One-sided rows that their constraints locate, at the present state.
     pub limits: Vec<Limit>,
+    /// First target of each constraint, and the end.
+    pub first: Vec<usize>,
     /// Right-hand side of a solve.
     pub c: Vec<f64>,
     pub lambda: Vec<f64>,
@@ -84,10 +87,20 @@ pub(crate) struct Moment {
     pub ahead: f64,
 }
 
-/// What free motion makes in `ahead` seconds; caches stay at the present.
+/// State and sites in `ahead` seconds if no momentum changes (or no velocity, of objects whose state holds velocities); caches stay at the present.
 fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
     let start = core.x.clone();
-    core.motion().coast(ahead);
+    for entry in core.table.iter() {
+        let x = &mut core.x[entry.span.x.clone()];
+        match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
+            Some(body) => {
+                let mut v = vec![0.0; entry.span.v.len()];
+                body.velocity(x, &mut v);
+                body.drift(x, &v, ahead);
+            }
+            None => coast(entry, x, ahead),
+        }
+    }
     core.motion().refresh();
     let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
     core.motion().refresh();
@@ -100,28 +113,27 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
 /// errors are told for the present state all the same.
 pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ahead: f64) -> Result<(), StepError> {
     if ahead <= 0.0 || constraints(&core.table).next().is_none() {
-        let first = lay_rows(core, work, level, None)?;
-        return locate_limits(core, work, &first);
+        lay_rows(core, work, level, None)?;
+        return locate_limits(core, work);
     }
     let middle = look_ahead(core, ahead);
-    let mut first = lay_rows(core, work, level, Some(&middle))?;
-    let mut errors = Vec::new();
+    lay_rows(core, work, level, Some(&middle))?;
+    let mut present = Vec::new();
     if work.targets.iter().any(closing::is_joint) {
-        let middle;
-        (errors, middle) = closing::middle(core, level, ahead)?;
-        first = lay_rows(core, work, level, Some(&middle))?;
+        let (errors, middle) = closing::middle(core, level, ahead)?;
+        lay_rows(core, work, level, Some(&middle))?;
+        present = errors;
     }
-    if errors.len() == work.targets.len() {
-        work.targets.iter_mut().zip(errors).for_each(|(target, error)| target.error = error);
+    if present.len() == work.targets.len() {
+        work.targets.iter_mut().zip(present).for_each(|(target, error)| target.error = error);
     } else {
         present_errors(core, work, ahead);
     }
-    locate_limits(core, work, &first)
+    locate_limits(core, work)
 }
 
-/// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment. The first
-/// target of each constraint, and the end.
-pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<Vec<usize>, StepError> {
+/// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment.
+pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<(), StepError> {
     work.rows.clear(core.dof);
     work.bias.clear();
     work.targets.clear();
@@ -143,7 +155,8 @@ pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: 
     let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
     builder.sites = sites;
     let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
-    let mut first = Vec::new();
+    let mut first = std::mem::take(&mut work.first);
+    first.clear();
     for (id, entry, constraint) in constraints(&core.table) {
         first.push(builder.targets.len());
         builder.owner = id;
@@ -153,16 +166,18 @@ pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: 
         }
     }
     first.push(work.targets.len());
+    work.first = first;
     let n = work.rows.len;
     work.c.resize(n, 0.0);
     work.lambda.clear();
     work.lambda.resize(n, 0.0);
-    Ok(first)
+    Ok(())
 }
 
-/// Gives one-sided rows the gap that their constraint tells for the present state. `first` has the first target of each constraint, and the end.
-fn locate_limits(core: &Core, work: &mut Workspace, first: &[usize]) -> Result<(), StepError> {
+/// Gives one-sided rows the gap that their constraint tells for the present state.
+fn locate_limits(core: &Core, work: &mut Workspace) -> Result<(), StepError> {
     limits(core, core.time, &mut work.limits)?;
+    let first = &work.first;
     for of_one in work.limits.chunk_by_mut(|a, b| a.key[0] == b.key[0]) {
         let place = of_one[0].key[0] as usize;
         let one_sided = (first[place]..first[place + 1]).filter(|&i| work.targets[i].set == RowSet::HalfLine);
