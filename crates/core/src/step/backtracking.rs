@@ -243,7 +243,7 @@ impl Backtracking {
                 }
                 core.held.fill(0.0);
                 closing::refresh_at(core, &start);
-                closing::close(core, &mut self.work, &start, h, &self.kept)?;
+                closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }

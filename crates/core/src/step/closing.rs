@@ -77,16 +77,16 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
     Ok(())
 }
 
-/// Closes the joints of `work`, whose rows were built at the state `start`, at the present state after `h` seconds. `kept` is the error of each
-/// constraint row that is to stay. Sites and caches are those of `start` before and after.
-pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64, kept: &[f64]) -> Result<(), StepError> {
+/// Closes the joints of `work`, whose rows were built at the state `start`, at the present state, `step.0` seconds later; `step.1` is the level of the
+/// rows. `kept` is the error of each constraint row that is to stay. Sites and caches are those of `start` before and after.
+pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: (f64, Level), kept: &[f64]) -> Result<(), StepError> {
     if !work.targets.iter().any(is_joint) {
         return Ok(());
     }
     let pushed = pushed(work);
     islands(work);
     let (mut probe, mut chord) = (Workspace::default(), true);
-    let mut open = Open::measure(core, work, &mut probe, h, kept, &pushed)?;
+    let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
     for _ in 0..ROUNDS {
         let before = core.x.clone();
         let worst = open.worst();
@@ -101,14 +101,14 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64
             islands(&mut probe);
             open.apply(core, &mut probe);
         }
-        open = Open::measure(core, work, &mut probe, h, kept, &pushed)?;
+        open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
         let (worse, slow) = (open.worst() > worst, open.worst() > SLOW * worst);
         if worse {
             core.x = before;
             if !chord {
                 break;
             }
-            open = Open::measure(core, work, &mut probe, h, kept, &pushed)?;
+            open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
         }
         chord &= !slow;
     }
@@ -127,11 +127,11 @@ struct Open {
 
 impl Open {
     /// Sites and caches are left at the present, whose rows come in `probe`. Nothing is open where they are not those of `work`.
-    fn measure(core: &mut Core, work: &Workspace, probe: &mut Workspace, h: f64, kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
+    fn measure(core: &mut Core, work: &Workspace, probe: &mut Workspace, step: (f64, Level), kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
         core.motion().refresh();
         let time = core.time;
-        core.time += h;
-        let laid = lay_rows(core, probe, Level::Velocity { h }, None);
+        core.time += step.0;
+        let laid = lay_rows(core, probe, step.1, None);
         core.time = time;
         laid?;
         let mut open = Open { least: (1e-2 * core.settings.contact_tolerance, core.settings.accuracy.tolerance), ..Open::default() };

@@ -1,6 +1,7 @@
 //! Physics proved: closed forms, conservation laws, determinism.
 
 mod adaptive;
+mod chains;
 mod free;
 mod friction;
 mod impacts;
