@@ -24,7 +24,7 @@ use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection};
 use crate::detect::Touch;
 use crate::integrators::Adaptive;
-use crate::object::Level;
+use crate::object::{Level, RowTarget};
 use crate::rows::RowSet;
 use crate::settings::Integrator;
 use crate::solver::Accuracy;
@@ -93,8 +93,9 @@ impl Backtracking {
         detect(core, left, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
-        let drifted = self.work.targets.iter().any(|t| off(t.error) || (t.set == RowSet::Equality && off(-t.error)));
-        if drifted || self.work.touches.iter().any(|t| off(t.contact.gap)) {
+        let hold = core.settings.stabilize_positions;
+        let drifted = |t: &RowTarget| if closing::is_joint(t) { hold && off(-t.error.abs()) } else { t.set == RowSet::HalfLine && off(t.error) };
+        if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
             projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);

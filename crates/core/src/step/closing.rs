@@ -20,7 +20,7 @@ use super::Workspace;
 use super::contacts::{Moment, displace, lay_rows, push, row_velocities, whiten, zero};
 use crate::object::{Level, RowTarget};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, LcpPyramid, RowSolver};
+use crate::solver::{Accuracy, GaussSeidel, RowSolver};
 use crate::world::{Core, StepError};
 
 /// Rounds at most.
@@ -30,8 +30,6 @@ const SLOW: f64 = 0.5;
 /// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
 /// responds with the square of it, far less, and is left alone; as the error goes so does the compliance (Levenberg and Marquardt).
 const SOFT: (f64, f64) = (10.0, 1e-3);
-/// Islands of at most so many rows are solved directly.
-const DIRECT: usize = 200;
 
 /// Whether a row is held in place.
 pub(super) fn is_joint(t: &RowTarget) -> bool {
@@ -210,8 +208,7 @@ fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64)
     let mut lambda = Vec::new();
     zero(&mut lambda, rows.len);
     let accuracy = Accuracy { sweeps: 100, relaxations: u32::MAX, tolerance };
-    let solver: &dyn RowSolver = if blocks.len() <= DIRECT { &LcpPyramid } else { &GaussSeidel };
-    solver.solve(rows, blocks, c, &mut lambda, du, accuracy);
+    GaussSeidel.solve(rows, blocks, c, &mut lambda, du, accuracy);
 }
 
 /// Sites and caches of a state that is not the present one.
