@@ -35,7 +35,7 @@ mod sync;
 mod view;
 mod world;
 
-pub use articulated::{Joint, LinkMass, Model, ModelBuilder, ModelError};
+pub use articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Drive, Freedom, Joint, LinkMass, Model, ModelBuilder, ModelError, Playback, Spring};
 pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use object::{

@@ -11,6 +11,7 @@ mod stacks;
 mod articulated_closed;
 mod articulated_laws;
 mod articulated_random;
+mod articulated_world;
 mod closures;
 mod common;
 mod meshes;
