@@ -24,7 +24,7 @@ use crate::solver::{Accuracy, GaussSeidel, RowSolver};
 use crate::world::{Core, StepError};
 
 /// Rounds at most.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 12;
 /// A round that leaves more of the error than this is the last of its kind.
 const SLOW: f64 = 0.5;
 /// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
@@ -86,29 +86,30 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
     let (mut probe, mut chord) = (Workspace::default(), true);
     let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
     for _ in 0..ROUNDS {
-        let before = core.x.clone();
-        let worst = open.worst();
-        if worst <= 1.0 {
+        if open.is_closed() {
             break;
         }
+        let before = core.x.clone();
         if chord {
             refresh_at(core, start);
             open.apply(core, work);
         } else {
             soften(&mut probe, largest(&open.place));
             islands(&mut probe);
-            open.apply(core, &mut probe);
+            open.apply(core, &probe);
         }
-        open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
-        let (worse, slow) = (open.worst() > worst, open.worst() > SLOW * worst);
-        if worse {
+        let next = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
+        let left = next.left_of(&open);
+        if left < 1.0 {
+            open = next;
+        } else {
             core.x = before;
             if !chord {
                 break;
             }
             open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
         }
-        chord &= !slow;
+        chord &= left < SLOW;
     }
     refresh_at(core, start);
     Ok(())
@@ -147,9 +148,20 @@ impl Open {
         Ok(open)
     }
 
-    /// The largest error, as a multiple of what counts as closed.
-    fn worst(&self) -> f64 {
-        (largest(&self.place) / self.least.0).max(largest(&self.speed) / self.least.1)
+    /// The largest errors, as multiples of what counts as closed.
+    fn worst(&self) -> (f64, f64) {
+        (largest(&self.place) / self.least.0, largest(&self.speed) / self.least.1)
+    }
+
+    fn is_closed(&self) -> bool {
+        let (place, speed) = self.worst();
+        place <= 1.0 && speed <= 1.0
+    }
+
+    /// The share of the error before that is left: of place while that is open, then of speed, for which a change of place is a change of rows.
+    fn left_of(&self, before: &Open) -> f64 {
+        let (place, speed) = before.worst();
+        if place > 1.0 { self.worst().0 / place } else { self.worst().1 / speed }
     }
 
     /// One round with the rows of `work`, whose islands are built, and the caches that they were built with.
