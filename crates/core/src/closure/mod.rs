@@ -32,6 +32,9 @@ use crate::world::World;
 use nalgebra::{RealField, Rotation3, Translation3};
 use tumble_collide::{Mat3, Pose, Quat, Vec3};
 
+#[cfg(test)]
+mod tests;
+
 /// What a closure holds together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClosureKind {
