@@ -234,7 +234,7 @@ impl TimeStepping {
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
         let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
-        closing::close(core, &mut self.work, &self.x0, h, &kept)?;
+        closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();
         core.check_finite(&dp)
     }
