@@ -28,6 +28,7 @@ pub mod rows;
 mod settings;
 mod site;
 pub mod solver;
+pub mod spatial;
 mod step;
 mod view;
 mod world;

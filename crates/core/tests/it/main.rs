@@ -1,5 +1,7 @@
 //! Physics proved: closed forms, conservation laws, determinism.
 
+mod abm;
+mod abm_reference;
 mod free;
 mod friction;
 mod impacts;
