@@ -27,7 +27,7 @@ use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection};
 use crate::detect::Touch;
 use crate::integrators::Adaptive;
-use crate::object::Level;
+use crate::object::{Level, RowTarget};
 use crate::rows::RowSet;
 use crate::settings::Integrator;
 use crate::solver::Accuracy;
@@ -99,8 +99,9 @@ impl Backtracking {
         detect(core, left, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
-        let drifted = self.work.targets.iter().any(|t| off(t.error) || (t.set == RowSet::Equality && off(-t.error)));
-        if drifted || self.work.touches.iter().any(|t| off(t.contact.gap)) {
+        let hold = core.settings.stabilize_positions;
+        let drifted = |t: &RowTarget| if closing::is_joint(t) { hold && off(-t.error.abs()) } else { t.set == RowSet::HalfLine && off(t.error) };
+        if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
             projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
@@ -251,7 +252,7 @@ impl Backtracking {
                 core.held.fill(0.0);
                 hold::hold(core, &mut self.probe, &self.held, h)?;
                 closing::refresh_at(core, &start);
-                closing::close(core, &mut self.work, &start, h, &self.kept)?;
+                closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }
