@@ -17,10 +17,11 @@
 //! joints: two hinges of a door agree about its axis only where both are closed, and rows taken beside that place would hold the door fast.
 
 use super::Workspace;
-use super::contacts::{Moment, displace, lay_rows, push, row_velocities, whiten, zero};
-use crate::object::{Level, RowTarget};
+use super::contacts::{displace, lay_rows, push, row_velocities, whiten, zero};
+use crate::object::{Integratable, Level, RowTarget};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, GaussSeidel, RowSolver};
+use crate::view::Entry;
 use crate::world::{Core, StepError};
 
 /// Rounds at most.
@@ -36,21 +37,38 @@ pub(super) fn is_joint(t: &RowTarget) -> bool {
     t.set == RowSet::Equality && t.compliance == 0.0
 }
 
-/// Errors of all constraint rows at the present, and the middle of the step: free motion of `ahead` seconds brought onto the joints. Sites and
-/// caches are those of the present before and after.
-pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f64>, Moment), StepError> {
-    let mut probe = Workspace::default();
-    lay_rows(core, &mut probe, level, None)?;
-    let errors: Vec<f64> = probe.targets.iter().map(|t| t.error).collect();
+/// Errors of all constraint rows at the present, and the rows of the middle of the step: free motion of `ahead` seconds brought onto the joints.
+/// Their Jacobians are those of the middle, their responses those of the present, as all rows of a step have. Sites and caches are those of the
+/// present before and after.
+pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f64>, Workspace), StepError> {
+    let mut rows = Workspace::default();
+    lay_rows(core, &mut rows, level, None)?;
+    let errors: Vec<f64> = rows.targets.iter().map(|t| t.error).collect();
     let (start, time) = (core.x.clone(), core.time);
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
-    let outcome = onto(core, &mut probe, level, &errors);
+    let outcome = onto(core, &mut rows, level, &errors).and_then(|_| lay_rows(core, &mut rows, level, None));
+    map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
     core.time = time;
-    let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
+    core.x = start;
     core.motion().refresh();
-    outcome.map(|_| (errors, moment))
+    map_sides(core, &mut rows, |body, j, y| body.respond(j, y));
+    outcome.map(|_| (errors, rows))
+}
+
+/// Replaces what every row holds of every side.
+fn map_sides(core: &Core, work: &mut Workspace, map: impl Fn(&dyn Integratable, &[f64], &mut [f64])) {
+    let starts: Vec<(usize, &Entry)> = core.table.iter().filter(|e| e.moves()).map(|e| (e.span.v.start, e)).collect();
+    let Rows { blocks, y, .. } = &mut work.rows;
+    for side in blocks.iter().flat_map(|b| b.sides()) {
+        let found = starts.binary_search_by_key(&(side.u as usize), |(start, _)| *start);
+        if let Some(body) = found.ok().and_then(|i| starts[i].1.object.integratable()) {
+            let held = &mut y[side.y as usize..(side.y + side.dof) as usize];
+            let before = held.to_vec();
+            map(body, &before, held);
+        }
+    }
 }
 
 /// Moves the present state to where the joints have the errors given.
@@ -178,6 +196,20 @@ impl Open {
         displace(core, &dx, 1.0);
         push(core, &dv);
     }
+}
+
+/// What the joints' impulses of the step do to whitened velocities, where no contact pushes.
+pub(super) fn impulses(work: &mut Workspace) -> Vec<f64> {
+    let mut du = vec![0.0; work.rows.dof];
+    if work.targets.iter().any(is_joint) {
+        let pushed = pushed(work);
+        for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
+            if is_joint(target) && !block.sides().iter().any(|s| pushed[s.u as usize]) {
+                work.rows.apply_block(block, &work.lambda, &mut du);
+            }
+        }
+    }
+    du
 }
 
 /// Which coordinates belong to objects of an island in which a contact pushes: the joint answer of all its rows counts more there than what the

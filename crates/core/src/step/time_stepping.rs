@@ -15,7 +15,7 @@
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
+use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, push, recover, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
 use super::closing;
 use super::projection::{self, Displacement};
@@ -238,8 +238,37 @@ impl TimeStepping {
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
     }
 
+    /// Lets the joints' impulses (whitened) act at the middle of the free step, of objects whose state holds velocities: what an impulse does to a
+    /// velocity depends on where they are.
+    fn join_midway(&mut self, core: &mut Core, h: f64, joined: &[f64]) {
+        let holds = |e: &&Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
+        if !core.table.iter().filter(holds).any(|e| joined[e.span.v.clone()].iter().any(|j| *j != 0.0)) {
+            return;
+        }
+        let mut impulse = vec![0.0; core.dof];
+        recover(core, joined, &mut impulse);
+        let start = std::mem::replace(&mut core.x, self.x0.clone());
+        core.motion().coast(0.5 * h);
+        core.motion().refresh();
+        for entry in core.table.iter().filter(holds) {
+            let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+            let (mut response, mut change) = (vec![0.0; v.len()], vec![0.0; v.len()]);
+            body.respond(&impulse[v.clone()], &mut response);
+            body.unwhiten(&response, &mut change);
+            let x = &mut core.x[entry.span.x.clone()];
+            body.kick(x, &self.work.dp[v], h);
+            body.kick(x, &change, 1.0);
+            body.coast(x, 0.5 * h);
+            self.free[entry.span.x.clone()].copy_from_slice(x);
+        }
+        closing::refresh_at(core, &start);
+        core.x = start;
+    }
+
     /// Writes the state at the end of the step.
     fn commit(&mut self, core: &mut Core, h: f64, u0: &[f64], u1: &[f64], du_force: &[f64]) -> Result<(), StepError> {
+        let joined = closing::impulses(&mut self.work);
+        self.join_midway(core, h, &joined);
         let share = |i: usize| if self.share[i] < 0.0 { 0.5 } else { self.share[i] };
         let free = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
         let mut change: Vec<f64> = u1.iter().zip(u0).map(|(a, b)| a - b).collect();
@@ -250,7 +279,7 @@ impl TimeStepping {
             if free(entry) {
                 x.copy_from_slice(&self.free[entry.span.x.clone()]);
                 for i in entry.span.v.clone() {
-                    change[i] -= du_force[i];
+                    change[i] -= du_force[i] + joined[i];
                     extra[i] = (1.0 - share(i)) * change[i];
                 }
             } else {

@@ -13,6 +13,7 @@ mod articulated_laws;
 mod articulated_random;
 mod articulated_world;
 mod closures;
+mod closures_articulated;
 mod closures_joints;
 mod common;
 mod meshes;
