@@ -20,12 +20,15 @@ use super::Workspace;
 use super::contacts::{displace, lay_rows, push, row_velocities, whiten, zero};
 use crate::object::{Integratable, Level, RowTarget};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, RowSolver};
+use crate::solver::{Accuracy, DIRECT_ROWS, GaussSeidel, RowSolver};
 use crate::view::Entry;
 use crate::world::{Core, StepError};
 
 /// Rounds at most.
 const ROUNDS: usize = 12;
+/// Rounds where some joints are too many for a direct solve, so that a long rope costs what its sweeps cost.
+const FEW_ROUNDS: usize = 2;
+const SWEEPS: u32 = 25;
 /// A round that leaves more of the error than this is the last of its kind.
 const SLOW: f64 = 0.5;
 /// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
@@ -74,17 +77,24 @@ fn map_sides(core: &Core, work: &mut Workspace, map: impl Fn(&dyn Integratable, 
 /// Moves the present state to where the joints have the errors given.
 fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) -> Result<(), StepError> {
     let least = 1e-2 * core.settings.contact_tolerance;
-    for _ in 0..ROUNDS {
+    let mut best = (f64::INFINITY, Vec::new());
+    for round in 0..ROUNDS {
         lay_rows(core, probe, level, None)?;
         if probe.targets.len() != errors.len() {
             return Ok(());
         }
         let off: Vec<f64> = probe.targets.iter().zip(errors).map(|(t, e)| if is_joint(t) { t.error - e } else { 0.0 }).collect();
-        if largest(&off) <= least {
+        if largest(&off) > best.0 {
+            core.x.clone_from(&best.1);
+            core.motion().refresh();
             return Ok(());
         }
-        soften(probe, largest(&off));
+        best = (largest(&off), core.x.clone());
         islands(probe);
+        if best.0 <= least || round >= rounds(probe) {
+            return Ok(());
+        }
+        soften(probe, best.0);
         let mut dx = vec![0.0; core.dof];
         probe.islands.iter().for_each(|blocks| solve(&probe.rows, blocks, &off, &mut dx, 0.1 * least));
         displace(core, &dx, 1.0);
@@ -103,7 +113,7 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
     islands(work);
     let (mut probe, mut chord) = (Workspace::default(), true);
     let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds(work) {
         if open.is_closed() {
             break;
         }
@@ -240,6 +250,11 @@ fn islands(work: &mut Workspace) {
     work.islands.build(&work.rows, |b| b >= touches && is_joint(&targets[b - touches]));
 }
 
+fn rounds(work: &Workspace) -> usize {
+    if work.islands.iter().any(|blocks| blocks.len() > DIRECT_ROWS) { FEW_ROUNDS } else { ROUNDS }
+}
+
+/// Gives rows that may not agree the compliance for such an error.
 fn soften(probe: &mut Workspace, error: f64) {
     let share = (SOFT.0 * error).min(SOFT.1);
     for b in 0..probe.rows.blocks.len() {
@@ -251,7 +266,7 @@ fn soften(probe: &mut Workspace, error: f64) {
 fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64) {
     let mut lambda = Vec::new();
     zero(&mut lambda, rows.len);
-    let accuracy = Accuracy { sweeps: 100, relaxations: u32::MAX, tolerance };
+    let accuracy = Accuracy { sweeps: SWEEPS, relaxations: u32::MAX, tolerance };
     GaussSeidel.solve(rows, blocks, c, &mut lambda, du, accuracy);
 }
 
