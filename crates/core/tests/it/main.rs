@@ -9,6 +9,7 @@ mod articulated_random;
 mod articulated_world;
 mod chains;
 mod closures;
+mod closures_articulated;
 mod closures_joints;
 mod common;
 mod free;
