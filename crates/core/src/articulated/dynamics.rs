@@ -2,6 +2,7 @@
 //! refreshed.
 
 use super::abm::{Sweep, push, spread, three, write_three};
+use super::batch::run;
 use super::compiled::{Compiled, Kind};
 use super::model::Model;
 use crate::site::Wrench;
@@ -165,13 +166,7 @@ impl Dynamics {
 /// a [`Dynamics::refresh`] first.
 pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
     let Dynamics { compiled, sweep, .. } = d;
-    sweep.place::<false>(compiled, |k| q[k], |k| v[k]);
-    for (i, body) in compiled.bodies.iter().enumerate().rev() {
-        sweep.fold_link(i + 1, body);
-        sweep.push_link(i + 1, body, |k| tau[k]);
-    }
-    sweep.slots[0].acceleration = Motion::new(Vector::default(), (-gravity).into());
-    sweep.spread(compiled, |k, x| qdd[k] = x);
+    run(compiled, sweep, gravity, |k| q[k], |k| v[k], |k| tau[k], |k, x| qdd[k] = x);
 }
 
 /// Three numbers of a slice from `k` on.
