@@ -6,10 +6,10 @@
 //! ```
 //!
 //! `best peer` is the best of Pinocchio, MuJoCo and dynibo, measured on another day, scaled by what dynibo's chain of 7 takes in this run. Lanes are
-//! microseconds per state with 1, 4 and 8 states side by side.
+//! microseconds per state with 1, 4 and 8 states side by side. A second table has what a step of the engine asks.
 
 use std::hint::black_box;
-use tumble_peers::articulated::{Batch, Dynibo, Robot, Single, anymal, chain, in_turns, panda, talos};
+use tumble_peers::articulated::{Batch, Dynibo, Maps, Robot, Single, anymal, chain, in_turns, panda, talos};
 
 /// States that the calls go through in turn.
 const STATES: usize = 8;
@@ -34,6 +34,12 @@ fn main() {
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for robot in robots.iter().filter(|r| names.is_empty() || names.contains(&r.name)) {
         println!("{}", line(robot, rounds, scale));
+    }
+    println!();
+    println!("| robot | refresh | accelerate | whiten | test impulses in 3 directions at the last link |");
+    println!("|---|---|---|---|---|");
+    for robot in robots.iter().filter(|r| names.is_empty() || names.contains(&r.name)) {
+        println!("{}", parts(robot, rounds));
     }
 }
 
@@ -87,6 +93,24 @@ fn line(robot: &Robot, rounds: usize, scale: f64) -> String {
         "| {} | {:.3} | {:.3} | {:.2} | {best:.2} | {:.2} | {difference:.0e} | {:.3} | {:.3} | {:.3} | {:.2} |",
         robot.name, times[0], times[1], times[0] / times[1], times[0] / best, times[2], times[3] / 4.0, times[4] / 8.0, times[4] / 8.0 / best
     )
+}
+
+/// What the engine asks at each step, µs.
+fn parts(robot: &Robot, rounds: usize) -> String {
+    let mut maps = Maps::new(robot);
+    let single = Single::new(robot);
+    let states: Vec<State> = states(robot).iter().map(|(q, v, tau)| {
+        let (q, v) = single.state(q, v);
+        (q, v, tau.clone())
+    }).collect();
+    let maps = std::cell::RefCell::new(&mut maps);
+    let times = in_turns(rounds, &mut [
+        &mut |k| maps.borrow_mut().refresh(black_box(&states[k % STATES].0), black_box(&states[k % STATES].1)),
+        &mut |k| maps.borrow_mut().accelerate(black_box(&states[k % STATES].2)),
+        &mut |k| maps.borrow_mut().whiten(black_box(&states[k % STATES].1)),
+        &mut |_| maps.borrow_mut().probe(),
+    ]);
+    format!("| {} | {:.3} | {:.3} | {:.3} | {:.3} |", robot.name, times[0], times[1], times[2], times[3])
 }
 
 /// States away from any limit. Forces are all zero on a floating base.

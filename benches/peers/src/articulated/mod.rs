@@ -8,4 +8,4 @@ mod tumble;
 pub use dynibo::Dynibo;
 pub use robot::{Motion, Part, Robot, anymal, chain, panda, talos};
 pub use timing::{in_turns, median};
-pub use tumble::{Batch, Single};
+pub use tumble::{Batch, Maps, Single};

@@ -2,7 +2,7 @@
 
 use super::robot::{Motion, Robot, base};
 use tumble_collide::{Mat3, Pose, Vec3};
-use tumble_core::articulated::{BatchDynamics, Dynamics, Lanes, forward_dynamics};
+use tumble_core::articulated::{BatchDynamics, Dynamics, Lanes, Scratch, forward_dynamics};
 use tumble_core::{Joint, LinkMass, Model, ModelBuilder};
 
 /// dynibo's.
@@ -59,6 +59,45 @@ impl Single {
     /// `q̈`.
     pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
         forward_dynamics(&mut self.dynamics, &GRAVITY, q, v, tau, qdd);
+    }
+}
+
+/// The parts of a step of the engine, at one state.
+pub struct Maps {
+    dynamics: Dynamics,
+    scratch: Scratch,
+    links: usize,
+    y: Vec<f64>,
+    out: Vec<f64>,
+}
+
+impl Maps {
+    /// Ready for a robot.
+    pub fn new(robot: &Robot) -> Maps {
+        let dynamics = Dynamics::new(&model(robot));
+        let (scratch, links, dof) = (dynamics.scratch(), dynamics.links(), dynamics.dof());
+        Maps { dynamics, scratch, links, y: vec![0.0; 3 * dof], out: vec![0.0; dof] }
+    }
+
+    /// Takes a state.
+    pub fn refresh(&mut self, q: &[f64], v: &[f64]) {
+        self.dynamics.refresh(q, v);
+    }
+
+    /// `q̈` at the state taken.
+    pub fn accelerate(&mut self, tau: &[f64]) {
+        self.dynamics.accelerate_in(&mut self.scratch, &GRAVITY, tau, &[], &mut self.out);
+    }
+
+    /// Whitened velocity.
+    pub fn whiten(&mut self, v: &[f64]) {
+        self.dynamics.whiten(&mut self.scratch, v, &mut self.out);
+    }
+
+    /// Test impulses in three directions at the last link.
+    pub fn probe(&mut self) {
+        let axes = [Vec3::x(), Vec3::y(), Vec3::z()];
+        self.dynamics.point_response(self.links - 1, &Vec3::new(0.1, 0.2, 0.3), &axes, 1.0, &mut self.y);
     }
 }
 
