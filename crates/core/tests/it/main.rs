@@ -3,6 +3,7 @@
 mod abm;
 mod abm_reference;
 mod adaptive;
+mod articulated_agree;
 mod articulated_closed;
 mod articulated_laws;
 mod articulated_random;
