@@ -224,6 +224,21 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
     }
 }
 
+/// What `h` seconds of coasting add to the whitened velocity of objects whose state holds velocities, from where they are pinned. Rows of joints
+/// are to hold at the end of the step, and aim ahead by it; a contact's point does not go with the part as it turns, and does not.
+pub(crate) fn coasting(core: &Core, h: f64) -> Vec<f64> {
+    let mut out = vec![0.0; core.dof];
+    let Some(middle) = core.pinned() else { return out };
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+        let (v, mut rate) = (entry.span.v.clone(), vec![0.0; entry.span.v.len()]);
+        body.coasting_rate(&middle[entry.span.x.clone()], &mut rate);
+        rate.iter_mut().for_each(|r| *r *= h);
+        body.whiten_rate(&rate, &mut out[v]);
+    }
+    out
+}
+
 /// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
 pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
     let mut out = vec![0.0; core.dof];

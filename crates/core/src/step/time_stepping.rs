@@ -18,7 +18,7 @@
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
+use super::contacts::{build_rows, coasting, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
 use super::closing;
 use super::projection::{self, Displacement};
@@ -200,9 +200,9 @@ impl TimeStepping {
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / h };
         }
-        let turning = if work.targets.is_empty() { Vec::new() } else { gyroscopic(core) };
+        let (turning, coasting) = if work.targets.is_empty() { Default::default() } else { (gyroscopic(core), coasting(core, 0.5 * h)) };
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
-            work.c[block.row as usize] -= h * work.rows.row_velocity(block, 0, &turning);
+            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &coasting) - h * work.rows.row_velocity(block, 0, &turning);
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
