@@ -1,5 +1,6 @@
 //! What `tumble-scene` promises of scene files.
 
+mod articulated;
 mod bad_input;
 mod expansion;
 mod finding;
