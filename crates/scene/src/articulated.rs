@@ -134,9 +134,9 @@ impl ArticulatedSpec {
             missing_meshes: f.choice_or("missing_meshes", MISSING, MissingMeshes::Error),
             collision_meshes: f.choice_or("collision_meshes", COLLISION, CollisionMeshes::Exact),
             surface: from.surface.clone(),
-            color: f.value("color").is_some() || f.value("material").is_some(),
+            recolor: f.value("color").is_some() || f.value("material").is_some(),
         };
-        match crate::urdf::read_file(&folder.join(path), &options) {
+        match crate::urdf::read_file(&folder.join(path), &options, true) {
             Ok(robot) => {
                 self.links = robot.links;
                 self.notes = robot.notes;

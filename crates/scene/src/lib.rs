@@ -53,6 +53,7 @@
 //! ```
 
 mod articulated;
+mod assemble;
 mod body;
 mod build;
 mod bound;

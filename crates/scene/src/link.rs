@@ -36,6 +36,25 @@ pub struct LinkSpec {
     pub shapes: Vec<LinkShape>,
 }
 
+impl LinkSpec {
+    /// Its mass in numbers; none where it comes from shapes.
+    pub(crate) fn given_mass(&self) -> LinkMass {
+        match self.mass {
+            LinkMassSpec::Given(mass) => mass,
+            LinkMassSpec::OfShapes | LinkMassSpec::Spread(_) => LinkMass::none(),
+        }
+    }
+
+    /// Whether it has any mass or inertia of its own.
+    pub(crate) fn has_mass(&self) -> bool {
+        match &self.mass {
+            LinkMassSpec::OfShapes => self.shapes.iter().any(|shape| shape.mass.is_some()),
+            LinkMassSpec::Spread(_) => true,
+            LinkMassSpec::Given(mass) => mass.mass > 0.0 || mass.inertia.amax() > 0.0,
+        }
+    }
+}
+
 /// How heavy a link is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LinkMassSpec {
@@ -178,6 +197,7 @@ impl<'a> LinkRow<'a> {
 fn read_floating(f: &mut Fields<'_>, name: &str) -> Option<JointSpec> {
     if let Some(value) = f.value("joint") {
         f.wrong("joint", value, "no joint: the body floats, and this link hangs on nothing; or floating = false");
+        JointSpec::read(f, name);
     }
     Some(JointSpec::new(name, Joint::Floating))
 }
@@ -297,7 +317,7 @@ pub(crate) fn inertia_fault(inertia: &Mat3) -> Option<String> {
     moments.sort_by(f64::total_cmp);
     let size = inertia.amax();
     let [a, b, c] = [moments[0], moments[1], moments[2]];
-    if a < -1e-9 * size {
+    if a < -1e-9 * size && a < -1e-12 {
         return Some(format!("principal moments of at least 0; the least is {a:.6e} kg·m²"));
     }
     (c > a + b + 1e-6 * size).then(|| format!("no principal moment greater than the sum of the others; they are {a:.6e}, {b:.6e} and {c:.6e} kg·m²"))

@@ -106,7 +106,7 @@ fn wrong_links_are_told() {
 fn wrong_joints_are_told() {
     told(&link_with("limits_deg = [30, -30]"), &["s.toml:7:14: `limits_deg` of link \"l\" is [30, -30]; wanted [lower, upper], the lower first; or false for none"]);
     told(&link_with("limits_rad = [-1, 1]\nlimits_deg = [-1, 1]"), &["s.toml:3:1: link \"l\" has both `limits_rad` and `limits_deg`; wanted one of them"]);
-    told(&link_with("limits_m = [-1, 1]"), &["s.toml:7:1: unknown key `limits_m` in link \"l\"; did you mean `limits_rad`?"]);
+    told(&link_with("limits_m = [-1, 1]"), &["s.toml:7:1: unknown key `limits_m` in link \"l\"; did you mean `limits_deg`?"]);
     told(&link_with("damping_n_m_s_per_rad = -1"), &["s.toml:7:25: `damping_n_m_s_per_rad` of link \"l\" is -1; wanted a number of at least 0"]);
     told(&link_with("drive = { type = \"position\" }"), &[
         "s.toml:7:9: the `drive` of link \"l\" has no stiffness and no damping; wanted `stiffness_n_m_per_rad` or `damping_n_m_s_per_rad` greater than 0",

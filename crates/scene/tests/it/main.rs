@@ -6,3 +6,4 @@ mod expansion;
 mod finding;
 mod robust;
 mod shipped;
+mod urdf;
