@@ -9,7 +9,7 @@
 //! Splitting a free multiplier into two nonnegative ones would serve as well, but rounding makes redundant rows contradict each other,
 //! and a contradiction is a ray.
 
-/// Rows whose pivot fell under this part of the largest diagonal depend on the others.
+/// Rows whose pivot fell under this part of their own diagonal depend on the others: rounding is a part of that, however large others are.
 const RANK: f64 = 1e-11;
 /// What is left of a diagonal after the elimination, below which nothing is left of its row.
 const VANISHED: f64 = 1e-12;
@@ -26,12 +26,13 @@ impl Equalities {
     /// Factors `k`, `e × e`, row-major, symmetric positive semidefinite.
     pub(super) fn new(k: &[f64], e: usize) -> Equalities {
         let mut rest: Vec<f64> = (0..e).map(|i| k[i * e + i]).collect();
-        let floor = RANK * rest.iter().copied().fold(0.0, f64::max);
+        let whole = rest.clone();
+        let share = |rest: &[f64], i: usize| if whole[i] > 0.0 { rest[i] / whole[i] } else { 0.0 };
         let mut columns: Vec<Vec<f64>> = Vec::new();
         let mut order: Vec<usize> = Vec::new();
         // Column by column; `columns[p][i]` is R of original row i and pivot p.
-        while let Some(next) = (0..e).filter(|i| !order.contains(i)).reduce(|a, b| if rest[b] > rest[a] { b } else { a }) {
-            if rest[next] <= floor {
+        while let Some(next) = (0..e).filter(|i| !order.contains(i)).reduce(|a, b| if share(&rest, b) > share(&rest, a) { b } else { a }) {
+            if share(&rest, next) <= RANK {
                 break;
             }
             let root = rest[next].sqrt();

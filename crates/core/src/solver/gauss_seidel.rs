@@ -1,8 +1,8 @@
 //! Block Gauss–Seidel on the friction cone.
 //!
-//! For each block in turn, with everything else held: `w = c + Yᵀ(Yλ)`, then
+//! For each block in turn, with everything else held: `w = c + Yᵀ(Yλ) + Rλ`, then
 //!
-//! - equality, half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K`;
+//! - equality, half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K + R`;
 //! - contact: its own three-row problem (`one_contact.rs`).
 //!
 //! Its fixed points are the exact Coulomb solutions: `λ_n ⟂ w_n` without the dilation that a convex cone brings, and
@@ -187,18 +187,30 @@ fn go_on(x: &mut f64, last: &mut f64, beta: f64) {
 enum Step {
     /// No response: no impulse.
     Dead,
-    Scalar { k: f64, inverse: f64, lo: f64, hi: f64 },
+    Scalar(Scalar),
     Contact(Contact),
+}
+
+/// A row by itself.
+struct Scalar {
+    /// Its diagonal of `K + R`.
+    k: f64,
+    inverse: f64,
+    compliance: f64,
+    lo: f64,
+    hi: f64,
 }
 
 impl Step {
     fn new(rows: &Rows, block: &Block) -> Step {
         let diagonal = rows.own(block, 0, 0);
+        let (compliance, k) = (block.compliance, diagonal + block.compliance);
+        let scalar = |lo, hi| Step::Scalar(Scalar { k, inverse: 1.0 / k, compliance, lo, hi });
         match block.set {
             _ if diagonal <= f64::MIN_POSITIVE => Step::Dead,
-            RowSet::Equality => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo: f64::NEG_INFINITY, hi: f64::INFINITY },
-            RowSet::HalfLine => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo: 0.0, hi: f64::INFINITY },
-            RowSet::Interval { lo, hi } => Step::Scalar { k: diagonal, inverse: 1.0 / diagonal, lo, hi },
+            RowSet::Equality => scalar(f64::NEG_INFINITY, f64::INFINITY),
+            RowSet::HalfLine => scalar(0.0, f64::INFINITY),
+            RowSet::Interval { lo, hi } => scalar(lo, hi),
             RowSet::Cone { mu } => Step::Contact(Contact::new(rows, block, mu)),
         }
     }
@@ -221,8 +233,8 @@ impl<'a> Local<'a> {
     fn relax(&mut self, rows: &Rows, du: &mut [f64], progress: &mut Progress) {
         match &self.step {
             Step::Dead => {}
-            Step::Scalar { k, inverse, lo, hi } => {
-                let w = self.c[0] + rows.row_velocity(self.block, 0, du);
+            Step::Scalar(Scalar { k, inverse, compliance, lo, hi }) => {
+                let w = self.c[0] + rows.row_velocity(self.block, 0, du) + compliance * self.lambda[0];
                 let next = clamp(self.lambda[0] - w * inverse, *lo, *hi);
                 let delta = next - self.lambda[0];
                 if delta != 0.0 {

@@ -1,6 +1,6 @@
 //! Solvers of the one contact problem, each behind [`RowSolver`].
 //!
-//! Find `λ` in the rows' sets so that `w = c + K·λ` answers each set as [`RowSet`](crate::rows::RowSet) says.
+//! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) answers each set as [`RowSet`](crate::rows::RowSet) says.
 
 mod equality;
 mod gauss_seidel;

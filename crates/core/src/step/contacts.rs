@@ -1,7 +1,9 @@
 //! From touches to rows, and from multipliers back to momentum: what both steppers share.
 
+use super::closing;
 use super::projection::Projection;
 use crate::detect::{Detector, Touch};
+use crate::motion::coast;
 use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
 use crate::rows::{RowSet, Rows};
@@ -21,6 +23,10 @@ pub(crate) struct Workspace {
     pub bias: Vec<f64>,
     /// Targets of the constraints' rows, after those of the touches.
     pub targets: Vec<RowTarget>,
+    /// One-sided rows that their constraints locate, at the present state.
+    pub limits: Vec<Limit>,
+    /// First target of each constraint, and the end.
+    pub first: Vec<usize>,
     /// Right-hand side of a solve.
     pub c: Vec<f64>,
     pub lambda: Vec<f64>,
@@ -32,6 +38,33 @@ pub(crate) struct Workspace {
     pub dp: Vec<f64>,
     /// What the projection solves.
     pub projection: Projection,
+}
+
+/// A one-sided row of a constraint, whose gap is told at any state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limit {
+    /// Place of the constraint in the order of constraints, and of the row among its one-sided ones.
+    pub key: [u32; 2],
+    /// Metres or radians; negative where violated.
+    pub gap: f64,
+    /// Its target, where the rows made match the gaps told.
+    pub target: Option<u32>,
+}
+
+/// The one-sided rows that constraints locate, at the present state and sites and at a given time; sorted by key.
+pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(), StepError> {
+    out.clear();
+    let view = WorldView { time, gravity: core.settings.gravity, implicit: core.implicit, x: &core.x, sites: &core.sites, table: &core.table };
+    let mut gaps = Vec::new();
+    for (place, (_, entry, constraint)) in constraints(&core.table).enumerate() {
+        gaps.clear();
+        constraint.gaps(&entry.span, &view, &mut gaps);
+        if gaps.iter().any(|gap| !gap.is_finite()) {
+            return Err(StepError::Row { object: entry.object.name().to_string(), why: "a gap that it tells is not finite".into() });
+        }
+        out.extend(gaps.iter().enumerate().map(|(row, gap)| Limit { key: [place as u32, row as u32], gap: *gap, target: None }));
+    }
+    Ok(())
 }
 
 /// Finds the contacts within reach of the next `horizon` seconds.
@@ -46,22 +79,61 @@ pub(crate) fn detect(core: &mut Core, horizon: f64, out: &mut Vec<Touch>) {
     core.report.contacts = out.len() as u32;
 }
 
-/// State and sites as free motion makes them in `t` seconds; caches stay at the present.
-fn look_ahead(core: &mut Core, t: f64) -> (Vec<f64>, Vec<Site>) {
+/// State and sites at another moment of the step.
+pub(crate) struct Moment {
+    pub x: Vec<f64>,
+    pub sites: Vec<Site>,
+    /// Seconds from the present.
+    pub ahead: f64,
+}
+
+/// State and sites in `ahead` seconds if no momentum changes (or no velocity, of objects whose state holds velocities); caches stay at the present.
+fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
     let start = core.x.clone();
-    core.motion().coast(t);
+    for entry in core.table.iter() {
+        let x = &mut core.x[entry.span.x.clone()];
+        match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
+            Some(body) => {
+                let mut v = vec![0.0; entry.span.v.len()];
+                body.velocity(x, &mut v);
+                body.drift(x, &v, ahead);
+            }
+            None => coast(entry, x, ahead),
+        }
+    }
     core.motion().refresh();
-    let ahead = (std::mem::replace(&mut core.x, start), core.sites.clone());
+    let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
     core.motion().refresh();
-    ahead
+    moment
 }
 
 /// Makes the rows of all touches and constraints: the thesis's test impulses. Touches are as they were found; constraints are asked about the
 /// state that free motion makes in `ahead` seconds, half the step to come: a direction that turns is then right to second order, where one
-/// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Their errors are told for the present state all the same.
+/// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Where there are joints that state is brought back onto them first. The
+/// errors are told for the present state all the same.
 pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ahead: f64) -> Result<(), StepError> {
-    let looked = (ahead > 0.0 && constraints(&core.table).next().is_some()).then(|| look_ahead(core, ahead));
-    let core = &*core;
+    if ahead <= 0.0 || constraints(&core.table).next().is_none() {
+        lay_rows(core, work, level, None)?;
+        return locate_limits(core, work);
+    }
+    let middle = look_ahead(core, ahead);
+    lay_rows(core, work, level, Some(&middle))?;
+    let mut present = Vec::new();
+    if work.targets.iter().any(closing::is_joint) {
+        let (errors, middle) = closing::middle(core, level, ahead)?;
+        lay_rows(core, work, level, Some(&middle))?;
+        present = errors;
+    }
+    if present.len() == work.targets.len() {
+        work.targets.iter_mut().zip(present).for_each(|(target, error)| target.error = error);
+    } else {
+        present_errors(core, work, ahead);
+    }
+    locate_limits(core, work)
+}
+
+/// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment.
+pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<(), StepError> {
     work.rows.clear(core.dof);
     work.bias.clear();
     work.targets.clear();
@@ -80,23 +152,43 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
             builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
         }
     }
-    let (x, sites) = looked.as_ref().map_or((&core.x, &core.sites), |(x, sites)| (x, sites));
+    let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
     builder.sites = sites;
-    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, x, sites, table: &core.table };
+    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
+    let mut first = std::mem::take(&mut work.first);
+    first.clear();
     for (id, entry, constraint) in constraints(&core.table) {
+        first.push(builder.targets.len());
         builder.owner = id;
         constraint.rows(&entry.span, &view, level, &mut builder);
         if let Some(why) = builder.problem.take() {
             return Err(StepError::Row { object: entry.object.name().to_string(), why });
         }
     }
-    if looked.is_some() {
-        present_errors(core, work, ahead);
-    }
+    first.push(work.targets.len());
+    work.first = first;
     let n = work.rows.len;
     work.c.resize(n, 0.0);
     work.lambda.clear();
     work.lambda.resize(n, 0.0);
+    Ok(())
+}
+
+/// Gives one-sided rows the gap that their constraint tells for the present state.
+fn locate_limits(core: &Core, work: &mut Workspace) -> Result<(), StepError> {
+    limits(core, core.time, &mut work.limits)?;
+    let first = &work.first;
+    for of_one in work.limits.chunk_by_mut(|a, b| a.key[0] == b.key[0]) {
+        let place = of_one[0].key[0] as usize;
+        let one_sided = (first[place]..first[place + 1]).filter(|&i| work.targets[i].set == RowSet::HalfLine);
+        let rows: Vec<usize> = one_sided.collect();
+        if rows.len() == of_one.len() {
+            for (limit, &row) in of_one.iter_mut().zip(&rows) {
+                limit.target = Some(row as u32);
+                work.targets[row].error = limit.gap;
+            }
+        }
+    }
     Ok(())
 }
 

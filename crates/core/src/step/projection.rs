@@ -8,6 +8,7 @@
 //! `h = 1`). What was wrong before is recovered at a bounded speed.
 
 use super::contacts::{Workspace, displace};
+use crate::object::RowTarget;
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, GaussSeidel, RowSolver};
 use crate::world::Core;
@@ -36,6 +37,7 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
         let v = c[work.rows.blocks[b].row as usize];
         match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
             (Some(touch), _) => -(allowed(touch.contact.gap, recovery) + h * v),
+            (None, Some(t)) if t.compliance > 0.0 => 0.0,
             (None, Some(t)) if t.set == RowSet::Equality => (t.error.clamp(-recovery, recovery) + h * v).abs(),
             (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
             _ => 0.0,
@@ -48,7 +50,9 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
     let mut p = std::mem::take(&mut work.projection);
     p.fill(work, h, recovery);
     let targets = &work.targets;
-    work.islands.build(&work.rows, |b| b < touches || !matches!(targets[b - touches].set, RowSet::Interval { .. }));
+    // a motor has no place to hold, and a spring may be anywhere
+    let rigid = |t: &RowTarget| t.compliance == 0.0 && !matches!(t.set, RowSet::Interval { .. });
+    work.islands.build(&work.rows, |b| b < touches || rigid(&targets[b - touches]));
     for blocks in work.islands.iter() {
         let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
         if worst > least {

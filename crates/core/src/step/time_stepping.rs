@@ -17,6 +17,7 @@
 
 use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
+use super::closing;
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
@@ -62,6 +63,7 @@ impl Stepper for TimeStepping {
 impl TimeStepping {
     /// One sub-step of `h` seconds.
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
+        core.implicit = true;
         self.smooth_forces(core, h)?;
         detect(core, h, &mut self.work.touches);
         flight::time_contacts(core, h, &mut self.work.touches);
@@ -266,6 +268,8 @@ impl TimeStepping {
         projection::project(core, &mut self.work, Displacement::Step { mean: &mean, h }, recovery, least);
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
+        let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
+        closing::close(core, &mut self.work, &self.x0, h, &kept)?;
         core.check_finite(&dp)
     }
 }

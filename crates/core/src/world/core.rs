@@ -31,6 +31,20 @@ pub enum StepError {
         /// Simulated time, s.
         time: f64,
     },
+    /// The adaptive integrator cannot hold its tolerance.
+    #[error("'{object}' at t = {time} s: its error stays above the integrator's tolerance {tolerance} (inner step {steps}, of {step} s); soften what acts on it, or loosen the tolerance")]
+    Tolerance {
+        /// The object whose error is greatest.
+        object: String,
+        /// Simulated time, s.
+        time: f64,
+        /// Length of the last inner step tried, s.
+        step: f64,
+        /// Inner steps of this frame, refused ones included.
+        steps: u32,
+        /// `Settings::integrator_tolerance`.
+        tolerance: f64,
+    },
     /// A constraint made a row that cannot be.
     #[error("constraint '{object}': {why}")]
     Row {
@@ -74,6 +88,9 @@ pub struct Core {
     pub(crate) sites: Vec<Site>,
     pub(crate) owners: Vec<Owner>,
     pub(crate) applied: Vec<Wrench>,
+    pub(crate) applied_generalized: Vec<f64>,
+    /// See [`WorldView::implicit`](crate::WorldView::implicit).
+    pub(crate) implicit: bool,
     pub(crate) held: Vec<f64>,
     pub(crate) forces: Forces,
     pub(crate) settings: Settings,
@@ -86,13 +103,15 @@ pub struct Core {
     pub(crate) contacts: Vec<ContactPoint>,
     pub(crate) report: StepReport,
     pub(crate) next_serial: u32,
+    /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
+    pub(crate) inner_step: f64,
 }
 
 impl Core {
     pub(crate) fn motion(&mut self) -> Motion<'_> {
         Motion {
             table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces,
-            gravity: self.settings.gravity, applied: &self.applied, held: &self.held,
+            gravity: self.settings.gravity, implicit: self.implicit, applied: &self.applied, applied_generalized: &self.applied_generalized, held: &self.held,
         }
     }
 

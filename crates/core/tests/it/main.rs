@@ -1,10 +1,17 @@
 //! Physics proved: closed forms, conservation laws, determinism.
 
+mod adaptive;
 mod free;
 mod friction;
 mod impacts;
+mod soft_rows;
 mod solvers;
 mod stacks;
+mod articulated_closed;
+mod articulated_laws;
+mod articulated_random;
+mod articulated_world;
+mod closures;
 mod common;
 mod meshes;
 mod paradox;
