@@ -30,6 +30,8 @@ pub struct ArticulatedSpec {
     pub self_collision: bool,
     /// Pairs of links that never meet.
     pub keep_apart: Vec<[usize; 2]>,
+    /// Whether links that overlap at the start never meet: true of a URDF.
+    pub part_overlaps: bool,
     /// Takes part in anything at all. Default true.
     pub alive: bool,
     /// What is to be said of the file it comes from.
@@ -47,6 +49,12 @@ impl ArticulatedSpec {
         self.links.iter().position(|link| link.joint.name == name && link.joint.kind != Joint::Fixed)
     }
 
+    /// One of these links, its base at the origin.
+    pub(crate) fn of(name: String, links: Vec<LinkSpec>) -> ArticulatedSpec {
+        let (base, keep_apart, notes) = (Pose::identity(), Vec::new(), Vec::new());
+        ArticulatedSpec { name, base, links, self_collision: true, keep_apart, part_overlaps: false, alive: true, notes }
+    }
+
     /// Reads one; `None`, with the problems recorded, where it has no links.
     pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, folder: &Path) -> Option<ArticulatedSpec> {
         let name = read_name(&mut f).unwrap_or_default();
@@ -54,10 +62,9 @@ impl ArticulatedSpec {
         let surface = Surface::read(&mut f, library, &Surface::default());
         let floating = f.flag_or("floating", false);
         let mut spec = ArticulatedSpec {
-            name, base, links: Vec::new(), keep_apart: Vec::new(), notes: Vec::new(),
-            self_collision: f.flag_or("self_collision", true),
-            alive: f.flag_or("alive", true),
+            base, part_overlaps: f.value("urdf").is_some(), ..ArticulatedSpec::of(name, Vec::new())
         };
+        (spec.self_collision, spec.alive) = (f.flag_or("self_collision", true), f.flag_or("alive", true));
         let from = Inherited {
             library, surface: &surface, floating, room: MOST_LINKS,
             collides: f.flag_or("collides", true), visible: f.flag_or("visible", true),

@@ -64,6 +64,7 @@ mod file;
 mod grid;
 mod joint;
 mod link;
+mod link_shapes;
 mod lists;
 mod log;
 mod look;

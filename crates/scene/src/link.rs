@@ -94,8 +94,12 @@ pub enum Geometry {
         path: PathBuf,
         /// Metres per unit, along x, y and z; a negative one mirrors.
         scale: [f64; 3],
-        /// Who names it: file, line and column.
+        /// Who names it: file and line.
         place: String,
+        /// Whether its convex hull collides instead of itself.
+        hull: bool,
+        /// Whether it is an error if it cannot be read, and not just left out.
+        required: bool,
     },
 }
 

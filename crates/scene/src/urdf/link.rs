@@ -10,7 +10,7 @@ use tumble_core::collide::{Mat3, Pose, Vec3};
 
 use super::files::{Found, find};
 use super::xml::Element;
-use super::{MissingMeshes, UrdfOptions};
+use super::{CollisionMeshes, MissingMeshes, UrdfOptions};
 use crate::bound::Bound;
 use crate::link::{Geometry, LinkShape, inertia_fault};
 use crate::look::Color;
@@ -165,12 +165,14 @@ fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) 
         return None;
     }
     let place = format!("{}:{}", context.file, mesh.log.line(mesh.span().start));
+    let hull = context.options.collision_meshes == CollisionMeshes::Hull;
+    let required = context.options.missing_meshes == MissingMeshes::Error;
     let why = match find(uri, context.folder, context.options) {
-        Found::Here(path) => return Some(Geometry::File { path, scale, place }),
+        Found::Here(path) => return Some(Geometry::File { path, scale, place, hull, required }),
         Found::Missing(path) => format!("there is no file {path}"),
         Found::Format(format) => format!("the format '{format}' is not read, only .stl and .obj"),
     };
-    if collides && context.options.missing_meshes == MissingMeshes::Error {
+    if collides && required {
         let wanted = "wanted a mesh that is there; `packages` says where packages are, missing_meshes = \"skip\" leaves it out";
         mesh.problem(format_args!("\"{uri}\" cannot be collided with: {why}"), wanted);
     } else {

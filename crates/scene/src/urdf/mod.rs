@@ -36,14 +36,17 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::articulated::ArticulatedSpec;
 use crate::assemble;
+use crate::build::Notes;
 use crate::error::Invalid;
 use crate::link::{LinkSpec, Surface};
+use crate::link_shapes::ShapeMaker;
 use crate::log::Log;
 use joint::JointElement;
 use link::{Context, LinkElement, read_color};
 use tree::TreeBuilder;
-use tumble_core::articulated::{LinkMass, MOST_LINKS, Model, ModelError};
+use tumble_core::articulated::{ArticulatedBody, LinkMass, MOST_LINKS, Model, ModelError};
 use xml::Element;
 
 /// Most bytes of a URDF: 64 MiB.
@@ -124,6 +127,27 @@ pub enum UrdfError {
         /// From the model.
         source: ModelError,
     },
+    /// A mesh cannot be read, or a shape or constant is refused.
+    #[error("{}: {why}", file.display())]
+    Body {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong; it names the link.
+        why: String,
+    },
+}
+
+/// Reads a URDF as a body that stands at the origin (or floats there), with its shapes, limits and couplings.
+///
+/// # Errors
+/// [`UrdfError`]: a file cannot be read, or has problems; those of the XML are told at once with line and column.
+pub fn load(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<(ArticulatedBody, Notes), UrdfError> {
+    let path = path.as_ref();
+    let robot = read_file(path, options, true)?;
+    let mut maker = ShapeMaker::new(&[]);
+    let spec = ArticulatedSpec { part_overlaps: true, ..ArticulatedSpec::of(robot.name, robot.links) };
+    let body = assemble::body(&spec, &mut maker).map_err(|why| UrdfError::Body { file: path.to_path_buf(), why })?;
+    Ok((body, robot.notes.into_iter().chain(maker.notes).collect()))
 }
 
 /// The tree of a URDF without its shapes.
