@@ -141,7 +141,7 @@ fn part_overlaps(
     }
     pairs.dedup();
     if !pairs.is_empty() {
-        maker.notes.push(format!("links that overlap at the start never meet: {}", pairs.join(", ")));
+        maker.notes.add("links that overlap at the start never meet", pairs.join(", "));
     }
     Ok(())
 }

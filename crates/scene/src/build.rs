@@ -109,8 +109,8 @@ impl SceneFile {
         let mut maker = ShapeMaker::new(&meshes);
         for spec in &self.articulated {
             self.add_articulated(spec, &mut maker, &mut built)?;
-            notes.extend(spec.notes.iter().chain(&maker.notes).map(|note| format!("{}: articulated \"{}\": {note}", self.file, spec.name)));
-            maker.notes.clear();
+            let said = spec.notes.iter().cloned().chain(maker.notes.take());
+            notes.extend(said.map(|note| format!("{}: articulated \"{}\": {note}", self.file, spec.name)));
         }
         for spec in &self.closures {
             self.add_closure(spec, &mut built)?;

@@ -70,6 +70,7 @@ mod log;
 mod look;
 mod material;
 mod mesh;
+mod notes;
 mod profile;
 mod rotation;
 mod shape;

@@ -13,6 +13,7 @@ use tumble_core::collide::{Pose, Shape, ShapeError, TreeSettings, TriMesh, Vec3}
 use crate::body::MassSpec;
 use crate::build::{MOST_MESH_BYTES, read_triangles};
 use crate::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec};
+use crate::notes::NoteList;
 use crate::shape::ShapeSpec;
 
 /// A shape in its place on a link.
@@ -32,7 +33,7 @@ pub(crate) struct ShapeMaker<'m> {
     /// Meshes of the scene as solids, with the place of the centre of each.
     meshes: &'m [(Shape, Vec3)],
     files: BTreeMap<(PathBuf, [u64; 3], Use), Result<(Shape, Vec3), String>>,
-    pub(crate) notes: Vec<String>,
+    pub(crate) notes: NoteList,
 }
 
 /// What a mesh file is read for.
@@ -58,7 +59,7 @@ pub(crate) fn make(spec: &ShapeSpec, meshes: &[(Shape, Vec3)]) -> Result<(Shape,
 
 impl<'m> ShapeMaker<'m> {
     pub(crate) fn new(meshes: &'m [(Shape, Vec3)]) -> Self {
-        ShapeMaker { meshes, files: BTreeMap::new(), notes: Vec::new() }
+        ShapeMaker { meshes, files: BTreeMap::new(), notes: NoteList::default() }
     }
 
     /// All shapes of a link; what may be left out and cannot be read is, with a note. Where no picture of a link can be read its collision shapes
@@ -96,7 +97,7 @@ impl<'m> ShapeMaker<'m> {
             Ok(made) => Ok(Some(made.clone())),
             Err(why) if required && spec.collides => Err(format!("{place}: {}: {why}", path.display())),
             Err(why) => {
-                self.notes.push(format!("{place}: {} is left out: {why}", path.display()));
+                self.notes.add(format!("{place}: {}", path.display()), format!("left out: {why}"));
                 Ok(None)
             }
         }
@@ -109,10 +110,13 @@ impl<'m> ShapeMaker<'m> {
             Use::Collision | Use::Hull => TreeSettings::default(),
         };
         if used != Use::Hull {
-            match Shape::mesh(mesh.clone(), &settings) {
-                Ok(made) => return Ok(made),
-                Err(why) => self.notes.push(format!("{}: its convex hull is used: {why}", path.display())),
+            if let Ok(made) = Shape::mesh(mesh.clone(), &settings) {
+                return Ok(made);
             }
+            if used == Use::Drawing {
+                return Shape::mesh(scales(&mesh), &settings).map_err(|e| e.to_string());
+            }
+            self.notes.add(path.display().to_string(), "its surface is not closed, so its convex hull collides");
         }
         let hull = mesh.convex_hull().map_err(|e| e.to_string())?;
         Shape::mesh(hull, &settings).map_err(|e| e.to_string())
@@ -136,6 +140,21 @@ fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
         mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
     mesh
+}
+
+/// A surface that need not be closed as a solid to draw: each triangle with a shallow pyramid below it.
+fn scales(mesh: &TriMesh) -> TriMesh {
+    let depth = 1e-4 * mesh.diagonal();
+    let mut made = TriMesh::default();
+    for t in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(t);
+        if let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) {
+            let first = made.vertices.len() as u32;
+            made.vertices.extend([a, b, c, (a + b + c) / 3.0 - depth * normal]);
+            made.triangles.extend([[0, 1, 2], [1, 0, 3], [2, 1, 3], [0, 2, 3]].map(|face| face.map(|v| first + v)));
+        }
+    }
+    made
 }
 
 /// The mass of a link, link frame.

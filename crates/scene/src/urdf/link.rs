@@ -14,6 +14,7 @@ use super::{CollisionMeshes, MissingMeshes, UrdfOptions};
 use crate::bound::Bound;
 use crate::link::{Geometry, LinkShape, inertia_fault};
 use crate::look::Color;
+use crate::notes::NoteList;
 use crate::rotation;
 use crate::shape::ShapeSpec;
 
@@ -28,7 +29,7 @@ pub(crate) struct Context<'c> {
     pub(crate) shapes: bool,
     /// Colours of the materials at the top of the file.
     pub(crate) colors: BTreeMap<String, Color>,
-    pub(crate) notes: Vec<String>,
+    pub(crate) notes: NoteList,
 }
 
 /// A link as its element says.
@@ -90,7 +91,7 @@ fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Context<'_>) -
     if let Some(fault) = inertia_fault(&inertia) {
         let what = if eigen.eigenvalues.min() < -1e-9 * inertia.amax() { "; those below 0 are set to 0" } else { "" };
         let line = element.log.line(element.span().start);
-        context.notes.push(format!("{}:{line}: {} is that of no rigid body: it must have {fault}{what}", context.file, element.what()));
+        context.notes.add(format!("{}:{line}", context.file), format!("{} is that of no rigid body: it must have {fault}{what}", element.what()));
     }
     if !negative {
         return inertia;
@@ -169,7 +170,8 @@ fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) 
     let required = context.options.missing_meshes == MissingMeshes::Error;
     let why = match find(uri, context.folder, context.options) {
         Found::Here(path) => return Some(Geometry::File { path, scale, place, hull, required }),
-        Found::Missing(path) => format!("there is no file {path}"),
+        Found::Missing(path) if collides && required => format!("there is no file {path}"),
+        Found::Missing(_) => "there is no such file".into(),
         Found::Format(format) => format!("the format '{format}' is not read, only .stl and .obj"),
     };
     if collides && required {
@@ -177,7 +179,7 @@ fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) 
         mesh.problem(format_args!("\"{uri}\" cannot be collided with: {why}"), wanted);
     } else {
         let kind = if collides { "collision" } else { "visual" };
-        context.notes.push(format!("{place}: the {kind} mesh \"{uri}\" is left out: {why}"));
+        context.notes.add(format!("{place}: {kind} mesh {uri}"), format!("left out: {why}"));
     }
     None
 }

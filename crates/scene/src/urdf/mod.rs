@@ -43,6 +43,7 @@ use crate::error::Invalid;
 use crate::link::{LinkSpec, Surface};
 use crate::link_shapes::ShapeMaker;
 use crate::log::Log;
+use crate::notes::NoteList;
 use joint::JointElement;
 use link::{Context, LinkElement, read_color};
 use tree::TreeBuilder;
@@ -147,7 +148,7 @@ pub fn load(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<(Articulate
     let mut maker = ShapeMaker::new(&[]);
     let spec = ArticulatedSpec { part_overlaps: true, ..ArticulatedSpec::of(robot.name, robot.links) };
     let body = assemble::body(&spec, &mut maker).map_err(|why| UrdfError::Body { file: path.to_path_buf(), why })?;
-    Ok((body, robot.notes.into_iter().chain(maker.notes).collect()))
+    Ok((body, robot.notes.into_iter().chain(maker.notes.take()).collect()))
 }
 
 /// The tree of a URDF without its shapes.
@@ -220,7 +221,7 @@ pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, shapes: 
     let document = xml::parse(&log, text);
     let robot = document.as_ref().and_then(|document| {
         let context = Context {
-            folder: path.parent().unwrap_or(Path::new("")), file: &file, options, shapes, colors: BTreeMap::new(), notes: Vec::new(),
+            folder: path.parent().unwrap_or(Path::new("")), file: &file, options, shapes, colors: BTreeMap::new(), notes: NoteList::default(),
         };
         read_robot(&Element::new(&log, document.root_element()), context)
     });
@@ -261,7 +262,7 @@ fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot
     let root = tree::find_root(robot.log, &elements, &joints)?;
     let name = robot.text("name").unwrap_or("robot").to_owned();
     let links = TreeBuilder::new(robot.log, elements, &joints).build(root, context.options.floating, &mut context.notes);
-    Some(Robot { name, links, notes: context.notes })
+    Some(Robot { name, links, notes: context.notes.take() })
 }
 
 fn note_unique(log: &Log<'_>, taken: &mut BTreeMap<String, usize>, kind: &str, name: &str, span: &Range<usize>) {

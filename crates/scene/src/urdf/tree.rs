@@ -9,6 +9,7 @@ use super::link::LinkElement;
 use crate::joint::{JointSpec, MimicSpec};
 use crate::link::{LinkMassSpec, LinkSpec};
 use crate::log::Log;
+use crate::notes::NoteList;
 
 /// The root of the tree: the one link that no joint moves. `None`, with the problem recorded, where there is not exactly one, a link has two
 /// parents, or joints form a loop.
@@ -59,7 +60,7 @@ impl<'t> TreeBuilder<'t> {
     }
 
     /// All links, with mimics resolved and masses checked.
-    pub(crate) fn build(mut self, root: usize, floating: bool, notes: &mut Vec<String>) -> Vec<LinkSpec> {
+    pub(crate) fn build(mut self, root: usize, floating: bool, notes: &mut NoteList) -> Vec<LinkSpec> {
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); self.elements.len()];
         for (number, joint) in self.joints.iter().enumerate() {
             children[joint.parent].push(number);
@@ -144,7 +145,7 @@ impl<'t> TreeBuilder<'t> {
     }
 
     /// Couplings. A fixed joint that mimics, as in robots reduced to some of their joints, follows nothing; nor can one follow it: both are told.
-    fn resolve_mimics(&mut self, notes: &mut Vec<String>) {
+    fn resolve_mimics(&mut self, notes: &mut NoteList) {
         for joint in self.joints {
             let Some(mimic) = &joint.mimic else { continue };
             let find = |name: &str| self.links.iter().position(|link| link.joint.name == name && link.joint.is_single());
@@ -159,7 +160,7 @@ impl<'t> TreeBuilder<'t> {
                 }
                 _ => {
                     let line = self.log.line(mimic.span.start);
-                    notes.push(format!("line {line}: joint \"{}\" does not follow \"{}\": both must be revolute or prismatic", joint.name, mimic.joint));
+                    notes.add(format!("line {line}: joint \"{}\"", joint.name), "follows no other, as it or the other is fixed");
                 }
             }
         }
