@@ -4,6 +4,7 @@ mod articulated;
 mod bad_input;
 mod expansion;
 mod finding;
+mod robots;
 mod robust;
 mod shipped;
 mod urdf;
