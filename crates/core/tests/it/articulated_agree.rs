@@ -94,7 +94,7 @@ fn poses_velocities_and_accelerations_of_links_are_the_same() {
         let qdd = random.numbers(case.model.dof(), 5.0);
         let (mut ours, mut theirs) = (vec![Rates::zero(); count], vec![(Vec3::zeros(), Vec3::zeros()); count]);
         case.kin.accelerations(&case.model, &qdd, &Vec3::zeros(), &mut ours);
-        case.dynamics.link_accelerations(&mut case.dynamics.scratch(), &qdd, &mut theirs);
+        case.dynamics.link_accelerations(&qdd, &mut theirs);
         for (i, link) in case.kin.links().iter().enumerate() {
             let (angular, linear) = case.dynamics.link_velocity(i);
             let size = 1.0 + linear.norm() + ours[i].linear.norm() + ours[i].angular.norm();
