@@ -17,8 +17,10 @@
 //! ```
 
 pub mod articulated;
+mod closure;
 mod collidable;
 mod detect;
+mod integrators;
 mod motion;
 mod object;
 mod rigid;
@@ -30,10 +32,12 @@ mod site;
 pub mod solver;
 pub mod spatial;
 mod step;
+mod sync;
 mod view;
 mod world;
 
-pub use articulated::{Joint, LinkMass, Model, ModelBuilder, ModelError};
+pub use articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Drive, Freedom, Joint, LinkMass, Model, ModelBuilder, ModelError, Playback, Spring};
+pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use object::{
     Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget, SyncError, Visual,

@@ -90,6 +90,11 @@ pub trait Integratable {
     fn coast(&self, x: &mut [f64], h: f64);
     /// Positions move with generalized velocity `v` for `h` seconds; exact on rotations. Momentum stays.
     fn drift(&self, x: &mut [f64], v: &[f64], h: f64);
+    /// Turns a velocity `v` at the displacement `displacement` from some state into the rate of that displacement: the inverse of the
+    /// differential of [`drift`](Self::drift)'s exponential map. Coordinates that simply add up leave `v` as it is, the default.
+    fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
+        let _ = (displacement, v);
+    }
     /// `u = L·v` of the momentum in `x`.
     fn whiten(&self, x: &[f64], u: &mut [f64]);
     /// `v = L⁻¹·u`.
@@ -181,6 +186,12 @@ pub trait Constraint {
     /// Adds its rows. See [`RowBuilder`] for how a row is made. The view shows the state that free motion makes by the middle of the step to
     /// come: directions are right there to second order. Errors are those of that state too; the stepper takes them back to the present.
     fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder);
+    /// Appends the errors of its one-sided rows ([`RowSet::HalfLine`]) at the view's state, one per row and in the order of the rows. What is told
+    /// here `backtracking` locates in time as it does contacts: the step ends where the limit is reached, and the limit acts from there on. Of a
+    /// constraint that tells nothing the limits act over the whole of the step in which they are reached.
+    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+        let _ = (me, view, out);
+    }
 }
 
 /// One row of a [`Constraint`]: what it may do and how far off it is.
@@ -194,12 +205,18 @@ pub struct RowTarget {
     pub velocity: f64,
     /// The part of the row's acceleration that is there without any force or change of velocity (`J̇·v`); 0 where the row's direction stays.
     pub bias_acceleration: f64,
+    /// Compliance `R` of the row, at least 0: it gives way by `R` times its multiplier, `w = c + (K + R)·λ`. In (m/s)/(N·s); at the
+    /// acceleration level (m/s²)/N. 0 is rigid. A soft row is a spring: no impact and no position projection knows it.
+    ///
+    /// An implicit PD drive `F = kp·(q* − q⁺) + kd·(v* − v⁺)` with `q⁺ = q + h·v⁺` is `compliance = 1/(h·(kd + h·kp))` with the target
+    /// velocity `(kp·(q* − q) + kd·v*)/(kd + h·kp)`; the same at the acceleration level, for a sub-step of `h`.
+    pub compliance: f64,
 }
 
 impl RowTarget {
-    /// A row at rest with the given set and position error.
+    /// A rigid row at rest with the given set and position error.
     pub fn new(set: RowSet, error: f64) -> RowTarget {
-        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0 }
+        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0, compliance: 0.0 }
     }
 }
 

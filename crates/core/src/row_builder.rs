@@ -1,5 +1,6 @@
 //! How constraints and contacts become rows.
 
+use crate::collidable::ContactFrame;
 use crate::object::{Constraint, Integratable, RowTarget};
 use crate::rows::{RowSet, Rows};
 use crate::site::Site;
@@ -35,12 +36,16 @@ impl RowBuilder<'_> {
     /// Starts a row. A `Cone` set is for contacts, which the world makes itself: it is refused here, and the step reports it.
     pub fn row(&mut self, target: RowTarget) -> &mut Self {
         let bounds = if let RowSet::Interval { lo, hi } = target.set { lo <= hi } else { true };
+        if !(target.compliance.is_finite() && target.compliance >= 0.0) {
+            self.refuse(format!("a row's compliance is {}; it must be finite and at least 0", target.compliance));
+            return self;
+        }
         let finite = [target.error, target.velocity, target.bias_acceleration].iter().all(|x| x.is_finite());
         if target.set.rows() != 1 || !finite || !bounds {
             self.refuse("a constraint's row must be Equality, HalfLine or Interval (lo ≤ hi), with finite error, velocity and bias".into());
             return self;
         }
-        self.rows.push_block(target.set);
+        self.rows.push_soft(target.set, target.compliance);
         self.bias.push(0.0);
         self.targets.push(target);
         self
@@ -52,12 +57,31 @@ impl RowBuilder<'_> {
         if !self.open(p.iter().chain(axis.iter())) {
             return self;
         }
-        match table.slots.get(id) {
-            Some(entry) if part < entry.span.site.len() && self.point_side(entry, part, p, &[*axis], sign) => {}
-            Some(entry) => self.refuse(format!("'{}' has no part {part} that answers impulses, or the row names a third object", entry.object.name())),
-            None => self.refuse("a row names an object that is not in the world".into()),
-        }
+        self.on_part(table.slots.get(id), part, |row, entry| row.point_side(entry, part, p, &[*axis], sign));
         self
+    }
+
+    /// Adds `sign ·` the angular velocity of one part along the unit vector `axis`. Said by a couple of test impulses, which every part answers:
+    /// for unit `b ⟂ c` with `b × c = axis` it is `(v(p + b) − v(p))·c`, exactly.
+    pub fn on_rotation(&mut self, id: ObjectId, part: usize, axis: &Vec3, sign: f64) -> &mut Self {
+        let table = self.table;
+        if !self.open(axis.iter()) {
+            return self;
+        }
+        let [_, b, c] = ContactFrame::new(Vec3::zeros(), *axis).axes;
+        self.on_part(table.slots.get(id), part, |row, entry| {
+            let p = row.sites[entry.span.site.start + part].position();
+            row.point_side(entry, part, &(p + b), &[c], sign) && row.point_side(entry, part, &p, &[c], -sign)
+        });
+        self
+    }
+
+    /// Lets `add` put its side of the row; refuses the row where the object is gone, has no such part, or is a third.
+    fn on_part(&mut self, entry: Option<&Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
+        let Some(entry) = entry else { return self.refuse("a row names an object that is not in the world".into()) };
+        if part >= entry.span.site.len() || !add(self, entry) {
+            self.refuse(format!("'{}' has no part {part} that answers impulses, or the row names a third object", entry.object.name()));
+        }
     }
 
     /// Adds `Σ j_k · v_k` over the generalized velocities of one object.

@@ -10,8 +10,9 @@
 //! | `Y`  | whitened response; stored per side and row, so a block of `r` rows on a side of `d` freedoms is `r × d`, row-major |
 //! | `c`  | free value of every row: the relative velocity (or acceleration) that the solve must mend |
 //! | `λ`  | multiplier of every row: impulse in N·s, or force in N at the acceleration level |
+//! | `R`  | compliance of a scalar row, at least 0: it gives way by `R·λ` |
 
-/// What a block's multipliers may be, and what its row velocities must be in return. With `w = c + K·λ`:
+/// What a block's multipliers may be, and what its row velocities must be in return. With `w = c + (K + R)·λ`:
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RowSet {
     /// `w = 0`, `λ` free (loop closure). One row.
@@ -59,6 +60,8 @@ pub struct Block {
     pub set: RowSet,
     /// First row of the block in `c` and `λ`.
     pub row: u32,
+    /// `R` of a scalar row, (m/s)/(N·s): 0 for a rigid row, and for contacts.
+    pub compliance: f64,
     sides: [Side; 2],
     side_count: u8,
 }
@@ -99,7 +102,13 @@ impl Rows {
 
     /// Starts a block without sides and returns its index.
     pub fn push_block(&mut self, set: RowSet) -> usize {
-        self.blocks.push(Block { set, row: self.len as u32, sides: [Side::default(); 2], side_count: 0 });
+        self.push_soft(set, 0.0)
+    }
+
+    /// The same with a compliance, which contacts do not take.
+    pub fn push_soft(&mut self, set: RowSet, compliance: f64) -> usize {
+        let compliance = if set.rows() == 1 { compliance } else { 0.0 };
+        self.blocks.push(Block { set, row: self.len as u32, compliance, sides: [Side::default(); 2], side_count: 0 });
         self.len += set.rows();
         self.blocks.len() - 1
     }
@@ -159,7 +168,7 @@ impl Rows {
         }
     }
 
-    /// `K = YᵀY` of the given blocks, dense, row-major, in the order of their rows. For the pivoting solvers and the tests.
+    /// `K + R`, with `K = YᵀY`, of the given blocks, dense, row-major, in the order of their rows. For the pivoting solvers and the tests.
     pub fn dense(&self, blocks: &[u32]) -> Vec<f64> {
         let rows: Vec<(&Block, usize)> = blocks
             .iter()
@@ -176,6 +185,7 @@ impl Rows {
                 dense[i * n + j] = value;
                 dense[j * n + i] = value;
             }
+            dense[i * n + i] += a.compliance;
         }
         dense
     }

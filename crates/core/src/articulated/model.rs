@@ -139,7 +139,7 @@ pub struct Link {
     pub parent: Option<usize>,
     /// Never [`Joint::Fixed`]; axes are unit.
     pub joint: Joint,
-    /// The joint's frame in the parent link's frame (in the structure's base frame for a root).
+    /// The joint's frame in the parent link's frame (in the world for a root). For a floating root, where it starts: its pose is all in `q`.
     pub placement: Pose,
     /// Mass, with that of all fixed links folded in, link frame.
     pub mass: LinkMass,
@@ -207,6 +207,13 @@ impl Model {
             if let Some(k) = link.joint.quaternion() {
                 q[link.q + k + 3] = 1.0;
             }
+        }
+    }
+
+    /// Moves the base: the placements of all roots that do not float.
+    pub(super) fn place(&mut self, step: &Pose) {
+        for link in self.links.iter_mut().filter(|l| l.parent.is_none() && l.joint != Joint::Floating) {
+            link.placement = step * link.placement;
         }
     }
 

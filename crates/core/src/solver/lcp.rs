@@ -20,13 +20,13 @@
 //! The sliding form cannot push any other way, so that it does not hold a body that other contacts or rows drive backward or sideways.
 //!
 //! Other rows: half-lines are plain; an interval is `λ = lo + z` with a multiplier for `hi − lo − z ≥ 0`; equalities are eliminated
-//! first ([`Equalities`]). A row without response gets no multiplier, and a dead tangent no share in `d₁`.
+//! first ([`Equalities`]); `K` has the compliance of soft rows on its diagonal. A row without response gets no multiplier, and a dead tangent no share in `d₁`.
 //!
 //! The warm start is not used, except that [`GaussSeidel`] takes over from it, with `converged` false, where there is no answer: on a
 //! secondary ray (`ray` true), where the pivots run out, and where there are more than [`UNKNOWNS`] unknowns (pivoting is O(n³)).
 //! Numbers that are not finite give zero multipliers and `converged` false.
 
-use super::equality::Equalities;
+use super::equality::{Equalities, RANK};
 use super::lemke::{LcpResult, lemke};
 use super::{Accuracy, GaussSeidel, Outcome, RowSolver};
 use crate::rows::{Block, RowSet, Rows};
@@ -136,7 +136,7 @@ fn finite(rows: &Rows, blocks: &[u32], c: &[f64]) -> bool {
         RowSet::Interval { lo, hi } => !lo.is_nan() && !hi.is_nan(),
         RowSet::Cone { mu } => mu.is_finite(),
     };
-    let row = |block: &Block| set(&block.set) && block.range().enumerate().all(|(k, i)| c[i].is_finite() && responses(block, k));
+    let row = |block: &Block| set(&block.set) && block.range().enumerate().all(|(k, i)| c[i].is_finite() && responses(block, k)) && block.compliance.is_finite();
     blocks.iter().all(|&b| row(&rows.blocks[b as usize]))
 }
 
@@ -165,7 +165,7 @@ struct Bound {
 
 /// The island's problem: unknowns are the columns, then the bounds.
 struct Problem {
-    /// `K` of the island, dense, row-major.
+    /// `K + R` of the island, dense, row-major.
     k: Vec<f64>,
     /// Free values of the island's rows.
     c: Vec<f64>,
@@ -187,18 +187,18 @@ impl Problem {
         let c: Vec<f64> = island().flat_map(|block| c[block.range()].iter().copied()).collect();
         let scale = c.iter().fold(SLOWEST, |a: f64, c| a.max(c.abs()));
         let start = vec![0.0; c.len()];
-        let equalities = Equalities::new(&[], 0);
+        let equalities = Equalities::new(&[], 0, RANK);
         let mut problem = Problem { k, c, scale, start, columns: Vec::new(), bounds: Vec::new(), free: Vec::new(), equalities };
         let mut first = 0;
         for block in island() {
-            if problem.diagonal(first) > f64::MIN_POSITIVE {
+            if rows.own(block, 0, 0) > f64::MIN_POSITIVE {
                 problem.add(friction, block, first);
             }
             first += block.set.rows();
         }
         let free = &problem.free;
         let among: Vec<f64> = free.iter().flat_map(|&i| free.iter().map(move |&j| (i, j))).map(|(i, j)| problem.entry(i, j)).collect();
-        problem.equalities = Equalities::new(&among, free.len());
+        problem.equalities = Equalities::new(&among, free.len(), RANK);
         problem
     }
 
@@ -311,7 +311,7 @@ impl Problem {
         (m, q)
     }
 
-    /// `c + K·λ` of the island's rows.
+    /// `c + (K + R)·λ` of the island's rows.
     fn velocities(&self, lambda: &[f64]) -> Vec<f64> {
         let n = self.c.len();
         (0..n).map(|i| self.c[i] + self.k[i * n..(i + 1) * n].iter().zip(lambda).map(|(k, l)| k * l).sum::<f64>()).collect()

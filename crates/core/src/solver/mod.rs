@@ -1,12 +1,13 @@
 //! Solvers of the one contact problem, each behind [`RowSolver`].
 //!
-//! Find `λ` in the rows' sets so that `w = c + K·λ` answers each set as [`RowSet`](crate::rows::RowSet) says.
+//! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) answers each set as [`RowSet`](crate::rows::RowSet) says.
 
 mod equality;
 mod gauss_seidel;
 mod island;
 mod lcp;
 mod lemke;
+mod linkage;
 mod one_contact;
 mod residual;
 #[cfg(test)]
@@ -16,6 +17,7 @@ pub use gauss_seidel::GaussSeidel;
 pub use island::Islands;
 pub use lcp::{LcpPyramid, LcpSliding, UNKNOWNS};
 pub use lemke::{LcpResult, lemke};
+pub use linkage::DIRECT_ROWS;
 pub use residual::residual;
 
 use crate::rows::Rows;

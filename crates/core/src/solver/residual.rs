@@ -3,7 +3,7 @@
 //! The natural map with De Saxcé's shift: for a contact, `λ` solves the problem iff
 //! `λ = Π(λ − (w + μ·|w_t|·n) / d)`, with `Π` the projection onto the friction cone `|λ_t| ≤ μ·λ_n` and any `d > 0`.
 //! The residual is `‖λ − Π(…)‖·d`, in m/s, with `d` the mean diagonal of the block of `K`; for the scalar sets the shift is
-//! absent and `Π` clamps. Source: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008, ch. 13.
+//! absent and `Π` clamps; `w` of a soft row has its `R·λ`. Source: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008, ch. 13.
 
 use crate::rows::{Block, RowSet, Rows};
 
@@ -19,7 +19,7 @@ fn block_residual(rows: &Rows, block: &Block, c: &[f64], lambda: &[f64], du: &[f
         return 0.0;
     }
     let first = block.row as usize;
-    let w = |k: usize| c[first + k] + rows.row_velocity(block, k, du);
+    let w = |k: usize| c[first + k] + rows.row_velocity(block, k, du) + block.compliance * lambda[first + k];
     match block.set {
         RowSet::Equality => w(0).abs(),
         RowSet::HalfLine => scalar(lambda[first], w(0), d, 0.0, f64::INFINITY),

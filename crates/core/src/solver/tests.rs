@@ -3,9 +3,11 @@
 mod contact;
 mod friction;
 mod islands;
+mod linkages;
 mod pivoting;
 mod residuals;
 mod scalar;
+mod soft;
 
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{RowSet, Rows};
@@ -106,7 +108,7 @@ pub(super) fn free(rows: &Rows, u: &[f64]) -> Vec<f64> {
 pub(super) struct Solved {
     pub lambda: Vec<f64>,
     pub du: Vec<f64>,
-    /// `c + K·λ`, by the dense `K`.
+    /// `c + (K + R)·λ`, by the dense `K + R`.
     pub w: Vec<f64>,
     pub outcome: Outcome,
 }
@@ -119,7 +121,9 @@ pub(super) fn solve(solver: &dyn RowSolver, rows: &Rows, c: &[f64], accuracy: Ac
     let (k, n) = (rows.dense(&blocks), rows.len);
     let w: Vec<f64> = (0..n).map(|i| c[i] + (0..n).map(|j| k[i * n + j] * lambda[j]).sum::<f64>()).collect();
     let size = c.iter().fold(1.0, |a: f64, c| a.max(c.abs()));
-    for (w, of_du) in w.iter().zip(free(rows, &du).iter().zip(c).map(|(yu, c)| yu + c)) {
+    let mut given: Vec<f64> = c.to_vec();
+    rows.blocks.iter().for_each(|b| given[b.row as usize] += b.compliance * lambda[b.row as usize]);
+    for (w, of_du) in w.iter().zip(free(rows, &du).iter().zip(&given).map(|(yu, c)| yu + c)) {
         assert!((w - of_du).abs() <= 1e-9 * size, "du is not Y·λ: {w} {of_du}");
     }
     Solved { lambda, du, w, outcome }

@@ -1,0 +1,136 @@
+//! Soft rows of constraints in a world: springs and drives that are solved with everything else.
+
+use crate::common::*;
+use tumble_core::collide::{Pose, Vec3};
+use tumble_core::rows::RowSet;
+use tumble_core::*;
+
+/// An implicit PD drive of a body's centre along x, or whatever row it is told to make.
+#[derive(Clone)]
+struct Drive {
+    body: ObjectId,
+    set: RowSet,
+    stiffness: f64,
+    damping: f64,
+    /// Where to, metres.
+    place: f64,
+    h: f64,
+}
+
+impl Object for Drive {
+    fn name(&self) -> &str {
+        "drive"
+    }
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(self.clone())
+    }
+    fn constraint(&self) -> Option<&dyn Constraint> {
+        Some(self)
+    }
+}
+
+impl Constraint for Drive {
+    fn rows(&self, _me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+        let p = view.site(self.body, 0).unwrap().position();
+        let gain = self.damping + self.h * self.stiffness;
+        let target = RowTarget {
+            compliance: 1.0 / (self.h * gain),
+            velocity: self.stiffness * (self.place - p.x) / gain,
+            ..RowTarget::new(self.set, p.x - self.place)
+        };
+        out.row(target).on_point(self.body, 0, &p, &Vec3::x(), 1.0);
+    }
+}
+
+fn ball(world: &mut World, mass: f64, v: f64) -> ObjectId {
+    let ball = RigidBody::with_mass("ball", sphere(0.1), mass).unwrap().surface(0.0, 0.0).at(Pose::translation(0.0, 0.0, 0.0));
+    world.add(ball.moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
+}
+
+/// `m·(v⁺ − v) = h·(kp·(q* − q − h·v⁺) − kd·v⁺)`; time stepping asks for `q` in the middle of the step, where free motion has it.
+#[test]
+fn a_drive_gives_the_velocity_found_by_hand() {
+    let (h, m, v, place) = (0.01, 2.0, 0.5, 0.3);
+    for stepper in STEPPERS {
+        for set in [RowSet::Equality, RowSet::Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY }] {
+            for (stiffness, damping) in [(100.0, 0.0), (5000.0, 30.0), (0.0, 4.0)] {
+                let mut world = no_gravity(world(stepper, h));
+                let body = ball(&mut world, m, v);
+                world.add(Drive { body, set, stiffness, damping, place, h }).unwrap();
+                world.step().unwrap();
+                let q = 0.5 * h * v;
+                let expected = (m * v + h * stiffness * (place - q)) / (m + h * (damping + h * stiffness));
+                let got = velocity(&world, body).x;
+                assert!((got - expected).abs() < 1e-12, "{stepper} {set:?} {stiffness} {damping}: {got}, by hand {expected}");
+            }
+        }
+    }
+}
+
+/// Under its weight a spring gives by `m·g/k`: it is in no way pulled to its place as a joint would be.
+#[test]
+fn a_soft_equality_is_a_spring_and_no_joint() {
+    let (h, m, k) = (1.0 / 60.0, 2.0, 100.0);
+    for stepper in STEPPERS {
+        let mut world = world(stepper, h);
+        world.set_settings(Settings { gravity: Vec3::new(-9.81, 0.0, 0.0), ..*world.settings() }).unwrap();
+        let body = ball(&mut world, m, 0.0);
+        world.add(Drive { body, set: RowSet::Equality, stiffness: k, damping: 30.0, place: 0.0, h }).unwrap();
+        for _ in 0..600 {
+            world.step().unwrap();
+        }
+        let x = position(&world, body).x;
+        assert!((x + m * 9.81 / k).abs() < 1e-9, "{stepper}: {x}");
+    }
+}
+
+/// An impact takes no time, in which a spring does nothing: two balls of one mass change their velocities.
+#[test]
+fn a_spring_takes_no_part_in_an_impact() {
+    let h = 1.0 / 240.0;
+    for stepper in STEPPERS {
+        let mut world = no_gravity(world(stepper, h));
+        let at = |name: &str, x: f64, v: f64| {
+            let ball = RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(x, 0.0, 0.0));
+            ball.moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())
+        };
+        let held = world.add(at("held", 0.0, 0.0)).unwrap();
+        let comes = world.add(at("comes", -0.201, 1.0)).unwrap();
+        // 1e-6 N·s/m: next to nothing in a step, and everything if the row were rigid
+        world.add(Drive { body: held, set: RowSet::Equality, stiffness: 0.0, damping: 1e-6, place: 0.0, h }).unwrap();
+        world.step().unwrap();
+        let (a, b) = (velocity(&world, held).x, velocity(&world, comes).x);
+        assert!((a - 1.0).abs() < 1e-6 && b.abs() < 1e-6, "{stepper}: {a} {b}");
+    }
+}
+
+#[test]
+fn a_compliance_that_is_none_is_refused() {
+    struct Row(ObjectId, f64);
+    impl Object for Row {
+        fn name(&self) -> &str {
+            "row"
+        }
+        fn fork(&self) -> Box<dyn Object> {
+            Box::new(Row(self.0, self.1))
+        }
+        fn constraint(&self) -> Option<&dyn Constraint> {
+            Some(self)
+        }
+    }
+    impl Constraint for Row {
+        fn rows(&self, _me: &Span, _view: &WorldView, _level: Level, out: &mut RowBuilder) {
+            let target = RowTarget { compliance: self.1, ..RowTarget::new(RowSet::Equality, 0.0) };
+            out.row(target).on_point(self.0, 0, &Vec3::zeros(), &Vec3::x(), 1.0);
+        }
+    }
+    for stepper in STEPPERS {
+        for compliance in [-1e-9, f64::NAN, f64::INFINITY] {
+            let mut world = world(stepper, 0.01);
+            let body = ball(&mut world, 1.0, 0.0);
+            world.add(Row(body, compliance)).unwrap();
+            let error = world.step().unwrap_err().to_string();
+            assert!(error.contains("compliance") && error.contains(&format!("{compliance}")) && error.contains("'row'"), "{error}");
+        }
+    }
+}
