@@ -139,11 +139,16 @@ impl Dynamics {
     }
 
     /// Angular acceleration of every link, rad/s², and acceleration of the material point at its origin, m/s², world axes, for given `qdd`.
-    pub fn link_accelerations(&self, s: &mut Scratch, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
-        self.carry(s, qdd);
-        for ((a, slot), out) in s.motions[1..].iter().zip(&self.sweep.slots[1..]).zip(out) {
-            let whole = *a + slot.drift;
-            *out = (whole.angular.into(), whole.linear.into());
+    pub fn link_accelerations(&self, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
+        let slots = &self.sweep.slots;
+        for (i, body) in self.compiled.bodies.iter().enumerate() {
+            let parent = body.parent.checked_sub(1).map_or(Motion::default(), |p| Motion::new(out[p].0.into(), out[p].1.into()));
+            let a = carried(body, &slots[i + 1], parent, qdd);
+            out[i] = (a.angular.into(), a.linear.into());
+        }
+        for ((angular, linear), slot) in out.iter_mut().zip(&slots[1..]) {
+            *angular += Vec3::from(slot.drift.angular);
+            *linear += Vec3::from(slot.drift.linear);
         }
     }
 

@@ -2,6 +2,7 @@
 //! rounding. The registers come from the crate `pulp`: its tokens prove that the processor was asked.
 
 use crate::spatial::Scalar;
+#[cfg(target_arch = "x86_64")]
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
 /// `N` numbers, one per state of a batch: how a batch takes its input and gives its output.
