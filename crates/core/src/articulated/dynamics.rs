@@ -12,6 +12,25 @@ use tumble_collide::{Mat3, Pose, Vec3};
 
 /// A model, and everything of it that is a function of `q` and `v`: poses, velocities, bias forces, articulated inertias and their factors.
 /// Before the first [`refresh`](Self::refresh) its answers mean nothing.
+///
+/// ```
+/// use tumble_core::{Joint, LinkMass, ModelBuilder, articulated::Dynamics, collide::{Pose, Vec3}};
+/// let mut builder = ModelBuilder::new();
+/// builder.link("bob", None, Joint::revolute(Vec3::y()), Pose::identity(), LinkMass::point(2.0, Vec3::new(0.0, 0.0, -0.5)));
+/// let model = builder.build()?;
+/// let mut dynamics = Dynamics::new(&model);
+/// dynamics.refresh(&[0.3], &[0.0]);
+/// // A pendulum of length 0.5 m: q̈ = −g/l·sin q.
+/// let mut qdd = [0.0];
+/// dynamics.accelerate_in(&mut dynamics.scratch(), &Vec3::new(0.0, 0.0, -9.81), &[0.0], &[], &mut qdd);
+/// assert!((qdd[0] + 9.81 / 0.5 * f64::sin(0.3)).abs() < 1e-12);
+/// // What an impulse of 1 N·s along x at the bob does, squared: 1/m of the point along its circle.
+/// let mut y = [0.0];
+/// let arm = dynamics.link_pose(0).rotation * Vec3::new(0.0, 0.0, -0.5);
+/// dynamics.point_response(0, &arm, &[Vec3::x()], 1.0, &mut y);
+/// assert!((y[0] * y[0] - f64::cos(0.3).powi(2) / 2.0).abs() < 1e-12);
+/// # Ok::<(), tumble_core::ModelError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     pub(super) compiled: Compiled,
