@@ -9,7 +9,9 @@
 //! ```
 //!
 //! Where the thesis halves, the time of contact is bracketed: the first guess is where the parabola of each nearing contact closes, then false
-//! position with bisection as its guard. The rules that make a frame end:
+//! position with bisection as its guard. With `dormand_prince` a sub-step is integrated once and the tries are read from its dense output; the
+//! state that is committed is then integrated to the moment found. Limits that tell their gaps ([`Constraint::gaps`](crate::Constraint::gaps))
+//! are located like contacts. The rules that make a frame end:
 //!
 //! - a contact that *lasts* (its pair carried a resting force in the sub-step before) may drift by the drift tolerance; it is projected out
 //!   afterwards and never makes the step go back; depth that was there before is no reason either;

@@ -47,7 +47,7 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     let mut rows = Workspace::default();
     lay_rows(core, &mut rows, level, None)?;
     let errors: Vec<f64> = rows.targets.iter().map(|t| t.error).collect();
-    let (start, time) = (core.x.clone(), core.time);
+    let (start, time, pinned) = (core.x.clone(), core.time, core.unpin());
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
@@ -55,6 +55,7 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
     core.time = time;
     core.x = start;
+    core.pin_again(pinned);
     core.motion().refresh();
     map_sides(core, &mut rows, |body, j, y| body.respond(j, y));
     outcome.map(|_| (errors, rows))
@@ -155,6 +156,13 @@ struct Open {
 impl Open {
     /// Sites and caches are left at the present, whose rows come in `probe`. Nothing is open where they are not those of `work`.
     fn measure(core: &mut Core, work: &Workspace, probe: &mut Workspace, step: (f64, Level), kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
+        let pinned = core.unpin();
+        let open = Open::measure_here(core, work, probe, step, kept, pushed);
+        core.pin_again(pinned);
+        open
+    }
+
+    fn measure_here(core: &mut Core, work: &Workspace, probe: &mut Workspace, step: (f64, Level), kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
         core.motion().refresh();
         let time = core.time;
         core.time += step.0;
@@ -206,20 +214,6 @@ impl Open {
         displace(core, &dx, 1.0);
         push(core, &dv);
     }
-}
-
-/// What the joints' impulses of the step do to whitened velocities, where no contact pushes.
-pub(super) fn impulses(work: &mut Workspace) -> Vec<f64> {
-    let mut du = vec![0.0; work.rows.dof];
-    if work.targets.iter().any(is_joint) {
-        let pushed = pushed(work);
-        for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
-            if is_joint(target) && !block.sides().iter().any(|s| pushed[s.u as usize]) {
-                work.rows.apply_block(block, &work.lambda, &mut du);
-            }
-        }
-    }
-    du
 }
 
 /// Which coordinates belong to objects of an island in which a contact pushes: the joint answer of all its rows counts more there than what the

@@ -180,8 +180,13 @@ fn lay_touches(core: &Core, work: &mut Workspace) {
         builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
         let axes = &touch.frame.axes[..set.rows()];
         for (site, point, sign) in [(touch.a, touch.contact.point, 1.0), (touch.b, touch.point_b(), -1.0)] {
-            let owner = core.owners[site as usize];
-            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
+            let (owner, index) = (core.owners[site as usize], site as usize);
+            let entry = &core.table.slots[owner.id];
+            let pinned = core.pinned_sites().filter(|_| entry.object.integratable().is_some_and(|b| b.holds_velocity()));
+            // the arm stays as it was found: the lowest point of a ball that spins does not turn with it
+            let point = pinned.map_or(point, |sites| point + sites[index].position() - core.sites[index].position());
+            builder.sites = pinned.unwrap_or(&core.sites);
+            builder.point_side(entry, owner.part as usize, &point, axes, sign);
         }
     }
 }
@@ -240,7 +245,8 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
     zero(du, core.dof);
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
-        body.whiten(&core.x[entry.span.x.clone()], &mut u[v.clone()]);
+        let x = if body.holds_velocity() { core.pinned().unwrap_or(&core.x) } else { &core.x };
+        body.whiten(&x[entry.span.x.clone()], &mut u[v.clone()]);
         body.whiten_rate(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
@@ -254,6 +260,18 @@ pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
         let mut turning = vec![0.0; v.len()];
         body.gyroscopic(&core.x[entry.span.x.clone()], &mut turning);
         body.whiten_rate(&turning, &mut out[v]);
+    }
+    out
+}
+
+/// Whitened acceleration of free motion, of objects whose state holds velocities and is pinned at the middle of the step: half a step of it is to come.
+pub(crate) fn coasting(core: &Core) -> Vec<f64> {
+    let mut out = vec![0.0; core.dof];
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let (Some(body), Some(middle)) = (entry.object.integratable().filter(|b| b.holds_velocity()), core.pinned()) else { continue };
+        let mut rate = vec![0.0; entry.span.v.len()];
+        body.coasting_rate(&middle[entry.span.x.clone()], &mut rate);
+        body.whiten_rate(&rate, &mut out[entry.span.v.clone()]);
     }
     out
 }
@@ -285,14 +303,27 @@ pub(crate) fn push(core: &mut Core, du: &[f64]) -> Vec<f64> {
     dp
 }
 
-/// Moves positions by `h·L⁻¹u`.
+/// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy: where the state holds velocities and the mass matrix changes with the pose,
+/// they are scaled to have the energy that they had.
 pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
-        if v.iter().any(|x| *x != 0.0) {
-            let mut velocity = vec![0.0; v.len()];
-            body.unwhiten(v, &mut velocity);
-            body.drift(&mut core.x[entry.span.x.clone()], &velocity, h);
+        if v.iter().all(|x| *x == 0.0) {
+            continue;
+        }
+        let (x, mut velocity) = (&mut core.x[entry.span.x.clone()], vec![0.0; v.len()]);
+        body.unwhiten(v, &mut velocity);
+        if !body.holds_velocity() {
+            body.drift(x, &velocity, h);
+            continue;
+        }
+        let before = body.energy(x, &Vec3::zeros()).kinetic;
+        body.drift(x, &velocity, h);
+        let scale = (before / body.energy(x, &Vec3::zeros()).kinetic).sqrt();
+        if scale.is_finite() {
+            body.velocity(x, &mut velocity);
+            velocity.iter_mut().for_each(|v| *v *= scale);
+            body.write_velocity(x, &velocity);
         }
     }
 }

@@ -55,7 +55,8 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
     // a motor has no place to hold, and a spring may be anywhere
     let rigid = |t: &RowTarget| t.compliance == 0.0 && !matches!(t.set, RowSet::Interval { .. });
     work.islands.build(&work.rows, |b| b < touches || rigid(&targets[b - touches]));
-    let closed_later = |&b: &u32| !in_place && (b as usize) >= touches && closing::is_joint(&targets[b as usize - touches]);
+    let waits = |t: &RowTarget| closing::is_joint(t) && t.velocity == 0.0;
+    let closed_later = |&b: &u32| !in_place && (b as usize) >= touches && waits(&targets[b as usize - touches]);
     for blocks in work.islands.iter() {
         if blocks.iter().all(closed_later) {
             continue;

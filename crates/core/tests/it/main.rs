@@ -16,6 +16,7 @@ mod closures;
 mod closures_articulated;
 mod closures_joints;
 mod common;
+mod limits;
 mod meshes;
 mod paradox;
 mod regressions;

@@ -3,5 +3,6 @@
 mod bad_input;
 mod expansion;
 mod finding;
+mod pinocchio;
 mod robust;
 mod shipped;
