@@ -21,6 +21,7 @@
 //!   counted as floor hits.
 
 use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten};
+use super::hold::{self, Held};
 use super::impact::{self, Candidate};
 use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection};
@@ -40,6 +41,9 @@ pub struct Backtracking {
     after: Vec<Touch>,
     limits_after: Vec<Limit>,
     watch: Watch,
+    /// Limits that push in this sub-step, and where their rows at its end are made.
+    held: Vec<Held>,
+    probe: Workspace,
     adaptive: Adaptive,
     /// Error of every constraint row that is not to be taken back in this sub-step.
     kept: Vec<f64>,
@@ -184,6 +188,7 @@ impl Backtracking {
         let s = core.settings.accuracy;
         let accuracy = Accuracy { sweeps: s.sweeps.max(2000), relaxations: s.relaxations.max(1_000_000), tolerance: s.tolerance / left };
         let ray = solve(core, work, accuracy, left, |b| keep[b]);
+        self.held = hold::pushing(work);
         let mut held = vec![0.0; core.dof];
         if ray {
             // no force at the acceleration level keeps the contacts: an impulse without collision does
@@ -245,6 +250,7 @@ impl Backtracking {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
                 core.held.fill(0.0);
+                hold::hold(core, &mut self.probe, &self.held, h)?;
                 closing::refresh_at(core, &start);
                 closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;

@@ -252,6 +252,21 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
     }
 }
 
+/// What `h` seconds of coasting add to the whitened velocity of objects whose state holds velocities, from where they are pinned. Rows of joints
+/// are to hold at the end of the step, and aim ahead by it; a contact's point does not go with the part as it turns, and does not.
+pub(crate) fn coasting(core: &Core, h: f64) -> Vec<f64> {
+    let mut out = vec![0.0; core.dof];
+    let Some(middle) = core.pinned() else { return out };
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+        let (v, mut rate) = (entry.span.v.clone(), vec![0.0; entry.span.v.len()]);
+        body.coasting_rate(&middle[entry.span.x.clone()], &mut rate);
+        rate.iter_mut().for_each(|r| *r *= h);
+        body.whiten_rate(&rate, &mut out[v]);
+    }
+    out
+}
+
 /// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
 pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
     let mut out = vec![0.0; core.dof];
@@ -260,18 +275,6 @@ pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
         let mut turning = vec![0.0; v.len()];
         body.gyroscopic(&core.x[entry.span.x.clone()], &mut turning);
         body.whiten_rate(&turning, &mut out[v]);
-    }
-    out
-}
-
-/// Whitened acceleration of free motion, of objects whose state holds velocities and is pinned at the middle of the step: half a step of it is to come.
-pub(crate) fn coasting(core: &Core) -> Vec<f64> {
-    let mut out = vec![0.0; core.dof];
-    for entry in core.table.iter().filter(|e| e.moves()) {
-        let (Some(body), Some(middle)) = (entry.object.integratable().filter(|b| b.holds_velocity()), core.pinned()) else { continue };
-        let mut rate = vec![0.0; entry.span.v.len()];
-        body.coasting_rate(&middle[entry.span.x.clone()], &mut rate);
-        body.whiten_rate(&rate, &mut out[entry.span.v.clone()]);
     }
     out
 }

@@ -200,13 +200,9 @@ impl TimeStepping {
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / h };
         }
-        let turning = if work.targets.is_empty() { Vec::new() } else { gyroscopic(core) };
-        let coasting = if work.targets.iter().any(closing::is_joint) { coasting(core) } else { Vec::new() };
+        let (turning, coasting) = if work.targets.is_empty() { Default::default() } else { (gyroscopic(core), coasting(core, 0.5 * h)) };
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
-            work.c[block.row as usize] -= h * work.rows.row_velocity(block, 0, &turning);
-            if closing::is_joint(target) {
-                work.c[block.row as usize] += 0.5 * h * work.rows.row_velocity(block, 0, &coasting);
-            }
+            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &coasting) - h * work.rows.row_velocity(block, 0, &turning);
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };

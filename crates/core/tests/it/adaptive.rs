@@ -137,6 +137,34 @@ fn it_is_of_fifth_order_on_a_free_and_on_a_driven_body() {
     }
 }
 
+/// Two links on ball joints, the first of them on a floating base: every kind of joint that turns in space.
+fn tangle(dt: f64, integrator: Integrator) -> Vec<f64> {
+    let mut world = world("backtracking", dt);
+    set(&mut world, |s| (s.integrator, s.integrator_tolerance) = (integrator, 0.1));
+    let mass = |i: [f64; 3]| LinkMass { mass: 1.0, center: Vec3::new(0.05, 0.1, -0.2), inertia: Mat3::from_diagonal(&(0.02 * Vec3::from(i))) };
+    let mut builder = ModelBuilder::new();
+    let base = builder.link("base", None, Joint::Floating, Pose::identity(), mass([1.0, 2.0, 3.0 - 0.1]));
+    let arm = builder.link("arm", Some(base), Joint::Spherical, Pose::translation(0.1, 0.0, -0.4), mass([2.0, 1.5, 1.0]));
+    builder.link("hand", Some(arm), Joint::Spherical, Pose::translation(0.0, 0.2, -0.3), mass([1.0, 1.0, 0.5]));
+    let spins = [0.5, 1.0, -0.7, 0.1, 0.2, 0.3, -2.0, 0.4, 1.0, 1.5, -1.0, 2.0];
+    let id = world.add(ArticulatedBody::new("tangle", builder.build().unwrap()).with_velocities(&spins).unwrap()).unwrap();
+    for _ in 0..(1.0 / dt).round() as usize {
+        let report = world.step().unwrap();
+        assert!(report.inner_steps <= 1 && report.tries == 1);
+    }
+    world.state_of(id).unwrap().to_vec()
+}
+
+#[test]
+fn it_is_of_fifth_order_on_ball_joints_and_floating_bases() {
+    let exact = tangle(1.0 / 4096.0, Integrator::Rk4);
+    let error = |dt: f64| tangle(dt, Integrator::DormandPrince).iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let (coarse, middle, fine) = (error(1.0 / 32.0), error(1.0 / 64.0), error(1.0 / 128.0));
+    let orders = ((coarse / middle).log2(), (middle / fine).log2());
+    println!("{coarse:e} {middle:e} {fine:e}: {orders:?}");
+    assert!((orders.1 - 5.0).abs() < 0.4, "orders {orders:?}: {coarse:e} {middle:e} {fine:e}");
+}
+
 /// Angular momentum is held by the state itself; energy, as the tolerance asks.
 #[test]
 fn it_keeps_angular_momentum_and_energy_of_the_free_body() {

@@ -208,3 +208,34 @@ fn a_gap_that_is_no_number_is_an_error() {
     let (mut world, _) = with(Integrator::Verlet, Pendulum { angle: 0.0, rate: 0.0, pull: 0.0, stops: [f64::NEG_INFINITY, 1.0], located: true });
     assert!(matches!(world.step().unwrap_err(), StepError::Row { object, .. } if object == "pendulum"));
 }
+
+/// A double pendulum whose first joint falls on a stop and is kept there by its weight, while the second swings on as a pendulum of its own from
+/// there: the first stays on the stop, and the energy is that of the stroke's end.
+#[test]
+fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
+    for integrator in BOTH {
+        let mut world = world("backtracking", 1.0 / 240.0);
+        world.set_settings(Settings { integrator, ..*world.settings() }).unwrap();
+        let mut body = ArticulatedBody::new("chain", crate::articulated_world::chain(2, 1.0, 0.2)).with_positions(&[0.8, -0.3]).unwrap();
+        body.set_freedom(0, Freedom { limits: Some([0.6, 2.0]), ..Freedom::default() }).unwrap();
+        let id = world.add(body).unwrap();
+        let (mut arrived, mut swing, mut off, mut drift, mut tries) = (None, [f64::MAX, f64::MIN], 0.0f64, 0.0f64, 0);
+        for frame in 0..1200 {
+            let report = *world.step().unwrap();
+            let (x, energy) = (world.state_of(id).unwrap(), world.energy().total());
+            let gap = x[0] - 0.6;
+            assert!(gap > -1e-6, "{integrator:?}: frame {frame}: {:e} rad beyond the stop", -gap);
+            let Some((_, start)) = arrived else {
+                arrived = (gap < 1e-6).then_some((frame, energy));
+                continue;
+            };
+            (off, tries) = (off.max(gap.abs()), tries.max(report.tries));
+            drift = drift.max((energy - start).abs());
+            swing = [swing[0].min(x[1]), swing[1].max(x[1])];
+        }
+        println!("{integrator:?}: arrived {arrived:?}, off {off:e}, swing {swing:?}, drift {drift:e}, {tries} tries");
+        // 0.28 J go to and fro in the swing
+        assert!(arrived.is_some() && swing[1] - swing[0] > 1.0, "{integrator:?}: {arrived:?}, {swing:?}");
+        assert!(off < 1e-9 && drift < 2e-4 && tries == 1, "{integrator:?}: {off:e} rad off the stop, energy off by {drift:e} J, {tries} tries");
+    }
+}
