@@ -40,7 +40,7 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
         match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
             (Some(touch), _) => -(allowed(touch.contact.gap, recovery) + h * v),
             (None, Some(t)) if t.compliance > 0.0 => 0.0,
-            (None, Some(t)) if t.set == RowSet::Equality => if hold { (t.error.clamp(-recovery, recovery) + h * v).abs() } else { 0.0 },
+            (None, Some(t)) if t.set == RowSet::Equality && hold => (t.error.clamp(-recovery, recovery) + h * v).abs(),
             (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
             _ => 0.0,
         }

@@ -216,6 +216,24 @@ fn a_wheel_that_is_led_drives_the_piston_as_asked() {
 }
 
 #[test]
+fn joints_that_cannot_close_do_not_open_others() {
+    // a box welded to two places 10 mm apart, beside the linkage
+    for stepper in STEPPERS {
+        let mut linkage = FourBar::new(stepper, 1.0 / RATE);
+        let stuck = linkage.world.add(bar("stuck", Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.2, 1.0, 0.0))).unwrap();
+        for (i, place) in [Vec3::new(0.1, 1.0, 0.0), Vec3::new(0.11, 1.0, 0.0)].into_iter().enumerate() {
+            let sides = (Anchor::on(stuck, 0, Pose::identity()), Anchor::world(Pose::from(place)));
+            linkage.world.add(Closure::new(format!("weld {i}"), ClosureKind::Weld, sides.0, sides.1).unwrap()).unwrap();
+        }
+        let worst = run(&mut linkage, 5.0);
+        println!("{stepper}, beside a box welded to two places: {worst:?}");
+        assert!(worst.gap < 3e-9 && worst.off < 1e-6, "{stepper}: {worst:?}");
+        let stuck = (position(&linkage.world, stuck) - Vec3::new(0.105, 1.0, 0.0)).norm();
+        assert!(stuck < 6e-3, "{stepper}: the box is {stuck} m from between the two places");
+    }
+}
+
+#[test]
 fn a_linkage_restored_from_a_snapshot_goes_on_with_the_same_bits() {
     for stepper in STEPPERS {
         let mut first = FourBar::new(stepper, 1.0 / RATE).world;
