@@ -216,6 +216,35 @@ fn a_wheel_that_is_led_drives_the_piston_as_asked() {
 }
 
 #[test]
+fn a_linkage_that_strikes_the_ground_stays_closed_and_out_of_it() {
+    for stepper in STEPPERS {
+        for (restitution, friction) in [(0.0, 0.5), (0.5, 0.0)] {
+            let mut linkage = FourBar::new(stepper, 1.0 / RATE);
+            for id in linkage.bars {
+                // bars overlap at their pins: they meet the ground alone
+                let body: &mut RigidBody = linkage.world.get_mut(id).unwrap();
+                (body.kind, body.meets) = (CollisionKind::new(1).unwrap(), CollisionKind::default().bit());
+                (body.material.restitution, body.material.friction) = (restitution, friction);
+            }
+            let floor = RigidBody::fixture("floor", Shape::half_space()).surface(restitution, friction).at(Pose::translation(0.0, 0.0, -0.12));
+            linkage.world.add_static(floor).unwrap();
+            let (mut gap, mut deep, mut energy, mut touched) = (0.0f64, 0.0f64, f64::MIN, 0);
+            for _ in 0..(10.0 * RATE) as usize {
+                deep = deep.max(linkage.world.step().unwrap().max_penetration);
+                gap = gap.max(linkage.gap());
+                energy = energy.max(linkage.world.energy().total() - linkage.start);
+                touched += linkage.world.contacts().iter().any(|c| c.impulse.norm() > 0.0) as u32;
+            }
+            println!("{stepper}, e = {restitution}, μ = {friction}: gap {gap:.1e} m, {deep:.1e} m deep, energy gained {energy:.1e} J, {touched} frames on the ground");
+            assert!(touched > 5, "{stepper}: it reaches the ground");
+            assert!(gap < 1e-6, "{stepper}: pins are {gap:e} m apart");
+            assert!(deep < 1e-4, "{stepper}: {deep:e} m deep");
+            assert!(energy < 1e-2, "{stepper}: {energy:e} J gained");
+        }
+    }
+}
+
+#[test]
 fn joints_that_cannot_close_do_not_open_others() {
     // a box welded to two places 10 mm apart, beside the linkage
     for stepper in STEPPERS {
