@@ -26,7 +26,7 @@ use crate::world::{Core, StepError};
 use std::ops::Range;
 
 /// Rounds at most.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 16;
 /// Rounds where some joints are too many for a direct solve, so that a long rope costs what its sweeps cost.
 const FEW_ROUNDS: usize = 2;
 /// Sweeps of a round there.
@@ -34,7 +34,7 @@ const SWEEPS: u32 = 25;
 /// No velocity is closed further than this, m/s, whatever the solver's tolerance.
 const FINEST: f64 = 1e-12;
 /// A round that leaves more of the error than this is the last of its kind.
-const SLOW: f64 = 0.5;
+const SLOW: f64 = 0.2;
 /// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
 /// responds with the square of it, far less, and is left alone; as the error goes so does the compliance (Levenberg and Marquardt).
 const SOFT: (f64, f64) = (10.0, 1e-3);
@@ -140,7 +140,13 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
         let mut worse = false;
         for piece in pieces.iter_mut().filter(|p| !p.done) {
             let (left, was) = (open.of(piece), piece.left);
-            // place first: with it rows change, and so do velocities along them
+            piece.rounds -= 1;
+            if was.0 > 1.0 && left.1 > was.1.max(1.0) && !piece.place_first {
+                // with the place rows change, and velocities along them: one after the other
+                piece.copy(&before, &mut core.x);
+                (worse, piece.place_first) = (true, true);
+                continue;
+            }
             let share = if was.0 > 1.0 { left.0 / was.0 } else { left.1 / was.1 };
             if share < 1.0 {
                 piece.left = left;
@@ -149,7 +155,6 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
                 (worse, piece.done) = (true, !piece.chord);
             }
             piece.chord &= share < SLOW;
-            piece.rounds -= 1;
         }
         if worse {
             open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
@@ -170,7 +175,10 @@ struct Piece {
     left: (f64, f64),
     /// Rounds that may still be taken.
     rounds: usize,
+    /// Whether by the rows of the step.
     chord: bool,
+    /// Whether velocities wait until the place is closed.
+    place_first: bool,
     done: bool,
 }
 
@@ -186,7 +194,7 @@ impl Piece {
             let stretches = starts.iter().filter_map(|u| entry_at(&entries, *u)).map(|e| e.span.x.clone()).collect();
             let rounds = if blocks.len() > DIRECT_ROWS { FEW_ROUNDS } else { ROUNDS };
             let rows = blocks.iter().map(|b| b - touches as u32).collect();
-            Piece { blocks: blocks.to_vec(), rows, stretches, left: (f64::INFINITY, f64::INFINITY), rounds, chord: true, done: false }
+            Piece { blocks: blocks.to_vec(), rows, stretches, left: (f64::INFINITY, f64::INFINITY), rounds, chord: true, place_first: false, done: false }
         };
         work.islands.iter().map(piece).collect()
     }
@@ -194,6 +202,11 @@ impl Piece {
     /// Takes its objects' state over.
     fn copy(&self, from: &[f64], to: &mut [f64]) {
         self.stretches.iter().for_each(|s| to[s.clone()].copy_from_slice(&from[s.clone()]));
+    }
+
+    /// Whether only its place is closed in this round.
+    fn moves_first(&self) -> bool {
+        self.place_first && self.left.0 > 1.0
     }
 
     /// The largest of its rows' numbers.
@@ -252,7 +265,7 @@ impl Open {
     /// A round with the rows of the step, in the caches that they were built with.
     fn chord(&self, core: &mut Core, work: &Workspace, pieces: &[Piece]) {
         let touches = work.touches.len();
-        self.apply(core, &work.rows, touches, pieces.iter().filter(|p| !p.done && p.chord).map(|p| &p.blocks));
+        self.apply(core, &work.rows, touches, pieces.iter().filter(|p| !p.done && p.chord).map(|p| (&p.blocks[..], p.moves_first())));
     }
 
     /// A round with the rows of the present, where those of the step have got too little done.
@@ -260,18 +273,18 @@ impl Open {
         for piece in pieces.iter().filter(|p| !p.done && !p.chord) {
             soften(&mut probe.rows, &piece.rows, piece.largest(&self.place));
         }
-        self.apply(core, &probe.rows, 0, pieces.iter().filter(|p| !p.done && !p.chord).map(|p| &p.rows));
+        self.apply(core, &probe.rows, 0, pieces.iter().filter(|p| !p.done && !p.chord).map(|p| (&p.rows[..], p.moves_first())));
     }
 
-    fn apply<'p>(&self, core: &mut Core, rows: &Rows, touches: usize, pieces: impl Iterator<Item = &'p Vec<u32>>) {
+    fn apply<'p>(&self, core: &mut Core, rows: &Rows, touches: usize, pieces: impl Iterator<Item = (&'p [u32], bool)>) {
         let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
         let mut c = [vec![0.0; rows.len], vec![0.0; rows.len]];
         for (i, block) in rows.blocks[touches..].iter().enumerate() {
             (c[0][block.row as usize], c[1][block.row as usize]) = (self.place[i], self.speed[i]);
         }
-        for blocks in pieces {
-            for (c, du, least) in [(&c[0], &mut dx, self.least.0), (&c[1], &mut dv, self.least.1)] {
-                if blocks.iter().any(|&b| c[rows.blocks[b as usize].row as usize].abs() > least) {
+        for (blocks, moves_first) in pieces {
+            for (c, du, least, wanted) in [(&c[0], &mut dx, self.least.0, true), (&c[1], &mut dv, self.least.1, !moves_first)] {
+                if wanted && blocks.iter().any(|&b| c[rows.blocks[b as usize].row as usize].abs() > least) {
                     solve(rows, blocks, c, du, 0.1 * least);
                 }
             }

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! `v̄` is the displacement velocity of the step, less what led bodies and motors are meant to move (0 for a projection in place, with
-//! `h = 1`). What was wrong before is recovered at a bounded speed.
+//! `h = 1`). What was wrong before is recovered at a bounded speed. Where nothing but joints moves an island, `closing.rs` does it at the end of the step.
 
 use super::closing;
 use super::contacts::{Workspace, displace};
