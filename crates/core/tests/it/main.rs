@@ -17,6 +17,7 @@ mod chains;
 mod closures;
 mod closures_articulated;
 mod closures_joints;
+mod closures_spatial;
 mod common;
 mod free;
 mod friction;
