@@ -67,8 +67,15 @@ impl Contact {
         Contact { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho, coupled }
     }
 
+    /// Whether a contact without multipliers stays so at normal velocity `w_n`, whatever the tangents do: where `μ·|k_nt| ≤ k_nn/2`, sticking would
+    /// need `w_n ≤ −λ_n·k_nn/2`.
+    #[inline(always)]
+    pub fn stays_open(&self, old: [f64; 3], normal: f64) -> bool {
+        normal >= 0.0 && !self.coupled && old == [0.0; 3]
+    }
+
     /// The multipliers that answer row velocities `w` found with multipliers `old`: `b = w − K·old`.
-    #[inline]
+    #[inline(always)]
     pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         if let Some(inverse) = &self.inverse {
             let step = inverse.times(w);
@@ -146,7 +153,7 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
 }
 
 impl Symmetric {
-    #[inline]
+    #[inline(always)]
     pub fn times(&self, v: [f64; 3]) -> [f64; 3] {
         [
             self.m00 * v[0] + self.m10 * v[1] + self.m20 * v[2],
