@@ -18,7 +18,7 @@
 //! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. High mass ratios stay slow; the residual says how far.
 
 use super::linkage::{Linkages, Reach};
-use super::one_contact::Contact;
+use super::one_contact::{Contact, Symmetric};
 use super::six::Six;
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{Block, RowSet, Rows};
@@ -50,7 +50,7 @@ impl RowSolver for GaussSeidel {
         for sweep in 1..=sweeps {
             let mut progress = Progress::default();
             for local in &mut locals {
-                local.relax(rows, &linkages, du, &mut progress);
+                local.relax(momentum.beta, rows, &linkages, du, &mut progress);
             }
             if progress.change <= accuracy.tolerance {
                 outcome = Outcome { iterations: sweep, converged: true, ray: false };
@@ -58,10 +58,10 @@ impl RowSolver for GaussSeidel {
             }
             if sweep < sweeps {
                 let plain = sweep > ACCELERATED || sweep + SETTLE >= sweeps;
-                momentum.extrapolate(&mut locals, progress.against > 0.0 || plain, du);
+                momentum.extrapolate(progress.against > 0.0 || plain, du);
             }
             if sweep % RENEW == 0 {
-                momentum.renew(&mut locals, &linkages, rows, c, lambda, du);
+                momentum.renew(&locals, &linkages, rows, c, lambda, du);
             }
         }
         write_back(&locals, lambda);
@@ -129,9 +129,11 @@ impl Progress {
     }
 }
 
-/// The extrapolation between sweeps, over the multipliers of the island and the stretches of `du` that they act on.
+/// The extrapolation between sweeps, over the stretches of `du` that the island acts on. Multipliers follow when it is their turn to be relaxed.
 struct Momentum {
     theta: f64,
+    /// `β` of the sweep to come.
+    beta: f64,
     /// First index and end of each stretch of `du`, one after the other; neighbours are joined.
     stretches: Vec<(u32, u32)>,
     /// `du` of the sweep before, of all stretches.
@@ -157,18 +159,14 @@ impl Momentum {
             joins
         });
         let last = stretches.iter().flat_map(|&(start, end)| &du[start as usize..end as usize]).copied().collect();
-        Momentum { theta: 1.0, stretches, last }
+        Momentum { theta: 1.0, beta: 0.0, stretches, last }
     }
 
-    fn extrapolate(&mut self, locals: &mut [Local], restart: bool, du: &mut [f64]) {
+    fn extrapolate(&mut self, restart: bool, du: &mut [f64]) {
         let next = 0.5 * (1.0 + (1.0 + 4.0 * self.theta * self.theta).sqrt());
-        let beta = if restart { 0.0 } else { (self.theta - 1.0) / next };
+        self.beta = if restart { 0.0 } else { (self.theta - 1.0) / next };
         self.theta = if restart { 1.0 } else { next };
-        for local in locals {
-            for (lambda, last) in local.lambda.iter_mut().zip(&mut local.last) {
-                go_on(lambda, last, beta);
-            }
-        }
+        let beta = self.beta;
         let mut rest = &mut self.last[..];
         for &(start, end) in &self.stretches {
             let (last, after) = rest.split_at_mut((end - start) as usize);
@@ -177,11 +175,11 @@ impl Momentum {
         }
     }
 
-    /// Makes `du` anew, and starts from rest.
-    fn renew(&mut self, locals: &mut [Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) {
+    /// Makes `du` anew from the multipliers, which are not extrapolated yet, and starts from rest.
+    fn renew(&mut self, locals: &[Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) {
         self.clear(du);
         apply(locals, linkages, rows, c, lambda, du);
-        self.extrapolate(locals, true, du);
+        self.extrapolate(true, du);
     }
 
     /// Zeroes `du` wherever the island acts.
@@ -217,17 +215,22 @@ struct Scalar {
 
 impl Step {
     fn new(rows: &Rows, linkages: &Linkages, block: &Block, reach: Reach) -> Step {
-        let diagonal = linkages.own(rows, block, reach, 0, 0);
-        let (compliance, k) = (block.compliance, diagonal + block.compliance);
-        let scalar = |lo, hi| Step::Scalar(Scalar { k, inverse: 1.0 / k, compliance, lo, hi });
-        match block.set {
-            _ if k <= f64::MIN_POSITIVE || rows.own(block, 0, 0) <= f64::MIN_POSITIVE => Step::Dead,
-            RowSet::Equality => scalar(f64::NEG_INFINITY, f64::INFINITY),
-            RowSet::HalfLine => scalar(0.0, f64::INFINITY),
-            RowSet::Interval { lo, hi } => scalar(lo, hi),
-            RowSet::Cone { mu } if reach.is_own() => Step::Contact(Contact::new(rows, block, mu)),
-            RowSet::Cone { mu } => Step::Contact(Contact::with_own(linkages.own_contact(rows, block, reach), mu)),
+        let (lo, hi) = match block.set {
+            RowSet::Cone { mu } => {
+                let k = if reach.is_own() { Symmetric::own(rows, block) } else { linkages.own_contact(rows, block, reach) };
+                return if k.m00 <= f64::MIN_POSITIVE { Step::Dead } else { Step::Contact(Contact::new(k, mu)) };
+            }
+            RowSet::Equality => (f64::NEG_INFINITY, f64::INFINITY),
+            RowSet::HalfLine => (0.0, f64::INFINITY),
+            RowSet::Interval { lo, hi } => (lo, hi),
+        };
+        let response = rows.own(block, 0, 0);
+        let moves = if reach.is_own() { response } else { linkages.own(rows, block, reach, 0, 0) };
+        let k = moves + block.compliance;
+        if response <= f64::MIN_POSITIVE || k <= f64::MIN_POSITIVE {
+            return Step::Dead;
         }
+        Step::Scalar(Scalar { k, inverse: 1.0 / k, compliance: block.compliance, lo, hi })
     }
 }
 
@@ -245,12 +248,13 @@ impl<'a> Local<'a> {
         Local { block, c: numbers(c), lambda: start, last: start, step, reach, six }
     }
 
-    /// Solves this block with the others held.
+    /// Extrapolates the multipliers of this block and solves it with the others held.
     #[inline(always)]
-    fn relax(&mut self, rows: &Rows, linkages: &Linkages, du: &mut [f64], progress: &mut Progress) {
+    fn relax(&mut self, beta: f64, rows: &Rows, linkages: &Linkages, du: &mut [f64], progress: &mut Progress) {
         match &self.step {
             Step::Dead => {}
             Step::Scalar(scalar) => {
+                go_on(&mut self.lambda[0], &mut self.last[0], beta);
                 let velocity = match self.six.and_then(|six| six.sides::<1>(rows, du)) {
                     Some(sides) => sides.velocity(0),
                     None => rows.row_velocity(self.block, 0, du),
@@ -268,6 +272,7 @@ impl<'a> Local<'a> {
                 }
             }
             Step::Contact(contact) => {
+                (0..3).for_each(|k| go_on(&mut self.lambda[k], &mut self.last[k], beta));
                 let w = match self.six.and_then(|six| six.sides::<3>(rows, du)) {
                     Some(sides) => {
                         let normal = self.c[0] + sides.velocity(0);

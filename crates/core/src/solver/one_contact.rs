@@ -11,7 +11,7 @@
 //! ground) that step diverges, and sliding is solved exactly: the direction is the root of `g(φ) = d × w_t` with `d·w_t > 0`, found by
 //! Newton's method on the angle `φ` of `d`. Both have the Coulomb solutions as their fixed points.
 
-use crate::rows::{Block, Rows, dot};
+use crate::rows::{Block, Rows, dot, dot6};
 
 /// Share of `k_nn` from which `μ·|k_nt|` makes the plain step too bold.
 const COUPLED: f64 = 0.5;
@@ -43,22 +43,8 @@ pub(super) struct Symmetric {
 }
 
 impl Contact {
-    pub fn new(rows: &Rows, block: &Block, mu: f64) -> Contact {
-        let mut k = Symmetric::default();
-        for side in block.sides() {
-            let [n, t1, t2] = [0, 1, 2].map(|r| rows.response(side, r));
-            k.m00 += dot(n, n);
-            k.m10 += dot(t1, n);
-            k.m20 += dot(t2, n);
-            k.m11 += dot(t1, t1);
-            k.m21 += dot(t2, t1);
-            k.m22 += dot(t2, t2);
-        }
-        Contact::with_own(k, mu)
-    }
-
     /// The contact whose own block of `K` is `k`.
-    pub fn with_own(k: Symmetric, mu: f64) -> Contact {
+    pub fn new(k: Symmetric, mu: f64) -> Contact {
         let mean = 0.5 * (k.m11 + k.m22);
         let half = 0.5 * (k.m11 - k.m22);
         let largest = mean + (half * half + k.m21 * k.m21).sqrt();
@@ -153,6 +139,30 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
 }
 
 impl Symmetric {
+    /// The own block of `K` of a block of three rows.
+    pub fn own(rows: &Rows, block: &Block) -> Symmetric {
+        let mut k = Symmetric::default();
+        for side in block.sides() {
+            let dof = side.dof as usize;
+            let y = &rows.y[side.y as usize..][..3 * dof];
+            match y.as_chunks::<6>().0 {
+                [n, t1, t2] if dof == 6 => k.add([n, t1, t2], dot6),
+                _ => k.add([&y[..dof], &y[dof..2 * dof], &y[2 * dof..]], dot),
+            }
+        }
+        k
+    }
+
+    #[inline(always)]
+    fn add<Y: Copy>(&mut self, [n, t1, t2]: [Y; 3], dot: impl Fn(Y, Y) -> f64) {
+        self.m00 += dot(n, n);
+        self.m10 += dot(t1, n);
+        self.m20 += dot(t2, n);
+        self.m11 += dot(t1, t1);
+        self.m21 += dot(t2, t1);
+        self.m22 += dot(t2, t2);
+    }
+
     #[inline(always)]
     pub fn times(&self, v: [f64; 3]) -> [f64; 3] {
         [
