@@ -86,8 +86,8 @@ impl ContactFrame {
 pub trait Collidable {
     /// Number of parts; each has a row in the site table.
     fn parts(&self) -> usize;
-    /// Shape of a part, in the part's frame.
-    fn shape(&self, part: usize) -> &Shape;
+    /// Shape of a part, in the part's frame; `None` for a part that meets nothing, and is there to be pushed at, joined or drawn.
+    fn shape(&self, part: usize) -> Option<&Shape>;
     /// Surface of a part.
     fn material(&self, part: usize) -> Material;
     /// Kind of a part.
@@ -95,7 +95,8 @@ pub trait Collidable {
     /// Whether a part meets parts of that kind. Two parts meet when both say so.
     fn collides_with(&self, part: usize, other: CollisionKind) -> bool;
     /// Whether two parts of this same object meet.
-    fn collides_with_itself(&self) -> bool {
+    fn parts_meet(&self, part_a: usize, part_b: usize) -> bool {
+        let _ = (part_a, part_b);
         false
     }
     /// "What would unit impulses along these axes at this point do?" (thesis `ApplyTestImpulse`). Adds `sign · L⁻ᵀJᵀ` to `y`: one

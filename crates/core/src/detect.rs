@@ -137,7 +137,8 @@ impl Detector<'_> {
         for entry in self.table.iter().filter(|e| e.status.alive && e.status.collidable) {
             let Some(collidable) = entry.object.collidable() else { continue };
             for (part, index) in entry.span.site.clone().enumerate() {
-                let (shape, site) = (collidable.shape(part), &self.sites[index]);
+                let Some(shape) = collidable.shape(part) else { continue };
+                let site = &self.sites[index];
                 let bound = shape.bounding_radius();
                 let turning = if bound.is_finite() { site.angular_velocity.norm() * bound } else { 0.0 };
                 let gain = horizon * horizon * site.acceleration.norm();
@@ -160,15 +161,16 @@ impl Detector<'_> {
         let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
         let (site_a, site_b) = (&self.sites[a as usize], &self.sites[b as usize]);
+        let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
         let mut margin = self.scratch.reach[i] + self.scratch.reach[j];
-        if let (Some(_), Some(_)) = (body_a.shape(part_a).tree(), body_b.shape(part_b).tree()) {
+        if let (Some(_), Some(_)) = (shape_a.tree(), shape_b.tree()) {
             // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
-            let size = body_a.shape(part_a).bounding_radius().min(body_b.shape(part_b).bounding_radius());
+            let size = shape_a.bounding_radius().min(shape_b.bounding_radius());
             margin = margin.min(2.0 * self.settings.drift_tolerance + TREE_REACH * size);
         }
         let found = &mut self.scratch.found;
         found.clear();
-        tumble_collide::contacts(body_a.shape(part_a), &site_a.pose, body_b.shape(part_b), &site_b.pose, margin, found);
+        tumble_collide::contacts(shape_a, &site_a.pose, shape_b, &site_b.pose, margin, found);
         let (ma, mb) = (body_a.material(part_a), body_b.material(part_b));
         let friction = self.settings.combine_friction.of(ma.friction, mb.friction);
         let restitution = self.settings.combine_restitution.of(ma.restitution, mb.restitution);
@@ -211,7 +213,7 @@ fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize) -> bool {
         return false;
     }
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
-    if a.serial == b.serial && !ca.collides_with_itself() {
+    if a.serial == b.serial && !ca.parts_meet(part_a, part_b) {
         return false;
     }
     ca.collides_with(part_a, cb.kind(part_b)) && cb.collides_with(part_b, ca.kind(part_a))

@@ -16,8 +16,11 @@
 //! # Ok::<(), tumble_core::WorldError>(())
 //! ```
 
+pub mod articulated;
+mod closure;
 mod collidable;
 mod detect;
+mod integrators;
 mod motion;
 mod object;
 mod rigid;
@@ -27,10 +30,14 @@ pub mod rows;
 mod settings;
 mod site;
 pub mod solver;
+pub mod spatial;
 mod step;
+mod sync;
 mod view;
 mod world;
 
+pub use articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Drive, Freedom, Joint, LinkMass, Model, ModelBuilder, ModelError, Playback, Spring};
+pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use object::{
     Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget, SyncError, Visual,

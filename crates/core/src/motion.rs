@@ -5,11 +5,14 @@
 //! | explicit Euler | `x += h·v(x,p)`, `p += h·f(x,p,t)` |
 //! | symplectic Euler | `p += h·f(x,p,t)`, `x += h·v(x,p)` |
 //! | Verlet | `x` coasts `h/2`, `p += h·f(x,p,t+h/2)`, `x` coasts `h/2` |
+//! | Dormand–Prince | fifth order, by inner steps that a tolerance chooses: [`crate::integrators`] |
 //! | RK4 | classical on `p`; on `x` the commutator-free method of Celledoni, Marthinsen and Owren (2003), two exponentials in the last stage |
 
+use crate::integrators::Adaptive;
 use crate::settings::Integrator;
 use crate::site::{Forces, Site, Wrench};
 use crate::view::{Entry, Mode, ObjectId, Table, WorldView};
+use crate::world::StepError;
 use tumble_collide::Vec3;
 
 /// What the integrators work on, borrowed from the world.
@@ -19,17 +22,30 @@ pub(crate) struct Motion<'a> {
     pub sites: &'a mut [Site],
     pub forces: &'a mut Forces,
     pub gravity: Vec3,
+    /// See [`WorldView::implicit`].
+    pub implicit: bool,
     /// Forces set by the user, per site.
     pub applied: &'a [Wrench],
+    /// Generalized forces set by the user, per coordinate.
+    pub applied_generalized: &'a [f64],
     /// Generalized contact forces that hold over the sub-step.
     pub held: &'a [f64],
+    /// See [`Core::pin`](crate::world::Core).
+    pub pinned: &'a [f64],
+    pub pinned_sites: &'a mut [Site],
 }
 
 impl Motion<'_> {
     /// Writes sites and caches from the state. What is static or not alive is at rest, whatever momentum it keeps.
     pub fn refresh(&mut self) {
         let (x, sites) = (&self.x[..], &mut *self.sites);
-        self.table.for_each_mut(|e| refresh(e, x, sites));
+        let (pinned, pinned_sites) = (self.pinned, &mut *self.pinned_sites);
+        self.table.for_each_mut(|e| {
+            refresh(e, x, sites);
+            if !pinned.is_empty() && e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity()) {
+                refresh(e, pinned, pinned_sites);
+            }
+        });
     }
 
     /// The same for one object.
@@ -45,8 +61,8 @@ impl Motion<'_> {
         self.forces.wrenches.clear();
         self.forces.wrenches.extend_from_slice(self.applied);
         self.forces.generalized.clear();
-        self.forces.generalized.extend_from_slice(self.held);
-        let view = WorldView { time: t, gravity: self.gravity, x: self.x, sites: self.sites, table: self.table };
+        self.forces.generalized.extend(self.held.iter().zip(self.applied_generalized).map(|(held, applied)| held + applied));
+        let view = WorldView { time: t, gravity: self.gravity, implicit: self.implicit, x: self.x, sites: self.sites, table: self.table };
         for entry in self.table.iter().filter(|e| e.status.alive) {
             if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {
                 body.accumulate_forces(&entry.span, &view, self.forces);
@@ -76,6 +92,17 @@ impl Motion<'_> {
         }
     }
 
+    /// Leaves of the rates what the coasts of a splitting do not do by themselves.
+    pub fn take_off_coasting(&self, dp: &mut [f64]) {
+        let mut coasting = Vec::new();
+        for entry in self.table.iter().filter(|e| e.moves()) {
+            let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+            coasting.resize(entry.span.v.len(), 0.0);
+            body.coasting_rate(&self.x[entry.span.x.clone()], &mut coasting);
+            dp[entry.span.v.clone()].iter_mut().zip(&coasting).for_each(|(dp, c)| *dp -= c);
+        }
+    }
+
     fn kick(&mut self, dp: &[f64], h: f64) {
         for entry in self.table.iter().filter(|e| e.moves()) {
             if let Some(body) = entry.object.integratable() {
@@ -84,7 +111,8 @@ impl Motion<'_> {
         }
     }
 
-    fn velocities(&self, v: &mut [f64]) {
+    /// Generalized velocities of everything that moves or is led; zero elsewhere.
+    pub fn velocities(&self, v: &mut [f64]) {
         v.fill(0.0);
         for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode != Mode::Static) {
             if let Some(body) = entry.object.integratable() {
@@ -102,13 +130,15 @@ impl Motion<'_> {
         }
     }
 
-    /// One step of `h` from time `t`; sites and caches are left at the new state.
-    pub fn integrate(&mut self, integrator: Integrator, t: f64, h: f64, dp: &mut [f64]) {
+    /// Integrates over `h` from time `t`: one step, or as many inner steps of `adaptive` as its tolerance asks for, which it records. Returns how far
+    /// it came, s: `h`, but for a record that is full. Sites and caches are left at the new state.
+    pub fn integrate(&mut self, integrator: Integrator, t: f64, h: f64, dp: &mut [f64], adaptive: &mut Adaptive) -> Result<f64, StepError> {
         let start = self.x.clone();
         match integrator {
             Integrator::Verlet => {
                 self.coast(0.5 * h);
                 self.evaluate(t + 0.5 * h, dp);
+                self.take_off_coasting(dp);
                 self.kick(dp, h);
                 self.coast(0.5 * h);
             }
@@ -127,9 +157,11 @@ impl Motion<'_> {
                 self.drift(&v, h);
             }
             Integrator::Rk4 => self.rk4(t, h, dp),
+            Integrator::DormandPrince => return adaptive.integrate(self, t, h, dp, true),
         }
         self.restore_led_velocities(&start);
         self.refresh();
+        Ok(h)
     }
 
     fn rk4(&mut self, t: f64, h: f64, dp: &mut [f64]) {

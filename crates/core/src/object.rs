@@ -69,8 +69,13 @@ pub trait Integratable {
     fn velocity(&self, x: &[f64], v: &mut [f64]);
     /// Changes the momentum in `x` so that the generalized velocity there is `v`: the inverse of [`velocity`](Self::velocity).
     fn write_velocity(&self, x: &mut [f64], v: &[f64]);
-    /// Rate of change of momentum under the forces `f`: the thesis's derivative.
+    /// Rate of what [`kick`](Self::kick) changes under the forces `f`: the thesis's derivative. That is momentum, or velocity for an object
+    /// whose state holds velocities; `dp` names it either way.
     fn derivative(&self, x: &[f64], f: &ForceSlice, dp: &mut [f64]);
+    /// Why the state at the last refresh has no motion (a singular mass matrix), if so. The step then ends with this as its error.
+    fn trouble(&self) -> Option<String> {
+        None
+    }
     /// Writes the accelerations of its sites for a rate of momentum `dp`.
     fn accelerations(&self, x: &[f64], dp: &[f64], sites: &mut [Site]);
     /// Writes `dp − M·v̇`: what of the rate of momentum changes the velocity's direction in the body and not its size (`ω × L` of a rigid
@@ -79,20 +84,44 @@ pub trait Integratable {
         let _ = x;
         out.fill(0.0);
     }
-    /// Momentum changes by `h·dp`; positions stay.
+    /// Momentum (or velocity, as [`derivative`](Self::derivative) says) changes by `h·dp`; positions stay.
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64);
     /// Free motion for `h` seconds with the momentum held: exact or symmetric of second order at least.
     fn coast(&self, x: &mut [f64], h: f64);
     /// Positions move with generalized velocity `v` for `h` seconds; exact on rotations. Momentum stays.
     fn drift(&self, x: &mut [f64], v: &[f64], h: f64);
+    /// Turns a velocity `v` at the displacement `displacement` from some state into the rate of that displacement: the inverse of the
+    /// differential of [`drift`](Self::drift)'s exponential map. Coordinates that simply add up leave `v` as it is, the default.
+    fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
+        let _ = (displacement, v);
+    }
     /// `u = L·v` of the momentum in `x`.
     fn whiten(&self, x: &[f64], u: &mut [f64]);
     /// `v = L⁻¹·u`.
     fn unwhiten(&self, u: &[f64], v: &mut [f64]);
     /// `y = L⁻ᵀ·j`: the whitened response to a generalized impulse `j`.
     fn respond(&self, j: &[f64], y: &mut [f64]);
-    /// `dp = Lᵀ·du`: the momentum that a change of `u` means.
-    fn recover(&self, du: &[f64], dp: &mut [f64]);
+    /// `j = Lᵀ·du`: the generalized impulse that a change of `u` means.
+    fn recover(&self, du: &[f64], j: &mut [f64]);
+    /// Whether its state holds velocities instead of momenta. Their free motion is not that of a constant momentum: `time_stepping` then takes
+    /// the free step first and adds what contacts do to its end.
+    fn holds_velocity(&self) -> bool {
+        false
+    }
+    /// What of [`derivative`](Self::derivative) is already in [`coast`](Self::coast): zero where coasting leaves the state's momentum alone;
+    /// the acceleration without any force of an object whose state holds velocities.
+    fn coasting_rate(&self, x: &[f64], out: &mut [f64]) {
+        let _ = x;
+        out.fill(0.0);
+    }
+    /// The change of whitened velocity that a change `dp` of the state's momentum means. An object whose state holds velocities answers `L·dp`.
+    fn whiten_rate(&self, dp: &[f64], du: &mut [f64]) {
+        self.respond(dp, du);
+    }
+    /// The inverse of [`whiten_rate`](Self::whiten_rate); `L⁻¹·du` for an object whose state holds velocities.
+    fn unwhiten_rate(&self, du: &[f64], dp: &mut [f64]) {
+        self.recover(du, dp);
+    }
     /// Called once per committed step, for what must be put right after integration.
     fn stabilize(&self, x: &mut [f64], h: f64) {
         let _ = (x, h);
@@ -157,6 +186,12 @@ pub trait Constraint {
     /// Adds its rows. See [`RowBuilder`] for how a row is made. The view shows the state that free motion makes by the middle of the step to
     /// come: directions are right there to second order. Errors are those of that state too; the stepper takes them back to the present.
     fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder);
+    /// Appends the errors of its one-sided rows ([`RowSet::HalfLine`]) at the view's state, one per row and in the order of the rows. What is told
+    /// here `backtracking` locates in time as it does contacts: the step ends where the limit is reached, and the limit acts from there on. Of a
+    /// constraint that tells nothing the limits act over the whole of the step in which they are reached.
+    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+        let _ = (me, view, out);
+    }
 }
 
 /// One row of a [`Constraint`]: what it may do and how far off it is.

@@ -13,6 +13,7 @@
 use crate::collidable::{Collidable, CollisionKind, Material};
 use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
 use crate::rotation;
+use crate::sync;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::view::WorldView;
 use nalgebra::{Quaternion, SymmetricEigen, Translation3, Unit};
@@ -313,21 +314,11 @@ impl Object for RigidBody {
 /// The whole state, 13 little-endian `f64`: exact, for replicas. What only draws can do with less.
 impl NetSync for RigidBody {
     fn get_data(&self, me: &Span, view: &WorldView, out: &mut Vec<u8>) {
-        out.extend(view.x[me.x.clone()].iter().flat_map(|x| x.to_le_bytes()));
+        sync::write_state(&view.x[me.x.clone()], out);
     }
 
     fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError> {
-        let wanted = 8 * x.len();
-        if data.len() != wanted {
-            return Err(SyncError::Length { got: data.len(), wanted });
-        }
-        let (numbers, _) = data.as_chunks::<8>();
-        let state: Vec<f64> = numbers.iter().map(|b| f64::from_le_bytes(*b)).collect();
-        if !self.accepts(&state) {
-            return Err(SyncError::Value);
-        }
-        x.copy_from_slice(&state);
-        Ok(())
+        sync::read_state(data, x, |state| self.accepts(state))
     }
 }
 
@@ -406,6 +397,11 @@ impl Integratable for RigidBody {
         write_orientation(x, &turned);
     }
 
+    fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
+        let rate = rotation::pull_back(&vec3(displacement), &vec3(v));
+        v[..3].copy_from_slice(rate.as_slice());
+    }
+
     fn whiten(&self, x: &[f64], u: &mut [f64]) {
         write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
     }
@@ -439,8 +435,8 @@ impl Collidable for RigidBody {
         1
     }
 
-    fn shape(&self, _part: usize) -> &Shape {
-        &self.shape
+    fn shape(&self, _part: usize) -> Option<&Shape> {
+        Some(&self.shape)
     }
 
     fn material(&self, _part: usize) -> Material {

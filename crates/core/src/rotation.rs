@@ -42,6 +42,27 @@ pub fn turn(q: &Quat, omega: &Vec3, h: f64) -> Quat {
     Unit::new_normalize(Quaternion::from_parts(c, axis) * q.into_inner())
 }
 
+/// The rate of the rotation vector `theta` of a rotation `exp(θ)·q₀` that turns with the world angular velocity `omega`: `dexp⁻¹_θ(ω)`, the inverse
+/// of the differential of [`turn`].
+///
+/// ```text
+/// θ̇ = ω − ½·θ×ω + c·θ×(θ×ω)           c = (1 − ½|θ|·cot ½|θ|)/|θ|² = 1/12 + |θ|²/720 + |θ|⁴/30240 + …
+/// ```
+///
+/// Singular at a full turn, `|θ| = 2π`.
+pub fn pull_back(theta: &Vec3, omega: &Vec3) -> Vec3 {
+    let square = theta.norm_squared();
+    let c = if square < 1e-2 {
+        1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1209600.0))
+    } else {
+        let half = 0.5 * square.sqrt();
+        let (sin, cos) = ComplexField::sin_cos(half);
+        (1.0 - half * cos / sin) / square
+    };
+    let across = theta.cross(omega);
+    omega - 0.5 * across + c * theta.cross(&across)
+}
+
 fn about(axis: usize, s: f64, c: f64) -> Quaternion<f64> {
     let mut v = Vec3::zeros();
     v[axis] = s;

@@ -1,5 +1,6 @@
 //! How constraints and contacts become rows.
 
+use crate::collidable::ContactFrame;
 use crate::object::{Constraint, Integratable, RowTarget};
 use crate::rows::{RowSet, Rows};
 use crate::site::Site;
@@ -56,12 +57,31 @@ impl RowBuilder<'_> {
         if !self.open(p.iter().chain(axis.iter())) {
             return self;
         }
-        match table.slots.get(id) {
-            Some(entry) if part < entry.span.site.len() && self.point_side(entry, part, p, &[*axis], sign) => {}
-            Some(entry) => self.refuse(format!("'{}' has no part {part} that answers impulses, or the row names a third object", entry.object.name())),
-            None => self.refuse("a row names an object that is not in the world".into()),
-        }
+        self.on_part(table.slots.get(id), part, |row, entry| row.point_side(entry, part, p, &[*axis], sign));
         self
+    }
+
+    /// Adds `sign ·` the angular velocity of one part along the unit vector `axis`. Said by a couple of test impulses, which every part answers:
+    /// for unit `b ⟂ c` with `b × c = axis` it is `(v(p + b) − v(p))·c`, exactly.
+    pub fn on_rotation(&mut self, id: ObjectId, part: usize, axis: &Vec3, sign: f64) -> &mut Self {
+        let table = self.table;
+        if !self.open(axis.iter()) {
+            return self;
+        }
+        let [_, b, c] = ContactFrame::new(Vec3::zeros(), *axis).axes;
+        self.on_part(table.slots.get(id), part, |row, entry| {
+            let p = row.sites[entry.span.site.start + part].position();
+            row.point_side(entry, part, &(p + b), &[c], sign) && row.point_side(entry, part, &p, &[c], -sign)
+        });
+        self
+    }
+
+    /// Lets `add` put its side of the row; refuses the row where the object is gone, has no such part, or is a third.
+    fn on_part(&mut self, entry: Option<&Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
+        let Some(entry) = entry else { return self.refuse("a row names an object that is not in the world".into()) };
+        if part >= entry.span.site.len() || !add(self, entry) {
+            self.refuse(format!("'{}' has no part {part} that answers impulses, or the row names a third object", entry.object.name()));
+        }
     }
 
     /// Adds `Σ j_k · v_k` over the generalized velocities of one object.

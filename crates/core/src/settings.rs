@@ -16,6 +16,8 @@ pub enum Integrator {
     ExplicitEuler,
     /// Fourth order: classical Runge–Kutta on momenta, commutator-free on rotations.
     Rk4,
+    /// Fifth order with error control (Dormand and Prince): inner steps as [`Settings::integrator_tolerance`] asks, with dense output.
+    DormandPrince,
 }
 
 /// A world's constants; they may be changed between steps.
@@ -29,10 +31,15 @@ pub struct Settings {
     pub substeps: u32,
     /// How the backtracking stepper integrates. `time_stepping` is the midpoint rule whatever is chosen here.
     pub integrator: Integrator,
+    /// `dormand_prince`: error that an inner step may make in any coordinate, as displacement (m, rad) and as velocity (m/s, rad/s), relative where
+    /// the coordinate's displacement or velocity is above 1; 1e-14 to 0.1.
+    pub integrator_tolerance: f64,
     /// Effort of the iterative solvers.
     pub accuracy: Accuracy,
     /// Sweeps at most of the position projection.
     pub projection_sweeps: u32,
+    /// Whether the equality rows of constraints (joints) are held in place too, and not in velocity alone: off, they drift.
+    pub stabilize_positions: bool,
     /// `backtracking`: surfaces closer than this touch, metres; deeper than this, a new contact makes the step go back. A rebound
     /// lower than this rests.
     pub contact_tolerance: f64,
@@ -53,8 +60,10 @@ impl Default for Settings {
             dt: 1.0 / 60.0,
             substeps: 1,
             integrator: Integrator::default(),
+            integrator_tolerance: 1e-6,
             accuracy: Accuracy { sweeps: 200, relaxations: 20_000, tolerance: 1e-9 },
             projection_sweeps: 15,
+            stabilize_positions: true,
             contact_tolerance: 1e-7,
             drift_tolerance: 1e-4,
             recovery_speed: 3.0,
@@ -85,6 +94,8 @@ impl Settings {
         self.gravity.iter().try_for_each(|&g| check("gravity", g, true, "finite"))?;
         check("dt", self.dt, self.dt > 0.0 && self.dt <= 1.0, "above 0 and at most 1 s")?;
         check("substeps", self.substeps as f64, (1..=1000).contains(&self.substeps), "1 to 1000")?;
+        let tolerance = self.integrator_tolerance;
+        check("integrator tolerance", tolerance, (1e-14..=0.1).contains(&tolerance), "1e-14 to 0.1")?;
         check("sweeps", self.accuracy.sweeps as f64, (1..=1_000_000).contains(&self.accuracy.sweeps), "1 to 1000000")?;
         check("solver tolerance", self.accuracy.tolerance, self.accuracy.tolerance >= 0.0, "at least 0")?;
         check("contact tolerance", self.contact_tolerance, self.contact_tolerance > 0.0, "above 0 m")?;
@@ -100,6 +111,8 @@ pub struct StepReport {
     pub substeps: u32,
     /// `backtracking`: integrations tried, committed ones included.
     pub tries: u32,
+    /// `backtracking` with `dormand_prince`: inner steps of all integrations, refused ones included.
+    pub inner_steps: u32,
     /// `backtracking`: sub-steps taken at the floor, where a crossing was accepted and projected out.
     pub floor_hits: u32,
     /// Contacts at the last sub-step: what the narrow phase found within its margin.

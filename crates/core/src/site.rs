@@ -38,12 +38,20 @@ pub struct Site {
     pub angular_acceleration: Vec3,
     /// Acceleration of the frame's origin, m/s².
     pub acceleration: Vec3,
+    /// What the angular acceleration would be if the generalized velocity did not change (`J̇·v`), rad/s²: zero for a body whose generalized
+    /// velocity is `[ω; v]`.
+    pub bias_angular_acceleration: Vec3,
+    /// The same of the origin's acceleration, m/s².
+    pub bias_acceleration: Vec3,
 }
 
 impl Default for Site {
     fn default() -> Site {
         let zero = Vec3::zeros();
-        Site { pose: Pose::identity(), angular_velocity: zero, velocity: zero, angular_acceleration: zero, acceleration: zero }
+        Site {
+            pose: Pose::identity(), angular_velocity: zero, velocity: zero, angular_acceleration: zero, acceleration: zero,
+            bias_angular_acceleration: zero, bias_acceleration: zero,
+        }
     }
 }
 

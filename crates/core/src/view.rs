@@ -94,6 +94,9 @@ pub struct WorldView<'a> {
     pub time: f64,
     /// Gravity, m/s².
     pub gravity: Vec3,
+    /// Whether this step's rows are at the velocity level, so that drives and damping are implicit rows of a [`Constraint`](crate::Constraint); where
+    /// they are not, such forces belong to the force table.
+    pub implicit: bool,
     /// The state `X` at this stage.
     pub x: &'a [f64],
     /// The site table at this stage.

@@ -110,7 +110,7 @@ impl BodySpec {
     }
 }
 
-fn read_name(f: &mut Fields<'_>) -> Option<String> {
+pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
     let (name, value) = f.text("name", "a name of its own")?;
     f.what = format!(
         "{} \"{}\"",
@@ -152,7 +152,7 @@ fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {
     }
 }
 
-fn read_material(f: &mut Fields<'_>, library: &Library<'_>) -> Option<usize> {
+pub(crate) fn read_material(f: &mut Fields<'_>, library: &Library<'_>) -> Option<usize> {
     let (name, value) = f.optional_text("material")?;
     let found = library.material_names.get(name).copied();
     if found.is_none() {

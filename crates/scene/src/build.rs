@@ -6,16 +6,19 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
 use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::solver::{self, Accuracy};
-use tumble_core::{Look as CoreLook, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
+use tumble_core::{ArticulatedBody, Closure, Look as CoreLook, ObjectId, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
 
 use crate::body::{BodySpec, MassSpec};
+use crate::articulated::ArticulatedSpec;
+use crate::assemble;
+use crate::closure::{ClosureKind, ClosureSpec, PartSpec};
 use crate::file::SceneFile;
+use crate::link_shapes::{self, ShapeMaker};
 use crate::look::Look;
 use crate::mesh::{MeshSource, MeshSpec};
-use crate::shape::ShapeSpec;
 
 /// Most bytes of a mesh file: 1 GiB.
-const MOST_MESH_BYTES: u64 = 1 << 30;
+pub(crate) const MOST_MESH_BYTES: u64 = 1 << 30;
 
 /// Why a checked scene did not become a world.
 #[derive(Debug, Error)]
@@ -54,6 +57,24 @@ pub enum BuildError {
         /// From the shape or the body.
         why: String,
     },
+    /// An articulated body's shapes or constants are wrong.
+    #[error("{scene}: articulated \"{body}\": {why}")]
+    Articulated {
+        /// The scene.
+        scene: String,
+        /// The body.
+        body: String,
+        /// From the shape or the body; it names the link.
+        why: String,
+    },
+    /// A closure joins what cannot be joined.
+    #[error("{scene}: {why}")]
+    Closure {
+        /// The scene.
+        scene: String,
+        /// From the closure, which it names.
+        why: String,
+    },
     /// The world refused a setting.
     #[error("{scene}: {source}")]
     World {
@@ -85,7 +106,50 @@ impl SceneFile {
             built.set_collidable(id, spec.collides).map_err(world)?;
             built.set_alive(id, spec.alive).map_err(world)?;
         }
+        let mut maker = ShapeMaker::new(&meshes);
+        for spec in &self.articulated {
+            self.add_articulated(spec, &mut maker, &mut built)?;
+            let said = spec.notes.iter().cloned().chain(maker.notes.take());
+            notes.extend(said.map(|note| format!("{}: articulated \"{}\": {note}", self.file, spec.name)));
+        }
+        for spec in &self.closures {
+            self.add_closure(spec, &mut built)?;
+        }
         Ok((built, notes))
+    }
+
+    fn add_articulated(&self, spec: &ArticulatedSpec, maker: &mut ShapeMaker<'_>, world: &mut World) -> Result<(), BuildError> {
+        let wrong = |why: String| BuildError::Articulated { scene: self.file.clone(), body: spec.name.clone(), why };
+        let body = assemble::body(spec, maker).map_err(wrong)?;
+        let id = world.add(body).map_err(|e| wrong(e.to_string()))?;
+        world.set_alive(id, spec.alive).map_err(|e| wrong(e.to_string()))
+    }
+
+    fn add_closure(&self, spec: &ClosureSpec, world: &mut World) -> Result<(), BuildError> {
+        let wrong = |why: String| BuildError::Closure { scene: self.file.clone(), why };
+        let (a, b) = (self.part(world, &spec.a), spec.b.and_then(|b| self.part(world, &b)));
+        let (point, axis, name) = (Vec3::from(spec.position_m), Vec3::from(spec.axis), spec.name.as_str());
+        let closure = match spec.kind {
+            ClosureKind::Point => Closure::point_at(name, world, a, b, point),
+            ClosureKind::Hinge => Closure::hinge_at(name, world, a, b, point, axis),
+            ClosureKind::Weld => Closure::weld_at(name, world, a, b, point),
+            ClosureKind::Slider => Closure::slider_at(name, world, a, b, point, axis),
+        };
+        world.add(closure.map_err(|e| wrong(e.to_string()))?).map(drop).map_err(|e| wrong(e.to_string()))
+    }
+
+    /// An object of the world and its part.
+    fn part(&self, world: &World, part: &PartSpec) -> Option<(ObjectId, usize)> {
+        match *part {
+            PartSpec::Body(body) => Some((world.find(&self.bodies[body].name)?, 0)),
+            PartSpec::Link(spec, link) => {
+                let spec = &self.articulated[spec];
+                let id = world.find(&spec.name)?;
+                let model = world.get::<ArticulatedBody>(id)?.model();
+                let carrier = model.frame(&spec.links[link].name)?.link;
+                Some((id, carrier.unwrap_or(model.links().len())))
+            }
+        }
     }
 
     fn settings(&self) -> Settings {
@@ -95,6 +159,7 @@ impl SceneFile {
             dt: w.dt_s,
             substeps: w.substeps,
             integrator: w.integrator.into(),
+            integrator_tolerance: w.integrator_tolerance,
             accuracy: Accuracy { sweeps: w.iterations, ..base.accuracy },
             contact_tolerance: w.contact_tolerance_m,
             drift_tolerance: base.drift_tolerance.max(w.contact_tolerance_m),
@@ -150,7 +215,7 @@ impl SceneFile {
     }
 
     fn body(&self, spec: &BodySpec, meshes: &[(Shape, Vec3)]) -> Result<RigidBody, BuildError> {
-        let (shape, center) = self.shape(spec, meshes)?;
+        let (shape, center) = link_shapes::make(&spec.shape, meshes).map_err(|e| self.body_error(spec, e))?;
         let body = match spec.mass {
             Some(MassSpec::Mass(mass)) => RigidBody::with_mass(&spec.name, shape.clone(), mass),
             Some(MassSpec::Density(density)) => RigidBody::with_density(&spec.name, shape.clone(), density),
@@ -168,19 +233,6 @@ impl SceneFile {
         body.linear_damping = spec.linear_damping_per_s;
         body.angular_damping = spec.angular_damping_per_s;
         Ok(body)
-    }
-
-    /// The shape in body axes, and where its centre of mass is in the axes of the description.
-    fn shape(&self, spec: &BodySpec, meshes: &[(Shape, Vec3)]) -> Result<(Shape, Vec3), BuildError> {
-        let shape = match spec.shape {
-            ShapeSpec::Mesh { mesh } => return Ok(meshes[mesh].clone()),
-            ShapeSpec::HalfSpace => Ok(Shape::half_space()),
-            ShapeSpec::Sphere { radius_m } => Shape::sphere(radius_m),
-            ShapeSpec::Box { size_m } => Shape::cuboid(0.5 * Vec3::from(size_m)),
-            ShapeSpec::Capsule { radius_m, length_m } => Shape::capsule(radius_m, 0.5 * length_m),
-            ShapeSpec::Cylinder { radius_m, height_m } => Shape::cylinder(radius_m, 0.5 * height_m),
-        };
-        Ok((shape.map_err(|e| self.body_error(spec, e))?, Vec3::zeros()))
     }
 
     fn body_error(&self, spec: &BodySpec, why: impl ToString) -> BuildError {
@@ -209,7 +261,7 @@ fn visuals(spec: &BodySpec, shape: Shape, center: &Vec3) -> Vec<Visual> {
 }
 
 /// The look in body axes, whose origin is the centre of mass.
-fn look(look: &Look, center: &Vec3) -> CoreLook {
+pub(crate) fn look(look: &Look, center: &Vec3) -> CoreLook {
     let [r, g, b] = look.second_color;
     let named = [
         ("second_r", r),

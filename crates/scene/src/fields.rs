@@ -160,7 +160,7 @@ impl<'a> Fields<'a> {
         self.optional_number(key, bound).unwrap_or(default)
     }
 
-    fn as_number(&self, key: &str, value: &Value<'_>, bound: Bound) -> f64 {
+    pub(crate) fn as_number(&self, key: &str, value: &Value<'_>, bound: Bound) -> f64 {
         match number_of(value) {
             Some(x) if bound.holds(x) => return x,
             Some(_) => self.wrong(key, value, bound.wanted()),

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 
 use toml::de::{DeTable, DeValue};
 
+use crate::articulated::ArticulatedSpec;
 use crate::body::{BodySpec, Library};
+use crate::closure::{ClosureSpec, PartSpec, Parts};
 use crate::error::{Invalid, SceneError};
 use crate::fields::Fields;
 use crate::grid::{self, MOST_BODIES};
@@ -21,6 +23,10 @@ use crate::world::WorldSettings;
 pub const MOST_BYTES: u64 = 16 << 20;
 /// In a longer text only the first slip of syntax is told: the parser keeps every one it finds.
 const RECOVERED_BYTES: usize = 256 << 10;
+/// Most articulated bodies of a scene.
+const MOST_ARTICULATED: usize = 10_000;
+/// Most closures of a scene.
+const MOST_CLOSURES: usize = 100_000;
 /// Most lights of a scene.
 const MOST_LIGHTS: usize = 64;
 
@@ -39,6 +45,10 @@ pub struct SceneFile {
     pub meshes: Vec<MeshSpec>,
     /// `[[body]]` in the order of the file, then the copies of each `[[grid]]`.
     pub bodies: Vec<BodySpec>,
+    /// `[[articulated]]` in the order of the file.
+    pub articulated: Vec<ArticulatedSpec>,
+    /// `[[closure]]` in the order of the file.
+    pub closures: Vec<ClosureSpec>,
     /// `[camera]`; `None` leaves the view to the renderer.
     pub camera: Option<CameraSpec>,
     /// `[[light]]`; a sun where there is none.
@@ -97,7 +107,11 @@ impl SceneFile {
         let materials = read_named(&mut f, "materials", |name, table| Some(MaterialSpec::read(name, table)));
         let meshes = read_named(&mut f, "meshes", |name, table| MeshSpec::read(name, table, folder));
         let materials: Vec<MaterialSpec> = materials.into_iter().filter_map(|(_, material)| material).collect();
-        let bodies = read_bodies(&mut f, &library(&meshes, &materials));
+        let library = library(&meshes, &materials);
+        let mut names = BTreeMap::new();
+        let bodies = read_bodies(&mut f, &library, &mut names);
+        let articulated = read_articulated(&mut f, &library, folder, &mut names);
+        let closures = read_closures(&mut f, &Objects { bodies: &bodies, articulated: &articulated }, &mut names);
         let camera = read_table(&mut f, "camera", CameraSpec::read);
         let mut lights: Vec<LightSpec> =
             f.tables("light", MOST_LIGHTS).into_iter().filter_map(LightSpec::read).collect();
@@ -114,6 +128,8 @@ impl SceneFile {
             materials,
             meshes: meshes.into_iter().filter_map(|(_, mesh)| mesh).collect(),
             bodies,
+            articulated,
+            closures,
             camera,
             lights,
             sky,
@@ -200,13 +216,12 @@ fn library<'a>(meshes: &[(&'a str, Option<MeshSpec>)], materials: &'a [MaterialS
 }
 
 /// All bodies, those of grids included, each with a name of its own.
-fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>) -> Vec<BodySpec> {
+fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>, names: &mut Taken) -> Vec<BodySpec> {
     let mut bodies = Vec::new();
-    let mut names: BTreeMap<String, Range<usize>> = BTreeMap::new();
     for mut table in f.tables("body", MOST_BODIES) {
         let place = name_span(&mut table);
         if let Some(body) = BodySpec::read(&mut table, library) {
-            note_name(&table, &mut names, &body.name, &place);
+            note_name(&table, names, &body.name, &place);
             bodies.push(body);
         }
         table.finish();
@@ -216,7 +231,7 @@ fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>) -> Vec<BodySpec> {
         let (log, what, first) = (table.log, table.what.clone(), bodies.len());
         grid::read(table, library, MOST_BODIES.saturating_sub(first), &mut bodies);
         for body in &bodies[first..] {
-            if !note_unique(log, &what, &mut names, &body.name, &place) {
+            if !note_unique(log, &what, names, &body.name, &place) {
                 break;
             }
         }
@@ -224,11 +239,62 @@ fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>) -> Vec<BodySpec> {
     bodies
 }
 
+/// All articulated bodies, each with a name that no other object has.
+fn read_articulated(f: &mut Fields<'_>, library: &Library<'_>, folder: &Path, names: &mut Taken) -> Vec<ArticulatedSpec> {
+    let one = |mut table: Fields<'_>| {
+        let (log, place) = (table.log, name_span(&mut table));
+        let spec = ArticulatedSpec::read(table, library, folder)?;
+        if !spec.name.is_empty() {
+            note_unique(log, "object", names, &spec.name, &place);
+        }
+        Some(spec)
+    };
+    f.tables("articulated", MOST_ARTICULATED).into_iter().filter_map(one).collect()
+}
+
+fn read_closures(f: &mut Fields<'_>, objects: &Objects<'_>, names: &mut Taken) -> Vec<ClosureSpec> {
+    let one = |mut table: Fields<'_>| {
+        let (log, place) = (table.log, name_span(&mut table));
+        let spec = ClosureSpec::read(table, objects)?;
+        if !spec.name.is_empty() {
+            note_unique(log, "object", names, &spec.name, &place);
+        }
+        Some(spec)
+    };
+    f.tables("closure", MOST_CLOSURES).into_iter().filter_map(one).collect()
+}
+
+/// The objects that closures can join.
+struct Objects<'a> {
+    bodies: &'a [BodySpec],
+    articulated: &'a [ArticulatedSpec],
+}
+
+impl Parts for Objects<'_> {
+    fn part(&self, name: &str) -> Option<PartSpec> {
+        if let Some(body) = self.bodies.iter().position(|body| body.name == name) {
+            return Some(PartSpec::Body(body));
+        }
+        self.articulated.iter().enumerate().find_map(|(k, spec)| {
+            let link = name.strip_prefix(spec.name.as_str())?.strip_prefix('/')?;
+            spec.link(link).map(|link| PartSpec::Link(k, link))
+        })
+    }
+
+    fn names(&self) -> Vec<String> {
+        let links = |spec: &ArticulatedSpec| spec.links.iter().map(|link| format!("{}/{}", spec.name, link.name)).collect::<Vec<_>>();
+        self.bodies.iter().map(|body| body.name.clone()).chain(self.articulated.iter().flat_map(links)).collect()
+    }
+}
+
+/// Names of objects, with where they stand.
+type Taken = BTreeMap<String, Range<usize>>;
+
 fn name_span(table: &mut Fields<'_>) -> Range<usize> {
     table.value("name").map_or(table.span.clone(), |value| value.span())
 }
 
-fn note_name(table: &Fields<'_>, names: &mut BTreeMap<String, Range<usize>>, name: &str, place: &Range<usize>) {
+fn note_name(table: &Fields<'_>, names: &mut Taken, name: &str, place: &Range<usize>) {
     if !name.is_empty() {
         note_unique(table.log, "body", names, name, place);
     }
@@ -238,7 +304,7 @@ fn note_name(table: &Fields<'_>, names: &mut BTreeMap<String, Range<usize>>, nam
 fn note_unique(
     log: &Log<'_>,
     what: &str,
-    names: &mut BTreeMap<String, Range<usize>>,
+    names: &mut Taken,
     name: &str,
     place: &Range<usize>,
 ) -> bool {

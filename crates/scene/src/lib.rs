@@ -52,29 +52,42 @@
 //! # Ok::<(), tumble_scene::SceneError>(())
 //! ```
 
+mod articulated;
+mod assemble;
 mod body;
 mod build;
 mod bound;
+mod closure;
 mod error;
 mod fields;
 mod file;
 mod grid;
+mod joint;
+mod link;
+mod link_shapes;
+mod lists;
 mod log;
 mod look;
 mod material;
 mod mesh;
+mod notes;
 mod profile;
 mod rotation;
 mod shape;
 mod shipped;
 mod suggest;
+pub mod urdf;
 mod view;
 mod world;
 
+pub use articulated::ArticulatedSpec;
 pub use body::{BodySpec, MassSpec};
 pub use build::{BuildError, Notes, read_triangles};
+pub use closure::{ClosureKind, ClosureSpec, PartSpec};
 pub use error::{Invalid, Problem, SceneError};
 pub use file::{MOST_BYTES, SceneFile};
+pub use joint::{JointSpec, MimicSpec};
+pub use link::{Geometry, LinkMassSpec, LinkShape, LinkSpec, Surface};
 pub use look::{Color, Look, Pattern};
 pub use material::MaterialSpec;
 pub use mesh::{MeshSource, MeshSpec};

@@ -3,6 +3,9 @@
 //! A rotation by θ about the unit axis **a** is `[a sin θ/2, cos θ/2]`; the product `p q` turns by
 //! `q` first.
 
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use tumble_core::collide::{Pose, Vec3};
+
 use crate::bound::Bound;
 use crate::fields::{Fields, norm};
 
@@ -21,6 +24,23 @@ pub(crate) fn read(f: &mut Fields<'_>) -> [f64; 4] {
     given.first().copied().unwrap_or([0.0, 0.0, 0.0, 1.0])
 }
 
+/// `position_m` and an orientation, as one pose.
+pub(crate) fn read_pose(f: &mut Fields<'_>) -> Pose {
+    let position = f.vector_or("position_m", Bound::ANY, [0.0; 3]);
+    pose(position, read(f))
+}
+
+/// A pose from its numbers: metres, and a unit quaternion `[x, y, z, w]`.
+pub(crate) fn pose(position_m: [f64; 3], [x, y, z, w]: [f64; 4]) -> Pose {
+    Pose::from_parts(Translation3::from(Vec3::from(position_m)), UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)))
+}
+
+/// Roll, pitch and yaw about the fixed axes x, then y, then z, radians, as a unit quaternion `[x, y, z, w]`.
+pub(crate) fn roll_pitch_yaw([x, y, z]: [f64; 3]) -> [f64; 4] {
+    let [about_x, about_y, about_z] = [about([1.0, 0.0, 0.0], x), about([0.0, 1.0, 0.0], y), about([0.0, 0.0, 1.0], z)];
+    product(about_z, product(about_y, about_x))
+}
+
 fn read_quaternion(f: &mut Fields<'_>) -> Option<[f64; 4]> {
     let value = f.value("orientation_xyzw")?;
     let q: [f64; 4] = f.as_vector("orientation_xyzw", value, Bound::ANY);
@@ -33,15 +53,18 @@ fn read_quaternion(f: &mut Fields<'_>) -> Option<[f64; 4]> {
 
 fn read_roll_pitch_yaw(f: &mut Fields<'_>) -> Option<[f64; 4]> {
     let angles: [f64; 3] = f.optional_vector("rotation_deg", ANGLE)?;
-    let [x, y, z] = angles.map(f64::to_radians);
-    let [about_x, about_y, about_z] = [about([1.0, 0.0, 0.0], x), about([0.0, 1.0, 0.0], y), about([0.0, 0.0, 1.0], z)];
-    Some(product(about_z, product(about_y, about_x)))
+    Some(roll_pitch_yaw(angles.map(f64::to_radians)))
 }
 
 fn read_axis_angle(f: &mut Fields<'_>) -> Option<[f64; 4]> {
-    let value = f.value("rotation")?;
+    axis_angle(f, "rotation")
+}
+
+/// `key = { axis = …, angle_deg = … }`, if it is there.
+pub(crate) fn axis_angle(f: &mut Fields<'_>, key: &'static str) -> Option<[f64; 4]> {
+    let value = f.value(key)?;
     let example = "{ axis = [0, 1, 0], angle_deg = 20 }";
-    let mut turn = Fields::of(f.log, value, format!("the rotation of {}", f.what), example)?;
+    let mut turn = Fields::of(f.log, value, format!("the {key} of {}", f.what), example)?;
     let axis = turn.direction("axis");
     let angle = turn.number("angle_deg", ANGLE).to_radians();
     turn.finish();

@@ -70,7 +70,19 @@ impl ShapeSpec {
             f.give_up();
             return None;
         };
-        let shape = match kind {
+        let shape = ShapeSpec::of_kind(&mut f, kind, meshes);
+        f.finish();
+        shape
+    }
+
+    /// Reads a table that is a shape and holds other keys besides; does not finish it.
+    pub(crate) fn read_part(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
+        let kind = f.choice("type", KINDS)?;
+        ShapeSpec::of_kind(f, kind, meshes)
+    }
+
+    fn of_kind(f: &mut Fields<'_>, kind: Kind, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
+        match kind {
             Kind::Sphere => Some(ShapeSpec::Sphere { radius_m: f.number("radius_m", Bound::POSITIVE) }),
             Kind::Box => Some(ShapeSpec::Box { size_m: f.vector("size_m", Bound::POSITIVE) }),
             Kind::Capsule => Some(ShapeSpec::Capsule {
@@ -82,10 +94,8 @@ impl ShapeSpec {
                 height_m: f.number("height_m", Bound::POSITIVE),
             }),
             Kind::HalfSpace => Some(ShapeSpec::HalfSpace),
-            Kind::Mesh => read_mesh(&mut f, meshes),
-        };
-        f.finish();
-        shape
+            Kind::Mesh => read_mesh(f, meshes),
+        }
     }
 }
 

@@ -2,20 +2,37 @@
 
 /// The word of `known` that `typed` most likely means: one that goes on after it, as `dt_s` does after
 /// `dt`, or else the least edit distance, at most a third of the length of the word typed (and at
-/// least one edit). Ties go to the earlier word.
+/// least one edit), or else the same quantity in another unit, as `limits_rad` is for `limits_m`. Ties go to the earlier word.
 pub(crate) fn nearest<'k>(typed: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
     let letters: Vec<char> = typed.chars().take(64).collect();
     let allowed = (letters.len() / 3).max(1);
     let mut best: Option<(usize, &str)> = None;
+    let mut in_another_unit = None;
     for word in known {
         let unit_left_out = word.strip_prefix(typed).is_some_and(|rest| !typed.is_empty() && rest.starts_with('_'));
         let distance = if unit_left_out { 0 } else { edit_distance(&letters, word) };
         if distance <= allowed && best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, word));
         }
+        if in_another_unit.is_none() && quantity(word) != word && quantity(word) == quantity(typed) {
+            in_another_unit = Some(word);
+        }
     }
-    best.map(|(_, word)| word)
+    best.map(|(_, word)| word).or(in_another_unit)
 }
+
+/// A key without the unit at its end.
+fn quantity(key: &str) -> &str {
+    let mut rest = key;
+    while let Some((before, last)) = rest.rsplit_once('_')
+        && UNITS.contains(&last)
+    {
+        rest = before;
+    }
+    rest
+}
+
+const UNITS: &[&str] = &["m", "s", "kg", "n", "rad", "deg", "per", "m2", "m3", "s2"];
 
 /// The fewest single-letter insertions, deletions, replacements and swaps of neighbours that turn
 /// `a` into `b` (optimal string alignment: a swapped pair is not edited again).
@@ -75,6 +92,13 @@ mod tests {
     #[test]
     fn a_unit_left_out_is_found() {
         assert_eq!(nearest("gravity", ["dt_s", "gravity_m_per_s2"]), Some("gravity_m_per_s2"));
+    }
+
+    #[test]
+    fn another_unit_is_found() {
+        assert_eq!(nearest("limits_m", ["lights", "limits_rad", "limits_deg"]), Some("limits_rad"));
+        assert_eq!(nearest("damping_n_s_per_m", ["friction_n_m", "damping_n_m_s_per_rad"]), Some("damping_n_m_s_per_rad"));
+        assert_eq!(nearest("mass_m", ["color", "collides"]), None);
     }
 
     #[test]

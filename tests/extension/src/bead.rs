@@ -197,8 +197,8 @@ impl Collidable for Bead {
         1
     }
 
-    fn shape(&self, _part: usize) -> &Shape {
-        &self.shape
+    fn shape(&self, _part: usize) -> Option<&Shape> {
+        Some(&self.shape)
     }
 
     fn material(&self, _part: usize) -> Material {
@@ -232,5 +232,9 @@ impl Constraint for Bead {
         let target = RowTarget { bias_acceleration: bias, ..RowTarget::new(RowSet::HalfLine, stop - x[0]) };
         let me = out.owner();
         out.row(target).on_coordinates(me, &[-1.0]);
+    }
+
+    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+        out.extend(self.stop.map(|stop| stop - view.x[me.x.start]));
     }
 }

@@ -148,8 +148,8 @@ impl Collidable for Particle {
         1
     }
 
-    fn shape(&self, _part: usize) -> &Shape {
-        &self.shape
+    fn shape(&self, _part: usize) -> Option<&Shape> {
+        Some(&self.shape)
     }
 
     fn material(&self, _part: usize) -> Material {

@@ -3,6 +3,7 @@
 mod check;
 mod distance;
 mod generate;
+mod hull;
 mod integrals;
 mod obj;
 mod stl;

@@ -9,7 +9,9 @@
 //! ```
 //!
 //! Where the thesis halves, the time of contact is bracketed: the first guess is where the parabola of each nearing contact closes, then false
-//! position with bisection as its guard. The rules that make a frame end:
+//! position with bisection as its guard. With `dormand_prince` a sub-step is integrated once and the tries are read from its dense output; the
+//! state that is committed is then integrated to the moment found. Limits that tell their gaps ([`Constraint::gaps`](crate::Constraint::gaps))
+//! are located like contacts. The rules that make a frame end:
 //!
 //! - a contact that *lasts* (its pair carried a resting force in the sub-step before) may drift by the drift tolerance; it is projected out
 //!   afterwards and never makes the step go back; depth that was there before is no reason either;
@@ -18,12 +20,16 @@
 //! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is one time-stepping sub-step. Both are
 //!   counted as floor hits.
 
-use super::contacts::{build_rows, detect, gyroscopic, impulses, kick, recover, row_velocities, solve, warm_start, whiten};
+use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten};
+use super::hold::{self, Held};
 use super::impact::{self, Candidate};
-use super::{Frame, Stepper, TimeStepping, Workspace, projection};
+use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
+use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection};
 use crate::detect::Touch;
-use crate::object::Level;
+use crate::integrators::Adaptive;
+use crate::object::{Level, RowTarget};
 use crate::rows::RowSet;
+use crate::settings::Integrator;
 use crate::solver::Accuracy;
 use crate::world::{Core, StepError};
 
@@ -31,9 +37,16 @@ use crate::world::{Core, StepError};
 #[derive(Default)]
 pub struct Backtracking {
     work: Workspace,
+    /// Contacts and limits of the state tried.
     after: Vec<Touch>,
-    /// Gap and its rate of every one-sided row of a constraint.
-    limits: Vec<(f64, f64)>,
+    limits_after: Vec<Limit>,
+    watch: Watch,
+    /// Limits that push in this sub-step, and where their rows at its end are made.
+    held: Vec<Held>,
+    probe: Workspace,
+    adaptive: Adaptive,
+    /// Error of every constraint row that is not to be taken back in this sub-step.
+    kept: Vec<f64>,
     fallback: TimeStepping,
 }
 
@@ -41,21 +54,10 @@ pub struct Backtracking {
 const TRIES: u32 = 200;
 /// Least sub-step, as a share of the frame.
 const FLOOR: f64 = 1.0 / (1 << 28) as f64;
-/// A margin of at least this is not measured, metres.
-const FAR: f64 = 1e-4;
 /// Passes of the impact phase at most.
 const IMPACT_PASSES: u32 = 200;
-/// A touching contact slower than this may drift like one that lasts, m/s.
-const SLOW: f64 = 1e-3;
-
-/// A touch's part in the sub-step that begins.
-#[derive(Clone, Copy)]
-struct Role {
-    lasts: bool,
-    touches: bool,
-    /// Depth that does not make the step go back, metres.
-    allowed: f64,
-}
+/// Corrections at most of a moment that dense output found, before its own state is taken.
+const CORRECTIONS: u32 = 2;
 
 impl Stepper for Backtracking {
     fn name(&self) -> &'static str {
@@ -65,18 +67,24 @@ impl Stepper for Backtracking {
     fn step(&mut self, frame: Frame) -> Result<(), StepError> {
         let core = frame.core;
         let dt = core.settings.dt;
-        let mut left = dt;
+        let (mut left, end) = (dt, core.time + dt);
         while left > 1e-12 * dt {
             if core.report.tries >= TRIES {
                 core.report.floor_hits += 1;
-                return self.fallback.substep(core, left);
+                self.fallback.substep(core, left)?;
+                break;
             }
+            core.implicit = false;
             self.gather(core, left)?;
-            let roles = self.roles(core);
-            let roles = if self.resolve_impacts(core, &roles) { self.gather(core, left).map(|_| self.roles(core))? } else { roles };
-            let held = self.resolve_contacts(core, &roles, left)?;
-            left -= self.advance(core, &roles, &held, left)?;
+            self.roles(core);
+            if self.resolve_impacts(core) {
+                self.gather(core, left)?;
+                self.roles(core);
+            }
+            let held = self.resolve_contacts(core, left)?;
+            left -= self.advance(core, &held, left)?;
         }
+        core.time = end; // whatever the sub-steps add up to
         Ok(())
     }
 
@@ -91,12 +99,15 @@ impl Backtracking {
         detect(core, left, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
-        let drifted = self.work.targets.iter().any(|t| off(t.error) || (t.set == RowSet::Equality && off(-t.error)));
-        if drifted || self.work.touches.iter().any(|t| off(t.contact.gap)) {
+        let hold = core.settings.stabilize_positions;
+        let drifted = |t: &RowTarget| if closing::is_joint(t) { hold && off(-t.error.abs()) } else { t.set == RowSet::HalfLine && off(t.error) };
+        if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
             projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
         }
+        let recovery = core.settings.recovery_speed * left;
+        self.kept = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
         core.motion().evaluate(time, &mut self.work.dp);
@@ -104,7 +115,7 @@ impl Backtracking {
         build_rows(core, &mut self.work, Level::Acceleration, 0.5 * left)
     }
 
-    fn roles(&self, core: &Core) -> Vec<Role> {
+    fn roles(&mut self, core: &Core) {
         let s = &core.settings;
         let role = |touch: &Touch| {
             let lasts = core.warm.carries(&touch.key) && touch.contact.gap <= s.drift_tolerance;
@@ -113,14 +124,15 @@ impl Backtracking {
             let allowed = if lasts || (touches && speed.abs() < SLOW) { s.drift_tolerance } else { s.contact_tolerance };
             Role { lasts, touches, allowed: allowed.max(-touch.contact.gap + s.contact_tolerance) }
         };
-        self.work.touches.iter().map(role).collect()
+        self.watch.roles.clear();
+        self.watch.roles.extend(self.work.touches.iter().map(role));
     }
 
     /// Thesis `ResolveImpacts`; whether anything was struck, so that other contacts may be near now.
-    fn resolve_impacts(&mut self, core: &mut Core, roles: &[Role]) -> bool {
+    fn resolve_impacts(&mut self, core: &mut Core) -> bool {
         let work = &mut self.work;
         let s = core.settings;
-        let candidates: Vec<Candidate> = work.touches.iter().zip(roles).map(|(touch, role)| {
+        let candidates: Vec<Candidate> = work.touches.iter().zip(&self.watch.roles).map(|(touch, role)| {
             let pressing = (-touch.acceleration(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).x).max(0.0);
             let rebound = (2.0 * pressing * if role.lasts { s.drift_tolerance } else { s.contact_tolerance }).sqrt();
             let rest_speed = (rebound / touch.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
@@ -132,13 +144,13 @@ impl Backtracking {
         impact::resolve(core, work, &candidates, IMPACT_PASSES, &mut u, &mut total);
         let struck = total.iter().any(|l| *l != 0.0);
         if struck {
-            push(core, &u, &before, 1.0);
+            push_to(core, &u, &before);
         }
         struck
     }
 
     /// Thesis `ResolveContacts`: the generalized contact forces that hold over the sub-step.
-    fn resolve_contacts(&mut self, core: &mut Core, roles: &[Role], left: f64) -> Result<Vec<f64>, StepError> {
+    fn resolve_contacts(&mut self, core: &mut Core, left: f64) -> Result<Vec<f64>, StepError> {
         let mut dp = std::mem::take(&mut self.work.dp);
         let time = core.time;
         core.motion().evaluate(time, &mut dp);
@@ -151,7 +163,7 @@ impl Backtracking {
         let acceleration: Vec<f64> = gyroscopic(core).iter().zip(&work.du_force).map(|(g, rate)| rate - g).collect();
         row_velocities(&work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
         let mut keep = vec![true; work.rows.blocks.len()];
-        for (i, (touch, role)) in work.touches.iter().zip(roles).enumerate() {
+        for (i, (touch, role)) in work.touches.iter().zip(&self.watch.roles).enumerate() {
             let range = work.rows.blocks[i].range();
             let acceleration = touch.acceleration(&core.sites[touch.a as usize], &core.sites[touch.b as usize]);
             for (k, row) in range.clone().enumerate() {
@@ -160,14 +172,14 @@ impl Backtracking {
             work.c[range.start] += touch.contact.gap.max(0.0) / (left * left);
             keep[i] = role.touches && (role.lasts || velocity[range.start] < 1e-7);
         }
+        self.watch_limits(core, &velocity, &mut keep);
+        let work = &mut self.work;
         let touches = work.touches.len();
-        self.limits.clear();
         for (i, target) in work.targets.iter().enumerate() {
             let row = work.rows.blocks[touches + i].row as usize;
             // rows are those of the middle of the step, and go on turning for the other half
             work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / left;
             if target.set == RowSet::HalfLine {
-                self.limits.push((target.error, velocity[row]));
                 work.c[row] += target.error.max(0.0) / (left * left);
             }
         }
@@ -176,11 +188,12 @@ impl Backtracking {
         let s = core.settings.accuracy;
         let accuracy = Accuracy { sweeps: s.sweeps.max(2000), relaxations: s.relaxations.max(1_000_000), tolerance: s.tolerance / left };
         let ray = solve(core, work, accuracy, left, |b| keep[b]);
+        self.held = hold::pushing(work);
         let mut held = vec![0.0; core.dof];
         if ray {
             // no force at the acceleration level keeps the contacts: an impulse without collision does
             let after: Vec<f64> = u.iter().zip(&work.du).map(|(u, du)| u + left * du).collect();
-            push(core, &after, &u, 1.0);
+            push_to(core, &after, &u);
         } else {
             recover(core, &work.du, &mut held);
         }
@@ -188,28 +201,58 @@ impl Backtracking {
         Ok(held)
     }
 
+    /// What limits do in the sub-step: those that are located act once they are reached, the others act ahead. `velocity` has the rows' velocities,
+    /// `work.c` their accelerations.
+    fn watch_limits(&mut self, core: &Core, velocity: &[f64], keep: &mut [bool]) {
+        let (work, touches, watch) = (&self.work, self.work.touches.len(), &mut self.watch);
+        watch.limits.clear();
+        let mut located = vec![false; work.targets.len()];
+        for limit in &work.limits {
+            let (mut rate, mut acceleration) = (0.0, 0.0);
+            if let Some(i) = limit.target.map(|i| i as usize) {
+                let row = work.rows.blocks[touches + i].row as usize;
+                (rate, acceleration) = (velocity[row], work.c[row] + work.targets[i].bias_acceleration);
+            }
+            let role = LimitRole::new(limit, rate, acceleration, &core.settings);
+            if let Some(i) = limit.target.map(|i| i as usize) {
+                (located[i], keep[touches + i]) = (true, role.acts());
+            }
+            watch.limits.push(role);
+        }
+        watch.guesses.clear();
+        for (target, block) in work.targets.iter().zip(&work.rows.blocks[touches..]).zip(&located).filter_map(|(t, located)| (!located).then_some(t)) {
+            let rate = velocity[block.row as usize];
+            if target.set == RowSet::HalfLine && target.error > 0.0 && rate < 0.0 {
+                watch.guesses.push(-target.error / rate);
+            }
+        }
+    }
+
     /// Integrates as far as nothing new crosses, `left` at most; the time taken.
-    fn advance(&mut self, core: &mut Core, roles: &[Role], held: &[f64], left: f64) -> Result<f64, StepError> {
+    fn advance(&mut self, core: &mut Core, held: &[f64], left: f64) -> Result<f64, StepError> {
         core.held.copy_from_slice(held);
+        self.adaptive.path.clear();
         let start = core.x.clone();
         let floor = core.settings.dt * FLOOR;
         let tolerance = core.settings.contact_tolerance;
-        let mut bracket = Bracket { low: (0.0, self.nearest(roles, tolerance)), high: None, same_side: 0 };
-        let mut h = self.first_guess(core, roles, left).clamp(floor.min(left), left);
+        let mut bracket = Bracket::new(self.watch.nearest(&self.work.touches, tolerance));
+        let mut h = self.watch.first_guess(&self.work.touches, &core.sites, left).clamp(floor.min(left), left);
         loop {
-            core.x.copy_from_slice(&start);
-            self.integrate(core, h)?;
-            core.report.tries += 1;
-            let deepest = std::mem::take(&mut core.report.max_penetration);
-            detect(core, 0.0, &mut self.after);
-            let f = self.margin(roles, tolerance);
-            let landed = f >= -tolerance && (f <= tolerance || bracket.high.is_none());
+            h = self.go_to(core, &start, h)?;
+            let deepest = core.report.max_penetration;
+            let f = self.margin(core, h)?;
+            let landed = f >= -tolerance && (f <= tolerance || !bracket.crossed());
             let floored = f < -tolerance && h <= floor;
             let stuck = core.report.tries >= TRIES;
             if landed || floored || (stuck && f >= -tolerance) {
                 core.report.floor_hits += floored as u32;
-                core.report.max_penetration = core.report.max_penetration.max(deepest);
+                if self.adaptive.path.goes_beyond(h) {
+                    h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
+                }
                 core.held.fill(0.0);
+                hold::hold(core, &mut self.probe, &self.held, h)?;
+                closing::refresh_at(core, &start);
+                closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }
@@ -224,85 +267,68 @@ impl Backtracking {
         }
     }
 
-    fn integrate(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
-        let (time, integrator) = (core.time, core.settings.integrator);
+    /// The state `h` after `start`: from the dense output where this sub-step has been integrated that far, else by the integrator. How far it came.
+    fn go_to(&mut self, core: &mut Core, start: &[f64], h: f64) -> Result<f64, StepError> {
+        if self.adaptive.path.reaches(h) {
+            self.adaptive.path.write(&mut core.motion(), h);
+            return Ok(h);
+        }
+        core.x.copy_from_slice(start);
         core.motion().refresh();
-        core.motion().integrate(integrator, time, h, &mut self.work.dp);
-        core.check_finite(&self.work.dp)
+        let (time, integrator) = (core.time, core.settings.integrator);
+        self.adaptive.set(&core.settings, core.inner_step, core.report.inner_steps);
+        let came = core.motion().integrate(integrator, time, h, &mut self.work.dp, &mut self.adaptive)?;
+        if integrator == Integrator::DormandPrince {
+            core.inner_step = self.adaptive.step;
+            core.report.inner_steps = self.adaptive.steps;
+        }
+        core.check_finite(&self.work.dp)?;
+        Ok(came)
     }
 
-    /// Where the parabola of the first nearing contact closes, or the first limit is reached, s.
-    fn first_guess(&self, core: &Core, roles: &[Role], left: f64) -> f64 {
-        let closing = |(touch, role): (&Touch, &Role)| -> Option<f64> {
-            if role.touches {
-                return None;
+    /// Replaces the state of the dense output at `h`, whose margin is `f`, by one that is integrated from the start of the inner step to there: it has the
+    /// full order, and forces and accelerations of its own. Where that one has not landed, because the two differ by more than the contact
+    /// tolerance, the moment is corrected; if that does not help (or `f` is not known) the dense state stays. The time taken.
+    fn settle(&mut self, core: &mut Core, h: f64, bracket: &Bracket, f: f64) -> Result<f64, StepError> {
+        let (dense, tolerance, time) = (core.x.clone(), core.settings.contact_tolerance, core.time);
+        let deepest = core.report.max_penetration;
+        let slope = bracket.slope(h, f);
+        let (from, length) = (self.adaptive.path.before(h).0, self.adaptive.path.length(h));
+        let mut at = h;
+        for _ in 0..=CORRECTIONS {
+            if !(at > from && at <= from + length && f.is_finite()) {
+                break;
             }
-            let (a, b) = (&core.sites[touch.a as usize], &core.sites[touch.b as usize]);
-            let (v, g) = (touch.velocity(a, b).dot(&touch.contact.normal), touch.contact.gap);
-            let a = touch.acceleration(a, b).x;
-            let root = v * v - 2.0 * a * g;
-            let t = 2.0 * g / (-v + root.max(0.0).sqrt());
-            (root >= 0.0 && t > 0.0 && t < left).then_some(t)
-        };
-        let limits = self.limits.iter().filter(|(gap, rate)| *gap > 0.0 && *rate < 0.0).map(|(gap, rate)| -gap / rate);
-        self.work.touches.iter().zip(roles).filter_map(closing).chain(limits).fold(left, f64::min)
-    }
-
-    /// Least gap of what does not touch yet, at the start of the sub-step.
-    fn nearest(&self, roles: &[Role], tolerance: f64) -> f64 {
-        let gaps = self.work.touches.iter().zip(roles).filter(|(_, r)| !r.touches).map(|(t, _)| t.contact.gap);
-        gaps.fold(FAR, f64::min).max(tolerance)
-    }
-
-    /// How far the tried state is from the first crossing: gap, less the depth that its pair is allowed.
-    fn margin(&self, roles: &[Role], tolerance: f64) -> f64 {
-        let before = &self.work.touches;
-        let value = |touch: &Touch| {
-            let pair = before.partition_point(|t| t.key.pair < touch.key.pair);
-            let same = before[pair..].iter().zip(&roles[pair..]).take_while(|(t, _)| t.key.pair == touch.key.pair);
-            let allowed = same.map(|(_, r)| r.allowed).fold(tolerance, f64::max);
-            touch.contact.gap + allowed - tolerance
-        };
-        self.after.iter().map(value).fold(FAR, f64::min)
-    }
-}
-
-/// The moment of a crossing, between a sub-step that ended before it and one that ended after: (length, margin) each.
-struct Bracket {
-    low: (f64, f64),
-    high: Option<(f64, f64)>,
-    /// How often in a row the low end moved (positive) or the high end (negative).
-    same_side: i32,
-}
-
-impl Bracket {
-    /// Takes a try in that did not land, and gives the next one. False position by the Illinois rule (an end that stays twice
-    /// counts half), bisection every fourth time and wherever the margin before the crossing is only known to be large.
-    fn narrow(&mut self, h: f64, f: f64, crossed: bool) -> f64 {
-        if crossed {
-            self.same_side = self.same_side.min(0) - 1;
-            self.high = Some((h, f));
-        } else {
-            self.same_side = self.same_side.max(0) + 1;
-            self.low = (h, f);
+            core.x.copy_from_slice(self.adaptive.path.before(h).1);
+            self.adaptive.set(&core.settings, length, core.report.inner_steps);
+            self.adaptive.integrate(&mut core.motion(), time + from, at - from, &mut self.work.dp, false)?;
+            core.report.inner_steps = self.adaptive.steps;
+            core.check_finite(&self.work.dp)?;
+            let off = self.margin(core, at)?;
+            if off.abs() <= tolerance {
+                return Ok(at);
+            }
+            core.report.max_penetration = deepest;
+            at -= off / slope;
         }
-        let high = self.high.get_or_insert((h, f));
-        match self.same_side {
-            2.. => high.1 *= 0.5,
-            ..=-2 => self.low.1 *= 0.5,
-            _ => {}
-        }
-        let (width, share) = (high.0 - self.low.0, self.low.1 / (self.low.1 - high.1));
-        let bisect = self.low.1 >= FAR || self.same_side.abs() % 4 == 3 || !share.is_finite();
-        self.low.0 + width * if bisect { 0.5 } else { share.clamp(1e-3, 1.0 - 1e-3) }
+        core.x.copy_from_slice(&dense);
+        core.motion().evaluate(time + h, &mut self.work.dp);
+        core.check_finite(&self.work.dp)?;
+        Ok(h)
+    }
+
+    /// The margin of the present state, `h` after the start of the sub-step: one try.
+    fn margin(&mut self, core: &mut Core, h: f64) -> Result<f64, StepError> {
+        core.report.tries += 1;
+        detect(core, 0.0, &mut self.after);
+        limits(core, core.time + h, &mut self.limits_after)?;
+        Ok(self.watch.margin(&self.work.touches, &self.after, &self.limits_after, core.settings.contact_tolerance))
     }
 }
 
 /// Makes the whitened velocity `after` where it was `before`, and refreshes what readers see.
-fn push(core: &mut Core, after: &[f64], before: &[f64], scale: f64) {
+fn push_to(core: &mut Core, after: &[f64], before: &[f64]) {
     let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
-    let mut dp = vec![0.0; core.dof];
-    recover(core, &change, &mut dp);
-    kick(core, &dp, scale);
+    push(core, &change);
     core.motion().refresh();
 }

@@ -1,7 +1,9 @@
 //! From touches to rows, and from multipliers back to momentum: what both steppers share.
 
+use super::closing;
 use super::projection::Projection;
 use crate::detect::{Detector, Touch};
+use crate::motion::coast;
 use crate::object::{Level, RowTarget};
 use crate::row_builder::{RowBuilder, constraints};
 use crate::rows::{RowSet, Rows};
@@ -21,6 +23,10 @@ pub(crate) struct Workspace {
     pub bias: Vec<f64>,
     /// Targets of the constraints' rows, after those of the touches.
     pub targets: Vec<RowTarget>,
+    /// One-sided rows that their constraints locate, at the present state.
+    pub limits: Vec<Limit>,
+    /// First target of each constraint, and the end.
+    pub first: Vec<usize>,
     /// Right-hand side of a solve.
     pub c: Vec<f64>,
     pub lambda: Vec<f64>,
@@ -32,6 +38,33 @@ pub(crate) struct Workspace {
     pub dp: Vec<f64>,
     /// What the projection solves.
     pub projection: Projection,
+}
+
+/// A one-sided row of a constraint, whose gap is told at any state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limit {
+    /// Place of the constraint in the order of constraints, and of the row among its one-sided ones.
+    pub key: [u32; 2],
+    /// Metres or radians; negative where violated.
+    pub gap: f64,
+    /// Its target, where the rows made match the gaps told.
+    pub target: Option<u32>,
+}
+
+/// The one-sided rows that constraints locate, at the present state and sites and at a given time; sorted by key.
+pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(), StepError> {
+    out.clear();
+    let view = WorldView { time, gravity: core.settings.gravity, implicit: core.implicit, x: &core.x, sites: &core.sites, table: &core.table };
+    let mut gaps = Vec::new();
+    for (place, (_, entry, constraint)) in constraints(&core.table).enumerate() {
+        gaps.clear();
+        constraint.gaps(&entry.span, &view, &mut gaps);
+        if gaps.iter().any(|gap| !gap.is_finite()) {
+            return Err(StepError::Row { object: entry.object.name().to_string(), why: "a gap that it tells is not finite".into() });
+        }
+        out.extend(gaps.iter().enumerate().map(|(row, gap)| Limit { key: [place as u32, row as u32], gap: *gap, target: None }));
+    }
+    Ok(())
 }
 
 /// Finds the contacts within reach of the next `horizon` seconds.
@@ -46,28 +79,99 @@ pub(crate) fn detect(core: &mut Core, horizon: f64, out: &mut Vec<Touch>) {
     core.report.contacts = out.len() as u32;
 }
 
-/// State and sites as free motion makes them in `t` seconds; caches stay at the present.
-fn look_ahead(core: &mut Core, t: f64) -> (Vec<f64>, Vec<Site>) {
+/// State and sites at another moment of the step.
+pub(crate) struct Moment {
+    pub x: Vec<f64>,
+    pub sites: Vec<Site>,
+    /// Seconds from the present.
+    pub ahead: f64,
+}
+
+/// State and sites in `ahead` seconds if no momentum changes (or no velocity, of objects whose state holds velocities); caches stay at the present.
+fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
     let start = core.x.clone();
-    core.motion().coast(t);
+    for entry in core.table.iter() {
+        let x = &mut core.x[entry.span.x.clone()];
+        match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
+            Some(body) => {
+                let mut v = vec![0.0; entry.span.v.len()];
+                body.velocity(x, &mut v);
+                body.drift(x, &v, ahead);
+            }
+            None => coast(entry, x, ahead),
+        }
+    }
     core.motion().refresh();
-    let ahead = (std::mem::replace(&mut core.x, start), core.sites.clone());
+    let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
     core.motion().refresh();
-    ahead
+    moment
 }
 
 /// Makes the rows of all touches and constraints: the thesis's test impulses. Touches are as they were found; constraints are asked about the
 /// state that free motion makes in `ahead` seconds, half the step to come: a direction that turns is then right to second order, where one
-/// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Their errors are told for the present state all the same.
+/// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Where there are joints that state is brought back onto them first. The
+/// errors are told for the present state all the same.
 pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ahead: f64) -> Result<(), StepError> {
-    let looked = (ahead > 0.0 && constraints(&core.table).next().is_some()).then(|| look_ahead(core, ahead));
-    let core = &*core;
-    work.rows.clear(core.dof);
-    work.bias.clear();
-    work.targets.clear();
+    if ahead <= 0.0 || constraints(&core.table).next().is_none() {
+        lay_rows(core, work, level, None)?;
+        return locate_limits(core, work);
+    }
+    let middle = look_ahead(core, ahead);
+    lay_rows(core, work, level, Some(&middle))?;
+    let mut present = Vec::new();
+    if work.targets.iter().any(closing::is_joint) {
+        let (errors, made) = closing::middle(core, level, ahead)?;
+        adopt(core, work, made);
+        present = errors;
+    }
+    if present.len() == work.targets.len() {
+        work.targets.iter_mut().zip(present).for_each(|(target, error)| target.error = error);
+    } else {
+        present_errors(core, work, ahead);
+    }
+    locate_limits(core, work)
+}
+
+/// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment.
+pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<(), StepError> {
+    lay_touches(core, work);
     let mut problem = None;
     let mut builder = RowBuilder {
         rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
+        owner: ObjectId::default(),
+    };
+    let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
+    builder.sites = sites;
+    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
+    let mut first = std::mem::take(&mut work.first);
+    first.clear();
+    for (id, entry, constraint) in constraints(&core.table) {
+        first.push(builder.targets.len());
+        builder.owner = id;
+        constraint.rows(&entry.span, &view, level, &mut builder);
+        if let Some(why) = builder.problem.take() {
+            return Err(StepError::Row { object: entry.object.name().to_string(), why });
+        }
+    }
+    first.push(work.targets.len());
+    work.first = first;
+    make_room(work);
+    Ok(())
+}
+
+fn make_room(work: &mut Workspace) {
+    let n = work.rows.len;
+    work.c.resize(n, 0.0);
+    zero(&mut work.lambda, n);
+}
+
+/// The rows of the touches, and no others.
+fn lay_touches(core: &Core, work: &mut Workspace) {
+    work.rows.clear(core.dof);
+    work.bias.clear();
+    work.targets.clear();
+    let mut builder = RowBuilder {
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut None,
         owner: ObjectId::default(),
     };
     for touch in &work.touches {
@@ -76,27 +180,48 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
         builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
         let axes = &touch.frame.axes[..set.rows()];
         for (site, point, sign) in [(touch.a, touch.contact.point, 1.0), (touch.b, touch.point_b(), -1.0)] {
-            let owner = core.owners[site as usize];
-            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
+            let (owner, index) = (core.owners[site as usize], site as usize);
+            let entry = &core.table.slots[owner.id];
+            let pinned = core.pinned_sites().filter(|_| entry.object.integratable().is_some_and(|b| b.holds_velocity()));
+            // the arm stays as it was found: the lowest point of a ball that spins does not turn with it
+            let point = pinned.map_or(point, |sites| point + sites[index].position() - core.sites[index].position());
+            builder.sites = pinned.unwrap_or(&core.sites);
+            builder.point_side(entry, owner.part as usize, &point, axes, sign);
         }
     }
-    let (x, sites) = looked.as_ref().map_or((&core.x, &core.sites), |(x, sites)| (x, sites));
-    builder.sites = sites;
-    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, x, sites, table: &core.table };
-    for (id, entry, constraint) in constraints(&core.table) {
-        builder.owner = id;
-        constraint.rows(&entry.span, &view, level, &mut builder);
-        if let Some(why) = builder.problem.take() {
-            return Err(StepError::Row { object: entry.object.name().to_string(), why });
+}
+
+/// The touches' rows, and after them the constraints' rows of another workspace.
+fn adopt(core: &Core, work: &mut Workspace, made: Workspace) {
+    lay_touches(core, work);
+    for block in &made.rows.blocks {
+        work.rows.push_soft(block.set, block.compliance);
+        for side in block.sides() {
+            if let Some(y) = work.rows.side(side.u as usize, side.dof as usize) {
+                y.copy_from_slice(made.rows.response(side, 0));
+            }
         }
     }
-    if looked.is_some() {
-        present_errors(core, work, ahead);
+    work.bias.extend(made.bias);
+    (work.targets, work.first) = (made.targets, made.first);
+    make_room(work);
+}
+
+/// Gives one-sided rows the gap that their constraint tells for the present state.
+fn locate_limits(core: &Core, work: &mut Workspace) -> Result<(), StepError> {
+    limits(core, core.time, &mut work.limits)?;
+    let first = &work.first;
+    for of_one in work.limits.chunk_by_mut(|a, b| a.key[0] == b.key[0]) {
+        let place = of_one[0].key[0] as usize;
+        let one_sided = (first[place]..first[place + 1]).filter(|&i| work.targets[i].set == RowSet::HalfLine);
+        let rows: Vec<usize> = one_sided.collect();
+        if rows.len() == of_one.len() {
+            for (limit, &row) in of_one.iter_mut().zip(&rows) {
+                limit.target = Some(row as u32);
+                work.targets[row].error = limit.gap;
+            }
+        }
     }
-    let n = work.rows.len;
-    work.c.resize(n, 0.0);
-    work.lambda.clear();
-    work.lambda.resize(n, 0.0);
     Ok(())
 }
 
@@ -120,10 +245,26 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
     zero(du, core.dof);
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
-        body.whiten(&core.x[entry.span.x.clone()], &mut u[v.clone()]);
-        body.respond(&dp[v.clone()], &mut du[v.clone()]);
+        let x = if body.holds_velocity() { core.pinned().unwrap_or(&core.x) } else { &core.x };
+        body.whiten(&x[entry.span.x.clone()], &mut u[v.clone()]);
+        body.whiten_rate(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
+}
+
+/// What `h` seconds of coasting add to the whitened velocity of objects whose state holds velocities, from where they are pinned. Rows of joints
+/// are to hold at the end of the step, and aim ahead by it; a contact's point does not go with the part as it turns, and does not.
+pub(crate) fn coasting(core: &Core, h: f64) -> Vec<f64> {
+    let mut out = vec![0.0; core.dof];
+    let Some(middle) = core.pinned() else { return out };
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+        let (v, mut rate) = (entry.span.v.clone(), vec![0.0; entry.span.v.len()]);
+        body.coasting_rate(&middle[entry.span.x.clone()], &mut rate);
+        rate.iter_mut().for_each(|r| *r *= h);
+        body.whiten_rate(&rate, &mut out[v]);
+    }
+    out
 }
 
 /// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
@@ -133,7 +274,7 @@ pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
         let mut turning = vec![0.0; v.len()];
         body.gyroscopic(&core.x[entry.span.x.clone()], &mut turning);
-        body.respond(&turning, &mut out[v]);
+        body.whiten_rate(&turning, &mut out[v]);
     }
     out
 }
@@ -144,33 +285,48 @@ pub(crate) fn zero(v: &mut Vec<f64>, n: usize) {
     v.resize(n, 0.0);
 }
 
-/// What a change `du` of whitened velocity means as momentum.
-pub(crate) fn recover(core: &Core, du: &[f64], dp: &mut [f64]) {
-    dp.fill(0.0);
+/// The generalized impulse (or force) that a change `du` of whitened velocity (or acceleration) means.
+pub(crate) fn recover(core: &Core, du: &[f64], j: &mut [f64]) {
+    j.fill(0.0);
     for entry in core.table.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.recover(&du[entry.span.v.clone()], &mut dp[entry.span.v.clone()]);
+            body.recover(&du[entry.span.v.clone()], &mut j[entry.span.v.clone()]);
         }
     }
 }
 
-/// Adds momentum to the state.
-pub(crate) fn kick(core: &mut Core, dp: &[f64], h: f64) {
+/// Changes the whitened velocity of the state by `du`; the momentum (or velocity) that this is.
+pub(crate) fn push(core: &mut Core, du: &[f64]) -> Vec<f64> {
+    let mut dp = vec![0.0; core.dof];
     for entry in core.table.iter().filter(|e| e.moves()) {
-        if let Some(body) = entry.object.integratable() {
-            body.kick(&mut core.x[entry.span.x.clone()], &dp[entry.span.v.clone()], h);
-        }
+        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        body.unwhiten_rate(&du[v.clone()], &mut dp[v.clone()]);
+        body.kick(&mut core.x[entry.span.x.clone()], &dp[v], 1.0);
     }
+    dp
 }
 
-/// Moves positions by `h·L⁻¹u`.
+/// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy: where the state holds velocities and the mass matrix changes with the pose,
+/// they are scaled to have the energy that they had.
 pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
-        if v.iter().any(|x| *x != 0.0) {
-            let mut velocity = vec![0.0; v.len()];
-            body.unwhiten(v, &mut velocity);
-            body.drift(&mut core.x[entry.span.x.clone()], &velocity, h);
+        if v.iter().all(|x| *x == 0.0) {
+            continue;
+        }
+        let (x, mut velocity) = (&mut core.x[entry.span.x.clone()], vec![0.0; v.len()]);
+        body.unwhiten(v, &mut velocity);
+        if !body.holds_velocity() {
+            body.drift(x, &velocity, h);
+            continue;
+        }
+        let before = body.energy(x, &Vec3::zeros()).kinetic;
+        body.drift(x, &velocity, h);
+        let scale = (before / body.energy(x, &Vec3::zeros()).kinetic).sqrt();
+        if scale.is_finite() {
+            body.velocity(x, &mut velocity);
+            velocity.iter_mut().for_each(|v| *v *= scale);
+            body.write_velocity(x, &velocity);
         }
     }
 }

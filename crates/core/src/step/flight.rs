@@ -74,7 +74,7 @@ fn glance(a: (&Shape, &Site), b: (&Shape, &Site), time: f64, h: f64, samples: f6
 fn shape(core: &Core, site: u32) -> Option<&Shape> {
     let owner = core.owners[site as usize];
     let body: &dyn Collidable = core.table.slots[owner.id].object.collidable()?;
-    Some(body.shape(owner.part as usize))
+    body.shape(owner.part as usize)
 }
 
 /// The moment at which the touch has closed to `near`, and the contact there; `None` where it does not within `h`.

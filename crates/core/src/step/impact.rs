@@ -11,7 +11,8 @@
 //!
 //! A contact slower than its rest speed has `e = 0`. When only such contacts approach, or after the cap, all candidates are solved at once with
 //! `e = 0`, which ends the phase. With equal `e` on `A` and no friction the energy of a pass cannot grow; with friction or unequal `e` Newton's law can
-//! create energy, so a pass that does is blended with its `e = 0` solution just as far as the energy allows.
+//! create energy, so a pass that does is blended with its `e = 0` solution just as far as the energy allows. A one-sided row of a constraint takes
+//! part where its gap is within the contact tolerance, always with `e = 0`.
 
 use super::contacts::{Workspace, row_velocities, zero};
 use crate::object::RowTarget;
@@ -32,8 +33,6 @@ pub(crate) struct Candidate {
 
 /// Impacts are solved to this share of the fastest row velocity, so that a reflection keeps energy to about this share.
 const PRECISION: f64 = 1e-13;
-/// A one-sided row of a constraint takes part when its gap is no larger, metres or radians.
-const AT_LIMIT: f64 = 1e-7;
 /// An approach slower than this is none, m/s.
 const APPROACH: f64 = 1e-9;
 /// An impact slower than this never bounces, m/s: bodies wedged between others would chatter for ever.
@@ -41,7 +40,7 @@ pub(crate) const SLOWEST_BOUNCE: f64 = 1e-4;
 
 /// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`.
 pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candidate], cap: u32, u: &mut [f64], total: &mut [f64]) {
-    let set = core.settings.accuracy;
+    let (set, reach) = (core.settings.accuracy, core.settings.contact_tolerance);
     let mut c = Vec::new();
     for pass in 0..=cap {
         row_velocities(&work.rows, &work.bias, u, &mut c);
@@ -49,7 +48,7 @@ pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candi
         let approach = |i: usize| candidates[i].takes_part && c[work.rows.blocks[i].row as usize] < -APPROACH;
         let bounces = |i: usize| approach(i) && candidates[i].restitution > 0.0 && -c[work.rows.blocks[i].row as usize] > candidates[i].rest_speed;
         let limits = work.rows.blocks[candidates.len()..].iter().zip(&work.targets);
-        let at_limit = |(block, t): (&Block, &RowTarget)| at_stop(t) && c[block.row as usize] < -APPROACH;
+        let at_limit = |(block, t): (&Block, &RowTarget)| at_stop(t, reach) && c[block.row as usize] < -APPROACH;
         if !(0..candidates.len()).any(approach) && !limits.clone().any(at_limit) {
             return;
         }
@@ -68,9 +67,9 @@ pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candi
     }
 }
 
-/// Whether a row is a rigid stop that is reached; springs do nothing in no time.
-fn at_stop(t: &RowTarget) -> bool {
-    t.set == RowSet::HalfLine && t.error <= AT_LIMIT && t.compliance == 0.0
+/// Whether a row is a rigid stop that is within `reach`; springs do nothing in no time.
+fn at_stop(t: &RowTarget, reach: f64) -> bool {
+    t.set == RowSet::HalfLine && t.error <= reach && t.compliance == 0.0
 }
 
 /// Velocities of the constraints' rows against their targets.
@@ -83,9 +82,9 @@ fn aim_constraints(work: &Workspace, c: &mut [f64]) {
 /// One pass: leaves the multipliers in `work.lambda` and their effect in `work.du`.
 fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bounce: &[f64], accuracy: Accuracy) {
     let touches = work.touches.len();
-    let targets = &work.targets;
+    let (targets, reach) = (&work.targets, core.settings.contact_tolerance);
     work.islands.build(&work.rows, |b| {
-        let takes_part = |t: &RowTarget| (t.set == RowSet::Equality && t.compliance == 0.0) || at_stop(t);
+        let takes_part = |t: &RowTarget| (t.set == RowSet::Equality && t.compliance == 0.0) || at_stop(t, reach);
         if b < touches { member[b] } else { takes_part(&targets[b - touches]) }
     });
     work.c.copy_from_slice(c);

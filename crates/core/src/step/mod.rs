@@ -1,9 +1,12 @@
 //! One frame of simulated time, by either of two steppers.
 
 mod backtracking;
+mod closing;
 mod contacts;
 mod flight;
+mod hold;
 mod impact;
+mod locate;
 mod projection;
 mod time_stepping;
 

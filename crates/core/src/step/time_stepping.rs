@@ -12,11 +12,15 @@
 //! With `τ = h/2` the displacement is the mean of the old and the new velocity: second order on lasting contacts too (a block slides to its
 //! stop as it should). With an impact the two coasts and the term `(τ − h/2)·h·a` add up to the parabola before and the parabola after.
 //!
+//! Objects whose state holds velocities (articulated bodies) are pushed where they are at `x_½`: the mass matrix, the rows and the velocity before the
+//! push are those of the middle. Coasting keeps kinetic energy, a push by contacts takes some, and displacement leaves it: nothing here feeds it.
+//!
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, kick, recover, row_velocities, solve, warm_start, whiten, zero};
+use super::contacts::{build_rows, coasting, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
+use super::closing;
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
@@ -59,6 +63,7 @@ impl Stepper for TimeStepping {
 impl TimeStepping {
     /// One sub-step of `h` seconds.
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
+        core.implicit = true;
         self.smooth_forces(core, h)?;
         detect(core, h, &mut self.work.touches);
         flight::time_contacts(core, h, &mut self.work.touches);
@@ -82,9 +87,13 @@ impl TimeStepping {
         let mut motion = core.motion();
         motion.coast(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
+        motion.take_off_coasting(&mut self.work.dp);
+        core.check_finite(&self.work.dp)?;
+        let middle = core.x.clone();
         core.x.copy_from_slice(&self.x0);
+        core.pin(middle);
         core.motion().refresh();
-        core.check_finite(&self.work.dp)
+        Ok(())
     }
 
     /// Times the impacts that free motion meets within the step and resolves them; the whitened velocity after them, forces not yet added.
@@ -128,9 +137,8 @@ impl TimeStepping {
         if self.impact.iter().all(|i| *i == 0.0) {
             return Ok(());
         }
-        let (change, mut dp): (Vec<f64>, Vec<f64>) = (after.iter().zip(before).map(|(a, b)| a - b).collect(), vec![0.0; core.dof]);
-        recover(core, &change, &mut dp);
-        kick(core, &dp, 1.0);
+        let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
+        push(core, &change);
         core.motion().refresh();
         let mut found = Vec::new();
         detect(core, h, &mut found);
@@ -192,9 +200,9 @@ impl TimeStepping {
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / h };
         }
-        let turning = if work.targets.is_empty() { Vec::new() } else { gyroscopic(core) };
+        let (turning, coasting) = if work.targets.is_empty() { Default::default() } else { (gyroscopic(core), coasting(core, 0.5 * h)) };
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
-            work.c[block.row as usize] -= h * work.rows.row_velocity(block, 0, &turning);
+            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &coasting) - h * work.rows.row_velocity(block, 0, &turning);
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
@@ -210,12 +218,10 @@ impl TimeStepping {
     fn commit(&mut self, core: &mut Core, h: f64, u0: &[f64], u1: &[f64], du_force: &[f64]) -> Result<(), StepError> {
         let share = |i: usize| if self.share[i] < 0.0 { 0.5 } else { self.share[i] };
         let change: Vec<f64> = u1.iter().zip(u0).map(|(a, b)| a - b).collect();
-        let mut dp = vec![0.0; core.dof];
-        recover(core, &change, &mut dp);
         for entry in core.table.iter() {
             coast(entry, &mut core.x[entry.span.x.clone()], h * entry.span.v.clone().next().map_or(0.5, share));
         }
-        kick(core, &dp, 1.0);
+        let dp = push(core, &change);
         for entry in core.table.iter() {
             coast(entry, &mut core.x[entry.span.x.clone()], h * entry.span.v.clone().next().map_or(0.5, |i| 1.0 - share(i)));
         }
@@ -227,6 +233,9 @@ impl TimeStepping {
         projection::project(core, &mut self.work, Displacement::Step { mean: &mean, h }, recovery, least);
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
+        let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
+        closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
+        core.unpin();
         core.check_finite(&dp)
     }
 }

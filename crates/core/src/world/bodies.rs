@@ -118,6 +118,21 @@ impl World {
         Ok(())
     }
 
+    /// Applies generalized forces during the next frame, one per degree of freedom of the object: joint torques (N·m) and forces (N).
+    pub fn apply_generalized(&mut self, id: ObjectId, forces: &[f64]) -> Result<(), WorldError> {
+        let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        let name = || entry.object.name().to_string();
+        if forces.len() != entry.span.v.len() {
+            return Err(WorldError::Freedoms { name: name(), dof: entry.span.v.len(), given: forces.len() });
+        }
+        if forces.iter().any(|x| !x.is_finite()) {
+            return Err(WorldError::NotFinite(name()));
+        }
+        let applied = &mut self.core.applied_generalized[entry.span.v.clone()];
+        applied.iter_mut().zip(forces).for_each(|(applied, force)| *applied += force);
+        Ok(())
+    }
+
     /// Applies an impulse (N·s) at a world point of one part, at once.
     pub fn apply_impulse(&mut self, id: ObjectId, part: usize, impulse: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[impulse, *point])?;
@@ -128,7 +143,7 @@ impl World {
         let (mut y, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof]);
         collidable.test_impulse(part, &core.sites[index], point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
         let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
-        body.recover(&du, &mut dp);
+        body.unwhiten_rate(&du, &mut dp);
         body.kick(&mut core.x[entry.span.x.clone()], &dp, 1.0);
         core.motion().refresh();
         Ok(())

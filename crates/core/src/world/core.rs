@@ -21,6 +21,30 @@ pub enum StepError {
         /// Simulated time, s.
         time: f64,
     },
+    /// An object's mass matrix has no inverse where it is.
+    #[error("'{object}' at t = {time} s: {why}")]
+    Singular {
+        /// Object.
+        object: String,
+        /// What is singular, and what helps.
+        why: String,
+        /// Simulated time, s.
+        time: f64,
+    },
+    /// The adaptive integrator cannot hold its tolerance.
+    #[error("'{object}' at t = {time} s: its motion needs more than the {steps} inner steps of this frame (the last of {step} s) at the integrator's tolerance {tolerance}; soften what acts on it, or loosen the tolerance")]
+    Tolerance {
+        /// The object whose error is greatest.
+        object: String,
+        /// Simulated time, s.
+        time: f64,
+        /// Length of the last inner step tried, s.
+        step: f64,
+        /// Inner steps of this frame, refused ones included.
+        steps: u32,
+        /// `Settings::integrator_tolerance`.
+        tolerance: f64,
+    },
     /// A constraint made a row that cannot be.
     #[error("constraint '{object}': {why}")]
     Row {
@@ -64,7 +88,12 @@ pub struct Core {
     pub(crate) sites: Vec<Site>,
     pub(crate) owners: Vec<Owner>,
     pub(crate) applied: Vec<Wrench>,
+    pub(crate) applied_generalized: Vec<f64>,
+    /// See [`WorldView::implicit`](crate::WorldView::implicit).
+    pub(crate) implicit: bool,
     pub(crate) held: Vec<f64>,
+    /// Where the caches of objects whose state holds velocities are kept, whatever state is refreshed; empty for none. And their sites there.
+    pub(crate) pinned: (Vec<f64>, Vec<Site>),
     pub(crate) forces: Forces,
     pub(crate) settings: Settings,
     pub(crate) time: f64,
@@ -76,13 +105,43 @@ pub struct Core {
     pub(crate) contacts: Vec<ContactPoint>,
     pub(crate) report: StepReport,
     pub(crate) next_serial: u32,
+    /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
+    pub(crate) inner_step: f64,
 }
 
 impl Core {
+    /// Keeps the caches of objects whose state holds velocities at `middle` until [`unpin`](Self::unpin): their impulses act in the middle of a
+    /// step, as momentum kicks do for others. Sites still follow the state.
+    pub(crate) fn pin(&mut self, middle: Vec<f64>) {
+        if self.table.iter().any(|e| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity())) {
+            self.pinned = (middle, self.sites.clone());
+        }
+    }
+
+    /// Lets the caches follow again from the next refresh on; what was pinned, to be put back.
+    pub(crate) fn unpin(&mut self) -> (Vec<f64>, Vec<Site>) {
+        std::mem::take(&mut self.pinned)
+    }
+
+    pub(crate) fn pin_again(&mut self, pinned: (Vec<f64>, Vec<Site>)) {
+        self.pinned = pinned;
+    }
+
+    /// The state of the pinned caches.
+    pub(crate) fn pinned(&self) -> Option<&Vec<f64>> {
+        Some(&self.pinned.0).filter(|x| !x.is_empty())
+    }
+
+    /// The sites of the pinned caches; only those of objects whose state holds velocities are there.
+    pub(crate) fn pinned_sites(&self) -> Option<&Vec<Site>> {
+        Some(&self.pinned.1).filter(|x| !x.is_empty())
+    }
+
     pub(crate) fn motion(&mut self) -> Motion<'_> {
         Motion {
             table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces,
-            gravity: self.settings.gravity, applied: &self.applied, held: &self.held,
+            gravity: self.settings.gravity, implicit: self.implicit, applied: &self.applied, applied_generalized: &self.applied_generalized, held: &self.held,
+            pinned: &self.pinned.0, pinned_sites: &mut self.pinned.1,
         }
     }
 
@@ -117,8 +176,12 @@ impl Core {
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
     }
 
-    /// Stops forces and impulses that are not numbers.
+    /// Stops forces and impulses that are not numbers, and objects that cannot move.
     pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
+        let trouble = |e: &Entry| Some((e.object.name().to_string(), e.object.integratable()?.trouble()?));
+        if let Some((object, why)) = self.table.iter().filter(|e| e.moves()).find_map(trouble) {
+            return Err(StepError::Singular { object, why, time: self.time });
+        }
         let accelerates = |s: &Site| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
         let fine = |e: &&Entry| dp[e.span.v.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(accelerates);
         let bad = self.table.iter().find(|e| !fine(e));

@@ -57,6 +57,16 @@ pub enum WorldError {
         /// Part asked for.
         part: usize,
     },
+    /// As many numbers are wanted as the object has degrees of freedom.
+    #[error("'{name}' has {dof} degrees of freedom, and {given} numbers were given")]
+    Freedoms {
+        /// Object.
+        name: String,
+        /// Its degrees of freedom.
+        dof: usize,
+        /// Numbers given.
+        given: usize,
+    },
     /// Numbers that are no state of this object: wrong length, not finite, or an orientation that is not of unit length.
     #[error("'{0}': these numbers are no state of it (wrong length, not finite, or an orientation that is not of unit length)")]
     BadState(String),
@@ -79,10 +89,10 @@ impl World {
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
         let core = Core {
-            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), held: Vec::new(),
+            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), pinned: Default::default(),
             forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
-            report: StepReport::default(), next_serial: 0,
+            report: StepReport::default(), next_serial: 0, inner_step: 0.0,
         };
         Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new(), names: BTreeMap::new() })
     }
@@ -120,12 +130,14 @@ impl World {
         core.report = StepReport::default();
         core.held.fill(0.0);
         self.before.clone_from(&core.x);
-        let (time, warm) = (core.time, core.warm.clone());
+        let (time, warm, inner_step) = (core.time, core.warm.clone(), core.inner_step);
         let outcome = self.stepper.step(Frame { core });
         core.applied.fill(Wrench::default());
+        core.applied_generalized.fill(0.0);
         if let Err(error) = outcome {
             core.x.clone_from(&self.before);
-            (core.time, core.warm) = (time, warm);
+            core.unpin();
+            (core.time, core.warm, core.inner_step) = (time, warm, inner_step);
             core.sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
             core.motion().refresh();
             return Err(error);
@@ -167,7 +179,7 @@ impl World {
     /// A read-only view, as objects get it.
     pub fn view(&self) -> WorldView<'_> {
         let c = &self.core;
-        WorldView { time: c.time, gravity: c.settings.gravity, x: &c.x, sites: &c.sites, table: &c.table }
+        WorldView { time: c.time, gravity: c.settings.gravity, implicit: false, x: &c.x, sites: &c.sites, table: &c.table }
     }
 
     /// Ids in the order in which the objects were added.
@@ -248,6 +260,7 @@ impl World {
         }
         core.dof = span.v.end;
         core.held.resize(core.dof, 0.0);
+        core.applied_generalized.resize(core.dof, 0.0);
         core.sites.resize(span.site.end, Site::default());
         core.applied.resize(span.site.end, Wrench::default());
         let serial = core.next_serial;
@@ -272,6 +285,7 @@ impl World {
         core.applied.drain(gone.span.site.clone());
         core.dof -= gone.span.v.len();
         core.held.truncate(core.dof);
+        core.applied_generalized.drain(gone.span.v.clone());
         let (dx, dv, ds) = (gone.span.x.len(), gone.span.v.len(), gone.span.site.len());
         for &other in &core.table.order {
             let span = &mut core.table.slots[other].span;
@@ -293,10 +307,10 @@ impl World {
         let c = &self.core;
         World {
             core: Core {
-                table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(),
+                table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(),
                 held: c.held.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
-                contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial,
+                contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, inner_step: c.inner_step,
             },
             stepper: self.stepper.fork(),
             before: Vec::new(),

@@ -1,8 +1,8 @@
 //! Saving and restoring: everything that the next step reads, and nothing else.
 //!
 //! A snapshot is the state `X`, the switches, the sites' accelerations (objects may read them), the forces that users applied, the warm starts,
-//! time and frame. Shapes, masses and settings are the scene's and are not in it: it is restored into a world of the same objects, which is
-//! checked by their names and sizes. The sweep order of the broad phase is left out because its pairs come sorted: no result depends on it.
+//! time and frame, and the adaptive integrator's inner step. Shapes, masses and settings are the scene's and are not in it: it is restored into
+//! a world of the same objects, which is checked by their names and sizes. The sweep order of the broad phase is left out because its pairs come sorted: no result depends on it.
 
 use super::World;
 use crate::detect::WarmStarts;
@@ -32,7 +32,7 @@ pub enum SnapshotError {
     NotFinite,
 }
 
-const MAGIC: [u8; 8] = *b"tumbleS1";
+const MAGIC: [u8; 8] = *b"tumbleS2";
 /// Objects that a world may have seen, at most; frames are capped by its square.
 const MOST: u32 = 1 << 31;
 
@@ -48,7 +48,10 @@ struct Snapshot {
     accelerations: Vec<[f64; 6]>,
     /// Torque, then force on every site.
     applied: Vec<[f64; 6]>,
+    applied_generalized: Vec<f64>,
     warm: WarmStarts,
+    /// Inner step of the adaptive integrator, s.
+    inner_step: f64,
 }
 
 #[derive(Serialize, Deserialize, PartialEq)]
@@ -86,7 +89,9 @@ impl World {
             x: c.x.clone(),
             accelerations: c.sites.iter().map(|s| six(&s.angular_acceleration, &s.acceleration)).collect(),
             applied: c.applied.iter().map(|w| six(&w.torque, &w.force)).collect(),
+            applied_generalized: c.applied_generalized.clone(),
             warm: c.warm.clone(),
+            inner_step: c.inner_step,
         };
         postcard::to_stdvec(&snapshot).unwrap_or_default() // writing plain numbers to memory cannot fail
     }
@@ -95,11 +100,12 @@ impl World {
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
         let saved: Snapshot = postcard::from_bytes(bytes).map_err(|e| SnapshotError::Format(e.to_string()))?;
         if saved.magic != MAGIC {
-            return Err(SnapshotError::Format("the first eight bytes are not 'tumbleS1'".into()));
+            return Err(SnapshotError::Format("the first eight bytes are not 'tumbleS2'".into()));
         }
         self.check(&saved)?;
         let core = &mut self.core;
         (core.time, core.frame, core.next_serial, core.warm) = (saved.time, saved.frame, saved.next_serial, saved.warm);
+        core.inner_step = saved.inner_step;
         core.x = saved.x;
         for (i, object) in saved.objects.iter().enumerate() {
             let entry = &mut core.table.slots[core.table.order[i]];
@@ -113,6 +119,7 @@ impl World {
             let (torque, force) = halves(w);
             *wrench = Wrench { torque, force };
         }
+        core.applied_generalized = saved.applied_generalized;
         core.contacts.clear();
         core.held.fill(0.0);
         core.motion().refresh();
@@ -139,11 +146,13 @@ impl World {
             }
         }
         let c = &self.core;
-        if (saved.x.len(), saved.accelerations.len(), saved.applied.len()) != (c.x.len(), c.sites.len(), c.sites.len()) {
+        let sizes = |s: &Snapshot| [s.x.len(), s.accelerations.len(), s.applied.len(), s.applied_generalized.len()];
+        if sizes(saved) != [c.x.len(), c.sites.len(), c.sites.len(), c.dof] {
             return Err(SnapshotError::Format("its tables have the wrong lengths".into()));
         }
-        let numbers = saved.x.iter().chain(saved.accelerations.iter().flatten()).chain(saved.applied.iter().flatten());
-        let finite = saved.time.is_finite() && numbers.copied().all(f64::is_finite) && saved.warm.finite();
+        let numbers = saved.x.iter().chain(&saved.applied_generalized).chain(saved.accelerations.iter().flatten()).chain(saved.applied.iter().flatten());
+        let steps = saved.time.is_finite() && saved.inner_step.is_finite() && saved.inner_step >= 0.0;
+        let finite = steps && numbers.copied().all(f64::is_finite) && saved.warm.finite();
         let states = c.table.iter().all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.span.x.clone()])));
         if !(finite && states) {
             return Err(SnapshotError::NotFinite);

@@ -4,6 +4,7 @@ use super::small;
 use crate::{DebugStyle, DrawList};
 use nalgebra::Point3;
 use std::str::FromStr;
+use tumble_core::collide::Shape;
 use tumble_core::{ContactPoint, Mode, World};
 
 /// Which overlays to draw.
@@ -103,7 +104,7 @@ fn trees(world: &World, list: &mut DrawList, level: u32) {
     for &id in world.ids() {
         let Some(collidable) = world.object(id).and_then(|o| o.collidable()) else { continue };
         for part in 0..collidable.parts() {
-            let (Some(site), Some(tree)) = (world.site(id, part), collidable.shape(part).tree()) else { continue };
+            let (Some(site), Some(tree)) = (world.site(id, part), collidable.shape(part).and_then(Shape::tree)) else { continue };
             let shown = tree.nodes().iter().filter(|n| n.level == level || (n.is_leaf() && n.level < level));
             for (node, color) in shown.zip(SHELL_COLORS.iter().cycle()) {
                 let center = site.pose * nalgebra::Point3::from(node.center);

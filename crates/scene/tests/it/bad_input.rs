@@ -3,7 +3,7 @@
 use tumble_scene::SceneFile;
 
 /// Reads `text` as `s.toml` and compares all that is told with `expected`, one line per problem.
-fn told(text: &str, expected: &[&str]) {
+pub fn told(text: &str, expected: &[&str]) {
     let error = SceneFile::parse(text, "s.toml").expect_err("the scene is wrong");
     let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();
     assert_eq!(lines, expected, "for:\n{text}");

@@ -1,7 +1,11 @@
 //! What `tumble-scene` promises of scene files.
 
+mod articulated;
 mod bad_input;
 mod expansion;
 mod finding;
+mod pinocchio;
+mod robots;
 mod robust;
 mod shipped;
+mod urdf;

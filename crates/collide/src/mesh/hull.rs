@@ -1,0 +1,171 @@
+//! Convex hull of a mesh's vertices: quickhull (Barber, Dobkin and Huhdanpaa 1996) on integers, so that no case is degenerate.
+//!
+//! Vertices are put on a grid of 2²⁰ cells along the longest side of their box, where the sign of
+//!
+//! ```text
+//! d(f, p) = (b − a) × (c − a) · (p − a),     f = (a, b, c) counter-clockwise seen from outside
+//! ```
+//!
+//! is exact in 64 bits: products of three differences of at most 2²⁰ sum to less than 2⁶³. A face sees `p` iff `d > 0`. The faces that see a point
+//! then form one patch with one simple rim, and no new face is without area: were `p` in line with an edge of the rim, it would be in the plane of the
+//! face that is said to see it.
+//!
+//! Departure from the paper: points in the plane of a face are not merged into it, so flat sides come out as several triangles.
+
+use super::TriMesh;
+use crate::{MeshError, Vec3};
+use std::collections::BTreeMap;
+
+/// Cells along the longest side.
+const CELLS: f64 = 1_048_576.0;
+
+type Point = [i64; 3];
+
+/// A triangle of the hull as it grows.
+struct Face {
+    corners: [u32; 3],
+    /// The face beyond the edge from corner `k` to the next.
+    beyond: [usize; 3],
+    /// Points that it sees and no other face is in charge of.
+    outside: Vec<u32>,
+    alive: bool,
+}
+
+impl TriMesh {
+    /// The convex hull of the vertices in use by triangles: closed and wound outwards. Its vertices are within half a millionth of the longest side
+    /// of the bounding box of those that it stands for.
+    ///
+    /// # Errors
+    /// As [`check_data`](Self::check_data); [`MeshError::NoVolume`] where all vertices lie in a plane (to that accuracy).
+    pub fn convex_hull(&self) -> Result<TriMesh, MeshError> {
+        self.check_data()?;
+        let mesh = self.welded();
+        let (least, cell) = (mesh.aabb().min, (mesh.aabb().max - mesh.aabb().min).max() / CELLS);
+        if cell == 0.0 {
+            return Err(MeshError::NoVolume { volume: 0.0 });
+        }
+        let mut points: Vec<Point> = mesh.vertices.iter().map(|v| ((v - least) / cell).map(|x| x.round() as i64).into()).collect();
+        points.sort_unstable();
+        points.dedup();
+        let faces = Hull::of(&points).ok_or(MeshError::NoVolume { volume: 0.0 })?.finished();
+        let place = |p: &Point| least + cell * Vec3::new(p[0] as f64, p[1] as f64, p[2] as f64);
+        Ok(TriMesh { vertices: points.iter().map(place).collect(), triangles: faces }.welded())
+    }
+}
+
+struct Hull<'p> {
+    points: &'p [Point],
+    faces: Vec<Face>,
+    /// Faces that may have points outside.
+    waiting: Vec<usize>,
+}
+
+impl<'p> Hull<'p> {
+    /// Grown to the end; `None` where all points lie in a plane.
+    fn of(points: &'p [Point]) -> Option<Hull<'p>> {
+        let mut hull = Hull { points, faces: Vec::new(), waiting: Vec::new() };
+        hull.start()?;
+        while let Some(face) = hull.waiting.pop() {
+            if hull.faces[face].alive && !hull.faces[face].outside.is_empty() {
+                hull.add_farthest(face);
+            }
+        }
+        Some(hull)
+    }
+
+    /// A tetrahedron of points far apart, and all others given to its faces.
+    fn start(&mut self) -> Option<()> {
+        let points = self.points;
+        let all = || 0..points.len() as u32;
+        let (a, b) = (0, points.len() as u32 - 1);
+        let area = |p: &u32| cross(points[a as usize], points[b as usize], points[*p as usize]).iter().map(|x| i128::from(*x).pow(2)).sum::<i128>();
+        let c = all().max_by_key(area).filter(|p| area(p) > 0)?;
+        let height = |p: &u32| self.sees(&[a, b, c], *p).abs();
+        let d = all().max_by_key(height).filter(|p| height(p) > 0)?;
+        let [a, b] = if self.sees(&[a, b, c], d) < 0 { [a, b] } else { [b, a] };
+        for corners in [[a, b, c], [b, a, d], [c, b, d], [a, c, d]] {
+            self.faces.push(Face { corners, beyond: [0; 3], outside: Vec::new(), alive: true });
+        }
+        for (face, beyond) in [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]].into_iter().enumerate() {
+            self.faces[face].beyond = beyond;
+        }
+        let others = all().filter(|p| ![a, b, c, d].contains(p)).collect();
+        self.share(others, 0);
+        Some(())
+    }
+
+    /// `d(f, p)`: positive where the face sees the point.
+    fn sees(&self, corners: &[u32; 3], p: u32) -> i64 {
+        let [a, b, c] = corners.map(|v| self.points[v as usize]);
+        let (n, p) = (cross(a, b, c), self.points[p as usize]);
+        (0..3).map(|k| n[k] * (p[k] - a[k])).sum()
+    }
+
+    /// Gives each point to the first face from `first` on that sees it; who is seen by none is inside.
+    fn share(&mut self, points: Vec<u32>, first: usize) {
+        for p in points {
+            if let Some(face) = (first..self.faces.len()).find(|&f| self.sees(&self.faces[f].corners, p) > 0) {
+                self.faces[face].outside.push(p);
+            }
+        }
+        self.waiting.extend((first..self.faces.len()).filter(|&f| !self.faces[f].outside.is_empty()));
+    }
+
+    /// Replaces all faces that see the farthest point of `face` by a cone from their rim to it.
+    fn add_farthest(&mut self, face: usize) {
+        let corners = self.faces[face].corners;
+        let Some(apex) = self.faces[face].outside.iter().copied().max_by_key(|&p| (self.sees(&corners, p), p)) else { return };
+        let (patch, rim) = self.patch(face, apex);
+        let first = self.faces.len();
+        let number: BTreeMap<u32, usize> = rim.iter().enumerate().map(|(k, (from, ..))| (*from, first + k)).collect();
+        let before: BTreeMap<u32, usize> = rim.iter().enumerate().map(|(k, (_, to, ..))| (*to, first + k)).collect();
+        for (k, &(from, to, beyond, edge)) in rim.iter().enumerate() {
+            self.faces[beyond].beyond[edge] = first + k;
+            self.faces.push(Face { corners: [from, to, apex], beyond: [beyond, number[&to], before[&from]], outside: Vec::new(), alive: true });
+        }
+        let mut left = Vec::new();
+        for gone in patch {
+            self.faces[gone].alive = false;
+            left.extend(std::mem::take(&mut self.faces[gone].outside).into_iter().filter(|&p| p != apex));
+        }
+        self.share(left, first);
+    }
+
+    /// The faces that see `apex`, and their rim: edges `from → to`, each with the face beyond it and the number of the edge there.
+    fn patch(&self, face: usize, apex: u32) -> (Vec<usize>, Vec<(u32, u32, usize, usize)>) {
+        let mut patch = vec![face];
+        let mut inside: BTreeMap<usize, bool> = BTreeMap::from([(face, true)]);
+        let mut rim = Vec::new();
+        let mut next = 0;
+        while next < patch.len() {
+            let here = &self.faces[patch[next]];
+            next += 1;
+            for k in 0..3 {
+                let other = here.beyond[k];
+                let seen = *inside.entry(other).or_insert_with(|| {
+                    let seen = self.sees(&self.faces[other].corners, apex) > 0;
+                    if seen {
+                        patch.push(other);
+                    }
+                    seen
+                });
+                if !seen {
+                    let (from, to) = (here.corners[k], here.corners[(k + 1) % 3]);
+                    let edge = self.faces[other].corners.iter().position(|v| *v == to).unwrap_or(0);
+                    rim.push((from, to, other, edge));
+                }
+            }
+        }
+        (patch, rim)
+    }
+
+    fn finished(self) -> Vec<[u32; 3]> {
+        self.faces.into_iter().filter(|face| face.alive).map(|face| face.corners).collect()
+    }
+}
+
+/// `(b − a) × (c − a)`.
+fn cross(a: Point, b: Point, c: Point) -> Point {
+    let [u, v] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+}

@@ -1,0 +1,341 @@
+//! The articulated body (thesis §III.B, `KSkeleton` of Fig. 12): one object, exact at its joints, whose links collide like any body.
+//!
+//! State `X = [q, v]`: the model's positions, then its velocities (see [`Joint`](super::Joint) for what the numbers of each joint mean). Parts, and so rows of the site
+//! table: one per moving link, with the link's frame and no shape, in the order of [`Model::links`]; then one for the base, which stands still; then one
+//! per collider, with its own frame.
+//! Generalized velocity is `v`; the mass matrix is whitened by the articulated inertias, `M = LᵀL`.
+
+use super::dynamics::{Dynamics, Scratch};
+use super::freedom::{Coupling, Freedom};
+use super::kinematics::Kinematics;
+use super::model::Model;
+use crate::collidable::{CollisionKind, Material};
+use crate::object::Visual;
+use nalgebra::Quaternion;
+use std::sync::{Mutex, MutexGuard};
+use tumble_collide::{Pose, Quat, Shape, Vec3};
+
+/// What is wrong with an articulated body.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ArticulatedError {
+    /// No such frame in the model.
+    #[error("articulated body '{body}' has no link named '{link}'")]
+    NoLink {
+        /// Body.
+        body: String,
+        /// Name asked for.
+        link: String,
+    },
+    /// A joint's constant is out of its range.
+    #[error("articulated body '{body}', link '{link}': {what} is {value}; it must be {wanted}")]
+    Range {
+        /// Body.
+        body: String,
+        /// Link that the joint moves.
+        link: String,
+        /// Which constant.
+        what: &'static str,
+        /// Value given.
+        value: f64,
+        /// What would be right.
+        wanted: &'static str,
+    },
+    /// A coupling between freedoms that cannot be.
+    #[error("articulated body '{body}': a coupling of freedom {freedom} to {of}; both must be different revolute or prismatic freedoms below {dof}, ratio and offset finite")]
+    Coupling {
+        /// Body.
+        body: String,
+        /// Freedom that follows.
+        freedom: usize,
+        /// Freedom that it follows.
+        of: usize,
+        /// Number of freedoms.
+        dof: usize,
+    },
+    /// Numbers that are no position or velocity of it.
+    #[error("articulated body '{body}': {what} must be {wanted} finite numbers, quaternions of unit length")]
+    Start {
+        /// Body.
+        body: String,
+        /// Which.
+        what: &'static str,
+        /// How many there must be.
+        wanted: usize,
+    },
+}
+
+/// A shape on a link.
+#[derive(Clone, Debug)]
+pub struct Collider {
+    /// Pose in the frame of the link that it is put on.
+    pub pose: Pose,
+    /// Geometry.
+    pub shape: Shape,
+    /// Surface constants.
+    pub material: Material,
+    /// Its kind, for filtering.
+    pub kind: CollisionKind,
+    /// Kinds it meets, one bit each.
+    pub meets: u64,
+}
+
+impl Collider {
+    /// A shape with the usual surface that meets everything.
+    pub fn new(shape: Shape, pose: Pose) -> Collider {
+        Collider { pose, shape, material: Material::default(), kind: CollisionKind::default(), meets: u64::MAX }
+    }
+}
+
+/// A collider in its place.
+#[derive(Clone)]
+pub(super) struct Part {
+    /// Moving link; `None` for one that is fixed to the base.
+    pub link: Option<usize>,
+    /// What it is, with its pose in the moving link's frame (or the base's).
+    pub collider: Collider,
+}
+
+/// A tree of links that moves as one object. See the module for its state.
+pub struct ArticulatedBody {
+    pub(super) name: String,
+    pub(super) model: Model,
+    base: Pose,
+    pub(super) colliders: Vec<Part>,
+    pub(super) visuals: Vec<Visual>,
+    /// What acts on each degree of freedom, in the order of `v`. May be changed between steps.
+    freedoms: Vec<Freedom>,
+    pub(super) couplings: Vec<Coupling>,
+    /// Whether links meet other links of the same body; links joined to each other never do.
+    pub self_collision: bool,
+    /// Pairs of moving links that do not meet, smaller number first; sorted.
+    apart: Vec<[usize; 2]>,
+    pub(super) start: Vec<f64>,
+    pub(super) dynamics: Dynamics,
+    pub(super) working: Mutex<Working>,
+}
+
+/// Working memory of the calls that take `&self`.
+#[derive(Clone)]
+pub(super) struct Working {
+    pub scratch: Scratch,
+    /// For states other than the last refreshed.
+    pub elsewhere: Dynamics,
+    pub kinematics: Kinematics,
+    /// No joint forces, no accelerations.
+    pub zeros: Vec<f64>,
+    pub wrenches: Vec<crate::site::Wrench>,
+    pub accelerations: Vec<(Vec3, Vec3)>,
+}
+
+impl Working {
+    /// The kinematics at a state.
+    pub fn moved(&mut self, model: &Model, x: &[f64]) -> &Kinematics {
+        let (q, v) = x.split_at(model.positions());
+        self.kinematics.refresh(model, q, v);
+        &self.kinematics
+    }
+}
+
+impl Clone for ArticulatedBody {
+    fn clone(&self) -> ArticulatedBody {
+        ArticulatedBody {
+            name: self.name.clone(), model: self.model.clone(), base: self.base, colliders: self.colliders.clone(), visuals: self.visuals.clone(),
+            freedoms: self.freedoms.clone(), couplings: self.couplings.clone(), self_collision: self.self_collision, apart: self.apart.clone(),
+            start: self.start.clone(), dynamics: self.dynamics.clone(), working: Mutex::new(self.working().clone()),
+        }
+    }
+}
+
+impl ArticulatedBody {
+    /// A body at its zero position and at rest, with no colliders and nothing on its joints but what the model says.
+    pub fn new(name: impl Into<String>, model: Model) -> ArticulatedBody {
+        let dynamics = Dynamics::new(&model);
+        let mut start = vec![0.0; model.positions() + model.dof()];
+        model.write_zero(&mut start);
+        for link in model.links().iter().filter(|l| l.joint == super::Joint::Floating) {
+            write_pose(&mut start[link.q..link.q + 7], &link.placement);
+        }
+        let working = Working {
+            scratch: dynamics.scratch(), elsewhere: dynamics.clone(), kinematics: Kinematics::new(&model), zeros: vec![0.0; model.dof()], wrenches: vec![Default::default(); model.links().len()],
+            accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],
+        };
+        let freedoms = vec![Freedom::default(); model.dof()];
+        let mut body = ArticulatedBody {
+            name: name.into(), model, base: Pose::identity(), colliders: Vec::new(), visuals: Vec::new(), freedoms, couplings: Vec::new(),
+            self_collision: true, apart: Vec::new(), start, dynamics, working: Mutex::new(working),
+        };
+        body.refresh_dynamics(&body.start.clone());
+        body
+    }
+
+    /// Puts the base at a pose in the world: what stands on it moves along, and the start of every floating root.
+    pub fn at(mut self, pose: Pose) -> Self {
+        let step = pose * self.base.inverse();
+        for link in self.model.links().iter().filter(|l| l.joint == super::Joint::Floating) {
+            let placed = step * read_pose(&self.start[link.q..link.q + 7]);
+            write_pose(&mut self.start[link.q..link.q + 7], &placed);
+        }
+        self.model.place(&step);
+        self.base = pose;
+        self.dynamics = Dynamics::new(&self.model);
+        self.working().elsewhere = self.dynamics.clone();
+        self.refresh_dynamics(&self.start.clone());
+        self
+    }
+
+    /// Sets all positions at time 0 (see [`Joint`](super::Joint) for what they mean).
+    pub fn with_positions(mut self, q: &[f64]) -> Result<Self, ArticulatedError> {
+        let wanted = self.model.positions();
+        let mut start = self.start.clone();
+        if q.len() == wanted {
+            start[..wanted].copy_from_slice(q);
+        }
+        if q.len() != wanted || !self.is_state(&start) {
+            return Err(ArticulatedError::Start { body: self.name, what: "positions", wanted });
+        }
+        self.refresh_dynamics(&start);
+        self.start = start;
+        Ok(self)
+    }
+
+    /// Sets all velocities at time 0.
+    pub fn with_velocities(mut self, v: &[f64]) -> Result<Self, ArticulatedError> {
+        let (wanted, n) = (self.model.dof(), self.model.positions());
+        if v.len() != wanted || v.iter().any(|x| !x.is_finite()) {
+            return Err(ArticulatedError::Start { body: self.name, what: "velocities", wanted });
+        }
+        self.start[n..].copy_from_slice(v);
+        self.refresh_dynamics(&self.start.clone());
+        Ok(self)
+    }
+
+    /// Puts a shape on a link, given by the name it was added under (folded links too).
+    pub fn add_collider(&mut self, link: &str, mut collider: Collider) -> Result<(), ArticulatedError> {
+        let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
+        collider.pose = frame.pose * collider.pose;
+        self.colliders.push(Part { link: frame.link, collider });
+        Ok(())
+    }
+
+    /// Adds a picture to a link; its `part` is set here and its pose is in the link's frame.
+    pub fn add_visual(&mut self, link: &str, mut visual: Visual) -> Result<(), ArticulatedError> {
+        let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
+        visual.pose = frame.pose * visual.pose;
+        visual.part = frame.link.unwrap_or(self.model.links().len());
+        self.visuals.push(visual);
+        Ok(())
+    }
+
+    /// Keeps two links from meeting.
+    pub fn keep_apart(&mut self, a: &str, b: &str) -> Result<(), ArticulatedError> {
+        let find = |link: &str| self.model.frame(link).map(|f| f.link).ok_or_else(|| self.no_link(link));
+        if let (Some(a), Some(b)) = (find(a)?, find(b)?) {
+            let pair = [a.min(b), a.max(b)];
+            if let Err(place) = self.apart.binary_search(&pair) {
+                self.apart.insert(place, pair);
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets what acts on one degree of freedom (its place in `v`).
+    pub fn set_freedom(&mut self, index: usize, freedom: Freedom) -> Result<(), ArticulatedError> {
+        let Some(link) = self.model.links().iter().find(|l| (l.v..l.v + l.joint.dof()).contains(&index)) else {
+            return Err(self.no_link(&format!("of freedom {index}")));
+        };
+        if let Some((what, value, wanted)) = freedom.fault(link.joint.dof() == 1) {
+            return Err(ArticulatedError::Range { body: self.name.clone(), link: link.name.clone(), what, value, wanted });
+        }
+        self.freedoms[index] = freedom;
+        Ok(())
+    }
+
+    /// Makes one freedom follow another.
+    pub fn couple(&mut self, coupling: Coupling) -> Result<(), ArticulatedError> {
+        let Coupling { freedom, of, multiplier, offset } = coupling;
+        let fine = freedom != of && [freedom, of].iter().all(|&i| self.position_of(i).is_some()) && multiplier.is_finite() && offset.is_finite();
+        if !fine {
+            return Err(ArticulatedError::Coupling { body: self.name.clone(), freedom, of, dof: self.model.dof() });
+        }
+        self.couplings.push(coupling);
+        Ok(())
+    }
+
+    /// The tree of links.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// What acts on each degree of freedom.
+    pub fn freedoms(&self) -> &[Freedom] {
+        &self.freedoms
+    }
+
+    /// Where the base stands, in the world.
+    pub fn base(&self) -> &Pose {
+        &self.base
+    }
+
+    /// The velocity coordinate of the joint that moves a link, if that joint has just one.
+    pub fn freedom_of(&self, link: &str) -> Option<usize> {
+        let link = &self.model.links()[self.model.link(link)?];
+        (link.joint.dof() == 1).then_some(link.v)
+    }
+
+    /// The place in `q` of the position of a revolute or prismatic freedom.
+    pub fn position_of(&self, freedom: usize) -> Option<usize> {
+        self.model.links().iter().find(|l| l.v == freedom && l.joint.dof() == 1).map(|l| l.q)
+    }
+
+    /// The moving link that carries a part; `None` for the base and what is fixed to it.
+    pub fn link_of(&self, part: usize) -> Option<usize> {
+        let links = self.model.links().len();
+        if part < links { Some(part) } else { self.collider(part)?.link }
+    }
+
+    /// The collider that is this part, if it is one.
+    pub(super) fn collider(&self, part: usize) -> Option<&Part> {
+        self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)
+    }
+
+    /// Whether two different moving links (or the base, `None`) may meet.
+    pub(super) fn links_meet(&self, a: Option<usize>, b: Option<usize>) -> bool {
+        let parent = |link: Option<usize>| link.map(|l| self.model.links()[l].parent);
+        let grounded = |link: Option<usize>| link.is_none_or(|l| self.model.links()[l].joint != super::Joint::Floating);
+        let joined = (parent(a) == Some(b) && grounded(a)) || (parent(b) == Some(a) && grounded(b));
+        let kept = matches!((a, b), (Some(a), Some(b)) if self.apart.binary_search(&[a.min(b), a.max(b)]).is_ok());
+        self.self_collision && a != b && !joined && !kept
+    }
+
+    /// Whether these numbers are a state: finite, quaternions of unit length.
+    pub(super) fn is_state(&self, x: &[f64]) -> bool {
+        let unit = |l: &super::Link| {
+            let norm = l.joint.quaternion().map_or(1.0, |k| x[l.q + k..l.q + k + 4].iter().map(|q| q * q).sum::<f64>());
+            (norm - 1.0).abs() < 1e-9
+        };
+        x.len() == self.start.len() && x.iter().all(|x| x.is_finite()) && self.model.links().iter().all(unit)
+    }
+
+    pub(super) fn refresh_dynamics(&mut self, x: &[f64]) {
+        let (q, v) = x.split_at(self.model.positions());
+        self.dynamics.refresh(q, v);
+    }
+
+    pub(super) fn working(&self) -> MutexGuard<'_, Working> {
+        self.working.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    fn no_link(&self, link: &str) -> ArticulatedError {
+        ArticulatedError::NoLink { body: self.name.clone(), link: link.to_string() }
+    }
+}
+
+pub(super) fn read_pose(q: &[f64]) -> Pose {
+    let rotation = Quat::new_unchecked(Quaternion::new(q[6], q[3], q[4], q[5]));
+    Pose::from_parts(Vec3::new(q[0], q[1], q[2]).into(), rotation)
+}
+
+fn write_pose(q: &mut [f64], pose: &Pose) {
+    q[..3].copy_from_slice(pose.translation.vector.as_slice());
+    q[3..7].copy_from_slice(pose.rotation.coords.as_slice());
+}

@@ -1,0 +1,153 @@
+//! The rows that joints make: limits, dry friction, drives, couplings (equations in `freedom.rs`).
+
+use super::body::ArticulatedBody;
+use super::freedom::{Drive, Freedom};
+use crate::object::{Constraint, Level, RowTarget};
+use crate::row_builder::RowBuilder;
+use crate::rows::RowSet;
+use crate::site::Span;
+use crate::view::WorldView;
+
+/// A freedom with its place: coordinate of its velocity, position (0 where it has none) and velocity.
+struct Place<'a> {
+    index: usize,
+    q: f64,
+    v: f64,
+    freedom: &'a Freedom,
+}
+
+impl ArticulatedBody {
+    /// Whether anything on its joints becomes a row.
+    pub(super) fn has_rows(&self) -> bool {
+        let rows = |f: &Freedom| f.limits.is_some() || f.friction > 0.0 || f.damping > 0.0 || f.drive != Drive::None;
+        !self.couplings.is_empty() || self.freedoms().iter().any(rows)
+    }
+
+    fn places<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = Place<'a>> {
+        let n = self.model.positions();
+        self.model.links().iter().flat_map(move |link| {
+            (0..link.joint.dof()).map(move |k| {
+                let index = link.v + k;
+                let q = if link.joint.dof() == 1 { x[link.q] } else { 0.0 };
+                Place { index, q, v: x[n + index], freedom: &self.freedoms()[index] }
+            })
+        })
+    }
+
+    /// Adds the forces of springs and, where rows are not implicit, of damping and position drives.
+    pub(super) fn joint_forces(&self, x: &[f64], implicit: bool, out: &mut [f64]) {
+        for Place { index, q, v, freedom } in self.places(x) {
+            out[index] += freedom.spring_force(q) + if implicit { 0.0 } else { freedom.explicit_force(q, v) };
+        }
+    }
+
+    /// Energy of the springs, J.
+    pub(super) fn spring_energy(&self, x: &[f64]) -> f64 {
+        let energy = |p: Place| p.freedom.spring.map_or(0.0, |s| 0.5 * s.stiffness * (p.q - s.rest).powi(2));
+        self.places(x).map(energy).sum()
+    }
+
+    /// Errors of the limits, in the order of their rows: lower, then upper, of each freedom.
+    fn limit_errors<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = (usize, f64, f64)> {
+        self.places(x).filter_map(|p| p.freedom.limits.map(|l| (p, l))).flat_map(|(p, [lo, hi])| {
+            let errors = [(p.index, 1.0, p.q - lo), (p.index, -1.0, hi - p.q)];
+            errors.into_iter().filter(|(_, _, error)| error.is_finite())
+        })
+    }
+}
+
+impl Constraint for ArticulatedBody {
+    fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder) {
+        let x = &view.x[me.x.clone()];
+        let mut maker = RowMaker { unit: vec![0.0; self.model.dof()], level, out };
+        for (index, sign, error) in self.limit_errors(x) {
+            maker.row(RowTarget::new(RowSet::HalfLine, error), &[(index, sign)]);
+        }
+        for place in self.places(x) {
+            maker.friction(&place);
+            maker.damping(&place);
+            maker.drive(&place, view.time);
+        }
+        for c in &self.couplings {
+            let position = |freedom| self.position_of(freedom).map_or(0.0, |q| x[q]);
+            let error = position(c.freedom) - c.multiplier * position(c.of) - c.offset;
+            maker.row(RowTarget::new(RowSet::Equality, error), &[(c.freedom, 1.0), (c.of, -c.multiplier)]);
+        }
+    }
+
+    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+        out.extend(self.limit_errors(&view.x[me.x.clone()]).map(|(_, _, error)| error));
+    }
+}
+
+impl Level {
+    /// Length of the step at the velocity level, s.
+    fn step(self) -> Option<f64> {
+        if let Level::Velocity { h } = self { Some(h) } else { None }
+    }
+}
+
+/// Makes rows on the coordinates of the owner.
+struct RowMaker<'a, 'b> {
+    unit: Vec<f64>,
+    level: Level,
+    out: &'a mut RowBuilder<'b>,
+}
+
+impl RowMaker<'_, '_> {
+    fn row(&mut self, target: RowTarget, entries: &[(usize, f64)]) {
+        let owner = self.out.owner();
+        entries.iter().for_each(|&(i, value)| self.unit[i] = value);
+        self.out.row(target).on_coordinates(owner, &self.unit);
+        entries.iter().for_each(|&(i, _)| self.unit[i] = 0.0);
+    }
+
+    /// What a force of `limit` may give over the step: an impulse, or the force itself at the acceleration level.
+    fn bounded(&self, limit: f64) -> RowSet {
+        let most = limit * self.level.step().unwrap_or(1.0);
+        RowSet::Interval { lo: -most, hi: most }
+    }
+
+    fn friction(&mut self, p: &Place) {
+        if p.freedom.friction > 0.0 {
+            self.row(RowTarget::new(self.bounded(p.freedom.friction), 0.0), &[(p.index, 1.0)]);
+        }
+    }
+
+    fn damping(&mut self, p: &Place) {
+        if let (Some(h), true) = (self.level.step(), p.freedom.damping > 0.0) {
+            let soft = RowTarget { compliance: 1.0 / (h * p.freedom.damping), ..RowTarget::new(RowSet::Equality, 0.0) };
+            self.row(soft, &[(p.index, 1.0)]);
+        }
+    }
+
+    fn drive(&mut self, p: &Place, time: f64) {
+        let hard = |limit: f64| limit.is_infinite();
+        match &p.freedom.drive {
+            Drive::None => {}
+            Drive::Position { stiffness, damping, target, velocity, limit } => {
+                let Some(h) = self.level.step() else { return };
+                // the view is that of the middle of the step: the position at its start is half a step behind
+                let (q, gain) = (p.q - 0.5 * h * p.v, damping + h * stiffness);
+                let aim = (stiffness * (target - q) + damping * velocity) / gain;
+                let set = if hard(*limit) { RowSet::Equality } else { self.bounded(*limit) };
+                self.row(RowTarget { velocity: aim, compliance: 1.0 / (h * gain), ..RowTarget::new(set, 0.0) }, &[(p.index, 1.0)]);
+            }
+            Drive::Velocity { target, limit } => {
+                let set = if hard(*limit) { RowSet::Equality } else { self.bounded(*limit) };
+                self.row(RowTarget { velocity: *target, ..RowTarget::new(set, 0.0) }, &[(p.index, 1.0)]);
+            }
+            Drive::Playback { motion, limit } if hard(*limit) => {
+                let (position, velocity) = motion.at(time);
+                self.row(RowTarget { velocity, ..RowTarget::new(RowSet::Equality, p.q - position) }, &[(p.index, 1.0)]);
+            }
+            Drive::Playback { motion, limit } => {
+                let velocity = match self.level.step() {
+                    Some(h) => (motion.at(time + 0.5 * h).0 - (p.q - 0.5 * h * p.v)) / h,
+                    None => motion.at(time).1,
+                };
+                self.row(RowTarget { velocity, ..RowTarget::new(self.bounded(*limit), 0.0) }, &[(p.index, 1.0)]);
+            }
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! The articulated body behind the interfaces of the thesis: it integrates, collides, is drawn and kept in step like any other object.
+
+use super::body::{ArticulatedBody, Part};
+use super::coast;
+use super::coordinates::integrate;
+use super::energy::{energy, momentum};
+use super::joint::Joint;
+use crate::collidable::{Collidable, CollisionKind, Material};
+use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
+use crate::site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
+use crate::rigid::vec3;
+use crate::rotation;
+use crate::sync;
+use crate::view::WorldView;
+use tumble_collide::{Pose, Shape, Vec3};
+
+impl Object for ArticulatedBody {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(self.clone())
+    }
+
+    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
+        self.refresh_dynamics(x);
+        let links = self.model.links().len();
+        let (moving, rest) = sites.split_at_mut(links);
+        let working = self.working.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
+        self.dynamics.link_accelerations(&working.zeros, &mut working.accelerations);
+        for (i, site) in moving.iter_mut().enumerate() {
+            let (angular_velocity, velocity) = self.dynamics.link_velocity(i);
+            (site.pose, site.angular_velocity, site.velocity) = (self.dynamics.link_pose(i), angular_velocity, velocity);
+            (site.bias_angular_acceleration, site.bias_acceleration) = working.accelerations[i];
+        }
+        rest[0] = Site { pose: *self.base(), ..Site::default() };
+        for (site, Part { link, collider }) in rest[1..].iter_mut().zip(&self.colliders) {
+            let carrier = link.map_or(Site { pose: *self.base(), ..Site::default() }, |l| moving[l]);
+            site.pose = carrier.pose * collider.pose;
+            let (point, spin) = (site.position(), carrier.angular_velocity);
+            let arm = point - carrier.position();
+            (site.angular_velocity, site.velocity) = (spin, carrier.velocity_at(&point));
+            site.bias_angular_acceleration = carrier.bias_angular_acceleration;
+            site.bias_acceleration = carrier.bias_acceleration + carrier.bias_angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
+        }
+    }
+
+    fn integratable(&self) -> Option<&dyn Integratable> {
+        Some(self)
+    }
+
+    fn collidable(&self) -> Option<&dyn Collidable> {
+        Some(self)
+    }
+
+    fn constraint(&self) -> Option<&dyn Constraint> {
+        self.has_rows().then_some(self)
+    }
+
+    fn renderable(&self) -> Option<&dyn Renderable> {
+        Some(self)
+    }
+
+    fn net_sync(&self) -> Option<&dyn NetSync> {
+        Some(self)
+    }
+}
+
+impl ArticulatedBody {
+    /// Wrenches per moving link from those per part.
+    fn gather(&self, parts: &[Wrench], links: &mut [Wrench]) {
+        let (moving, rest) = parts.split_at(links.len());
+        links.copy_from_slice(moving);
+        for (wrench, Part { link, collider }) in rest[1..].iter().zip(&self.colliders) {
+            let Some(link) = *link else { continue };
+            let arm = self.dynamics.link_pose(link).rotation * collider.pose.translation.vector;
+            links[link].force += wrench.force;
+            links[link].torque += wrench.torque + arm.cross(&wrench.force);
+        }
+    }
+}
+
+impl Integratable for ArticulatedBody {
+    fn dims(&self) -> Dims {
+        Dims { x: self.model.positions() + self.model.dof(), dof: self.model.dof(), sites: self.model.links().len() + 1 + self.colliders.len() }
+    }
+
+    fn write_initial(&self, x: &mut [f64]) {
+        x.copy_from_slice(&self.start);
+    }
+
+    fn accepts(&self, x: &[f64]) -> bool {
+        self.is_state(x)
+    }
+
+    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
+        for (i, link) in self.model.links().iter().enumerate().filter(|(_, l)| l.mass.mass > 0.0) {
+            let (weight, wrench) = (link.mass.mass * view.gravity, &mut out.wrenches[me.site.start + i]);
+            wrench.force += weight;
+            wrench.torque += (self.dynamics.link_pose(i).rotation * link.mass.center).cross(&weight);
+        }
+        self.joint_forces(&view.x[me.x.clone()], view.implicit, &mut out.generalized[me.v.clone()]);
+    }
+
+    fn velocity(&self, x: &[f64], v: &mut [f64]) {
+        v.copy_from_slice(&x[self.model.positions()..]);
+    }
+
+    fn write_velocity(&self, x: &mut [f64], v: &[f64]) {
+        x[self.model.positions()..].copy_from_slice(v);
+    }
+
+    fn derivative(&self, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+        let working = &mut *self.working();
+        self.gather(f.wrenches, &mut working.wrenches);
+        self.dynamics.accelerate(&mut working.scratch, f.generalized, &working.wrenches, dp);
+    }
+
+    fn trouble(&self) -> Option<String> {
+        let link = &self.model.links()[self.dynamics.singular()?];
+        Some(format!(
+            "nothing that hangs on the joint of link '{}' has inertia along it where it stands (gimbal lock of stacked joints, or a point mass on the axis): \
+             a spherical joint in place of the stack has no such pose",
+            link.name
+        ))
+    }
+
+    fn accelerations(&self, _x: &[f64], dp: &[f64], sites: &mut [Site]) {
+        let working = &mut *self.working();
+        self.dynamics.link_accelerations(dp, &mut working.accelerations);
+        let (moving, rest) = sites.split_at_mut(self.model.links().len());
+        for (site, (angular, linear)) in moving.iter_mut().zip(&working.accelerations) {
+            (site.angular_acceleration, site.acceleration) = (*angular, *linear);
+        }
+        for (site, Part { link, .. }) in rest[1..].iter_mut().zip(&self.colliders) {
+            let carrier = link.map_or(Site::default(), |l| moving[l]);
+            let point = site.position();
+            site.angular_acceleration = carrier.angular_acceleration;
+            site.acceleration = if link.is_some() { carrier.acceleration_following(&point, &carrier.velocity_at(&point)) } else { Vec3::zeros() };
+        }
+    }
+
+    fn holds_velocity(&self) -> bool {
+        true
+    }
+
+    fn coasting_rate(&self, _x: &[f64], out: &mut [f64]) {
+        let working = &mut *self.working();
+        self.dynamics.accelerate(&mut working.scratch, &working.zeros, &[], out);
+    }
+
+    fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
+        x[self.model.positions()..].iter_mut().zip(dp).for_each(|(v, dp)| *v += h * dp);
+    }
+
+    fn coast(&self, x: &mut [f64], h: f64) {
+        coast::coast(&self.model, &mut self.working(), x, h);
+    }
+
+    fn drift(&self, x: &mut [f64], v: &[f64], h: f64) {
+        integrate(&self.model, &mut x[..self.model.positions()], v, h);
+    }
+
+    fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
+        for link in self.model.links() {
+            // a link's own axes turn on the right, where the world's turn on the left: the same with both signs changed
+            let sign = match link.joint {
+                Joint::Floating => 1.0,
+                Joint::Spherical => -1.0,
+                _ => continue,
+            };
+            let rate = rotation::pull_back(&(sign * vec3(&displacement[link.v..])), &vec3(&v[link.v..]));
+            v[link.v..link.v + 3].copy_from_slice(rate.as_slice());
+        }
+    }
+
+    fn whiten(&self, x: &[f64], u: &mut [f64]) {
+        self.dynamics.whiten(&mut self.working().scratch, &x[self.model.positions()..], u);
+    }
+
+    fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
+        self.dynamics.unwhiten(&mut self.working().scratch, u, v);
+    }
+
+    fn respond(&self, j: &[f64], y: &mut [f64]) {
+        self.dynamics.respond(&mut self.working().scratch, j, y);
+    }
+
+    fn recover(&self, du: &[f64], j: &mut [f64]) {
+        self.dynamics.recover(&mut self.working().scratch, du, j);
+    }
+
+    fn whiten_rate(&self, dp: &[f64], du: &mut [f64]) {
+        self.dynamics.whiten(&mut self.working().scratch, dp, du);
+    }
+
+    fn unwhiten_rate(&self, du: &[f64], dp: &mut [f64]) {
+        self.dynamics.unwhiten(&mut self.working().scratch, du, dp);
+    }
+
+    fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
+        let sum = energy(&self.model, self.working().moved(&self.model, x), gravity);
+        Energy { potential: sum.potential + self.spring_energy(x), ..sum }
+    }
+
+    fn momentum(&self, x: &[f64]) -> Momentum {
+        momentum(&self.model, self.working().moved(&self.model, x))
+    }
+}
+
+impl Collidable for ArticulatedBody {
+    fn parts(&self) -> usize {
+        self.model.links().len() + 1 + self.colliders.len()
+    }
+
+    fn shape(&self, part: usize) -> Option<&Shape> {
+        Some(&self.collider(part)?.collider.shape)
+    }
+
+    fn material(&self, part: usize) -> Material {
+        self.collider(part).map_or(Material::default(), |p| p.collider.material)
+    }
+
+    fn kind(&self, part: usize) -> CollisionKind {
+        self.collider(part).map_or(CollisionKind::default(), |p| p.collider.kind)
+    }
+
+    fn collides_with(&self, part: usize, other: CollisionKind) -> bool {
+        self.collider(part).is_some_and(|p| p.collider.meets & other.bit() != 0)
+    }
+
+    fn parts_meet(&self, part_a: usize, part_b: usize) -> bool {
+        self.links_meet(self.link_of(part_a), self.link_of(part_b))
+    }
+
+    fn test_impulse(&self, part: usize, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
+        let Some(link) = self.link_of(part) else { return };
+        let carried = self.collider(part).map_or(Vec3::zeros(), |p| p.collider.pose.translation.vector);
+        let arm = point - site.position() + self.dynamics.link_pose(link).rotation * carried;
+        self.dynamics.point_response(link, &arm, axes, sign, y);
+    }
+}
+
+impl Renderable for ArticulatedBody {
+    fn visuals(&self) -> &[Visual] {
+        &self.visuals
+    }
+}
+
+/// The whole state as little-endian `f64`: exact, for replicas.
+impl NetSync for ArticulatedBody {
+    fn get_data(&self, me: &Span, view: &WorldView, out: &mut Vec<u8>) {
+        sync::write_state(&view.x[me.x.clone()], out);
+    }
+
+    fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError> {
+        sync::read_state(data, x, |state| self.is_state(state))
+    }
+}
+
+/// The pose that a part's frame has in its carrier, for those who put things on it.
+impl ArticulatedBody {
+    /// Pose of a part's frame in the frame of the link (or the base) that carries it.
+    pub fn part_pose(&self, part: usize) -> Pose {
+        self.collider(part).map_or(Pose::identity(), |p| p.collider.pose)
+    }
+}

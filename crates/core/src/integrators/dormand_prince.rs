@@ -1,0 +1,269 @@
+//! Dormand–Prince 5(4): an explicit Runge–Kutta pair that chooses its steps by a tolerance, on states with rotations.
+//!
+//! Within an inner step from `x₀` the unknown is `y = (Θ, Π)`: the tangent displacement and the change of momentum since its start
+//! (Runge–Kutta–Munthe-Kaas). The state it stands for is
+//!
+//! ```text
+//! x(y) = drift(kick(x₀, Π), Θ)            Θ' = dexp⁻¹_Θ(v(x, t))            Π' = f(x, t)
+//! y_i = h·Σ_{j<i} a_ij·k_j                k_i = y'(t + c_i·h, y_i)          i = 1…7;   y₇ is the step (fifth order) and k₇ the next step's k₁
+//! e = h·Σ e_i·k_i                         the difference from the embedded step of fourth order
+//! ```
+//!
+//! The error of an object is the greatest of `|e_Θ| / (tol·(1 + |Θ|))` and `|e_v| / (tol·(1 + |v|))` over its coordinates, with `e_v = M⁻¹·e_Π` the
+//! error as a velocity and 1 one SI unit (m, rad, m/s, rad/s). That of a step is the greatest of all objects, so that one object is not
+//! diluted by many. A step is taken if it is at most 1; the next is `0.9·error^(−1/5)` as long, within 0.2 and 5.
+//!
+//! Sources: Dormand and Prince, *A family of embedded Runge–Kutta formulae*, 1980; Munthe-Kaas, *High order Runge–Kutta methods on manifolds*,
+//! 1999; Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, §II.4–6 (step control, dense output), §IV.8 of
+//! Hairer, Lubich and Wanner, *Geometric Numerical Integration* (`dexp⁻¹`).
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `h`, `tol` | length of the inner step (s), `Settings::integrator_tolerance` |
+//! | `Θ`, `Π` | displacement and change of momentum since the start of the inner step, `dof` numbers each |
+//! | `k_i` | rates of `y` at stage `i`, `2·dof` numbers |
+//!
+//! What is led keeps the velocity that it has at the start of the whole call: `Θ = t·v`, without error.
+
+use super::trajectory::{Piece, Trajectory};
+use crate::motion::Motion;
+use crate::settings::Settings;
+use crate::view::{Entry, Mode};
+use crate::world::StepError;
+use nalgebra::ComplexField;
+
+/// Stages; the last is the first of the next step.
+pub(super) const STAGES: usize = 7;
+const C: [f64; STAGES] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
+const A: [[f64; STAGES - 1]; STAGES] = [
+    [0.0; 6],
+    [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
+    [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0, 0.0],
+    [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0, 0.0],
+    [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
+    [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
+];
+/// Fifth order less fourth.
+const E: [f64; STAGES] = [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+
+/// Inner steps in one frame at most, refused ones included.
+const MOST_STEPS: u32 = 100_000;
+/// Least inner step, as a share of the frame.
+const FLOOR: f64 = 1e-12;
+/// Least and greatest factor from one inner step to the next.
+const SHRINK: f64 = 0.2;
+const GROW: f64 = 5.0;
+/// Share of the factor that the error allows which is taken.
+const SAFETY: f64 = 0.9;
+
+/// The integrator's constants for a call, the step size that it carries from call to call, its working memory and its record.
+#[derive(Default)]
+pub(crate) struct Adaptive {
+    /// `Settings::integrator_tolerance`.
+    pub tolerance: f64,
+    /// Length of a frame, s: what the floor is a share of, and the longest inner step that is carried.
+    pub frame: f64,
+    /// Inner step to begin with, s; the frame where it is 0. Afterwards the one to go on with.
+    pub step: f64,
+    /// Inner steps of the frame so far, refused ones included.
+    pub steps: u32,
+    /// The accepted inner steps of the last recorded call.
+    pub path: Trajectory,
+    work: Work,
+}
+
+#[derive(Default)]
+struct Work {
+    start: Vec<f64>,
+    /// Velocity of what is led.
+    led: Vec<f64>,
+    k: [Vec<f64>; STAGES],
+    y: Vec<f64>,
+    /// Velocity at the end of the step, not pulled back.
+    velocity: Vec<f64>,
+    error: Vec<f64>,
+    x: Vec<f64>,
+    v: Vec<f64>,
+}
+
+/// The greatest error of a step and whose it is: the place in the table's order.
+#[derive(Clone, Copy)]
+struct Worst {
+    error: f64,
+    object: usize,
+}
+
+impl Adaptive {
+    /// Before a call: the constants, the inner step to begin with, and how many the frame has had.
+    pub fn set(&mut self, settings: &Settings, step: f64, steps: u32) {
+        (self.tolerance, self.frame) = (settings.integrator_tolerance, settings.dt);
+        (self.step, self.steps) = (step, steps);
+    }
+
+    /// Integrates from time `t` over `h` exactly, as many inner steps as the tolerance asks for. With `record` the path is kept, and the call ends
+    /// early where no more of it can be. Returns how far it came, s; state, sites and forces are left there, the last rates in `dp`.
+    pub fn integrate(&mut self, motion: &mut Motion, t: f64, h: f64, dp: &mut [f64], record: bool) -> Result<f64, StepError> {
+        let n = dp.len();
+        self.begin(motion, t, n);
+        if record {
+            self.path.begin(motion.x.len(), n, &self.work.led);
+        }
+        self.step = if self.step > 0.0 { self.step.clamp(FLOOR * self.frame, self.frame) } else { self.frame };
+        let (mut done, mut grow) = (0.0, GROW);
+        while done < h && !(record && self.path.full()) {
+            // equal parts of what is left, so that no sliver remains for the last
+            let parts = ((h - done) / self.step).ceil();
+            let step = (h - done) / parts;
+            self.steps += 1;
+            let worst = self.attempt(motion, t + done, step);
+            let factor = (SAFETY * ComplexField::powf(worst.error, -0.2)).clamp(SHRINK, grow);
+            if worst.error > 1.0 {
+                if step <= FLOOR * self.frame || self.steps >= MOST_STEPS {
+                    return Err(self.give_up(motion, t + done, step, worst));
+                }
+                (self.step, grow) = (step * factor, 1.0);
+                continue;
+            }
+            let end = if parts <= 1.0 { h } else { done + step };
+            if record {
+                self.path.push(Piece { start: done, length: step }, end, &self.work.start, &self.work.k, &self.work.y);
+            }
+            done = end;
+            let proposed = step * factor;
+            self.step = if factor >= grow { self.step.max(proposed) } else { proposed }.min(self.frame);
+            grow = GROW;
+            self.go_on(motion, n);
+            if self.steps >= MOST_STEPS && done < h {
+                return Err(self.give_up(motion, t + done, step, worst));
+            }
+        }
+        dp.copy_from_slice(&self.work.k[0][n..]);
+        Ok(done)
+    }
+
+    /// The first stage of the first step.
+    fn begin(&mut self, motion: &mut Motion, t: f64, n: usize) {
+        let w = &mut self.work;
+        w.k.iter_mut().for_each(|k| k.resize(2 * n, 0.0));
+        [&mut w.y, &mut w.error].into_iter().for_each(|v| v.resize(2 * n, 0.0));
+        [&mut w.led, &mut w.velocity].into_iter().for_each(|v| v.resize(n, 0.0));
+        w.start.clone_from(motion.x);
+        let (v, f) = w.k[0].split_at_mut(n);
+        motion.evaluate(t, f);
+        motion.velocities(v);
+        w.led.copy_from_slice(v);
+    }
+
+    /// Tries one inner step: the state is left at its end; the rates of all stages are in `k`, the step in `y`.
+    fn attempt(&mut self, motion: &mut Motion, t: f64, step: f64) -> Worst {
+        let w = &mut self.work;
+        let n = w.led.len();
+        for i in 1..STAGES {
+            let (before, after) = w.k.split_at_mut(i);
+            combine(before, &A[i][..i], step, &mut w.y);
+            motion.displace(&w.start, &w.y, &w.led);
+            let (v, f) = after[0].split_at_mut(n);
+            motion.evaluate(t + C[i] * step, f);
+            motion.velocities(v);
+            w.velocity.copy_from_slice(v);
+            motion.pull_back(&w.y[..n], v, &w.led);
+        }
+        combine(&w.k, &E, step, &mut w.error);
+        self.worst(motion)
+    }
+
+    /// The greatest error of all objects that move; what is not a number is infinite.
+    fn worst(&mut self, motion: &Motion) -> Worst {
+        let w = &mut self.work;
+        let n = w.led.len();
+        let mut worst = Worst { error: 0.0, object: 0 };
+        for (object, entry) in motion.table.iter().enumerate().filter(|(_, e)| e.moves()) {
+            let Some(body) = entry.object.integratable() else { continue };
+            let (x, v) = (entry.span.x.clone(), entry.span.v.clone());
+            // e_v = M⁻¹·e_Π: the velocity that the error is, at the end of the step
+            let momentum = &w.error[n + v.start..n + v.end];
+            w.x.clear();
+            w.x.extend_from_slice(&motion.x[x]);
+            w.v.clear();
+            w.v.resize(v.len(), 0.0);
+            body.write_velocity(&mut w.x, &w.v);
+            body.kick(&mut w.x, momentum, 1.0);
+            body.velocity(&w.x, &mut w.v);
+            let displacement = w.error[v.clone()].iter().zip(&w.y[v.clone()]);
+            let velocity = w.v.iter().zip(&w.velocity[v]);
+            for (e, y) in displacement.chain(velocity) {
+                let error = e.abs() / (self.tolerance * (1.0 + y.abs()));
+                let error = if error.is_nan() { f64::INFINITY } else { error };
+                if error > worst.error {
+                    worst = Worst { error, object };
+                }
+            }
+        }
+        worst
+    }
+
+    /// Makes the end of the step the start of the next: its last stage is the next one's first.
+    fn go_on(&mut self, motion: &Motion, n: usize) {
+        let w = &mut self.work;
+        w.start.copy_from_slice(motion.x);
+        w.k.swap(0, STAGES - 1);
+        w.k[0][..n].copy_from_slice(&w.velocity);
+        for entry in motion.table.iter().filter(|e| led(e)) {
+            w.k[0][entry.span.v.clone()].copy_from_slice(&w.led[entry.span.v.clone()]);
+        }
+    }
+
+    fn give_up(&self, motion: &Motion, time: f64, step: f64, worst: Worst) -> StepError {
+        let Some(entry) = motion.table.iter().nth(worst.object) else { unreachable!("the object was found in this table") };
+        let object = entry.object.name().to_string();
+        match entry.object.integratable().and_then(|body| body.trouble()) {
+            Some(why) => StepError::Singular { object, why, time },
+            None => StepError::Tolerance { object, time, step, steps: self.steps, tolerance: self.tolerance },
+        }
+    }
+}
+
+/// `out = h·Σ weight_j·k_j`.
+fn combine(k: &[Vec<f64>], weight: &[f64], h: f64, out: &mut [f64]) {
+    out.fill(0.0);
+    for (k, weight) in k.iter().zip(weight).filter(|(_, w)| **w != 0.0) {
+        out.iter_mut().zip(k).for_each(|(out, k)| *out += weight * k);
+    }
+    out.iter_mut().for_each(|out| *out *= h);
+}
+
+fn led(entry: &Entry) -> bool {
+    entry.status.alive && entry.status.mode == Mode::Kinematic
+}
+
+impl Motion<'_> {
+    /// Writes the state `(Θ, Π)` away from `start`. What is led has its one velocity there too.
+    pub(super) fn displace(&mut self, start: &[f64], y: &[f64], led_velocity: &[f64]) {
+        self.x.copy_from_slice(start);
+        let (theta, pi) = y.split_at(led_velocity.len());
+        for entry in self.table.iter().filter(|e| e.moves() || led(e)) {
+            let Some(body) = entry.object.integratable() else { continue };
+            let (x, v) = (&mut self.x[entry.span.x.clone()], entry.span.v.clone());
+            if entry.moves() {
+                body.kick(x, &pi[v.clone()], 1.0);
+                body.drift(x, &theta[v], 1.0);
+            } else {
+                body.drift(x, &theta[v.clone()], 1.0);
+                body.write_velocity(x, &led_velocity[v]);
+            }
+        }
+    }
+
+    /// Turns velocities at the displacement `Θ` into rates of `Θ`.
+    fn pull_back(&self, theta: &[f64], v: &mut [f64], led_velocity: &[f64]) {
+        for entry in self.table.iter() {
+            let (Some(body), span) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+            if entry.moves() {
+                body.pull_back(&theta[span.clone()], &mut v[span]);
+            } else if led(entry) {
+                v[span.clone()].copy_from_slice(&led_velocity[span]);
+            }
+        }
+    }
+}

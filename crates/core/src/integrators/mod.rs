@@ -1,0 +1,9 @@
+//! Integrators that choose their own steps.
+
+mod dormand_prince;
+mod trajectory;
+
+pub(crate) use dormand_prince::Adaptive;
+
+#[cfg(test)]
+mod tests;

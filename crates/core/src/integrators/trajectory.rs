@@ -1,0 +1,120 @@
+//! Dense output: the state at any time of a call, from the stages that were computed anyway.
+//!
+//! Per inner step the interpolant of fourth order of Dormand and Prince (Hairer, Nørsett and Wanner, §II.6) on `y = (Θ, Π)`:
+//!
+//! ```text
+//! y(s) = s·(r₂ + (1−s)·(r₃ + s·(r₄ + (1−s)·r₅)))           s from 0 to 1 over the step of length h
+//! r₂ = y₁     r₃ = h·k₁ − y₁     r₄ = y₁ − h·k₇ − r₃     r₅ = h·Σ d_i·k_i
+//! ```
+//!
+//! It meets the step's ends with the right slopes, so the whole is once continuously differentiable.
+
+use super::dormand_prince::STAGES;
+use crate::motion::Motion;
+
+const D: [f64; STAGES] = [
+    -12715105075.0 / 11282082432.0,
+    0.0,
+    87487479700.0 / 32700410799.0,
+    -10690763975.0 / 1880347072.0,
+    701980252875.0 / 199316789632.0,
+    -1453857185.0 / 822651844.0,
+    69997945.0 / 29380423.0,
+];
+/// Numbers kept at most (32 MiB), one inner step always.
+const MOST_NUMBERS: usize = 1 << 22;
+
+/// One inner step: when it starts, counted from the start of the call, and how long it is, s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    pub start: f64,
+    pub length: f64,
+}
+
+/// The inner steps of a call, one after the other.
+#[derive(Default)]
+pub(crate) struct Trajectory {
+    pieces: Vec<Piece>,
+    /// Per piece: the state at its start, then `r₂ … r₅`.
+    data: Vec<f64>,
+    state: usize,
+    dof: usize,
+    /// How far it goes, s.
+    end: f64,
+    /// Velocity of what is led.
+    led: Vec<f64>,
+}
+
+impl Trajectory {
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.pieces.clear();
+        self.data.clear();
+    }
+
+    pub(super) fn begin(&mut self, state: usize, dof: usize, led: &[f64]) {
+        self.clear();
+        (self.state, self.dof) = (state, dof);
+        self.led.clear();
+        self.led.extend_from_slice(led);
+    }
+
+    fn stride(&self) -> usize {
+        self.state + 8 * self.dof
+    }
+
+    /// Whether another piece would be too much.
+    pub(super) fn full(&self) -> bool {
+        !self.pieces.is_empty() && self.data.len() + self.stride() > MOST_NUMBERS
+    }
+
+    /// Adds an inner step that takes the path to `end`.
+    pub(super) fn push(&mut self, piece: Piece, end: f64, start: &[f64], k: &[Vec<f64>; STAGES], y: &[f64]) {
+        let h = piece.length;
+        self.end = end;
+        self.pieces.push(piece);
+        self.data.extend_from_slice(start);
+        self.data.extend_from_slice(y);
+        self.data.extend(k[0].iter().zip(y).map(|(k, y)| h * k - y));
+        self.data.extend((0..y.len()).map(|i| y[i] - h * k[6][i] - (h * k[0][i] - y[i])));
+        self.data.extend((0..y.len()).map(|i| h * (0..STAGES).map(|s| D[s] * k[s][i]).sum::<f64>()));
+    }
+
+    /// Whether the path goes from its start to `t` seconds after it.
+    pub fn reaches(&self, t: f64) -> bool {
+        !self.pieces.is_empty() && t <= self.end
+    }
+
+    /// Whether it goes on after `t`.
+    pub fn goes_beyond(&self, t: f64) -> bool {
+        !self.pieces.is_empty() && t < self.end
+    }
+
+    /// The last start of an inner step before `t`, counted from the path's start, s, and the state there.
+    pub fn before(&self, t: f64) -> (f64, &[f64]) {
+        let i = self.index(t);
+        (self.pieces[i].start, &self.data[i * self.stride()..][..self.state])
+    }
+
+    /// Length of the inner step that holds `t`, s.
+    pub fn length(&self, t: f64) -> f64 {
+        self.pieces[self.index(t)].length
+    }
+
+    /// The piece that holds `t`.
+    fn index(&self, t: f64) -> usize {
+        self.pieces.partition_point(|p| p.start < t).saturating_sub(1)
+    }
+
+    /// Writes the state `t` seconds after the path's start, and refreshes what readers see; accelerations stay as they are.
+    pub fn write(&self, motion: &mut Motion, t: f64) {
+        let (i, n) = (self.index(t), 2 * self.dof);
+        let piece = self.pieces[i];
+        let (start, r) = self.data[i * self.stride()..(i + 1) * self.stride()].split_at(self.state);
+        let s = (t - piece.start) / piece.length;
+        let y = |i: usize| s * (r[i] + (1.0 - s) * (r[n + i] + s * (r[2 * n + i] + (1.0 - s) * r[3 * n + i])));
+        let y: Vec<f64> = (0..n).map(y).collect();
+        motion.displace(start, &y, &self.led);
+        motion.refresh();
+    }
+}

@@ -1,0 +1,152 @@
+//! Where a sub-step of `backtracking` ends: what is near, when it should close, how far a tried state is from the first crossing.
+//!
+//! A *margin* is a gap, less the depth that its pair (or limit) is allowed, plus the contact tolerance: it is 0 where the crossing is, and a state whose
+//! margin is within the tolerance on either side has landed.
+
+use super::contacts::Limit;
+use crate::detect::Touch;
+use crate::settings::Settings;
+use crate::site::Site;
+
+/// A margin of at least this is not measured, metres.
+const FAR: f64 = 1e-4;
+/// What touches and is slower than this may drift like what lasts, m/s or rad/s.
+pub(super) const SLOW: f64 = 1e-3;
+
+/// A touch's part in the sub-step that begins.
+#[derive(Clone, Copy)]
+pub(super) struct Role {
+    pub lasts: bool,
+    pub touches: bool,
+    /// Depth that does not make the step go back, metres.
+    pub allowed: f64,
+}
+
+/// The part of a one-sided row that its constraint locates.
+#[derive(Clone, Copy)]
+pub(super) struct LimitRole {
+    key: [u32; 2],
+    gap: f64,
+    rate: f64,
+    acceleration: f64,
+    touches: bool,
+    allowed: f64,
+}
+
+impl LimitRole {
+    /// `rate` and `acceleration` are those of the gap; without a force of the limit's own.
+    pub fn new(limit: &Limit, rate: f64, acceleration: f64, s: &Settings) -> LimitRole {
+        let slow = rate.abs() < SLOW;
+        let touches = limit.gap <= s.contact_tolerance || (slow && limit.gap <= s.drift_tolerance);
+        let allowed = match (touches, slow) {
+            (true, _) if limit.target.is_none() => f64::INFINITY, // there is no row to hold it
+            (true, true) => s.drift_tolerance,
+            _ => s.contact_tolerance,
+        };
+        LimitRole { key: limit.key, gap: limit.gap, rate, acceleration, touches, allowed: allowed.max(s.contact_tolerance - limit.gap) }
+    }
+
+    /// Whether its force belongs to the sub-step that begins: it is reached and not left.
+    pub fn acts(&self) -> bool {
+        self.touches && self.rate < SLOW
+    }
+}
+
+/// Everything that can end a sub-step, as it is at the start.
+#[derive(Default)]
+pub(super) struct Watch {
+    pub roles: Vec<Role>,
+    pub limits: Vec<LimitRole>,
+    /// When limits that no constraint locates should be reached, s.
+    pub guesses: Vec<f64>,
+}
+
+impl Watch {
+    /// Where the parabola of the first nearing contact or limit closes, s; `left` at most.
+    pub fn first_guess(&self, touches: &[Touch], sites: &[Site], left: f64) -> f64 {
+        let contacts = touches.iter().zip(&self.roles).filter(|(_, role)| !role.touches).filter_map(|(touch, _)| {
+            let (a, b) = (&sites[touch.a as usize], &sites[touch.b as usize]);
+            closing(touch.contact.gap, touch.velocity(a, b).dot(&touch.contact.normal), touch.acceleration(a, b).x)
+        });
+        let limits = self.limits.iter().filter(|l| !l.touches).filter_map(|l| closing(l.gap, l.rate, l.acceleration));
+        contacts.chain(limits).chain(self.guesses.iter().copied()).fold(left, f64::min)
+    }
+
+    /// Least gap of what does not touch yet.
+    pub fn nearest(&self, touches: &[Touch], tolerance: f64) -> f64 {
+        let contacts = touches.iter().zip(&self.roles).filter(|(_, r)| !r.touches).map(|(t, _)| t.contact.gap);
+        let limits = self.limits.iter().filter(|l| !l.touches).map(|l| l.gap);
+        contacts.chain(limits).fold(FAR, f64::min).max(tolerance)
+    }
+
+    /// How far a tried state, with the contacts and limits `after`, is from the first crossing. `before` are the contacts of the start.
+    pub fn margin(&self, before: &[Touch], after: &[Touch], limits: &[Limit], tolerance: f64) -> f64 {
+        let contact = |touch: &Touch| {
+            let pair = before.partition_point(|t| t.key.pair < touch.key.pair);
+            let same = before[pair..].iter().zip(&self.roles[pair..]).take_while(|(t, _)| t.key.pair == touch.key.pair);
+            touch.contact.gap + same.map(|(_, r)| r.allowed).fold(tolerance, f64::max) - tolerance
+        };
+        let limit = |limit: &Limit| {
+            let role = self.limits.binary_search_by_key(&limit.key, |l| l.key).ok();
+            limit.gap + role.map_or(tolerance, |i| self.limits[i].allowed) - tolerance
+        };
+        after.iter().map(contact).chain(limits.iter().map(limit)).fold(FAR, f64::min)
+    }
+}
+
+/// When `gap + rate·t + ½·acceleration·t²` first reaches 0, s; `None` where it never does.
+fn closing(gap: f64, rate: f64, acceleration: f64) -> Option<f64> {
+    let root = rate * rate - 2.0 * acceleration * gap;
+    let t = 2.0 * gap / (-rate + root.max(0.0).sqrt());
+    (root >= 0.0 && t > 0.0).then_some(t)
+}
+
+/// The moment of a crossing, between a sub-step that ended before it and one that ended after: (length, margin) each.
+pub(super) struct Bracket {
+    low: (f64, f64),
+    high: Option<(f64, f64)>,
+    /// How often in a row the low end moved (positive) or the high end (negative).
+    same_side: i32,
+    /// The last two tries.
+    tries: [(f64, f64); 2],
+}
+
+impl Bracket {
+    /// At the start of a sub-step the margin is `margin`.
+    pub fn new(margin: f64) -> Bracket {
+        Bracket { low: (0.0, margin), high: None, same_side: 0, tries: [(0.0, margin); 2] }
+    }
+
+    /// Whether any try was beyond the crossing.
+    pub fn crossed(&self) -> bool {
+        self.high.is_some()
+    }
+
+    /// Takes a try in that did not land, and gives the next one. False position by the Illinois rule (an end that stays twice
+    /// counts half), bisection every fourth time and wherever the margin before the crossing is only known to be large.
+    pub fn narrow(&mut self, h: f64, f: f64, crossed: bool) -> f64 {
+        self.tries = [self.tries[1], (h, f)];
+        if crossed {
+            self.same_side = self.same_side.min(0) - 1;
+            self.high = Some((h, f));
+        } else {
+            self.same_side = self.same_side.max(0) + 1;
+            self.low = (h, f);
+        }
+        let high = self.high.get_or_insert((h, f));
+        match self.same_side {
+            2.. => high.1 *= 0.5,
+            ..=-2 => self.low.1 *= 0.5,
+            _ => {}
+        }
+        let (width, share) = (high.0 - self.low.0, self.low.1 / (self.low.1 - high.1));
+        let bisect = self.low.1 >= FAR || self.same_side.abs() % 4 == 3 || !share.is_finite();
+        self.low.0 + width * if bisect { 0.5 } else { share.clamp(1e-3, 1.0 - 1e-3) }
+    }
+
+    /// How fast the margin changes between the last try and a landing at `h` with margin `f`, per second.
+    pub fn slope(&self, h: f64, f: f64) -> f64 {
+        let (h0, f0) = self.tries[1];
+        (f - f0) / (h - h0)
+    }
+}

@@ -1,0 +1,269 @@
+//! `[[articulated]]`: a tree of links that moves as one object, written out or taken from a URDF.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use tumble_core::Joint;
+use tumble_core::articulated::MOST_LINKS;
+use tumble_core::collide::Pose;
+
+use crate::body::{Library, read_name};
+use crate::bound::Bound;
+use crate::fields::{Fields, Names, Value, number_of};
+use crate::link::{Inherited, LinkRow, LinkSpec, Surface};
+use crate::rotation;
+use crate::urdf::{CollisionMeshes, MissingMeshes, UrdfOptions};
+
+/// Most pairs in `keep_apart`.
+const MOST_PAIRS: usize = 100_000;
+
+/// One articulated body at the start, all references resolved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArticulatedSpec {
+    /// Unique in the scene, bodies included; at most 63 bytes.
+    pub name: String,
+    /// Where the base stands, world axes. Links without a parent hang on it; a floating one starts from it.
+    pub base: Pose,
+    /// All links, a parent before its children.
+    pub links: Vec<LinkSpec>,
+    /// Whether links that are not joined to each other meet. Default true.
+    pub self_collision: bool,
+    /// Pairs of links that never meet.
+    pub keep_apart: Vec<[usize; 2]>,
+    /// Whether links that overlap at the start never meet: true of a URDF.
+    pub part_overlaps: bool,
+    /// Takes part in anything at all. Default true.
+    pub alive: bool,
+    /// What is to be said of the file it comes from.
+    pub notes: Vec<String>,
+}
+
+impl ArticulatedSpec {
+    /// Index of the link of that name.
+    pub fn link(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|link| link.name == name)
+    }
+
+    /// Index of the link whose joint has that name.
+    pub fn joint(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|link| link.joint.name == name && link.joint.kind != Joint::Fixed)
+    }
+
+    /// One of these links, its base at the origin.
+    pub(crate) fn of(name: String, links: Vec<LinkSpec>) -> ArticulatedSpec {
+        let (base, keep_apart, notes) = (Pose::identity(), Vec::new(), Vec::new());
+        ArticulatedSpec { name, base, links, self_collision: true, keep_apart, part_overlaps: false, alive: true, notes }
+    }
+
+    /// Reads one; `None`, with the problems recorded, where it has no links.
+    pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, folder: &Path) -> Option<ArticulatedSpec> {
+        let name = read_name(&mut f).unwrap_or_default();
+        let base = rotation::read_pose(&mut f);
+        let surface = Surface::read(&mut f, library, &Surface::default());
+        let floating = f.flag_or("floating", false);
+        let mut spec = ArticulatedSpec {
+            base, part_overlaps: f.value("urdf").is_some(), ..ArticulatedSpec::of(name, Vec::new())
+        };
+        (spec.self_collision, spec.alive) = (f.flag_or("self_collision", true), f.flag_or("alive", true));
+        let from = Inherited {
+            library, surface: &surface, floating, room: MOST_LINKS,
+            collides: f.flag_or("collides", true), visible: f.flag_or("visible", true),
+        };
+        match f.value("urdf") {
+            Some(_) => spec.read_urdf(&mut f, &from, folder)?,
+            None => spec.read_links(&mut f, &from),
+        }
+        spec.read_joints(&mut f);
+        spec.read_start(&mut f);
+        spec.read_velocity(&mut f, floating);
+        spec.read_pairs(&mut f);
+        spec.links.iter_mut().for_each(|link| link.joint.settle());
+        f.finish();
+        (!spec.links.is_empty()).then_some(spec)
+    }
+
+    fn read_links(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>) {
+        let tables = f.tables("link", MOST_LINKS);
+        if tables.is_empty() && f.value("link").is_none() {
+            f.missing("link", "links, each under a line [[articulated.link]], or `urdf`");
+        }
+        let mut mimics = Vec::new();
+        let mut lines: BTreeMap<String, usize> = BTreeMap::new();
+        for mut table in tables {
+            let names: Vec<&str> = self.links.iter().map(|link| link.name.as_str()).collect();
+            let room = MOST_LINKS.saturating_sub(self.links.len());
+            let row = LinkRow::read(&mut table, &Inherited { room, ..*from }, &names);
+            let place = table.value("name").map_or(table.span.clone(), Value::span);
+            let first = self.links.len();
+            let Some(mut row) = row else {
+                table.give_up();
+                continue;
+            };
+            mimics.extend(row.mimic.take().map(|(of, value)| (first, row.count, of, value)));
+            row.append_to(&mut self.links);
+            if from.floating && first > 0 && self.links.get(first).is_some_and(|link| link.parent.is_none()) {
+                let message = format!("{} is a second link without `parent` in a body that floats", table.what);
+                table.log.report(place.clone(), message, "wanted a `parent`: one root carries all");
+            }
+            for link in &self.links[first..] {
+                if let Some(line) = lines.insert(link.name.clone(), f.log.line(place.start)) {
+                    let message = format!("there is a second link \"{}\"; the first is at line {line}", link.name);
+                    table.log.report(place.clone(), message, "wanted a name that no other link of the body has");
+                    break;
+                }
+            }
+            table.finish();
+        }
+        for (first, count, of, value) in mimics {
+            self.resolve_mimic(f, first..first + count, of, value);
+        }
+    }
+
+    fn resolve_mimic(&mut self, f: &Fields<'_>, followers: std::ops::Range<usize>, of: &str, value: &Value<'_>) {
+        let Some(link) = self.joint(of).filter(|&k| self.links[k].joint.is_single()) else {
+            let single = self.links.iter().filter(|link| link.joint.is_single()).map(|link| link.name.as_str());
+            return f.unknown_name("mimic", value, of, single.collect());
+        };
+        if followers.contains(&link) {
+            return f.wrong("mimic", value, "a joint other than its own");
+        }
+        for follower in &mut self.links[followers] {
+            follower.joint.mimic.iter_mut().for_each(|mimic| mimic.link = link);
+        }
+    }
+
+    /// `urdf`, with the keys that only it has.
+    fn read_urdf(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>, folder: &Path) -> Option<()> {
+        let (path, value) = f.optional_text("urdf")?;
+        let options = UrdfOptions {
+            floating: from.floating,
+            packages: read_packages(f, folder),
+            missing_meshes: f.choice_or("missing_meshes", MISSING, MissingMeshes::Error),
+            collision_meshes: f.choice_or("collision_meshes", COLLISION, CollisionMeshes::Exact),
+            surface: from.surface.clone(),
+            recolor: f.value("color").is_some() || f.value("material").is_some(),
+        };
+        match crate::urdf::read_file(&folder.join(path), &options, true) {
+            Ok(robot) => {
+                self.links = robot.links;
+                self.notes = robot.notes;
+                for shape in self.links.iter_mut().flat_map(|link| &mut link.shapes) {
+                    shape.collides &= from.collides;
+                    shape.visible &= from.visible;
+                }
+                Some(())
+            }
+            Err(error) => {
+                let told = error.to_string();
+                let lines: Vec<&str> = told.lines().collect();
+                for line in &lines {
+                    f.log.report(value.span(), format!("`urdf` of {}: {line}", f.what), "wanted a URDF that can be read");
+                }
+                None
+            }
+        }
+    }
+
+    /// `[[articulated.joint]]`: what acts on joints that are there.
+    fn read_joints(&mut self, f: &mut Fields<'_>) {
+        for mut table in f.tables("joint", MOST_LINKS) {
+            let named = table.texts("name", MOST_LINKS, "the name of a joint, or a list of them");
+            let joints: Vec<usize> = named.iter().filter_map(|(name, value)| self.named_joint(&table, "name", name, value)).collect();
+            if let Some((name, _)) = named.first() {
+                table.what = format!("joint \"{name}\"");
+            }
+            if joints.is_empty() {
+                table.give_up();
+                continue;
+            }
+            for joint in joints {
+                self.links[joint].joint.read_effects(&mut table);
+            }
+            table.finish();
+        }
+    }
+
+    fn named_joint(&self, f: &Fields<'_>, key: &str, name: &str, value: &Value<'_>) -> Option<usize> {
+        let found = self.joint(name);
+        if found.is_none() {
+            let moving = self.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.as_str());
+            f.unknown_name(key, value, name, moving.collect());
+        }
+        found
+    }
+
+    /// `start = { JOINT = position }`.
+    fn read_start(&mut self, f: &mut Fields<'_>) {
+        let Some(start) = f.table("start", "{ JOINT = 0.5 }") else { return };
+        for (name, span, value) in start.entries() {
+            let Some(link) = self.joint(name).filter(|&k| self.links[k].joint.is_single()) else {
+                let single = self.links.iter().filter(|link| link.joint.is_single()).map(|link| link.joint.name.as_str());
+                let near = crate::suggest::nearest(name, single);
+                let wanted = near.map_or("wanted the name of a revolute or prismatic joint".into(), |near| format!("did you mean `{near}`?"));
+                f.log.report(span, format!("{} has no joint \"{name}\" with one position", f.what), wanted);
+                continue;
+            };
+            match number_of(value).filter(|x| Bound::ANY.holds(*x)) {
+                Some(x) => self.links[link].joint.position = vec![x],
+                None => start.wrong(name, value, "a position: rad of a revolute joint, m of a prismatic one"),
+            }
+        }
+    }
+
+    /// The velocity of a base that floats.
+    fn read_velocity(&mut self, f: &mut Fields<'_>, floating: bool) {
+        if !floating {
+            return;
+        }
+        let linear: [f64; 3] = f.vector_or("velocity_m_per_s", Bound::ANY, [0.0; 3]);
+        let angular: [f64; 3] = f.vector_or("angular_velocity_rad_per_s", Bound::ANY, [0.0; 3]);
+        for link in self.links.iter_mut().filter(|link| link.joint.kind == Joint::Floating) {
+            link.joint.velocity = angular.into_iter().chain(linear).collect();
+        }
+    }
+
+    fn read_pairs(&mut self, f: &mut Fields<'_>) {
+        let wanted = "pairs of links, such as [[\"a\", \"b\"]]";
+        for value in f.list("keep_apart", MOST_PAIRS, wanted) {
+            let items = value.get_ref().as_array().filter(|items| items.len() == 2);
+            let Some(items) = items else {
+                f.wrong("keep_apart", value, "two names of links, such as [\"a\", \"b\"]");
+                continue;
+            };
+            let pair: Vec<usize> = items.iter().filter_map(|item| self.named_link(f, item)).collect();
+            if let [a, b] = pair[..] {
+                self.keep_apart.push([a, b]);
+            }
+        }
+    }
+
+    fn named_link(&self, f: &Fields<'_>, value: &Value<'_>) -> Option<usize> {
+        let Some(name) = value.get_ref().as_str() else {
+            f.wrong("keep_apart", value, "the name of a link");
+            return None;
+        };
+        let found = self.link(name);
+        if found.is_none() {
+            f.unknown_name("keep_apart", value, name, self.links.iter().map(|link| link.name.as_str()).collect());
+        }
+        found
+    }
+}
+
+const MISSING: Names<MissingMeshes> = &[("error", MissingMeshes::Error), ("skip", MissingMeshes::Skip)];
+const COLLISION: Names<CollisionMeshes> = &[("exact", CollisionMeshes::Exact), ("hull", CollisionMeshes::Hull)];
+
+/// `packages = { NAME = "dir" }`, directories relative to the folder of the scene.
+fn read_packages(f: &mut Fields<'_>, folder: &Path) -> BTreeMap<String, PathBuf> {
+    let Some(table) = f.table("packages", "{ my_robot = \"../my_robot\" }") else { return BTreeMap::new() };
+    let mut packages = BTreeMap::new();
+    for (name, _, value) in table.entries() {
+        let Some(text) = table.as_text(name, value) else { continue };
+        let directory = folder.join(text);
+        if !directory.is_dir() {
+            table.wrong(name, value, format!("a folder; there is none at {}", directory.display()));
+        }
+        packages.insert(name.to_owned(), directory);
+    }
+    packages
+}

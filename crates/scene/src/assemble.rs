@@ -1,0 +1,164 @@
+//! From links to what the dynamics knows: a model, and a body with colliders, pictures and motors.
+
+use tumble_core::articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Kinematics, LinkMass, Model, ModelBuilder, ModelError};
+use tumble_core::collide::{Pose, Shape, contacts};
+use tumble_core::{Joint, Look, Material, Visual};
+
+use crate::articulated::ArticulatedSpec;
+use crate::build::look;
+use crate::link::LinkSpec;
+use crate::link_shapes::{Placed, ShapeMaker, mass};
+
+/// The tree of links, with a mass for each.
+pub(crate) fn model(links: &[LinkSpec], masses: &[LinkMass]) -> Result<Model, ModelError> {
+    let mut builder = ModelBuilder::new();
+    for (link, mass) in links.iter().zip(masses) {
+        builder.link(&link.name, link.parent, link.joint.kind, link.placement, *mass);
+    }
+    builder.build()
+}
+
+/// Names of the joints that move, in the order of the model's links and so of its coordinates.
+pub(crate) fn moving_joints(links: &[LinkSpec]) -> Vec<String> {
+    links.iter().filter(|link| moves(link)).map(|link| link.joint.name.clone()).collect()
+}
+
+fn moves(link: &LinkSpec) -> bool {
+    link.joint.kind != Joint::Fixed
+}
+
+/// The body of a description; what is wrong names the link.
+pub(crate) fn body(spec: &ArticulatedSpec, maker: &mut ShapeMaker<'_>) -> Result<ArticulatedBody, String> {
+    let told = |link: &LinkSpec, why: String| format!("link \"{}\": {why}", link.name);
+    let mut shapes = Vec::with_capacity(spec.links.len());
+    let mut masses = Vec::with_capacity(spec.links.len());
+    for link in &spec.links {
+        let placed = maker.shapes(link).map_err(|why| told(link, why))?;
+        masses.push(mass(link, &placed).map_err(|why| told(link, why.to_string()))?);
+        shapes.push(placed);
+    }
+    let model = model(&spec.links, &masses).map_err(|e| e.to_string())?;
+    furnished(spec, model, &shapes, maker).map_err(|e| e.to_string())
+}
+
+/// The body with all that is on its links and joints.
+fn furnished(spec: &ArticulatedSpec, model: Model, shapes: &[Vec<Placed<'_>>], maker: &mut ShapeMaker<'_>) -> Result<ArticulatedBody, ArticulatedError> {
+    let moving: Vec<&LinkSpec> = spec.links.iter().filter(|link| moves(link)).collect();
+    let positions: Vec<f64> = moving.iter().flat_map(|link| position(link, &spec.base)).collect();
+    let velocities: Vec<f64> = moving.iter().flat_map(|link| link.joint.velocity.clone()).collect();
+    let mut body = ArticulatedBody::new(&spec.name, model).at(spec.base).with_positions(&positions)?.with_velocities(&velocities)?;
+    body.self_collision = spec.self_collision;
+    for (link, placed) in spec.links.iter().zip(shapes) {
+        for placed in placed {
+            furnish(&mut body, &link.name, placed)?;
+        }
+    }
+    for (number, link) in moving.iter().enumerate() {
+        let first = body.model().links()[number].v;
+        for index in first..first + link.joint.kind.dof() {
+            body.set_freedom(index, link.joint.freedom.clone())?;
+        }
+        if let Some(mimic) = link.joint.mimic
+            && let Some(of) = body.freedom_of(&spec.links[mimic.link].name)
+        {
+            body.couple(Coupling { freedom: first, of, multiplier: mimic.multiplier, offset: mimic.offset })?;
+        }
+    }
+    for [a, b] in &spec.keep_apart {
+        body.keep_apart(&spec.links[*a].name, &spec.links[*b].name)?;
+    }
+    keep_apart_across_stacks(spec, &mut body)?;
+    if spec.part_overlaps && spec.self_collision {
+        let poses = link_poses(spec, &body, &positions, &velocities);
+        part_overlaps(spec, shapes, &poses, &mut body, maker)?;
+    }
+    Ok(body)
+}
+
+/// Position numbers of a joint at time 0; a floating root starts where it is placed.
+fn position(link: &LinkSpec, base: &Pose) -> Vec<f64> {
+    match link.joint.kind {
+        Joint::Floating => {
+            let pose = base * link.placement;
+            pose.translation.vector.iter().chain(pose.rotation.coords.iter()).copied().collect()
+        }
+        _ => link.joint.position.clone(),
+    }
+}
+
+fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result<(), ArticulatedError> {
+    let surface = &placed.spec.surface;
+    if placed.spec.collides {
+        let material = Material { restitution: surface.restitution, friction: surface.friction };
+        body.add_collider(link, Collider { material, ..Collider::new(placed.shape.clone(), placed.pose) })?;
+    }
+    if placed.visible {
+        let look: Look = look(&surface.look, &placed.center);
+        body.add_visual(link, Visual { part: 0, pose: placed.pose, shape: placed.shape.clone(), look })?;
+    }
+    Ok(())
+}
+
+/// Links that are joined through links without mass and shape, the stacks that joints of several freedoms are made of, are neighbours.
+fn keep_apart_across_stacks(spec: &ArticulatedSpec, body: &mut ArticulatedBody) -> Result<(), ArticulatedError> {
+    let empty = |link: &LinkSpec| link.shapes.is_empty() && !link.has_mass();
+    for link in &spec.links {
+        let mut above = link.parent;
+        while let Some(between) = above.map(|k| &spec.links[k]).filter(|between| empty(between)) {
+            above = between.parent;
+        }
+        if let Some(above) = above.filter(|_| above != link.parent) {
+            body.keep_apart(&link.name, &spec.links[above].name)?;
+        }
+    }
+    Ok(())
+}
+
+/// Keeps apart all links that overlap at the start: files of robots do not say which links may meet, and their shapes reach into each other.
+fn part_overlaps(
+    spec: &ArticulatedSpec, shapes: &[Vec<Placed<'_>>], poses: &[Pose], body: &mut ArticulatedBody, maker: &mut ShapeMaker<'_>,
+) -> Result<(), ArticulatedError> {
+    let solid: Vec<(usize, &Shape, Pose)> = shapes.iter().enumerate()
+        .flat_map(|(k, placed)| placed.iter().filter(|p| p.spec.collides).map(move |p| (k, &p.shape, p.pose)))
+        .map(|(k, shape, pose)| (k, shape, poses[k] * pose))
+        .collect();
+    let mut pairs = Vec::new();
+    let mut found = Vec::new();
+    for (n, (a, shape_a, pose_a)) in solid.iter().enumerate() {
+        for (b, shape_b, pose_b) in &solid[n + 1..] {
+            let near = shape_a.aabb(pose_a).overlaps(&shape_b.aabb(pose_b));
+            if a == b || !near || !meet(body, &spec.links[*a].name, &spec.links[*b].name) {
+                continue;
+            }
+            found.clear();
+            contacts(shape_a, pose_a, shape_b, pose_b, 0.0, &mut found);
+            if !found.is_empty() {
+                let [a, b] = [a, b].map(|k| spec.links[*k].name.as_str());
+                body.keep_apart(a, b)?;
+                pairs.push(format!("{a} and {b}"));
+            }
+        }
+    }
+    pairs.dedup();
+    if !pairs.is_empty() {
+        maker.notes.add("links that overlap at the start never meet", pairs.join(", "));
+    }
+    Ok(())
+}
+
+/// Whether two links are on different moving links that are not joined.
+fn meet(body: &ArticulatedBody, a: &str, b: &str) -> bool {
+    let carrier = |name: &str| body.model().frame(name).and_then(|frame| frame.link);
+    let parent = |link: Option<usize>| link.and_then(|l| body.model().links()[l].parent);
+    let (a, b) = (carrier(a), carrier(b));
+    a != b && (a.is_none() || parent(a) != b) && (b.is_none() || parent(b) != a)
+}
+
+/// Poses of all links in the world.
+fn link_poses(spec: &ArticulatedSpec, body: &ArticulatedBody, q: &[f64], v: &[f64]) -> Vec<Pose> {
+    let model = body.model();
+    let mut kinematics = Kinematics::new(model);
+    kinematics.refresh(model, q, v);
+    let carrier = |link: Option<usize>| link.map_or(*body.base(), |l| kinematics.links()[l].pose);
+    spec.links.iter().map(|link| model.frame(&link.name).map_or(Pose::identity(), |f| carrier(f.link) * f.pose)).collect()
+}

@@ -1,0 +1,185 @@
+//! `<link>`: mass, what is drawn, what collides.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+
+use nalgebra::SymmetricEigen;
+use tumble_core::articulated::LinkMass;
+use tumble_core::collide::{Mat3, Pose, Vec3};
+
+use super::files::{Found, find};
+use super::xml::Element;
+use super::{CollisionMeshes, MissingMeshes, UrdfOptions};
+use crate::bound::Bound;
+use crate::link::{Geometry, LinkShape, inertia_fault};
+use crate::look::Color;
+use crate::notes::NoteList;
+use crate::rotation;
+use crate::shape::ShapeSpec;
+
+/// What links share while they are read.
+pub(crate) struct Context<'c> {
+    /// The folder of the file.
+    pub(crate) folder: &'c Path,
+    /// The file, for messages.
+    pub(crate) file: &'c str,
+    pub(crate) options: &'c UrdfOptions,
+    /// Whether shapes are wanted at all.
+    pub(crate) shapes: bool,
+    /// Colours of the materials at the top of the file.
+    pub(crate) colors: BTreeMap<String, Color>,
+    pub(crate) notes: NoteList,
+}
+
+/// A link as its element says.
+pub(crate) struct LinkElement {
+    pub(crate) name: String,
+    pub(crate) span: Range<usize>,
+    pub(crate) mass: LinkMass,
+    pub(crate) shapes: Vec<LinkShape>,
+}
+
+/// `<origin xyz rpy>`, in a place that may have one.
+pub(crate) fn read_origin(parent: &Element<'_, '_>) -> Pose {
+    let Some(origin) = parent.child("origin") else { return Pose::identity() };
+    let xyz = origin.numbers("xyz", Bound::ANY).unwrap_or_default();
+    let rpy = origin.numbers("rpy", Bound::ANY).unwrap_or_default();
+    rotation::pose(xyz, rotation::roll_pitch_yaw(rpy))
+}
+
+/// `<color rgba>` of a material; the fourth number is not used.
+pub(crate) fn read_color(material: &Element<'_, '_>) -> Option<Color> {
+    let [r, g, b, _]: [f64; 4] = material.child("color")?.numbers("rgba", Bound::ANY)?;
+    Some([r, g, b].map(|x| x.clamp(0.0, 1.0)))
+}
+
+impl LinkElement {
+    pub(crate) fn read(link: &Element<'_, '_>, context: &mut Context<'_>) -> Option<LinkElement> {
+        let name = link.required_text("name", "a name of its own")?.to_owned();
+        let mass = link.child("inertial").map_or_else(LinkMass::none, |inertial| read_inertial(&inertial, context));
+        let shapes = if context.shapes { read_shapes(link, context) } else { Vec::new() };
+        Some(LinkElement { name, span: link.span(), mass, shapes })
+    }
+}
+
+fn read_inertial(inertial: &Element<'_, '_>, context: &mut Context<'_>) -> LinkMass {
+    let origin = read_origin(inertial);
+    let mass = inertial.required("mass", "<mass value=\"…\"/>, kg");
+    let mass = mass.map_or(0.0, |mass| mass.required_number("value", Bound::NOT_NEGATIVE));
+    let inertia = inertial.required("inertia", "<inertia ixx iyy izz ixy ixz iyz/>, kg·m² about the centre of mass").map(|i| {
+        let of = |name| i.number(name, Bound::ANY);
+        let diagonal = ["ixx", "iyy", "izz"].map(|name| i.required_number(name, Bound::ANY));
+        let [xy, xz, yz] = ["ixy", "ixz", "iyz"].map(|name| of(name).unwrap_or(0.0));
+        let [xx, yy, zz] = diagonal;
+        (i, Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
+    });
+    let mut own = Mat3::zeros();
+    if let Some((element, matrix)) = inertia
+        && matrix.iter().all(|x| x.is_finite())
+    {
+        own = mended(&element, matrix, context);
+    }
+    LinkMass { mass, center: Vec3::zeros(), inertia: own }.seen_from(&origin)
+}
+
+/// The inertia of a body that can be: negative principal moments, which real files have, are set to 0 and told where they are more than rounding.
+/// Moments that are too large beside the others change nothing in the equations of motion and are only told.
+fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Context<'_>) -> Mat3 {
+    let eigen = SymmetricEigen::new(inertia);
+    let negative = eigen.eigenvalues.min() < 0.0;
+    if let Some(fault) = inertia_fault(&inertia) {
+        let what = if eigen.eigenvalues.min() < -1e-9 * inertia.amax() { "; those below 0 are set to 0" } else { "" };
+        let line = element.log.line(element.span().start);
+        context.notes.add(format!("{}:{line}", context.file), format!("{} is that of no rigid body: it must have {fault}{what}", element.what()));
+    }
+    if !negative {
+        return inertia;
+    }
+    let axes = eigen.eigenvectors;
+    let whole = axes * Mat3::from_diagonal(&eigen.eigenvalues.map(|x| x.max(0.0))) * axes.transpose();
+    0.5 * (whole + whole.transpose())
+}
+
+fn read_shapes(link: &Element<'_, '_>, context: &mut Context<'_>) -> Vec<LinkShape> {
+    let read = |tag: &'static str, context: &mut Context<'_>| -> (Vec<LinkShape>, usize) {
+        let all: Vec<_> = link.children(tag).map(|element| read_shape(&element, tag == "collision", context)).collect();
+        let dropped = all.iter().filter(|shape| shape.is_none()).count();
+        (all.into_iter().flatten().collect(), dropped)
+    };
+    let (mut collisions, _) = read("collision", context);
+    let (visuals, dropped) = read("visual", context);
+    if visuals.is_empty() && dropped > 0 {
+        collisions.iter_mut().for_each(|shape| shape.visible = true);
+    }
+    collisions.extend(visuals);
+    collisions
+}
+
+/// A `<visual>` or `<collision>`; `None` where it is left out or wrong.
+fn read_shape(element: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<LinkShape> {
+    let pose = read_origin(element);
+    let geometry = element.required("geometry", "<geometry> with a box, cylinder, sphere, capsule or mesh")?;
+    let geometry = read_geometry(&geometry, collides, context)?;
+    let mut surface = context.options.surface.clone();
+    if !context.options.recolor
+        && let Some(color) = material_color(element, context)
+    {
+        surface.look.color = color;
+    }
+    Some(LinkShape { pose, geometry, mass: None, surface, collides, visible: !collides })
+}
+
+fn material_color(element: &Element<'_, '_>, context: &Context<'_>) -> Option<Color> {
+    let material = element.child("material")?;
+    read_color(&material).or_else(|| context.colors.get(material.text("name")?).copied())
+}
+
+fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<Geometry> {
+    let wanted = "wanted <box>, <cylinder>, <sphere>, <capsule> or <mesh>";
+    let Some(form) = geometry.first() else {
+        geometry.problem("is empty", wanted);
+        return None;
+    };
+    let length = |name: &str| form.required_number(name, Bound::POSITIVE);
+    Some(Geometry::Shape(match form.tag() {
+        "box" => {
+            form.required_text("size", "three lengths, m")?;
+            ShapeSpec::Box { size_m: form.numbers("size", Bound::POSITIVE)? }
+        }
+        "cylinder" => ShapeSpec::Cylinder { radius_m: length("radius"), height_m: length("length") },
+        "sphere" => ShapeSpec::Sphere { radius_m: length("radius") },
+        "capsule" => ShapeSpec::Capsule { radius_m: length("radius"), length_m: length("length") },
+        "mesh" => return read_mesh(&form, collides, context),
+        other => {
+            form.problem(format_args!("(<{other}>) is no shape"), wanted);
+            return None;
+        }
+    }))
+}
+
+fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<Geometry> {
+    let uri = mesh.required_text("filename", "the path of an .stl or .obj file")?;
+    let scale: [f64; 3] = mesh.numbers("scale", Bound::ANY).unwrap_or([1.0; 3]);
+    if scale.contains(&0.0) {
+        mesh.wrong("scale", "three numbers other than 0");
+        return None;
+    }
+    let place = format!("{}:{}", context.file, mesh.log.line(mesh.span().start));
+    let hull = context.options.collision_meshes == CollisionMeshes::Hull;
+    let required = context.options.missing_meshes == MissingMeshes::Error;
+    let why = match find(uri, context.folder, context.options) {
+        Found::Here(path) => return Some(Geometry::File { path, scale, place, hull, required }),
+        Found::Missing(path) if collides && required => format!("there is no file {path}"),
+        Found::Missing(_) => "there is no such file".into(),
+        Found::Format(format) => format!("the format '{format}' is not read, only .stl and .obj"),
+    };
+    if collides && required {
+        let wanted = "wanted a mesh that is there; `packages` says where packages are, missing_meshes = \"skip\" leaves it out";
+        mesh.problem(format_args!("\"{uri}\" cannot be collided with: {why}"), wanted);
+    } else {
+        let kind = if collides { "collision" } else { "visual" };
+        context.notes.add(format!("{place}: {kind} mesh {uri}"), format!("left out: {why}"));
+    }
+    None
+}

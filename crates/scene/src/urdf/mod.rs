@@ -1,0 +1,273 @@
+//! URDF: a robot's links, joints, masses and shapes, from the XML files that the robotics world exchanges.
+//!
+//! ```no_run
+//! use tumble_scene::urdf::{UrdfOptions, load};
+//!
+//! let options = UrdfOptions { floating: true, ..UrdfOptions::default() };
+//! let (robot, notes) = load("anymal.urdf", &options)?;
+//! notes.iter().for_each(|note| println!("{note}"));
+//! # Ok::<(), tumble_scene::urdf::UrdfError>(())
+//! ```
+//!
+//! | element | what becomes of it |
+//! |---|---|
+//! | `<inertial>` | mass, centre and inertia, turned by its origin; a link without is massless |
+//! | `<joint>` revolute, continuous, prismatic, fixed | the joint of that kind; fixed links are folded into their parents |
+//! | `<joint>` planar | two massless slides `NAME/x`, `NAME/y` in the plane, then a hinge `NAME` about its normal |
+//! | `<joint>` floating | a free root where its parent stands still; else slides `NAME/x`, `/y`, `/z` and a ball joint |
+//! | `<limit>` | position limits; effort is the limit of drives that name none; velocity is kept and not enforced |
+//! | `<dynamics>` | viscous damping and dry friction |
+//! | `<mimic>` | a coupling of the two joints |
+//! | `<collision>` | box, cylinder, sphere, capsule; meshes in STL and OBJ |
+//! | `<visual>` | the same, with the colour of its material; where no visual of a link can be read its collision shapes are drawn |
+//!
+//! All else (transmissions, sensors, simulators' own elements) is passed over. The root link is fixed to the base, or floats if asked.
+
+mod files;
+mod joint;
+mod link;
+mod tree;
+mod xml;
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::articulated::ArticulatedSpec;
+use crate::assemble;
+use crate::build::Notes;
+use crate::error::Invalid;
+use crate::link::{LinkSpec, Surface};
+use crate::link_shapes::ShapeMaker;
+use crate::log::Log;
+use crate::notes::NoteList;
+use joint::JointElement;
+use link::{Context, LinkElement, read_color};
+use tree::TreeBuilder;
+use tumble_core::articulated::{ArticulatedBody, LinkMass, MOST_LINKS, Model, ModelError};
+use xml::Element;
+
+/// Most bytes of a URDF: 64 MiB.
+const MOST_BYTES: u64 = 64 << 20;
+
+/// What to do about collision meshes that are not there or cannot be read. Visual ones are always left out, with a note.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MissingMeshes {
+    /// They are an error.
+    #[default]
+    Error,
+    /// They are left out, with a note.
+    Skip,
+}
+
+/// What a collision mesh collides as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CollisionMeshes {
+    /// As it is, where it is closed; an open one as its convex hull, with a note.
+    #[default]
+    Exact,
+    /// As its convex hull.
+    Hull,
+}
+
+/// How a URDF is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct UrdfOptions {
+    /// Whether the root link floats; else it is fixed to the base.
+    pub floating: bool,
+    /// Folders of packages by name, for `package://NAME/…`. What is not among them is looked for in the folders above the URDF.
+    pub packages: BTreeMap<String, PathBuf>,
+    /// Default [`MissingMeshes::Error`].
+    pub missing_meshes: MissingMeshes,
+    /// Default [`CollisionMeshes::Exact`].
+    pub collision_meshes: CollisionMeshes,
+    /// Surface of all links.
+    pub surface: Surface,
+    /// Whether the look of `surface` stands instead of the file's colours.
+    pub recolor: bool,
+}
+
+/// Why a URDF could not be read.
+#[derive(Debug, Error)]
+pub enum UrdfError {
+    /// The file could not be opened or read.
+    #[error("{}: cannot read the URDF: {source}", file.display())]
+    Read {
+        /// The path that was tried.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is larger than any URDF may be.
+    #[error("{}: the file is larger than {MOST_BYTES} bytes, the most a URDF may have", file.display())]
+    TooLarge {
+        /// The path that was tried.
+        file: PathBuf,
+    },
+    /// The file is not text.
+    #[error("{}:{line}: byte {byte} of the file is not UTF-8; a URDF is a UTF-8 text in XML", file.display())]
+    NotUtf8 {
+        /// The path that was tried.
+        file: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// Offset of the first bad byte, from 0.
+        byte: usize,
+    },
+    /// The text was read, and is wrong in one or more places.
+    #[error("{0}")]
+    Invalid(Box<Invalid>),
+    /// What it says is no tree that can move.
+    #[error("{}: {source}", file.display())]
+    Model {
+        /// The file.
+        file: PathBuf,
+        /// From the model.
+        source: ModelError,
+    },
+    /// A mesh cannot be read, or a shape or constant is refused.
+    #[error("{}: {why}", file.display())]
+    Body {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong; it names the link.
+        why: String,
+    },
+}
+
+/// Reads a URDF as a body that stands at the origin (or floats there), with its shapes, limits and couplings.
+///
+/// # Errors
+/// [`UrdfError`]: a file cannot be read, or has problems; those of the XML are told at once with line and column.
+pub fn load(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<(ArticulatedBody, Notes), UrdfError> {
+    let path = path.as_ref();
+    let robot = read_file(path, options, true)?;
+    let mut maker = ShapeMaker::new(&[]);
+    let spec = ArticulatedSpec { part_overlaps: true, ..ArticulatedSpec::of(robot.name, robot.links) };
+    let body = assemble::body(&spec, &mut maker).map_err(|why| UrdfError::Body { file: path.to_path_buf(), why })?;
+    Ok((body, robot.notes.into_iter().chain(maker.notes.take()).collect()))
+}
+
+/// The tree of a URDF without its shapes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UrdfModel {
+    /// The robot's name.
+    pub name: String,
+    /// Its tree.
+    pub model: Model,
+    /// Names of its joints, one for each of [`Model::links`]: in the order of the coordinates. That of a floating root is the root link's.
+    pub joints: Vec<String>,
+    /// What is to be said of the file.
+    pub notes: Vec<String>,
+}
+
+/// Reads the tree of a URDF. No mesh is looked for.
+///
+/// # Errors
+/// [`UrdfError`]: the file cannot be read, or has problems, all of which are told at once with line and column.
+pub fn model(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<UrdfModel, UrdfError> {
+    let path = path.as_ref();
+    let robot = read_file(path, options, false)?;
+    robot.into_model(path)
+}
+
+/// The same from a text; `file_name` is shown in errors.
+///
+/// # Errors
+/// As [`model`], but for those of files.
+pub fn parse_model(text: &str, file_name: &str, options: &UrdfOptions) -> Result<UrdfModel, UrdfError> {
+    let path = Path::new(file_name);
+    read_text(text, path, options, false)?.into_model(path)
+}
+
+impl Robot {
+    fn into_model(self, path: &Path) -> Result<UrdfModel, UrdfError> {
+        let masses: Vec<LinkMass> = self.links.iter().map(LinkSpec::given_mass).collect();
+        let model = assemble::model(&self.links, &masses).map_err(|source| UrdfError::Model { file: path.to_path_buf(), source })?;
+        Ok(UrdfModel { joints: assemble::moving_joints(&self.links), name: self.name, model, notes: self.notes })
+    }
+}
+
+/// What a URDF says.
+pub(crate) struct Robot {
+    pub(crate) name: String,
+    /// A parent before its children.
+    pub(crate) links: Vec<LinkSpec>,
+    pub(crate) notes: Vec<String>,
+}
+
+/// Reads a file; without `shapes` no mesh is looked for.
+pub(crate) fn read_file(path: &Path, options: &UrdfOptions, shapes: bool) -> Result<Robot, UrdfError> {
+    let unread = |source| UrdfError::Read { file: path.to_path_buf(), source };
+    let mut bytes = Vec::new();
+    std::fs::File::open(path).map_err(unread)?.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(UrdfError::TooLarge { file: path.to_path_buf() });
+    }
+    let text = std::str::from_utf8(&bytes).map_err(|error| {
+        let byte = error.valid_up_to();
+        UrdfError::NotUtf8 { file: path.to_path_buf(), line: 1 + bytes[..byte].iter().filter(|&&b| b == b'\n').count(), byte }
+    })?;
+    read_text(text, path, options, shapes)
+}
+
+/// Reads a text; `path` is shown in messages, and meshes are looked for from its folder.
+pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, shapes: bool) -> Result<Robot, UrdfError> {
+    let log = Log::new(text);
+    let file = path.display().to_string();
+    let document = xml::parse(&log, text);
+    let robot = document.as_ref().and_then(|document| {
+        let context = Context {
+            folder: path.parent().unwrap_or(Path::new("")), file: &file, options, shapes, colors: BTreeMap::new(), notes: NoteList::default(),
+        };
+        read_robot(&Element::new(&log, document.root_element()), context)
+    });
+    match robot {
+        Some(robot) if log.count() == 0 => Ok(robot),
+        _ => {
+            drop(document);
+            Err(UrdfError::Invalid(Box::new(Invalid { file, text: text.to_owned(), problems: log.into_problems() })))
+        }
+    }
+}
+
+/// `<robot>`; `None`, with the problems recorded, where it has no tree.
+fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot> {
+    if robot.tag() != "robot" {
+        robot.problem("is the outermost element", "wanted <robot>");
+        return None;
+    }
+    let colors: Vec<_> = robot.children("material").filter_map(|m| Some((m.text("name")?, read_color(&m)?))).collect();
+    context.colors = colors.iter().map(|(name, color)| ((*name).to_owned(), *color)).collect();
+    let mut taken = BTreeMap::new();
+    let elements: Vec<LinkElement> = robot.children("link").filter_map(|link| LinkElement::read(&link, &mut context)).collect();
+    let mut names = BTreeMap::new();
+    for (number, link) in elements.iter().enumerate() {
+        names.insert(link.name.clone(), number);
+        note_unique(robot.log, &mut taken, "link", &link.name, &link.span);
+    }
+    if elements.is_empty() || elements.len() > MOST_LINKS {
+        robot.problem(format_args!("has {} links", elements.len()), format!("wanted 1 to {MOST_LINKS}"));
+        return None;
+    }
+    let joints: Vec<JointElement> = robot.children("joint").filter_map(|joint| JointElement::read(&joint, &names)).collect();
+    taken.clear();
+    joints.iter().for_each(|joint| note_unique(robot.log, &mut taken, "joint", &joint.name, &joint.span));
+    if robot.log.count() > 0 {
+        return None;
+    }
+    let root = tree::find_root(robot.log, &elements, &joints)?;
+    let name = robot.text("name").unwrap_or("robot").to_owned();
+    let links = TreeBuilder::new(robot.log, elements, &joints).build(root, context.options.floating, &mut context.notes);
+    Some(Robot { name, links, notes: context.notes.take() })
+}
+
+fn note_unique(log: &Log<'_>, taken: &mut BTreeMap<String, usize>, kind: &str, name: &str, span: &Range<usize>) {
+    if let Some(line) = taken.insert(name.to_owned(), log.line(span.start)) {
+        let message = format!("there is a second {kind} \"{name}\"; the first is at line {line}");
+        log.report(span.clone(), message, format!("wanted a name that no other {kind} has"));
+    }
+}
