@@ -99,12 +99,6 @@ pub trait Collidable {
         let _ = (part_a, part_b);
         false
     }
-    /// Angular (rad/s²) and linear (m/s²) acceleration of a part's frame while the object's generalized velocities stay as they are, from its
-    /// sites: `J̇·v`. None where the generalized velocity is the part's own, as a rigid body's; links of a chain have one.
-    fn coasting_acceleration(&self, part: usize, sites: &[Site]) -> (Vec3, Vec3) {
-        let _ = (part, sites);
-        (Vec3::zeros(), Vec3::zeros())
-    }
     /// "What would unit impulses along these axes at this point do?" (thesis `ApplyTestImpulse`). Adds `sign · L⁻ᵀJᵀ` to `y`: one
     /// row of `dof` numbers per axis.
     fn test_impulse(&self, part: usize, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]);

@@ -30,6 +30,7 @@ pub mod rows;
 mod settings;
 mod site;
 pub mod solver;
+pub mod spatial;
 mod step;
 mod sync;
 mod view;

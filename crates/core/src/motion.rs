@@ -30,13 +30,22 @@ pub(crate) struct Motion<'a> {
     pub applied_generalized: &'a [f64],
     /// Generalized contact forces that hold over the sub-step.
     pub held: &'a [f64],
+    /// See [`Core::pin`](crate::world::Core).
+    pub pinned: &'a [f64],
+    pub pinned_sites: &'a mut [Site],
 }
 
 impl Motion<'_> {
     /// Writes sites and caches from the state. What is static or not alive is at rest, whatever momentum it keeps.
     pub fn refresh(&mut self) {
         let (x, sites) = (&self.x[..], &mut *self.sites);
-        self.table.for_each_mut(|e| refresh(e, x, sites));
+        let (pinned, pinned_sites) = (self.pinned, &mut *self.pinned_sites);
+        self.table.for_each_mut(|e| {
+            refresh(e, x, sites);
+            if !pinned.is_empty() && e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity()) {
+                refresh(e, pinned, pinned_sites);
+            }
+        });
     }
 
     /// The same for one object.

@@ -159,6 +159,7 @@ impl SceneFile {
             dt: w.dt_s,
             substeps: w.substeps,
             integrator: w.integrator.into(),
+            integrator_tolerance: w.integrator_tolerance,
             accuracy: Accuracy { sweeps: w.iterations, ..base.accuracy },
             contact_tolerance: w.contact_tolerance_m,
             drift_tolerance: base.drift_tolerance.max(w.contact_tolerance_m),

@@ -30,6 +30,8 @@ pub enum Integrator {
     ExplicitEuler,
     /// The classical Runge–Kutta method of fourth order.
     Rk4,
+    /// Dormand and Prince's pair of fifth and fourth order, with error control.
+    DormandPrince,
 }
 
 /// How contact forces are found.
@@ -53,6 +55,7 @@ impl Integrator {
         ("symplectic_euler", Integrator::SymplecticEuler),
         ("explicit_euler", Integrator::ExplicitEuler),
         ("rk4", Integrator::Rk4),
+        ("dormand_prince", Integrator::DormandPrince),
     ];
 }
 
@@ -79,6 +82,7 @@ impl From<Integrator> for tumble_core::Integrator {
             Integrator::SymplecticEuler => Self::SymplecticEuler,
             Integrator::ExplicitEuler => Self::ExplicitEuler,
             Integrator::Rk4 => Self::Rk4,
+            Integrator::DormandPrince => Self::DormandPrince,
         }
     }
 }
@@ -145,6 +149,8 @@ pub struct WorldSettings {
     pub stepper: Stepper,
     /// Default `verlet`.
     pub integrator: Integrator,
+    /// `dormand_prince`: error of an inner step (m, rad, m/s, rad/s), from 1e-14 to 0.1. Default 1e-6.
+    pub integrator_tolerance: f64,
     /// Default `gauss_seidel`.
     pub solver: Solver,
     /// Most sweeps of an iterating solver per solve, 1 to 100 000. Default 200.
@@ -166,6 +172,7 @@ impl Default for WorldSettings {
             seconds: 5.0,
             stepper: Stepper::TimeStepping,
             integrator: Integrator::Verlet,
+            integrator_tolerance: 1e-6,
             solver: Solver::GaussSeidel,
             iterations: 200,
             contact_tolerance_m: 1e-7,
@@ -177,6 +184,7 @@ impl Default for WorldSettings {
 
 const DT: Bound = Bound::new(1e-6, 1.0, "a time from 1e-6 to 1 s");
 const TOLERANCE: Bound = Bound::new(1e-9, 1.0, "a length from 1e-9 to 1 m");
+const ACCURACY: Bound = Bound::new(1e-14, 0.1, "a tolerance from 1e-14 to 0.1");
 const SECONDS: Bound = Bound::new(0.0, 1e6, "a time from 0 to 1e6 s");
 
 impl WorldSettings {
@@ -189,6 +197,7 @@ impl WorldSettings {
             seconds: f.number_or("seconds", SECONDS, usual.seconds),
             stepper: f.choice_or("stepper", Stepper::NAMES, usual.stepper),
             integrator: f.choice_or("integrator", Integrator::NAMES, usual.integrator),
+            integrator_tolerance: f.number_or("integrator_tolerance", ACCURACY, usual.integrator_tolerance),
             solver: f.choice_or("solver", Solver::NAMES, usual.solver),
             iterations: f.integer_or("iterations", 1..=100_000, usual.iterations),
             contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, usual.contact_tolerance_m),

@@ -39,7 +39,7 @@ pub struct RunOptions {
     /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
     #[arg(long, value_name = "NAME", value_parser = solver)]
     pub solver: Option<Solver>,
-    /// verlet, symplectic_euler, explicit_euler or rk4; time_stepping is the midpoint rule whatever is chosen.
+    /// verlet, symplectic_euler, explicit_euler, rk4 or dormand_prince; time_stepping is the midpoint rule whatever is chosen.
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<Integrator>,
     /// Write a recording (MCAP; opens in Foxglove).

@@ -233,4 +233,8 @@ impl Constraint for Bead {
         let me = out.owner();
         out.row(target).on_coordinates(me, &[-1.0]);
     }
+
+    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+        out.extend(self.stop.map(|stop| stop - view.x[me.x.start]));
+    }
 }

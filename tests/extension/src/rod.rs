@@ -79,4 +79,10 @@ impl Constraint for Rod {
             }
         }
     }
+
+    fn gaps(&self, _me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+        if let (true, Some((pa, _)), Some((pb, _))) = (self.rope, motion(self.ends[0], view), motion(self.ends[1], view)) {
+            out.push(self.length - (pa - pb).norm());
+        }
+    }
 }

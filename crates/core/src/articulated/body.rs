@@ -121,6 +121,8 @@ pub(super) struct Working {
     /// For states other than the last refreshed.
     pub elsewhere: Dynamics,
     pub kinematics: Kinematics,
+    /// No joint forces, no accelerations.
+    pub zeros: Vec<f64>,
     pub wrenches: Vec<crate::site::Wrench>,
     pub accelerations: Vec<(Vec3, Vec3)>,
 }
@@ -154,7 +156,7 @@ impl ArticulatedBody {
             write_pose(&mut start[link.q..link.q + 7], &link.placement);
         }
         let working = Working {
-            scratch: dynamics.scratch(), elsewhere: dynamics.clone(), kinematics: Kinematics::new(&model), wrenches: vec![Default::default(); model.links().len()],
+            scratch: dynamics.scratch(), elsewhere: dynamics.clone(), kinematics: Kinematics::new(&model), zeros: vec![0.0; model.dof()], wrenches: vec![Default::default(); model.links().len()],
             accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],
         };
         let freedoms = vec![Freedom::default(); model.dof()];

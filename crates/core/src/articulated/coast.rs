@@ -19,7 +19,7 @@ pub(super) fn coast(model: &Model, working: &mut Working, x: &mut [f64], h: f64)
     if h == 0.0 || x[n..].iter().all(|v| *v == 0.0) {
         return;
     }
-    let Working { scratch, elsewhere, .. } = working;
+    let Working { scratch, elsewhere, zeros, .. } = working;
     let start = x.to_vec();
     let (mut k, mut stage): (Vec<Vec<f64>>, Vec<f64>) = (Vec::with_capacity(4), start.clone());
     let mut rates: Vec<Vec<f64>> = Vec::with_capacity(4);
@@ -29,7 +29,7 @@ pub(super) fn coast(model: &Model, working: &mut Working, x: &mut [f64], h: f64)
         let (q, v) = stage.split_at(n);
         elsewhere.refresh(q, v);
         let mut rate = vec![0.0; v.len()];
-        elsewhere.accelerate(scratch, &[], &[], &mut rate);
+        elsewhere.accelerate(scratch, zeros, &[], &mut rate);
         if s == 0 {
             energy = energy_of(elsewhere, scratch, v);
         }

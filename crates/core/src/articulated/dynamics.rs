@@ -1,54 +1,185 @@
-//! A dense stand-in, to be replaced by the articulated-body method: same answers, O(n³).
-#![allow(missing_docs)]
-use super::*;
+//! Forward dynamics of one model at one state: the sweeps of [`abm`](super::abm) in `f64`, kept so that many questions are answered at the state last
+//! refreshed.
+
+use super::abm::{Sweep, push, spread, three, write_three};
+use super::compiled::{Compiled, Kind};
+use super::model::Model;
 use crate::site::Wrench;
-use nalgebra::{DMatrix, DVector};
-use tumble_collide::{Pose, Vec3};
-#[derive(Clone)]
-pub struct Dynamics { model: Model, kin: Kinematics, id: InverseDynamics, c: DMatrix<f64>, bad: Option<usize> }
-#[derive(Clone)]
-pub struct Scratch;
+use crate::spatial::{Force, Motion, Vector};
+use nalgebra::{Rotation3, UnitQuaternion};
+use tumble_collide::{Mat3, Pose, Vec3};
+
+/// A model, and everything of it that is a function of `q` and `v`: poses, velocities, bias forces, articulated inertias and their factors.
+/// Before the first [`refresh`](Self::refresh) its answers mean nothing.
+#[derive(Clone, Debug)]
+pub struct Dynamics {
+    pub(super) compiled: Compiled,
+    pub(super) sweep: Sweep<f64>,
+    /// `√D` and `1/√D` (or 0) of each hinge and slider, by slot.
+    pub(super) roots: Vec<[f64; 2]>,
+    singular: Option<usize>,
+}
+
+/// Working memory of one call, for the maps that take `&self`. Made by [`Dynamics::scratch`]; holds nothing between calls.
+#[derive(Clone, Debug)]
+pub struct Scratch {
+    pub(super) motions: Vec<Motion>,
+    pub(super) forces: Vec<Force>,
+    pub(super) efforts: Vec<Force>,
+}
+
 impl Dynamics {
-    pub fn new(model: &Model) -> Dynamics { let n = model.dof(); Dynamics { model: model.clone(), kin: Kinematics::new(model), id: InverseDynamics::new(model), c: DMatrix::identity(n, n), bad: None } }
-    pub fn scratch(&self) -> Scratch { Scratch }
+    /// Makes a model ready; all allocation happens here.
+    pub fn new(model: &Model) -> Dynamics {
+        let compiled = Compiled::new(model);
+        let sweep = Sweep::new(&compiled, 0.0);
+        Dynamics { roots: vec![[0.0; 2]; compiled.bodies.len() + 1], compiled, sweep, singular: None }
+    }
+
+    /// Moving links.
+    pub fn links(&self) -> usize {
+        self.compiled.bodies.len()
+    }
+
+    /// Degrees of freedom: length of `v`.
+    pub fn dof(&self) -> usize {
+        self.compiled.dof
+    }
+
+    /// Length of `q`.
+    pub fn positions(&self) -> usize {
+        self.compiled.positions
+    }
+
+    /// Working memory for the maps.
+    pub fn scratch(&self) -> Scratch {
+        let slots = self.sweep.slots.len();
+        Scratch { motions: vec![Motion::default(); slots], forces: vec![Force::default(); slots], efforts: vec![Force::default(); slots] }
+    }
+
+    /// Takes a new state. Quaternions in `q` may have any length above 0.
     pub fn refresh(&mut self, q: &[f64], v: &[f64]) {
-        self.kin.refresh(&self.model, q, v);
-        let n = self.model.dof();
-        let mut m = vec![0.0; n * n];
-        MassMatrix::new(&self.model).write(&self.model, &self.kin, &mut m);
-        match DMatrix::from_row_slice(n, n, &m).cholesky() { Some(c) => { self.c = c.l(); self.bad = None }, None => self.bad = Some(0) }
-    }
-    pub fn singular(&self) -> Option<usize> { self.bad }
-    pub fn link_pose(&self, i: usize) -> Pose { self.kin.links()[i].pose }
-    pub fn link_velocity(&self, i: usize) -> (Vec3, Vec3) { (self.kin.links()[i].angular, self.kin.links()[i].linear) }
-    pub fn accelerate(&self, _s: &mut Scratch, tau: &[f64], wrenches: &[Wrench], qdd: &mut [f64]) {
-        let n = self.model.dof();
-        let mut b = vec![0.0; n];
-        self.id.clone().bias(&self.model, &self.kin, &Vec3::zeros(), wrenches, &mut b);
-        let rhs: Vec<f64> = (0..n).map(|i| tau.get(i).copied().unwrap_or(0.0) - b[i]).collect();
-        let mut y = vec![0.0; n];
-        self.respond(&mut Scratch, &rhs, &mut y);
-        self.unwhiten(&mut Scratch, &y, qdd);
-    }
-    pub fn link_accelerations(&self, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
-        let mut r = vec![Rates::zero(); out.len()];
-        self.kin.accelerations(&self.model, qdd, &Vec3::zeros(), &mut r);
-        out.iter_mut().zip(&r).for_each(|(o, r)| *o = (r.angular, r.linear));
-    }
-    pub fn whiten(&self, _s: &mut Scratch, v: &[f64], u: &mut [f64]) { u.copy_from_slice((self.c.transpose() * DVector::from_row_slice(v)).as_slice()); }
-    pub fn recover(&self, _s: &mut Scratch, u: &[f64], j: &mut [f64]) { j.copy_from_slice((&self.c * DVector::from_row_slice(u)).as_slice()); }
-    pub fn respond(&self, _s: &mut Scratch, j: &[f64], y: &mut [f64]) { y.copy_from_slice(self.c.solve_lower_triangular(&DVector::from_row_slice(j)).unwrap().as_slice()); }
-    pub fn unwhiten(&self, _s: &mut Scratch, u: &[f64], v: &mut [f64]) { v.copy_from_slice(self.c.tr_solve_lower_triangular(&DVector::from_row_slice(u)).unwrap().as_slice()); }
-    pub fn point_response(&self, link: usize, arm: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
-        let n = self.model.dof();
-        let p = self.kin.links()[link].pose.translation.vector + arm;
-        let mut j = vec![0.0; 3 * n];
-        point_jacobian(&self.model, &self.kin, link, &p, &mut j);
-        for (axis, y) in axes.iter().zip(y.chunks_exact_mut(n)) {
-            let row: Vec<f64> = (0..n).map(|k| (0..3).map(|r| axis[r] * j[r * n + k]).sum()).collect();
-            let mut w = vec![0.0; n];
-            self.respond(&mut Scratch, &row, &mut w);
-            y.iter_mut().zip(&w).for_each(|(y, w)| *y += sign * w);
+        self.sweep.place::<true>(&self.compiled, |k| q[k], |k| v[k]);
+        self.sweep.fold(&self.compiled);
+        self.singular = None;
+        for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
+            let slot = &self.sweep.slots[i + 1];
+            let positive = match body.kind {
+                Kind::Revolute | Kind::Prismatic => {
+                    let root = if slot.inverse > 0.0 { slot.pivot.sqrt() } else { 0.0 };
+                    self.roots[i + 1] = [root, if root > 0.0 { 1.0 / root } else { 0.0 }];
+                    root > 0.0
+                }
+                Kind::Spherical(block) => {
+                    let block = &mut self.sweep.blocks[block];
+                    block.first = block.first.with_roots();
+                    block.first.is_positive()
+                }
+                Kind::Floating(block) => {
+                    let block = &mut self.sweep.blocks[block];
+                    (block.first, block.second) = (block.first.with_roots(), block.second.with_roots());
+                    block.first.is_positive() && block.second.is_positive()
+                }
+            };
+            if !positive {
+                self.singular = Some(i);
+            }
         }
     }
+
+    /// First link whose joint nothing resists at the state last refreshed (gimbal lock of stacked hinges): `D` along an axis of it is below 1e-12 of
+    /// the size of its articulated inertia. The maps then hold that axis still, and stay finite.
+    pub fn singular(&self) -> Option<usize> {
+        self.singular
+    }
+
+    /// Pose of a link's frame in the world.
+    pub fn link_pose(&self, link: usize) -> Pose {
+        let slot = &self.sweep.slots[link + 1];
+        let rotation = Mat3::from(slot.rotation) * self.compiled.bodies[link].own.transpose();
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Pose::from_parts(Vec3::from(slot.position).into(), rotation)
+    }
+
+    /// Angular velocity of a link, rad/s, and velocity of its origin, m/s, world axes.
+    pub fn link_velocity(&self, link: usize) -> (Vec3, Vec3) {
+        let slot = &self.sweep.slots[link + 1];
+        (slot.angular.into(), slot.linear.into())
+    }
+
+    /// Generalized accelerations `q̈`, Coriolis and centrifugal terms included, under joint forces `tau` (N·m, N) and one wrench per moving link (world
+    /// axes, torque about the link's origin; an empty slice is none). Without gravity.
+    pub fn accelerate(&self, s: &mut Scratch, tau: &[f64], wrenches: &[Wrench], qdd: &mut [f64]) {
+        self.accelerate_in(s, &Vec3::zeros(), tau, wrenches, qdd);
+    }
+
+    /// [`accelerate`](Self::accelerate) in uniform gravity `gravity`, m/s², world axes.
+    pub fn accelerate_in(&self, s: &mut Scratch, gravity: &Vec3, tau: &[f64], wrenches: &[Wrench], qdd: &mut [f64]) {
+        for (p, slot) in s.forces.iter_mut().zip(&self.sweep.slots) {
+            *p = slot.bias;
+        }
+        for (p, wrench) in s.forces[1..].iter_mut().zip(wrenches) {
+            *p -= Force::new(wrench.torque.into(), wrench.force.into());
+        }
+        let Sweep { slots, blocks } = &self.sweep;
+        for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
+            let slot = &slots[i + 1];
+            let passed = push(body, slot, blocks, s.forces[i + 1], |k| tau[k], &mut s.efforts[i + 1]);
+            s.forces[body.parent] += passed.from_arm(slot.arm);
+        }
+        s.motions[0] = Motion::new(Vector::default(), (-gravity).into());
+        for (i, body) in self.compiled.bodies.iter().enumerate() {
+            let slot = &slots[i + 1];
+            let carried = s.motions[body.parent].at(slot.arm);
+            s.motions[i + 1] = spread(body, slot, blocks, &s.efforts[i + 1], carried, &mut |k, x| qdd[k] = x);
+        }
+    }
+
+    /// Angular acceleration of every link, rad/s², and acceleration of the material point at its origin, m/s², world axes, for given `qdd`.
+    pub fn link_accelerations(&self, s: &mut Scratch, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
+        self.carry(s, qdd);
+        for ((a, slot), out) in s.motions[1..].iter().zip(&self.sweep.slots[1..]).zip(out) {
+            let whole = *a + slot.drift;
+            *out = (whole.angular.into(), whole.linear.into());
+        }
+    }
+
+    /// Motion of every link that joint rates `v` alone give: `V = X Vₚ + S v`, into `s.motions`.
+    pub(super) fn carry(&self, s: &mut Scratch, v: &[f64]) {
+        s.motions[0] = Motion::default();
+        for (i, body) in self.compiled.bodies.iter().enumerate() {
+            let slot = &self.sweep.slots[i + 1];
+            let mut motion = s.motions[body.parent].at(slot.arm);
+            match body.kind {
+                Kind::Revolute => motion.angular += slot.rotation.z * v[body.v],
+                Kind::Prismatic => motion.linear += slot.rotation.z * v[body.v],
+                Kind::Spherical(_) => motion.angular += slot.rotation * three(|k| v[k], body.v),
+                Kind::Floating(_) => motion = Motion::new(three(|k| v[k], body.v), three(|k| v[k], body.v + 3)),
+            }
+            s.motions[i + 1] = motion;
+        }
+    }
+}
+
+/// Forward dynamics in one go: `q̈` from `q`, `v` and joint forces `tau` in uniform gravity. Leaves `d` fit for another call of this alone: its maps need
+/// a [`Dynamics::refresh`] first.
+pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
+    let Dynamics { compiled, sweep, .. } = d;
+    sweep.place::<false>(compiled, |k| q[k], |k| v[k]);
+    for (i, body) in compiled.bodies.iter().enumerate().rev() {
+        sweep.fold_link(i + 1, body);
+        sweep.push_link(i + 1, body, |k| tau[k]);
+    }
+    sweep.slots[0].acceleration = Motion::new(Vector::default(), (-gravity).into());
+    sweep.spread(compiled, |k, x| qdd[k] = x);
+}
+
+/// Three numbers of a slice from `k` on.
+pub(super) fn at(x: &[f64], k: usize) -> Vector {
+    three(|k| x[k], k)
+}
+
+/// Writes three numbers of a slice from `k` on.
+pub(super) fn put(x: &mut [f64], k: usize, v: Vector) {
+    write_three(k, v, &mut |k, x_k| x[k] = x_k);
 }

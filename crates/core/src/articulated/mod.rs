@@ -1,12 +1,15 @@
 //! Articulated bodies in reduced coordinates (thesis §III.B, [RBDA]).
 
+mod abm;
 mod body;
 mod coast;
+mod compiled;
 mod coordinates;
 mod crba;
 mod drives;
 mod dynamics;
 mod energy;
+mod factor;
 mod freedom;
 mod jacobian;
 mod joint;
@@ -15,12 +18,13 @@ mod model;
 mod object;
 mod playback;
 mod rnea;
+mod whiten;
 
 pub use body::{ArticulatedBody, ArticulatedError, Collider};
 pub use coordinates::{difference, integrate, normalize};
 pub use crba::MassMatrix;
+pub use dynamics::{Dynamics, Scratch, forward_dynamics};
 pub use energy::{center_of_mass, energy, momentum};
-pub use dynamics::{Dynamics, Scratch};
 pub use freedom::{Coupling, Drive, Freedom, Spring};
 pub use jacobian::{link_jacobian, point_jacobian};
 pub use joint::Joint;

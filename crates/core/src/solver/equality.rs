@@ -1,4 +1,4 @@
-//! Free multipliers taken out of a problem before pivoting: `w_E = 0` solved for `λ_E`, redundant rows included.
+//! Free multipliers taken out of a problem: `w_E = 0` solved for `λ_E`, redundant rows included. `K` has the compliance of soft rows in it.
 //!
 //! ```text
 //! w_E = c_E + K_EE·λ_E + K_EZ·z = 0                      K_EE = P·R·Rᵀ·Pᵀ, pivoted Cholesky, stopped at rank r
@@ -8,63 +8,90 @@
 //!
 //! Splitting a free multiplier into two nonnegative ones would serve as well, but rounding makes redundant rows contradict each other,
 //! and a contradiction is a ray.
+//!
+//! Columns of `R` are mostly zero where rows meet few others, as along a chain, and what is zero is passed over: pivots of equal rank are
+//! taken first come, first served, which takes every second joint of a chain first.
 
 /// Rows whose pivot fell under this part of their own diagonal depend on the others: rounding is a part of that, however large others are.
-const RANK: f64 = 1e-11;
+pub(super) const RANK: f64 = 1e-11;
 /// What is left of a diagonal after the elimination, below which nothing is left of its row.
-const VANISHED: f64 = 1e-12;
+pub(super) const VANISHED: f64 = 1e-12;
 
 /// A pivoted Cholesky factor of `K_EE`.
 pub(super) struct Equalities {
+    size: usize,
     /// Independent rows, as positions within E, in pivot order.
     order: Vec<usize>,
-    /// `R`, lower triangular, row `i` with `i + 1` numbers.
-    factor: Vec<Vec<f64>>,
+    /// `R`, one column of `size` numbers after the other, each in the order of E; 0 at the rows of earlier pivots.
+    columns: Vec<f64>,
 }
 
 impl Equalities {
-    /// Factors `k`, `e × e`, row-major, symmetric positive semidefinite.
-    pub(super) fn new(k: &[f64], e: usize) -> Equalities {
-        let mut rest: Vec<f64> = (0..e).map(|i| k[i * e + i]).collect();
-        let whole = rest.clone();
-        let share = |rest: &[f64], i: usize| if whole[i] > 0.0 { rest[i] / whole[i] } else { 0.0 };
-        let mut columns: Vec<Vec<f64>> = Vec::new();
-        let mut order: Vec<usize> = Vec::new();
-        // Column by column; `columns[p][i]` is R of original row i and pivot p.
-        while let Some(next) = (0..e).filter(|i| !order.contains(i)).reduce(|a, b| if share(&rest, b) > share(&rest, a) { b } else { a }) {
-            if share(&rest, next) <= RANK {
+    /// Factors `k`, `e × e`, row-major, symmetric positive semidefinite. A pivot of at most `rank` of its own diagonal ends it.
+    pub(super) fn new(k: &[f64], e: usize, rank: f64) -> Equalities {
+        let whole: Vec<f64> = (0..e).map(|i| k[i * e + i]).collect();
+        // What is left of each diagonal as a part of it; negative once it was the pivot.
+        let mut left: Vec<f64> = whole.iter().map(|d| if *d > 0.0 { 1.0 } else { 0.0 }).collect();
+        let mut factor = Equalities { size: e, order: Vec::new(), columns: Vec::new() };
+        for _ in 0..e {
+            let next = (0..e).fold(0, |best, i| if left[i] > left[best] { i } else { best });
+            if left[next].is_nan() || left[next] <= rank {
                 break;
             }
-            let root = rest[next].sqrt();
-            let below = |i: usize| k[i * e + next] - columns.iter().map(|c| c[i] * c[next]).sum::<f64>();
-            let column: Vec<f64> = (0..e).map(|i| if i == next { root } else { below(i) / root }).collect();
-            (0..e).for_each(|i| rest[i] -= column[i] * column[i]);
-            columns.push(column);
-            order.push(next);
+            factor.eliminate(k, next, left[next] * whole[next]);
+            let column = factor.column(factor.order.len() - 1);
+            (0..e).filter(|&i| column[i] != 0.0).for_each(|i| left[i] -= column[i] * column[i] / whole[i]);
+            left[next] = f64::NEG_INFINITY;
         }
-        let factor = order.iter().enumerate().map(|(p, &i)| columns[..=p].iter().map(|c| c[i]).collect()).collect();
-        Equalities { order, factor }
+        factor
     }
 
-    /// `R⁻¹` of the independent entries of `x`.
+    /// Appends the column of the pivot at `next`, of which `rest` is left: `(k − Σ earlier columns) / √rest`.
+    fn eliminate(&mut self, k: &[f64], next: usize, rest: f64) {
+        let e = self.size;
+        let mut column = k[next * e..(next + 1) * e].to_vec();
+        for earlier in self.columns.chunks_exact(e).filter(|c| c[next] != 0.0) {
+            add_multiple(earlier, -earlier[next], &mut column);
+        }
+        let root = rest.sqrt();
+        column.iter_mut().for_each(|x| *x /= root);
+        self.order.iter().for_each(|&i| column[i] = 0.0);
+        column[next] = root;
+        self.columns.extend(column);
+        self.order.push(next);
+    }
+
+    /// Rows that do not depend on others.
+    pub(super) fn rank(&self) -> usize {
+        self.order.len()
+    }
+
+    fn column(&self, p: usize) -> &[f64] {
+        &self.columns[p * self.size..(p + 1) * self.size]
+    }
+
+    /// `R⁻¹` of the independent entries of `x`, in pivot order.
     fn forward(&self, x: &[f64]) -> Vec<f64> {
-        let mut t: Vec<f64> = Vec::with_capacity(self.order.len());
-        for (row, &i) in self.factor.iter().zip(&self.order) {
-            let sum: f64 = row.iter().zip(&t).map(|(r, t)| r * t).sum();
-            t.push((x[i] - sum) / row[t.len()]);
+        let mut left = x.to_vec();
+        let mut t = Vec::with_capacity(self.rank());
+        for (p, &i) in self.order.iter().enumerate() {
+            let next = if left[i] == 0.0 { 0.0 } else { left[i] / self.column(p)[i] };
+            if next != 0.0 {
+                add_multiple(self.column(p), -next, &mut left);
+            }
+            t.push(next);
         }
         t
     }
 
     /// `K_EE⁻¹·x` on the independent rows, 0 elsewhere; as long as `x`.
     pub(super) fn solve(&self, x: &[f64]) -> Vec<f64> {
-        let mut t = self.forward(x);
-        for p in (0..t.len()).rev() {
-            let sum: f64 = (p + 1..t.len()).map(|l| self.factor[l][p] * t[l]).sum();
-            t[p] = (t[p] - sum) / self.factor[p][p];
-        }
+        let t = self.forward(x);
         let mut out = vec![0.0; x.len()];
-        self.order.iter().zip(&t).for_each(|(&i, t)| out[i] = *t);
+        for (p, &i) in self.order.iter().enumerate().rev() {
+            let column = self.column(p);
+            out[i] = (t[p] - dot(column, &out)) / column[i];
+        }
         out
     }
 
@@ -72,7 +99,6 @@ impl Equalities {
     pub(super) fn reduce(&self, coupling: &[Vec<f64>], free: &[f64], k: &mut [f64], stride: usize, c: &mut [f64]) {
         let t = self.forward(free);
         let columns: Vec<Vec<f64>> = coupling.iter().map(|x| self.forward(x)).collect();
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let whole: Vec<f64> = (0..c.len()).map(|i| k[i * stride + i]).collect();
         for (i, a) in columns.iter().enumerate() {
             c[i] -= dot(a, &t);
@@ -87,4 +113,19 @@ impl Equalities {
             }
         }
     }
+}
+
+fn add_multiple(x: &[f64], scale: f64, to: &mut [f64]) {
+    to.iter_mut().zip(x).for_each(|(to, x)| *to += scale * x);
+}
+
+/// `a·b` in four sums that the processor adds at once.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in a.iter().zip(b) {
+        (0..4).for_each(|k| sums[k] += a[k] * b[k]);
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }

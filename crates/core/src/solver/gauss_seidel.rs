@@ -2,8 +2,11 @@
 //!
 //! For each block in turn, with everything else held: `w = c + Yᵀ(Yλ) + Rλ`, then
 //!
-//! - equality, half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K + R`;
+//! - half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K + R`;
 //! - contact: its own three-row problem (`one_contact.rs`).
+//!
+//! Equalities are in no sweep: they are solved all at once and hold in every iterate (`linkage.rs`), but for linkages too large for that,
+//! where they are relaxed like intervals without ends.
 //!
 //! Its fixed points are the exact Coulomb solutions: `λ_n ⟂ w_n` without the dilation that a convex cone brings, and
 //! friction against the sliding velocity.
@@ -14,6 +17,7 @@
 //! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. With friction the problem is not convex and the
 //! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. High mass ratios stay slow; the residual says how far.
 
+use super::linkage::{Linkages, Reach};
 use super::one_contact::Contact;
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{Block, RowSet, Rows, Side, dot, dot6};
@@ -31,19 +35,21 @@ impl RowSolver for GaussSeidel {
     }
 
     fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome {
+        let mut linkages = Linkages::new(rows, blocks);
         let mut locals: Vec<Local> = Vec::with_capacity(blocks.len());
         for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
-            locals.push(Local::new(rows, block, c, lambda));
+            if !linkages.hold(rows, block) {
+                locals.push(Local::new(rows, &mut linkages, block, c, lambda));
+            }
         }
-        write_back(&locals, lambda);
-        apply(&locals, rows, lambda, du);
-        let sweeps = accuracy.sweeps_of(blocks.len());
-        let mut momentum = Momentum::new(&locals, du);
+        apply(&locals, &linkages, rows, c, lambda, du);
+        let sweeps = accuracy.sweeps_of(locals.len());
+        let mut momentum = Momentum::new(&locals, &linkages, du);
         let mut outcome = Outcome { iterations: sweeps, converged: false, ray: false };
         for sweep in 1..=sweeps {
             let mut progress = Progress::default();
             for local in &mut locals {
-                local.relax(rows, du, &mut progress);
+                local.relax(rows, &linkages, du, &mut progress);
             }
             if progress.change <= accuracy.tolerance {
                 outcome = Outcome { iterations: sweep, converged: true, ray: false };
@@ -54,10 +60,14 @@ impl RowSolver for GaussSeidel {
                 momentum.extrapolate(&mut locals, progress.against > 0.0 || plain, du);
             }
             if sweep % RENEW == 0 {
-                momentum.renew(&mut locals, rows, lambda, du);
+                momentum.renew(&mut locals, &linkages, rows, c, lambda, du);
             }
         }
         write_back(&locals, lambda);
+        if !linkages.is_empty() {
+            momentum.clear(du);
+            outcome.converged &= apply(&locals, &linkages, rows, c, lambda, du);
+        }
         outcome
     }
 
@@ -78,14 +88,16 @@ fn write_back(locals: &[Local], lambda: &mut [f64]) {
     }
 }
 
-/// `du += Y·λ` of the island.
-fn apply(locals: &[Local], rows: &Rows, lambda: &[f64], du: &mut [f64]) {
+/// `du += Y·λ` of the island, with the equalities that are solved at once; whether those are.
+fn apply(locals: &[Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
+    write_back(locals, lambda);
     for local in locals.iter().filter(|l| l.lambda != [0.0; 3]) {
         match local.step {
-            Step::Contact(_) => local.block.sides().iter().for_each(|s| add_impulse(rows, s, local.lambda, du)),
+            Step::Contact(_) => local.block.sides().iter().for_each(|s| add_impulse(&rows.y, s, local.lambda, du)),
             _ => rows.apply_block(local.block, lambda, du),
         }
     }
+    linkages.settle(rows, c, lambda, du)
 }
 
 /// A block as the sweeps read it; of a scalar block only the first of each three numbers counts.
@@ -96,6 +108,7 @@ struct Local<'a> {
     /// `λ` of the sweep before.
     last: [f64; 3],
     step: Step,
+    reach: Reach,
 }
 
 /// What a sweep did.
@@ -127,8 +140,8 @@ struct Momentum {
 }
 
 impl Momentum {
-    fn new(locals: &[Local], du: &[f64]) -> Momentum {
-        let mut stretches: Vec<(u32, u32)> = Vec::new();
+    fn new(locals: &[Local], linkages: &Linkages, du: &[f64]) -> Momentum {
+        let mut stretches: Vec<(u32, u32)> = linkages.stretches().collect();
         for (i, local) in locals.iter().enumerate() {
             // the contacts of a pair follow one another: one of them is enough
             let same = |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));
@@ -166,13 +179,15 @@ impl Momentum {
     }
 
     /// Makes `du` anew, and starts from rest.
-    fn renew(&mut self, locals: &mut [Local], rows: &Rows, lambda: &mut [f64], du: &mut [f64]) {
-        write_back(locals, lambda);
-        for &(start, end) in &self.stretches {
-            du[start as usize..end as usize].fill(0.0);
-        }
-        apply(locals, rows, lambda, du);
+    fn renew(&mut self, locals: &mut [Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) {
+        self.clear(du);
+        apply(locals, linkages, rows, c, lambda, du);
         self.extrapolate(locals, true, du);
+    }
+
+    /// Zeroes `du` wherever the island acts.
+    fn clear(&self, du: &mut [f64]) {
+        self.stretches.iter().for_each(|&(start, end)| du[start as usize..end as usize].fill(0.0));
     }
 }
 
@@ -202,35 +217,37 @@ struct Scalar {
 }
 
 impl Step {
-    fn new(rows: &Rows, block: &Block) -> Step {
-        let diagonal = rows.own(block, 0, 0);
+    fn new(rows: &Rows, linkages: &Linkages, block: &Block, reach: Reach) -> Step {
+        let diagonal = linkages.own(rows, block, reach, 0, 0);
         let (compliance, k) = (block.compliance, diagonal + block.compliance);
         let scalar = |lo, hi| Step::Scalar(Scalar { k, inverse: 1.0 / k, compliance, lo, hi });
         match block.set {
-            _ if diagonal <= f64::MIN_POSITIVE => Step::Dead,
+            _ if k <= f64::MIN_POSITIVE || rows.own(block, 0, 0) <= f64::MIN_POSITIVE => Step::Dead,
             RowSet::Equality => scalar(f64::NEG_INFINITY, f64::INFINITY),
             RowSet::HalfLine => scalar(0.0, f64::INFINITY),
             RowSet::Interval { lo, hi } => scalar(lo, hi),
-            RowSet::Cone { mu } => Step::Contact(Contact::new(rows, block, mu)),
+            RowSet::Cone { mu } if reach.is_own() => Step::Contact(Contact::new(rows, block, mu)),
+            RowSet::Cone { mu } => Step::Contact(Contact::with_own(linkages.own_contact(rows, block, reach), mu)),
         }
     }
 }
 
 impl<'a> Local<'a> {
-    fn new(rows: &Rows, block: &'a Block, c: &[f64], lambda: &[f64]) -> Local<'a> {
-        let step = Step::new(rows, block);
+    fn new(rows: &Rows, linkages: &mut Linkages, block: &'a Block, c: &[f64], lambda: &[f64]) -> Local<'a> {
+        let reach = linkages.lay(rows, block);
+        let step = Step::new(rows, linkages, block, reach);
         let numbers = |from: &[f64]| {
             let mut three = [0.0; 3];
             three[..block.set.rows()].copy_from_slice(&from[block.range()]);
             three
         };
         let start = if matches!(step, Step::Dead) { [0.0; 3] } else { numbers(lambda) };
-        Local { block, c: numbers(c), lambda: start, last: start, step }
+        Local { block, c: numbers(c), lambda: start, last: start, step, reach }
     }
 
     /// Solves this block with the others held.
     #[inline]
-    fn relax(&mut self, rows: &Rows, du: &mut [f64], progress: &mut Progress) {
+    fn relax(&mut self, rows: &Rows, linkages: &Linkages, du: &mut [f64], progress: &mut Progress) {
         match &self.step {
             Step::Dead => {}
             Step::Scalar(Scalar { k, inverse, compliance, lo, hi }) => {
@@ -239,8 +256,9 @@ impl<'a> Local<'a> {
                 let delta = next - self.lambda[0];
                 if delta != 0.0 {
                     self.lambda[0] = next;
-                    for side in self.block.sides() {
-                        add_multiple(rows.response(side, 0), delta, &mut du[side.u as usize..(side.u + side.dof) as usize]);
+                    let (sides, y) = linkages.moved(rows, self.block, self.reach);
+                    for side in sides {
+                        add_multiple(row(y, side, 0), delta, &mut du[side.u as usize..(side.u + side.dof) as usize]);
                     }
                     progress.against -= delta * (next - self.last[0]);
                     progress.note((delta * k).abs());
@@ -248,12 +266,13 @@ impl<'a> Local<'a> {
             }
             Step::Contact(contact) => {
                 let mut w = self.c;
-                self.block.sides().iter().for_each(|s| add_velocity(rows, s, du, &mut w));
+                self.block.sides().iter().for_each(|s| add_velocity(&rows.y, s, du, &mut w));
                 let next = contact.solve(self.lambda, w);
                 let delta = [next[0] - self.lambda[0], next[1] - self.lambda[1], next[2] - self.lambda[2]];
                 if delta != [0.0; 3] {
                     self.lambda = next;
-                    self.block.sides().iter().for_each(|s| add_impulse(rows, s, delta, du));
+                    let (sides, y) = linkages.moved(rows, self.block, self.reach);
+                    sides.iter().for_each(|s| add_impulse(y, s, delta, du));
                     let last = &self.last;
                     progress.against -= delta[0] * (next[0] - last[0]) + delta[1] * (next[1] - last[1]) + delta[2] * (next[2] - last[2]);
                     progress.note((delta[0] * contact.k.m00).abs());
@@ -274,34 +293,41 @@ fn clamp(x: f64, lo: f64, hi: f64) -> f64 {
 
 /// The three rows of a side of six freedoms.
 #[inline(always)]
-fn six<'a>(rows: &'a Rows, side: &Side) -> Option<[&'a [f64; 6]; 3]> {
-    let [normal, first, second, ..] = rows.y[side.y as usize..].as_chunks::<6>().0 else { return None };
+fn six<'a>(y: &'a [f64], side: &Side) -> Option<[&'a [f64; 6]; 3]> {
+    let [normal, first, second, ..] = y[side.y as usize..].as_chunks::<6>().0 else { return None };
     (side.dof == 6).then_some([normal, first, second])
+}
+
+/// Row `r` of a side whose responses are in `y`.
+#[inline(always)]
+fn row<'a>(y: &'a [f64], side: &Side, r: usize) -> &'a [f64] {
+    let (start, dof) = (side.y as usize + r * side.dof as usize, side.dof as usize);
+    &y[start..start + dof]
 }
 
 /// `w += Yᵀu` of one side of a contact.
 #[inline(always)]
-fn add_velocity(rows: &Rows, side: &Side, u: &[f64], w: &mut [f64; 3]) {
+fn add_velocity(y: &[f64], side: &Side, u: &[f64], w: &mut [f64; 3]) {
     let u = &u[side.u as usize..(side.u + side.dof) as usize];
-    if let (Some([y0, y1, y2]), Some(u)) = (six(rows, side), u.as_array::<6>()) {
+    if let (Some([y0, y1, y2]), Some(u)) = (six(y, side), u.as_array::<6>()) {
         w[0] += dot6(y0, u);
         w[1] += dot6(y1, u);
         w[2] += dot6(y2, u);
     } else {
-        w.iter_mut().enumerate().for_each(|(r, w)| *w += dot(rows.response(side, r), u));
+        w.iter_mut().enumerate().for_each(|(r, w)| *w += dot(row(y, side, r), u));
     }
 }
 
 /// `u += Y·δ` of one side of a contact.
 #[inline(always)]
-fn add_impulse(rows: &Rows, side: &Side, delta: [f64; 3], u: &mut [f64]) {
+fn add_impulse(y: &[f64], side: &Side, delta: [f64; 3], u: &mut [f64]) {
     let u = &mut u[side.u as usize..(side.u + side.dof) as usize];
-    if let (Some([y0, y1, y2]), Some(u)) = (six(rows, side), u.as_mut_array::<6>()) {
+    if let (Some([y0, y1, y2]), Some(u)) = (six(y, side), u.as_mut_array::<6>()) {
         for k in 0..6 {
             u[k] += y0[k] * delta[0] + y1[k] * delta[1] + y2[k] * delta[2];
         }
     } else {
-        (0..3).for_each(|r| add_multiple(rows.response(side, r), delta[r], u));
+        (0..3).for_each(|r| add_multiple(row(y, side, r), delta[r], u));
     }
 }
 

@@ -26,7 +26,7 @@
 //! secondary ray (`ray` true), where the pivots run out, and where there are more than [`UNKNOWNS`] unknowns (pivoting is O(n³)).
 //! Numbers that are not finite give zero multipliers and `converged` false.
 
-use super::equality::Equalities;
+use super::equality::{Equalities, RANK};
 use super::lemke::{LcpResult, lemke};
 use super::{Accuracy, GaussSeidel, Outcome, RowSolver};
 use crate::rows::{Block, RowSet, Rows};
@@ -187,7 +187,7 @@ impl Problem {
         let c: Vec<f64> = island().flat_map(|block| c[block.range()].iter().copied()).collect();
         let scale = c.iter().fold(SLOWEST, |a: f64, c| a.max(c.abs()));
         let start = vec![0.0; c.len()];
-        let equalities = Equalities::new(&[], 0);
+        let equalities = Equalities::new(&[], 0, RANK);
         let mut problem = Problem { k, c, scale, start, columns: Vec::new(), bounds: Vec::new(), free: Vec::new(), equalities };
         let mut first = 0;
         for block in island() {
@@ -198,7 +198,7 @@ impl Problem {
         }
         let free = &problem.free;
         let among: Vec<f64> = free.iter().flat_map(|&i| free.iter().map(move |&j| (i, j))).map(|(i, j)| problem.entry(i, j)).collect();
-        problem.equalities = Equalities::new(&among, free.len());
+        problem.equalities = Equalities::new(&among, free.len(), RANK);
         problem
     }
 

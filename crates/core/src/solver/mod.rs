@@ -7,6 +7,7 @@ mod gauss_seidel;
 mod island;
 mod lcp;
 mod lemke;
+mod linkage;
 mod one_contact;
 mod residual;
 #[cfg(test)]
@@ -16,6 +17,7 @@ pub use gauss_seidel::GaussSeidel;
 pub use island::Islands;
 pub use lcp::{LcpPyramid, LcpSliding, UNKNOWNS};
 pub use lemke::{LcpResult, lemke};
+pub use linkage::DIRECT_ROWS;
 pub use residual::residual;
 
 use crate::rows::Rows;

@@ -54,6 +54,11 @@ impl Contact {
             k.m21 += dot(t2, t1);
             k.m22 += dot(t2, t2);
         }
+        Contact::with_own(k, mu)
+    }
+
+    /// The contact whose own block of `K` is `k`.
+    pub fn with_own(k: Symmetric, mu: f64) -> Contact {
         let mean = 0.5 * (k.m11 + k.m22);
         let half = 0.5 * (k.m11 - k.m22);
         let largest = mean + (half * half + k.m21 * k.m21).sqrt();

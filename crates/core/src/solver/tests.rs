@@ -3,6 +3,7 @@
 mod contact;
 mod friction;
 mod islands;
+mod linkages;
 mod pivoting;
 mod residuals;
 mod scalar;

@@ -9,7 +9,9 @@
 //! ```
 //!
 //! Where the thesis halves, the time of contact is bracketed: the first guess is where the parabola of each nearing contact closes, then false
-//! position with bisection as its guard. The rules that make a frame end:
+//! position with bisection as its guard. With `dormand_prince` a sub-step is integrated once and the tries are read from its dense output; the
+//! state that is committed is then integrated to the moment found. Limits that tell their gaps ([`Constraint::gaps`](crate::Constraint::gaps))
+//! are located like contacts. The rules that make a frame end:
 //!
 //! - a contact that *lasts* (its pair carried a resting force in the sub-step before) may drift by the drift tolerance; it is projected out
 //!   afterwards and never makes the step go back; depth that was there before is no reason either;
@@ -19,12 +21,13 @@
 //!   counted as floor hits.
 
 use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten};
+use super::hold::{self, Held};
 use super::impact::{self, Candidate};
 use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection};
 use crate::detect::Touch;
 use crate::integrators::Adaptive;
-use crate::object::Level;
+use crate::object::{Level, RowTarget};
 use crate::rows::RowSet;
 use crate::settings::Integrator;
 use crate::solver::Accuracy;
@@ -38,6 +41,9 @@ pub struct Backtracking {
     after: Vec<Touch>,
     limits_after: Vec<Limit>,
     watch: Watch,
+    /// Limits that push in this sub-step, and where their rows at its end are made.
+    held: Vec<Held>,
+    probe: Workspace,
     adaptive: Adaptive,
     /// Error of every constraint row that is not to be taken back in this sub-step.
     kept: Vec<f64>,
@@ -93,8 +99,9 @@ impl Backtracking {
         detect(core, left, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
-        let drifted = self.work.targets.iter().any(|t| off(t.error) || (t.set == RowSet::Equality && off(-t.error)));
-        if drifted || self.work.touches.iter().any(|t| off(t.contact.gap)) {
+        let hold = core.settings.stabilize_positions;
+        let drifted = |t: &RowTarget| if closing::is_joint(t) { hold && off(-t.error.abs()) } else { t.set == RowSet::HalfLine && off(t.error) };
+        if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
             projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
@@ -181,6 +188,7 @@ impl Backtracking {
         let s = core.settings.accuracy;
         let accuracy = Accuracy { sweeps: s.sweeps.max(2000), relaxations: s.relaxations.max(1_000_000), tolerance: s.tolerance / left };
         let ray = solve(core, work, accuracy, left, |b| keep[b]);
+        self.held = hold::pushing(work);
         let mut held = vec![0.0; core.dof];
         if ray {
             // no force at the acceleration level keeps the contacts: an impulse without collision does
@@ -242,8 +250,9 @@ impl Backtracking {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
                 core.held.fill(0.0);
+                hold::hold(core, &mut self.probe, &self.held, h)?;
                 closing::refresh_at(core, &start);
-                closing::close(core, &mut self.work, &start, h, &self.kept)?;
+                closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }

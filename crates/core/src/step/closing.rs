@@ -20,18 +20,16 @@ use super::Workspace;
 use super::contacts::{Moment, displace, lay_rows, push, row_velocities, whiten, zero};
 use crate::object::{Level, RowTarget};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, LcpPyramid, RowSolver};
+use crate::solver::{Accuracy, GaussSeidel, RowSolver};
 use crate::world::{Core, StepError};
 
 /// Rounds at most.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 12;
 /// A round that leaves more of the error than this is the last of its kind.
 const SLOW: f64 = 0.5;
 /// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
 /// responds with the square of it, far less, and is left alone; as the error goes so does the compliance (Levenberg and Marquardt).
 const SOFT: (f64, f64) = (10.0, 1e-3);
-/// Islands of at most so many rows are solved directly.
-const DIRECT: usize = 200;
 
 /// Whether a row is held in place.
 pub(super) fn is_joint(t: &RowTarget) -> bool {
@@ -44,13 +42,14 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     let mut probe = Workspace::default();
     lay_rows(core, &mut probe, level, None)?;
     let errors: Vec<f64> = probe.targets.iter().map(|t| t.error).collect();
-    let (start, time) = (core.x.clone(), core.time);
+    let (start, time, pinned) = (core.x.clone(), core.time, core.unpin());
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
     let outcome = onto(core, &mut probe, level, &errors);
     core.time = time;
     let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
+    core.pin_again(pinned);
     core.motion().refresh();
     outcome.map(|_| (errors, moment))
 }
@@ -77,40 +76,41 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
     Ok(())
 }
 
-/// Closes the joints of `work`, whose rows were built at the state `start`, at the present state after `h` seconds. `kept` is the error of each
-/// constraint row that is to stay. Sites and caches are those of `start` before and after.
-pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64, kept: &[f64]) -> Result<(), StepError> {
+/// Closes the joints of `work`, whose rows were built at the state `start`, at the present state, `step.0` seconds later; `step.1` is the level of the
+/// rows. `kept` is the error of each constraint row that is to stay. Sites and caches are those of `start` before and after.
+pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: (f64, Level), kept: &[f64]) -> Result<(), StepError> {
     if !work.targets.iter().any(is_joint) {
         return Ok(());
     }
     let pushed = pushed(work);
     islands(work);
     let (mut probe, mut chord) = (Workspace::default(), true);
-    let mut open = Open::measure(core, work, &mut probe, h, kept, &pushed)?;
+    let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
     for _ in 0..ROUNDS {
-        let before = core.x.clone();
-        let worst = open.worst();
-        if worst <= 1.0 {
+        if open.is_closed() {
             break;
         }
+        let before = core.x.clone();
         if chord {
             refresh_at(core, start);
             open.apply(core, work);
         } else {
             soften(&mut probe, largest(&open.place));
             islands(&mut probe);
-            open.apply(core, &mut probe);
+            open.apply(core, &probe);
         }
-        open = Open::measure(core, work, &mut probe, h, kept, &pushed)?;
-        let (worse, slow) = (open.worst() > worst, open.worst() > SLOW * worst);
-        if worse {
+        let next = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
+        let left = next.left_of(&open);
+        if left < 1.0 {
+            open = next;
+        } else {
             core.x = before;
             if !chord {
                 break;
             }
-            open = Open::measure(core, work, &mut probe, h, kept, &pushed)?;
+            open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
         }
-        chord &= !slow;
+        chord &= left < SLOW;
     }
     refresh_at(core, start);
     Ok(())
@@ -127,11 +127,18 @@ struct Open {
 
 impl Open {
     /// Sites and caches are left at the present, whose rows come in `probe`. Nothing is open where they are not those of `work`.
-    fn measure(core: &mut Core, work: &Workspace, probe: &mut Workspace, h: f64, kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
+    fn measure(core: &mut Core, work: &Workspace, probe: &mut Workspace, step: (f64, Level), kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
+        let pinned = core.unpin();
+        let open = Open::measure_here(core, work, probe, step, kept, pushed);
+        core.pin_again(pinned);
+        open
+    }
+
+    fn measure_here(core: &mut Core, work: &Workspace, probe: &mut Workspace, step: (f64, Level), kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
         core.motion().refresh();
         let time = core.time;
-        core.time += h;
-        let laid = lay_rows(core, probe, Level::Velocity { h }, None);
+        core.time += step.0;
+        let laid = lay_rows(core, probe, step.1, None);
         core.time = time;
         laid?;
         let mut open = Open { least: (1e-2 * core.settings.contact_tolerance, core.settings.accuracy.tolerance), ..Open::default() };
@@ -149,9 +156,20 @@ impl Open {
         Ok(open)
     }
 
-    /// The largest error, as a multiple of what counts as closed.
-    fn worst(&self) -> f64 {
-        (largest(&self.place) / self.least.0).max(largest(&self.speed) / self.least.1)
+    /// The largest errors, as multiples of what counts as closed.
+    fn worst(&self) -> (f64, f64) {
+        (largest(&self.place) / self.least.0, largest(&self.speed) / self.least.1)
+    }
+
+    fn is_closed(&self) -> bool {
+        let (place, speed) = self.worst();
+        place <= 1.0 && speed <= 1.0
+    }
+
+    /// The share of the error before that is left: of place while that is open, then of speed, for which a change of place is a change of rows.
+    fn left_of(&self, before: &Open) -> f64 {
+        let (place, speed) = before.worst();
+        if place > 1.0 { self.worst().0 / place } else { self.worst().1 / speed }
     }
 
     /// One round with the rows of `work`, whose islands are built, and the caches that they were built with.
@@ -210,8 +228,7 @@ fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64)
     let mut lambda = Vec::new();
     zero(&mut lambda, rows.len);
     let accuracy = Accuracy { sweeps: 100, relaxations: u32::MAX, tolerance };
-    let solver: &dyn RowSolver = if blocks.len() <= DIRECT { &LcpPyramid } else { &GaussSeidel };
-    solver.solve(rows, blocks, c, &mut lambda, du, accuracy);
+    GaussSeidel.solve(rows, blocks, c, &mut lambda, du, accuracy);
 }
 
 /// Sites and caches of a state that is not the present one.

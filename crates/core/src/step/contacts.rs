@@ -148,8 +148,13 @@ pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: 
         builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
         let axes = &touch.frame.axes[..set.rows()];
         for (site, point, sign) in [(touch.a, touch.contact.point, 1.0), (touch.b, touch.point_b(), -1.0)] {
-            let owner = core.owners[site as usize];
-            builder.point_side(&core.table.slots[owner.id], owner.part as usize, &point, axes, sign);
+            let (owner, index) = (core.owners[site as usize], site as usize);
+            let entry = &core.table.slots[owner.id];
+            let pinned = core.pinned_sites().filter(|_| entry.object.integratable().is_some_and(|b| b.holds_velocity()));
+            // the arm stays as it was found: the lowest point of a ball that spins does not turn with it
+            let point = pinned.map_or(point, |sites| point + sites[index].position() - core.sites[index].position());
+            builder.sites = pinned.unwrap_or(&core.sites);
+            builder.point_side(entry, owner.part as usize, &point, axes, sign);
         }
     }
     let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
@@ -212,10 +217,26 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
     zero(du, core.dof);
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
-        body.whiten(&core.x[entry.span.x.clone()], &mut u[v.clone()]);
+        let x = if body.holds_velocity() { core.pinned().unwrap_or(&core.x) } else { &core.x };
+        body.whiten(&x[entry.span.x.clone()], &mut u[v.clone()]);
         body.whiten_rate(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
+}
+
+/// What `h` seconds of coasting add to the whitened velocity of objects whose state holds velocities, from where they are pinned. Rows of joints
+/// are to hold at the end of the step, and aim ahead by it; a contact's point does not go with the part as it turns, and does not.
+pub(crate) fn coasting(core: &Core, h: f64) -> Vec<f64> {
+    let mut out = vec![0.0; core.dof];
+    let Some(middle) = core.pinned() else { return out };
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+        let (v, mut rate) = (entry.span.v.clone(), vec![0.0; entry.span.v.len()]);
+        body.coasting_rate(&middle[entry.span.x.clone()], &mut rate);
+        rate.iter_mut().for_each(|r| *r *= h);
+        body.whiten_rate(&rate, &mut out[v]);
+    }
+    out
 }
 
 /// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
@@ -257,14 +278,27 @@ pub(crate) fn push(core: &mut Core, du: &[f64]) -> Vec<f64> {
     dp
 }
 
-/// Moves positions by `h·L⁻¹u`.
+/// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy: where the state holds velocities and the mass matrix changes with the pose,
+/// they are scaled to have the energy that they had.
 pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
-        if v.iter().any(|x| *x != 0.0) {
-            let mut velocity = vec![0.0; v.len()];
-            body.unwhiten(v, &mut velocity);
-            body.drift(&mut core.x[entry.span.x.clone()], &velocity, h);
+        if v.iter().all(|x| *x == 0.0) {
+            continue;
+        }
+        let (x, mut velocity) = (&mut core.x[entry.span.x.clone()], vec![0.0; v.len()]);
+        body.unwhiten(v, &mut velocity);
+        if !body.holds_velocity() {
+            body.drift(x, &velocity, h);
+            continue;
+        }
+        let before = body.energy(x, &Vec3::zeros()).kinetic;
+        body.drift(x, &velocity, h);
+        let scale = (before / body.energy(x, &Vec3::zeros()).kinetic).sqrt();
+        if scale.is_finite() {
+            body.velocity(x, &mut velocity);
+            velocity.iter_mut().for_each(|v| *v *= scale);
+            body.write_velocity(x, &velocity);
         }
     }
 }

@@ -38,7 +38,11 @@ impl LimitRole {
     pub fn new(limit: &Limit, rate: f64, acceleration: f64, s: &Settings) -> LimitRole {
         let slow = rate.abs() < SLOW;
         let touches = limit.gap <= s.contact_tolerance || (slow && limit.gap <= s.drift_tolerance);
-        let allowed = if touches && slow { s.drift_tolerance } else { s.contact_tolerance };
+        let allowed = match (touches, slow) {
+            (true, _) if limit.target.is_none() => f64::INFINITY, // there is no row to hold it
+            (true, true) => s.drift_tolerance,
+            _ => s.contact_tolerance,
+        };
         LimitRole { key: limit.key, gap: limit.gap, rate, acceleration, touches, allowed: allowed.max(s.contact_tolerance - limit.gap) }
     }
 

@@ -4,6 +4,7 @@ mod backtracking;
 mod closing;
 mod contacts;
 mod flight;
+mod hold;
 mod impact;
 mod locate;
 mod projection;

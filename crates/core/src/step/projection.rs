@@ -7,6 +7,7 @@
 //! `v̄` is the displacement velocity of the step, less what led bodies and motors are meant to move (0 for a projection in place, with
 //! `h = 1`). What was wrong before is recovered at a bounded speed.
 
+use super::closing;
 use super::contacts::{Workspace, displace};
 use crate::object::RowTarget;
 use crate::rows::{RowSet, Rows};
@@ -24,6 +25,7 @@ pub(crate) enum Displacement<'a> {
 /// Corrects positions so that the displacement ends without overlap. `recovery` bounds how much of the error that was there before is undone,
 /// metres; an island that is wrong by no more than `least` metres is left alone.
 pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displacement, recovery: f64, least: f64) {
+    let in_place = matches!(displacement, Displacement::InPlace);
     let h = if let Displacement::Step { h, .. } = displacement { h } else { 1.0 };
     for (b, block) in work.rows.blocks.iter().enumerate() {
         let target = b.checked_sub(work.touches.len()).map_or(0.0, |i| work.targets[i].velocity);
@@ -32,13 +34,13 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
             Displacement::InPlace => 0.0,
         };
     }
-    let touches = work.touches.len();
+    let (touches, hold) = (work.touches.len(), core.settings.stabilize_positions);
     let violation = |b: usize, c: &[f64]| -> f64 {
         let v = c[work.rows.blocks[b].row as usize];
         match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
             (Some(touch), _) => -(allowed(touch.contact.gap, recovery) + h * v),
             (None, Some(t)) if t.compliance > 0.0 => 0.0,
-            (None, Some(t)) if t.set == RowSet::Equality => (t.error.clamp(-recovery, recovery) + h * v).abs(),
+            (None, Some(t)) if t.set == RowSet::Equality => if hold { (t.error.clamp(-recovery, recovery) + h * v).abs() } else { 0.0 },
             (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
             _ => 0.0,
         }
@@ -48,12 +50,16 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
         return;
     }
     let mut p = std::mem::take(&mut work.projection);
-    p.fill(work, h, recovery);
+    p.fill(work, h, recovery, hold);
     let targets = &work.targets;
     // a motor has no place to hold, and a spring may be anywhere
     let rigid = |t: &RowTarget| t.compliance == 0.0 && !matches!(t.set, RowSet::Interval { .. });
     work.islands.build(&work.rows, |b| b < touches || rigid(&targets[b - touches]));
+    let closed_later = |&b: &u32| !in_place && (b as usize) >= touches && closing::is_joint(&targets[b as usize - touches]);
     for blocks in work.islands.iter() {
+        if blocks.iter().all(closed_later) {
+            continue;
+        }
         let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
         if worst > least {
             let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, relaxations: u32::MAX, tolerance: 0.1 * least / h };
@@ -78,7 +84,8 @@ pub(crate) struct Projection {
 }
 
 impl Projection {
-    fn fill(&mut self, work: &Workspace, h: f64, recovery: f64) {
+    /// Equalities that are not to be held in place are not to be moved either.
+    fn fill(&mut self, work: &Workspace, h: f64, recovery: f64, hold: bool) {
         self.rows.clear(work.rows.dof);
         self.c.clear();
         for (b, block) in work.rows.blocks.iter().enumerate() {
@@ -96,7 +103,7 @@ impl Projection {
                     y.copy_from_slice(response);
                 }
             }
-            self.c.push(work.c[block.row as usize] + error / h);
+            self.c.push(if set == RowSet::Equality && !hold { 0.0 } else { work.c[block.row as usize] + error / h });
         }
         self.lambda.clear();
         self.lambda.resize(self.rows.len, 0.0);

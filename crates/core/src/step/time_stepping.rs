@@ -12,10 +12,13 @@
 //! With `τ = h/2` the displacement is the mean of the old and the new velocity: second order on lasting contacts too (a block slides to its
 //! stop as it should). With an impact the two coasts and the term `(τ − h/2)·h·a` add up to the parabola before and the parabola after.
 //!
+//! Objects whose state holds velocities (articulated bodies) are pushed where they are at `x_½`: the mass matrix, the rows and the velocity before the
+//! push are those of the middle. Coasting keeps kinetic energy, a push by contacts takes some, and displacement leaves it: nothing here feeds it.
+//!
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
+use super::contacts::{build_rows, coasting, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
 use super::closing;
 use super::projection::{self, Displacement};
@@ -24,7 +27,6 @@ use crate::detect::Touch;
 use crate::motion::coast;
 use crate::object::Level;
 use crate::rows::RowSet;
-use crate::view::Entry;
 use crate::world::{Core, StepError};
 
 /// The default stepper, `time_stepping`.
@@ -32,8 +34,6 @@ use crate::world::{Core, StepError};
 pub struct TimeStepping {
     work: Workspace,
     x0: Vec<f64>,
-    /// State at the end of the free step, of objects whose state holds velocities.
-    free: Vec<f64>,
     /// Share of the step before the first impact, per coordinate; negative where there is none.
     share: Vec<f64>,
     candidates: Vec<Candidate>,
@@ -70,7 +70,7 @@ impl TimeStepping {
         build_rows(core, &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
-        self.whiten(core, h, &mut u, &mut du_force);
+        whiten(core, &self.work.dp, h, &mut u, &mut du_force);
         let mut after = self.impacts(core, h, &u, &du_force);
         self.look_again(core, h, &u, &after)?;
         self.contacts(core, h, &mut after, &du_force);
@@ -89,35 +89,11 @@ impl TimeStepping {
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.take_off_coasting(&mut self.work.dp);
         core.check_finite(&self.work.dp)?;
-        self.free_motion(core, h);
+        let middle = core.x.clone();
         core.x.copy_from_slice(&self.x0);
+        core.pin(middle);
         core.motion().refresh();
         Ok(())
-    }
-
-    /// From the midpoint, the end of the free step of every object whose state holds velocities, into `free`.
-    fn free_motion(&mut self, core: &mut Core, h: f64) {
-        self.free.clone_from(&core.x);
-        for entry in core.table.iter().filter(|e| e.moves()) {
-            let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
-            let x = &mut self.free[entry.span.x.clone()];
-            body.kick(x, &self.work.dp[entry.span.v.clone()], h);
-            body.coast(x, 0.5 * h);
-        }
-    }
-
-    /// Whitened velocity at the start and its change in free motion.
-    fn whiten(&self, core: &Core, h: f64, u: &mut Vec<f64>, du: &mut Vec<f64>) {
-        whiten(core, &self.work.dp, h, u, du);
-        for entry in core.table.iter().filter(|e| e.moves()) {
-            let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
-            let (x, v) = (entry.span.x.clone(), entry.span.v.clone());
-            let (mut before, mut after) = (vec![0.0; v.len()], vec![0.0; v.len()]);
-            body.velocity(&core.x[x.clone()], &mut before);
-            body.velocity(&self.free[x], &mut after);
-            after.iter_mut().zip(&before).for_each(|(a, b)| *a -= b);
-            body.whiten_rate(&after, &mut du[v]);
-        }
     }
 
     /// Times the impacts that free motion meets within the step and resolves them; the whitened velocity after them, forces not yet added.
@@ -224,9 +200,9 @@ impl TimeStepping {
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / h };
         }
-        let turning = if work.targets.is_empty() { Vec::new() } else { gyroscopic(core) };
+        let (turning, coasting) = if work.targets.is_empty() { Default::default() } else { (gyroscopic(core), coasting(core, 0.5 * h)) };
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
-            work.c[block.row as usize] -= h * work.rows.row_velocity(block, 0, &turning);
+            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &coasting) - h * work.rows.row_velocity(block, 0, &turning);
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
@@ -241,27 +217,16 @@ impl TimeStepping {
     /// Writes the state at the end of the step.
     fn commit(&mut self, core: &mut Core, h: f64, u0: &[f64], u1: &[f64], du_force: &[f64]) -> Result<(), StepError> {
         let share = |i: usize| if self.share[i] < 0.0 { 0.5 } else { self.share[i] };
-        let free = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
-        let mut change: Vec<f64> = u1.iter().zip(u0).map(|(a, b)| a - b).collect();
-        let parabola: Vec<f64> = (0..core.dof).map(|i| (share(i) - 0.5) * du_force[i]).collect();
-        let mut extra = parabola.clone();
+        let change: Vec<f64> = u1.iter().zip(u0).map(|(a, b)| a - b).collect();
         for entry in core.table.iter() {
-            let x = &mut core.x[entry.span.x.clone()];
-            if free(entry) {
-                x.copy_from_slice(&self.free[entry.span.x.clone()]);
-                for i in entry.span.v.clone() {
-                    change[i] -= du_force[i];
-                    extra[i] = (1.0 - share(i)) * change[i];
-                }
-            } else {
-                coast(entry, x, h * entry.span.v.clone().next().map_or(0.5, share));
-            }
+            coast(entry, &mut core.x[entry.span.x.clone()], h * entry.span.v.clone().next().map_or(0.5, share));
         }
         let dp = push(core, &change);
-        for entry in core.table.iter().filter(|e| !free(e)) {
+        for entry in core.table.iter() {
             coast(entry, &mut core.x[entry.span.x.clone()], h * entry.span.v.clone().next().map_or(0.5, |i| 1.0 - share(i)));
         }
-        displace(core, &extra, h);
+        let parabola: Vec<f64> = (0..core.dof).map(|i| (share(i) - 0.5) * du_force[i]).collect();
+        displace(core, &parabola, h);
         let mean: Vec<f64> = (0..core.dof).map(|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]).collect();
         let recovery = core.settings.recovery_speed * h;
         let least = core.settings.contact_tolerance;
@@ -269,7 +234,8 @@ impl TimeStepping {
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
         let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
-        closing::close(core, &mut self.work, &self.x0, h, &kept)?;
+        closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
+        core.unpin();
         core.check_finite(&dp)
     }
 }

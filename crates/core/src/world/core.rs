@@ -32,7 +32,7 @@ pub enum StepError {
         time: f64,
     },
     /// The adaptive integrator cannot hold its tolerance.
-    #[error("'{object}' at t = {time} s: its error stays above the integrator's tolerance {tolerance} (inner step {steps}, of {step} s); soften what acts on it, or loosen the tolerance")]
+    #[error("'{object}' at t = {time} s: its motion needs more than the {steps} inner steps of this frame (the last of {step} s) at the integrator's tolerance {tolerance}; soften what acts on it, or loosen the tolerance")]
     Tolerance {
         /// The object whose error is greatest.
         object: String,
@@ -92,6 +92,8 @@ pub struct Core {
     /// See [`WorldView::implicit`](crate::WorldView::implicit).
     pub(crate) implicit: bool,
     pub(crate) held: Vec<f64>,
+    /// Where the caches of objects whose state holds velocities are kept, whatever state is refreshed; empty for none. And their sites there.
+    pub(crate) pinned: (Vec<f64>, Vec<Site>),
     pub(crate) forces: Forces,
     pub(crate) settings: Settings,
     pub(crate) time: f64,
@@ -108,10 +110,38 @@ pub struct Core {
 }
 
 impl Core {
+    /// Keeps the caches of objects whose state holds velocities at `middle` until [`unpin`](Self::unpin): their impulses act in the middle of a
+    /// step, as momentum kicks do for others. Sites still follow the state.
+    pub(crate) fn pin(&mut self, middle: Vec<f64>) {
+        if self.table.iter().any(|e| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity())) {
+            self.pinned = (middle, self.sites.clone());
+        }
+    }
+
+    /// Lets the caches follow again from the next refresh on; what was pinned, to be put back.
+    pub(crate) fn unpin(&mut self) -> (Vec<f64>, Vec<Site>) {
+        std::mem::take(&mut self.pinned)
+    }
+
+    pub(crate) fn pin_again(&mut self, pinned: (Vec<f64>, Vec<Site>)) {
+        self.pinned = pinned;
+    }
+
+    /// The state of the pinned caches.
+    pub(crate) fn pinned(&self) -> Option<&Vec<f64>> {
+        Some(&self.pinned.0).filter(|x| !x.is_empty())
+    }
+
+    /// The sites of the pinned caches; only those of objects whose state holds velocities are there.
+    pub(crate) fn pinned_sites(&self) -> Option<&Vec<Site>> {
+        Some(&self.pinned.1).filter(|x| !x.is_empty())
+    }
+
     pub(crate) fn motion(&mut self) -> Motion<'_> {
         Motion {
             table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces,
             gravity: self.settings.gravity, implicit: self.implicit, applied: &self.applied, applied_generalized: &self.applied_generalized, held: &self.held,
+            pinned: &self.pinned.0, pinned_sites: &mut self.pinned.1,
         }
     }
 

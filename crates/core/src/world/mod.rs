@@ -89,7 +89,7 @@ impl World {
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
         let core = Core {
-            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(),
+            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), pinned: Default::default(),
             forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
             report: StepReport::default(), next_serial: 0, inner_step: 0.0,
@@ -136,6 +136,7 @@ impl World {
         core.applied_generalized.fill(0.0);
         if let Err(error) = outcome {
             core.x.clone_from(&self.before);
+            core.unpin();
             (core.time, core.warm, core.inner_step) = (time, warm, inner_step);
             core.sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
             core.motion().refresh();
@@ -306,7 +307,7 @@ impl World {
         let c = &self.core;
         World {
             core: Core {
-                table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit,
+                table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(),
                 held: c.held.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
                 contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, inner_step: c.inner_step,

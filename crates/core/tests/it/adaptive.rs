@@ -137,6 +137,34 @@ fn it_is_of_fifth_order_on_a_free_and_on_a_driven_body() {
     }
 }
 
+/// Two links on ball joints, the first of them on a floating base: every kind of joint that turns in space.
+fn tangle(dt: f64, integrator: Integrator) -> Vec<f64> {
+    let mut world = world("backtracking", dt);
+    set(&mut world, |s| (s.integrator, s.integrator_tolerance) = (integrator, 0.1));
+    let mass = |i: [f64; 3]| LinkMass { mass: 1.0, center: Vec3::new(0.05, 0.1, -0.2), inertia: Mat3::from_diagonal(&(0.02 * Vec3::from(i))) };
+    let mut builder = ModelBuilder::new();
+    let base = builder.link("base", None, Joint::Floating, Pose::identity(), mass([1.0, 2.0, 3.0 - 0.1]));
+    let arm = builder.link("arm", Some(base), Joint::Spherical, Pose::translation(0.1, 0.0, -0.4), mass([2.0, 1.5, 1.0]));
+    builder.link("hand", Some(arm), Joint::Spherical, Pose::translation(0.0, 0.2, -0.3), mass([1.0, 1.0, 0.5]));
+    let spins = [0.5, 1.0, -0.7, 0.1, 0.2, 0.3, -2.0, 0.4, 1.0, 1.5, -1.0, 2.0];
+    let id = world.add(ArticulatedBody::new("tangle", builder.build().unwrap()).with_velocities(&spins).unwrap()).unwrap();
+    for _ in 0..(1.0 / dt).round() as usize {
+        let report = world.step().unwrap();
+        assert!(report.inner_steps <= 1 && report.tries == 1);
+    }
+    world.state_of(id).unwrap().to_vec()
+}
+
+#[test]
+fn it_is_of_fifth_order_on_ball_joints_and_floating_bases() {
+    let exact = tangle(1.0 / 4096.0, Integrator::Rk4);
+    let error = |dt: f64| tangle(dt, Integrator::DormandPrince).iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let (coarse, middle, fine) = (error(1.0 / 32.0), error(1.0 / 64.0), error(1.0 / 128.0));
+    let orders = ((coarse / middle).log2(), (middle / fine).log2());
+    println!("{coarse:e} {middle:e} {fine:e}: {orders:?}");
+    assert!((orders.1 - 5.0).abs() < 0.4, "orders {orders:?}: {coarse:e} {middle:e} {fine:e}");
+}
+
 /// Angular momentum is held by the state itself; energy, as the tolerance asks.
 #[test]
 fn it_keeps_angular_momentum_and_energy_of_the_free_body() {
@@ -220,6 +248,33 @@ fn strokes_against_a_wall_are_located_within_inner_steps() {
     // 50 rad at 2·reach each: 12 strokes; each is located to 1e-7 m, at 4.3 m/s
     assert_eq!(strokes, 12);
     assert!(worst < 12.0 * 1e-7 && tries < 20, "off by {worst:e} m, at most {tries} tries a frame");
+}
+
+/// Pushed away from the middle between two walls, `x = ¼·cosh(κt)`: the parabola of the start arrives late, so every stroke is found in the dense
+/// output. At `e = 1` the way back is the same. `κ` is such that an inner step is as long as a frame.
+#[test]
+fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
+    let (k, rate) = (50.0, 5.0);
+    for tolerance in [1e-3, 1e-6] {
+        let mut world = adaptive(0.1, tolerance);
+        let wall = Pose::new(Vec3::new(0.6, 0.0, 0.0), Vec3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
+        world.add_static(RigidBody::fixture("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall)).unwrap();
+        let body = RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.25, 0.0, 0.0));
+        let id = world.add(body).unwrap();
+        world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: -k, c: 0.0 }).unwrap();
+        let stroke = 2f64.acosh() / rate;
+        let (mut worst, mut strokes) = (0.0f64, 0);
+        for _ in 0..12 {
+            let report = *world.step().unwrap();
+            strokes += report.impact_passes.min(1);
+            assert!(report.max_penetration <= world.settings().contact_tolerance && report.tries < 20, "{report:?}");
+            let from_rest = (world.time() + stroke) % (2.0 * stroke) - stroke;
+            worst = worst.max((position(&world, id).x - 0.25 * (rate * from_rest).cosh()).abs());
+        }
+        println!("tolerance {tolerance:e}: {strokes} strokes, off by {worst:e}");
+        // what is wrong at a stroke grows by up to e^(2·1.317) = 14 until the next
+        assert!(strokes == 2 && worst < 2.0 * tolerance, "tolerance {tolerance:e}: {strokes} strokes, off by {worst:e}");
+    }
 }
 
 /// Two equal discs that strike off centre exchange what they have along the line of centres.

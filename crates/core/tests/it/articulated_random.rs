@@ -119,10 +119,18 @@ pub fn random_trees(seed: u64) -> Vec<Model> {
         .into()
 }
 
-/// Greatest difference of two lists relative to the greatest number of the second (at least 1).
+/// Greatest difference of two lists relative to the greatest number of the second (or to 1, where that is less).
 pub fn apart(a: &[f64], b: &[f64]) -> f64 {
+    greatest_difference(a, b) / b.iter().fold(1.0f64, |m, x| m.max(x.abs()))
+}
+
+/// Greatest difference of two lists relative to the greatest number of the second.
+pub fn relative(a: &[f64], b: &[f64]) -> f64 {
+    greatest_difference(a, b) / b.iter().fold(0.0f64, |m, x| m.max(x.abs()))
+}
+
+fn greatest_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
-    let size = b.iter().fold(1.0f64, |m, x| m.max(x.abs()));
     // Not `max`, which forgets what is not a number.
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, |m, d| if d <= m { m } else { d }) / size
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, |m, d| if d <= m { m } else { d })
 }

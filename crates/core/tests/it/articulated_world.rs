@@ -147,3 +147,39 @@ fn adaptive_chain_energy() {
         println!("adaptive {n} links, 10 s: {:.2e}, {inner} inner steps", worst / drop);
     }
 }
+
+/// A floating chain of capsules joined by ball joints, along x, its middle at `center`.
+fn loose_chain(links: usize, length: f64, radius: f64, mass: f64, center: Vec3) -> ArticulatedBody {
+    let shape = Shape::capsule(radius, 0.5 * length - radius).unwrap();
+    let along = Pose::new(Vec3::new(0.5 * length, 0.0, 0.0), Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
+    let solid = shape.mass_properties(1.0).unwrap();
+    let unit = LinkMass { mass, center: Vec3::zeros(), inertia: solid.inertia * (mass / solid.mass) };
+    let mut builder = ModelBuilder::new();
+    let mut parent = None;
+    for i in 0..links {
+        let (joint, x) = if i == 0 { (Joint::Floating, 0.0) } else { (Joint::Spherical, length) };
+        parent = Some(builder.link(format!("link {i}"), parent, joint, Pose::translation(x, 0.0, 0.0), unit.seen_from(&along)));
+    }
+    let start = Pose::translation(center.x - 0.5 * links as f64 * length, center.y, center.z);
+    let mut body = ArticulatedBody::new("chain", builder.build().unwrap()).at(start);
+    for i in 0..links {
+        body.add_collider(&format!("link {i}"), Collider::new(shape.clone(), along)).unwrap();
+    }
+    body
+}
+
+#[test]
+fn a_chain_over_a_sphere_comes_to_rest() {
+    let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
+    world.add_static(tumble_core::RigidBody::fixture("floor", Shape::half_space())).unwrap();
+    world.add_static(tumble_core::RigidBody::fixture("ball", Shape::sphere(0.3).unwrap()).at(Pose::translation(0.0, 0.0, 0.6))).unwrap();
+    let id = world.add(loose_chain(16, 0.1, 0.02, 0.05, Vec3::new(0.03, 0.01, 1.0))).unwrap();
+    for frame in 0..240 * 8 {
+        let report = *world.step().unwrap();
+        if frame % 240 == 239 || frame < 140 && frame > 104 {
+            let e = world.energy();
+            println!("{:.0} s: kinetic {:.2e} potential {:.4} depth {:.1e} contacts {} unconverged {} residual {:.1e} it {}", world.time(), e.kinetic, e.potential, report.max_penetration, report.contacts, report.unconverged, report.residual, report.iterations);
+        }
+    }
+    let _ = id;
+}

@@ -40,15 +40,16 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
 #[test]
 fn every_word_of_the_world() {
     let scene = read(
-        "[world]\nstepper = \"backtracking\"\nintegrator = \"rk4\"\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
+        "[world]\nstepper = \"backtracking\"\nintegrator = \"dormand_prince\"\nintegrator_tolerance = 1e-9\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
          seconds = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"max\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\n",
     );
     let world = scene.world;
     assert_eq!(
         (world.stepper, world.integrator, world.solver),
-        (Stepper::Backtracking, Integrator::Rk4, Solver::LcpSliding)
+        (Stepper::Backtracking, Integrator::DormandPrince, Solver::LcpSliding)
     );
     assert_eq!((world.substeps, world.iterations, world.seconds), (4, 7, 2.0));
+    assert_eq!(world.integrator_tolerance, 1e-9);
     assert_eq!((world.contact_tolerance_m, world.gravity_m_per_s2), (1e-5, [1.0, 2.0, 3.0]));
     assert_eq!((world.combine_restitution, world.combine_friction), (Combine::Max, Combine::Product));
 }
@@ -56,6 +57,9 @@ fn every_word_of_the_world() {
 #[test]
 fn words_outside_of_files() {
     assert_eq!("backtracking".parse(), Ok(Stepper::Backtracking));
+    for integrator in ["verlet", "symplectic_euler", "explicit_euler", "rk4", "dormand_prince"] {
+        assert_eq!(integrator.parse::<Integrator>().unwrap().to_string(), integrator);
+    }
     for solver in ["gauss_seidel", "lcp_pyramid", "lcp_sliding"] {
         assert_eq!(solver.parse::<Solver>().unwrap().to_string(), solver);
     }

@@ -81,7 +81,9 @@ fn a_rope_is_slack_and_then_holds() {
         assert!((position(&world, id).z - free).abs() < 1e-9, "{stepper}: {} m, by hand {free}", position(&world, id).z);
         step(&mut world, 48);
         let z = position(&world, id).z;
-        assert!((z + LENGTH).abs() < 1e-5 && velocity(&world, id).norm() < 1e-6, "{stepper}: at {z} m with {} m/s", velocity(&world, id));
+        // the moment at which it is used up is located by `backtracking`
+        let bound = if stepper == "backtracking" { 1e-6 } else { 1e-5 };
+        assert!((z + LENGTH).abs() < bound && velocity(&world, id).norm() < 1e-6, "{stepper}: at {z} m with {} m/s", velocity(&world, id));
     }
 }
 

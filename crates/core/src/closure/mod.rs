@@ -23,7 +23,6 @@
 //! Velocities and biases are exact in any pose; those of `place` and `line` are the derivatives of their errors (`s(p_A)` has the arm on which
 //! B's axes turn). A rotation's error is exact to first order and zero only where it should be: the projection goes there in Newton steps.
 
-use crate::collidable::Collidable;
 use crate::object::{Constraint, Level, Object, RowTarget};
 use crate::row_builder::RowBuilder;
 use crate::rows::RowSet;
@@ -32,6 +31,9 @@ use crate::view::{ObjectId, WorldView};
 use crate::world::World;
 use nalgebra::{RealField, Rotation3, Translation3};
 use tumble_collide::{Mat3, Pose, Quat, Vec3};
+
+#[cfg(test)]
+mod tests;
 
 /// What a closure holds together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -208,9 +210,7 @@ impl End {
         view.status(id).filter(|s| s.alive)?;
         // a part that is not there is left to the row, which refuses it by name
         let mut site = view.site(id, part).copied().unwrap_or_default();
-        let sites = &view.sites[view.span(id)?.site.clone()];
-        let coasting = |c: &dyn Collidable| c.coasting_acceleration(part, sites);
-        (site.angular_acceleration, site.acceleration) = view.object(id)?.collidable().filter(|c| part < c.parts()).map_or_else(Default::default, coasting);
+        (site.angular_acceleration, site.acceleration) = (site.bias_angular_acceleration, site.bias_acceleration);
         Some(End { part: Some((id, part)), frame: site.pose * anchor.frame, site })
     }
 

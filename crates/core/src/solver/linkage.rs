@@ -1,0 +1,288 @@
+//! Equality rows solved all at once, for the sweeps: loops of links and chains of joints converge badly one by one.
+//!
+//! Objects that equality rows join, directly or through others, are a *linkage*. Its rows E are factored once per solve (`equality.rs`), and
+//! whatever else pushes one of its objects then pushes all of them, with the joints held:
+//!
+//! ```text
+//! w_E = c_E + Y_Eᵀu + R_E·λ_E = 0  before and after      A = K_EE + R_E
+//! δλ_E = −A⁻¹·K_Ei·δλ_i
+//! δu   = Y_i·δλ_i + Y_E·δλ_E = Ỹ_i·δλ_i                  Ỹ_i = Y_i − Y_E·A⁻¹·K_Ei   the reach of row i
+//! K̃_ij = Y_iᵀ·Ỹ_j                                        what a sweep meets as its own diagonal
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `E`, `i` | equality rows of a linkage; a row of any other block |
+//! | `Y`, `K`, `R`, `c` | as in `rows.rs` |
+//! | `Ỹ` | the whitened velocities that a unit of `λ_i` gives to the whole linkage |
+//!
+//! So a sweep reads a row's velocity from its own two objects, as ever, and writes to the linkages that they belong to. The equalities never
+//! come up in it: they hold in every iterate, and `λ_E` is found at the end. The cost is `e³/3` for the factor and `e²` for every other row that
+//! meets the linkage; where that is more than [`WORK`], or `e` more than [`DIRECT_ROWS`], the linkage's rows are relaxed one by one.
+//!
+//! Rows that depend on others get no multiplier. [`RANK`] is coarser here than rounding alone asks: two pins of one joint that have drifted
+//! apart by a part `ε` of the size of their bodies leave `ε²` of a diagonal, and solved for they would lock the joint.
+//!
+//! Intervals without ends are equalities. A motor with limits is not: its row would have to join E while it is inside its limits and leave E at them. That
+//! is an active set: bordering the factor by one row (`e²`) when one joins, dropping it by the inverse of that, and a sweep in between.
+
+use super::equality::{Equalities, VANISHED};
+use super::one_contact::Symmetric;
+use crate::rows::{Block, RowSet, Rows, Side, dot};
+
+/// Most equality rows of a linkage that are solved at once.
+pub const DIRECT_ROWS: usize = 200;
+/// Most multiplications spent on a linkage before the first sweep: some 20 ms.
+const WORK: usize = 40_000_000;
+/// Rows whose pivot fell under this part of their own diagonal depend on the others: two pins of one joint, 0.1 mm in a metre apart.
+const RANK: f64 = 1e-8;
+/// What is left of a velocity along an equality row counts as none if it is less than this part of the largest that there was.
+const SOLVED: f64 = 1e-9;
+
+/// The linkages of an island that are solved at once.
+#[derive(Default)]
+pub(super) struct Linkages {
+    linkages: Vec<Linkage>,
+    /// Every object of theirs: the start of its `u` and its linkage, sorted.
+    objects: Vec<(u32, usize)>,
+    /// Sides of all reaches, and their responses.
+    sides: Vec<Side>,
+    y: Vec<f64>,
+}
+
+struct Linkage {
+    /// Its equality rows, as indices into `Rows::blocks`.
+    rows: Vec<u32>,
+    factor: Equalities,
+    /// Its objects, sorted: where `u` starts, freedoms.
+    objects: Vec<(u32, u32)>,
+}
+
+/// What a block of other rows moves where it meets a linkage: sides of [`Linkages`].
+#[derive(Clone, Copy, Default)]
+pub(super) struct Reach {
+    first: u32,
+    end: u32,
+}
+
+impl Reach {
+    /// Whether the block meets no linkage: it moves its own sides alone.
+    #[inline(always)]
+    pub fn is_own(self) -> bool {
+        self.first == self.end
+    }
+}
+
+impl Linkages {
+    /// Finds the linkages among `blocks` and factors their rows.
+    pub fn new(rows: &Rows, blocks: &[u32]) -> Linkages {
+        let joints: Vec<u32> = blocks.iter().copied().filter(|&b| is_joint(rows, &rows.blocks[b as usize])).collect();
+        let mut all = Linkages::default();
+        for joined in groups(rows, &joints) {
+            let objects = objects_of(rows, &joined);
+            let meets = |block: &&Block| block.sides().iter().any(|s| objects.binary_search(&(s.u, s.dof)).is_ok());
+            let met: usize = if joined.len() > DIRECT_ROWS { 0 } else { island(rows, blocks).filter(meets).map(|b| b.set.rows()).sum() };
+            if joined.len() <= DIRECT_ROWS && joined.len().pow(2) * met <= WORK {
+                all.objects.extend(objects.iter().map(|(u, _)| (*u, all.linkages.len())));
+                all.linkages.push(Linkage::new(rows, joined, objects));
+            }
+        }
+        all.objects.sort_unstable();
+        all
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.linkages.is_empty()
+    }
+
+    /// Whether the block is one of the rows solved here.
+    pub fn hold(&self, rows: &Rows, block: &Block) -> bool {
+        !self.is_empty() && is_joint(rows, block) && block.sides().iter().any(|s| self.linkage_of(s).is_some())
+    }
+
+    /// First index and end of every stretch of `du` that they move.
+    pub fn stretches(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.linkages.iter().flat_map(|l| l.objects.iter().map(|(u, dof)| (*u, u + dof)))
+    }
+
+    /// Lays out `Ỹ` of a block of other rows.
+    pub fn lay(&mut self, rows: &Rows, block: &Block) -> Reach {
+        let met: Vec<Option<usize>> = block.sides().iter().map(|s| self.linkage_of(s)).collect();
+        if met.iter().all(Option::is_none) {
+            return Reach::default();
+        }
+        let (first, count) = (self.sides.len(), block.set.rows());
+        for (side, _) in block.sides().iter().zip(&met).filter(|(_, met)| met.is_none()) {
+            self.push_side(side.u, side.dof, count);
+        }
+        for (i, linkage) in met.iter().enumerate().filter_map(|(i, l)| Some((i, (*l)?))) {
+            // both sides in one linkage are one reach
+            if i == 0 || met[0] != Some(linkage) {
+                let objects = std::mem::take(&mut self.linkages[linkage].objects);
+                objects.iter().for_each(|(u, dof)| self.push_side(*u, *dof, count));
+                self.linkages[linkage].objects = objects;
+                self.hold_joints(rows, block, linkage, first);
+            }
+        }
+        for side in block.sides() {
+            (0..count).for_each(|k| self.add(first, side, k, 1.0, rows.response(side, k)));
+        }
+        let reach = Reach { first: first as u32, end: self.sides.len() as u32 };
+        for k in 0..count {
+            if self.own(rows, block, reach, k, k) <= VANISHED * rows.own(block, k, k) {
+                self.clear(reach, k);
+            }
+        }
+        reach
+    }
+
+    /// `Ỹ −= Y_E·A⁻¹·K_Ei` of one linkage, for every row of a block.
+    fn hold_joints(&mut self, rows: &Rows, block: &Block, linkage: usize, first: usize) {
+        for k in 0..block.set.rows() {
+            let linkage = &self.linkages[linkage];
+            let coupling: Vec<f64> = island(rows, &linkage.rows).map(|joint| rows.coupling(joint, 0, block, k)).collect();
+            let held = linkage.factor.solve(&coupling);
+            let joints: Vec<(u32, f64)> = linkage.rows.iter().copied().zip(held).filter(|(_, h)| *h != 0.0).collect();
+            for (joint, held) in joints {
+                rows.blocks[joint as usize].sides().iter().for_each(|s| self.add(first, s, k, -held, rows.response(s, 0)));
+            }
+        }
+    }
+
+    fn linkage_of(&self, side: &Side) -> Option<usize> {
+        let place = self.objects.binary_search_by_key(&side.u, |(u, _)| *u).ok()?;
+        Some(self.objects[place].1)
+    }
+
+    fn push_side(&mut self, u: u32, dof: u32, count: usize) {
+        self.sides.push(Side { u, dof, y: self.y.len() as u32 });
+        self.y.resize(self.y.len() + count * dof as usize, 0.0);
+    }
+
+    /// `Ỹ_k += scale·y` on the object of `side`, in the reach that starts at `first`.
+    fn add(&mut self, first: usize, side: &Side, k: usize, scale: f64, y: &[f64]) {
+        if let Some(to) = self.sides[first..].iter().find(|s| s.u == side.u) {
+            let start = to.y as usize + k * y.len();
+            self.y[start..start + y.len()].iter_mut().zip(y).for_each(|(to, y)| *to += scale * y);
+        }
+    }
+
+    fn clear(&mut self, reach: Reach, k: usize) {
+        for side in &self.sides[reach.first as usize..reach.end as usize] {
+            let (start, dof) = (side.y as usize + k * side.dof as usize, side.dof as usize);
+            self.y[start..start + dof].fill(0.0);
+        }
+    }
+
+    /// The sides that a block moves, and the numbers that their responses are in.
+    #[inline(always)]
+    pub fn moved<'a>(&'a self, rows: &'a Rows, block: &'a Block, reach: Reach) -> (&'a [Side], &'a [f64]) {
+        if reach.is_own() { (block.sides(), &rows.y) } else { (&self.sides[reach.first as usize..reach.end as usize], &self.y) }
+    }
+
+    /// `K̃_ij = Y_iᵀ·Ỹ_j` of a block's own rows.
+    pub fn own(&self, rows: &Rows, block: &Block, reach: Reach, i: usize, j: usize) -> f64 {
+        let (sides, y) = self.moved(rows, block, reach);
+        let part = |side: &Side| {
+            let to = sides.iter().find(|s| s.u == side.u)?;
+            let start = to.y as usize + j * to.dof as usize;
+            Some(dot(rows.response(side, i), &y[start..start + to.dof as usize]))
+        };
+        block.sides().iter().filter_map(part).sum()
+    }
+
+    /// The whole of a contact's own `K̃`.
+    pub fn own_contact(&self, rows: &Rows, block: &Block, reach: Reach) -> Symmetric {
+        let k = |i, j| self.own(rows, block, reach, i, j);
+        Symmetric { m00: k(0, 0), m10: k(1, 0), m20: k(2, 0), m11: k(1, 1), m21: k(2, 1), m22: k(2, 2) }
+    }
+
+    /// Finds all `λ_E` for the `du` that the other rows make, and adds what they do. Whether that leaves no velocity along any of the rows.
+    pub fn settle(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
+        self.linkages.iter().map(|l| l.settle(rows, c, lambda, du)).fold(true, |all, settled| all & settled)
+    }
+}
+
+impl Linkage {
+    fn new(rows: &Rows, joints: Vec<u32>, objects: Vec<(u32, u32)>) -> Linkage {
+        let factor = Equalities::new(&rows.dense(&joints), joints.len(), RANK);
+        Linkage { rows: joints, factor, objects }
+    }
+
+    fn settle(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
+        island(rows, &self.rows).for_each(|joint| lambda[joint.row as usize] = 0.0);
+        let velocities = |lambda: &[f64], du: &[f64]| -> Vec<f64> {
+            let w = |joint: &Block| c[joint.row as usize] + rows.row_velocity(joint, 0, du) + joint.compliance * lambda[joint.row as usize];
+            island(rows, &self.rows).map(w).collect()
+        };
+        let largest = |w: &[f64]| w.iter().fold(0.0, |a: f64, w| a.max(w.abs()));
+        let mut w = velocities(lambda, du);
+        let before = largest(&w);
+        // The second pass is iterative refinement.
+        for _ in 0..2 {
+            for (joint, change) in island(rows, &self.rows).zip(self.factor.solve(&w)) {
+                lambda[joint.row as usize] -= change;
+                for s in joint.sides() {
+                    let du = &mut du[s.u as usize..(s.u + s.dof) as usize];
+                    du.iter_mut().zip(rows.response(s, 0)).for_each(|(du, y)| *du -= y * change);
+                }
+            }
+            w = velocities(lambda, du);
+        }
+        largest(&w) <= SOLVED * before
+    }
+}
+
+/// Whether a block is one free multiplier that does something.
+fn is_joint(rows: &Rows, block: &Block) -> bool {
+    let free = match block.set {
+        RowSet::Equality => true,
+        RowSet::Interval { lo, hi } => lo == f64::NEG_INFINITY && hi == f64::INFINITY,
+        RowSet::HalfLine | RowSet::Cone { .. } => false,
+    };
+    free && rows.own(block, 0, 0) > f64::MIN_POSITIVE
+}
+
+fn island<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = &'a Block> {
+    blocks.iter().map(|&b| &rows.blocks[b as usize])
+}
+
+/// The objects of some blocks, sorted: where `u` starts, freedoms.
+fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
+    let mut objects: Vec<(u32, u32)> = island(rows, blocks).flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))).collect();
+    objects.sort_unstable();
+    objects.dedup();
+    objects
+}
+
+/// The joints, parted by what hangs together, in the order of the first joint of each part.
+fn groups(rows: &Rows, joints: &[u32]) -> Vec<Vec<u32>> {
+    let objects = objects_of(rows, joints);
+    let place = |s: &Side| objects.binary_search(&(s.u, s.dof)).unwrap_or(0);
+    let mut parent: Vec<usize> = (0..objects.len()).collect();
+    let root = |parent: &[usize], mut i: usize| {
+        while parent[i] != i {
+            i = parent[i];
+        }
+        i
+    };
+    for joint in island(rows, joints) {
+        if let [first, second] = joint.sides() {
+            let (a, b) = (root(&parent, place(first)), root(&parent, place(second)));
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    let mut group_of = vec![usize::MAX; objects.len()];
+    let mut groups: Vec<Vec<u32>> = Vec::new();
+    for (&b, joint) in joints.iter().zip(island(rows, joints)) {
+        // a joint has a response, and so a side
+        let root = joint.sides().first().map_or(0, |s| root(&parent, place(s)));
+        if group_of[root] == usize::MAX {
+            group_of[root] = groups.len();
+            groups.push(Vec::new());
+        }
+        groups[group_of[root]].push(b);
+    }
+    groups
+}

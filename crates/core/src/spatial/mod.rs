@@ -1,0 +1,29 @@
+//! Spatial algebra: what moves and what pushes, six numbers at a time [RBDA §2].
+//!
+//! | type | numbers | meaning |
+//! |---|---|---|
+//! | [`Motion`] | angular, linear | velocity or acceleration of a body, seen at a point of it |
+//! | [`Force`] | torque, force | wrench or momentum, the torque about a point |
+//! | [`Transform`] | `R`, `p` | change of frame, for both of the above; never stored as 6×6 |
+//! | [`Inertia`] | mass, first moment, inertia about the frame's origin: 10 | of a rigid body |
+//! | [`ArticulatedInertia`] | `J`, `H`, `M`: 21 | of a body that others hang on by joints |
+//!
+//! Motion and force are different spaces: the one product between them is [`Motion::power`], W. Angular parts come first.
+//!
+//! All is generic over a [`Scalar`]: `f64`, or several `f64` side by side, so that one code moves one world or many.
+
+mod articulated;
+mod inertia;
+mod matrix;
+mod motion;
+mod scalar;
+mod transform;
+mod vector;
+
+pub use articulated::ArticulatedInertia;
+pub use inertia::Inertia;
+pub use matrix::{Matrix, Symmetric};
+pub use motion::{Force, Motion};
+pub use scalar::Scalar;
+pub use transform::Transform;
+pub use vector::Vector;

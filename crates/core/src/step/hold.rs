@@ -1,0 +1,88 @@
+//! Limits that push are held: their gap and its rate are closed at the end of the sub-step.
+//!
+//! A limit's force is that of the start of the sub-step and holds over it. What it should have been changes as the rest moves, so at the end the
+//! gap is off by `⅙·ȧ·h³` and its rate by `½·ȧ·h²`. Left alone this lets the limit go and strikes it anew, over and over. So what pushed is
+//! brought back onto its stop, with the joints where they are:
+//!
+//! ```text
+//! x += M⁻¹Jᵀμ,  K·μ = −gap        v += M⁻¹Jᵀν,  K·ν = −J·v            rows J of the limits that pushed, and of joints with 0 in place of −gap, −J·v
+//! ```
+//!
+//! A limit that would have let go within the sub-step is held to its end. Where contacts push in the same island velocities are left to them.
+
+use super::Workspace;
+use super::closing::is_joint;
+use super::contacts::{build_rows, displace, push, row_velocities, whiten, zero};
+use crate::object::Level;
+use crate::rows::RowSet;
+use crate::solver::{Accuracy, GaussSeidel, RowSolver};
+use crate::world::{Core, StepError};
+
+/// A limit that pushes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    pub key: [u32; 2],
+    /// Whether a contact pushes in its island.
+    pub with_contacts: bool,
+}
+
+/// The limits that pushed in the solve that was just made in `work`; sorted by key.
+pub(super) fn pushing(work: &Workspace) -> Vec<Held> {
+    let touches = work.touches.len();
+    let force = |b: usize| work.lambda[work.rows.blocks[b].row as usize];
+    let mut held = Vec::new();
+    for blocks in work.islands.iter() {
+        let with_contacts = blocks.iter().any(|&b| (b as usize) < touches && force(b as usize) != 0.0);
+        for limit in &work.limits {
+            let block = limit.target.map(|t| t + touches as u32);
+            if block.is_some_and(|b| blocks.contains(&b) && force(b as usize) > 0.0) {
+                held.push(Held { key: limit.key, with_contacts });
+            }
+        }
+    }
+    held.sort_by_key(|h| h.key);
+    held
+}
+
+/// Closes the limits `held` at the present state, `h` seconds after the present time; those that are off by more than the drift tolerance have let go.
+/// Sites and caches are left at the present.
+pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64) -> Result<(), StepError> {
+    if held.is_empty() {
+        return Ok(());
+    }
+    core.motion().refresh();
+    let time = core.time;
+    core.time += h;
+    let laid = build_rows(core, probe, Level::Acceleration, 0.0);
+    core.time = time;
+    laid?;
+    whiten(core, &vec![0.0; core.dof], 0.0, &mut probe.u, &mut probe.du_force);
+    row_velocities(&probe.rows, &probe.bias, &probe.u, &mut probe.c);
+    let (mut place, mut speed) = (vec![0.0; probe.rows.len], vec![0.0; probe.rows.len]);
+    let mut chosen = vec![false; probe.targets.len()];
+    for limit in &probe.limits {
+        let (Some(target), Ok(i)) = (limit.target, held.binary_search_by_key(&limit.key, |h| h.key)) else { continue };
+        if limit.gap.abs() > core.settings.drift_tolerance {
+            continue;
+        }
+        let block = &mut probe.rows.blocks[target as usize];
+        (block.set, chosen[target as usize]) = (RowSet::Equality, true);
+        place[block.row as usize] = limit.gap;
+        speed[block.row as usize] = if held[i].with_contacts { 0.0 } else { probe.c[block.row as usize] };
+    }
+    let targets = &probe.targets;
+    probe.islands.build(&probe.rows, |b| chosen[b] || is_joint(&targets[b]));
+    let s = core.settings;
+    let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
+    for blocks in probe.islands.iter().filter(|blocks| blocks.iter().any(|&b| chosen[b as usize])) {
+        for (c, tolerance, du) in [(&place, 1e-3 * s.contact_tolerance, &mut dx), (&speed, s.accuracy.tolerance, &mut dv)] {
+            zero(&mut probe.lambda, probe.rows.len);
+            let accuracy = Accuracy { sweeps: 100, relaxations: u32::MAX, tolerance };
+            GaussSeidel.solve(&probe.rows, blocks, c, &mut probe.lambda, du, accuracy);
+        }
+    }
+    displace(core, &dx, 1.0);
+    push(core, &dv);
+    core.motion().refresh();
+    Ok(())
+}
