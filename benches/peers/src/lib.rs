@@ -1,5 +1,6 @@
 //! tumble beside its peers: the same scenes, the same clock, the same measure of error.
 
+pub mod articulated;
 pub mod clock;
 pub mod measure;
 pub mod rapier;

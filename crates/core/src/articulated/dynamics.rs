@@ -1,8 +1,9 @@
 //! Forward dynamics of one model at one state: the sweeps of [`abm`](super::abm) in `f64`, kept so that many questions are answered at the state last
 //! refreshed.
 
-use super::abm::{Sweep, push, spread, three, write_three};
-use super::compiled::{Compiled, Kind};
+use super::abm::{Slot, Sweep, push, spread, three, write_three};
+use super::batch::run;
+use super::compiled::{Body, Compiled, Kind};
 use super::model::Model;
 use crate::site::Wrench;
 use crate::spatial::{Force, Motion, Vector};
@@ -136,42 +137,46 @@ impl Dynamics {
     }
 
     /// Angular acceleration of every link, rad/s², and acceleration of the material point at its origin, m/s², world axes, for given `qdd`.
-    pub fn link_accelerations(&self, s: &mut Scratch, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
-        self.carry(s, qdd);
-        for ((a, slot), out) in s.motions[1..].iter().zip(&self.sweep.slots[1..]).zip(out) {
-            let whole = *a + slot.drift;
-            *out = (whole.angular.into(), whole.linear.into());
+    pub fn link_accelerations(&self, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
+        let slots = &self.sweep.slots;
+        for (i, body) in self.compiled.bodies.iter().enumerate() {
+            let parent = body.parent.checked_sub(1).map_or(Motion::default(), |p| Motion::new(out[p].0.into(), out[p].1.into()));
+            let a = carried(body, &slots[i + 1], parent, qdd);
+            out[i] = (a.angular.into(), a.linear.into());
+        }
+        for ((angular, linear), slot) in out.iter_mut().zip(&slots[1..]) {
+            *angular += Vec3::from(slot.drift.angular);
+            *linear += Vec3::from(slot.drift.linear);
         }
     }
 
-    /// Motion of every link that joint rates `v` alone give: `V = X Vₚ + S v`, into `s.motions`.
+    /// Motion of every link that joint rates `v` alone give, into `s.motions`.
     pub(super) fn carry(&self, s: &mut Scratch, v: &[f64]) {
         s.motions[0] = Motion::default();
         for (i, body) in self.compiled.bodies.iter().enumerate() {
-            let slot = &self.sweep.slots[i + 1];
-            let mut motion = s.motions[body.parent].at(slot.arm);
-            match body.kind {
-                Kind::Revolute => motion.angular += slot.rotation.z * v[body.v],
-                Kind::Prismatic => motion.linear += slot.rotation.z * v[body.v],
-                Kind::Spherical(_) => motion.angular += slot.rotation * three(|k| v[k], body.v),
-                Kind::Floating(_) => motion = Motion::new(three(|k| v[k], body.v), three(|k| v[k], body.v + 3)),
-            }
-            s.motions[i + 1] = motion;
+            s.motions[i + 1] = carried(body, &self.sweep.slots[i + 1], s.motions[body.parent], v);
         }
     }
+}
+
+/// `V = X Vₚ + S v` of a link.
+#[inline(always)]
+fn carried(body: &Body, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> Motion {
+    let mut motion = parent.at(slot.arm);
+    match body.kind {
+        Kind::Revolute => motion.angular += slot.rotation.z * v[body.v],
+        Kind::Prismatic => motion.linear += slot.rotation.z * v[body.v],
+        Kind::Spherical(_) => motion.angular += slot.rotation * at(v, body.v),
+        Kind::Floating(_) => motion = Motion::new(at(v, body.v), at(v, body.v + 3)),
+    }
+    motion
 }
 
 /// Forward dynamics in one go: `q̈` from `q`, `v` and joint forces `tau` in uniform gravity. Leaves `d` fit for another call of this alone: its maps need
 /// a [`Dynamics::refresh`] first.
 pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
     let Dynamics { compiled, sweep, .. } = d;
-    sweep.place::<false>(compiled, |k| q[k], |k| v[k]);
-    for (i, body) in compiled.bodies.iter().enumerate().rev() {
-        sweep.fold_link(i + 1, body);
-        sweep.push_link(i + 1, body, |k| tau[k]);
-    }
-    sweep.slots[0].acceleration = Motion::new(Vector::default(), (-gravity).into());
-    sweep.spread(compiled, |k, x| qdd[k] = x);
+    run(compiled, sweep, gravity, |k| q[k], |k| v[k], |k| tau[k], |k, x| qdd[k] = x);
 }
 
 /// Three numbers of a slice from `k` on.

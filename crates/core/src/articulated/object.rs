@@ -28,7 +28,7 @@ impl Object for ArticulatedBody {
         let links = self.model.links().len();
         let (moving, rest) = sites.split_at_mut(links);
         let working = self.working.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
-        self.dynamics.link_accelerations(&mut working.scratch, &working.zeros, &mut working.accelerations);
+        self.dynamics.link_accelerations(&working.zeros, &mut working.accelerations);
         for (i, site) in moving.iter_mut().enumerate() {
             let (angular_velocity, velocity) = self.dynamics.link_velocity(i);
             (site.pose, site.angular_velocity, site.velocity) = (self.dynamics.link_pose(i), angular_velocity, velocity);
@@ -128,7 +128,7 @@ impl Integratable for ArticulatedBody {
 
     fn accelerations(&self, _x: &[f64], dp: &[f64], sites: &mut [Site]) {
         let working = &mut *self.working();
-        self.dynamics.link_accelerations(&mut working.scratch, dp, &mut working.accelerations);
+        self.dynamics.link_accelerations(dp, &mut working.accelerations);
         let (moving, rest) = sites.split_at_mut(self.model.links().len());
         for (site, (angular, linear)) in moving.iter_mut().zip(&working.accelerations) {
             (site.angular_acceleration, site.acceleration) = (*angular, *linear);

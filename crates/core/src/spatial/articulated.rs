@@ -71,10 +71,10 @@ impl<T: Scalar> ArticulatedInertia<T> {
     #[inline(always)]
     pub fn minus_square(&self, u: Force<T>, d: T) -> ArticulatedInertia<T> {
         let (n, f) = (u.torque * d, u.force * d);
-        let row = |h: Vector<T>, n: T| h - f * n;
+        let [x, y, z] = self.coupling;
         ArticulatedInertia {
             rotational: self.rotational.minus_outer(u.torque, n),
-            coupling: [row(self.coupling[0], u.torque.x), row(self.coupling[1], u.torque.y), row(self.coupling[2], u.torque.z)],
+            coupling: [x - f * u.torque.x, y - f * u.torque.y, z - f * u.torque.z],
             mass: self.mass.minus_outer(u.force, f),
         }
     }

@@ -32,8 +32,7 @@ impl<T: Scalar> Matrix<T> {
     /// `A c` of a constant vector.
     #[inline(always)]
     pub fn of_constant(&self, c: &Vector<f64>) -> Vector<T> {
-        let row = |x: T, y: T, z: T| x * c.x + y * c.y + z * c.z;
-        Vector::new(row(self.x.x, self.y.x, self.z.x), row(self.x.y, self.y.y, self.z.y), row(self.x.z, self.y.z, self.z.z))
+        self.x.times_constant(c.x) + self.y.times_constant(c.y) + self.z.times_constant(c.z)
     }
 
     /// `A C` of a constant matrix.
@@ -99,11 +98,11 @@ impl<T: Scalar> Symmetric<T> {
     /// `a bᵀ + b aᵀ`.
     #[inline(always)]
     pub fn of_pair(a: Vector<T>, b: Vector<T>) -> Symmetric<T> {
-        let twice = |x: T| x + x;
+        let (x, y, z) = (a.x * b.x, a.y * b.y, a.z * b.z);
         Symmetric {
-            xx: twice(a.x * b.x),
-            yy: twice(a.y * b.y),
-            zz: twice(a.z * b.z),
+            xx: x + x,
+            yy: y + y,
+            zz: z + z,
             xy: a.x * b.y + a.y * b.x,
             xz: a.x * b.z + a.z * b.x,
             yz: a.y * b.z + a.z * b.y,

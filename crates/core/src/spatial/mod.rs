@@ -18,6 +18,7 @@ mod matrix;
 mod motion;
 mod scalar;
 mod transform;
+mod trig;
 mod vector;
 
 pub use articulated::ArticulatedInertia;

@@ -1,5 +1,6 @@
 //! The numbers that the algebra is written over.
 
+use super::trig;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
 /// `f64`, or some of them side by side in the lanes of a SIMD register. Every operation acts on each lane alone and rounds as `f64` does, so a lane's
@@ -13,8 +14,13 @@ pub trait Scalar:
     fn sqrt(self) -> Self;
     /// `1/self` where `self > least`, 0 elsewhere (and where either is not a number).
     fn reciprocal_above(self, least: Self) -> Self;
-    /// Sine and cosine of an angle in radians.
-    fn sin_cos(self) -> (Self, Self);
+    /// `libm`'s sine and cosine in the lanes where `|self|` is above `far` or not a number, `near` in the others.
+    fn sin_cos_beyond(self, far: f64, near: (Self, Self)) -> (Self, Self);
+    /// Sine and cosine of an angle in radians, to one unit in the last place.
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        self.sin_cos_beyond(trig::FAR, trig::sin_cos(self))
+    }
 }
 
 impl Scalar for f64 {
@@ -34,7 +40,7 @@ impl Scalar for f64 {
     }
 
     #[inline(always)]
-    fn sin_cos(self) -> (f64, f64) {
-        nalgebra::ComplexField::sin_cos(self)
+    fn sin_cos_beyond(self, far: f64, near: (f64, f64)) -> (f64, f64) {
+        if self.abs() <= far { near } else { nalgebra::ComplexField::sin_cos(self) }
     }
 }

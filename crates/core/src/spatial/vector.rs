@@ -34,6 +34,12 @@ impl<T: Scalar> Vector<T> {
         Vector::new(like.constant(v.x), like.constant(v.y), like.constant(v.z))
     }
 
+    /// Times a constant.
+    #[inline(always)]
+    pub fn times_constant(self, s: f64) -> Vector<T> {
+        Vector { x: self.x * s, y: self.y * s, z: self.z * s }
+    }
+
     /// `self · other`, summed in the order x, y, z.
     #[inline(always)]
     pub fn dot(self, other: Vector<T>) -> T {

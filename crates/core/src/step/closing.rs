@@ -17,14 +17,18 @@
 //! joints: two hinges of a door agree about its axis only where both are closed, and rows taken beside that place would hold the door fast.
 
 use super::Workspace;
-use super::contacts::{Moment, displace, lay_rows, push, row_velocities, whiten, zero};
-use crate::object::{Level, RowTarget};
+use super::contacts::{displace, lay_rows, push, row_velocities, whiten, zero};
+use crate::object::{Integratable, Level, RowTarget};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, RowSolver};
+use crate::solver::{Accuracy, DIRECT_ROWS, GaussSeidel, RowSolver};
+use crate::view::Entry;
 use crate::world::{Core, StepError};
 
 /// Rounds at most.
 const ROUNDS: usize = 12;
+/// Rounds where some joints are too many for a direct solve, so that a long rope costs what its sweeps cost.
+const FEW_ROUNDS: usize = 2;
+const SWEEPS: u32 = 25;
 /// A round that leaves more of the error than this is the last of its kind.
 const SLOW: f64 = 0.5;
 /// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
@@ -36,38 +40,62 @@ pub(super) fn is_joint(t: &RowTarget) -> bool {
     t.set == RowSet::Equality && t.compliance == 0.0
 }
 
-/// Errors of all constraint rows at the present, and the middle of the step: free motion of `ahead` seconds brought onto the joints. Sites and
-/// caches are those of the present before and after.
-pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f64>, Moment), StepError> {
-    let mut probe = Workspace::default();
-    lay_rows(core, &mut probe, level, None)?;
-    let errors: Vec<f64> = probe.targets.iter().map(|t| t.error).collect();
+/// Errors of all constraint rows at the present, and the rows of the middle of the step: free motion of `ahead` seconds brought onto the joints.
+/// Their Jacobians are those of the middle, their responses those of the present, as all rows of a step have. Sites and caches are those of the
+/// present before and after.
+pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f64>, Workspace), StepError> {
+    let mut rows = Workspace::default();
+    lay_rows(core, &mut rows, level, None)?;
+    let errors: Vec<f64> = rows.targets.iter().map(|t| t.error).collect();
     let (start, time, pinned) = (core.x.clone(), core.time, core.unpin());
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
-    let outcome = onto(core, &mut probe, level, &errors);
+    let outcome = onto(core, &mut rows, level, &errors).and_then(|_| lay_rows(core, &mut rows, level, None));
+    map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
     core.time = time;
-    let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
+    core.x = start;
     core.pin_again(pinned);
     core.motion().refresh();
-    outcome.map(|_| (errors, moment))
+    map_sides(core, &mut rows, |body, j, y| body.respond(j, y));
+    outcome.map(|_| (errors, rows))
+}
+
+/// Replaces what every row holds of every side.
+fn map_sides(core: &Core, work: &mut Workspace, map: impl Fn(&dyn Integratable, &[f64], &mut [f64])) {
+    let starts: Vec<(usize, &Entry)> = core.table.iter().filter(|e| e.moves()).map(|e| (e.span.v.start, e)).collect();
+    let Rows { blocks, y, .. } = &mut work.rows;
+    for side in blocks.iter().flat_map(|b| b.sides()) {
+        let found = starts.binary_search_by_key(&(side.u as usize), |(start, _)| *start);
+        if let Some(body) = found.ok().and_then(|i| starts[i].1.object.integratable()) {
+            let held = &mut y[side.y as usize..(side.y + side.dof) as usize];
+            let before = held.to_vec();
+            map(body, &before, held);
+        }
+    }
 }
 
 /// Moves the present state to where the joints have the errors given.
 fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) -> Result<(), StepError> {
     let least = 1e-2 * core.settings.contact_tolerance;
-    for _ in 0..ROUNDS {
+    let mut best = (f64::INFINITY, Vec::new());
+    for round in 0..ROUNDS {
         lay_rows(core, probe, level, None)?;
         if probe.targets.len() != errors.len() {
             return Ok(());
         }
         let off: Vec<f64> = probe.targets.iter().zip(errors).map(|(t, e)| if is_joint(t) { t.error - e } else { 0.0 }).collect();
-        if largest(&off) <= least {
+        if largest(&off) > best.0 {
+            core.x.clone_from(&best.1);
+            core.motion().refresh();
             return Ok(());
         }
-        soften(probe, largest(&off));
+        best = (largest(&off), core.x.clone());
         islands(probe);
+        if best.0 <= least || round >= rounds(probe) {
+            return Ok(());
+        }
+        soften(probe, best.0);
         let mut dx = vec![0.0; core.dof];
         probe.islands.iter().for_each(|blocks| solve(&probe.rows, blocks, &off, &mut dx, 0.1 * least));
         displace(core, &dx, 1.0);
@@ -86,7 +114,7 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
     islands(work);
     let (mut probe, mut chord) = (Workspace::default(), true);
     let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds(work) {
         if open.is_closed() {
             break;
         }
@@ -216,6 +244,11 @@ fn islands(work: &mut Workspace) {
     work.islands.build(&work.rows, |b| b >= touches && is_joint(&targets[b - touches]));
 }
 
+fn rounds(work: &Workspace) -> usize {
+    if work.islands.iter().any(|blocks| blocks.len() > DIRECT_ROWS) { FEW_ROUNDS } else { ROUNDS }
+}
+
+/// Gives rows that may not agree the compliance for such an error.
 fn soften(probe: &mut Workspace, error: f64) {
     let share = (SOFT.0 * error).min(SOFT.1);
     for b in 0..probe.rows.blocks.len() {
@@ -227,7 +260,7 @@ fn soften(probe: &mut Workspace, error: f64) {
 fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64) {
     let mut lambda = Vec::new();
     zero(&mut lambda, rows.len);
-    let accuracy = Accuracy { sweeps: 100, relaxations: u32::MAX, tolerance };
+    let accuracy = Accuracy { sweeps: SWEEPS, relaxations: u32::MAX, tolerance };
     GaussSeidel.solve(rows, blocks, c, &mut lambda, du, accuracy);
 }
 

@@ -120,8 +120,8 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
     lay_rows(core, work, level, Some(&middle))?;
     let mut present = Vec::new();
     if work.targets.iter().any(closing::is_joint) {
-        let (errors, middle) = closing::middle(core, level, ahead)?;
-        lay_rows(core, work, level, Some(&middle))?;
+        let (errors, made) = closing::middle(core, level, ahead)?;
+        adopt(core, work, made);
         present = errors;
     }
     if present.len() == work.targets.len() {
@@ -134,12 +134,44 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
 
 /// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment.
 pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<(), StepError> {
-    work.rows.clear(core.dof);
-    work.bias.clear();
-    work.targets.clear();
+    lay_touches(core, work);
     let mut problem = None;
     let mut builder = RowBuilder {
         rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
+        owner: ObjectId::default(),
+    };
+    let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
+    builder.sites = sites;
+    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
+    let mut first = std::mem::take(&mut work.first);
+    first.clear();
+    for (id, entry, constraint) in constraints(&core.table) {
+        first.push(builder.targets.len());
+        builder.owner = id;
+        constraint.rows(&entry.span, &view, level, &mut builder);
+        if let Some(why) = builder.problem.take() {
+            return Err(StepError::Row { object: entry.object.name().to_string(), why });
+        }
+    }
+    first.push(work.targets.len());
+    work.first = first;
+    make_room(work);
+    Ok(())
+}
+
+fn make_room(work: &mut Workspace) {
+    let n = work.rows.len;
+    work.c.resize(n, 0.0);
+    zero(&mut work.lambda, n);
+}
+
+/// The rows of the touches, and no others.
+fn lay_touches(core: &Core, work: &mut Workspace) {
+    work.rows.clear(core.dof);
+    work.bias.clear();
+    work.targets.clear();
+    let mut builder = RowBuilder {
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut None,
         owner: ObjectId::default(),
     };
     for touch in &work.touches {
@@ -157,26 +189,22 @@ pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: 
             builder.point_side(entry, owner.part as usize, &point, axes, sign);
         }
     }
-    let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
-    builder.sites = sites;
-    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
-    let mut first = std::mem::take(&mut work.first);
-    first.clear();
-    for (id, entry, constraint) in constraints(&core.table) {
-        first.push(builder.targets.len());
-        builder.owner = id;
-        constraint.rows(&entry.span, &view, level, &mut builder);
-        if let Some(why) = builder.problem.take() {
-            return Err(StepError::Row { object: entry.object.name().to_string(), why });
+}
+
+/// The touches' rows, and after them the constraints' rows of another workspace.
+fn adopt(core: &Core, work: &mut Workspace, made: Workspace) {
+    lay_touches(core, work);
+    for block in &made.rows.blocks {
+        work.rows.push_soft(block.set, block.compliance);
+        for side in block.sides() {
+            if let Some(y) = work.rows.side(side.u as usize, side.dof as usize) {
+                y.copy_from_slice(made.rows.response(side, 0));
+            }
         }
     }
-    first.push(work.targets.len());
-    work.first = first;
-    let n = work.rows.len;
-    work.c.resize(n, 0.0);
-    work.lambda.clear();
-    work.lambda.resize(n, 0.0);
-    Ok(())
+    work.bias.extend(made.bias);
+    (work.targets, work.first) = (made.targets, made.first);
+    make_room(work);
 }
 
 /// Gives one-sided rows the gap that their constraint tells for the present state.

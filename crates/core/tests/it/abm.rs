@@ -94,7 +94,7 @@ fn poses_velocities_and_accelerations_of_links() {
         let poses = poses(&model, &q);
         let qdd = Numbers::new(seed + 9).list(d.dof(), 2.0);
         let mut found = vec![(Vec3::zeros(), Vec3::zeros()); d.links()];
-        d.link_accelerations(&mut d.scratch(), &qdd, &mut found);
+        d.link_accelerations(&qdd, &mut found);
         for i in 0..d.links() {
             let pose = d.link_pose(i);
             assert!((pose.translation.vector - poses[i].translation.vector).norm() < 1e-12);
@@ -266,10 +266,10 @@ fn a_ball_joint_moves_as_three_hinges_do() {
     let wrench = Wrench { torque: Vec3::new(0.4, 0.1, -0.3), force: Vec3::zeros() };
     let (mut qdd, mut out) = ([0.0; 3], [(Vec3::zeros(), Vec3::zeros()); 3]);
     hinges.accelerate_in(&mut hinges.scratch(), &-Vec3::z(), &[0.0; 3], &[Wrench::default(), Wrench::default(), wrench], &mut qdd);
-    hinges.link_accelerations(&mut hinges.scratch(), &qdd, &mut out);
+    hinges.link_accelerations(&qdd, &mut out);
     let wanted = out[2].0;
     single.accelerate_in(&mut single.scratch(), &-Vec3::z(), &[0.0; 3], &[wrench], &mut qdd);
-    single.link_accelerations(&mut single.scratch(), &qdd, &mut out);
+    single.link_accelerations(&qdd, &mut out);
     assert!((out[0].0 - wanted).norm() < 1e-12, "{:?} {wanted:?}", out[0].0);
 }
 

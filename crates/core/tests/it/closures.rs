@@ -44,11 +44,11 @@ pub struct FourBar {
     start: f64,
 }
 
-const LENGTHS: [f64; 3] = [0.2, 0.5, 0.4];
-const GROUND: Vec3 = Vec3::new(0.4, 0.0, 0.0);
+pub const LENGTHS: [f64; 3] = [0.2, 0.5, 0.4];
+pub const GROUND: Vec3 = Vec3::new(0.4, 0.0, 0.0);
 
 /// The closed form: the pins between crank and coupler, and between coupler and rocker, at an angle of the crank (coupler above).
-fn pins(crank: f64) -> (Vec3, Vec3) {
+pub fn pins(crank: f64) -> (Vec3, Vec3) {
     let a = LENGTHS[0] * at(crank);
     let d = GROUND - a;
     let along = (LENGTHS[1].powi(2) - LENGTHS[2].powi(2) + d.norm_squared()) / (2.0 * d.norm());

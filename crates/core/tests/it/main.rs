@@ -1,14 +1,18 @@
 //! Physics proved: closed forms, conservation laws, determinism.
 
 mod abm;
+mod abm_lanes;
 mod abm_reference;
+mod abm_spatial;
 mod adaptive;
+mod articulated_agree;
 mod articulated_closed;
 mod articulated_laws;
 mod articulated_random;
 mod articulated_world;
 mod chains;
 mod closures;
+mod closures_articulated;
 mod closures_joints;
 mod common;
 mod free;

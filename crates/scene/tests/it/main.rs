@@ -1,12 +1,11 @@
 //! What `tumble-scene` promises of scene files.
 
 mod articulated;
-mod articulated_world;
 mod bad_input;
 mod expansion;
 mod finding;
-mod robots;
 mod pinocchio;
+mod robots;
 mod robust;
 mod shipped;
 mod urdf;

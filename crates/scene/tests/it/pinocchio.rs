@@ -6,7 +6,7 @@
 mod articulated_random;
 
 use articulated_random::*;
-use nalgebra::{DMatrix, DVector, Quaternion};
+use nalgebra::Quaternion;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write;
@@ -88,12 +88,10 @@ fn agrees(name: &str, model: &Model) -> bool {
 fn answers(model: &Model, state: &State) -> Vec<(&'static str, Vec<f64>)> {
     let dof = model.dof();
     let (mut kin, mut work) = (Kinematics::new(model), InverseDynamics::new(model));
-    let (mut tau, mut bias, mut mass) = (vec![f64::NAN; dof], vec![f64::NAN; dof], vec![f64::NAN; dof * dof]);
+    let (mut qdd, mut tau, mut mass) = (vec![f64::NAN; dof], vec![f64::NAN; dof], vec![f64::NAN; dof * dof]);
+    forward_dynamics(&mut Dynamics::new(model), &GRAVITY, &state.q, &state.v, &state.t, &mut qdd);
     inverse_dynamics(model, (&mut kin, &mut work), &GRAVITY, &state.q, &state.v, &state.a, &[], &mut tau);
-    work.bias(model, &kin, &GRAVITY, &[], &mut bias);
     MassMatrix::new(model).write(model, &kin, &mut mass);
-    let net = DVector::from_column_slice(&state.t) - DVector::from_vec(bias);
-    let qdd = DMatrix::from_row_slice(dof, dof, &mass).cholesky().unwrap().solve(&net);
     let (e, p) = (energy(model, &kin, &GRAVITY), momentum(model, &kin));
     let (center, velocity) = center_of_mass(model, &kin).unwrap();
     let mut rates = vec![Rates::zero(); model.links().len()];
@@ -102,7 +100,7 @@ fn answers(model: &Model, state: &State) -> Vec<(&'static str, Vec<f64>)> {
     link_jacobian(model, &kin, model.links().len() - 1, &mut jacobian);
     let pair = |a: &Vec3, b: &Vec3| [a.data.0[0], b.data.0[0]].concat();
     vec![
-        ("qdd", qdd.as_slice().to_vec()),
+        ("qdd", qdd),
         ("tau", tau),
         ("mass", mass),
         ("energy", vec![e.kinetic, e.potential]),
