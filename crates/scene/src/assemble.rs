@@ -9,6 +9,9 @@ use crate::build::look;
 use crate::link::LinkSpec;
 use crate::link_shapes::{Placed, ShapeMaker, mass};
 
+/// Pairs of links told by name.
+const TOLD_PAIRS: usize = 8;
+
 /// The tree of links, with a mass for each.
 pub(crate) fn model(links: &[LinkSpec], masses: &[LinkMass]) -> Result<Model, ModelError> {
     let mut builder = ModelBuilder::new();
@@ -139,9 +142,12 @@ fn part_overlaps(
             }
         }
     }
+    pairs.sort();
     pairs.dedup();
     if !pairs.is_empty() {
-        maker.notes.add("links that overlap at the start never meet", pairs.join(", "));
+        let more = pairs.len().saturating_sub(TOLD_PAIRS);
+        let rest = if more > 0 { format!(" and {more} more pairs") } else { String::new() };
+        maker.notes.add("links that overlap at the start never meet", pairs[..pairs.len() - more].join(", ") + &rest);
     }
     Ok(())
 }

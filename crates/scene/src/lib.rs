@@ -58,6 +58,7 @@ mod body;
 mod build;
 mod bound;
 mod closure;
+mod collada;
 mod error;
 mod fields;
 mod file;

@@ -32,9 +32,12 @@ pub(crate) struct Placed<'s> {
 pub(crate) struct ShapeMaker<'m> {
     /// Meshes of the scene as solids, with the place of the centre of each.
     meshes: &'m [(Shape, Vec3)],
-    files: BTreeMap<(PathBuf, [u64; 3], Use), Result<(Shape, Vec3), String>>,
+    files: BTreeMap<FileKey, Result<(Shape, Vec3), String>>,
     pub(crate) notes: NoteList,
 }
+
+/// A file, the bits of its scale, and what it is read for.
+type FileKey = (PathBuf, [u64; 3], Use);
 
 /// What a mesh file is read for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

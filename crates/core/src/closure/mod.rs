@@ -1,4 +1,4 @@
-//! Loop closures: joints by equality rows, between any two parts of any two objects (the future work of the thesis, §V).
+//! Loop closures: joints by equality rows, between any two parts of any two objects (future work of the thesis, §VI).
 //!
 //! A frame on each side, given in its part's axes: `p`, and `x y z` for the axes. With `s(q) = v_A(q) − v_B(q)`, the velocity of A's material
 //! point at `q` against B's, and `ω = ω_A − ω_B`:
