@@ -49,30 +49,22 @@ fn a_floating_link_and_a_rigid_body_are_the_same_thing() {
 
 #[test]
 fn the_same_contact_gives_the_same_impulse() {
-    // both are set down on the same state, a hair into the floor: one frame, impacts and friction
-    for stepper in ["time_stepping", "backtracking"] {
-        let mut found = Vec::new();
-        for articulated in [false, true] {
-            let (mut world, id) = thrown(world(1.0 / 240.0, stepper, Integrator::Verlet), articulated, -0.6 + 0.352);
-            let deep = world.contacts().len();
-            world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
-            if articulated {
-                let mut x = world.state_of(id).unwrap().to_vec();
-                x[7..10].fill(0.0);
-                world.write_state_of(id, &x).unwrap();
-            } else {
-                world.set_velocity(id, Vec3::new(0.5, 0.2, -1.0), Vec3::zeros()).unwrap();
-            }
-            let before = world.momentum();
-            world.step().unwrap();
-            let after = world.momentum();
-            assert_eq!(deep, 0);
-            found.push([after.linear - before.linear, after.angular - before.angular]);
+    // both are set down on the same state, a hair into the floor: one frame, an impact with friction
+    let [a, b] = [false, true].map(|articulated| {
+        let (mut world, id) = thrown(world(1.0 / 240.0, "time_stepping", Integrator::Verlet), articulated, -0.6 + 0.352);
+        world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
+        if articulated {
+            let mut x = world.state_of(id).unwrap().to_vec();
+            x[7..10].fill(0.0);
+            world.write_state_of(id, &x).unwrap();
+        } else {
+            world.set_velocity(id, Vec3::new(0.5, 0.2, -1.0), Vec3::zeros()).unwrap();
         }
-        let [a, b] = [found[0], found[1]];
-        assert!(a[0].norm() > 0.1, "{stepper}: {a:?} {b:?}");
-        a.iter().zip(b).for_each(|(a, b)| assert!((a - b).norm() < 1e-10 * a.norm(), "{stepper}: {a:?} {b:?}"));
-    }
+        world.step().unwrap();
+        world.contacts().iter().map(|c| c.impulse).collect::<Vec<_>>()
+    });
+    assert!(a.len() == b.len() && a.iter().any(|i| i.norm() > 0.1), "{a:?} {b:?}");
+    a.iter().zip(&b).for_each(|(a, b)| assert!((a - b).norm() < 1e-10, "{a:?} {b:?}"));
 }
 
 #[test]

@@ -221,6 +221,30 @@ fn obj(mesh: &TriMesh, without: usize) -> String {
     vertices.chain(faces).collect()
 }
 
+/// A chain of balls 0.1 m apart on a fixed base, with radii that overlap their second neighbours.
+#[test]
+fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
+    let link = |name: &str, radius: f64| format!("<link name=\"{name}\">{BALL}<collision><geometry><sphere radius=\"{radius}\"/></geometry></collision></link>\n");
+    let joint = |name: &str, kind: &str, parent: &str, child: &str| {
+        format!("<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0.1 0 0\"/></joint>\n")
+    };
+    let text = format!(
+        "<robot name=\"r\">\n{}{}{}{}{}{}{}{}</robot>",
+        link("base", 0.04), link("a", 0.04), link("b", 0.12), link("c", 0.04), link("d", 0.09),
+        joint("j", "continuous", "base", "a") + &joint("k", "planar", "a", "b"), joint("l", "continuous", "b", "c"), joint("m", "continuous", "c", "d"),
+    );
+    let folder = Folder::new("overlap");
+    let (body, notes) = load(folder.write("r.urdf", &text), &UrdfOptions { floating: true, ..UrdfOptions::default() }).unwrap();
+    let first = body.model().links().len() + 1;
+    let collidable = body.collidable().unwrap();
+    let meet = |a: usize, b: usize| collidable.parts_meet(first + a, first + b);
+    // 0.2 m between second neighbours: b reaches 0.12 and d 0.09, the others 0.04
+    assert!(!meet(0, 1) && !meet(1, 2) && !meet(2, 3) && !meet(3, 4), "joined, one pair through a stack");
+    assert!(!meet(2, 4), "overlap");
+    assert!(meet(0, 2) && meet(0, 3) && meet(1, 3) && meet(1, 4));
+    assert_eq!(notes, ["links that overlap at the start never meet: b and d"]);
+}
+
 /// One link with a collision mesh and a picture.
 fn with_meshes(collision: &str, scale: &str, visual: &str) -> String {
     format!(
