@@ -102,7 +102,7 @@ impl Backtracking {
         let hold = core.settings.stabilize_positions;
         let drifted = |t: &RowTarget| if closing::is_joint(t) { hold && off(-t.error.abs()) } else { t.set == RowSet::HalfLine && off(t.error) };
         if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
-            projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
+            projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance)?;
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
         }

@@ -230,7 +230,7 @@ impl TimeStepping {
         let mean: Vec<f64> = (0..core.dof).map(|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]).collect();
         let recovery = core.settings.recovery_speed * h;
         let least = core.settings.contact_tolerance;
-        projection::project(core, &mut self.work, Displacement::Step { mean: &mean, h }, recovery, least);
+        projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean: &mean, h }, recovery, least)?;
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
         let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
