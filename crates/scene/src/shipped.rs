@@ -21,7 +21,7 @@ macro_rules! shipped_scenes {
     };
 }
 
-const SHIPPED: &[Shipped] = shipped_scenes!["falling", "stack", "billiards", "bowling", "incline"];
+const SHIPPED: &[Shipped] = shipped_scenes!["falling", "stack", "billiards", "bowling", "incline", "pendulum", "chain", "piston"];
 
 /// The scenes that come with tumble.
 pub fn shipped() -> &'static [Shipped] {

@@ -3,6 +3,7 @@
 mod bad_input;
 mod common;
 mod determinism;
+mod machines;
 mod outputs;
 mod picture;
 mod scenes;
