@@ -66,7 +66,10 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
         }
         let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
         if worst > least {
-            let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, relaxations: u32::MAX, tolerance: 0.1 * least / h };
+            // the rows of a body's limits and contacts lean on each other through all its links, and a pile's do not
+            let jointed = blocks.iter().any(|&b| b as usize >= touches);
+            let most = if jointed { core.settings.accuracy.sweeps } else { 0 };
+            let accuracy = Accuracy { sweeps: core.settings.projection_sweeps.max(most), relaxations: u32::MAX, tolerance: 0.1 * least / h };
             GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, accuracy);
         }
     }
