@@ -184,7 +184,8 @@ pub enum Level {
 /// Constrains itself or others: joint limits, loop closures, rods (thesis §IV.A.4). Its rows are solved together with all contacts.
 pub trait Constraint {
     /// Adds its rows. See [`RowBuilder`] for how a row is made. The view shows the state that free motion makes by the middle of the step to
-    /// come: directions are right there to second order. Errors are those of that state too; the stepper takes them back to the present.
+    /// come: directions are right there to second order. Errors are those of that state too; the stepper takes them back to the present. Where there
+    /// are rigid equality rows they are asked for several times in a step, at its start, middle and end: rows are a function of the view alone.
     fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder);
     /// Appends the errors of its one-sided rows ([`RowSet::HalfLine`]) at the view's state, one per row and in the order of the rows. What is told
     /// here `backtracking` locates in time as it does contacts: the step ends where the limit is reached, and the limit acts from there on. Of a

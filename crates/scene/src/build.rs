@@ -11,6 +11,7 @@ use tumble_core::{ArticulatedBody, Closure, Look as CoreLook, ObjectId, RigidBod
 use crate::body::{BodySpec, MassSpec};
 use crate::articulated::ArticulatedSpec;
 use crate::assemble;
+use crate::collada;
 use crate::closure::{ClosureKind, ClosureSpec, PartSpec};
 use crate::file::SceneFile;
 use crate::link_shapes::{self, ShapeMaker};
@@ -240,7 +241,7 @@ impl SceneFile {
     }
 }
 
-/// Reads OBJ or STL by the file's extension; anything else is told apart by its content.
+/// Reads OBJ, STL or COLLADA by the file's extension.
 pub fn read_triangles(path: &std::path::Path, bytes: &[u8]) -> Result<TriMesh, String> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     match extension.as_str() {
@@ -249,7 +250,11 @@ pub fn read_triangles(path: &std::path::Path, bytes: &[u8]) -> Result<TriMesh, S
             let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is not UTF-8; an OBJ file is text", e.valid_up_to()))?;
             TriMesh::from_obj(text).map_err(|e| e.to_string())
         }
-        other => Err(format!("the extension is '{other}'; meshes are read from .obj and .stl")),
+        "dae" => {
+            let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is not UTF-8; a COLLADA file is text", e.valid_up_to()))?;
+            collada::read(text)
+        }
+        other => Err(format!("the extension is '{other}'; meshes are read from .obj, .stl and .dae")),
     }
 }
 

@@ -115,7 +115,8 @@ impl fmt::Display for Invalid {
 }
 
 impl Invalid {
-    fn report(&self, color: bool) -> String {
+    /// All problems, each with its line of the file.
+    pub(crate) fn report(&self, color: bool) -> String {
         let source = Source::from(self.text.as_str());
         let mut out = String::new();
         for problem in self.problems.iter().take(SHOWN_PROBLEMS) {

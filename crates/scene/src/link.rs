@@ -174,7 +174,7 @@ impl<'a> LinkRow<'a> {
         let shapes = read_shapes(f, &from);
         let mass = read_mass(f, &shapes, joint.as_ref().is_some_and(|j| j.kind == Joint::Fixed));
         let (count, next, colors) = read_repeat(f, &name, from.room);
-        let Some(mut joint) = joint else { return None };
+        let mut joint = joint?;
         let mimic = joint.read_mimic(f);
         Some(LinkRow { link: LinkSpec { name, parent, placement, joint, mass, shapes }, count, next, colors, mimic })
     }
@@ -316,15 +316,35 @@ fn read_inertia(f: &mut Fields<'_>) -> Option<Mat3> {
 
 /// What keeps a symmetric matrix from being the inertia of a body about its centre of mass: principal moments are not negative, and none is greater
 /// than the sum of the others.
-pub(crate) fn inertia_fault(inertia: &Mat3) -> Option<String> {
+pub(crate) fn inertia_fault(inertia: &Mat3) -> Option<InertiaFault> {
     let mut moments: Vec<f64> = inertia.symmetric_eigenvalues().iter().copied().collect();
     moments.sort_by(f64::total_cmp);
     let size = inertia.amax();
     let [a, b, c] = [moments[0], moments[1], moments[2]];
     if a < -1e-9 * size && a < -1e-12 {
-        return Some(format!("principal moments of at least 0; the least is {a:.6e} kg·m²"));
+        return Some(InertiaFault::Negative(a));
     }
-    (c > a + b + 1e-6 * size).then(|| format!("no principal moment greater than the sum of the others; they are {a:.6e}, {b:.6e} and {c:.6e} kg·m²"))
+    (c > a + b + 1e-6 * size && c > a + b + 1e-9).then_some(InertiaFault::Triangle([a, b, c]))
+}
+
+/// Why a matrix is the inertia of no body.
+#[derive(Debug)]
+pub(crate) enum InertiaFault {
+    /// The least principal moment.
+    Negative(f64),
+    /// All principal moments, the least first.
+    Triangle([f64; 3]),
+}
+
+impl std::fmt::Display for InertiaFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            InertiaFault::Negative(a) => write!(f, "principal moments of at least 0; the least is {a:.6e} kg·m²"),
+            InertiaFault::Triangle([a, b, c]) => {
+                write!(f, "no principal moment greater than the sum of the others; they are {a:.6e}, {b:.6e} and {c:.6e} kg·m²")
+            }
+        }
+    }
 }
 
 /// `repeat`: how many, how each next one is placed, colours in turn.

@@ -17,7 +17,7 @@ pub struct Tumble {
 pub enum Command {
     /// Simulate a scene; record it, sum it up, take a picture of its end.
     Run(RunOptions),
-    /// Check scene and mesh files; nothing is run.
+    /// Check scenes, URDF robots and meshes; nothing is run.
     Check(CheckOptions),
     /// List the scenes that are shipped.
     Scenes,
@@ -70,7 +70,7 @@ pub struct RunOptions {
 
 #[derive(Args)]
 pub struct CheckOptions {
-    /// Scene files, folders, names of shipped scenes; .obj and .stl meshes.
+    /// Scene files, folders, names of shipped scenes; .urdf robots; .obj and .stl meshes.
     #[arg(required = true)]
     pub files: Vec<String>,
 }

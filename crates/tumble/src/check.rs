@@ -4,7 +4,7 @@ use crate::args::CheckOptions;
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{Shape, TreeSettings};
-use tumble::scene::{read_triangles, resolve_scene};
+use tumble::scene::{read_triangles, resolve_scene, urdf};
 
 /// Checks every file; all are looked at, and the first failure's code is kept.
 pub fn check(options: &CheckOptions) -> Result<(), Failure> {
@@ -24,7 +24,18 @@ pub fn check(options: &CheckOptions) -> Result<(), Failure> {
 
 fn one(file: &str) -> Result<String, Failure> {
     let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    if extension == "obj" || extension == "stl" { mesh(Path::new(file)) } else { scene(file) }
+    match extension.as_str() {
+        "obj" | "stl" => mesh(Path::new(file)),
+        "urdf" => robot(Path::new(file)),
+        _ => scene(file),
+    }
+}
+
+fn robot(path: &Path) -> Result<String, Failure> {
+    let (body, notes) = urdf::load(path, &urdf::UrdfOptions::default())?;
+    notes.iter().for_each(|note| println!("{note}"));
+    let (links, model) = (body.model().frames().len(), body.model());
+    Ok(format!("a robot of {links} links, {} degrees of freedom on a fixed base, {:.6} kg that move", model.dof(), model.mass()))
 }
 
 fn scene(name: &str) -> Result<String, Failure> {

@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use tumble::scene::SceneError;
+use tumble::scene::urdf::UrdfError;
 
 /// Why the command stopped.
 pub enum Failure {
@@ -40,6 +41,12 @@ impl Failure {
 
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Failure {
+        Failure::Input(error.report(std::io::stderr().is_terminal()))
+    }
+}
+
+impl From<UrdfError> for Failure {
+    fn from(error: UrdfError) -> Failure {
         Failure::Input(error.report(std::io::stderr().is_terminal()))
     }
 }

@@ -11,7 +11,9 @@ pub fn in_turns(rounds: usize, calls: &mut [&mut dyn FnMut(usize)]) -> Vec<f64> 
     for round in 0..rounds + rounds / 10 {
         for (call, times) in calls.iter_mut().zip(&mut times) {
             let start = Instant::now();
-            (0..CALLS).for_each(|k| call(k));
+            for k in 0..CALLS {
+                call(k);
+            }
             let elapsed = start.elapsed().as_secs_f64() * 1e6 / CALLS as f64;
             // The first rounds warm up.
             if round >= rounds / 10 {

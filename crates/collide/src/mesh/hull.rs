@@ -21,6 +21,9 @@ const CELLS: f64 = 1_048_576.0;
 
 type Point = [i64; 3];
 
+/// An edge of a patch's rim: from and to which point, the face beyond it, and the number of the edge there.
+type RimEdge = (u32, u32, usize, usize);
+
 /// A triangle of the hull as it grows.
 struct Face {
     corners: [u32; 3],
@@ -131,8 +134,8 @@ impl<'p> Hull<'p> {
         self.share(left, first);
     }
 
-    /// The faces that see `apex`, and their rim: edges `from → to`, each with the face beyond it and the number of the edge there.
-    fn patch(&self, face: usize, apex: u32) -> (Vec<usize>, Vec<(u32, u32, usize, usize)>) {
+    /// The faces that see `apex`, and their rim.
+    fn patch(&self, face: usize, apex: u32) -> (Vec<usize>, Vec<RimEdge>) {
         let mut patch = vec![face];
         let mut inside: BTreeMap<usize, bool> = BTreeMap::from([(face, true)]);
         let mut rim = Vec::new();

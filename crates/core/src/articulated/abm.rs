@@ -28,9 +28,22 @@
 use super::compiled::{Body, Compiled, Kind};
 use super::factor::{Factor, rows_times, rows_transposed_times};
 use crate::spatial::{ArticulatedInertia, Force, Inertia, Matrix, Motion, Scalar, Symmetric, Vector};
+use tumble_collide::Vec3;
 
 /// A joint's `D` must be above this part of its inertia's size (the trace of `J` or `M`), or the joint counts as singular.
 pub(super) const SINGULAR: f64 = 1e-12;
+
+/// Where a sweep reads its state and forces. A trait and not closures, so that all of it is compiled for the instructions of the sweep.
+pub(super) trait Input<T> {
+    /// Sine and cosine of the hinge of a link, whose angle is position number `q`.
+    fn turn(&self, link: usize, q: usize) -> (T, T);
+    /// A position number.
+    fn q(&self, k: usize) -> T;
+    /// A velocity number.
+    fn v(&self, k: usize) -> T;
+    /// A joint force.
+    fn tau(&self, k: usize) -> T;
+}
 
 /// What the sweeps know of a link.
 #[derive(Clone, Copy, Debug)]
@@ -108,7 +121,7 @@ impl<T: Scalar> Sweep<T> {
 
     /// Places every link and sets its rigid inertia and bias. `WHOLE` also writes positions and velocities of the origins.
     #[inline(always)]
-    pub fn place<const WHOLE: bool>(&mut self, compiled: &Compiled, q: impl Fn(usize) -> T + Copy, v: impl Fn(usize) -> T + Copy) {
+    pub fn place<const WHOLE: bool>(&mut self, compiled: &Compiled, state: &impl Input<T>) {
         for (i, body) in compiled.bodies.iter().enumerate() {
             let parent = &self.slots[body.parent];
             let turned = parent.rotation.times_constant(&body.turned);
@@ -120,24 +133,24 @@ impl<T: Scalar> Sweep<T> {
             let mut slide = turn;
             let rotation = match body.kind {
                 Kind::Revolute => {
-                    turn = turned.z * v(body.v);
-                    turn_about_z(&turned, q(body.q))
+                    turn = turned.z * state.v(body.v);
+                    turn_about_z(&turned, state.turn(i, body.q))
                 }
                 Kind::Prismatic => {
-                    arm += turned.z * q(body.q);
-                    slide = turned.z * v(body.v);
+                    arm += turned.z * state.q(body.q);
+                    slide = turned.z * state.v(body.v);
                     turned
                 }
                 Kind::Spherical(_) => {
-                    let rotation = turned * quaternion_matrix([q(body.q), q(body.q + 1), q(body.q + 2), q(body.q + 3)]);
-                    turn = rotation * three(v, body.v);
+                    let rotation = turned * quaternion_matrix(four(state, body.q));
+                    turn = rotation * three(|k| state.v(k), body.v);
                     rotation
                 }
                 Kind::Floating(_) => {
-                    arm = three(q, body.q);
-                    turn = three(v, body.v);
-                    slide = three(v, body.v + 3);
-                    quaternion_matrix([q(body.q + 3), q(body.q + 4), q(body.q + 5), q(body.q + 6)])
+                    arm = three(|k| state.q(k), body.q);
+                    turn = three(|k| state.v(k), body.v);
+                    slide = three(|k| state.v(k), body.v + 3);
+                    quaternion_matrix(four(state, body.q + 3))
                 }
             };
             let angular = outer + turn;
@@ -200,15 +213,28 @@ impl<T: Scalar> Sweep<T> {
 
     /// The inward step of forces at one link: what is left in `bias` goes to the parent's.
     #[inline(always)]
-    pub fn push_link(&mut self, i: usize, body: &Body, tau: impl Fn(usize) -> T + Copy) {
+    pub fn push_link(&mut self, i: usize, body: &Body, state: &impl Input<T>) {
         let slot = &mut self.slots[i];
         let mut effort = slot.effort;
-        let passed = push(body, slot, &self.blocks, slot.bias, tau, &mut effort);
+        let passed = push(body, slot, &self.blocks, slot.bias, |k| state.tau(k), &mut effort);
         slot.effort = effort;
         let arm = slot.arm;
         if body.parent != 0 {
             self.slots[body.parent].bias += passed.from_arm(arm);
         }
+    }
+
+    /// The whole method in uniform gravity: place, fold, push, spread.
+    #[inline(always)]
+    pub fn run(&mut self, compiled: &Compiled, gravity: &Vec3, state: &impl Input<T>, out: impl FnMut(usize, T)) {
+        self.place::<false>(compiled, state);
+        for (i, body) in compiled.bodies.iter().enumerate().rev() {
+            self.fold_link(i + 1, body);
+            self.push_link(i + 1, body, state);
+        }
+        let zero = self.slots[0].pivot;
+        self.slots[0].acceleration = Motion::new(Vector::splat(zero), Vector::constant(zero, &(-gravity).into()));
+        self.spread(compiled, out);
     }
 
     /// The outward sweep of accelerations, from the world's `Â`. Writes `q̈` to `out`.
@@ -344,10 +370,9 @@ fn floating_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut Block
     block.second = Factor::new(&rest, inertia.rotational.trace() * SINGULAR);
 }
 
-/// `A·Rz(angle)`.
+/// `A·Rz` of an angle by its sine and cosine.
 #[inline(always)]
-fn turn_about_z<T: Scalar>(a: &Matrix<T>, angle: T) -> Matrix<T> {
-    let (sin, cos) = angle.sin_cos();
+fn turn_about_z<T: Scalar>(a: &Matrix<T>, (sin, cos): (T, T)) -> Matrix<T> {
     Matrix { x: a.x * cos + a.y * sin, y: a.y * cos - a.x * sin, z: a.z }
 }
 
@@ -365,6 +390,12 @@ fn quaternion_matrix<T: Scalar>([x, y, z, w]: [T; 4]) -> Matrix<T> {
         y: Vector::new(xy - wz, one - (xx + zz), yz + wx),
         z: Vector::new(xz + wy, yz - wx, one - (xx + yy)),
     }
+}
+
+/// Four position numbers from `k` on.
+#[inline(always)]
+fn four<T>(state: &impl Input<T>, k: usize) -> [T; 4] {
+    [state.q(k), state.q(k + 1), state.q(k + 2), state.q(k + 3)]
 }
 
 /// Three numbers from `k` on.

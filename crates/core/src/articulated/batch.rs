@@ -3,32 +3,26 @@
 //! A lane's bits are those of [`forward_dynamics`](super::forward_dynamics) on that state alone, on every processor: what differs is how many lanes
 //! one instruction moves.
 
-use super::abm::{Sweep, three};
+use super::abm::{Input, Sweep};
 use super::compiled::Compiled;
 use super::lanes::{Lanes, Register};
 #[cfg(target_arch = "x86_64")]
 use super::lanes::{Eight, Four};
 use super::model::Model;
-use crate::spatial::{Motion, Scalar, Vector};
 use tumble_collide::Vec3;
 
-/// A model made ready for `N` states at a time. Fastest where `N` fills a register: 4 with AVX2, 8 with AVX-512, found out when it is made.
+/// A model made ready for `N` states at a time. Fast where `N` fills registers: a multiple of 8 on processors with AVX-512, of 4 on those with AVX2.
+/// All others are moved one by one.
 #[derive(Clone, Debug)]
 pub struct BatchDynamics<const N: usize> {
     compiled: Compiled,
-    way: Way<N>,
+    way: Way,
 }
 
-/// The instructions used.
+/// The registers used, with the proof that the processor has them.
 #[derive(Clone, Debug)]
-enum Way<const N: usize> {
-    /// One lane.
+enum Way {
     One(Sweep<f64>),
-    /// What every processor has.
-    Plain(Sweep<Lanes<N>>),
-    /// Plain numbers, AVX2 where the compiler finds a use for it.
-    #[cfg(target_arch = "x86_64")]
-    Compiler(pulp::x86::V3, Sweep<Lanes<N>>),
     #[cfg(target_arch = "x86_64")]
     Four(pulp::x86::V3, Sweep<Four>),
     #[cfg(target_arch = "x86_64")]
@@ -39,13 +33,13 @@ impl<const N: usize> BatchDynamics<N> {
     /// Makes a model ready; all allocation happens here.
     pub fn new(model: &Model) -> BatchDynamics<N> {
         let compiled = Compiled::new(model);
-        BatchDynamics { way: Way::best(&compiled), compiled }
+        BatchDynamics { way: Way::best(&compiled, N), compiled }
     }
 
-    /// The same without instructions that some processors lack: slower, the same bits.
+    /// The same one by one, as on a processor without SIMD: slower, the same bits.
     pub fn plain(model: &Model) -> BatchDynamics<N> {
         let compiled = Compiled::new(model);
-        BatchDynamics { way: Way::Plain(Sweep::new(&compiled, Lanes::default())), compiled }
+        BatchDynamics { way: Way::One(Sweep::new(&compiled, 0.0)), compiled }
     }
 
     /// `q̈` of every lane from its `q`, `v` and joint forces `tau` (lengths `positions` and `dof` of the model, one state per lane), in uniform gravity,
@@ -54,9 +48,6 @@ impl<const N: usize> BatchDynamics<N> {
         let call = Call { compiled: &self.compiled, gravity, q, v, tau, qdd };
         match &mut self.way {
             Way::One(sweep) => call.run((), sweep),
-            Way::Plain(sweep) => call.run((), sweep),
-            #[cfg(target_arch = "x86_64")]
-            Way::Compiler(token, sweep) => token.vectorize(Within { call, token: (), sweep }),
             #[cfg(target_arch = "x86_64")]
             Way::Four(token, sweep) => token.vectorize(Within { call, token: *token, sweep }),
             #[cfg(target_arch = "x86_64")]
@@ -65,24 +56,19 @@ impl<const N: usize> BatchDynamics<N> {
     }
 }
 
-impl<const N: usize> Way<N> {
-    fn best(compiled: &Compiled) -> Way<N> {
-        if N == 1 {
-            return Way::One(Sweep::new(compiled, 0.0));
-        }
+impl Way {
+    fn best(compiled: &Compiled, lanes: usize) -> Way {
         #[cfg(target_arch = "x86_64")]
         {
-            if let (8, Some(token)) = (N, pulp::x86::V4::try_new()) {
-                return Way::Eight(token, Sweep::new(compiled, Eight::load(token, &[0.0; 8])));
+            if let (0, Some(token)) = (lanes % Eight::LANES, pulp::x86::V4::try_new()) {
+                return Way::Eight(token, Sweep::new(compiled, Eight::load(token, &[0.0; Eight::LANES])));
             }
-            if let (4, Some(token)) = (N, pulp::x86::V3::try_new()) {
-                return Way::Four(token, Sweep::new(compiled, Four::load(token, &[0.0; 4])));
-            }
-            if let Some(token) = pulp::x86::V3::try_new() {
-                return Way::Compiler(token, Sweep::new(compiled, Lanes::default()));
+            if let (0, Some(token)) = (lanes % Four::LANES, pulp::x86::V3::try_new()) {
+                return Way::Four(token, Sweep::new(compiled, Four::load(token, &[0.0; Four::LANES])));
             }
         }
-        Way::Plain(Sweep::new(compiled, Lanes::default()))
+        let _ = lanes;
+        Way::One(Sweep::new(compiled, 0.0))
     }
 }
 
@@ -97,11 +83,41 @@ struct Call<'a, const N: usize> {
 }
 
 impl<const N: usize> Call<'_, N> {
+    /// A register of lanes after the other.
     #[inline(always)]
     fn run<T: Register>(self, token: T::Token, sweep: &mut Sweep<T>) {
         let Call { compiled, gravity, q, v, tau, qdd } = self;
-        let (q, v, tau) = (|k: usize| T::load(token, &q[k].0), |k: usize| T::load(token, &v[k].0), |k: usize| T::load(token, &tau[k].0));
-        run(compiled, sweep, gravity, q, v, tau, |k, x| x.store(&mut qdd[k].0));
+        for first in (0..N).step_by(T::LANES) {
+            sweep.run(compiled, gravity, &Rows::<T, N> { token, first, q, v, tau }, |k, x| x.store(&mut qdd[k].0[first..]));
+        }
+    }
+}
+
+/// States side by side, as a sweep reads them: a register of lanes from the first on.
+struct Rows<'a, T: Register, const N: usize> {
+    token: T::Token,
+    first: usize,
+    q: &'a [Lanes<N>],
+    v: &'a [Lanes<N>],
+    tau: &'a [Lanes<N>],
+}
+
+impl<T: Register, const N: usize> Input<T> for Rows<'_, T, N> {
+    #[inline(always)]
+    fn turn(&self, _: usize, q: usize) -> (T, T) {
+        self.q(q).sin_cos()
+    }
+    #[inline(always)]
+    fn q(&self, k: usize) -> T {
+        T::load(self.token, &self.q[k].0[self.first..])
+    }
+    #[inline(always)]
+    fn v(&self, k: usize) -> T {
+        T::load(self.token, &self.v[k].0[self.first..])
+    }
+    #[inline(always)]
+    fn tau(&self, k: usize) -> T {
+        T::load(self.token, &self.tau[k].0[self.first..])
     }
 }
 
@@ -120,25 +136,4 @@ impl<T: Register, const N: usize> pulp::NullaryFnOnce for Within<'_, T, N> {
     fn call(self) {
         self.call.run(self.token, self.sweep);
     }
-}
-
-/// The whole method: place, fold, push, spread.
-#[inline(always)]
-pub(super) fn run<T: Scalar>(
-    compiled: &Compiled,
-    sweep: &mut Sweep<T>,
-    gravity: &Vec3,
-    q: impl Fn(usize) -> T + Copy,
-    v: impl Fn(usize) -> T + Copy,
-    tau: impl Fn(usize) -> T + Copy,
-    out: impl FnMut(usize, T),
-) {
-    sweep.place::<false>(compiled, q, v);
-    for (i, body) in compiled.bodies.iter().enumerate().rev() {
-        sweep.fold_link(i + 1, body);
-        sweep.push_link(i + 1, body, tau);
-    }
-    let zero = sweep.slots[0].pivot;
-    sweep.slots[0].acceleration = Motion::new(Vector::splat(zero), three(|k| zero.constant(-gravity[k]), 0));
-    sweep.spread(compiled, out);
 }

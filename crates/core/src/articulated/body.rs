@@ -96,6 +96,20 @@ pub(super) struct Part {
 }
 
 /// A tree of links that moves as one object. See the module for its state.
+///
+/// ```
+/// # use tumble_core::{ArticulatedBody, Collider, Freedom, Joint, LinkMass, ModelBuilder, Settings, World, collide::{Mat3, Pose, Shape, Vec3}};
+/// # let mut world = World::new(Settings::default())?;
+/// # let rod = LinkMass { mass: 1.0, center: Vec3::new(0.0, 0.0, -0.5), inertia: Mat3::identity() };
+/// let mut builder = ModelBuilder::new();
+/// let upper = builder.link("upper", None, Joint::revolute(Vec3::y()), Pose::identity(), rod);
+/// builder.link("lower", Some(upper), Joint::revolute(Vec3::y()), Pose::translation(0.0, 0.0, -1.0), rod);
+/// let mut arm = ArticulatedBody::new("arm", builder.build()?).at(Pose::translation(0.0, 0.0, 2.0));
+/// arm.add_collider("lower", Collider::new(Shape::capsule(0.05, 0.4)?, Pose::translation(0.0, 0.0, -0.5)))?;
+/// arm.set_freedom(0, Freedom { limits: Some([-1.0, 1.0]), ..Freedom::default() })?;
+/// world.add(arm)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct ArticulatedBody {
     pub(super) name: String,
     pub(super) model: Model,

@@ -1,10 +1,10 @@
 //! Forward dynamics of one model at one state: the sweeps of [`abm`](super::abm) in `f64`, kept so that many questions are answered at the state last
 //! refreshed.
 
-use super::abm::{Slot, Sweep, push, spread, three, write_three};
-use super::batch::run;
+use super::abm::{Input, Slot, Sweep, push, spread, three, write_three};
 use super::compiled::{Body, Compiled, Kind};
 use super::model::Model;
+use super::sines::Sines;
 use crate::site::Wrench;
 use crate::spatial::{Force, Motion, Vector};
 use nalgebra::{Rotation3, UnitQuaternion};
@@ -12,10 +12,30 @@ use tumble_collide::{Mat3, Pose, Vec3};
 
 /// A model, and everything of it that is a function of `q` and `v`: poses, velocities, bias forces, articulated inertias and their factors.
 /// Before the first [`refresh`](Self::refresh) its answers mean nothing.
+///
+/// ```
+/// use tumble_core::{Joint, LinkMass, ModelBuilder, articulated::Dynamics, collide::{Pose, Vec3}};
+/// let mut builder = ModelBuilder::new();
+/// builder.link("bob", None, Joint::revolute(Vec3::y()), Pose::identity(), LinkMass::point(2.0, Vec3::new(0.0, 0.0, -0.5)));
+/// let model = builder.build()?;
+/// let mut dynamics = Dynamics::new(&model);
+/// dynamics.refresh(&[0.3], &[0.0]);
+/// // A pendulum of length 0.5 m: q̈ = −g/l·sin q.
+/// let mut qdd = [0.0];
+/// dynamics.accelerate_in(&mut dynamics.scratch(), &Vec3::new(0.0, 0.0, -9.81), &[0.0], &[], &mut qdd);
+/// assert!((qdd[0] + 9.81 / 0.5 * f64::sin(0.3)).abs() < 1e-12);
+/// // What an impulse of 1 N·s along x at the bob does, squared: 1/m of the point along its circle.
+/// let mut y = [0.0];
+/// let arm = dynamics.link_pose(0).rotation * Vec3::new(0.0, 0.0, -0.5);
+/// dynamics.point_response(0, &arm, &[Vec3::x()], 1.0, &mut y);
+/// assert!((y[0] * y[0] - f64::cos(0.3).powi(2) / 2.0).abs() < 1e-12);
+/// # Ok::<(), tumble_core::ModelError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     pub(super) compiled: Compiled,
     pub(super) sweep: Sweep<f64>,
+    sines: Sines,
     /// `√D` and `1/√D` (or 0) of each hinge and slider, by slot.
     pub(super) roots: Vec<[f64; 2]>,
     singular: Option<usize>,
@@ -34,7 +54,7 @@ impl Dynamics {
     pub fn new(model: &Model) -> Dynamics {
         let compiled = Compiled::new(model);
         let sweep = Sweep::new(&compiled, 0.0);
-        Dynamics { roots: vec![[0.0; 2]; compiled.bodies.len() + 1], compiled, sweep, singular: None }
+        Dynamics { roots: vec![[0.0; 2]; compiled.bodies.len() + 1], sines: Sines::new(&compiled), compiled, sweep, singular: None }
     }
 
     /// Moving links.
@@ -60,7 +80,8 @@ impl Dynamics {
 
     /// Takes a new state. Quaternions in `q` may have any length above 0.
     pub fn refresh(&mut self, q: &[f64], v: &[f64]) {
-        self.sweep.place::<true>(&self.compiled, |k| q[k], |k| v[k]);
+        let turns = self.sines.take(q);
+        self.sweep.place::<true>(&self.compiled, &Alone { turns, q, v, tau: &[] });
         self.sweep.fold(&self.compiled);
         self.singular = None;
         for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
@@ -175,8 +196,36 @@ fn carried(body: &Body, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> Motion {
 /// Forward dynamics in one go: `q̈` from `q`, `v` and joint forces `tau` in uniform gravity. Leaves `d` fit for another call of this alone: its maps need
 /// a [`Dynamics::refresh`] first.
 pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
-    let Dynamics { compiled, sweep, .. } = d;
-    run(compiled, sweep, gravity, |k| q[k], |k| v[k], |k| tau[k], |k, x| qdd[k] = x);
+    let Dynamics { compiled, sweep, sines, .. } = d;
+    let turns = sines.take(q);
+    sweep.run(compiled, gravity, &Alone { turns, q, v, tau }, |k, x| qdd[k] = x);
+}
+
+/// One state, as a sweep reads it.
+struct Alone<'a> {
+    turns: &'a [(f64, f64)],
+    q: &'a [f64],
+    v: &'a [f64],
+    tau: &'a [f64],
+}
+
+impl Input<f64> for Alone<'_> {
+    #[inline(always)]
+    fn turn(&self, link: usize, _: usize) -> (f64, f64) {
+        self.turns[link]
+    }
+    #[inline(always)]
+    fn q(&self, k: usize) -> f64 {
+        self.q[k]
+    }
+    #[inline(always)]
+    fn v(&self, k: usize) -> f64 {
+        self.v[k]
+    }
+    #[inline(always)]
+    fn tau(&self, k: usize) -> f64 {
+        self.tau[k]
+    }
 }
 
 /// Three numbers of a slice from `k` on.

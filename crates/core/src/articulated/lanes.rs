@@ -1,12 +1,12 @@
-//! Several `f64` side by side: as plain numbers that every processor has, and in the SIMD registers of those that have them. All round alike, lane by
-//! lane: one product or sum, one rounding. The registers come from the crate `pulp`: its tokens prove that the processor was asked.
+//! Several `f64` side by side in the SIMD registers of the processors that have them. All round as `f64` does, lane by lane: one product or sum, one
+//! rounding. The registers come from the crate `pulp`: its tokens prove that the processor was asked.
 
 use crate::spatial::Scalar;
+#[cfg(target_arch = "x86_64")]
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// `N` numbers, one per state of a batch.
+/// `N` numbers, one per state of a batch: how a batch takes its input and gives its output.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(align(32))]
 pub struct Lanes<const N: usize>(pub [f64; N]);
 
 impl<const N: usize> Default for Lanes<N> {
@@ -15,15 +15,10 @@ impl<const N: usize> Default for Lanes<N> {
     }
 }
 
-impl<const N: usize> Lanes<N> {
-    #[inline(always)]
-    fn with(self, b: Lanes<N>, f: impl Fn(f64, f64) -> f64) -> Lanes<N> {
-        Lanes(std::array::from_fn(|k| f(self.0[k], b.0[k])))
-    }
-}
-
 /// A [`Scalar`] that is filled from a state per lane.
 pub(super) trait Register: Scalar {
+    /// How many.
+    const LANES: usize;
     /// Proof that the processor has the instructions.
     type Token: Copy;
     /// The first numbers of a slice, one per lane.
@@ -33,6 +28,7 @@ pub(super) trait Register: Scalar {
 }
 
 impl Register for f64 {
+    const LANES: usize = 1;
     type Token = ();
     #[inline(always)]
     fn load(_: (), x: &[f64]) -> f64 {
@@ -41,95 +37,6 @@ impl Register for f64 {
     #[inline(always)]
     fn store(self, out: &mut [f64]) {
         out[0] = self;
-    }
-}
-
-impl<const N: usize> Register for Lanes<N> {
-    type Token = ();
-    #[inline(always)]
-    fn load(_: (), x: &[f64]) -> Lanes<N> {
-        Lanes(std::array::from_fn(|k| x[k]))
-    }
-    #[inline(always)]
-    fn store(self, out: &mut [f64]) {
-        out.copy_from_slice(&self.0);
-    }
-}
-
-impl<const N: usize> Scalar for Lanes<N> {
-    #[inline(always)]
-    fn constant(self, value: f64) -> Lanes<N> {
-        Lanes([value; N])
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Lanes<N> {
-        Lanes(self.0.map(f64::sqrt))
-    }
-
-    #[inline(always)]
-    fn reciprocal_above(self, least: Lanes<N>) -> Lanes<N> {
-        self.with(least, Scalar::reciprocal_above)
-    }
-
-    #[inline(always)]
-    fn sin_cos_beyond(self, far: f64, near: (Lanes<N>, Lanes<N>)) -> (Lanes<N>, Lanes<N>) {
-        let each: [(f64, f64); N] = std::array::from_fn(|k| self.0[k].sin_cos_beyond(far, (near.0.0[k], near.1.0[k])));
-        (Lanes(each.map(|s| s.0)), Lanes(each.map(|s| s.1)))
-    }
-}
-
-impl<const N: usize> Add for Lanes<N> {
-    type Output = Lanes<N>;
-    #[inline(always)]
-    fn add(self, b: Lanes<N>) -> Lanes<N> {
-        self.with(b, |a, b| a + b)
-    }
-}
-
-impl<const N: usize> Sub for Lanes<N> {
-    type Output = Lanes<N>;
-    #[inline(always)]
-    fn sub(self, b: Lanes<N>) -> Lanes<N> {
-        self.with(b, |a, b| a - b)
-    }
-}
-
-impl<const N: usize> Mul for Lanes<N> {
-    type Output = Lanes<N>;
-    #[inline(always)]
-    fn mul(self, b: Lanes<N>) -> Lanes<N> {
-        self.with(b, |a, b| a * b)
-    }
-}
-
-impl<const N: usize> Mul<f64> for Lanes<N> {
-    type Output = Lanes<N>;
-    #[inline(always)]
-    fn mul(self, b: f64) -> Lanes<N> {
-        Lanes(self.0.map(|a| a * b))
-    }
-}
-
-impl<const N: usize> Neg for Lanes<N> {
-    type Output = Lanes<N>;
-    #[inline(always)]
-    fn neg(self) -> Lanes<N> {
-        Lanes(self.0.map(|a| -a))
-    }
-}
-
-impl<const N: usize> AddAssign for Lanes<N> {
-    #[inline(always)]
-    fn add_assign(&mut self, b: Lanes<N>) {
-        *self = *self + b;
-    }
-}
-
-impl<const N: usize> SubAssign for Lanes<N> {
-    #[inline(always)]
-    fn sub_assign(&mut self, b: Lanes<N>) {
-        *self = *self - b;
     }
 }
 
@@ -147,6 +54,7 @@ macro_rules! register {
         }
 
         impl Register for $name {
+            const LANES: usize = $lanes;
             type Token = $token;
             #[inline(always)]
             fn load(token: $token, x: &[f64]) -> $name {
@@ -155,7 +63,7 @@ macro_rules! register {
             }
             #[inline(always)]
             fn store(self, out: &mut [f64]) {
-                out.copy_from_slice(&self.lanes());
+                out[..$lanes].copy_from_slice(&self.lanes());
             }
         }
 

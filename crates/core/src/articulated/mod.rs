@@ -20,6 +20,7 @@ mod model;
 mod object;
 mod playback;
 mod rnea;
+mod sines;
 mod whiten;
 
 pub use batch::BatchDynamics;

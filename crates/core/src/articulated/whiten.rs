@@ -109,7 +109,7 @@ impl Dynamics {
                 Kind::Spherical(block) => {
                     let Block { first, w, .. } = &self.sweep.blocks[block];
                     let own = at(u, body.v);
-                    p = p + Force::new(first.lower_times(own), rows_transposed_times(w, first.divide_root(own)));
+                    p += Force::new(first.lower_times(own), rows_transposed_times(w, first.divide_root(own)));
                     put(j, body.v, slot.rotation.transposed_times(p.torque));
                 }
                 Kind::Floating(block) => {

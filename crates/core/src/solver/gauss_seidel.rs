@@ -18,9 +18,10 @@
 //! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. High mass ratios stay slow; the residual says how far.
 
 use super::linkage::{Linkages, Reach};
-use super::one_contact::Contact;
+use super::one_contact::{Contact, Symmetric};
+use super::six::Six;
 use super::{Accuracy, Outcome, RowSolver};
-use crate::rows::{Block, RowSet, Rows, Side, dot, dot6};
+use crate::rows::{Block, RowSet, Rows};
 
 /// Sweeps with extrapolation between them.
 const ACCELERATED: u32 = 200;
@@ -49,7 +50,7 @@ impl RowSolver for GaussSeidel {
         for sweep in 1..=sweeps {
             let mut progress = Progress::default();
             for local in &mut locals {
-                local.relax(rows, &linkages, du, &mut progress);
+                local.relax(momentum.beta, rows, &linkages, du, &mut progress);
             }
             if progress.change <= accuracy.tolerance {
                 outcome = Outcome { iterations: sweep, converged: true, ray: false };
@@ -57,10 +58,10 @@ impl RowSolver for GaussSeidel {
             }
             if sweep < sweeps {
                 let plain = sweep > ACCELERATED || sweep + SETTLE >= sweeps;
-                momentum.extrapolate(&mut locals, progress.against > 0.0 || plain, du);
+                momentum.extrapolate(progress.against > 0.0 || plain, du);
             }
             if sweep % RENEW == 0 {
-                momentum.renew(&mut locals, &linkages, rows, c, lambda, du);
+                momentum.renew(&locals, &linkages, rows, c, lambda, du);
             }
         }
         write_back(&locals, lambda);
@@ -92,8 +93,8 @@ fn write_back(locals: &[Local], lambda: &mut [f64]) {
 fn apply(locals: &[Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
     write_back(locals, lambda);
     for local in locals.iter().filter(|l| l.lambda != [0.0; 3]) {
-        match local.step {
-            Step::Contact(_) => local.block.sides().iter().for_each(|s| add_impulse(&rows.y, s, local.lambda, du)),
+        match (local.six, &local.step) {
+            (Some(six), Step::Contact(_)) => six.push(rows, local.lambda, du),
             _ => rows.apply_block(local.block, lambda, du),
         }
     }
@@ -109,6 +110,7 @@ struct Local<'a> {
     last: [f64; 3],
     step: Step,
     reach: Reach,
+    six: Option<Six>,
 }
 
 /// What a sweep did.
@@ -130,9 +132,11 @@ impl Progress {
     }
 }
 
-/// The extrapolation between sweeps, over the multipliers of the island and the stretches of `du` that they act on.
+/// The extrapolation between sweeps, over the stretches of `du` that the island acts on. Multipliers follow when it is their turn to be relaxed.
 struct Momentum {
     theta: f64,
+    /// `β` of the sweep to come.
+    beta: f64,
     /// First index and end of each stretch of `du`, one after the other; neighbours are joined.
     stretches: Vec<(u32, u32)>,
     /// `du` of the sweep before, of all stretches.
@@ -158,18 +162,14 @@ impl Momentum {
             joins
         });
         let last = stretches.iter().flat_map(|&(start, end)| &du[start as usize..end as usize]).copied().collect();
-        Momentum { theta: 1.0, stretches, last }
+        Momentum { theta: 1.0, beta: 0.0, stretches, last }
     }
 
-    fn extrapolate(&mut self, locals: &mut [Local], restart: bool, du: &mut [f64]) {
+    fn extrapolate(&mut self, restart: bool, du: &mut [f64]) {
         let next = 0.5 * (1.0 + (1.0 + 4.0 * self.theta * self.theta).sqrt());
-        let beta = if restart { 0.0 } else { (self.theta - 1.0) / next };
+        self.beta = if restart { 0.0 } else { (self.theta - 1.0) / next };
         self.theta = if restart { 1.0 } else { next };
-        for local in locals {
-            for (lambda, last) in local.lambda.iter_mut().zip(&mut local.last) {
-                go_on(lambda, last, beta);
-            }
-        }
+        let beta = self.beta;
         let mut rest = &mut self.last[..];
         for &(start, end) in &self.stretches {
             let (last, after) = rest.split_at_mut((end - start) as usize);
@@ -178,11 +178,11 @@ impl Momentum {
         }
     }
 
-    /// Makes `du` anew, and starts from rest.
-    fn renew(&mut self, locals: &mut [Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) {
+    /// Makes `du` anew from the multipliers, which are not extrapolated yet, and starts from rest.
+    fn renew(&mut self, locals: &[Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) {
         self.clear(du);
         apply(locals, linkages, rows, c, lambda, du);
-        self.extrapolate(locals, true, du);
+        self.extrapolate(true, du);
     }
 
     /// Zeroes `du` wherever the island acts.
@@ -218,17 +218,22 @@ struct Scalar {
 
 impl Step {
     fn new(rows: &Rows, linkages: &Linkages, block: &Block, reach: Reach) -> Step {
-        let diagonal = linkages.own(rows, block, reach, 0, 0);
-        let (compliance, k) = (block.compliance, diagonal + block.compliance);
-        let scalar = |lo, hi| Step::Scalar(Scalar { k, inverse: 1.0 / k, compliance, lo, hi });
-        match block.set {
-            _ if k <= f64::MIN_POSITIVE || rows.own(block, 0, 0) <= f64::MIN_POSITIVE => Step::Dead,
-            RowSet::Equality => scalar(f64::NEG_INFINITY, f64::INFINITY),
-            RowSet::HalfLine => scalar(0.0, f64::INFINITY),
-            RowSet::Interval { lo, hi } => scalar(lo, hi),
-            RowSet::Cone { mu } if reach.is_own() => Step::Contact(Contact::new(rows, block, mu)),
-            RowSet::Cone { mu } => Step::Contact(Contact::with_own(linkages.own_contact(rows, block, reach), mu)),
+        let (lo, hi) = match block.set {
+            RowSet::Cone { mu } => {
+                let k = if reach.is_own() { Symmetric::own(rows, block) } else { linkages.own_contact(rows, block, reach) };
+                return if k.m00 <= f64::MIN_POSITIVE { Step::Dead } else { Step::Contact(Contact::new(k, mu)) };
+            }
+            RowSet::Equality => (f64::NEG_INFINITY, f64::INFINITY),
+            RowSet::HalfLine => (0.0, f64::INFINITY),
+            RowSet::Interval { lo, hi } => (lo, hi),
+        };
+        let response = rows.own(block, 0, 0);
+        let moves = if reach.is_own() { response } else { linkages.own(rows, block, reach, 0, 0) };
+        let k = moves + block.compliance;
+        if response <= f64::MIN_POSITIVE || k <= f64::MIN_POSITIVE {
+            return Step::Dead;
         }
+        Step::Scalar(Scalar { k, inverse: 1.0 / k, compliance: block.compliance, lo, hi })
     }
 }
 
@@ -236,51 +241,87 @@ impl<'a> Local<'a> {
     fn new(rows: &Rows, linkages: &mut Linkages, block: &'a Block, c: &[f64], lambda: &[f64]) -> Local<'a> {
         let reach = linkages.lay(rows, block);
         let step = Step::new(rows, linkages, block, reach);
+        let six = if reach.is_own() { Six::of(block) } else { None };
         let numbers = |from: &[f64]| {
             let mut three = [0.0; 3];
             three[..block.set.rows()].copy_from_slice(&from[block.range()]);
             three
         };
         let start = if matches!(step, Step::Dead) { [0.0; 3] } else { numbers(lambda) };
-        Local { block, c: numbers(c), lambda: start, last: start, step, reach }
+        Local { block, c: numbers(c), lambda: start, last: start, step, reach, six }
     }
 
-    /// Solves this block with the others held.
-    #[inline]
-    fn relax(&mut self, rows: &Rows, linkages: &Linkages, du: &mut [f64], progress: &mut Progress) {
+    /// Extrapolates the multipliers of this block and solves it with the others held.
+    #[inline(always)]
+    fn relax(&mut self, beta: f64, rows: &Rows, linkages: &Linkages, du: &mut [f64], progress: &mut Progress) {
         match &self.step {
             Step::Dead => {}
-            Step::Scalar(Scalar { k, inverse, compliance, lo, hi }) => {
-                let w = self.c[0] + rows.row_velocity(self.block, 0, du) + compliance * self.lambda[0];
-                let next = clamp(self.lambda[0] - w * inverse, *lo, *hi);
-                let delta = next - self.lambda[0];
+            Step::Scalar(scalar) => {
+                go_on(&mut self.lambda[0], &mut self.last[0], beta);
+                let velocity = match self.six.and_then(|six| six.sides::<1>(rows, du)) {
+                    Some(sides) => sides.velocity(0),
+                    None => rows.row_velocity(self.block, 0, du),
+                };
+                let delta = scalar.change(self.lambda[0], self.c[0], velocity);
                 if delta != 0.0 {
+                    let next = clamp(self.lambda[0] + delta, scalar.lo, scalar.hi);
                     self.lambda[0] = next;
-                    let (sides, y) = linkages.moved(rows, self.block, self.reach);
-                    for side in sides {
-                        add_multiple(row(y, side, 0), delta, &mut du[side.u as usize..(side.u + side.dof) as usize]);
-                    }
                     progress.against -= delta * (next - self.last[0]);
-                    progress.note((delta * k).abs());
+                    progress.note((delta * scalar.k).abs());
+                    match self.six {
+                        Some(six) => six.push(rows, [delta], du),
+                        None => self.push(rows, linkages, &[delta], du),
+                    }
                 }
             }
             Step::Contact(contact) => {
-                let mut w = self.c;
-                self.block.sides().iter().for_each(|s| add_velocity(&rows.y, s, du, &mut w));
-                let next = contact.solve(self.lambda, w);
-                let delta = [next[0] - self.lambda[0], next[1] - self.lambda[1], next[2] - self.lambda[2]];
+                (0..3).for_each(|k| go_on(&mut self.lambda[k], &mut self.last[k], beta));
+                let w = match self.six.and_then(|six| six.sides::<3>(rows, du)) {
+                    Some(sides) => {
+                        let normal = self.c[0] + sides.velocity(0);
+                        if contact.stays_open(self.lambda, normal) {
+                            return;
+                        }
+                        [normal, self.c[1] + sides.velocity(1), self.c[2] + sides.velocity(2)]
+                    }
+                    None => [0, 1, 2].map(|k| self.c[k] + rows.row_velocity(self.block, k, du)),
+                };
+                let (next, delta) = contact.solve(self.lambda, w);
                 if delta != [0.0; 3] {
                     self.lambda = next;
-                    let (sides, y) = linkages.moved(rows, self.block, self.reach);
-                    sides.iter().for_each(|s| add_impulse(y, s, delta, du));
                     let last = &self.last;
                     progress.against -= delta[0] * (next[0] - last[0]) + delta[1] * (next[1] - last[1]) + delta[2] * (next[2] - last[2]);
                     progress.note((delta[0] * contact.k.m00).abs());
                     progress.note((delta[1] * contact.k.m11).abs());
                     progress.note((delta[2] * contact.k.m22).abs());
+                    match self.six {
+                        Some(six) => six.push(rows, delta, du),
+                        None => self.push(rows, linkages, &delta, du),
+                    }
                 }
             }
         }
+    }
+
+    /// `u += Ỹ·δ`.
+    fn push(&self, rows: &Rows, linkages: &Linkages, delta: &[f64], du: &mut [f64]) {
+        let (sides, y) = linkages.moved(rows, self.block, self.reach);
+        for side in sides {
+            let (u, dof) = (side.u as usize, side.dof as usize);
+            for (y, delta) in y[side.y as usize..].chunks_exact(dof).zip(delta) {
+                du[u..u + dof].iter_mut().zip(y).for_each(|(u, y)| *u += y * delta);
+            }
+        }
+    }
+}
+
+impl Scalar {
+    /// How the multiplier changes where it was `old` and the row velocity is `w = c + velocity + R·old`. Written so that what waits for
+    /// the velocity is short: rows of one body wait for each other.
+    #[inline(always)]
+    fn change(&self, old: f64, c: f64, velocity: f64) -> f64 {
+        let without = -(c + self.compliance * old) * self.inverse;
+        clamp(without - velocity * self.inverse, self.lo - old, self.hi - old)
     }
 }
 
@@ -289,54 +330,4 @@ impl<'a> Local<'a> {
 fn clamp(x: f64, lo: f64, hi: f64) -> f64 {
     let above = if x < lo { lo } else { x };
     if above > hi { hi } else { above }
-}
-
-/// The three rows of a side of six freedoms.
-#[inline(always)]
-fn six<'a>(y: &'a [f64], side: &Side) -> Option<[&'a [f64; 6]; 3]> {
-    let [normal, first, second, ..] = y[side.y as usize..].as_chunks::<6>().0 else { return None };
-    (side.dof == 6).then_some([normal, first, second])
-}
-
-/// Row `r` of a side whose responses are in `y`.
-#[inline(always)]
-fn row<'a>(y: &'a [f64], side: &Side, r: usize) -> &'a [f64] {
-    let (start, dof) = (side.y as usize + r * side.dof as usize, side.dof as usize);
-    &y[start..start + dof]
-}
-
-/// `w += Yᵀu` of one side of a contact.
-#[inline(always)]
-fn add_velocity(y: &[f64], side: &Side, u: &[f64], w: &mut [f64; 3]) {
-    let u = &u[side.u as usize..(side.u + side.dof) as usize];
-    if let (Some([y0, y1, y2]), Some(u)) = (six(y, side), u.as_array::<6>()) {
-        w[0] += dot6(y0, u);
-        w[1] += dot6(y1, u);
-        w[2] += dot6(y2, u);
-    } else {
-        w.iter_mut().enumerate().for_each(|(r, w)| *w += dot(row(y, side, r), u));
-    }
-}
-
-/// `u += Y·δ` of one side of a contact.
-#[inline(always)]
-fn add_impulse(y: &[f64], side: &Side, delta: [f64; 3], u: &mut [f64]) {
-    let u = &mut u[side.u as usize..(side.u + side.dof) as usize];
-    if let (Some([y0, y1, y2]), Some(u)) = (six(y, side), u.as_mut_array::<6>()) {
-        for k in 0..6 {
-            u[k] += y0[k] * delta[0] + y1[k] * delta[1] + y2[k] * delta[2];
-        }
-    } else {
-        (0..3).for_each(|r| add_multiple(row(y, side, r), delta[r], u));
-    }
-}
-
-/// `u += y·δ`.
-#[inline(always)]
-fn add_multiple(y: &[f64], delta: f64, u: &mut [f64]) {
-    if let (Some(y), Some(u)) = (y.as_array::<6>(), u.as_mut_array::<6>()) {
-        (0..6).for_each(|k| u[k] += y[k] * delta);
-    } else {
-        u.iter_mut().zip(y).for_each(|(u, y)| *u += y * delta);
-    }
 }

@@ -108,6 +108,9 @@ impl Linkages {
 
     /// Lays out `Ỹ` of a block of other rows.
     pub fn lay(&mut self, rows: &Rows, block: &Block) -> Reach {
+        if self.is_empty() {
+            return Reach::default();
+        }
         let met: Vec<Option<usize>> = block.sides().iter().map(|s| self.linkage_of(s)).collect();
         if met.iter().all(Option::is_none) {
             return Reach::default();
@@ -183,6 +186,9 @@ impl Linkages {
 
     /// `K̃_ij = Y_iᵀ·Ỹ_j` of a block's own rows.
     pub fn own(&self, rows: &Rows, block: &Block, reach: Reach, i: usize, j: usize) -> f64 {
+        if reach.is_own() {
+            return rows.own(block, i, j);
+        }
         let (sides, y) = self.moved(rows, block, reach);
         let part = |side: &Side| {
             let to = sides.iter().find(|s| s.u == side.u)?;

@@ -10,6 +10,7 @@ mod lemke;
 mod linkage;
 mod one_contact;
 mod residual;
+mod six;
 #[cfg(test)]
 mod tests;
 

@@ -11,7 +11,7 @@
 //! ground) that step diverges, and sliding is solved exactly: the direction is the root of `g(φ) = d × w_t` with `d·w_t > 0`, found by
 //! Newton's method on the angle `φ` of `d`. Both have the Coulomb solutions as their fixed points.
 
-use crate::rows::{Block, Rows, dot};
+use crate::rows::{Block, Rows, dot, dot6};
 
 /// Share of `k_nn` from which `μ·|k_nt|` makes the plain step too bold.
 const COUPLED: f64 = 0.5;
@@ -43,22 +43,8 @@ pub(super) struct Symmetric {
 }
 
 impl Contact {
-    pub fn new(rows: &Rows, block: &Block, mu: f64) -> Contact {
-        let mut k = Symmetric::default();
-        for side in block.sides() {
-            let [n, t1, t2] = [0, 1, 2].map(|r| rows.response(side, r));
-            k.m00 += dot(n, n);
-            k.m10 += dot(t1, n);
-            k.m20 += dot(t2, n);
-            k.m11 += dot(t1, t1);
-            k.m21 += dot(t2, t1);
-            k.m22 += dot(t2, t2);
-        }
-        Contact::with_own(k, mu)
-    }
-
     /// The contact whose own block of `K` is `k`.
-    pub fn with_own(k: Symmetric, mu: f64) -> Contact {
+    pub fn new(k: Symmetric, mu: f64) -> Contact {
         let mean = 0.5 * (k.m11 + k.m22);
         let half = 0.5 * (k.m11 - k.m22);
         let largest = mean + (half * half + k.m21 * k.m21).sqrt();
@@ -67,17 +53,25 @@ impl Contact {
         Contact { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho, coupled }
     }
 
-    /// The multipliers that answer row velocities `w` found with multipliers `old`: `b = w − K·old`.
-    #[inline]
-    pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+    /// Whether a contact without multipliers stays so at normal velocity `w_n`, whatever the tangents do: where `μ·|k_nt| ≤ k_nn/2`, sticking would
+    /// need `w_n ≤ −λ_n·k_nn/2`.
+    #[inline(always)]
+    pub fn stays_open(&self, old: [f64; 3], normal: f64) -> bool {
+        normal >= 0.0 && !self.coupled && old == [0.0; 3]
+    }
+
+    /// The multipliers that answer row velocities `w` found with multipliers `old`, and how they differ from those: `b = w − K·old`.
+    #[inline(always)]
+    pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> ([f64; 3], [f64; 3]) {
         if let Some(inverse) = &self.inverse {
-            let step = inverse.times(w);
-            let full = [old[0] - step[0], old[1] - step[1], old[2] - step[2]];
+            let delta = inverse.times(w).map(|x| -x);
+            let full = [old[0] + delta[0], old[1] + delta[1], old[2] + delta[2]];
             if full[0] >= 0.0 && full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) {
-                return full;
+                return (full, delta);
             }
         }
-        self.open_or_slide(old, w)
+        let next = self.open_or_slide(old, w);
+        (next, [next[0] - old[0], next[1] - old[1], next[2] - old[2]])
     }
 
     /// The answers without sticking: the rarer ones in a pile.
@@ -146,7 +140,31 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
 }
 
 impl Symmetric {
-    #[inline]
+    /// The own block of `K` of a block of three rows.
+    pub fn own(rows: &Rows, block: &Block) -> Symmetric {
+        let mut k = Symmetric::default();
+        for side in block.sides() {
+            let dof = side.dof as usize;
+            let y = &rows.y[side.y as usize..][..3 * dof];
+            match y.as_chunks::<6>().0 {
+                [n, t1, t2] if dof == 6 => k.add([n, t1, t2], dot6),
+                _ => k.add([&y[..dof], &y[dof..2 * dof], &y[2 * dof..]], dot),
+            }
+        }
+        k
+    }
+
+    #[inline(always)]
+    fn add<Y: Copy>(&mut self, [n, t1, t2]: [Y; 3], dot: impl Fn(Y, Y) -> f64) {
+        self.m00 += dot(n, n);
+        self.m10 += dot(t1, n);
+        self.m20 += dot(t2, n);
+        self.m11 += dot(t1, t1);
+        self.m21 += dot(t2, t1);
+        self.m22 += dot(t2, t2);
+    }
+
+    #[inline(always)]
     pub fn times(&self, v: [f64; 3]) -> [f64; 3] {
         [
             self.m00 * v[0] + self.m10 * v[1] + self.m20 * v[2],

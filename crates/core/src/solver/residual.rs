@@ -5,7 +5,7 @@
 //! The residual is `‖λ − Π(…)‖·d`, in m/s, with `d` the mean diagonal of the block of `K`; for the scalar sets the shift is
 //! absent and `Π` clamps; `w` of a soft row has its `R·λ`. Source: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008, ch. 13.
 
-use crate::rows::{Block, RowSet, Rows};
+use crate::rows::{Block, RowSet, Rows, dot};
 
 /// The largest residual of any block, m/s (m/s² where `c` holds accelerations). `du` must be `Y·λ` of all blocks.
 pub fn residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
@@ -14,12 +14,21 @@ pub fn residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f6
 
 fn block_residual(rows: &Rows, block: &Block, c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
     let n = block.set.rows();
-    let d = (0..n).map(|k| rows.own(block, k, k)).sum::<f64>() / n as f64;
+    let (mut velocity, mut diagonal) = ([0.0; 3], 0.0);
+    for side in block.sides() {
+        let u = &du[side.u as usize..(side.u + side.dof) as usize];
+        for (k, velocity) in velocity.iter_mut().enumerate().take(n) {
+            let y = rows.response(side, k);
+            *velocity += dot(y, u);
+            diagonal += dot(y, y);
+        }
+    }
+    let d = diagonal / n as f64;
     if d <= f64::MIN_POSITIVE {
         return 0.0;
     }
     let first = block.row as usize;
-    let w = |k: usize| c[first + k] + rows.row_velocity(block, k, du) + block.compliance * lambda[first + k];
+    let w = |k: usize| c[first + k] + velocity[k] + block.compliance * lambda[first + k];
     match block.set {
         RowSet::Equality => w(0).abs(),
         RowSet::HalfLine => scalar(lambda[first], w(0), d, 0.0, f64::INFINITY),

@@ -10,6 +10,17 @@
 //!
 //! Motion and force are different spaces: the one product between them is [`Motion::power`], W. Angular parts come first.
 //!
+//! ```
+//! use tumble_core::spatial::{Force, Motion, Vector};
+//! let turning = Motion::new(Vector::new(0.0, 0.0, 2.0), Vector::default());
+//! let pushed = Force::new(Vector::default(), Vector::new(0.0, 3.0, 0.0)).from_arm(Vector::new(0.5, 0.0, 0.0));
+//! assert_eq!(turning.power(pushed), 3.0);
+//! ```
+//! ```compile_fail,E0308
+//! # use tumble_core::spatial::Motion;
+//! Motion::<f64>::default().power(Motion::default());
+//! ```
+//!
 //! All is generic over a [`Scalar`]: `f64`, or several `f64` side by side, so that one code moves one world or many.
 
 mod articulated;

@@ -23,14 +23,18 @@ use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, DIRECT_ROWS, GaussSeidel, RowSolver};
 use crate::view::Entry;
 use crate::world::{Core, StepError};
+use std::ops::Range;
 
 /// Rounds at most.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 16;
 /// Rounds where some joints are too many for a direct solve, so that a long rope costs what its sweeps cost.
 const FEW_ROUNDS: usize = 2;
+/// Sweeps of a round there.
 const SWEEPS: u32 = 25;
+/// No velocity is closed further than this, m/s, whatever the solver's tolerance.
+const FINEST: f64 = 1e-12;
 /// A round that leaves more of the error than this is the last of its kind.
-const SLOW: f64 = 0.5;
+const SLOW: f64 = 0.2;
 /// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
 /// responds with the square of it, far less, and is left alone; as the error goes so does the compliance (Levenberg and Marquardt).
 const SOFT: (f64, f64) = (10.0, 1e-3);
@@ -51,7 +55,7 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
-    let outcome = onto(core, &mut rows, level, &errors).and_then(|_| lay_rows(core, &mut rows, level, None));
+    let outcome = onto(core, &mut rows, level, &errors);
     map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
     core.time = time;
     core.x = start;
@@ -61,13 +65,21 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     outcome.map(|_| (errors, rows))
 }
 
+/// What moves, in the order of its coordinates, in which it was added too.
+fn by_start(core: &Core) -> Vec<&Entry> {
+    core.table.iter().filter(|e| e.moves()).collect()
+}
+
+fn entry_at<'e>(entries: &[&'e Entry], u: u32) -> Option<&'e Entry> {
+    entries.binary_search_by_key(&(u as usize), |e| e.span.v.start).ok().map(|i| entries[i])
+}
+
 /// Replaces what every row holds of every side.
 fn map_sides(core: &Core, work: &mut Workspace, map: impl Fn(&dyn Integratable, &[f64], &mut [f64])) {
-    let starts: Vec<(usize, &Entry)> = core.table.iter().filter(|e| e.moves()).map(|e| (e.span.v.start, e)).collect();
+    let entries = by_start(core);
     let Rows { blocks, y, .. } = &mut work.rows;
     for side in blocks.iter().flat_map(|b| b.sides()) {
-        let found = starts.binary_search_by_key(&(side.u as usize), |(start, _)| *start);
-        if let Some(body) = found.ok().and_then(|i| starts[i].1.object.integratable()) {
+        if let Some(body) = entry_at(&entries, side.u).and_then(|e| e.object.integratable()) {
             let held = &mut y[side.y as usize..(side.y + side.dof) as usize];
             let before = held.to_vec();
             map(body, &before, held);
@@ -75,31 +87,31 @@ fn map_sides(core: &Core, work: &mut Workspace, map: impl Fn(&dyn Integratable, 
     }
 }
 
-/// Moves the present state to where the joints have the errors given.
+/// Moves the present state to where the joints have the errors given; `probe` has the rows there, sites and caches are those of it.
 fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) -> Result<(), StepError> {
     let least = 1e-2 * core.settings.contact_tolerance;
-    let mut best = (f64::INFINITY, Vec::new());
-    for round in 0..ROUNDS {
-        lay_rows(core, probe, level, None)?;
-        if probe.targets.len() != errors.len() {
-            return Ok(());
-        }
-        let off: Vec<f64> = probe.targets.iter().zip(errors).map(|(t, e)| if is_joint(t) { t.error - e } else { 0.0 }).collect();
-        if largest(&off) > best.0 {
-            core.x.clone_from(&best.1);
-            core.motion().refresh();
-            return Ok(());
-        }
-        best = (largest(&off), core.x.clone());
-        islands(probe);
-        if best.0 <= least || round >= rounds(probe) {
-            return Ok(());
-        }
-        soften(probe, best.0);
+    lay_rows(core, probe, level, None)?;
+    let mut pieces = Piece::all(core, probe);
+    let mut kept = core.x.clone();
+    while probe.targets.len() == errors.len() && pieces.iter().any(|p| !p.done) {
+        let off: Vec<f64> = probe.targets.iter().zip(errors).map(|(t, e)| t.error - e).collect();
         let mut dx = vec![0.0; core.dof];
-        probe.islands.iter().for_each(|blocks| solve(&probe.rows, blocks, &off, &mut dx, 0.1 * least));
+        for piece in pieces.iter_mut().filter(|p| !p.done) {
+            let worst = piece.largest(&off);
+            if worst > piece.left.0 {
+                piece.copy(&kept, &mut core.x); // it was better before
+            }
+            piece.done = worst > piece.left.0 || worst <= least || piece.rounds == 0;
+            (piece.left.0, piece.rounds) = (worst, piece.rounds.saturating_sub(1));
+            if !piece.done {
+                soften(&mut probe.rows, &piece.rows, worst);
+                solve(&probe.rows, &piece.rows, &off, &mut dx, 0.1 * least);
+            }
+        }
+        kept.clone_from(&core.x);
         displace(core, &dx, 1.0);
         core.motion().refresh();
+        lay_rows(core, probe, level, None)?;
     }
     Ok(())
 }
@@ -111,37 +123,96 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
         return Ok(());
     }
     let pushed = pushed(work);
-    islands(work);
-    let (mut probe, mut chord) = (Workspace::default(), true);
+    let mut pieces = Piece::all(core, work);
+    let mut probe = Workspace::default();
     let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
-    for _ in 0..rounds(work) {
-        if open.is_closed() {
+    pieces.iter_mut().for_each(|piece| piece.left = open.of(piece));
+    loop {
+        pieces.iter_mut().for_each(|piece| piece.done |= (piece.left.0 <= 1.0 && piece.left.1 <= 1.0) || piece.rounds == 0);
+        if pieces.iter().all(|p| p.done) {
             break;
         }
         let before = core.x.clone();
-        if chord {
-            refresh_at(core, start);
-            open.apply(core, work);
-        } else {
-            soften(&mut probe, largest(&open.place));
-            islands(&mut probe);
-            open.apply(core, &probe);
-        }
-        let next = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
-        let left = next.left_of(&open);
-        if left < 1.0 {
-            open = next;
-        } else {
-            core.x = before;
-            if !chord {
-                break;
+        open.newton(core, &mut probe, &pieces);
+        refresh_at(core, start);
+        open.chord(core, work, &pieces);
+        open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
+        let mut worse = false;
+        for piece in pieces.iter_mut().filter(|p| !p.done) {
+            let (left, was) = (open.of(piece), piece.left);
+            piece.rounds -= 1;
+            if was.0 > 1.0 && left.1 > was.1.max(1.0) && !piece.place_first {
+                // with the place rows change, and velocities along them: one after the other
+                piece.copy(&before, &mut core.x);
+                (worse, piece.place_first) = (true, true);
+                continue;
             }
+            let share = if was.0 > 1.0 { left.0 / was.0 } else { left.1 / was.1 };
+            if share < 1.0 {
+                piece.left = left;
+            } else {
+                piece.copy(&before, &mut core.x);
+                (worse, piece.done) = (true, !piece.chord);
+            }
+            piece.chord &= share < SLOW;
+        }
+        if worse {
             open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
         }
-        chord &= left < SLOW;
     }
     refresh_at(core, start);
     Ok(())
+}
+
+/// Objects that joints join, directly or through others, and their joints. What cannot be closed in one piece does not hinder another.
+struct Piece {
+    /// Joints, as indices of blocks; and of constraint rows.
+    blocks: Vec<u32>,
+    rows: Vec<u32>,
+    /// Its objects' stretches of the state.
+    stretches: Vec<Range<usize>>,
+    /// What is open: place, speed.
+    left: (f64, f64),
+    /// Rounds that may still be taken.
+    rounds: usize,
+    /// Whether by the rows of the step.
+    chord: bool,
+    /// Whether velocities wait until the place is closed.
+    place_first: bool,
+    done: bool,
+}
+
+impl Piece {
+    fn all(core: &Core, work: &mut Workspace) -> Vec<Piece> {
+        let (touches, targets) = (work.touches.len(), &work.targets);
+        work.islands.build(&work.rows, |b| b >= touches && is_joint(&targets[b - touches]));
+        let entries = by_start(core);
+        let piece = |blocks: &[u32]| {
+            let mut starts: Vec<u32> = blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides()).map(|s| s.u).collect();
+            starts.sort_unstable();
+            starts.dedup();
+            let stretches = starts.iter().filter_map(|u| entry_at(&entries, *u)).map(|e| e.span.x.clone()).collect();
+            let rounds = if blocks.len() > DIRECT_ROWS { FEW_ROUNDS } else { ROUNDS };
+            let rows = blocks.iter().map(|b| b - touches as u32).collect();
+            Piece { blocks: blocks.to_vec(), rows, stretches, left: (f64::INFINITY, f64::INFINITY), rounds, chord: true, place_first: false, done: false }
+        };
+        work.islands.iter().map(piece).collect()
+    }
+
+    /// Takes its objects' state over.
+    fn copy(&self, from: &[f64], to: &mut [f64]) {
+        self.stretches.iter().for_each(|s| to[s.clone()].copy_from_slice(&from[s.clone()]));
+    }
+
+    /// Whether only its place is closed in this round.
+    fn moves_first(&self) -> bool {
+        self.place_first && self.left.0 > 1.0
+    }
+
+    /// The largest of its rows' numbers.
+    fn largest(&self, of_rows: &[f64]) -> f64 {
+        self.rows.iter().fold(0.0, |worst, &i| worst.max(of_rows[i as usize].abs()))
+    }
 }
 
 /// How far each constraint row is off at the present state; 0 where that is to stay.
@@ -169,8 +240,10 @@ impl Open {
         let laid = lay_rows(core, probe, step.1, None);
         core.time = time;
         laid?;
-        let mut open = Open { least: (1e-2 * core.settings.contact_tolerance, core.settings.accuracy.tolerance), ..Open::default() };
-        if probe.targets.len() != work.targets.len() {
+        let n = work.targets.len();
+        let least = (1e-2 * core.settings.contact_tolerance, core.settings.accuracy.tolerance.max(FINEST));
+        let mut open = Open { place: vec![0.0; n], speed: vec![0.0; n], least };
+        if probe.targets.len() != n {
             return Ok(open);
         }
         whiten(core, &vec![0.0; core.dof], 0.0, &mut probe.u, &mut probe.du_force);
@@ -178,37 +251,42 @@ impl Open {
         for (i, (target, block)) in probe.targets.iter().zip(&probe.rows.blocks).enumerate() {
             let joint = is_joint(target);
             let free = !block.sides().iter().any(|s| pushed[s.u as usize]);
-            open.place.push(if joint && core.settings.stabilize_positions { target.error - kept[i] } else { 0.0 });
-            open.speed.push(if joint && free { probe.c[i] - target.velocity } else { 0.0 });
+            open.place[i] = if joint && core.settings.stabilize_positions { target.error - kept[i] } else { 0.0 };
+            open.speed[i] = if joint && free { probe.c[i] - target.velocity } else { 0.0 };
         }
         Ok(open)
     }
 
-    /// The largest errors, as multiples of what counts as closed.
-    fn worst(&self) -> (f64, f64) {
-        (largest(&self.place) / self.least.0, largest(&self.speed) / self.least.1)
+    /// The largest place and speed of a piece, as multiples of what counts as closed.
+    fn of(&self, piece: &Piece) -> (f64, f64) {
+        (piece.largest(&self.place) / self.least.0, piece.largest(&self.speed) / self.least.1)
     }
 
-    fn is_closed(&self) -> bool {
-        let (place, speed) = self.worst();
-        place <= 1.0 && speed <= 1.0
-    }
-
-    /// The share of the error before that is left: of place while that is open, then of speed, for which a change of place is a change of rows.
-    fn left_of(&self, before: &Open) -> f64 {
-        let (place, speed) = before.worst();
-        if place > 1.0 { self.worst().0 / place } else { self.worst().1 / speed }
-    }
-
-    /// One round with the rows of `work`, whose islands are built, and the caches that they were built with.
-    fn apply(&self, core: &mut Core, work: &Workspace) {
+    /// A round with the rows of the step, in the caches that they were built with.
+    fn chord(&self, core: &mut Core, work: &Workspace, pieces: &[Piece]) {
         let touches = work.touches.len();
+        self.apply(core, &work.rows, touches, pieces.iter().filter(|p| !p.done && p.chord).map(|p| (&p.blocks[..], p.moves_first())));
+    }
+
+    /// A round with the rows of the present, where those of the step have got too little done.
+    fn newton(&self, core: &mut Core, probe: &mut Workspace, pieces: &[Piece]) {
+        for piece in pieces.iter().filter(|p| !p.done && !p.chord) {
+            soften(&mut probe.rows, &piece.rows, piece.largest(&self.place));
+        }
+        self.apply(core, &probe.rows, 0, pieces.iter().filter(|p| !p.done && !p.chord).map(|p| (&p.rows[..], p.moves_first())));
+    }
+
+    fn apply<'p>(&self, core: &mut Core, rows: &Rows, touches: usize, pieces: impl Iterator<Item = (&'p [u32], bool)>) {
         let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
-        let mut c = vec![0.0; work.rows.len];
-        for (off, least, du) in [(&self.place, self.least.0, &mut dx), (&self.speed, self.least.1, &mut dv)] {
-            work.rows.blocks[touches..].iter().zip(off).for_each(|(block, off)| c[block.row as usize] = *off);
-            for blocks in work.islands.iter().filter(|blocks| blocks.iter().any(|&b| off[b as usize - touches].abs() > least)) {
-                solve(&work.rows, blocks, &c, du, 0.1 * least);
+        let mut c = [vec![0.0; rows.len], vec![0.0; rows.len]];
+        for (i, block) in rows.blocks[touches..].iter().enumerate() {
+            (c[0][block.row as usize], c[1][block.row as usize]) = (self.place[i], self.speed[i]);
+        }
+        for (blocks, moves_first) in pieces {
+            for (c, du, least, wanted) in [(&c[0], &mut dx, self.least.0, true), (&c[1], &mut dv, self.least.1, !moves_first)] {
+                if wanted && blocks.iter().any(|&b| c[rows.blocks[b as usize].row as usize].abs() > least) {
+                    solve(rows, blocks, c, du, 0.1 * least);
+                }
             }
         }
         displace(core, &dx, 1.0);
@@ -234,26 +312,11 @@ fn pushed(work: &mut Workspace) -> Vec<bool> {
     pushed
 }
 
-fn largest(v: &[f64]) -> f64 {
-    v.iter().fold(0.0, |worst, x| worst.max(x.abs()))
-}
-
-/// Groups the joints alone.
-fn islands(work: &mut Workspace) {
-    let (touches, targets) = (work.touches.len(), &work.targets);
-    work.islands.build(&work.rows, |b| b >= touches && is_joint(&targets[b - touches]));
-}
-
-fn rounds(work: &Workspace) -> usize {
-    if work.islands.iter().any(|blocks| blocks.len() > DIRECT_ROWS) { FEW_ROUNDS } else { ROUNDS }
-}
-
 /// Gives rows that may not agree the compliance for such an error.
-fn soften(probe: &mut Workspace, error: f64) {
-    let share = (SOFT.0 * error).min(SOFT.1);
-    for b in 0..probe.rows.blocks.len() {
-        let own = probe.rows.own(&probe.rows.blocks[b], 0, 0);
-        probe.rows.blocks[b].compliance = share * own;
+fn soften(rows: &mut Rows, blocks: &[u32], error: f64) {
+    for &b in blocks {
+        let own = rows.own(&rows.blocks[b as usize], 0, 0);
+        rows.blocks[b as usize].compliance = (SOFT.0 * error).min(SOFT.1) * own;
     }
 }
 

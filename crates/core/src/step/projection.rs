@@ -5,8 +5,9 @@
 //! ```
 //!
 //! `v̄` is the displacement velocity of the step, less what led bodies and motors are meant to move (0 for a projection in place, with
-//! `h = 1`). What was wrong before is recovered at a bounded speed. Limits that tell their gap at any state (of joints, of rods) are asked for it at
-//! the end of the step, in place of `gap + h·J·v̄`: as links swing about each other a joint does not move by the mean of its two velocities.
+//! `h = 1`). What was wrong before is recovered at a bounded speed. Where nothing but joints moves an island, `closing.rs` does it at the end of the step.
+//! Limits that tell their gap at any state (of joints, of rods) are asked for it at the end of the step, in place of `gap + h·J·v̄`: as links swing
+//! about each other a joint does not move by the mean of its two velocities.
 
 use super::closing::{self, refresh_at};
 use super::contacts::{Workspace, displace, limits};
@@ -44,7 +45,7 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
         match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
             (Some(touch), _) => -(allowed(touch.contact.gap, recovery) + h * v),
             (None, Some(t)) if t.compliance > 0.0 => 0.0,
-            (None, Some(t)) if t.set == RowSet::Equality => if hold { (t.error.clamp(-recovery, recovery) + h * v).abs() } else { 0.0 },
+            (None, Some(t)) if t.set == RowSet::Equality && hold => (t.error.clamp(-recovery, recovery) + h * v).abs(),
             (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
             _ => 0.0,
         }
@@ -59,7 +60,8 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
     // a motor has no place to hold, and a spring may be anywhere
     let rigid = |t: &RowTarget| t.compliance == 0.0 && !matches!(t.set, RowSet::Interval { .. });
     work.islands.build(&work.rows, |b| b < touches || rigid(&targets[b - touches]));
-    let closed_later = |&b: &u32| !in_place && (b as usize) >= touches && closing::is_joint(&targets[b as usize - touches]);
+    let waits = |t: &RowTarget| closing::is_joint(t) && t.velocity == 0.0;
+    let closed_later = |&b: &u32| !in_place && (b as usize) >= touches && waits(&targets[b as usize - touches]);
     for blocks in work.islands.iter() {
         if blocks.iter().all(closed_later) {
             continue;

@@ -250,6 +250,38 @@ fn gimbal_lock_is_named_and_finite() {
 }
 
 #[test]
+fn gimbal_lock_is_told_from_its_neighbourhood_in_any_structure() {
+    for seed in 0..200 {
+        let mut n = Numbers::new(seed);
+        let mut builder = ModelBuilder::new();
+        let turned = |n: &mut Numbers| Joint::revolute(n.vector());
+        let (joint, placement, mass) = (turned(&mut n), n.pose(0.5), n.mass());
+        let before = builder.link("before", None, joint, placement, mass);
+        let outer = builder.link("yaw", Some(before), Joint::revolute(Vec3::z()), n.pose(0.5), LinkMass::none());
+        let middle = builder.link("pitch", Some(outer), Joint::revolute(Vec3::y()), Pose::identity(), LinkMass::none());
+        let thin = 10f64.powf(3.0 * n.next() - 3.0);
+        let moments = Mat3::from_diagonal(&Vec3::new(1.0 + thin, 1.0, thin));
+        let axes = n.rotation().to_rotation_matrix().into_inner();
+        let body = LinkMass { mass: 1.0, center: n.vector(), inertia: axes * moments * axes.transpose() };
+        let hand = builder.link("roll", Some(middle), Joint::revolute(Vec3::x()), Pose::identity(), body);
+        let (joint, placement, mass) = (turned(&mut n), n.pose(0.5), n.mass());
+        builder.link("after", Some(hand), joint, placement, mass);
+        let model = builder.build().unwrap();
+        let mut d = Dynamics::new(&model);
+        let v = n.list(model.dof(), 1.0);
+        for (off, singular) in [(0.0, true), (1e-4, false), (-1e-3, false)] {
+            let mut q = n.list(model.positions(), 3.0);
+            q[2] = std::f64::consts::FRAC_PI_2 + off;
+            d.refresh(&q, &v);
+            assert_eq!(d.singular(), singular.then_some(1), "seed {seed}, {off} from lock");
+            let mut qdd = vec![f64::NAN; model.dof()];
+            d.accelerate(&mut d.scratch(), &v, &[], &mut qdd);
+            assert!(qdd.iter().all(|x| x.is_finite()));
+        }
+    }
+}
+
+#[test]
 fn a_ball_joint_moves_as_three_hinges_do() {
     // The same body on a ball joint and on the stack of hinges, away from gimbal lock: the same angular acceleration.
     let stack = gimbal();

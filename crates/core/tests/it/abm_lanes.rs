@@ -37,6 +37,8 @@ fn check_all(model: &Model, states: &[State]) {
     check::<3>(model, states);
     check::<4>(model, states);
     check::<8>(model, states);
+    check::<12>(model, states);
+    check::<16>(model, states);
 }
 
 #[test]
@@ -48,7 +50,7 @@ fn a_lane_has_the_bits_of_its_state_alone() {
                 let (q, v) = random_state(&model, seed + k);
                 (q, v, Numbers::new(seed + 50 + k).list(model.dof(), 2.0))
             };
-            check_all(&model, &(0..8).map(state).collect::<Vec<State>>());
+            check_all(&model, &(0..16).map(state).collect::<Vec<State>>());
         }
     }
 }
@@ -61,7 +63,8 @@ fn a_lane_of_far_angles_or_of_gimbal_lock_disturbs_no_other() {
     let body = LinkMass { mass: 1.0, center: Vec3::new(0.1, 0.0, 0.2), inertia: Mat3::from_diagonal(&Vec3::new(0.1, 0.2, 0.3)) };
     builder.link("roll", Some(middle), Joint::revolute(Vec3::x()), Pose::identity(), body);
     let model = builder.build().unwrap();
-    let pitch = [0.1, 3e7, std::f64::consts::FRAC_PI_2, -1e12, 0.4, -0.5, 1.0, 2.0];
+    let near = [0.1, 3e7, std::f64::consts::FRAC_PI_2, -1e12, 0.4, -0.5, 1.0, 2.0];
+    let pitch: Vec<f64> = near.iter().chain(&near.map(|x| 0.3 - x)).copied().collect();
     let states: Vec<State> = pitch.iter().map(|&pitch| (vec![0.3, pitch, 1.1], vec![1.0, 2.0, 3.0], vec![0.1; 3])).collect();
     check_all(&model, &states);
 }

@@ -216,6 +216,64 @@ fn a_wheel_that_is_led_drives_the_piston_as_asked() {
 }
 
 #[test]
+fn steps_that_are_too_long_leave_the_linkage_closed() {
+    // the crank turns by up to 0.25 rad a frame: energy wanders, and nothing blows up
+    for stepper in STEPPERS {
+        let worst = run(&mut FourBar::new(stepper, 1.0 / 60.0), 60.0);
+        println!("{stepper}, 60 s at 60 Hz: {worst:?}");
+        assert!(worst.gap < 3e-9 && worst.off < 1e-6, "{stepper}: {worst:?}");
+        assert!(worst.energy < 0.5 * worst.kinetic, "{stepper}: energy is off by {} J of {} J", worst.energy, worst.kinetic);
+    }
+}
+
+#[test]
+fn a_linkage_that_strikes_the_ground_stays_closed_and_out_of_it() {
+    for stepper in STEPPERS {
+        for (restitution, friction) in [(0.0, 0.5), (0.5, 0.0)] {
+            let mut linkage = FourBar::new(stepper, 1.0 / RATE);
+            for id in linkage.bars {
+                // bars overlap at their pins: they meet the ground alone
+                let body: &mut RigidBody = linkage.world.get_mut(id).unwrap();
+                (body.kind, body.meets) = (CollisionKind::new(1).unwrap(), CollisionKind::default().bit());
+                (body.material.restitution, body.material.friction) = (restitution, friction);
+            }
+            let floor = RigidBody::fixture("floor", Shape::half_space()).surface(restitution, friction).at(Pose::translation(0.0, 0.0, -0.12));
+            linkage.world.add_static(floor).unwrap();
+            let (mut gap, mut deep, mut energy, mut touched) = (0.0f64, 0.0f64, f64::MIN, 0);
+            for _ in 0..(10.0 * RATE) as usize {
+                deep = deep.max(linkage.world.step().unwrap().max_penetration);
+                gap = gap.max(linkage.gap());
+                energy = energy.max(linkage.world.energy().total() - linkage.start);
+                touched += linkage.world.contacts().iter().any(|c| c.impulse.norm() > 0.0) as u32;
+            }
+            println!("{stepper}, e = {restitution}, μ = {friction}: gap {gap:.1e} m, {deep:.1e} m deep, energy gained {energy:.1e} J, {touched} frames on the ground");
+            assert!(touched > 5, "{stepper}: it reaches the ground");
+            assert!(gap < 1e-6, "{stepper}: pins are {gap:e} m apart");
+            assert!(deep < 1e-4, "{stepper}: {deep:e} m deep");
+            assert!(energy < 1e-2, "{stepper}: {energy:e} J gained");
+        }
+    }
+}
+
+#[test]
+fn joints_that_cannot_close_do_not_open_others() {
+    // a box welded to two places 10 mm apart, beside the linkage
+    for stepper in STEPPERS {
+        let mut linkage = FourBar::new(stepper, 1.0 / RATE);
+        let stuck = linkage.world.add(bar("stuck", Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.2, 1.0, 0.0))).unwrap();
+        for (i, place) in [Vec3::new(0.1, 1.0, 0.0), Vec3::new(0.11, 1.0, 0.0)].into_iter().enumerate() {
+            let sides = (Anchor::on(stuck, 0, Pose::identity()), Anchor::world(Pose::from(place)));
+            linkage.world.add(Closure::new(format!("weld {i}"), ClosureKind::Weld, sides.0, sides.1).unwrap()).unwrap();
+        }
+        let worst = run(&mut linkage, 5.0);
+        println!("{stepper}, beside a box welded to two places: {worst:?}");
+        assert!(worst.gap < 3e-9 && worst.off < 1e-6, "{stepper}: {worst:?}");
+        let stuck = (position(&linkage.world, stuck) - Vec3::new(0.105, 1.0, 0.0)).norm();
+        assert!(stuck < 6e-3, "{stepper}: the box is {stuck} m from between the two places");
+    }
+}
+
+#[test]
 fn a_linkage_restored_from_a_snapshot_goes_on_with_the_same_bits() {
     for stepper in STEPPERS {
         let mut first = FourBar::new(stepper, 1.0 / RATE).world;

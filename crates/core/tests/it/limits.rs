@@ -216,7 +216,7 @@ fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
     for integrator in BOTH {
         let mut world = world("backtracking", 1.0 / 240.0);
         world.set_settings(Settings { integrator, ..*world.settings() }).unwrap();
-        let mut body = ArticulatedBody::new("chain", crate::articulated_world::chain(2, 1.0, 0.2)).with_positions(&[0.8, -0.3]).unwrap();
+        let mut body = ArticulatedBody::new("chain", crate::articulated_world::hinged(2, 0.2, crate::articulated_world::rod(1.0, 0.2))).with_positions(&[0.8, -0.3]).unwrap();
         body.set_freedom(0, Freedom { limits: Some([0.6, 2.0]), ..Freedom::default() }).unwrap();
         let id = world.add(body).unwrap();
         let (mut arrived, mut swing, mut off, mut drift, mut tries) = (None, [f64::MAX, f64::MIN], 0.0f64, 0.0f64, 0);

@@ -12,7 +12,7 @@ use super::files::{Found, find};
 use super::xml::Element;
 use super::{CollisionMeshes, MissingMeshes, UrdfOptions};
 use crate::bound::Bound;
-use crate::link::{Geometry, LinkShape, inertia_fault};
+use crate::link::{Geometry, InertiaFault, LinkShape, inertia_fault};
 use crate::look::Color;
 use crate::notes::NoteList;
 use crate::rotation;
@@ -89,9 +89,12 @@ fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Context<'_>) -
     let eigen = SymmetricEigen::new(inertia);
     let negative = eigen.eigenvalues.min() < 0.0;
     if let Some(fault) = inertia_fault(&inertia) {
-        let what = if eigen.eigenvalues.min() < -1e-9 * inertia.amax() { "; those below 0 are set to 0" } else { "" };
+        let what = match fault {
+            InertiaFault::Negative(_) => "has principal moments below 0, which are set to 0",
+            InertiaFault::Triangle(_) => "is that of no rigid body: one principal moment is greater than the sum of the others",
+        };
         let line = element.log.line(element.span().start);
-        context.notes.add(format!("{}:{line}", context.file), format!("{} is that of no rigid body: it must have {fault}{what}", element.what()));
+        context.notes.add(format!("{}:{line}: {}", context.file, element.what()), what);
     }
     if !negative {
         return inertia;
@@ -159,7 +162,7 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
 }
 
 fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<Geometry> {
-    let uri = mesh.required_text("filename", "the path of an .stl or .obj file")?;
+    let uri = mesh.required_text("filename", "the path of an .stl, .obj or .dae file")?;
     let scale: [f64; 3] = mesh.numbers("scale", Bound::ANY).unwrap_or([1.0; 3]);
     if scale.contains(&0.0) {
         mesh.wrong("scale", "three numbers other than 0");
@@ -172,7 +175,7 @@ fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) 
         Found::Here(path) => return Some(Geometry::File { path, scale, place, hull, required }),
         Found::Missing(path) if collides && required => format!("there is no file {path}"),
         Found::Missing(_) => "there is no such file".into(),
-        Found::Format(format) => format!("the format '{format}' is not read, only .stl and .obj"),
+        Found::Format(format) => format!("the format '{format}' is not read, only .stl, .obj and .dae"),
     };
     if collides && required {
         let wanted = "wanted a mesh that is there; `packages` says where packages are, missing_meshes = \"skip\" leaves it out";

@@ -18,7 +18,7 @@
 //! | `<limit>` | position limits; effort is the limit of drives that name none; velocity is kept and not enforced |
 //! | `<dynamics>` | viscous damping and dry friction |
 //! | `<mimic>` | a coupling of the two joints |
-//! | `<collision>` | box, cylinder, sphere, capsule; meshes in STL and OBJ |
+//! | `<collision>` | box, cylinder, sphere, capsule; meshes in STL, OBJ and COLLADA |
 //! | `<visual>` | the same, with the colour of its material; where no visual of a link can be read its collision shapes are drawn |
 //!
 //! All else (transmissions, sensors, simulators' own elements) is passed over. The root link is fixed to the base, or floats if asked.
@@ -188,6 +188,16 @@ impl Robot {
         let masses: Vec<LinkMass> = self.links.iter().map(LinkSpec::given_mass).collect();
         let model = assemble::model(&self.links, &masses).map_err(|source| UrdfError::Model { file: path.to_path_buf(), source })?;
         Ok(UrdfModel { joints: assemble::moving_joints(&self.links), name: self.name, model, notes: self.notes })
+    }
+}
+
+impl UrdfError {
+    /// The error as a full report for a person, as [`SceneError::report`](crate::SceneError::report).
+    pub fn report(&self, color: bool) -> String {
+        match self {
+            UrdfError::Invalid(invalid) => invalid.report(color),
+            other => format!("Error: {other}\n"),
+        }
     }
 }
 

@@ -284,7 +284,7 @@ fn mesh_files() {
     );
     told(
         &mesh("bunny.ply"),
-        &["s.toml:3:8: `file` of [meshes.m] is \"bunny.ply\"; wanted the path of an .obj or .stl file"],
+        &["s.toml:3:8: `file` of [meshes.m] is \"bunny.ply\"; wanted the path of an .obj, .stl or .dae file"],
     );
 }
 

@@ -87,7 +87,7 @@ fn all_files_are_read_or_their_faults_are_named() {
     assert!(read >= 60, "{read} robots");
 }
 
-fn urdf_files(folder: &Path) -> Vec<PathBuf> {
+pub fn urdf_files(folder: &Path) -> Vec<PathBuf> {
     let mut entries: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     entries.sort();
     let below = |path: PathBuf| if path.is_dir() { urdf_files(&path) } else { vec![path] };

@@ -186,7 +186,7 @@ fn wrong_numbers() {
 fn an_inertia_of_no_body_is_mended_and_told() {
     let robot = read(&two("continuous", "").replace("ixx=\"1\" iyy=\"1\" izz=\"1\"", "ixx=\"-0.5\" iyy=\"1\" izz=\"1\""));
     assert_eq!(robot.notes.len(), 1);
-    assert!(robot.notes[0].starts_with("r.urdf:3: the inertia of the inertial of link \"b\" is that of no rigid body"), "{}", robot.notes[0]);
+    assert_eq!(robot.notes[0], "r.urdf:3: the inertia of the inertial of link \"b\": has principal moments below 0, which are set to 0");
     assert!((robot.model.links()[0].mass.inertia - Mat3::from_diagonal(&Vec3::new(0.0, 1.0, 1.0))).amax() < 1e-15);
 }
 
@@ -221,6 +221,30 @@ fn obj(mesh: &TriMesh, without: usize) -> String {
     vertices.chain(faces).collect()
 }
 
+/// A chain of balls 0.1 m apart on a fixed base, with radii that overlap their second neighbours.
+#[test]
+fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
+    let link = |name: &str, radius: f64| format!("<link name=\"{name}\">{BALL}<collision><geometry><sphere radius=\"{radius}\"/></geometry></collision></link>\n");
+    let joint = |name: &str, kind: &str, parent: &str, child: &str| {
+        format!("<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0.1 0 0\"/></joint>\n")
+    };
+    let text = format!(
+        "<robot name=\"r\">\n{}{}{}{}{}{}{}{}</robot>",
+        link("base", 0.04), link("a", 0.04), link("b", 0.12), link("c", 0.04), link("d", 0.09),
+        joint("j", "continuous", "base", "a") + &joint("k", "planar", "a", "b"), joint("l", "continuous", "b", "c"), joint("m", "continuous", "c", "d"),
+    );
+    let folder = Folder::new("overlap");
+    let (body, notes) = load(folder.write("r.urdf", &text), &UrdfOptions { floating: true, ..UrdfOptions::default() }).unwrap();
+    let first = body.model().links().len() + 1;
+    let collidable = body.collidable().unwrap();
+    let meet = |a: usize, b: usize| collidable.parts_meet(first + a, first + b);
+    // 0.2 m between second neighbours: b reaches 0.12 and d 0.09, the others 0.04
+    assert!(!meet(0, 1) && !meet(1, 2) && !meet(2, 3) && !meet(3, 4), "joined, one pair through a stack");
+    assert!(!meet(2, 4), "overlap");
+    assert!(meet(0, 2) && meet(0, 3) && meet(1, 3) && meet(1, 4));
+    assert_eq!(notes, ["links that overlap at the start never meet: b and d"]);
+}
+
 /// One link with a collision mesh and a picture.
 fn with_meshes(collision: &str, scale: &str, visual: &str) -> String {
     format!(
@@ -250,7 +274,7 @@ fn meshes_that_are_missing_open_or_in_another_format() {
     let ball = TriMesh::icosphere(1.0, 2);
     folder.write("open.obj", &obj(&ball, 40));
     folder.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    folder.write("ball.dae", "<COLLADA/>");
+    folder.write("ball.mesh", "");
     let skip = UrdfOptions { missing_meshes: MissingMeshes::Skip, ..UrdfOptions::default() };
     let file = |collision: &str, visual: &str| folder.write("r.urdf", &with_meshes(collision, "1 1 1", visual));
 
@@ -264,12 +288,12 @@ fn meshes_that_are_missing_open_or_in_another_format() {
     let Some(Shape::Mesh(drawn)) = body.renderable().unwrap().visuals().first().map(|v| v.shape.clone()) else { panic!("a picture") };
     assert_eq!(drawn.mesh().triangles.len(), 4 * (320 - 40), "an open surface is drawn with its hole");
 
-    let path = file("open.obj", "ball.dae");
+    let path = file("open.obj", "ball.mesh");
     let (body, notes) = load(&path, &UrdfOptions::default()).unwrap();
     let Some(Shape::Mesh(hull)) = body.collidable().unwrap().shape(2) else { panic!("a mesh") };
     assert!(hull.volume() > 0.9 * ball.signed_volume() && hull.volume() < ball.signed_volume() * (1.0 + 1e-6), "the hull of most of a ball");
     assert_eq!(notes.len(), 2, "{notes:?}");
-    assert!(notes[0].ends_with("visual mesh ball.dae: left out: the format 'dae' is not read, only .stl and .obj"), "{notes:?}");
+    assert!(notes[0].ends_with("visual mesh ball.mesh: left out: the format 'mesh' is not read, only .stl, .obj and .dae"), "{notes:?}");
     assert!(notes[1].ends_with("open.obj: its surface is not closed, so its convex hull collides"), "{notes:?}");
     assert_eq!(body.renderable().unwrap().visuals().len(), 1, "what collides is drawn instead");
 

@@ -117,6 +117,10 @@ fn check_passes_what_is_good_and_scenes_lists_what_is_shipped() {
     let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
     let said = succeed(&["check", &folder.write("tetrahedron.obj", mesh)]);
     assert!(said.contains("volume 1.666667e-1 m³") && said.contains("(0.250000, 0.250000, 0.250000)"), "{said}");
+    let robot = "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"><inertial><mass value=\"2\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\n\
+                 <joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/></joint></robot>";
+    let said = succeed(&["check", &folder.write("robot.urdf", robot)]);
+    assert!(said.contains("a robot of 2 links, 1 degrees of freedom on a fixed base, 2.000000 kg that move"), "{said}");
 }
 
 /// One line of text per thing written, and a summary of the run, unless quiet.

@@ -1,0 +1,79 @@
+//! The arithmetic of blocks whose sides have six freedoms each, as rigid bodies have: the same sums as for any other side, laid out for
+//! registers that hold two numbers.
+
+use crate::rows::{Block, Rows, dot6};
+
+/// Where a block of one or two sides of six freedoms finds its numbers.
+#[derive(Clone, Copy)]
+pub(super) struct Six {
+    /// First index of each side's stretch of `du`; of one side alone, twice the same.
+    u: [u32; 2],
+    /// First index of each side's responses, likewise.
+    y: [u32; 2],
+    alone: bool,
+}
+
+/// The responses of `K` rows, and what they meet.
+type Meeting<'a, const K: usize> = (&'a [[f64; 6]; K], &'a [f64; 6]);
+
+/// Both sides of a block of `K` rows; the second is absent, or there.
+pub(super) struct Sides<'a, const K: usize> {
+    first: Meeting<'a, K>,
+    second: Option<Meeting<'a, K>>,
+}
+
+impl<const K: usize> Sides<'_, K> {
+    /// `(Yᵀu)` of row `k`.
+    #[inline(always)]
+    pub fn velocity(&self, k: usize) -> f64 {
+        let first = dot6(&self.first.0[k], self.first.1);
+        self.second.map_or(first, |(y, u)| first + dot6(&y[k], u))
+    }
+}
+
+impl Six {
+    /// `None` where a side has another number of freedoms.
+    pub fn of(block: &Block) -> Option<Six> {
+        match block.sides() {
+            [a, b] if a.dof == 6 && b.dof == 6 => Some(Six { u: [a.u, b.u], y: [a.y, b.y], alone: false }),
+            [a] if a.dof == 6 => Some(Six { u: [a.u; 2], y: [a.y; 2], alone: true }),
+            _ => None,
+        }
+    }
+
+    /// The numbers of a block of `K` rows; there always are.
+    #[inline(always)]
+    pub fn sides<'a, const K: usize>(&self, rows: &'a Rows, du: &'a [f64]) -> Option<Sides<'a, K>> {
+        let side = |s: usize| Some((responses(rows, self.y[s])?, du.get(self.u[s] as usize..)?.first_chunk()?));
+        let second = if self.alone { None } else { Some(side(1)?) };
+        Some(Sides { first: side(0)?, second })
+    }
+
+    /// `u += Y·δ`.
+    #[inline(always)]
+    pub fn push<const K: usize>(&self, rows: &Rows, delta: [f64; K], du: &mut [f64]) {
+        self.push_side(0, rows, delta, du);
+        if !self.alone {
+            self.push_side(1, rows, delta, du);
+        }
+    }
+
+    #[inline(always)]
+    fn push_side<const K: usize>(&self, side: usize, rows: &Rows, delta: [f64; K], du: &mut [f64]) {
+        let u = du.get_mut(self.u[side] as usize..).and_then(|u| u.first_chunk_mut::<6>());
+        if let (Some(y), Some(u)) = (responses::<K>(rows, self.y[side]), u) {
+            let mut next = *u;
+            for i in 0..6 {
+                let mut sum = y[0][i] * delta[0];
+                (1..K).for_each(|k| sum += y[k][i] * delta[k]);
+                next[i] += sum;
+            }
+            *u = next;
+        }
+    }
+}
+
+#[inline(always)]
+fn responses<const K: usize>(rows: &Rows, start: u32) -> Option<&[[f64; 6]; K]> {
+    rows.y.get(start as usize..)?.as_chunks::<6>().0.first_chunk()
+}
