@@ -5,9 +5,9 @@
 //! ```
 //!
 //! `v̄` is the displacement velocity of the step, less what led bodies and motors are meant to move (0 for a projection in place, with
-//! `h = 1`). What was wrong before is recovered at a bounded speed. Limits that tell their gap at any state (of joints, of rods) are asked for it at
-//! the end of the step, in place of `gap + h·J·v̄`: as links swing about each other a joint does not move by the mean of its two velocities.
-//! Where nothing but joints moves an island, `closing.rs` does it at the end of the step.
+//! `h = 1`). What was wrong before is recovered at a bounded speed. Where nothing but joints moves an island, `closing.rs` does it at the end of the step.
+//! Limits that tell their gap at any state (of joints, of rods) are asked for it at the end of the step, in place of `gap + h·J·v̄`: as links swing
+//! about each other a joint does not move by the mean of its two velocities.
 
 use super::closing::{self, refresh_at};
 use super::contacts::{Workspace, displace, limits};
@@ -68,7 +68,10 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
         }
         let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
         if worst > least {
-            let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, relaxations: u32::MAX, tolerance: 0.1 * least / h };
+            // the rows of a body's limits and contacts lean on each other through all its links, and a pile's do not
+            let jointed = blocks.iter().any(|&b| b as usize >= touches);
+            let most = if jointed { core.settings.accuracy.sweeps } else { 0 };
+            let accuracy = Accuracy { sweeps: core.settings.projection_sweeps.max(most), relaxations: u32::MAX, tolerance: 0.1 * least / h };
             GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, accuracy);
         }
     }
