@@ -105,8 +105,8 @@ def check_rust(name, lines, pages, faults):
 
 
 def documentation(text):
-    """The `//!` page of a source file as a reader sees it, without hidden lines."""
-    page = [line[4:] for line in text.splitlines() if line.startswith("//!")]
+    """The documentation of a source file as a reader sees it, without hidden lines."""
+    page = [line.lstrip()[4:] for line in text.splitlines() if line.lstrip().startswith(("//!", "///"))]
     return "".join(line + "\n" for line in page if not line.startswith("# "))
 
 

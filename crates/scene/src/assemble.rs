@@ -2,7 +2,7 @@
 
 use tumble_core::articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Kinematics, LinkMass, Model, ModelBuilder, ModelError};
 use tumble_core::collide::{Pose, Shape, contacts};
-use tumble_core::{Joint, Look, Material, Visual};
+use tumble_core::{Joint, Look, Material, Object, Visual};
 
 use crate::articulated::ArticulatedSpec;
 use crate::build::look;
@@ -121,29 +121,28 @@ fn keep_apart_across_stacks(spec: &ArticulatedSpec, body: &mut ArticulatedBody) 
 fn part_overlaps(
     spec: &ArticulatedSpec, shapes: &[Vec<Placed<'_>>], poses: &[Pose], body: &mut ArticulatedBody, maker: &mut ShapeMaker<'_>,
 ) -> Result<(), ArticulatedError> {
-    let solid: Vec<(usize, &Shape, Pose)> = shapes.iter().enumerate()
-        .flat_map(|(k, placed)| placed.iter().filter(|p| p.spec.collides).map(move |p| (k, &p.shape, p.pose)))
-        .map(|(k, shape, pose)| (k, shape, poses[k] * pose))
+    let solid: Vec<Solid<'_>> = shapes.iter().enumerate()
+        .flat_map(|(link, placed)| placed.iter().filter(|p| p.spec.collides).map(move |p| (link, p)))
+        .map(|(link, placed)| Solid { link, shape: &placed.shape, pose: poses[link] * placed.pose })
         .collect();
+    // parts are the links, the base, then the colliders in this order
+    let first = body.model().links().len() + 1;
+    let name = |link: usize| spec.links[link].name.as_str();
     let mut pairs = Vec::new();
-    let mut found = Vec::new();
-    for (n, (a, shape_a, pose_a)) in solid.iter().enumerate() {
-        for (b, shape_b, pose_b) in &solid[n + 1..] {
-            let near = shape_a.aabb(pose_a).overlaps(&shape_b.aabb(pose_b));
-            if a == b || !near || !meet(body, &spec.links[*a].name, &spec.links[*b].name) {
+    for (n, a) in solid.iter().enumerate() {
+        for (m, b) in solid.iter().enumerate().skip(n + 1) {
+            let meet = |body: &ArticulatedBody| body.collidable().is_some_and(|c| c.parts_meet(first + n, first + m));
+            if !meet(body) || !a.overlaps(b) {
                 continue;
             }
-            found.clear();
-            contacts(shape_a, pose_a, shape_b, pose_b, 0.0, &mut found);
-            if !found.is_empty() {
-                let [a, b] = [a, b].map(|k| spec.links[*k].name.as_str());
-                body.keep_apart(a, b)?;
-                pairs.push(format!("{a} and {b}"));
+            let pair = format!("{} and {}", name(a.link), name(b.link));
+            body.keep_apart(name(a.link), name(b.link))?;
+            match meet(body) {
+                true => maker.notes.add(pair, "overlap at the start and meet all the same"),
+                false => pairs.push(pair),
             }
         }
     }
-    pairs.sort();
-    pairs.dedup();
     if !pairs.is_empty() {
         let more = pairs.len().saturating_sub(TOLD_PAIRS);
         let rest = if more > 0 { format!(" and {more} more pairs") } else { String::new() };
@@ -152,12 +151,22 @@ fn part_overlaps(
     Ok(())
 }
 
-/// Whether two links are on different moving links that are not joined.
-fn meet(body: &ArticulatedBody, a: &str, b: &str) -> bool {
-    let carrier = |name: &str| body.model().frame(name).and_then(|frame| frame.link);
-    let parent = |link: Option<usize>| link.and_then(|l| body.model().links()[l].parent);
-    let (a, b) = (carrier(a), carrier(b));
-    a != b && (a.is_none() || parent(a) != b) && (b.is_none() || parent(b) != a)
+/// A shape of a link in the world.
+struct Solid<'s> {
+    link: usize,
+    shape: &'s Shape,
+    pose: Pose,
+}
+
+impl Solid<'_> {
+    fn overlaps(&self, other: &Solid<'_>) -> bool {
+        let near = self.shape.aabb(&self.pose).overlaps(&other.shape.aabb(&other.pose));
+        let mut found = Vec::new();
+        if near {
+            contacts(self.shape, &self.pose, other.shape, &other.pose, 0.0, &mut found);
+        }
+        !found.is_empty()
+    }
 }
 
 /// Poses of all links in the world.

@@ -9,6 +9,7 @@
 //! made for ignore it too.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use nalgebra::{Matrix4, Rotation3, Unit};
 use roxmltree::{Document, Node, ParsingOptions};
@@ -76,6 +77,9 @@ fn numbers<T: std::str::FromStr>(node: Node<'_, '_>) -> Result<Vec<T>, String> {
 
 /// Triangles of one geometry, in its own axes.
 type Geometry = (Vec<Vec3>, Vec<[u32; 3]>);
+
+/// A run of corners: where it begins, how many it has, and the list of indices that it lies in.
+type Face = (usize, usize, Rc<Vec<u32>>);
 
 struct Reader<'a, 'd> {
     ids: BTreeMap<&'a str, Node<'a, 'd>>,
@@ -188,12 +192,12 @@ impl<'a, 'd> Reader<'a, 'd> {
     }
 }
 
-/// Faces as runs of corners: where each begins, how many it has, and the list of indices that it lies in.
-fn faces(primitive: Node<'_, '_>, stride: usize) -> Result<Vec<(usize, usize, std::rc::Rc<Vec<u32>>)>, String> {
+/// All faces of a primitive.
+fn faces(primitive: Node<'_, '_>, stride: usize) -> Result<Vec<Face>, String> {
     let mut faces = Vec::new();
     let counts = child(primitive, "vcount").map(numbers::<usize>).transpose()?;
     for p in primitive.children().filter(|node| is(node, "p")) {
-        let list = std::rc::Rc::new(numbers::<u32>(p)?);
+        let list = Rc::new(numbers::<u32>(p)?);
         let corners = list.len() / stride;
         let lengths = match (primitive.tag_name().name(), &counts) {
             ("triangles", _) => vec![3; corners / 3],

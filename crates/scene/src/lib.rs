@@ -39,7 +39,8 @@
 //! target_m = [0, 0, 0.3]
 //! ```
 //!
-//! `[meshes.NAME]` is [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its common keys;
+//! `[[articulated]]` is [`ArticulatedSpec`], a tree of links written out or taken from a URDF ([`urdf`]), and `[[closure]]` is
+//! [`ClosureSpec`], which closes loops. `[meshes.NAME]` is [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its common keys;
 //! `[[light]]`, `[sky]` and `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]. The table of
 //! all keys is `scenes/README.md`.
 //!

@@ -4,7 +4,7 @@
 //! says so: it is closed for any input, it touches what the mesh touches from outside, and robots' collision meshes are mostly made to be used that
 //! way. (A box or capsule around them would be larger by far at the corners that robots touch things with.)
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use tumble_core::articulated::LinkMass;
@@ -116,10 +116,13 @@ impl<'m> ShapeMaker<'m> {
             if let Ok(made) = Shape::mesh(mesh.clone(), &settings) {
                 return Ok(made);
             }
-            if used == Use::Drawing {
-                return Shape::mesh(scales(&mesh), &settings).map_err(|e| e.to_string());
+            if used == Use::Drawing
+                && let Ok(made) = Shape::mesh(scales(&mesh), &settings)
+            {
+                return Ok(made);
             }
-            self.notes.add(path.display().to_string(), "its surface is not closed, so its convex hull collides");
+            let does = if used == Use::Drawing { "is drawn" } else { "collides" };
+            self.notes.add(path.display().to_string(), format!("its surface is not closed, so its convex hull {does}"));
         }
         let hull = mesh.convex_hull().map_err(|e| e.to_string())?;
         Shape::mesh(hull, &settings).map_err(|e| e.to_string())
@@ -145,13 +148,18 @@ fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
     mesh
 }
 
-/// A surface that need not be closed as a solid to draw: each triangle with a shallow pyramid below it.
+/// A surface that need not be closed as a solid to draw: each triangle with a shallow pyramid below it. Slivers, and triangles that are there
+/// already, are left out.
 fn scales(mesh: &TriMesh) -> TriMesh {
-    let depth = 1e-4 * mesh.diagonal();
+    let size = mesh.diagonal();
+    let depth = 1e-4 * size;
     let mut made = TriMesh::default();
+    let mut there = BTreeSet::new();
     for t in 0..mesh.triangles.len() {
         let [a, b, c] = mesh.corners(t);
-        if let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) {
+        let mut key = [a, b, c].map(|corner| [0, 1, 2].map(|k| corner[k].to_bits()));
+        key.sort_unstable();
+        if let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-12 * size * size).filter(|_| there.insert(key)) {
             let first = made.vertices.len() as u32;
             made.vertices.extend([a, b, c, (a + b + c) / 3.0 - depth * normal]);
             made.triangles.extend([[0, 1, 2], [1, 0, 3], [2, 1, 3], [0, 2, 3]].map(|face| face.map(|v| first + v)));

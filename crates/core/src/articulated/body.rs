@@ -96,6 +96,20 @@ pub(super) struct Part {
 }
 
 /// A tree of links that moves as one object. See the module for its state.
+///
+/// ```
+/// # use tumble_core::{ArticulatedBody, Collider, Freedom, Joint, LinkMass, ModelBuilder, Settings, World, collide::{Mat3, Pose, Shape, Vec3}};
+/// # let mut world = World::new(Settings::default())?;
+/// # let rod = LinkMass { mass: 1.0, center: Vec3::new(0.0, 0.0, -0.5), inertia: Mat3::identity() };
+/// let mut builder = ModelBuilder::new();
+/// let upper = builder.link("upper", None, Joint::revolute(Vec3::y()), Pose::identity(), rod);
+/// builder.link("lower", Some(upper), Joint::revolute(Vec3::y()), Pose::translation(0.0, 0.0, -1.0), rod);
+/// let mut arm = ArticulatedBody::new("arm", builder.build()?).at(Pose::translation(0.0, 0.0, 2.0));
+/// arm.add_collider("lower", Collider::new(Shape::capsule(0.05, 0.4)?, Pose::translation(0.0, 0.0, -0.5)))?;
+/// arm.set_freedom(0, Freedom { limits: Some([-1.0, 1.0]), ..Freedom::default() })?;
+/// world.add(arm)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct ArticulatedBody {
     pub(super) name: String,
     pub(super) model: Model,
@@ -107,7 +121,7 @@ pub struct ArticulatedBody {
     pub(super) couplings: Vec<Coupling>,
     /// Whether links meet other links of the same body; links joined to each other never do.
     pub self_collision: bool,
-    /// Pairs of moving links that do not meet, smaller number first; sorted.
+    /// Pairs of links (and the base, as the last) that do not meet, smaller number first; sorted.
     apart: Vec<[usize; 2]>,
     pub(super) start: Vec<f64>,
     pub(super) dynamics: Dynamics,
@@ -226,16 +240,20 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// Keeps two links from meeting.
+    /// Keeps two links from meeting, or a link and the base.
     pub fn keep_apart(&mut self, a: &str, b: &str) -> Result<(), ArticulatedError> {
         let find = |link: &str| self.model.frame(link).map(|f| f.link).ok_or_else(|| self.no_link(link));
-        if let (Some(a), Some(b)) = (find(a)?, find(b)?) {
-            let pair = [a.min(b), a.max(b)];
-            if let Err(place) = self.apart.binary_search(&pair) {
-                self.apart.insert(place, pair);
-            }
+        let pair = self.pair(find(a)?, find(b)?);
+        if let Err(place) = self.apart.binary_search(&pair) {
+            self.apart.insert(place, pair);
         }
         Ok(())
+    }
+
+    /// Two links by number, the smaller first; the base comes after all links.
+    fn pair(&self, a: Option<usize>, b: Option<usize>) -> [usize; 2] {
+        let [a, b] = [a, b].map(|link| link.unwrap_or(self.model.links().len()));
+        [a.min(b), a.max(b)]
     }
 
     /// Sets what acts on one degree of freedom (its place in `v`).
@@ -303,7 +321,7 @@ impl ArticulatedBody {
         let parent = |link: Option<usize>| link.map(|l| self.model.links()[l].parent);
         let grounded = |link: Option<usize>| link.is_none_or(|l| self.model.links()[l].joint != super::Joint::Floating);
         let joined = (parent(a) == Some(b) && grounded(a)) || (parent(b) == Some(a) && grounded(b));
-        let kept = matches!((a, b), (Some(a), Some(b)) if self.apart.binary_search(&[a.min(b), a.max(b)]).is_ok());
+        let kept = self.apart.binary_search(&self.pair(a, b)).is_ok();
         self.self_collision && a != b && !joined && !kept
     }
 

@@ -104,6 +104,16 @@ pub struct Misfit {
 }
 
 /// A joint between two parts of any objects. It has no state. Where a side is gone or not alive it makes no rows.
+///
+/// ```
+/// # use tumble_core::{Closure, RigidBody, Settings, World, collide::{Shape, Vec3}};
+/// # let mut world = World::new(Settings::default())?;
+/// # let door = world.add(RigidBody::with_mass("door", Shape::cuboid(Vec3::new(0.4, 0.02, 1.0))?, 20.0)?)?;
+/// # let (point, axis) = (Vec3::new(-0.4, 0.0, 0.0), Vec3::z());
+/// let hinge = Closure::hinge_at("hinge", &world, Some((door, 0)), None, point, axis)?;
+/// world.add(hinge)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Closure {
     name: String,

@@ -1,6 +1,7 @@
 //! What `tumble-scene` promises of scene files.
 
 mod articulated;
+mod articulated_world;
 mod bad_input;
 mod expansion;
 mod finding;

@@ -24,6 +24,18 @@ fn every_scene_cut_at_every_byte() {
     }
 }
 
+/// The example of every key of articulated bodies.
+fn articulated() -> &'static str {
+    let reference = include_str!("../../../../scenes/README.md");
+    reference.split("```toml\n").nth(1).unwrap().split("```").next().unwrap()
+}
+
+#[test]
+fn articulated_bodies_cut_at_every_byte() {
+    let text = articulated();
+    (0..text.len()).filter(|&end| text.is_char_boundary(end)).for_each(|end| read(&text[..end]));
+}
+
 #[test]
 fn deep_nesting_and_long_lines() {
     read(&"[".repeat(100_000));
@@ -33,6 +45,29 @@ fn deep_nesting_and_long_lines() {
     read(&"x".repeat(1_000_000));
     read(&"\n\u{feff}é = 1\n".repeat(5_000));
     read("\u{feff}description = \"é\u{301}\"\n\u{301}x = 1");
+}
+
+const OTHERS: &[&str] = &[
+    "nan", "-1", "0", "1e400", "[]", "[[[]]]", "{}", "\"\"", "true", "[1, 2, 3]", "{ type = \"box\" }", "{ count = 300 }", "\"rope_20\"", "\"fixed\"",
+    "{ type = \"playback\", times_s = [], values_rad = [] }", "{ joint = \"wheel\" }", "[[\"jib\"]]",
+];
+
+#[test]
+fn articulated_bodies_with_each_value_swapped_for_others() {
+    let lines: Vec<&str> = articulated().lines().collect();
+    for at in (0..lines.len()).filter(|&k| lines[k].contains(" = ")) {
+        for value in OTHERS {
+            let mut changed = lines.clone();
+            let line = format!("{} = {value}", lines[at].split(" = ").next().unwrap_or(""));
+            changed[at] = &line;
+            let text = changed.join("\n");
+            read(&text);
+            // what is right can also be built, or is refused with a reason
+            if let Ok(scene) = SceneFile::parse(&text, "changed.toml") {
+                let _ = scene.build().map_err(|error| assert!(!error.to_string().is_empty()));
+            }
+        }
+    }
 }
 
 proptest! {

@@ -186,7 +186,7 @@ fn wrong_numbers() {
 fn an_inertia_of_no_body_is_mended_and_told() {
     let robot = read(&two("continuous", "").replace("ixx=\"1\" iyy=\"1\" izz=\"1\"", "ixx=\"-0.5\" iyy=\"1\" izz=\"1\""));
     assert_eq!(robot.notes.len(), 1);
-    assert_eq!(robot.notes[0], "r.urdf:3: the inertia of the inertial of link \"b\": has principal moments below 0, which are set to 0");
+    assert_eq!(robot.notes[0], "r.urdf:3: the inertia of the inertial of link \"b\": principal moments below 0 are set to 0");
     assert!((robot.model.links()[0].mass.inertia - Mat3::from_diagonal(&Vec3::new(0.0, 1.0, 1.0))).amax() < 1e-15);
 }
 
@@ -219,6 +219,30 @@ fn obj(mesh: &TriMesh, without: usize) -> String {
     let vertices = mesh.vertices.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
     let faces = mesh.triangles[..mesh.triangles.len() - without].iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
     vertices.chain(faces).collect()
+}
+
+/// A chain of balls 0.1 m apart on a fixed base, with radii that overlap their second neighbours.
+#[test]
+fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
+    let link = |name: &str, radius: f64| format!("<link name=\"{name}\">{BALL}<collision><geometry><sphere radius=\"{radius}\"/></geometry></collision></link>\n");
+    let joint = |name: &str, kind: &str, parent: &str, child: &str| {
+        format!("<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0.1 0 0\"/></joint>\n")
+    };
+    let text = format!(
+        "<robot name=\"r\">\n{}{}{}{}{}{}{}{}</robot>",
+        link("base", 0.04), link("a", 0.04), link("b", 0.12), link("c", 0.04), link("d", 0.09),
+        joint("j", "continuous", "base", "a") + &joint("k", "planar", "a", "b"), joint("l", "continuous", "b", "c"), joint("m", "continuous", "c", "d"),
+    );
+    let folder = Folder::new("overlap");
+    let (body, notes) = load(folder.write("r.urdf", &text), &UrdfOptions { floating: true, ..UrdfOptions::default() }).unwrap();
+    let first = body.model().links().len() + 1;
+    let collidable = body.collidable().unwrap();
+    let meet = |a: usize, b: usize| collidable.parts_meet(first + a, first + b);
+    // 0.2 m between second neighbours: b reaches 0.12 and d 0.09, the others 0.04
+    assert!(!meet(0, 1) && !meet(1, 2) && !meet(2, 3) && !meet(3, 4), "joined, one pair through a stack");
+    assert!(!meet(2, 4), "overlap");
+    assert!(meet(0, 2) && meet(0, 3) && meet(1, 3) && meet(1, 4));
+    assert_eq!(notes, ["links that overlap at the start never meet: b and d"]);
 }
 
 /// One link with a collision mesh and a picture.

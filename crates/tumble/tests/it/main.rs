@@ -1,5 +1,6 @@
 //! The `tumble` command as its users run it: processes, files, exit codes.
 
+mod articulated_scenes;
 mod bad_input;
 mod common;
 mod determinism;
