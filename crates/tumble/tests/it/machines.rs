@@ -235,7 +235,7 @@ fn piston_follows_the_slider_crank_formula_without_drift() {
         let method = world.methods().0;
         println!("{method}, {seconds} s: pistons off by {off:?} m in each half, rods by {open:e} m, crank by {late:?} rad");
         assert!(off[0].max(off[1]) < 1e-6, "{method}: {off:?} m");
-        // the drive's velocity is exact at the ends of frames; between them its torque is held
+        // the drive holds a velocity at the ends of frames, and nothing holds the angle
         assert!(late[0].max(late[1]) < 5e-6, "{method}: the crank is {late:?} rad from 4π·t");
     }
 }
