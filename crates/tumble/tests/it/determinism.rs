@@ -21,6 +21,7 @@ fn seconds(scene: &str) -> f64 {
         _ if std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1") => 60.0,
         "bowling" => 3.2, // the ball meets the pins after 2.55 s
         "stack" => 0.5,
+        "chain" => 1.0, // the ball meets it after 0.29 s
         _ => 2.0,
     }
 }

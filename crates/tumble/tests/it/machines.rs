@@ -162,7 +162,7 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
     let (h, ball) = (scene.world.dt_s, world.find("ball").unwrap());
     let about_hook = |world: &World| world.momentum().angular - HOOK.cross(&world.momentum().linear);
     let (start, mut before) = (world.energy().total(), world.energy().total());
-    assert!((start - (6.0 * (0.5 * 51.25 - 2.2 * 0.0) + 6.0 * G * 1.6 + 6.4 * G * (3.4 - 16.0 * 0.092))).abs() < 1e-9, "{start}");
+    assert!((start - (6.0 * 0.5 * 7.25 + 6.0 * G * 1.6 + 6.4 * G * (3.4 - 16.0 * 0.092))).abs() < 1e-9, "{start}");
     let (mut expected, begin) = (about_hook(&world), about_hook(&world).norm());
     let (mut met, mut rise, mut off, mut open, mut depth) = (f64::NAN, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
     let mut landed = false;
@@ -184,7 +184,7 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
         }
         if met.is_nan() {
             let t = world.time();
-            let flight = Vec3::new(-2.2 + 7.0 * t, 0.03, 1.6 + 1.5 * t - 0.5 * G * t * t);
+            let flight = Vec3::new(-1.0 + 2.5 * t, 0.03, 1.6 + t - 0.5 * G * t * t);
             assert!((x - flight).norm() < 1e-12, "the ball flies {:e} m off its parabola", (x - flight).norm());
         }
         for k in 0..31 {
@@ -194,9 +194,9 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
         open = open.max((link(&world, "chain", "shackle").position() - HOOK).norm());
     }
     println!("met after {met} s; joints open by {open:e} m; energy rose by {rise:e} J; moment about the hook off by {off:e} of {begin}; depth {depth:e}");
-    assert!((met - 0.2745).abs() < 2.0 * h, "the ball meets the chain after {met} s");
+    assert!((met - 0.28865).abs() < 2.0 * h, "the ball meets the chain after {met} s");
     assert!(open < 1e-12, "joints open by {open:e} m");
-    assert!(rise < 1e-6 * start, "energy rises by {rise:e} J in a frame");
+    assert!(rise < 1e-12 * start, "energy rises by {rise:e} J in a frame");
     assert!(off < 1e-3 * begin, "the moment about the hook is off by {off:e} N·m·s");
     let away = (0..32).map(|k| (link(&world, "chain", &ring(k)).position() - world.site(ball, 0).unwrap().position()).norm());
     assert!(away.fold(f64::INFINITY, f64::min) > 0.5, "the ball has come off the chain");
@@ -211,21 +211,21 @@ fn piston_follows_the_slider_crank_formula_without_drift() {
         scene.world.stepper = stepper;
         let mut world = build(&scene);
         let (r, l, shaft) = (0.06, 0.2, Vec3::new(0.0, 0.0, 0.55));
-        let (mut late, mut off, mut open) = (0.0f64, [0.0f64; 2], 0.0f64);
+        let (mut late, mut off, mut open) = ([0.0f64; 2], [0.0f64; 2], 0.0f64);
         let frames = (seconds / scene.world.dt_s).round() as usize;
         for frame in 1..=frames {
             world.step().unwrap();
             let pin = turned(link(&world, "engine", "crank"), Vec3::x());
             let angle = pin.z.atan2(pin.x);
             let lag = (angle - 2.0 * TAU * world.time()).rem_euclid(TAU);
-            late = late.max(lag.min(TAU - lag));
+            let half = usize::from(2 * frame > frames);
+            late[half] = late[half].max(lag.min(TAU - lag));
             for k in 0..5 {
                 let cylinder = PI / 2.0 + f64::from(k) * TAU / 5.0;
                 let psi = angle - cylinder;
                 let x = r * psi.cos() + (l * l - (r * psi.sin()).powi(2)).sqrt();
                 let piston = link(&world, "engine", &format!("piston_{}", k + 1)).position();
                 let at = shaft + x * Vec3::new(cylinder.cos(), 0.0, cylinder.sin());
-                let half = usize::from(2 * frame > frames);
                 off[half] = off[half].max((piston - at).norm());
                 let rod = link(&world, "engine", &format!("rod_{}", k + 1));
                 let end = rod.position() + turned(rod, Vec3::new(l, 0.0, 0.0));
@@ -233,8 +233,9 @@ fn piston_follows_the_slider_crank_formula_without_drift() {
             }
         }
         let method = world.methods().0;
-        println!("{method}, {seconds} s: pistons off by {off:?} m in each half, rods by {open:e} m, crank by {late:e} rad");
+        println!("{method}, {seconds} s: pistons off by {off:?} m in each half, rods by {open:e} m, crank by {late:?} rad");
         assert!(off[0].max(off[1]) < 1e-6, "{method}: {off:?} m");
-        assert!(late < 1e-6, "{method}: the crank is {late} rad from 4π·t");
+        // the drive holds a velocity at the ends of frames, and nothing holds the angle
+        assert!(late[0].max(late[1]) < 5e-6, "{method}: the crank is {late:?} rad from 4π·t");
     }
 }
