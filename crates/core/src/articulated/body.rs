@@ -121,7 +121,7 @@ pub struct ArticulatedBody {
     pub(super) couplings: Vec<Coupling>,
     /// Whether links meet other links of the same body; links joined to each other never do.
     pub self_collision: bool,
-    /// Pairs of moving links that do not meet, smaller number first; sorted.
+    /// Pairs of links (and the base, as the last) that do not meet, smaller number first; sorted.
     apart: Vec<[usize; 2]>,
     pub(super) start: Vec<f64>,
     pub(super) dynamics: Dynamics,
@@ -240,16 +240,20 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// Keeps two links from meeting.
+    /// Keeps two links from meeting, or a link and the base.
     pub fn keep_apart(&mut self, a: &str, b: &str) -> Result<(), ArticulatedError> {
         let find = |link: &str| self.model.frame(link).map(|f| f.link).ok_or_else(|| self.no_link(link));
-        if let (Some(a), Some(b)) = (find(a)?, find(b)?) {
-            let pair = [a.min(b), a.max(b)];
-            if let Err(place) = self.apart.binary_search(&pair) {
-                self.apart.insert(place, pair);
-            }
+        let pair = self.pair(find(a)?, find(b)?);
+        if let Err(place) = self.apart.binary_search(&pair) {
+            self.apart.insert(place, pair);
         }
         Ok(())
+    }
+
+    /// Two links by number, the smaller first; the base comes after all links.
+    fn pair(&self, a: Option<usize>, b: Option<usize>) -> [usize; 2] {
+        let [a, b] = [a, b].map(|link| link.unwrap_or(self.model.links().len()));
+        [a.min(b), a.max(b)]
     }
 
     /// Sets what acts on one degree of freedom (its place in `v`).
@@ -317,7 +321,7 @@ impl ArticulatedBody {
         let parent = |link: Option<usize>| link.map(|l| self.model.links()[l].parent);
         let grounded = |link: Option<usize>| link.is_none_or(|l| self.model.links()[l].joint != super::Joint::Floating);
         let joined = (parent(a) == Some(b) && grounded(a)) || (parent(b) == Some(a) && grounded(b));
-        let kept = matches!((a, b), (Some(a), Some(b)) if self.apart.binary_search(&[a.min(b), a.max(b)]).is_ok());
+        let kept = self.apart.binary_search(&self.pair(a, b)).is_ok();
         self.self_collision && a != b && !joined && !kept
     }
 

@@ -250,8 +250,7 @@ impl Backtracking {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
                 core.held.fill(0.0);
-                let reach = core.settings.drift_tolerance;
-                hold::hold(core, &mut self.probe, &self.held, h, reach)?;
+                hold::hold(core, &mut self.probe, &self.held, h)?;
                 closing::refresh_at(core, &start);
                 closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;

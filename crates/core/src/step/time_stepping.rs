@@ -20,7 +20,7 @@
 
 use super::contacts::{build_rows, coasting, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
-use super::{closing, hold};
+use super::closing;
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
@@ -33,7 +33,6 @@ use crate::world::{Core, StepError};
 #[derive(Default)]
 pub struct TimeStepping {
     work: Workspace,
-    probe: Workspace,
     x0: Vec<f64>,
     /// Share of the step before the first impact, per coordinate; negative where there is none.
     share: Vec<f64>,
@@ -237,11 +236,6 @@ impl TimeStepping {
         let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
         closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();
-        if !self.work.limits.is_empty() {
-            core.motion().refresh();
-            let passed = hold::passed(core, &mut self.probe, h)?;
-            hold::hold(core, &mut self.probe, &passed, h, recovery)?;
-        }
         core.check_finite(&dp)
     }
 }

@@ -217,3 +217,26 @@ fn a_snapshot_of_links_in_contact_goes_on_with_the_same_bytes() {
     run(&mut fork, 0.3);
     assert!(world.save() == other.save() && world.save() == fork.save());
 }
+
+#[test]
+fn a_link_is_kept_apart_from_the_base_it_does_not_hang_on() {
+    for apart in [false, true] {
+        let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
+        let mut builder = ModelBuilder::new();
+        builder.link("stand", None, Joint::Fixed, Pose::identity(), LinkMass::none());
+        let mut parent = None;
+        for i in 0..2 {
+            let at = Pose::translation(0.0, 0.0, if i == 0 { 1.0 } else { -0.4 });
+            parent = Some(builder.link(format!("link {i}"), parent, Joint::revolute(Vec3::y()), at, rod(1.0, 0.4)));
+        }
+        let mut body = ArticulatedBody::new("arm", builder.build().unwrap()).with_positions(&[1.5, 0.0]).unwrap();
+        body.add_collider("stand", Collider::new(sphere(0.3), Pose::translation(0.0, 0.0, 0.2))).unwrap();
+        body.add_collider("link 1", Collider::new(sphere(0.05), Pose::translation(0.0, 0.0, -0.35))).unwrap();
+        if apart {
+            body.keep_apart("link 1", "stand").unwrap();
+        }
+        world.add(body).unwrap();
+        let met = (0..480).filter(|_| world.step().unwrap().max_penetration > 0.0 || world.contacts().iter().any(|c| c.impulse.norm() > 0.0)).count();
+        assert_eq!(met > 0, !apart);
+    }
+}

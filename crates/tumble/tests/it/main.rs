@@ -4,6 +4,7 @@ mod articulated_scenes;
 mod bad_input;
 mod common;
 mod determinism;
+mod machines;
 mod outputs;
 mod picture;
 mod scenes;
