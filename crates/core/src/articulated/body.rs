@@ -121,8 +121,8 @@ pub struct ArticulatedBody {
     pub(super) couplings: Vec<Coupling>,
     /// Whether links meet other links of the same body; links joined to each other never do.
     pub self_collision: bool,
-    /// Pairs of moving links that do not meet, smaller number first; sorted.
-    apart: Vec<[usize; 2]>,
+    /// Pairs that do not meet, smaller number first and the base (`None`) before all; sorted.
+    apart: Vec<[Option<usize>; 2]>,
     pub(super) start: Vec<f64>,
     pub(super) dynamics: Dynamics,
     pub(super) working: Mutex<Working>,
@@ -240,14 +240,13 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// Keeps two links from meeting.
+    /// Keeps two links from meeting; what is folded into another link, or into the base, stands for all of that.
     pub fn keep_apart(&mut self, a: &str, b: &str) -> Result<(), ArticulatedError> {
         let find = |link: &str| self.model.frame(link).map(|f| f.link).ok_or_else(|| self.no_link(link));
-        if let (Some(a), Some(b)) = (find(a)?, find(b)?) {
-            let pair = [a.min(b), a.max(b)];
-            if let Err(place) = self.apart.binary_search(&pair) {
-                self.apart.insert(place, pair);
-            }
+        let (a, b) = (find(a)?, find(b)?);
+        let pair = [a.min(b), a.max(b)];
+        if let Err(place) = self.apart.binary_search(&pair) {
+            self.apart.insert(place, pair);
         }
         Ok(())
     }
@@ -317,7 +316,7 @@ impl ArticulatedBody {
         let parent = |link: Option<usize>| link.map(|l| self.model.links()[l].parent);
         let grounded = |link: Option<usize>| link.is_none_or(|l| self.model.links()[l].joint != super::Joint::Floating);
         let joined = (parent(a) == Some(b) && grounded(a)) || (parent(b) == Some(a) && grounded(b));
-        let kept = matches!((a, b), (Some(a), Some(b)) if self.apart.binary_search(&[a.min(b), a.max(b)]).is_ok());
+        let kept = self.apart.binary_search(&[a.min(b), a.max(b)]).is_ok();
         self.self_collision && a != b && !joined && !kept
     }
 
