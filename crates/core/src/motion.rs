@@ -80,7 +80,8 @@ impl Motion<'_> {
                 body.derivative(&self.x[span.x.clone()], &self.forces.slice(span), dp);
                 body.accelerations(&self.x[span.x.clone()], dp, sites);
             } else {
-                sites.iter_mut().for_each(|s| (s.acceleration, s.angular_acceleration) = (Vec3::zeros(), Vec3::zeros()));
+                // what is led keeps its generalized velocity: a link that turns about another still has its centripetal acceleration
+                sites.iter_mut().for_each(|s| (s.acceleration, s.angular_acceleration) = (s.bias_acceleration, s.bias_angular_acceleration));
             }
         }
     }

@@ -193,6 +193,10 @@ pub trait Constraint {
     fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
         let _ = (me, view, out);
     }
+    /// Whether its rows act on nothing but itself. They are left out while impulses do not move it: what is led may pass its own limits.
+    fn on_itself(&self) -> bool {
+        false
+    }
 }
 
 /// One row of a [`Constraint`]: what it may do and how far off it is.

@@ -151,8 +151,8 @@ impl RowBuilder<'_> {
     }
 }
 
-/// The constraints of the table in the order in which they were added.
+/// The constraints of the table in the order in which they were added; without those that hold nothing but an object that nothing moves.
 pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (ObjectId, &Entry, &dyn Constraint)> {
     let entries = table.order.iter().map(|&id| (id, &table.slots[id]));
-    entries.filter(|(_, e)| e.status.alive).filter_map(|(id, e)| Some((id, e, e.object.constraint()?)))
+    entries.filter(|(_, e)| e.status.alive).filter_map(|(id, e)| Some((id, e, e.object.constraint().filter(|c| e.moves() || !c.on_itself())?)))
 }

@@ -121,8 +121,8 @@ pub struct ArticulatedBody {
     pub(super) couplings: Vec<Coupling>,
     /// Whether links meet other links of the same body; links joined to each other never do.
     pub self_collision: bool,
-    /// Pairs of links (and the base, as the last) that do not meet, smaller number first; sorted.
-    apart: Vec<[usize; 2]>,
+    /// Pairs that do not meet, smaller number first and the base (`None`) before all; sorted.
+    apart: Vec<[Option<usize>; 2]>,
     pub(super) start: Vec<f64>,
     pub(super) dynamics: Dynamics,
     pub(super) working: Mutex<Working>,
@@ -240,20 +240,15 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// Keeps two links from meeting, or a link and the base.
+    /// Keeps two links from meeting; what is folded into another link, or into the base, stands for all of that.
     pub fn keep_apart(&mut self, a: &str, b: &str) -> Result<(), ArticulatedError> {
         let find = |link: &str| self.model.frame(link).map(|f| f.link).ok_or_else(|| self.no_link(link));
-        let pair = self.pair(find(a)?, find(b)?);
+        let (a, b) = (find(a)?, find(b)?);
+        let pair = [a.min(b), a.max(b)];
         if let Err(place) = self.apart.binary_search(&pair) {
             self.apart.insert(place, pair);
         }
         Ok(())
-    }
-
-    /// Two links by number, the smaller first; the base comes after all links.
-    fn pair(&self, a: Option<usize>, b: Option<usize>) -> [usize; 2] {
-        let [a, b] = [a, b].map(|link| link.unwrap_or(self.model.links().len()));
-        [a.min(b), a.max(b)]
     }
 
     /// Sets what acts on one degree of freedom (its place in `v`).
@@ -316,12 +311,21 @@ impl ArticulatedBody {
         self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)
     }
 
+    /// What a link hangs on: its parent, beyond massless links of a stack. `None` is the base.
+    fn bearer(&self, link: usize) -> Option<usize> {
+        let mut parent = self.model.links()[link].parent;
+        while let Some(p) = parent.filter(|&p| self.model.links()[p].mass == super::LinkMass::none()) {
+            parent = self.model.links()[p].parent;
+        }
+        parent
+    }
+
     /// Whether two different moving links (or the base, `None`) may meet.
     pub(super) fn links_meet(&self, a: Option<usize>, b: Option<usize>) -> bool {
-        let parent = |link: Option<usize>| link.map(|l| self.model.links()[l].parent);
+        let parent = |link: Option<usize>| link.map(|l| self.bearer(l));
         let grounded = |link: Option<usize>| link.is_none_or(|l| self.model.links()[l].joint != super::Joint::Floating);
         let joined = (parent(a) == Some(b) && grounded(a)) || (parent(b) == Some(a) && grounded(b));
-        let kept = self.apart.binary_search(&self.pair(a, b)).is_ok();
+        let kept = self.apart.binary_search(&[a.min(b), a.max(b)]).is_ok();
         self.self_collision && a != b && !joined && !kept
     }
 

@@ -78,6 +78,10 @@ impl Constraint for ArticulatedBody {
     fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
         out.extend(self.limit_errors(&view.x[me.x.clone()]).map(|(_, _, error)| error));
     }
+
+    fn on_itself(&self) -> bool {
+        true
+    }
 }
 
 impl Level {

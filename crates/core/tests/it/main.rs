@@ -32,3 +32,4 @@ mod soft_rows;
 mod solvers;
 mod stacks;
 mod state;
+mod regressions_articulated;
