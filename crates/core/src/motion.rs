@@ -30,6 +30,8 @@ pub(crate) struct Motion<'a> {
     pub applied_generalized: &'a [f64],
     /// Generalized contact forces that hold over the sub-step.
     pub held: &'a [f64],
+    /// Contact forces that hold over the sub-step on links, per site; empty for none.
+    pub held_wrenches: &'a [Wrench],
     /// See [`Core::pin`](crate::world::Core).
     pub pinned: &'a [f64],
     pub pinned_sites: &'a mut [Site],
@@ -60,6 +62,10 @@ impl Motion<'_> {
         self.refresh();
         self.forces.wrenches.clear();
         self.forces.wrenches.extend_from_slice(self.applied);
+        for (wrench, held) in self.forces.wrenches.iter_mut().zip(self.held_wrenches) {
+            wrench.force += held.force;
+            wrench.torque += held.torque;
+        }
         self.forces.generalized.clear();
         self.forces.generalized.extend(self.held.iter().zip(self.applied_generalized).map(|(held, applied)| held + applied));
         let view = WorldView { time: t, gravity: self.gravity, implicit: self.implicit, x: self.x, sites: self.sites, table: self.table };

@@ -63,7 +63,7 @@ impl Bench {
     fn motion(&mut self) -> Motion<'_> {
         Motion {
             table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces, gravity: Vec3::zeros(),
-            implicit: false, applied: &self.applied, applied_generalized: &[0.0; 6], held: &self.held, pinned: &[], pinned_sites: &mut [],
+            implicit: false, applied: &self.applied, applied_generalized: &[0.0; 6], held: &self.held, held_wrenches: &[], pinned: &[], pinned_sites: &mut [],
         }
     }
 }

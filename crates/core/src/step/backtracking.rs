@@ -30,7 +30,9 @@ use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
 use crate::rows::RowSet;
 use crate::settings::Integrator;
+use crate::site::Wrench;
 use crate::solver::Accuracy;
+use crate::view::Entry;
 use crate::world::{Core, StepError};
 
 /// The stepper of the thesis, `backtracking`.
@@ -195,7 +197,7 @@ impl Backtracking {
             let after: Vec<f64> = u.iter().zip(&work.du).map(|(u, du)| u + left * du).collect();
             push_to(core, &after, &u);
         } else {
-            recover(core, &work.du, &mut held);
+            hold_forces(core, work, &mut held);
         }
         core.publish(&work.touches, impulses(work, &work.lambda).map(|f| f * left).collect(), impulses(work, &work.lambda));
         Ok(held)
@@ -249,7 +251,7 @@ impl Backtracking {
                 if self.adaptive.path.goes_beyond(h) {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
-                core.held.fill(0.0);
+                core.let_go();
                 hold::hold(core, &mut self.probe, &self.held, h)?;
                 closing::refresh_at(core, &start);
                 closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
@@ -259,7 +261,7 @@ impl Backtracking {
             core.report.max_penetration = deepest;
             if stuck {
                 core.x.copy_from_slice(&start);
-                core.held.fill(0.0);
+                core.let_go();
                 core.motion().refresh();
                 return Ok(0.0);
             }
@@ -323,6 +325,35 @@ impl Backtracking {
         detect(core, 0.0, &mut self.after);
         limits(core, core.time + h, &mut self.limits_after)?;
         Ok(self.watch.margin(&self.work.touches, &self.after, &self.limits_after, core.settings.contact_tolerance))
+    }
+}
+
+/// The forces that hold over the sub-step: generalized ones into `held`. What contacts do to an object whose state holds velocities is kept as wrenches on
+/// its parts: its coordinates turn with its links, and a force in them would turn too.
+fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
+    recover(core, &work.du, held);
+    core.held_wrenches.clear();
+    let on_links = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
+    if work.touches.is_empty() || !core.table.iter().any(on_links) {
+        return;
+    }
+    let mut joined = vec![0.0; core.dof];
+    work.rows.blocks[work.touches.len()..].iter().for_each(|block| work.rows.apply_block(block, &work.lambda, &mut joined));
+    let mut generalized = vec![0.0; core.dof];
+    recover(core, &joined, &mut generalized);
+    for entry in core.table.iter().filter(|e| on_links(e)) {
+        held[entry.span.v.clone()].copy_from_slice(&generalized[entry.span.v.clone()]);
+    }
+    core.held_wrenches.resize(core.sites.len(), Wrench::default());
+    for (touch, force) in work.touches.iter().zip(impulses(work, &work.lambda)) {
+        for (site, point, force) in [(touch.a, touch.contact.point, force), (touch.b, touch.point_b(), -force)] {
+            if on_links(&core.table.slots[core.owners[site as usize].id]) {
+                let arm = point - core.sites[site as usize].position();
+                let wrench = &mut core.held_wrenches[site as usize];
+                wrench.force += force;
+                wrench.torque += arm.cross(&force);
+            }
+        }
     }
 }
 

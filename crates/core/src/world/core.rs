@@ -92,6 +92,8 @@ pub struct Core {
     /// See [`WorldView::implicit`](crate::WorldView::implicit).
     pub(crate) implicit: bool,
     pub(crate) held: Vec<f64>,
+    /// Contact forces that hold over the sub-step, per site, of objects whose state holds velocities; empty for none.
+    pub(crate) held_wrenches: Vec<Wrench>,
     /// Where the caches of objects whose state holds velocities are kept, whatever state is refreshed; empty for none. And their sites there.
     pub(crate) pinned: (Vec<f64>, Vec<Site>),
     pub(crate) forces: Forces,
@@ -110,6 +112,12 @@ pub struct Core {
 }
 
 impl Core {
+    /// No contact or joint forces hold any more.
+    pub(crate) fn let_go(&mut self) {
+        self.held.fill(0.0);
+        self.held_wrenches.clear();
+    }
+
     /// Keeps the caches of objects whose state holds velocities at `middle` until [`unpin`](Self::unpin): their impulses act in the middle of a
     /// step, as momentum kicks do for others. Sites still follow the state.
     pub(crate) fn pin(&mut self, middle: Vec<f64>) {
@@ -140,7 +148,7 @@ impl Core {
     pub(crate) fn motion(&mut self) -> Motion<'_> {
         Motion {
             table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces,
-            gravity: self.settings.gravity, implicit: self.implicit, applied: &self.applied, applied_generalized: &self.applied_generalized, held: &self.held,
+            gravity: self.settings.gravity, implicit: self.implicit, applied: &self.applied, applied_generalized: &self.applied_generalized, held: &self.held, held_wrenches: &self.held_wrenches,
             pinned: &self.pinned.0, pinned_sites: &mut self.pinned.1,
         }
     }

@@ -89,7 +89,7 @@ impl World {
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
         let core = Core {
-            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), pinned: Default::default(),
+            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), held_wrenches: Vec::new(), pinned: Default::default(),
             forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
             report: StepReport::default(), next_serial: 0, inner_step: 0.0,
@@ -128,7 +128,7 @@ impl World {
     pub fn step(&mut self) -> Result<&StepReport, StepError> {
         let core = &mut self.core;
         core.report = StepReport::default();
-        core.held.fill(0.0);
+        core.let_go();
         self.before.clone_from(&core.x);
         let (time, warm, inner_step) = (core.time, core.warm.clone(), core.inner_step);
         let outcome = self.stepper.step(Frame { core });
@@ -308,7 +308,7 @@ impl World {
         World {
             core: Core {
                 table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(),
-                held: c.held.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
+                held: c.held.clone(), held_wrenches: c.held_wrenches.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
                 contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, inner_step: c.inner_step,
             },

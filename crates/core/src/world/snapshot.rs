@@ -121,7 +121,7 @@ impl World {
         }
         core.applied_generalized = saved.applied_generalized;
         core.contacts.clear();
-        core.held.fill(0.0);
+        core.let_go();
         core.motion().refresh();
         Ok(())
     }
