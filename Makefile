@@ -5,7 +5,7 @@
 help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/"
 	@echo "make test       install what is missing, run all tests, check the papers"
-	@echo "make test-slow  the same, and the determinism tests over a minute"
+	@echo "make test-slow  the same, and determinism and energy over a minute"
 	@echo "make lint       clippy; warnings are errors"
 	@echo "make bench      step times beside Rapier (benches/peers, a workspace of its own)"
 	@echo "make clean      remove everything built"

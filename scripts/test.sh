@@ -20,7 +20,7 @@ stage build cargo test $tests --no-run
 # shellcheck disable=SC2086
 stage tests cargo test $tests --no-fail-fast
 # shellcheck disable=SC2086
-[ "${1:-}" != --slow ] || stage "slow tests" env TUMBLE_SLOW=1 cargo test $tests --no-fail-fast determinism
+[ "${1:-}" != --slow ] || stage "slow tests" env TUMBLE_SLOW=1 cargo test $tests --no-fail-fast -- determinism full_length
 stage "doc tests" cargo test --no-fail-fast --release --workspace --locked --doc
 stage papers python3 scripts/check_papers.py
 

@@ -94,6 +94,11 @@ pub trait Collidable {
     fn kind(&self, part: usize) -> CollisionKind;
     /// Whether a part meets parts of that kind. Two parts meet when both say so.
     fn collides_with(&self, part: usize, other: CollisionKind) -> bool;
+    /// Whether impulses can move a part at all: not what of a moving object is fixed to the world.
+    fn part_moves(&self, part: usize) -> bool {
+        let _ = part;
+        true
+    }
     /// Whether two parts of this same object meet.
     fn parts_meet(&self, part_a: usize, part_b: usize) -> bool {
         let _ = (part_a, part_b);

@@ -209,10 +209,10 @@ fn across(v: Vec3, along: &Vec3) -> Vec3 {
 
 /// Whether two parts are to be tested: one of them moves, and both kinds say yes.
 fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize) -> bool {
-    if !(a.moves() || b.moves()) {
+    let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
+    if !(a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
         return false;
     }
-    let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
     if a.serial == b.serial && !ca.parts_meet(part_a, part_b) {
         return false;
     }

@@ -36,7 +36,7 @@ pub struct Settings {
     pub integrator_tolerance: f64,
     /// Effort of the iterative solvers.
     pub accuracy: Accuracy,
-    /// Sweeps at most of the position projection.
+    /// Sweeps at most of the position projection; of groups with joints as many as [`Settings::accuracy`] grants a solve, if that is more.
     pub projection_sweeps: u32,
     /// Whether the equality rows of constraints (joints) are held in place too, and not in velocity alone: off, they drift.
     pub stabilize_positions: bool,

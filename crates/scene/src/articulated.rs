@@ -9,6 +9,7 @@ use tumble_core::collide::Pose;
 
 use crate::body::{Library, read_name};
 use crate::bound::Bound;
+use crate::file::Place;
 use crate::fields::{Fields, Names, Value, number_of};
 use crate::link::{Inherited, LinkRow, LinkSpec, Surface};
 use crate::rotation;
@@ -56,7 +57,7 @@ impl ArticulatedSpec {
     }
 
     /// Reads one; `None`, with the problems recorded, where it has no links.
-    pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, folder: &Path) -> Option<ArticulatedSpec> {
+    pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, place: &Place<'_>) -> Option<ArticulatedSpec> {
         let name = read_name(&mut f).unwrap_or_default();
         let base = rotation::read_pose(&mut f);
         let surface = Surface::read(&mut f, library, &Surface::default());
@@ -70,7 +71,7 @@ impl ArticulatedSpec {
             collides: f.flag_or("collides", true), visible: f.flag_or("visible", true),
         };
         match f.value("urdf") {
-            Some(_) => spec.read_urdf(&mut f, &from, folder)?,
+            Some(_) => spec.read_urdf(&mut f, &from, place)?,
             None => spec.read_links(&mut f, &from),
         }
         spec.read_joints(&mut f);
@@ -133,17 +134,22 @@ impl ArticulatedSpec {
     }
 
     /// `urdf`, with the keys that only it has.
-    fn read_urdf(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>, folder: &Path) -> Option<()> {
+    fn read_urdf(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>, place: &Place<'_>) -> Option<()> {
         let (path, value) = f.optional_text("urdf")?;
         let options = UrdfOptions {
             floating: from.floating,
-            packages: read_packages(f, folder),
+            packages: read_packages(f, place.folder),
             missing_meshes: f.choice_or("missing_meshes", MISSING, MissingMeshes::Error),
             collision_meshes: f.choice_or("collision_meshes", COLLISION, CollisionMeshes::Exact),
             surface: from.surface.clone(),
             recolor: f.value("color").is_some() || f.value("material").is_some(),
         };
-        match crate::urdf::read_file(&folder.join(path), &options, true) {
+        let file = place.folder.join(path);
+        let robot = match place.files.iter().find(|(name, _)| *name == path) {
+            Some((_, text)) => crate::urdf::read_text(text, &file, &options, true),
+            None => crate::urdf::read_file(&file, &options, true),
+        };
+        match robot {
             Ok(robot) => {
                 self.links = robot.links;
                 self.notes = robot.notes;

@@ -87,20 +87,26 @@ impl SceneFile {
     /// # Errors
     /// [`SceneError::TooLarge`] or [`SceneError::Invalid`].
     pub fn parse(text: &str, file_name: &str) -> Result<SceneFile, SceneError> {
+        SceneFile::parse_with(text, file_name, &[])
+    }
+
+    /// The same with texts that stand in for files of the scene's folder: names and contents.
+    pub(crate) fn parse_with(text: &str, file_name: &str, files: &[(&str, &str)]) -> Result<SceneFile, SceneError> {
         if text.len() as u64 > MOST_BYTES {
             return Err(SceneError::TooLarge { file: file_name.into(), limit: MOST_BYTES });
         }
         let log = Log::new(text);
         // What follows a slip of syntax is guesswork: it is told alone.
-        let scene = parse_toml(&log, text).map(|root| SceneFile::read(&log, &root, file_name));
+        let scene = parse_toml(&log, text).map(|root| SceneFile::read(&log, &root, file_name, files));
         match scene {
             Some(scene) if log.count() == 0 => Ok(scene),
             _ => Err(invalid(log, text, file_name)),
         }
     }
 
-    fn read(log: &Log<'_>, root: &DeTable<'_>, file_name: &str) -> SceneFile {
+    fn read(log: &Log<'_>, root: &DeTable<'_>, file_name: &str, files: &[(&str, &str)]) -> SceneFile {
         let folder = Path::new(file_name).parent().unwrap_or(Path::new(""));
+        let place = Place { folder, files };
         let mut f = Fields::of_table(log, root, 0..0, "the scene");
         let description = f.optional_text("description").map_or("", |(text, _)| text).to_owned();
         let world = read_table(&mut f, "world", WorldSettings::read).unwrap_or_default();
@@ -110,7 +116,7 @@ impl SceneFile {
         let library = library(&meshes, &materials);
         let mut names = BTreeMap::new();
         let bodies = read_bodies(&mut f, &library, &mut names);
-        let articulated = read_articulated(&mut f, &library, folder, &mut names);
+        let articulated = read_articulated(&mut f, &library, &place, &mut names);
         let closures = read_closures(&mut f, &Objects { bodies: &bodies, articulated: &articulated }, &mut names);
         let camera = read_table(&mut f, "camera", CameraSpec::read);
         let mut lights: Vec<LightSpec> =
@@ -136,6 +142,14 @@ impl SceneFile {
             ground,
         }
     }
+}
+
+/// Where the files are that a scene names.
+pub(crate) struct Place<'a> {
+    /// The folder of the scene.
+    pub folder: &'a Path,
+    /// Names and contents of those that came with the text of the scene.
+    pub files: &'a [(&'a str, &'a str)],
 }
 
 /// The tree of a TOML text; `None`, with the problems recorded, if it is no TOML.
@@ -240,10 +254,10 @@ fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>, names: &mut Taken) -> 
 }
 
 /// All articulated bodies, each with a name that no other object has.
-fn read_articulated(f: &mut Fields<'_>, library: &Library<'_>, folder: &Path, names: &mut Taken) -> Vec<ArticulatedSpec> {
+fn read_articulated(f: &mut Fields<'_>, library: &Library<'_>, files: &Place<'_>, names: &mut Taken) -> Vec<ArticulatedSpec> {
     let one = |mut table: Fields<'_>| {
         let (log, place) = (table.log, name_span(&mut table));
-        let spec = ArticulatedSpec::read(table, library, folder)?;
+        let spec = ArticulatedSpec::read(table, library, files)?;
         if !spec.name.is_empty() {
             note_unique(log, "object", names, &spec.name, &place);
         }

@@ -13,15 +13,25 @@ pub struct Shipped {
     pub name: &'static str,
     /// The whole text of its `scene.toml`.
     pub text: &'static str,
+    /// Names and contents of the other files of its folder that it reads.
+    pub files: &'static [(&'static str, &'static str)],
 }
 
-macro_rules! shipped_scenes {
-    ($($name:literal),* $(,)?) => {
-        &[$(Shipped { name: $name, text: include_str!(concat!("../../../scenes/", $name, "/scene.toml")) }),*]
+macro_rules! shipped_file {
+    ($name:literal, $file:literal) => {
+        include_str!(concat!("../../../scenes/", $name, "/", $file))
     };
 }
 
-const SHIPPED: &[Shipped] = shipped_scenes!["falling", "stack", "billiards", "bowling", "incline"];
+/// Names of folders, each with the files beside its `scene.toml`.
+macro_rules! shipped_scenes {
+    ($($name:literal $([$($file:literal),*])?),* $(,)?) => {
+        &[$(Shipped { name: $name, text: shipped_file!($name, "scene.toml"), files: &[$($(($file, shipped_file!($name, $file))),*)?] }),*]
+    };
+}
+
+const SHIPPED: &[Shipped] =
+    shipped_scenes!["falling", "stack", "billiards", "bowling", "incline", "pendulum", "chain", "piston", "skeleton", "robot" ["arm.urdf"]];
 
 /// The scenes that come with tumble.
 pub fn shipped() -> &'static [Shipped] {
@@ -39,7 +49,7 @@ impl Shipped {
     /// # Errors
     /// None for the scenes as they are; the type is that of [`SceneFile::parse`].
     pub fn read(&self) -> Result<SceneFile, SceneError> {
-        SceneFile::parse(self.text, &format!("scenes/{}/scene.toml", self.name))
+        SceneFile::parse_with(self.text, &format!("scenes/{}/scene.toml", self.name), self.files)
     }
 }
 

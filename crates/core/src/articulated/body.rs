@@ -311,9 +311,18 @@ impl ArticulatedBody {
         self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)
     }
 
+    /// What a link hangs on: its parent, beyond massless links of a stack. `None` is the base.
+    fn bearer(&self, link: usize) -> Option<usize> {
+        let mut parent = self.model.links()[link].parent;
+        while let Some(p) = parent.filter(|&p| self.model.links()[p].mass == super::LinkMass::none()) {
+            parent = self.model.links()[p].parent;
+        }
+        parent
+    }
+
     /// Whether two different moving links (or the base, `None`) may meet.
     pub(super) fn links_meet(&self, a: Option<usize>, b: Option<usize>) -> bool {
-        let parent = |link: Option<usize>| link.map(|l| self.model.links()[l].parent);
+        let parent = |link: Option<usize>| link.map(|l| self.bearer(l));
         let grounded = |link: Option<usize>| link.is_none_or(|l| self.model.links()[l].joint != super::Joint::Floating);
         let joined = (parent(a) == Some(b) && grounded(a)) || (parent(b) == Some(a) && grounded(b));
         let kept = self.apart.binary_search(&[a.min(b), a.max(b)]).is_ok();

@@ -98,7 +98,7 @@ impl Freedom {
     pub(super) fn fault(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
         let least = |what, value: f64| (!(value.is_finite() && value >= 0.0)).then_some((what, value, "finite and at least 0"));
         let finite = |what, value: f64| (!value.is_finite()).then_some((what, value, "finite"));
-        let limit = |value: f64| (!(value >= 0.0)).then_some(("the drive's limit", value, "at least 0; infinite for none"));
+        let limit = |value: f64| (value.is_nan() || value < 0.0).then_some(("the drive's limit", value, "at least 0; infinite for none"));
         if !positional && (self.limits.is_some() || self.spring.is_some() || self.drive != Drive::None) {
             return Some(("the number of its joint's freedoms that have limits, springs or drives", 1.0, "0: only revolute and prismatic joints have them"));
         }

@@ -234,6 +234,10 @@ impl Collidable for ArticulatedBody {
         self.collider(part).is_some_and(|p| p.collider.meets & other.bit() != 0)
     }
 
+    fn part_moves(&self, part: usize) -> bool {
+        self.link_of(part).is_some()
+    }
+
     fn parts_meet(&self, part_a: usize, part_b: usize) -> bool {
         self.links_meet(self.link_of(part_a), self.link_of(part_b))
     }

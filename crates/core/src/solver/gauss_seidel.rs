@@ -93,7 +93,10 @@ fn write_back(locals: &[Local], lambda: &mut [f64]) {
 fn apply(locals: &[Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
     write_back(locals, lambda);
     for local in locals.iter().filter(|l| l.lambda != [0.0; 3]) {
-        rows.apply_block(local.block, lambda, du);
+        match (local.six, &local.step) {
+            (Some(six), Step::Contact(_)) => six.push(rows, local.lambda, du),
+            _ => rows.apply_block(local.block, lambda, du),
+        }
     }
     linkages.settle(rows, c, lambda, du)
 }
@@ -259,9 +262,9 @@ impl<'a> Local<'a> {
                     Some(sides) => sides.velocity(0),
                     None => rows.row_velocity(self.block, 0, du),
                 };
-                let next = scalar.solve(self.lambda[0], self.c[0] + velocity);
-                let delta = next - self.lambda[0];
+                let delta = scalar.change(self.lambda[0], self.c[0], velocity);
                 if delta != 0.0 {
+                    let next = clamp(self.lambda[0] + delta, scalar.lo, scalar.hi);
                     self.lambda[0] = next;
                     progress.against -= delta * (next - self.last[0]);
                     progress.note((delta * scalar.k).abs());
@@ -283,8 +286,7 @@ impl<'a> Local<'a> {
                     }
                     None => [0, 1, 2].map(|k| self.c[k] + rows.row_velocity(self.block, k, du)),
                 };
-                let next = contact.solve(self.lambda, w);
-                let delta = [next[0] - self.lambda[0], next[1] - self.lambda[1], next[2] - self.lambda[2]];
+                let (next, delta) = contact.solve(self.lambda, w);
                 if delta != [0.0; 3] {
                     self.lambda = next;
                     let last = &self.last;
@@ -314,10 +316,12 @@ impl<'a> Local<'a> {
 }
 
 impl Scalar {
-    /// The multiplier that answers row velocity `w`, but for the compliance, found with multiplier `old`.
+    /// How the multiplier changes where it was `old` and the row velocity is `w = c + velocity + R·old`. Written so that what waits for
+    /// the velocity is short: rows of one body wait for each other.
     #[inline(always)]
-    fn solve(&self, old: f64, w: f64) -> f64 {
-        clamp(old - (w + self.compliance * old) * self.inverse, self.lo, self.hi)
+    fn change(&self, old: f64, c: f64, velocity: f64) -> f64 {
+        let without = -(c + self.compliance * old) * self.inverse;
+        clamp(without - velocity * self.inverse, self.lo - old, self.hi - old)
     }
 }
 

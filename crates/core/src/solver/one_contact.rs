@@ -60,17 +60,18 @@ impl Contact {
         normal >= 0.0 && !self.coupled && old == [0.0; 3]
     }
 
-    /// The multipliers that answer row velocities `w` found with multipliers `old`: `b = w − K·old`.
+    /// The multipliers that answer row velocities `w` found with multipliers `old`, and how they differ from those: `b = w − K·old`.
     #[inline(always)]
-    pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+    pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> ([f64; 3], [f64; 3]) {
         if let Some(inverse) = &self.inverse {
-            let step = inverse.times(w);
-            let full = [old[0] - step[0], old[1] - step[1], old[2] - step[2]];
+            let delta = inverse.times(w).map(|x| -x);
+            let full = [old[0] + delta[0], old[1] + delta[1], old[2] + delta[2]];
             if full[0] >= 0.0 && full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0]) {
-                return full;
+                return (full, delta);
             }
         }
-        self.open_or_slide(old, w)
+        let next = self.open_or_slide(old, w);
+        (next, [next[0] - old[0], next[1] - old[1], next[2] - old[2]])
     }
 
     /// The answers without sticking: the rarer ones in a pile.

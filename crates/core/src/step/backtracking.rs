@@ -102,7 +102,7 @@ impl Backtracking {
         let hold = core.settings.stabilize_positions;
         let drifted = |t: &RowTarget| if closing::is_joint(t) { hold && off(-t.error.abs()) } else { t.set == RowSet::HalfLine && off(t.error) };
         if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
-            projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance);
+            projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance)?;
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
         }
@@ -250,8 +250,7 @@ impl Backtracking {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
                 core.held.fill(0.0);
-                let reach = core.settings.drift_tolerance;
-                hold::hold(core, &mut self.probe, &self.held, h, reach)?;
+                hold::hold(core, &mut self.probe, &self.held, h)?;
                 closing::refresh_at(core, &start);
                 closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;

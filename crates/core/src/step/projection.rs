@@ -6,25 +6,27 @@
 //!
 //! `v̄` is the displacement velocity of the step, less what led bodies and motors are meant to move (0 for a projection in place, with
 //! `h = 1`). What was wrong before is recovered at a bounded speed. Where nothing but joints moves an island, `closing.rs` does it at the end of the step.
+//! Limits that tell their gap at any state (of joints, of rods) are asked for it at the end of the step, in place of `gap + h·J·v̄`: as links swing
+//! about each other a joint does not move by the mean of its two velocities.
 
-use super::closing;
-use super::contacts::{Workspace, displace};
+use super::closing::{self, refresh_at};
+use super::contacts::{Workspace, displace, limits};
 use crate::object::RowTarget;
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, GaussSeidel, RowSolver};
-use crate::world::Core;
+use crate::world::{Core, StepError};
 
 /// What is to be projected.
 pub(crate) enum Displacement<'a> {
-    /// The displacement `h·mean` (whitened) of a step that ends here; led bodies and motors move with their own velocities.
-    Step { mean: &'a [f64], h: f64 },
+    /// The displacement `h·mean` (whitened) of a step from the state `start` that ends here; led bodies and motors move with their own velocities.
+    Step { start: &'a [f64], mean: &'a [f64], h: f64 },
     /// None: bodies are moved apart where they are.
     InPlace,
 }
 
 /// Corrects positions so that the displacement ends without overlap. `recovery` bounds how much of the error that was there before is undone,
 /// metres; an island that is wrong by no more than `least` metres is left alone.
-pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displacement, recovery: f64, least: f64) {
+pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displacement, recovery: f64, least: f64) -> Result<(), StepError> {
     let in_place = matches!(displacement, Displacement::InPlace);
     let h = if let Displacement::Step { h, .. } = displacement { h } else { 1.0 };
     for (b, block) in work.rows.blocks.iter().enumerate() {
@@ -33,6 +35,9 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
             Displacement::Step { mean, .. } => work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean) - target,
             Displacement::InPlace => 0.0,
         };
+    }
+    if let Displacement::Step { start, h, .. } = displacement {
+        ask_limits(core, work, start, h)?;
     }
     let (touches, hold) = (work.touches.len(), core.settings.stabilize_positions);
     let violation = |b: usize, c: &[f64]| -> f64 {
@@ -47,7 +52,7 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
     };
     let worst = (0..work.rows.blocks.len()).map(|b| violation(b, &work.c)).fold(0.0, f64::max);
     if worst <= least {
-        return;
+        return Ok(());
     }
     let mut p = std::mem::take(&mut work.projection);
     p.fill(work, h, recovery, hold);
@@ -63,12 +68,37 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
         }
         let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
         if worst > least {
-            let accuracy = Accuracy { sweeps: core.settings.projection_sweeps, relaxations: u32::MAX, tolerance: 0.1 * least / h };
+            // the rows of a body's limits and contacts lean on each other through all its links, and a pile's do not
+            let jointed = blocks.iter().any(|&b| b as usize >= touches);
+            let most = if jointed { core.settings.accuracy.sweeps } else { 0 };
+            let accuracy = Accuracy { sweeps: core.settings.projection_sweeps.max(most), relaxations: u32::MAX, tolerance: 0.1 * least / h };
             GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, accuracy);
         }
     }
     displace(core, &p.du, h);
     work.projection = p;
+    Ok(())
+}
+
+/// Makes `h·c` of the limits what the step did to their gaps, where one is near enough to be passed. Sites and caches are those of `start` before and after.
+fn ask_limits(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64) -> Result<(), StepError> {
+    let touches = work.touches.len();
+    let row = |target: u32| work.rows.blocks[touches + target as usize].row as usize;
+    let near = |target: u32| work.targets[target as usize].error <= core.settings.drift_tolerance + 2.0 * h * work.c[row(target)].abs();
+    if !work.limits.iter().any(|limit| limit.target.is_some_and(near)) {
+        return Ok(());
+    }
+    let (pinned, mut ends) = (core.unpin(), Vec::new());
+    core.motion().refresh();
+    limits(core, core.time + h, &mut ends)?;
+    core.pin_again(pinned);
+    refresh_at(core, start);
+    for (limit, end) in work.limits.iter().zip(ends).filter(|(limit, end)| limit.key == end.key) {
+        if let Some(target) = limit.target {
+            work.c[row(target)] = (end.gap - work.targets[target as usize].error) / h;
+        }
+    }
+    Ok(())
 }
 
 fn allowed(gap: f64, recovery: f64) -> f64 {

@@ -21,7 +21,7 @@
 
 use super::contacts::{build_rows, coasting, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
-use super::{closing, hold};
+use super::closing;
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
@@ -35,7 +35,6 @@ use crate::world::{Core, StepError};
 #[derive(Default)]
 pub struct TimeStepping {
     work: Workspace,
-    probe: Workspace,
     x0: Vec<f64>,
     /// Share of the step before the first impact, per coordinate; negative where there is none.
     share: Vec<f64>,
@@ -240,17 +239,12 @@ impl TimeStepping {
         let mean: Vec<f64> = (0..core.dof).map(|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]).collect();
         let recovery = core.settings.recovery_speed * h;
         let least = core.settings.contact_tolerance;
-        projection::project(core, &mut self.work, Displacement::Step { mean: &mean, h }, recovery, least);
+        projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean: &mean, h }, recovery, least)?;
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
         let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
         closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();
-        if !self.work.limits.is_empty() {
-            core.motion().refresh();
-            let passed = hold::passed(core, &mut self.probe, h)?;
-            hold::hold(core, &mut self.probe, &passed, h, recovery)?;
-        }
         core.check_finite(&dp)
     }
 }

@@ -105,8 +105,10 @@ fn a_chain_drapes_over_a_sphere() {
             world.step().unwrap();
             last = world.energy().kinetic.max(last);
         }
-        let weight: f64 = world.contacts().iter().map(|c| if c.a == id { c.impulse.z } else { -c.impulse.z }).sum();
-        println!("{stepper}: kinetic energy {last:.1e} J, lowest link at {:.3} m, impulse {weight:.5} N·s of {:.5}", world.site(id, 0).unwrap().position().z, 10.0 * 0.05 * 9.81 / 240.0);
+        let up: f64 = world.contacts().iter().map(|c| if c.a == id { c.force.z } else { -c.force.z }).sum();
+        println!("{stepper}: kinetic energy {last:.1e} J, held up by {up:.6} N");
+        assert!(last < 1e-12 && (up - 10.0 * 0.05 * 9.81).abs() < 1e-6, "{stepper}: {last} {up}");
+        assert!(world.site(id, 0).unwrap().position().z < 0.1, "its ends hang down");
         joined(&world, id, 10);
         assert!(world.report().max_penetration < 1e-3);
     }
@@ -214,4 +216,27 @@ fn a_snapshot_of_links_in_contact_goes_on_with_the_same_bytes() {
     run(&mut other, 0.3);
     run(&mut fork, 0.3);
     assert!(world.save() == other.save() && world.save() == fork.save());
+}
+
+#[test]
+fn a_link_is_kept_apart_from_the_base_it_does_not_hang_on() {
+    for apart in [false, true] {
+        let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
+        let mut builder = ModelBuilder::new();
+        builder.link("stand", None, Joint::Fixed, Pose::identity(), LinkMass::none());
+        let mut parent = None;
+        for i in 0..2 {
+            let at = Pose::translation(0.0, 0.0, if i == 0 { 1.0 } else { -0.4 });
+            parent = Some(builder.link(format!("link {i}"), parent, Joint::revolute(Vec3::y()), at, rod(1.0, 0.4)));
+        }
+        let mut body = ArticulatedBody::new("arm", builder.build().unwrap()).with_positions(&[1.5, 0.0]).unwrap();
+        body.add_collider("stand", Collider::new(sphere(0.3), Pose::translation(0.0, 0.0, 0.2))).unwrap();
+        body.add_collider("link 1", Collider::new(sphere(0.05), Pose::translation(0.0, 0.0, -0.35))).unwrap();
+        if apart {
+            body.keep_apart("link 1", "stand").unwrap();
+        }
+        world.add(body).unwrap();
+        let met = (0..480).filter(|_| world.step().unwrap().max_penetration > 0.0 || world.contacts().iter().any(|c| c.impulse.norm() > 0.0)).count();
+        assert_eq!(met > 0, !apart);
+    }
 }

@@ -8,6 +8,7 @@ mod adaptive;
 mod articulated_agree;
 mod articulated_closed;
 mod articulated_laws;
+mod articulated_limits;
 mod articulated_random;
 mod articulated_contacts;
 mod articulated_joints;

@@ -90,8 +90,8 @@ fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Context<'_>) -
     let negative = eigen.eigenvalues.min() < 0.0;
     if let Some(fault) = inertia_fault(&inertia) {
         let what = match fault {
-            InertiaFault::Negative(_) => "has principal moments below 0, which are set to 0",
-            InertiaFault::Triangle(_) => "is that of no rigid body: one principal moment is greater than the sum of the others",
+            InertiaFault::Negative(_) => "principal moments below 0 are set to 0",
+            InertiaFault::Triangle(_) => "one principal moment is greater than the sum of the others, as that of no rigid body; it is used as it is",
         };
         let line = element.log.line(element.span().start);
         context.notes.add(format!("{}:{line}: {}", context.file, element.what()), what);

@@ -186,7 +186,7 @@ fn wrong_numbers() {
 fn an_inertia_of_no_body_is_mended_and_told() {
     let robot = read(&two("continuous", "").replace("ixx=\"1\" iyy=\"1\" izz=\"1\"", "ixx=\"-0.5\" iyy=\"1\" izz=\"1\""));
     assert_eq!(robot.notes.len(), 1);
-    assert_eq!(robot.notes[0], "r.urdf:3: the inertia of the inertial of link \"b\": has principal moments below 0, which are set to 0");
+    assert_eq!(robot.notes[0], "r.urdf:3: the inertia of the inertial of link \"b\": principal moments below 0 are set to 0");
     assert!((robot.model.links()[0].mass.inertia - Mat3::from_diagonal(&Vec3::new(0.0, 1.0, 1.0))).amax() < 1e-15);
 }
 

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The shipped scenes.
-pub const SCENES: [&str; 5] = ["billiards", "bowling", "falling", "incline", "stack"];
+pub const SCENES: [&str; 10] =
+    ["billiards", "bowling", "chain", "falling", "incline", "pendulum", "piston", "robot", "skeleton", "stack"];
 pub const STEPPERS: [&str; 2] = ["time_stepping", "backtracking"];
 
 /// A folder that is removed in the end.

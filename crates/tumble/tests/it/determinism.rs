@@ -21,6 +21,7 @@ fn seconds(scene: &str) -> f64 {
         _ if std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1") => 60.0,
         "bowling" => 3.2, // the ball meets the pins after 2.55 s
         "stack" => 0.5,
+        "chain" => 1.0, // the ball meets it after 0.29 s
         _ => 2.0,
     }
 }
@@ -49,7 +50,8 @@ fn a_state_saved_in_mid_contact_goes_on_in_another_process_as_if_nothing_had_hap
             let summary = text(&folder.path("half.json"));
             let first = [scene, "--seconds", &half.to_string(), "--stepper", stepper, "--summary", &summary];
             let halfway = state(&folder, "half", &first);
-            assert!(json(summary.as_ref())["contacts_max"].as_u64() > Some(0), "{scene} in {stepper}: nothing touched before the save");
+            let free = ["pendulum", "piston"].contains(&scene);
+            assert!(free || json(summary.as_ref())["contacts_max"].as_u64() > Some(0), "{scene} in {stepper}: nothing touched before the save");
             let from = text(&folder.path("half"));
             let resumed = state(&folder, "rest", &[scene, "--seconds", &half.to_string(), "--stepper", stepper, "--restore", &from]);
             assert!(resumed != halfway, "{scene} in {stepper}: nothing happened after the restore");

@@ -1,8 +1,10 @@
 //! The `tumble` command as its users run it: processes, files, exit codes.
 
+mod articulated_scenes;
 mod bad_input;
 mod common;
 mod determinism;
+mod machines;
 mod outputs;
 mod picture;
 mod scenes;
