@@ -90,6 +90,11 @@ pub trait Integratable {
     fn coast(&self, x: &mut [f64], h: f64);
     /// Positions move with generalized velocity `v` for `h` seconds; exact on rotations. Momentum stays.
     fn drift(&self, x: &mut [f64], v: &[f64], h: f64);
+    /// Positions move by `h·v`, a displacement and no motion: kinetic energy stays, and linear momentum to second order at least. [`drift`](Self::drift)
+    /// where the state holds momenta; an object whose state holds velocities carries them along parallel to themselves.
+    fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
+        self.drift(x, v, h);
+    }
     /// Turns a velocity `v` at the displacement `displacement` from some state into the rate of that displacement: the inverse of the
     /// differential of [`drift`](Self::drift)'s exponential map. Coordinates that simply add up leave `v` as it is, the default.
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {

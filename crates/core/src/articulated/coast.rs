@@ -9,8 +9,9 @@
 //! freedom and takes nothing from the order. Coasting then never gains energy, however long the step.
 
 use super::body::Working;
-use super::coordinates::integrate;
+use super::coordinates::{integrate, read_vector};
 use super::dynamics::{Dynamics, Scratch};
+use super::joint::Joint;
 use super::model::Model;
 
 /// Moves `x = [q, v]` by `h` seconds of free motion.
@@ -61,6 +62,57 @@ pub(super) fn coast(model: &Model, working: &mut Working, x: &mut [f64], h: f64)
     elsewhere.refresh(q, v);
     let after = energy_of(elsewhere, scratch, v);
     let scale = (energy / after).sqrt();
+    if scale.is_finite() {
+        v.iter_mut().for_each(|v| *v *= scale);
+    }
+}
+
+/// Moves the positions of `x = [q, v]` by `h·d` and carries `v` along parallel to itself in the metric `M` (Levi-Civita):
+///
+/// ```text
+/// v̇ = −Γ(d, v) = ¼(a(v + d) − a(v − d)) − ½[d, v]        a(v) = q̈ of free motion, quadratic in v;   [d, v] = ±d×v of ball joints and floating roots
+/// ```
+///
+/// Kinetic energy stays, by a last scaling to rounding, and so does linear momentum: it is the product of `v` with a field that is parallel.
+pub(super) fn transport(model: &Model, working: &mut Working, x: &mut [f64], d: &[f64], h: f64) {
+    let n = model.positions();
+    let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let stretch = size(&x[n..]) / size(d);
+    if !(stretch.is_finite() && stretch > 0.0) {
+        integrate(model, &mut x[..n], d, h);
+        return;
+    }
+    let Working { scratch, elsewhere, zeros, .. } = working;
+    elsewhere.refresh(&x[..n], &x[n..]);
+    let before = energy_of(elsewhere, scratch, &x[n..]);
+    let mut rate = |q: &[f64], v: &[f64]| {
+        let [more, less] = [stretch, -stretch].map(|s| {
+            let v: Vec<f64> = v.iter().zip(d).map(|(v, d)| v + s * d).collect();
+            let mut a = vec![0.0; v.len()];
+            elsewhere.refresh(q, &v);
+            elsewhere.accelerate(scratch, zeros, &[], &mut a);
+            a
+        });
+        let mut rate: Vec<f64> = more.iter().zip(less).map(|(more, less)| (more - less) / (4.0 * stretch)).collect();
+        for link in model.links() {
+            let sign = match link.joint {
+                Joint::Spherical => -0.5,
+                Joint::Floating => 0.5,
+                _ => continue,
+            };
+            let turn = sign * read_vector(&d[link.v..]).cross(&read_vector(&v[link.v..]));
+            rate[link.v..link.v + 3].iter_mut().zip(turn.iter()).for_each(|(rate, turn)| *rate += turn);
+        }
+        rate
+    };
+    let mut middle = x.to_vec();
+    let first = rate(&x[..n], &x[n..]);
+    step(model, &mut middle, d, &first, 0.5 * h);
+    let second = rate(&middle[..n], &middle[n..]);
+    step(model, x, d, &second, h);
+    let (q, v) = x.split_at_mut(n);
+    elsewhere.refresh(q, v);
+    let scale = (before / energy_of(elsewhere, scratch, v)).sqrt();
     if scale.is_finite() {
         v.iter_mut().for_each(|v| *v *= scale);
     }

@@ -162,6 +162,10 @@ impl Integratable for ArticulatedBody {
         integrate(&self.model, &mut x[..self.model.positions()], v, h);
     }
 
+    fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
+        coast::transport(&self.model, &mut self.working(), x, v, h);
+    }
+
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
         for link in self.model.links() {
             // a link's own axes turn on the right, where the world's turn on the left: the same with both signs changed

@@ -306,28 +306,16 @@ pub(crate) fn push(core: &mut Core, du: &[f64]) -> Vec<f64> {
     dp
 }
 
-/// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy: where the state holds velocities and the mass matrix changes with the pose,
-/// they are scaled to have the energy that they had.
+/// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy.
 pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
         if v.iter().all(|x| *x == 0.0) {
             continue;
         }
-        let (x, mut velocity) = (&mut core.x[entry.span.x.clone()], vec![0.0; v.len()]);
+        let mut velocity = vec![0.0; v.len()];
         body.unwhiten(v, &mut velocity);
-        if !body.holds_velocity() {
-            body.drift(x, &velocity, h);
-            continue;
-        }
-        let before = body.energy(x, &Vec3::zeros()).kinetic;
-        body.drift(x, &velocity, h);
-        let scale = (before / body.energy(x, &Vec3::zeros()).kinetic).sqrt();
-        if scale.is_finite() {
-            body.velocity(x, &mut velocity);
-            velocity.iter_mut().for_each(|v| *v *= scale);
-            body.write_velocity(x, &velocity);
-        }
+        body.displace(&mut core.x[entry.span.x.clone()], &velocity, h);
     }
 }
 
