@@ -1,11 +1,12 @@
 # Short names for the scripts; each can be run by itself where there is no make.
 
-.PHONY: help demo test test-slow lint bench clean
+.PHONY: help demo test test-slow references lint bench clean
 
 help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/"
 	@echo "make test       install what is missing, run all tests, check the papers"
 	@echo "make test-slow  the same, and determinism and energy over a minute"
+	@echo "make references installs Pinocchio and real robots from PyPI into target/python; tests that compare with them then run"
 	@echo "make lint       clippy; warnings are errors"
 	@echo "make bench      step times beside Rapier (benches/peers, a workspace of its own)"
 	@echo "make clean      remove everything built"
@@ -18,6 +19,10 @@ test:
 
 test-slow:
 	@scripts/test.sh --slow
+
+references:
+	python3 -m venv target/python
+	target/python/bin/pip install --quiet pin example-robot-data
 
 lint:
 	@scripts/lint.sh

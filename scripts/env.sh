@@ -43,3 +43,8 @@ stage() {
 stages() {
     printf '%s  %-12s %5d s\n' "$times" all "$(($(date +%s) - started))"
 }
+
+# What `make references` installed, for the tests that compare with it.
+if [ -z "${TUMBLE_PYTHON:-}" ] && [ -x target/python/bin/python ]; then
+    export TUMBLE_PYTHON="$PWD/target/python/bin/python"
+fi
