@@ -252,7 +252,8 @@ impl Backtracking {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
                 core.let_go();
-                hold::hold(core, &mut self.probe, &self.held, h)?;
+                let reach = core.settings.drift_tolerance;
+                hold::hold(core, &mut self.probe, &self.held, h, reach)?;
                 closing::refresh_at(core, &start);
                 closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;

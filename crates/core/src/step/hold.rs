@@ -8,11 +8,14 @@
 //! x += M⁻¹Jᵀμ,  K·μ = −gap        v += M⁻¹Jᵀν,  K·ν = −J·v            rows J of the limits that pushed, and of joints with 0 in place of −gap, −J·v
 //! ```
 //!
+//! The projection of `time_stepping` ends after so many sweeps, contacts and limits together; a limit that it leaves passed is put back in the same way,
+//! with its rate left to the next step.
+//!
 //! A limit that would have let go within the sub-step is held to its end. Where contacts push in the same island velocities are left to them.
 
 use super::Workspace;
 use super::closing::is_joint;
-use super::contacts::{build_rows, displace, push, row_velocities, whiten, zero};
+use super::contacts::{build_rows, displace, limits, push, row_velocities, whiten, zero};
 use crate::object::Level;
 use crate::rows::RowSet;
 use crate::solver::{Accuracy, GaussSeidel, RowSolver};
@@ -44,9 +47,17 @@ pub(super) fn pushing(work: &Workspace) -> Vec<Held> {
     held
 }
 
-/// Closes the limits `held` at the present state, `h` seconds after the present time; those that are off by more than the drift tolerance have
-/// let go. Sites and caches are left at the present.
-pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64) -> Result<(), StepError> {
+/// The limits that are passed at the present state, `h` seconds after the present time: their place alone is to be put right.
+pub(super) fn passed(core: &mut Core, probe: &mut Workspace, h: f64) -> Result<Vec<Held>, StepError> {
+    let time = core.time + h;
+    limits(core, time, &mut probe.limits)?;
+    let least = core.settings.contact_tolerance;
+    Ok(probe.limits.iter().filter(|l| l.gap < -least).map(|l| Held { key: l.key, with_contacts: true }).collect())
+}
+
+/// Closes the limits `held` at the present state, `h` seconds after the present time; those that are off by more than `reach` are left alone: they have
+/// let go, or are to come back at a bounded speed. Sites and caches are left at the present.
+pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64, reach: f64) -> Result<(), StepError> {
     if held.is_empty() {
         return Ok(());
     }
@@ -62,7 +73,7 @@ pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64
     let mut chosen = vec![false; probe.targets.len()];
     for limit in &probe.limits {
         let (Some(target), Ok(i)) = (limit.target, held.binary_search_by_key(&limit.key, |h| h.key)) else { continue };
-        if limit.gap.abs() > core.settings.drift_tolerance {
+        if limit.gap.abs() > reach {
             continue;
         }
         let block = &mut probe.rows.blocks[target as usize];

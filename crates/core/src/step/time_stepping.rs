@@ -21,7 +21,7 @@
 
 use super::contacts::{build_rows, coasting, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
-use super::closing;
+use super::{closing, hold};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
@@ -35,6 +35,7 @@ use crate::world::{Core, StepError};
 #[derive(Default)]
 pub struct TimeStepping {
     work: Workspace,
+    probe: Workspace,
     x0: Vec<f64>,
     /// Share of the step before the first impact, per coordinate; negative where there is none.
     share: Vec<f64>,
@@ -245,6 +246,11 @@ impl TimeStepping {
         let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
         closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();
+        if !self.work.limits.is_empty() {
+            core.motion().refresh();
+            let passed = hold::passed(core, &mut self.probe, h)?;
+            hold::hold(core, &mut self.probe, &passed, h, recovery)?;
+        }
         core.check_finite(&dp)
     }
 }

@@ -54,7 +54,7 @@ fn what_is_not_there() {
     let error = resolve_scene("biliards", &[]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "no scene `biliards`: did you mean `billiards`? Shipped are `falling`, `stack`, `billiards`, `bowling` and `incline`"
+        "no scene `biliards`: did you mean `billiards`? Shipped are `falling`, `stack`, `billiards`, `bowling`, `incline`, `pendulum`, `chain`, `piston`, `skeleton` and `robot`"
     );
     let error = resolve_scene("no/such.toml", &[]).unwrap_err();
     assert!(error.to_string().starts_with("no/such.toml: cannot read the scene: "), "{error}");
