@@ -108,8 +108,8 @@ pub trait Integratable {
     fn respond(&self, j: &[f64], y: &mut [f64]);
     /// `j = Lᵀ·du`: the generalized impulse that a change of `u` means.
     fn recover(&self, du: &[f64], j: &mut [f64]);
-    /// Whether its state holds velocities instead of momenta. Their free motion is not that of a constant momentum: `time_stepping` then takes
-    /// the free step first and adds what contacts do to its end.
+    /// Whether its state holds velocities instead of momenta, because its mass matrix turns with its pose. `time_stepping` then asks for everything that
+    /// pushes it (mass matrix, rows, the velocity before the push) in the middle of the step.
     fn holds_velocity(&self) -> bool {
         false
     }

@@ -6,11 +6,11 @@ use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::{ArticulatedBody, Collider, Freedom, Integrator, Joint, LinkMass, Material, ModelBuilder, ObjectId, RigidBody, Settings, World};
 
 /// A box that is thrown at the floor: a rigid body, or a floating link with nothing on it.
-fn thrown(mut world: World, articulated: bool, stepper_step: f64) -> (World, ObjectId) {
+fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
     ground(&mut world, 0.6, 0.5);
     let shape = Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)).unwrap();
     let solid = RigidBody::with_mass("box", shape.clone(), 2.0).unwrap();
-    let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6 + stepper_step), Vec3::new(0.3, 0.5, 0.1));
+    let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6 + lift), Vec3::new(0.3, 0.5, 0.1));
     let (v, w) = (Vec3::new(0.5, 0.2, -1.0), Vec3::new(1.0, 2.0, 3.0));
     let id = if articulated {
         let mut builder = ModelBuilder::new();
