@@ -11,61 +11,17 @@
 //! errors: no contact is missed, and none is invented beyond `e₁ + e₂`.
 
 mod ball;
+mod builder;
 mod octree;
+mod settings;
 mod verify;
+
+pub use builder::{Progress, StageCount};
+pub use settings::{Builder, TreeSettings};
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
 use ball::Ball;
-
-/// How a tree is built.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TreeSettings {
-    /// Which method.
-    pub builder: Builder,
-    /// Greatest number of subdivisions, 1 to 9.
-    pub depth: u32,
-    /// A cell is not divided further once its ball reaches at most this far outwards, as a part of the mesh's
-    /// diagonal; 1e-4 to 1.
-    pub error: f64,
-    /// Grow every leaf to the same stand-off, `error`: flat faces stay flat, so that what stands on them stands
-    /// upright and at rest. Otherwise each leaf is as tight as it can be.
-    pub even: bool,
-}
-
-/// The methods there are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Builder {
-    /// Cells of an octree that the surface passes through.
-    #[default]
-    Octree,
-}
-
-impl Default for TreeSettings {
-    /// Outward error of 1 % of the diagonal, evenly.
-    fn default() -> TreeSettings {
-        TreeSettings { builder: Builder::Octree, depth: 7, error: 0.01, even: true }
-    }
-}
-
-impl TreeSettings {
-    fn check(&self) -> Result<(), MeshError> {
-        if !(1..=9).contains(&self.depth) {
-            return Err(MeshError::Settings {
-                what: "the depth of a sphere tree",
-                value: f64::from(self.depth),
-                allowed: "1 to 9",
-            });
-        }
-        if !(1e-4..=1.0).contains(&self.error) {
-            return Err(MeshError::Settings {
-                what: "the error of a sphere tree",
-                value: self.error,
-                allowed: "0.0001 to 1",
-            });
-        }
-        Ok(())
-    }
-}
+use builder::{Cell, Job, TreeBuilder};
 
 /// One ball of a tree, in the mesh's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,12 +52,6 @@ impl SphereNode {
     }
 }
 
-/// What a builder hands over: nested cells, whose leaves have their balls.
-enum Cell {
-    Leaf(Ball),
-    Inner(Vec<Cell>),
-}
-
 /// A tree of balls around a closed surface; flat, breadth first, the root first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereTree {
@@ -112,16 +62,27 @@ pub struct SphereTree {
 impl SphereTree {
     /// Builds and verifies a tree around a closed, outward-wound mesh (see [`TriMesh::check_closed`]).
     pub fn build(mesh: &TriMesh, settings: &TreeSettings) -> Result<SphereTree, MeshError> {
+        Ok(SphereTree::build_watched(mesh, settings, &())?.0)
+    }
+
+    /// The same, told how far it is, and with what each stage did.
+    pub fn build_watched(
+        mesh: &TriMesh,
+        settings: &TreeSettings,
+        progress: &dyn Progress,
+    ) -> Result<(SphereTree, Vec<StageCount>), MeshError> {
         settings.check()?;
         mesh.check_data()?;
         let distance = MeshDistance::new(mesh);
-        let root = match settings.builder {
-            Builder::Octree => octree::build(mesh, &distance, settings)?,
+        let builder: &dyn TreeBuilder = match settings.builder {
+            Builder::Octree => &octree::Octree,
         };
-        let tree = SphereTree::flatten(&root, &distance);
+        let built = builder.build(&Job { mesh, distance: &distance, settings, progress })?;
+        let tree = SphereTree::flatten(&built.root, &distance);
         tree.check_nesting()?;
         tree.check_coverage(mesh)?;
-        Ok(tree)
+        progress.at(1.0);
+        Ok((tree, built.stages))
     }
 
     /// All balls, breadth first; the root is the first.

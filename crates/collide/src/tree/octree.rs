@@ -12,8 +12,8 @@
 //! will do.
 
 use super::ball::{Ball, around_points};
-use super::{Cell, TreeSettings};
-use crate::{MeshDistance, MeshError, TriMesh, Vec3};
+use super::builder::{Built, Cell, Job, StageCount, TreeBuilder};
+use crate::{MeshDistance, MeshError, Vec3};
 
 /// No tree gets more leaves than this.
 const MOST_LEAVES: usize = 400_000;
@@ -34,24 +34,31 @@ struct Context<'a> {
     leaves: usize,
 }
 
-pub(super) fn build(mesh: &TriMesh, distance: &MeshDistance, settings: &TreeSettings) -> Result<Cell, MeshError> {
-    let bounds = mesh.aabb();
-    let side = (bounds.max - bounds.min).max();
-    let pieces = (0..mesh.triangles.len()).map(|t| mesh.corners(t).to_vec()).collect();
-    let mut context = Context {
-        distance,
-        target: settings.error * mesh.diagonal(),
-        depth: settings.depth,
-        even: settings.even,
-        leaves: 0,
-    };
-    let root = context.cell(pieces, 0.5 * (bounds.min + bounds.max), 0.5 * side, 0);
-    if context.leaves > MOST_LEAVES {
-        let (what, allowed) =
-            ("the number of leaves of a sphere tree", "at most 400000: lower the depth or raise the error");
-        return Err(MeshError::Settings { what, value: context.leaves as f64, allowed });
+/// The builder.
+pub(super) struct Octree;
+
+impl TreeBuilder for Octree {
+    fn build(&self, job: &Job) -> Result<Built, MeshError> {
+        let (mesh, settings) = (job.mesh, job.settings);
+        let bounds = mesh.aabb();
+        let side = (bounds.max - bounds.min).max();
+        let pieces = (0..mesh.triangles.len()).map(|t| mesh.corners(t).to_vec()).collect();
+        let mut context = Context {
+            distance: job.distance,
+            target: settings.error * mesh.diagonal(),
+            depth: settings.depth,
+            even: settings.even,
+            leaves: 0,
+        };
+        let root = context.cell(pieces, 0.5 * (bounds.min + bounds.max), 0.5 * side, 0);
+        if context.leaves > MOST_LEAVES {
+            let (what, allowed) =
+                ("the number of leaves of a sphere tree", "at most 400000: lower the depth or raise the error");
+            return Err(MeshError::Settings { what, value: context.leaves as f64, allowed });
+        }
+        let leaves = StageCount { level: settings.depth, stage: "leaves".into(), count: context.leaves as u64 };
+        Ok(Built { root, stages: vec![leaves] })
     }
-    Ok(root)
 }
 
 impl Context<'_> {

@@ -1,0 +1,54 @@
+//! What every builder does: a job in, nested cells and an account of the stages out.
+
+use super::TreeSettings;
+use super::ball::Ball;
+use crate::{MeshDistance, MeshError, TriMesh};
+
+/// What a builder works on.
+pub(super) struct Job<'a> {
+    /// Closed, outward-wound.
+    pub mesh: &'a TriMesh,
+    pub distance: &'a MeshDistance,
+    pub settings: &'a TreeSettings,
+    pub progress: &'a dyn Progress,
+}
+
+/// A method of building: one file (or folder) each.
+pub(super) trait TreeBuilder {
+    /// Nested cells whose balls cover the surface; the balls of inner cells are made later, around their children.
+    fn build(&self, job: &Job) -> Result<Built, MeshError>;
+}
+
+/// What a builder hands over.
+pub(super) struct Built {
+    pub root: Cell,
+    pub stages: Vec<StageCount>,
+}
+
+/// Nested cells, whose leaves have their balls.
+pub(super) enum Cell {
+    Leaf(Ball),
+    Inner(Vec<Cell>),
+}
+
+/// Told how far a build is, from whichever thread works.
+pub trait Progress: Sync {
+    /// `share` of the work is done, 0 to 1; does not fall.
+    fn at(&self, share: f64);
+}
+
+/// Nobody listens.
+impl Progress for () {
+    fn at(&self, _share: f64) {}
+}
+
+/// How often a stage of a builder did its work at one level.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StageCount {
+    /// Level of the balls that were made, the root being 0.
+    pub level: u32,
+    /// The stage, in the words of the builder's file.
+    pub stage: String,
+    /// How many.
+    pub count: u64,
+}
