@@ -17,7 +17,7 @@
 //! joints: two hinges of a door agree about its axis only where both are closed, and rows taken beside that place would hold the door fast.
 
 use super::Workspace;
-use super::contacts::{displace, lay_rows, push, row_velocities, whiten, zero};
+use super::contacts::{lay_rows, push, row_velocities, shift, whiten, zero};
 use crate::object::{Integratable, Level, RowTarget};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, DIRECT_ROWS, GaussSeidel, RowSolver};
@@ -109,7 +109,7 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
             }
         }
         kept.clone_from(&core.x);
-        displace(core, &dx, 1.0);
+        shift(core, &dx, 1.0);
         core.motion().refresh();
         lay_rows(core, probe, level, None)?;
     }
@@ -289,7 +289,7 @@ impl Open {
                 }
             }
         }
-        displace(core, &dx, 1.0);
+        shift(core, &dx, 1.0);
         push(core, &dv);
     }
 }

@@ -20,6 +20,7 @@ mod closures_articulated;
 mod closures_joints;
 mod closures_spatial;
 mod common;
+mod elastic;
 mod free;
 mod friction;
 mod impacts;
