@@ -5,7 +5,7 @@ use super::projection::Projection;
 use crate::detect::{Detector, Touch};
 use crate::motion::coast;
 use crate::object::{Integratable, Level, RowTarget};
-use crate::row_builder::{RowBuilder, constraints};
+use crate::row_builder::{RowBuilder, RowKind, constraints};
 use crate::rows::{RowSet, Rows};
 use crate::site::Site;
 use crate::solver::{Accuracy, Islands, residual};
@@ -23,6 +23,8 @@ pub(crate) struct Workspace {
     pub bias: Vec<f64>,
     /// Targets of the constraints' rows, after those of the touches.
     pub targets: Vec<RowTarget>,
+    /// What each target is of.
+    pub kinds: Vec<RowKind>,
     /// One-sided rows that their constraints locate, at the present state.
     pub limits: Vec<Limit>,
     /// First target of each constraint, and the end.
@@ -137,7 +139,7 @@ pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: 
     lay_touches(core, work);
     let mut problem = None;
     let mut builder = RowBuilder {
-        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, kinds: &mut work.kinds, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
         owner: ObjectId::default(),
     };
     let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
@@ -170,8 +172,9 @@ fn lay_touches(core: &Core, work: &mut Workspace) {
     work.rows.clear(core.dof);
     work.bias.clear();
     work.targets.clear();
+    work.kinds.clear();
     let mut builder = RowBuilder {
-        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut None,
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, kinds: &mut work.kinds, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut None,
         owner: ObjectId::default(),
     };
     for touch in &work.touches {
@@ -203,7 +206,7 @@ fn adopt(core: &Core, work: &mut Workspace, made: Workspace) {
         }
     }
     work.bias.extend(made.bias);
-    (work.targets, work.first) = (made.targets, made.first);
+    (work.targets, work.kinds, work.first) = (made.targets, made.kinds, made.first);
     make_room(work);
 }
 
@@ -314,6 +317,16 @@ pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
 /// The same along the rows of a step, which is how joints are closed: momenta stay, and what that does to the energy the next step undoes.
 pub(crate) fn shift(core: &mut Core, u: &[f64], h: f64) {
     each_displaced(core, u, |body, x, v| if body.holds_velocity() { body.displace(x, v, h) } else { body.drift(x, v, h) });
+}
+
+/// `v += L⁻¹·u`.
+pub(crate) fn unwhiten_onto(core: &Core, u: &[f64], v: &mut [f64]) {
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let (Some(body), range) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        let mut velocity = vec![0.0; range.len()];
+        body.unwhiten(&u[range.clone()], &mut velocity);
+        v[range].iter_mut().zip(&velocity).for_each(|(v, more)| *v += more);
+    }
 }
 
 fn each_displaced(core: &mut Core, u: &[f64], go: impl Fn(&dyn Integratable, &mut [f64], &[f64])) {

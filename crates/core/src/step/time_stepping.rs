@@ -21,7 +21,7 @@
 
 use super::contacts::{build_rows, coasting, detect, gyroscopic, impulses, push, row_velocities, shift, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
-use super::{closing, hold};
+use super::{closing, hold, reach};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
@@ -260,7 +260,7 @@ impl TimeStepping {
         projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean: &mean, h }, recovery, least)?;
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
-        let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
+        let kept = reach::left(&self.work, |i| self.work.targets[i].error, recovery);
         closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();
         if !self.work.limits.is_empty() {

@@ -26,6 +26,7 @@ mod friction;
 mod impacts;
 mod limits;
 mod meshes;
+mod out_of_reach;
 mod paradox;
 mod regressions;
 mod regressions_rows;
