@@ -38,7 +38,7 @@ const FINEST: f64 = 1e-12;
 const SLOW: f64 = 0.2;
 /// Compliance of rows that are off by a metre, as a share of their response, and the most that is taken. What is redundant but for an error
 /// responds with the square of it, far less, and is left alone; as the error goes so does the compliance (Levenberg and Marquardt).
-const SOFT: (f64, f64) = (10.0, 1e-3);
+const SOFT: (f64, f64) = (10.0, 0.1);
 /// What a round that made things worse multiplies the compliance by, what one that did not divides it by, and where no more is tried.
 const DAMPING: (f64, f64, f64) = (10.0, 3.0, 1e6);
 

@@ -31,8 +31,9 @@ use crate::solver::smallest_pivot;
 use crate::world::Core;
 use std::ops::Range;
 
-/// Compliance of the velocity rows of what is out of reach, as a share of their response: nothing there goes more than five times as fast as it is led.
-pub(super) const GIVING: f64 = 1e-2;
+/// Compliance of the velocity rows of what is out of reach, as a share of their response: nothing there is asked for more than half the speed that it is led with.
+/// Where it goes is left to closing. Held harder, what is led back would make a straight chain buckle before its end is in reach.
+pub(super) const GIVING: f64 = 1.0;
 
 /// A piece whose rows respond in some direction by less than this share may be at its full stretch before the step ends.
 const WEAK: f64 = 3e-2;
