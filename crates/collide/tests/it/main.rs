@@ -1,6 +1,7 @@
 //! One binary for all integration tests of the crate.
 
 mod against_parry;
+mod bad_meshes;
 mod broad;
 mod hull;
 mod mesh_contacts;
@@ -9,3 +10,4 @@ mod primitives;
 mod rng;
 mod shared_meshes;
 mod trees;
+mod winding;
