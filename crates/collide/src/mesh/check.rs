@@ -131,7 +131,7 @@ impl TriMesh {
 
     /// Lets every triangle name the first in use of the vertices at the same place; also returns how many others
     /// there were. The vertices stay.
-    fn with_shared_vertices(&self) -> (TriMesh, usize) {
+    pub(super) fn with_shared_vertices(&self) -> (TriMesh, usize) {
         let mut order: Vec<u32> = self.triangles.iter().flatten().copied().collect();
         order.sort_unstable();
         order.dedup();
@@ -161,7 +161,7 @@ impl TriMesh {
     }
 
     /// Keeps the triangles of which `keep` says so, and their numbers in `face_of`; returns how many went.
-    fn retain_faces(&mut self, face_of: &mut Vec<usize>, keep: impl Fn(usize) -> bool) -> usize {
+    pub(super) fn retain_faces(&mut self, face_of: &mut Vec<usize>, keep: impl Fn(usize) -> bool) -> usize {
         let before = self.triangles.len();
         let kept: Vec<usize> = (0..before).filter(|&t| keep(t)).collect();
         self.triangles = kept.iter().map(|&t| self.triangles[t]).collect();
@@ -169,7 +169,7 @@ impl TriMesh {
         before - kept.len()
     }
 
-    fn drop_degenerate(&mut self, collinear_too: bool, face_of: &mut Vec<usize>) -> usize {
+    pub(super) fn drop_degenerate(&mut self, collinear_too: bool, face_of: &mut Vec<usize>) -> usize {
         let before = self.clone();
         self.retain_faces(face_of, |t| {
             let ([i, j, k], [a, b, c]) = (before.triangles[t], before.corners(t));
@@ -181,7 +181,7 @@ impl TriMesh {
     }
 
     /// Drops a face that has the same corners in the same sense as an earlier one.
-    fn drop_duplicates(&mut self, face_of: &mut Vec<usize>) -> usize {
+    pub(super) fn drop_duplicates(&mut self, face_of: &mut Vec<usize>) -> usize {
         let smallest_first = |t: [u32; 3]| {
             let k = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
             [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
@@ -195,7 +195,7 @@ impl TriMesh {
 
     /// Spreads the winding of each shell's first face over edges of two faces, then turns each shell that was changed
     /// outwards.
-    fn unify_winding(&mut self) -> usize {
+    pub(super) fn unify_winding(&mut self) -> usize {
         let groups = edge_groups(self);
         let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.triangles.len()];
         for group in groups.iter().filter(|g| g.len() == 2) {
@@ -270,7 +270,7 @@ pub(super) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
     uses.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)).map(<[EdgeUse]>::to_vec).collect()
 }
 
-fn unbalanced(groups: &[Vec<EdgeUse>]) -> impl Iterator<Item = &Vec<EdgeUse>> {
+pub(super) fn unbalanced(groups: &[Vec<EdgeUse>]) -> impl Iterator<Item = &Vec<EdgeUse>> {
     groups.iter().filter(|g| 2 * g.iter().filter(|u| u.forward).count() != g.len())
 }
 

@@ -5,9 +5,12 @@ mod check;
 mod crossing;
 mod distance;
 mod generate;
+mod holes;
 mod hull;
 mod integrals;
 mod obj;
+mod pairing;
+mod repair;
 mod shells;
 mod stl;
 mod union;
@@ -15,6 +18,7 @@ mod winding;
 
 pub use check::ClosedReport;
 pub use distance::{ClosestPoint, MeshDistance};
+pub use repair::{RepairReport, RepairSettings};
 pub use winding::WindingNumber;
 
 use distance::closest_on_triangle;

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! are the winding numbers in front of the piece and behind it, with no step off the surface. The piece bounds the
-//! solid if one of them is above 1/2 and the other is not; it is then counted `1/J` times, since each of the faces
+//! solid if one of them is above 1/2 and the other is not; it is then counted `1/|J|` times, since each of the faces
 //! that lie on each other there has such a piece. Faces that cross none are told patch by patch.
 //!
 //! Integrals over the boundary's pieces are exact for the union, whatever the number of times it is gone around.
@@ -26,6 +26,9 @@ use crate::Vec3;
 const MOST_PARTNERS: usize = 64;
 /// Pieces of one face.
 const MOST_PIECES: usize = 512;
+/// Pieces per face of the mesh, on average, and a floor for small meshes; further faces are not cut.
+const MOST_CUT: usize = 4;
+const FEWEST_CUT: usize = 200_000;
 /// Faces closer than this part of the diagonal lie on each other.
 const SAME_PLACE: f64 = 1e-10;
 /// A winding number farther than this from an integer is not believed.
@@ -37,7 +40,7 @@ pub(super) struct Piece {
     pub corners: [Vec3; 3],
     /// The face that it is, or is a part of.
     pub face: u32,
-    /// How often it counts in an integral over the boundary; negative where the solid is in front of it.
+    /// How often it counts in an integral over the boundary, 0 to 1.
     pub weight: f64,
     /// Which normals tell the side that a point is on.
     pub trust: Trust,
@@ -107,6 +110,8 @@ impl Boundary {
             partners[b as usize].push(a);
         }
         let tolerance = SAME_PLACE * mesh.diagonal();
+        let most = (MOST_CUT * mesh.triangles.len()).max(FEWEST_CUT);
+        let mut cut = 0;
         let mut outcome: Vec<Option<Told>> = vec![None; patches.count];
         for face in 0..mesh.triangles.len() {
             let others = &partners[face];
@@ -118,7 +123,8 @@ impl Boundary {
                     tell(mesh, winding, largest, &mesh.corners(largest), &[], tolerance)
                 });
                 self.keep(face, mesh.corners(face), told);
-            } else if let Some(parts) = parts(mesh, face, others) {
+            } else if let Some(parts) = parts(mesh, face, others).filter(|_| cut <= most) {
+                cut += parts.len();
                 for part in parts {
                     self.keep(face, part, tell(mesh, winding, face, &part, others, tolerance));
                 }
@@ -131,7 +137,7 @@ impl Boundary {
     fn keep(&mut self, face: usize, corners: [Vec3; 3], told: Told) {
         let weight = match told {
             Told::Buried => 0.0,
-            Told::Bounds(weight) => weight,
+            Told::Bounds(share) => share.abs(),
             Told::Doubtful => {
                 self.doubtful_area += 0.5 * area_vector(&corners).norm();
                 1.0
@@ -139,7 +145,8 @@ impl Boundary {
         };
         self.differs |= weight != 1.0;
         if weight != 0.0 {
-            let trust = if told != Told::Doubtful && weight > 0.0 { Trust::Face } else { Trust::None };
+            let faces_out = matches!(told, Told::Bounds(share) if share > 0.0);
+            let trust = if faces_out { Trust::Face } else { Trust::None };
             self.pieces.push(Piece { corners, face: face as u32, weight, trust });
         }
     }
@@ -166,7 +173,7 @@ impl Boundary {
 enum Told {
     /// Solid, or none, on both sides.
     Buried,
-    /// Its boundary, which counts so often.
+    /// Its boundary, of which it is such a share; negative where the solid is in front of it.
     Bounds(f64),
     /// Taken as its boundary for safety.
     Doubtful,

@@ -184,6 +184,31 @@ fn boxes_with_faces_on_each_other_count_once() {
     }
 }
 
+/// An arrowhead whose bottom is triangulated over the notch, so that it is folded: the fold is no boundary. With a box
+/// on the fold three faces lie on each other, and together count once.
+#[test]
+fn folded_face_counts_what_it_bounds() {
+    let outline = [[2.0, 0.0], [-1.0, 1.0], [0.0, 0.0], [-1.0, -1.0]];
+    let vertices = [0.0, 1.0].iter().flat_map(|&z| outline.map(|[x, y]| Vec3::new(x, y, z))).collect();
+    let mut triangles: Vec<[u32; 3]> = vec![[6, 4, 5], [6, 7, 4], [1, 3, 2], [1, 0, 3]];
+    triangles.extend((0..4).flat_map(|k| [[k, (k + 1) % 4, k + 4], [(k + 1) % 4, (k + 1) % 4 + 4, k + 4]]));
+    let arrow = TriMesh { vertices, triangles };
+    let report = arrow.clone().check_closed().unwrap();
+    near(report.volume, 2.0, 1e-12, "arrow");
+    assert!(report.crossing_faces > 0 && report.doubtful == 0.0, "{report:?}");
+    let block = TriMesh::box_(Vec3::new(0.625, 0.5, 0.5)).translated(&Vec3::new(-0.875, 0.0, 0.5));
+    // the arrow has two triangles of 1/32 m² of the box's 1.25 m²
+    let mut joined = both(&arrow, &block);
+    near(joined.check_closed().unwrap().volume, 2.0 + 1.25 - 0.0625, 1e-12, "with a box");
+    let distance = MeshDistance::new(&joined);
+    let mut rng = Rng::new(8);
+    let winding = WindingNumber::new(&joined);
+    for _ in 0..2000 {
+        let p = rng.vec(1.5);
+        assert_eq!(distance.closest(&p).signed_distance < 0.0, winding_by_ray(&joined, &p, &rng.direction()) >= 1, "{p:?} {}", winding.exact(&p));
+    }
+}
+
 /// A ball within a ball: a cavity if it is wound inwards, nothing if outwards.
 #[test]
 fn shell_in_a_shell_is_a_cavity_or_buried_by_its_winding() {
