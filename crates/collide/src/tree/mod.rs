@@ -12,11 +12,15 @@
 
 mod ball;
 mod builder;
+mod levels;
 mod octree;
+mod quality;
 mod settings;
 mod verify;
 
 pub use builder::{Progress, StageCount};
+pub use levels::LevelBall;
+pub use quality::{LevelQuality, QualitySettings};
 pub use settings::{Builder, TreeSettings};
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};

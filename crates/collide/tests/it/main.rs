@@ -6,6 +6,7 @@ mod hull;
 mod mesh_contacts;
 mod meshes;
 mod primitives;
+mod quality;
 mod rng;
 mod shared_meshes;
 mod trees;
