@@ -12,6 +12,8 @@
 
 mod ball;
 mod builder;
+mod cache;
+mod file;
 mod levels;
 mod octree;
 mod quality;
@@ -19,6 +21,8 @@ mod settings;
 mod verify;
 
 pub use builder::{Progress, StageCount};
+pub use cache::{CachedTree, TreeCache};
+pub use file::{MeshId, TreeFile, TreeFileError};
 pub use levels::LevelBall;
 pub use quality::{LevelQuality, QualitySettings};
 pub use settings::{Builder, TreeSettings};
@@ -154,6 +158,11 @@ impl SphereTree {
             nodes[n].radius = ball.radius;
             nodes[n].outward = ball.outward(distance);
         }
+        SphereTree::of_nodes(nodes)
+    }
+
+    /// Of nodes that are already a tree: breadth first, children neighbours.
+    fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()
             .filter(|n| n.is_leaf())

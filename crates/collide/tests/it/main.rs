@@ -9,4 +9,6 @@ mod primitives;
 mod quality;
 mod rng;
 mod shared_meshes;
+mod tree_cache;
+mod tree_file;
 mod trees;
