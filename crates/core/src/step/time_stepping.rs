@@ -12,9 +12,10 @@
 //! With `τ = h/2` the displacement is the mean of the old and the new velocity: second order on lasting contacts too (a block slides to its
 //! stop as it should). With an impact the two coasts and the term `(τ − h/2)·h·a` add up to the parabola before and the parabola after.
 //!
-//! Objects whose state holds velocities (articulated bodies) are pushed where they are at `x_½`: the mass matrix, the rows and the velocity before the
-//! push are those of the middle. Coasting keeps kinetic energy, a push by contacts takes some, and displacement leaves it: nothing here feeds it. So they
-//! coast h/2 and h/2 whenever their impacts are, and are displaced by the rest, (τ − h/2)·(v_0 − v_1), at the end.
+//! What is pushed is pushed where it is then: mass matrix, rows and the velocity before the push are those of `x_½`, or of `x_0` coasted τ where there is an
+//! impact. Coasting keeps kinetic energy, a push by contacts takes some, and displacement leaves it: nothing here feeds it.
+//! Objects whose state holds velocities (articulated bodies) are pushed at `x_½` whenever their impacts are, so as to have their caches made once; they
+//! coast h/2 and h/2, and are displaced by the rest, (τ − h/2)·(v_0 − v_1), at the end.
 //!
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.

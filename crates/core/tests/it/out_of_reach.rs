@@ -78,14 +78,16 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
                 let (across, _) = led.lead(speed * along, 1.0);
                 let (out, _) = led.lead(speed * along, 1.0);
                 let hand = position(&led.world, led.hand);
-                let (misfit, expected) = (led.misfit(), lag(&hand, reach));
+                let (misfit, expected, reported) = (led.misfit(), lag(&hand, reach), led.reported.unwrap());
                 let end = led.world.site(led.chain, links - 1).unwrap().pose;
                 let bent = (end.rotation * -Vec3::z()).angle(&Vec3::new(hand.x, 0.0, hand.z));
-                let (back, _) = led.lead(-speed * along, 1.8);
+                let (back, _) = led.lead(-speed * along, 2.0);
                 let (rest, _) = led.lead(Vec3::zeros(), 0.5);
                 println!("{name}: {across:.1} rad/s across, {out:.2} out, {back:.1} back; lags {misfit:.6} m, {:.1e} off, {bent:.1e} rad; closed to {:.1e} m, {rest:.1e} rad/s", misfit - expected, led.misfit());
-                let reported = led.reported.unwrap();
-                assert!(reported.closure == led.closure && (reported.distance - misfit).abs() < 0.5 * misfit, "{name}: {reported:?}");
+                assert!(across < 4.0 * crossing && back < 4.0 * crossing && out < 4.0 * speed / LENGTH, "{name}: {across}, {out}, {back} rad/s");
+                assert!((misfit - expected).abs() < 1e-3 && bent < 3e-2, "{name}: {misfit} m for {expected} m, bent by {bent} rad");
+                assert!(reported.closure == led.closure && reported.distance == misfit, "{name}: {reported:?}");
+                assert!(led.misfit() < 2e-9, "{name}: open by {:e} m", led.misfit());
             }
         }
     }
@@ -118,6 +120,9 @@ fn rigid_bars_pinned_in_a_row_share_what_is_out_of_reach() {
             }
         }
         let open = pins.iter().map(|id| world.get::<Closure>(*id).unwrap().misfit(&world.view()).unwrap().distance).fold(0.0, f64::max);
+        assert!(fastest < 2.0 * (4.0 * 0.5 * 240.0 / 0.2f64).sqrt(), "{stepper}: {fastest} rad/s");
+        assert!(said > 0.5 / 4.0 - 1e-3 && said < 0.5, "{stepper}: {said} m is said, of 0.5 m shared by four pins");
+        assert!(open < 1e-7, "{stepper}: {open:e} m are open");
         println!("{stepper}: {fastest:.2} rad/s at most, {said:.3} m out of reach, {open:.1e} m open at the end");
     }
 }
