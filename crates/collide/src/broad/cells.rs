@@ -14,7 +14,7 @@
 use super::fat::{Fat, pair};
 
 /// A cell is cut when it holds more.
-const FULL: usize = 48;
+const FULL: usize = 72;
 /// A cut must leave either side with at most this share of the boxes, in percent.
 const WORTH: usize = 80;
 /// Centres that are looked at to place a cut.
@@ -57,6 +57,8 @@ pub(super) struct Cells {
     /// Cells when it was built; those cut since.
     built: usize,
     cuts: usize,
+    /// A cell of each box, by handle; a hint.
+    homes: Vec<u32>,
     /// Working memory.
     buffer: Vec<Entry>,
     places: Vec<(u32, bool, bool)>,
@@ -71,8 +73,22 @@ impl Cells {
         self.nodes.clear();
         self.cells.clear();
         self.nodes.push(Node::Cell(0));
-        self.divide(0, 0, Fat::EVERYWHERE, &mut buffer, 0, &mut |region, entries| Cell::sweep(region, entries, pairs));
+        let mut homes = std::mem::take(&mut self.homes);
+        homes.clear();
+        homes.resize(buffer.iter().map(|e| e.handle as usize + 1).max().unwrap_or(0), 0);
+        let mut cell = 0;
+        self.divide(0, 0, Fat::EVERYWHERE, &mut buffer, 0, &mut |region, entries| {
+            Cell::sweep(region, entries, pairs);
+            entries.iter().for_each(|e| homes[e.handle as usize] = cell);
+            cell += 1;
+        });
+        self.homes = homes;
         (self.built, self.cuts, self.buffer) = (self.cells.len(), 0, buffer);
+    }
+
+    /// A cell where a box was last seen: boxes that are refiled in this order meet cells that others have just met.
+    pub fn home(&self, handle: u32) -> u32 {
+        self.homes.get(handle as usize).copied().unwrap_or(0)
     }
 
     /// Whether so many cells were cut one by one that the tree may lean.
@@ -81,8 +97,8 @@ impl Cells {
     }
 
     /// Files one box anew, that was `old`, and tells every other that it meets.
-    #[inline(never)]
     pub fn refile(&mut self, handle: u32, old: &Fat, new: &Fat, mut met: impl FnMut(u32)) {
+        self.homes.resize(self.homes.len().max(handle as usize + 1), 0);
         let mut places = std::mem::take(&mut self.places);
         places.push((0, true, true));
         while let Some((node, was, is)) = places.pop() {
@@ -97,6 +113,7 @@ impl Cells {
                 Some(&Node::Cell(index)) => {
                     let cell = &mut self.cells[index as usize];
                     cell.refile(handle, was, is.then_some(new), &mut met);
+                    self.homes[handle as usize] = index;
                     if cell.boxes.len() > cell.limit {
                         self.cut(node, index);
                     }
@@ -149,7 +166,6 @@ impl Cells {
 
 impl Cell {
     /// Forgets a box that `was` here, tells whom the new one meets here, and takes that in.
-    #[inline(never)]
     fn refile(&mut self, handle: u32, was: bool, new: Option<&Fat>, met: &mut impl FnMut(u32)) {
         let place = if was { self.handles.iter().position(|h| *h == handle) } else { None };
         if let Some(place) = place {
@@ -169,7 +185,6 @@ impl Cell {
     }
 
     /// All pairs of a cell of these boxes, which are sorted for it.
-    #[inline(never)]
     fn sweep(region: &Fat, entries: &mut [Entry], pairs: &mut Vec<u64>) {
         let axis = axes(entries)[0].1;
         entries.sort_unstable_by(|a, b| a.fat.min(axis).total_cmp(&b.fat.min(axis)));

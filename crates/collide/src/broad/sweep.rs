@@ -2,7 +2,7 @@
 //!
 //! | list | holds | changes |
 //! |---|---|---|
-//! | `tight` | the boxes as they were given | when they are set |
+//! | `tight` | the boxes as they were given, and `rounded` the same in short | when they are set |
 //! | `fat` | each box with some room around it | when the box has left it |
 //! | `cells` | space in cells, each with the fat boxes that reach it ([`Cells`]) | with the fat boxes |
 //! | `near` | the pairs of fat boxes that overlap | with the fat boxes |
@@ -15,7 +15,7 @@
 //! Sources: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6, for coherence; fat boxes go back to Verlet's neighbour lists (1967).
 
 use super::cells::{Cells, Entry};
-use super::fat::{Fat, pair};
+use super::fat::{Fat, Guess, Rounded, pair};
 use super::{BroadPhase, NOWHERE, proper};
 use crate::Aabb;
 
@@ -28,6 +28,7 @@ const CROWD: usize = 4;
 #[derive(Clone, Debug, Default)]
 pub struct SweepAndPrune {
     tight: Vec<Aabb>,
+    rounded: Vec<Rounded>,
     fat: Vec<Fat>,
     state: Vec<State>,
     /// Boxes to be filed anew.
@@ -55,6 +56,7 @@ impl BroadPhase for SweepAndPrune {
     fn insert(&mut self, bounds: &Aabb, moving: bool) -> u32 {
         let handle = self.free.pop().unwrap_or_else(|| {
             self.tight.push(NOWHERE);
+            self.rounded.push(Rounded::new(&NOWHERE));
             self.fat.push(Fat::NOWHERE);
             self.state.push(State::default());
             self.tight.len() as u32 - 1
@@ -69,6 +71,7 @@ impl BroadPhase for SweepAndPrune {
         let i = handle as usize;
         let Some(state) = self.state.get_mut(i).filter(|s| s.taken) else { return };
         self.tight[i] = proper(bounds);
+        self.rounded[i] = Rounded::new(&self.tight[i]);
         if !state.changed && (state.moving != moving || !self.fat[i].holds(&self.tight[i])) {
             state.changed = true;
             self.changed.push(handle);
@@ -84,6 +87,7 @@ impl BroadPhase for SweepAndPrune {
         }
         *state = State { taken: false, moving: false, changed: true };
         self.tight[i] = NOWHERE;
+        self.rounded[i] = Rounded::new(&NOWHERE);
         self.free.push(handle);
         self.count -= 1;
     }
@@ -100,7 +104,6 @@ impl BroadPhase for SweepAndPrune {
 
 impl SweepAndPrune {
     /// Fat boxes, cells and near pairs of everything.
-    #[inline(never)]
     fn file_all(&mut self) {
         self.changed.clear();
         self.state.iter_mut().for_each(|s| s.changed = false);
@@ -114,7 +117,6 @@ impl SweepAndPrune {
     }
 
     /// The near pairs that overlap indeed. Every pair is written and only then counted or not: whether they do is anybody's guess.
-    #[inline(never)]
     fn compare(&self, out: &mut Vec<[u32; 2]>) {
         out.clear();
         out.resize(self.near.len(), [0; 2]);
@@ -122,13 +124,17 @@ impl SweepAndPrune {
         for pair in &self.near {
             let [i, j] = [(pair >> 32) as u32, *pair as u32];
             out[count] = [i, j];
-            count += usize::from(overlap(&self.tight[i as usize], &self.tight[j as usize]));
+            let (a, b) = (&self.rounded[i as usize], &self.rounded[j as usize]);
+            let overlap = match a.overlaps(b) {
+                Guess::Perhaps => self.tight[i as usize].overlaps(&self.tight[j as usize]),
+                guess => guess == Guess::Yes,
+            };
+            count += usize::from(overlap);
         }
         out.truncate(count);
     }
 
     /// The same, where only the changed boxes have to be looked at. A box is told of those that were filed before it.
-    #[inline(never)]
     fn file_changed(&mut self) {
         let SweepAndPrune { tight, fat, state, changed, cells, near, fresh, .. } = self;
         let mut count = 0;
@@ -139,6 +145,7 @@ impl SweepAndPrune {
         }
         near.truncate(count);
         fresh.clear();
+        changed.sort_unstable_by_key(|&handle| (cells.home(handle), handle));
         for &handle in changed.iter() {
             let i = handle as usize;
             let old = fat[i];
@@ -157,7 +164,6 @@ impl SweepAndPrune {
 }
 
 /// Works `fresh` into `list`; both ascend.
-#[inline(never)]
 fn merge(list: &mut Vec<u64>, fresh: &[u64]) {
     let mut from = list.len();
     list.resize(list.len() + fresh.len(), 0);
@@ -170,10 +176,4 @@ fn merge(list: &mut Vec<u64>, fresh: &[u64]) {
         to -= 1;
         list[to] = pair;
     }
-}
-
-/// [`Aabb::overlaps`] without branches.
-fn overlap(a: &Aabb, b: &Aabb) -> bool {
-    let side = |k: usize| (a.min[k] <= b.max[k]) & (b.min[k] <= a.max[k]);
-    side(0) & side(1) & side(2)
 }
