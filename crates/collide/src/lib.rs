@@ -39,4 +39,7 @@ pub use narrow::contacts;
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
-pub use tree::{Builder, Progress, SphereNode, SphereTree, StageCount, TreeSettings};
+pub use tree::{
+    Builder, CachedTree, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree, StageCount, TreeCache, TreeFile, TreeFileError,
+    TreeSettings,
+};
