@@ -12,6 +12,8 @@
 
 mod ball;
 mod builder;
+mod close;
+mod medial;
 mod octree;
 mod settings;
 mod verify;
@@ -76,6 +78,7 @@ impl SphereTree {
         let distance = MeshDistance::new(mesh);
         let builder: &dyn TreeBuilder = match settings.builder {
             Builder::Octree => &octree::Octree,
+            Builder::Medial => &medial::Medial,
         };
         let built = builder.build(&Job { mesh, distance: &distance, settings, progress })?;
         let tree = SphereTree::flatten(&built.root, &distance);

@@ -25,6 +25,8 @@ pub enum Builder {
     /// Cells of an octree that the surface passes through.
     #[default]
     Octree,
+    /// Adaptive medial axis.
+    Medial,
 }
 
 impl Default for TreeSettings {

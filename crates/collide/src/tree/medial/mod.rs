@@ -1,0 +1,32 @@
+//! The adaptive medial axis builder.
+//!
+//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004).
+//!
+//! Level by level, each ball's points are covered by at most `branch` balls: candidates on the medial axis
+//! ([`candidates`]) are reduced ([`expand`]), moved to where they need least ([`refit`]), exchanged ([`optimise`]),
+//! and divide the points among themselves. Then the leaves are refitted all together, made to cover the surface
+//! itself and not its samples (`close`), and the inner balls are put around their children.
+
+mod candidates;
+mod cover_points;
+mod expand;
+mod levels;
+mod optimise;
+mod refit;
+mod site;
+mod spheres;
+
+use super::builder::{Built, Job, TreeBuilder};
+use crate::MeshError;
+
+/// The builder.
+pub(super) struct Medial;
+
+impl TreeBuilder for Medial {
+    fn build(&self, job: &Job) -> Result<Built, MeshError> {
+        let mut levels = levels::Levels::new(job);
+        while levels.next_level() {}
+        let (balls, parents) = levels.leaves();
+        Ok(Built { root: levels.cells(&super::close::closed(job.mesh, balls), &parents), stages: levels.stages })
+    }
+}

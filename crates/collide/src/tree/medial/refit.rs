@@ -1,0 +1,151 @@
+//! Refit: points choose their balls, balls move to where their points need least.
+//!
+//! One pass assigns each point to the site of least need (an additively weighted Voronoi partition) and then moves
+//! each site by Nelder and Mead's simplex (*A simplex method for function minimization*, 1965) to lower
+//! `max |p − c| + s(c)` over its own points. Neither half can raise the worst need.
+
+use super::site::Site;
+use crate::{MeshDistance, Vec3};
+
+/// Evaluations of the simplex per site and pass.
+const EVALUATIONS: usize = 36;
+
+/// Sites and the points that each must hold.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Fit {
+    pub sites: Vec<Site>,
+    /// Points of each site.
+    pub parts: Vec<Vec<u32>>,
+    /// The worst need of each part, metres; at least 0.
+    pub errors: Vec<f64>,
+}
+
+impl Fit {
+    /// Assigns the points of `region`; sites that get none are dropped.
+    pub fn assigned(sites: Vec<Site>, points: &[Vec3], region: &[u32]) -> Fit {
+        let mut fit = Fit { parts: vec![Vec::new(); sites.len()], errors: vec![0.0; sites.len()], sites };
+        for &i in region {
+            let (k, need) = fit.chosen(&points[i as usize]);
+            fit.parts[k].push(i);
+            fit.errors[k] = fit.errors[k].max(need);
+        }
+        fit.drop_empty();
+        fit
+    }
+
+    /// The site of least need, the first of equals.
+    fn chosen(&self, p: &Vec3) -> (usize, f64) {
+        let mut best = (0, f64::INFINITY);
+        for (k, site) in self.sites.iter().enumerate() {
+            let need = site.need(p);
+            if need < best.1 {
+                best = (k, need);
+            }
+        }
+        best
+    }
+
+    /// Drops the sites without points.
+    pub fn drop_empty(&mut self) {
+        let mut kept = self.parts.iter().map(|p| !p.is_empty());
+        self.sites.retain(|_| kept.next().unwrap_or(false));
+        let mut kept = self.parts.iter().map(|p| !p.is_empty());
+        self.errors.retain(|_| kept.next().unwrap_or(false));
+        self.parts.retain(|p| !p.is_empty());
+    }
+
+    /// The greatest error.
+    pub fn worst(&self) -> f64 {
+        self.errors.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// What the reducers compare and lower: the sum of the errors' eighth powers, each as a part of `scale`, so that
+    /// the worst counts most and the others are not forgotten.
+    pub fn cost(&self, scale: f64) -> f64 {
+        self.errors.iter().map(|e| (e / scale).powi(8)).sum()
+    }
+
+    /// `passes` times: move the sites, assign anew.
+    pub fn refit(mut self, passes: usize, points: &[Vec3], region: &[u32], distance: &MeshDistance) -> Fit {
+        let mut settled: Vec<Vec<u32>> = Vec::new();
+        for _ in 0..passes {
+            if self.parts == settled {
+                break;
+            }
+            settled.clone_from(&self.parts);
+            for k in 0..self.sites.len() {
+                let own: Vec<Vec3> = self.parts[k].iter().map(|&i| points[i as usize]).collect();
+                self.sites[k] = moved(self.sites[k], &own, distance);
+            }
+            self = Fit::assigned(self.sites, points, region);
+        }
+        self
+    }
+}
+
+/// The site moved to where its points need less.
+pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
+    let start = site.worst(own);
+    let radius = start + site.depth;
+    if start <= 1e-9 * radius {
+        return site;
+    }
+    let step = (start * 2.0).min(0.3 * radius).max(1e-3 * radius);
+    let mut depth = site.depth;
+    let mut best = (site.center, start);
+    simplex(site.center, step, EVALUATIONS, |c| {
+        let reach = own.iter().map(|p| (p - c).norm_squared()).fold(0.0, f64::max).sqrt();
+        // depths differ by no more than the centres do
+        let bound = reach - site.depth - (c - site.center).norm();
+        if bound >= 2.0 * start {
+            return bound;
+        }
+        let here = -distance.closest(c).signed_distance;
+        if reach - here < best.1 {
+            best = (*c, reach - here);
+            depth = here;
+        }
+        reach - here
+    });
+    Site { center: best.0, depth }
+}
+
+/// Nelder and Mead in three dimensions, from a corner simplex of side `step`; `f` keeps the best itself.
+pub(super) fn simplex(start: Vec3, step: f64, evaluations: usize, mut f: impl FnMut(&Vec3) -> f64) {
+    let mut at = [start; 4];
+    for k in 0..3 {
+        at[k + 1][k] += step;
+    }
+    let mut corners = at.map(|c| (f(&c), c));
+    let mut used = 4;
+    while used < evaluations {
+        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let middle = (corners[0].1 + corners[1].1 + corners[2].1) / 3.0;
+        let away = middle - corners[3].1;
+        let mut tried = |t: f64| {
+            let c = middle + away * t;
+            (f(&c), c)
+        };
+        let reflected = tried(1.0);
+        used += 1;
+        let next = if reflected.0 < corners[0].0 {
+            used += 1;
+            let expanded = tried(2.0);
+            if expanded.0 < reflected.0 { expanded } else { reflected }
+        } else if reflected.0 < corners[2].0 {
+            reflected
+        } else {
+            used += 1;
+            if reflected.0 < corners[3].0 { tried(0.5) } else { tried(-0.5) }
+        };
+        if next.0 < corners[3].0 {
+            corners[3] = next;
+        } else {
+            for n in 1..4 {
+                let c = 0.5 * (corners[n].1 + corners[0].1);
+                corners[n] = (f(&c), c);
+            }
+            used += 3;
+        }
+    }
+}
