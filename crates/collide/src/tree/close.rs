@@ -46,7 +46,7 @@ fn cover(piece: &[Vec3; 3], near: &[u32], small: f64, balls: &mut [Ball]) {
 }
 
 /// By how much a ball must be grown to hold the piece.
-fn lack(ball: &Ball, piece: &[Vec3; 3]) -> f64 {
+pub(super) fn lack(ball: &Ball, piece: &[Vec3; 3]) -> f64 {
     let square = piece.iter().map(|p| (p - ball.center).norm_squared()).fold(0.0, f64::max);
     square.sqrt() - ball.radius
 }

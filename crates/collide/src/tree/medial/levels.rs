@@ -2,13 +2,15 @@
 
 use super::candidates::touching;
 use super::expand::expand;
+use super::gaps::add_gaps;
+use super::group::grouped;
 use super::optimise::Exchange;
-use super::refit::{Fit, moved};
+use super::refit::{Fit, own};
 use super::site::Site;
 use super::spheres::CoverPoints;
+use crate::Vec3;
 use crate::tree::ball::Ball;
 use crate::tree::builder::{Cell, Job, StageCount};
-use crate::{MeshDistance, Vec3};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
@@ -16,23 +18,15 @@ use std::sync::Mutex;
 const CANDIDATES: usize = 300;
 /// Points of a region that the reducers look at; the last refit looks at all.
 const LOOKED_AT: usize = 1200;
-/// Exchanges tried per region.
-const TRIES: usize = 24;
-
-/// A ball of a level: its site and the points it is for.
-#[derive(Clone, Debug)]
-struct Node {
-    parent: usize,
-    site: Site,
-    points: Vec<u32>,
-    error: f64,
-}
+/// Exchanges tried per ball.
+const TRIES: usize = 3;
+/// Sizes of the gaps that are filled, one after the other; parts of the mesh's diagonal.
+const GAPS: [f64; 4] = [8e-3, 4e-3, 2e-3, 1e-3];
 
 pub(super) struct Levels<'a> {
     job: &'a Job<'a>,
     cover: CoverPoints,
     candidates: Vec<Site>,
-    levels: Vec<Vec<Node>>,
     scale: f64,
     done: Mutex<f64>,
     pub stages: Vec<StageCount>,
@@ -43,103 +37,128 @@ impl<'a> Levels<'a> {
         let scale = job.mesh.diagonal();
         let balls = (f64::from(job.settings.branch)).powi(job.settings.depth as i32);
         let cover = CoverPoints::on(job.mesh, (balls * 40.0).clamp(6000.0, 20_000.0) as usize);
-        let candidates = (0..cover.points.len() as u32)
-            .into_par_iter()
-            .map(|i| touching(&cover, i, job.distance, 0.5 * scale))
-            .collect();
-        let points = (0..cover.points.len() as u32).collect();
-        let root = Node { parent: 0, site: Site { center: Vec3::zeros(), depth: 0.0 }, points, error: scale };
-        Levels { job, cover, candidates, levels: vec![vec![root]], scale, done: Mutex::new(0.0), stages: Vec::new() }
+        let mut levels =
+            Levels { job, cover, candidates: Vec::new(), scale, done: Mutex::new(0.0), stages: Vec::new() };
+        levels.touch();
+        levels
     }
 
-    /// Divides the balls of the deepest level, unless that is the last.
-    pub fn next_level(&mut self) -> bool {
-        let level = self.levels.len() as u32;
-        let settings = self.job.settings;
-        if level > settings.depth {
-            return false;
+    /// Candidates for the cover points that have none yet.
+    fn touch(&mut self) {
+        let new = self.candidates.len() as u32..self.cover.points.len() as u32;
+        let more: Vec<Site> =
+            new.into_par_iter().map(|i| touching(&self.cover, i, self.job.distance, 0.5 * self.scale)).collect();
+        self.candidates.extend(more);
+    }
+
+    /// The whole of it.
+    pub fn cells(&mut self) -> Cell {
+        let leaves = self.leaves();
+        let balls = self.balls(&leaves);
+        let balls = crate::tree::close::closed(self.job.mesh, balls);
+        self.nested(&balls, &leaves.parts, (0..balls.len() as u32).collect(), self.job.settings.depth)
+    }
+
+    fn balls(&self, fit: &Fit) -> Vec<Ball> {
+        fit.sites.iter().zip(&fit.parts).map(|(s, part)| s.ball(&own(&self.cover.points, part))).collect()
+    }
+
+    fn leaves(&mut self) -> Fit {
+        let all = (0..self.cover.points.len() as u32).collect();
+        let center = Site::at(self.cover.points[0], self.job.distance);
+        let mut fit = Fit { sites: vec![center], parts: vec![all], errors: vec![self.scale] };
+        let enough = self.job.settings.error * self.scale;
+        for level in 1..=self.job.settings.depth {
+            if fit.worst() <= enough {
+                break;
+            }
+            fit = self.next_level(&fit, level, enough);
         }
-        let last = self.levels.last().map_or(&[][..], |l| l);
-        let enough = settings.error * self.scale;
-        if last.iter().all(|n| n.error <= enough) {
-            return false;
+        let most = fit.sites.len();
+        self.debug(&fit, "levels");
+        fit.refit_all(3, &self.cover.points, self.job.distance);
+        self.debug(&fit, "refit");
+        for gap in GAPS {
+            let exchange = Exchange {
+                points: &self.cover.points,
+                candidates: &self.candidates,
+                distance: self.job.distance,
+                most,
+                tries: 3 * most,
+            };
+            let (better, wins) = exchange.run(fit);
+            fit = better;
+            self.debug(&fit, &format!("exchanges {wins}"));
+            fit.refit_all(2, &self.cover.points, self.job.distance);
+            self.debug(&fit, "refit");
+            let balls = self.balls(&fit);
+            let added = add_gaps(&mut self.cover, self.job.mesh, &balls, gap * self.scale);
+            self.touch();
+            fit.refit_all(2, &self.cover.points, self.job.distance);
+            self.debug(&fit, &format!("gaps {added}"));
         }
-        let fits: Vec<(Fit, u64)> = last
+        fit
+    }
+
+    fn debug(&self, fit: &Fit, what: &str) {
+        if std::env::var_os("DBG").is_some() {
+            let mut e: Vec<f64> = fit.errors.iter().map(|e| e / self.scale).collect();
+            e.sort_by(|a, b| b.total_cmp(a));
+            let n = e.len();
+            eprintln!("{what}: {n} balls, errors {:.4} {:.4} {:.4} {:.4} {:.4}", e[0], e[n / 8], e[n / 4], e[n / 2], e[n - 1]);
+        }
+    }
+
+    /// Divides the balls of the deepest level.
+    fn next_level(&mut self, fit: &Fit, level: u32, enough: f64) -> Fit {
+        let divided: Vec<(Fit, u64)> = fit
+            .parts
             .par_iter()
-            .map(|node| if node.error <= enough { self.kept(node) } else { self.divided(node) })
-            .collect();
-        let wins = fits.iter().map(|f| f.1).sum();
-        let nodes: Vec<Node> = fits
-            .into_iter()
-            .enumerate()
-            .flat_map(|(parent, (fit, _))| {
-                let parts = fit.parts.into_iter().zip(fit.errors);
-                fit.sites
-                    .into_iter()
-                    .zip(parts)
-                    .map(move |(site, (points, error))| Node { parent, site, points, error })
+            .zip(&fit.sites)
+            .zip(&fit.errors)
+            .map(|((part, site), error)| {
+                if *error <= enough {
+                    (Fit { sites: vec![*site], parts: vec![part.clone()], errors: vec![*error] }, 0)
+                } else {
+                    self.divided(part)
+                }
             })
             .collect();
+        let wins = divided.iter().map(|f| f.1).sum();
+        let mut next = Fit::default();
+        for (fit, _) in divided {
+            next.sites.extend(fit.sites);
+            next.parts.extend(fit.parts);
+            next.errors.extend(fit.errors);
+        }
         self.stages.push(StageCount { level, stage: "exchanges won".into(), count: wins });
-        self.stages.push(StageCount { level, stage: "balls".into(), count: nodes.len() as u64 });
-        self.levels.push(nodes);
-        self.relax();
-        true
+        self.stages.push(StageCount { level, stage: "balls".into(), count: next.sites.len() as u64 });
+        next
     }
 
-    fn kept(&self, node: &Node) -> (Fit, u64) {
-        (Fit { sites: vec![node.site], parts: vec![node.points.clone()], errors: vec![node.error] }, 0)
-    }
-
-    /// The points of a node covered by at most `branch` balls.
-    fn divided(&self, node: &Node) -> (Fit, u64) {
+    /// The points of a part covered by at most `branch` balls.
+    fn divided(&self, part: &[u32]) -> (Fit, u64) {
         let most = self.job.settings.branch as usize;
         let points = &self.cover.points;
-        let some = every(&node.points, LOOKED_AT);
-        let looked: Vec<Vec3> = some.iter().map(|&i| points[i as usize]).collect();
-        let mut candidates: Vec<Site> =
-            every(&node.points, CANDIDATES).iter().map(|&i| self.candidates[i as usize]).collect();
-        candidates.push(node.site);
-        let chosen = expand(&candidates, &looked, most);
-        let fit = Fit::assigned(chosen, points, &some).refit(4, points, &some, self.job.distance);
+        let some = every(part, LOOKED_AT);
+        let candidates: Vec<Site> =
+            every(part, CANDIDATES).iter().map(|&i| self.candidates[i as usize]).collect();
+        let chosen = expand(&candidates, &own(points, &some), most);
+        let mut fit = Fit::of(chosen, points, &some);
+        fit.refit(4, points, &some, self.job.distance);
         let exchange = Exchange {
             points,
-            region: &some,
-            candidates: &candidates,
+            candidates: &self.candidates,
             distance: self.job.distance,
             most,
-            tries: TRIES,
+            tries: TRIES * most,
         };
-        let (fit, wins) = exchange.run(fit);
-        let fit = Fit::assigned(fit.sites, points, &node.points).refit(3, points, &node.points, self.job.distance);
-        self.report(node.points.len());
+        let (mut fit, wins) = exchange.run(fit);
+        fit.assign(points, part);
+        fit.refit(2, points, part, self.job.distance);
+        fit.drop_empty();
+        self.report(part.len());
         (fit, wins)
-    }
-
-    /// All balls of the deepest level refitted together, across regions.
-    fn relax(&mut self) {
-        for _ in 0..3 {
-            self.reassign();
-            let (points, distance) = (&self.cover.points, self.job.distance);
-            if let Some(nodes) = self.levels.last_mut() {
-                nodes.par_iter_mut().for_each(|n| n.refit(points, distance));
-            }
-        }
-        self.reassign();
-    }
-
-    fn reassign(&mut self) {
-        let Some(nodes) = self.levels.last_mut() else { return };
-        let sites: Vec<Site> = nodes.iter().map(|n| n.site).collect();
-        let owner: Vec<usize> = self.cover.points.par_iter().map(|p| least(&sites, p)).collect();
-        nodes.iter_mut().for_each(|n| n.points.clear());
-        for (i, k) in owner.into_iter().enumerate() {
-            nodes[k].points.push(i as u32);
-        }
-        nodes.retain(|n| !n.points.is_empty());
-        for n in nodes {
-            n.error = n.site.worst(&own(&self.cover.points, &n.points)).max(0.0);
-        }
     }
 
     fn report(&self, points: usize) {
@@ -150,58 +169,26 @@ impl<'a> Levels<'a> {
         }
     }
 
-    /// The balls of the deepest level and their parents.
-    pub fn leaves(&self) -> (Vec<Ball>, Vec<usize>) {
-        let nodes = self.levels.last().map_or(&[][..], |l| l);
-        (
-            nodes.iter().map(|n| n.site.ball(&own(&self.cover.points, &n.points))).collect(),
-            nodes.iter().map(|n| n.parent).collect(),
-        )
-    }
-
-    /// Nested cells over the leaves' balls.
-    pub fn cells(&self, balls: &[Ball], parents: &[usize]) -> Cell {
-        let mut below: Vec<(usize, Cell)> =
-            parents.iter().zip(balls).map(|(p, ball)| (*p, Cell::Leaf(*ball))).collect();
-        for level in (0..self.levels.len() - 1).rev() {
-            let nodes = &self.levels[level];
-            let mut inside: Vec<Vec<Cell>> = nodes.iter().map(|_| Vec::new()).collect();
-            for (parent, cell) in below {
-                inside[parent].push(cell);
-            }
-            below = nodes
-                .iter()
-                .zip(inside)
-                .filter(|(_, cells)| !cells.is_empty())
-                .map(|(n, cells)| (n.parent, Cell::Inner(cells)))
-                .collect();
+    /// Nested cells over the leaves `which`, `depth` levels of them.
+    fn nested(&self, balls: &[Ball], parts: &[Vec<u32>], which: Vec<u32>, depth: u32) -> Cell {
+        let branch = self.job.settings.branch as usize;
+        if which.len() <= branch {
+            return Cell::Inner(which.iter().map(|&k| Cell::Leaf(balls[k as usize])).collect());
         }
-        below.pop().map_or(Cell::Inner(Vec::new()), |(_, cell)| cell)
+        let mut part: Vec<u32> = which.iter().flat_map(|&k| parts[k as usize].iter().copied()).collect();
+        part.sort_unstable();
+        let sites = self.divided(&part).0.sites;
+        let own: Vec<Ball> = which.iter().map(|&k| balls[k as usize]).collect();
+        let groups = grouped(&own, sites, branch.pow(depth - 1), self.job.distance);
+        let inner = |group: &Vec<u32>| {
+            let which = group.iter().map(|&n| which[n as usize]).collect();
+            self.nested(balls, parts, which, depth - 1)
+        };
+        Cell::Inner(groups.par_iter().map(inner).collect())
     }
-}
-
-impl Node {
-    fn refit(&mut self, points: &[Vec3], distance: &MeshDistance) {
-        self.site = moved(self.site, &own(points, &self.points), distance);
-    }
-}
-
-fn own(points: &[Vec3], part: &[u32]) -> Vec<Vec3> {
-    part.iter().map(|&i| points[i as usize]).collect()
 }
 
 /// At most `most` of the items, evenly.
 fn every(items: &[u32], most: usize) -> Vec<u32> {
     items.iter().copied().step_by(items.len().div_ceil(most).max(1)).collect()
-}
-
-fn least(sites: &[Site], p: &Vec3) -> usize {
-    let mut best = (f64::INFINITY, 0);
-    for (k, site) in sites.iter().enumerate() {
-        let need = site.need(p);
-        if need < best.0 {
-            best = (need, k);
-        }
-    }
-    best.1
 }

@@ -10,6 +10,8 @@
 mod candidates;
 mod cover_points;
 mod expand;
+mod gaps;
+mod group;
 mod levels;
 mod optimise;
 mod refit;
@@ -25,8 +27,6 @@ pub(super) struct Medial;
 impl TreeBuilder for Medial {
     fn build(&self, job: &Job) -> Result<Built, MeshError> {
         let mut levels = levels::Levels::new(job);
-        while levels.next_level() {}
-        let (balls, parents) = levels.leaves();
-        Ok(Built { root: levels.cells(&super::close::closed(job.mesh, balls), &parents), stages: levels.stages })
+        Ok(Built { root: levels.cells(), stages: levels.stages })
     }
 }

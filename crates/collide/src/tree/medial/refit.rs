@@ -6,6 +6,7 @@
 
 use super::site::Site;
 use crate::{MeshDistance, Vec3};
+use rayon::prelude::*;
 
 /// Evaluations of the simplex per site and pass.
 const EVALUATIONS: usize = 36;
@@ -21,28 +22,23 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// Assigns the points of `region`; sites that get none are dropped.
-    pub fn assigned(sites: Vec<Site>, points: &[Vec3], region: &[u32]) -> Fit {
-        let mut fit = Fit { parts: vec![Vec::new(); sites.len()], errors: vec![0.0; sites.len()], sites };
-        for &i in region {
-            let (k, need) = fit.chosen(&points[i as usize]);
-            fit.parts[k].push(i);
-            fit.errors[k] = fit.errors[k].max(need);
-        }
-        fit.drop_empty();
+    /// Assigns the points of `region` to the sites.
+    pub fn of(sites: Vec<Site>, points: &[Vec3], region: &[u32]) -> Fit {
+        let mut fit = Fit { sites, ..Fit::default() };
+        fit.assign(points, region);
         fit
     }
 
-    /// The site of least need, the first of equals.
-    fn chosen(&self, p: &Vec3) -> (usize, f64) {
-        let mut best = (0, f64::INFINITY);
-        for (k, site) in self.sites.iter().enumerate() {
-            let need = site.need(p);
-            if need < best.1 {
-                best = (k, need);
-            }
+    /// Assigns the points of `region`, each to the site it needs least of.
+    pub fn assign(&mut self, points: &[Vec3], region: &[u32]) {
+        self.parts.resize(self.sites.len(), Vec::new());
+        self.parts.iter_mut().for_each(Vec::clear);
+        self.errors = vec![0.0; self.sites.len()];
+        for &i in region {
+            let (need, k) = least(&self.sites, &points[i as usize]);
+            self.parts[k].push(i);
+            self.errors[k] = self.errors[k].max(need);
         }
-        best
     }
 
     /// Drops the sites without points.
@@ -66,25 +62,66 @@ impl Fit {
     }
 
     /// `passes` times: move the sites, assign anew.
-    pub fn refit(mut self, passes: usize, points: &[Vec3], region: &[u32], distance: &MeshDistance) -> Fit {
-        let mut settled: Vec<Vec<u32>> = Vec::new();
+    pub fn refit(&mut self, passes: usize, points: &[Vec3], region: &[u32], distance: &MeshDistance) {
+        let mut settled = vec![Vec::new(); self.sites.len()];
         for _ in 0..passes {
-            if self.parts == settled {
+            let changed: Vec<usize> = (0..self.sites.len()).filter(|&k| self.parts[k] != settled[k]).collect();
+            if changed.is_empty() {
                 break;
             }
             settled.clone_from(&self.parts);
-            for k in 0..self.sites.len() {
-                let own: Vec<Vec3> = self.parts[k].iter().map(|&i| points[i as usize]).collect();
-                self.sites[k] = moved(self.sites[k], &own, distance);
+            for k in changed {
+                self.sites[k] = moved(self.sites[k], &own(points, &self.parts[k]), distance);
             }
-            self = Fit::assigned(self.sites, points, region);
+            self.assign(points, region);
         }
-        self
     }
+
+    /// The same for many sites, on all threads.
+    pub fn refit_all(&mut self, passes: usize, points: &[Vec3], distance: &MeshDistance) {
+        for _ in 0..passes {
+            self.assign_all(points);
+            let moved_to = |(site, part): (&Site, &Vec<u32>)| moved(*site, &own(points, part), distance);
+            self.sites = self.sites.par_iter().zip(&self.parts).map(moved_to).collect();
+        }
+        self.assign_all(points);
+        self.drop_empty();
+    }
+
+    /// Assigns all points there are, on all threads.
+    pub fn assign_all(&mut self, points: &[Vec3]) {
+        let owners: Vec<(f64, usize)> = points.par_iter().map(|p| least(&self.sites, p)).collect();
+        self.parts = vec![Vec::new(); self.sites.len()];
+        self.errors = vec![0.0; self.sites.len()];
+        for (i, (need, k)) in owners.into_iter().enumerate() {
+            self.parts[k].push(i as u32);
+            self.errors[k] = self.errors[k].max(need);
+        }
+    }
+}
+
+/// The points of a part.
+pub(super) fn own(points: &[Vec3], part: &[u32]) -> Vec<Vec3> {
+    part.iter().map(|&i| points[i as usize]).collect()
+}
+
+/// The least need of the sites and which has it, the first of equals.
+fn least(sites: &[Site], p: &Vec3) -> (f64, usize) {
+    let mut best = (f64::INFINITY, 0);
+    for (k, site) in sites.iter().enumerate() {
+        let need = site.need(p);
+        if need < best.0 {
+            best = (need, k);
+        }
+    }
+    best
 }
 
 /// The site moved to where its points need less.
 pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
+    if own.is_empty() {
+        return site;
+    }
     let start = site.worst(own);
     let radius = start + site.depth;
     if start <= 1e-9 * radius {
