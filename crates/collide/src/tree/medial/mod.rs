@@ -9,6 +9,7 @@
 
 mod candidates;
 mod cover_points;
+pub(in crate::tree) mod delaunay;
 mod expand;
 mod gaps;
 mod group;
