@@ -33,8 +33,11 @@ const SLACK: f64 = 1e-9;
 /// Sites to begin with, as a part of the balls asked for. A surface of `n` sites has about `3 n` inner balls.
 const FIRST: usize = 12;
 
-/// Balls that hold all cover points of `region` (indices), refined as `want` says, and what was done. The order of the
-/// balls is a function of the input alone.
+/// Balls that hold all cover points of `region` (indices), refined as `want` says, and what was done. Of the INTERNAL
+/// ones those that hold some of the points. The order of the balls is a function of the input alone.
+///
+/// For the regions of a tree it is cheaper to refine one [`Axis`] of all points, and to hand each region the balls that
+/// hold its points ([`Axis::holders`]).
 pub(in crate::tree) fn adaptive(
     cover: &CoverPoints,
     region: &[u32],
@@ -73,6 +76,8 @@ impl Counts {
 /// Voronoi balls with their flags. Cover points are numbered by their place in the region.
 pub(in crate::tree) struct Axis<'a> {
     points: Vec<Vec3>,
+    /// Whether the points are of a part of the surface.
+    partial: bool,
     distance: &'a MeshDistance,
     /// `None` for a region of no extent.
     voronoi: Option<Voronoi<'a>>,
@@ -106,6 +111,7 @@ impl<'a> Axis<'a> {
         let mut axis = Axis {
             witness: vec![NONE; points.len()],
             next: vec![NONE; points.len()],
+            partial: points.len() < cover.points.len(),
             points,
             distance,
             voronoi: Voronoi::new(&first, &solid, distance),
@@ -152,18 +158,49 @@ impl<'a> Axis<'a> {
             self.judge_again(c);
         }
         let mut balls = Vec::with_capacity(self.internal + self.covering);
-        for c in 0..self.first.len() as u32 {
-            if self.is_flagged(c) {
-                let outward = self.error(c);
-                if let Some(b) = self.voronoi.as_ref().and_then(|v| v.ball(c)) {
-                    let ball = Ball { center: b.ball.center, radius: b.ball.radius * (1.0 + SLACK) };
-                    balls.push(MedialBall { ball, outward });
-                }
+        for c in self.listed() {
+            let outward = self.error(c);
+            if let Some(b) = self.voronoi.as_ref().and_then(|v| v.ball(c)) {
+                let ball = Ball { center: b.ball.center, radius: b.ball.radius * (1.0 + SLACK) };
+                balls.push(MedialBall { ball, outward });
             }
         }
         let alone = (0..self.points.len()).filter(|&i| self.witness[i] == NONE).map(|i| self.points[i]);
         balls.extend(alone.map(|center| MedialBall { ball: Ball { center, radius: 0.0 }, outward: 0.0 }));
         balls
+    }
+
+    /// Per point, the balls of the list that [`Axis::balls`] just gave which hold it: all that do, up to rounding; that
+    /// is at least one.
+    pub fn holders(&mut self) -> Vec<Vec<u32>> {
+        let mut place = vec![NONE; self.first.len()];
+        let listed = self.listed();
+        listed.iter().enumerate().for_each(|(n, &c)| place[c as usize] = n as u32);
+        let (mut hint, mut alone) = (0, listed.len() as u32);
+        let mut all = Vec::with_capacity(self.points.len());
+        for i in 0..self.points.len() as u32 {
+            let mut holders = Vec::new();
+            hint = self.each_holder(i, hint, |c, _| {
+                if place[c as usize] != NONE {
+                    holders.push(place[c as usize]);
+                }
+                true
+            });
+            let witness = self.witness[i as usize];
+            if witness == NONE {
+                holders.push(alone);
+                alone += 1;
+            } else if !holders.contains(&place[witness as usize]) {
+                holders.push(place[witness as usize]);
+            }
+            all.push(holders);
+        }
+        all
+    }
+
+    /// The flagged cells that matter.
+    fn listed(&self) -> Vec<u32> {
+        (0..self.first.len() as u32).filter(|&c| self.is_flagged(c) && self.matters(c)).collect()
     }
 
     /// What was done so far.
@@ -183,7 +220,7 @@ impl<'a> Axis<'a> {
                 continue;
             }
             self.judge_again(cell.0);
-            if self.is_flagged(cell.0) {
+            if self.is_flagged(cell.0) && self.matters(cell.0) {
                 return Some((f64::from_bits(bits), cell.0));
             }
             self.queued[cell.0 as usize] = NONE;
@@ -267,36 +304,48 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// Finds a point its witness, walking from `hint`: the first INTERNAL ball met that holds it, or else the one of least error. The cell it lies in.
+    /// Finds a point its witness: the first INTERNAL ball met that holds it, or else the one of least error. The cell it
+    /// lies in, walking from `hint`.
     fn judge(&mut self, i: u32, hint: u32) -> u32 {
-        let Some(voronoi) = self.voronoi.as_mut() else { return NONE };
+        let mut best = (f64::INFINITY, NONE);
+        let home = self.each_holder(i, hint, |c, axis| {
+            if axis.inner[c as usize] {
+                best.1 = c;
+                return false;
+            }
+            let error = axis.error(c);
+            if error < best.0 {
+                best = (error, c);
+            }
+            true
+        });
+        if best.1 != NONE {
+            self.entrust(i, best.1);
+        }
+        home
+    }
+
+    /// Calls `visit` for all cells whose balls hold point `i`, until it says no. The cell it lies in, walking from `hint`.
+    fn each_holder(&mut self, i: u32, hint: u32, mut visit: impl FnMut(u32, &mut Self) -> bool) -> u32 {
+        let Some(voronoi) = self.voronoi.as_ref() else { return NONE };
         let p = self.points[i as usize];
         let home = voronoi.delaunay.locate(&p, hint);
         self.search += 1;
         self.seen[home as usize] = self.search;
         let mut stack = vec![home];
-        let mut best = (f64::INFINITY, NONE);
         while let Some(c) = stack.pop() {
-            if let Some(radius) = voronoi.ball(c).filter(|b| holds(&b.ball, &p)).map(|b| b.ball.radius) {
-                if self.inner[c as usize] {
-                    best.1 = c;
-                    break;
-                }
-                let error = radius + voronoi.signed_distance(c);
-                if error < best.0 {
-                    best = (error, c);
-                }
+            if self.holds(c, i) && !visit(c, self) {
+                break;
             }
+            let Some(voronoi) = self.voronoi.as_ref() else { break };
             for n in voronoi.delaunay.across(c) {
+                // on through slivers that have no ball
                 let on = voronoi.delaunay.is_finite(n) && voronoi.ball(n).is_none_or(|b| holds(&b.ball, &p));
                 if on && self.seen[n as usize] != self.search {
                     self.seen[n as usize] = self.search;
                     stack.push(n);
                 }
             }
-        }
-        if best.1 != NONE {
-            self.entrust(i, best.1);
         }
         home
     }
@@ -325,6 +374,11 @@ impl<'a> Axis<'a> {
 
     fn is_flagged(&self, cell: u32) -> bool {
         self.inner[cell as usize] || self.first[cell as usize] != NONE
+    }
+
+    /// Whether a flagged ball is of the region: it holds some point of it.
+    fn matters(&self, cell: u32) -> bool {
+        !self.partial || self.first[cell as usize] != NONE || (0..self.points.len() as u32).any(|i| self.holds(cell, i))
     }
 
     /// Upper bound of how far the ball reaches out of the solid, metres.
@@ -379,6 +433,15 @@ mod tests {
             assert!((b.outward - (b.ball.radius + s).max(0.0)).abs() <= 1e-7 * b.ball.radius);
         }
         assert_eq!(balls.len() as u64, counts.internal + counts.cover + counts.alone);
+        let mut axis = Axis::new(&cover, &region, &distance, want.least / FIRST);
+        axis.refine(want);
+        assert_eq!(axis.balls(), balls);
+        for (p, holders) in cover.points.iter().zip(axis.holders()) {
+            let strictly: Vec<u32> =
+                (0..balls.len() as u32).filter(|&k| far(&balls[k as usize], p) < -1e-6 * mesh.diagonal()).collect();
+            assert!(strictly.iter().all(|k| holders.contains(k)), "{p}");
+            assert!(!holders.is_empty() && holders.iter().all(|&k| far(&balls[k as usize], p) <= 0.0));
+        }
         assert_eq!((balls.clone(), counts), adaptive(&cover, &region, &distance, want));
         (balls, counts)
     }
@@ -408,8 +471,7 @@ mod tests {
         let cover = CoverPoints::on(&mesh, 600);
         let region: Vec<u32> = (0..cover.points.len() as u32).filter(|&i| cover.points[i as usize].z == 0.5).collect();
         let distance = MeshDistance::new(&mesh);
-        let (balls, counts) = adaptive(&cover, &region, &distance, &Want { target: 0.02, least: 50, most: 500 });
-        eprintln!("{counts:?}");for b in &balls { if b.outward > 0.02 {eprintln!("{b:?}");}}
+        let (balls, _) = adaptive(&cover, &region, &distance, &Want { target: 0.02, least: 50, most: 500 });
         for &i in &region {
             let p = cover.points[i as usize];
             assert!(balls.iter().any(|b| (b.ball.center - p).norm() <= b.ball.radius), "{p} is bare");
@@ -433,6 +495,15 @@ mod tests {
                 let start = std::time::Instant::now();
                 let (balls, counts) = adaptive(&cover, &region, &distance, &Want { target: target * scale, least: 1000, most: 5000 });
                 let worst = balls.iter().map(|b| b.outward).fold(0.0, f64::max) / scale;
+                let mut axis = Axis::new(&cover, &region, &distance, 80);
+                axis.refine(&Want { target: target * scale, least: 1000, most: 5000 });
+                axis.balls();
+                let t = std::time::Instant::now();
+                let h = axis.holders();
+                eprintln!("{:?} {}", t.elapsed(), h.iter().map(Vec::len).sum::<usize>() / h.len());
+                let t = std::time::Instant::now();
+                let (some, counts2) = adaptive(&cover, &region[1000..2000], &distance, &Want { target: target * scale, least: 200, most: 300 });
+                eprintln!("part {counts2:?} {} {:?} worst {:.4}", some.len(), t.elapsed(), some.iter().map(|b| b.outward).fold(0.0, f64::max) / scale);
                 eprintln!("{name} {target}: {} balls, worst {worst:.4}, {counts:?} {:?}", balls.len(), start.elapsed());
             }
         }
