@@ -8,6 +8,7 @@ fn check(mesh: &TriMesh, want: &Want) -> (Vec<MedialBall>, Counts) {
     let distance = MeshDistance::new(mesh);
     let region: Vec<u32> = (0..cover.points.len() as u32).collect();
     let (balls, counts) = adaptive(&cover, &region, &distance, want);
+    let slack = 1e-6 * mesh.diagonal();
     let far = |b: &MedialBall, p: &Vec3| (b.ball.center - p).norm() - b.ball.radius;
     for p in &cover.points {
         assert!(balls.iter().any(|b| far(b, p) <= 0.0), "{p} is bare");
@@ -22,7 +23,7 @@ fn check(mesh: &TriMesh, want: &Want) -> (Vec<MedialBall>, Counts) {
     assert_eq!(axis.balls(), balls);
     for (p, holders) in cover.points.iter().zip(axis.holders()) {
         let strictly: Vec<u32> =
-            (0..balls.len() as u32).filter(|&k| far(&balls[k as usize], p) < -1e-6 * mesh.diagonal()).collect();
+            (0..balls.len() as u32).filter(|&k| far(&balls[k as usize], p) < -slack).collect();
         assert!(strictly.iter().all(|k| holders.contains(k)), "{p}");
         assert!(!holders.is_empty() && holders.iter().all(|&k| far(&balls[k as usize], p) <= 0.0));
     }
