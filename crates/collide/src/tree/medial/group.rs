@@ -40,11 +40,21 @@ impl Groups {
     /// Groups whose budget is `slack` times what the worst of them needs.
     pub fn new(balls: Vec<Ball>, of: Vec<usize>, room: usize, slack: f64, distance: &MeshDistance) -> Groups {
         let count = of.iter().max().map_or(0, |g| g + 1);
-        let nowhere = Site { center: crate::Vec3::zeros(), depth: 0.0 };
+        let nowhere = Site { center: crate::Vec3::zeros(), depth: 0.0, fence: None };
         let mut groups = Groups { room, budget: f64::INFINITY, of, balls, sites: vec![nowhere; count] };
-        let worst = (0..count).map(|g| groups.fit(g, distance)).fold(0.0, f64::max);
-        groups.budget = slack * worst;
+        groups.budget = slack * groups.worst(distance);
         groups
+    }
+
+    /// Within what a ball has to stay.
+    pub fn fence(&self, k: usize) -> Option<Ball> {
+        let site = &self.sites[self.of[k]];
+        Some(Ball { center: site.center, radius: site.depth + self.budget })
+    }
+
+    /// How far the balls around the groups reach out at most, fitted anew.
+    pub fn worst(&mut self, distance: &MeshDistance) -> f64 {
+        (0..self.sites.len()).map(|g| self.fit(g, distance)).fold(0.0, f64::max)
     }
 
     /// Fits the ball around a group; how far it reaches out.

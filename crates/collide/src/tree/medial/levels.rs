@@ -88,12 +88,14 @@ impl<'a> Levels<'a> {
                     self.touch();
                     fit.refit_all(2, &self.cover.points, self.job.distance);
                     self.debug(&fit, &format!("gaps {added}"));
+        self.debug_groups(&fit, &groups, "gaps");
                     if gap == GAPS[1] {
                         fit = self.exchanged(fit, level, &mut groups);
                     }
                 }
             }
             let kept = fit.drop_empty();
+            fit.sites.iter_mut().for_each(|s| s.fence = None);
             let mut of = groups.map_or(of, |g| g.of);
             keep(&mut of, &kept);
             parents.push(of);
@@ -101,9 +103,11 @@ impl<'a> Levels<'a> {
         (fit, parents)
     }
 
-    fn exchanged(&mut self, fit: Fit, level: u32, groups: &mut Option<Groups>) -> Fit {
+    fn exchanged(&mut self, mut fit: Fit, level: u32, groups: &mut Option<Groups>) -> Fit {
         if let Some(groups) = groups {
             groups.balls = self.balls(&fit);
+            groups.worst(self.job.distance);
+            (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
         }
         let exchange = Exchange {
             points: &self.cover.points,
@@ -112,12 +116,25 @@ impl<'a> Levels<'a> {
             most: fit.sites.len(),
             tries: 3 * fit.sites.len(),
         };
+        self.debug_groups(&fit, groups, "before");
         let (mut fit, wins) = exchange.run(fit, groups);
+        self.debug_groups(&fit, groups, "after");
         self.debug(&fit, &format!("exchanges {wins}"));
         fit.refit_all(3, &self.cover.points, self.job.distance);
         self.debug(&fit, "refit");
+        self.debug_groups(&fit, groups, "refit");
         self.stages.push(StageCount { level, stage: "exchanges won across".into(), count: wins });
         fit
+    }
+
+    fn debug_groups(&self, fit: &Fit, groups: &Option<Groups>, what: &str) {
+        if std::env::var_os("DBG").is_none() { return; }
+        if let Some(g) = groups {
+            let mut g = g.clone();
+            g.balls = self.balls(fit);
+            let w = g.worst(self.job.distance);
+            eprintln!("   {what} budget {:.4} worst {:.4}", g.budget / self.scale, w / self.scale);
+        }
     }
 
     fn debug(&self, fit: &Fit, what: &str) {

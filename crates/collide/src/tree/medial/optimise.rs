@@ -56,6 +56,9 @@ impl Exchange<'_> {
                 missed[k] = self.missed(&fit, k).0;
                 vain[k] = false;
             }
+            if let Some(groups) = groups {
+                (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
+            }
             (wins, failures) = (wins + 1, 0);
         }
         (fit, wins)
@@ -137,7 +140,7 @@ impl Exchange<'_> {
     fn best_for(&self, part: &[u32], old: Site) -> Site {
         let own = own(self.points, part);
         let some = part.iter().step_by(part.len().div_ceil(LOOKED_AT));
-        let best = some.map(|&i| self.candidates[i as usize]).fold((old.worst(&own), old), |best, c| {
+        let best = some.map(|&i| Site { fence: old.fence, ..self.candidates[i as usize] }).fold((old.worst(&own), old), |best, c| {
             let need = c.worst(&own);
             if need < best.0 { (need, c) } else { best }
         });

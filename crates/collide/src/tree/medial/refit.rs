@@ -135,7 +135,7 @@ pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
     }
     let step = (start * 2.0).min(0.3 * radius).max(1e-3 * radius);
     let mut depth = site.depth;
-    let mut best = (site.center, start);
+    let mut best = (site.center, start + site.beyond(&site.center, radius));
     simplex(site.center, step, EVALUATIONS, |c| {
         let reach = own.iter().map(|p| (p - c).norm_squared()).fold(0.0, f64::max).sqrt();
         // depths differ by no more than the centres do
@@ -144,11 +144,12 @@ pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
             return bound;
         }
         let here = -distance.closest(c).signed_distance;
-        if reach - here < best.1 {
-            best = (*c, reach - here);
+        let cost = reach - here + site.beyond(c, reach);
+        if cost < best.1 {
+            best = (*c, cost);
             depth = here;
         }
-        reach - here
+        cost
     });
-    Site { center: best.0, depth }
+    Site { center: best.0, depth, ..site }
 }
