@@ -1,6 +1,6 @@
 //! Closing: leaves are grown until they cover the surface itself, and not only samples of it.
 //!
-//! A triangle lies in a ball iff its corners do. Each is split 1:4 until a piece lies in one ball or is small; the
+//! A triangle lies in a ball iff its corners do. Each is halved at its longest side until a piece lies in one ball or is small; the
 //! ball that needs least to hold a small piece is grown to hold it.
 
 use super::ball::Ball;
@@ -26,8 +26,7 @@ fn cover(piece: &[Vec3; 3], near: &[u32], small: f64, balls: &mut [Ball]) {
     if near.iter().any(|&k| lack(&balls[k as usize], piece) <= 0.0) {
         return;
     }
-    let [a, b, c] = *piece;
-    let size = (a - b).norm().max((b - c).norm()).max((c - a).norm());
+    let (size, halves) = halved(piece);
     if size < small {
         let least = near.iter().map(|&k| (lack(&balls[k as usize], piece), k)).min_by(|x, y| x.0.total_cmp(&y.0));
         if let Some((lack, k)) = least {
@@ -39,10 +38,18 @@ fn cover(piece: &[Vec3; 3], near: &[u32], small: f64, balls: &mut [Ball]) {
     let lacks: Vec<(f64, u32)> = near.iter().map(|&k| (lack(&balls[k as usize], piece), k)).collect();
     let bar = lacks.iter().map(|l| l.0).fold(f64::INFINITY, f64::min).max(0.0) + size;
     let near: Vec<u32> = lacks.into_iter().filter(|l| l.0 <= bar).map(|l| l.1).collect();
-    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
-    for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
-        cover(&part, &near, small, balls);
+    for half in halves {
+        cover(&half, &near, small, balls);
     }
+}
+
+/// The longest side of a piece, and its halves on the two sides of that side's middle.
+pub(super) fn halved(piece: &[Vec3; 3]) -> (f64, [[Vec3; 3]; 2]) {
+    let side = |k: usize| (piece[(k + 1) % 3] - piece[k]).norm();
+    let k = (0..3).max_by(|&i, &j| side(i).total_cmp(&side(j))).unwrap_or(0);
+    let [a, b, c] = [piece[k], piece[(k + 1) % 3], piece[(k + 2) % 3]];
+    let middle = 0.5 * (a + b);
+    (side(k), [[a, middle, c], [middle, b, c]])
 }
 
 /// By how much a ball must be grown to hold the piece.

@@ -16,6 +16,7 @@ mod close;
 mod medial;
 mod octree;
 mod settings;
+mod simplex;
 mod verify;
 
 pub use builder::{Progress, StageCount};
@@ -81,7 +82,7 @@ impl SphereTree {
             Builder::Medial => &medial::Medial,
         };
         let built = builder.build(&Job { mesh, distance: &distance, settings, progress })?;
-        let tree = SphereTree::flatten(&built.root, &distance);
+        let tree = SphereTree::flatten(&built.root, &distance, settings.builder != Builder::Octree);
         tree.check_nesting()?;
         tree.check_coverage(mesh)?;
         progress.at(1.0);
@@ -124,7 +125,7 @@ impl SphereTree {
     }
 
     /// Breadth first, so that children are neighbours; a cell with one child is replaced by it.
-    fn flatten(root: &Cell, distance: &MeshDistance) -> SphereTree {
+    fn flatten(root: &Cell, distance: &MeshDistance, deep: bool) -> SphereTree {
         let mut nodes = vec![empty_node(0)];
         let mut cells = vec![skip_single(root)];
         let mut next = 0;
@@ -146,7 +147,7 @@ impl SphereTree {
                         .iter()
                         .map(|c| Ball { center: c.center, radius: c.radius })
                         .collect();
-                    ball::around_balls(&children)
+                    if deep { ball::deep_around(&children, distance) } else { ball::around_balls(&children) }
                 }
             };
             nodes[n].center = ball.center;

@@ -17,11 +17,11 @@ const STEPS: usize = 12;
 pub(super) fn touching(cover: &CoverPoints, i: u32, distance: &MeshDistance, largest: f64) -> Site {
     let (p, n) = (cover.points[i as usize], cover.normals[i as usize]);
     let mut radius = largest;
-    let mut site = Site { center: p, depth: 0.0 };
+    let mut site = Site { center: p, depth: 0.0, fence: None };
     for _ in 0..STEPS {
         let center: Vec3 = p - n * radius;
         let closest = distance.closest(&center);
-        site = Site { center, depth: -closest.signed_distance };
+        site = Site { center, depth: -closest.signed_distance, fence: None };
         let reach = p - closest.point;
         let along = 2.0 * n.dot(&reach);
         if site.depth >= radius * (1.0 - 1e-3) || along <= 0.0 {

@@ -7,34 +7,41 @@ use super::spheres::CoverPoints;
 use crate::TriMesh;
 use crate::Vec3;
 use crate::tree::ball::Ball;
-use crate::tree::close::lack;
+use crate::tree::close::{halved, lack};
 
-/// Adds cover points where pieces of surface of about the size `small` lie in no ball; their number.
+/// Adds cover points where pieces of surface of about the size `small` lie in no ball, one for each cube of that size;
+/// their number.
 pub(super) fn add_gaps(cover: &mut CoverPoints, mesh: &TriMesh, balls: &[Ball], small: f64) -> usize {
     let all: Vec<u32> = (0..balls.len() as u32).collect();
     let before = cover.points.len();
+    let mut found = Vec::new();
     for t in 0..mesh.triangles.len() {
-        let mut found = Vec::new();
-        look(&mesh.corners(t), &all, small, balls, &mut found);
-        found.into_iter().for_each(|p| cover.push(p, t as u32, mesh));
+        look(&mesh.corners(t), t as u32, &all, small, balls, &mut found);
     }
+    let origin = mesh.aabb().min;
+    let cube = |p: &Vec3| ((p - origin) / small).map(|x| x as u32);
+    found.sort_by(|x, y| {
+        let (a, b) = (cube(&x.1), cube(&y.1));
+        a.as_slice().cmp(b.as_slice()).then(y.0.total_cmp(&x.0)).then(x.2.cmp(&y.2))
+    });
+    found.dedup_by(|x, y| cube(&x.1) == cube(&y.1));
+    found.into_iter().for_each(|(_, p, t)| cover.push(p, t, mesh));
     cover.points.len() - before
 }
 
-fn look(piece: &[Vec3; 3], near: &[u32], small: f64, balls: &[Ball], found: &mut Vec<Vec3>) {
+/// Finds the points that stick out: by how much, where, on which triangle.
+fn look(piece: &[Vec3; 3], t: u32, near: &[u32], small: f64, balls: &[Ball], found: &mut Vec<(f64, Vec3, u32)>) {
     let lacks: Vec<(f64, u32)> = near.iter().map(|&k| (lack(&balls[k as usize], piece), k)).collect();
     let Some(least) = lacks.iter().min_by(|a, b| a.0.total_cmp(&b.0)).filter(|l| l.0 > 0.0) else { return };
-    let [a, b, c] = *piece;
-    let size = (a - b).norm().max((b - c).norm()).max((c - a).norm());
+    let (size, halves) = halved(piece);
     if size < small {
         let ball = &balls[least.1 as usize];
         let out = |p: &Vec3| (p - ball.center).norm_squared();
-        found.extend(piece.iter().copied().max_by(|p, q| out(p).total_cmp(&out(q))));
+        found.extend(piece.iter().max_by(|p, q| out(p).total_cmp(&out(q))).map(|p| (least.0, *p, t)));
         return;
     }
     let near: Vec<u32> = lacks.iter().filter(|l| l.0 <= least.0 + size).map(|l| l.1).collect();
-    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
-    for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
-        look(&part, &near, small, balls, found);
+    for half in halves {
+        look(&half, t, &near, small, balls, found);
     }
 }

@@ -3,13 +3,14 @@
 use super::candidates::touching;
 use super::expand::expand;
 use super::gaps::add_gaps;
-use super::group::grouped;
+use super::group::Groups;
 use super::optimise::Exchange;
-use super::refit::{Fit, own};
+use super::refit::{Fit, keep, own};
 use super::site::Site;
 use super::spheres::CoverPoints;
 use crate::Vec3;
 use crate::tree::ball::Ball;
+use crate::tree::close::closed;
 use crate::tree::builder::{Cell, Job, StageCount};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -53,51 +54,87 @@ impl<'a> Levels<'a> {
 
     /// The whole of it.
     pub fn cells(&mut self) -> Cell {
-        let leaves = self.leaves();
-        let balls = self.balls(&leaves);
-        let balls = crate::tree::close::closed(self.job.mesh, balls);
-        self.nested(&balls, &leaves.parts, (0..balls.len() as u32).collect(), self.job.settings.depth)
+        let (fit, parents) = self.leaves();
+        let balls = closed(self.job.mesh, self.balls(&fit));
+        nested(&balls, &parents)
     }
 
     fn balls(&self, fit: &Fit) -> Vec<Ball> {
         fit.sites.iter().zip(&fit.parts).map(|(s, part)| s.ball(&own(&self.cover.points, part))).collect()
     }
 
-    fn leaves(&mut self) -> Fit {
-        let all = (0..self.cover.points.len() as u32).collect();
+    /// The leaves, and of each level the balls' parents.
+    fn leaves(&mut self) -> (Fit, Vec<Vec<usize>>) {
+        let all: Vec<u32> = (0..self.cover.points.len() as u32).collect();
         let center = Site::at(self.cover.points[0], self.job.distance);
         let mut fit = Fit { sites: vec![center], parts: vec![all], errors: vec![self.scale] };
         let enough = self.job.settings.error * self.scale;
+        let mut parents = Vec::new();
         for level in 1..=self.job.settings.depth {
             if fit.worst() <= enough {
                 break;
             }
-            fit = self.next_level(&fit, level, enough);
+            let (next, of) = self.next_level(&fit, level, enough);
+            let mut groups = (level > 1).then(|| {
+                let room = self.job.settings.branch as usize;
+                Groups::new(self.balls(&next), of.clone(), room, slack(), self.job.distance)
+            });
+            self.debug(&next, "level");
+            fit = self.exchanged(next, level, &mut groups);
+            if level == self.job.settings.depth {
+                for gap in GAPS {
+                    let balls = self.balls(&fit);
+                    let added = add_gaps(&mut self.cover, self.job.mesh, &balls, gap * self.scale);
+                    self.touch();
+                    fit.refit_all(2, &self.cover.points, self.job.distance);
+                    self.debug(&fit, &format!("gaps {added}"));
+        self.debug_groups(&fit, &groups, "gaps");
+                    if gap == GAPS[1] {
+                        fit = self.exchanged(fit, level, &mut groups);
+                    }
+                }
+            }
+            let kept = fit.drop_empty();
+            fit.sites.iter_mut().for_each(|s| s.fence = None);
+            let mut of = groups.map_or(of, |g| g.of);
+            keep(&mut of, &kept);
+            parents.push(of);
         }
-        let most = fit.sites.len();
-        self.debug(&fit, "levels");
+        (fit, parents)
+    }
+
+    fn exchanged(&mut self, mut fit: Fit, level: u32, groups: &mut Option<Groups>) -> Fit {
+        if let Some(groups) = groups {
+            groups.balls = self.balls(&fit);
+            groups.worst(self.job.distance);
+            (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
+        }
+        let exchange = Exchange {
+            points: &self.cover.points,
+            candidates: &self.candidates,
+            distance: self.job.distance,
+            most: fit.sites.len(),
+            tries: 3 * fit.sites.len(),
+        };
+        self.debug_groups(&fit, groups, "before");
+        let (mut fit, wins) = exchange.run(fit, groups);
+        self.debug_groups(&fit, groups, "after");
+        self.debug(&fit, &format!("exchanges {wins}"));
         fit.refit_all(3, &self.cover.points, self.job.distance);
         self.debug(&fit, "refit");
-        for gap in GAPS {
-            let exchange = Exchange {
-                points: &self.cover.points,
-                candidates: &self.candidates,
-                distance: self.job.distance,
-                most,
-                tries: 3 * most,
-            };
-            let (better, wins) = exchange.run(fit);
-            fit = better;
-            self.debug(&fit, &format!("exchanges {wins}"));
-            fit.refit_all(2, &self.cover.points, self.job.distance);
-            self.debug(&fit, "refit");
-            let balls = self.balls(&fit);
-            let added = add_gaps(&mut self.cover, self.job.mesh, &balls, gap * self.scale);
-            self.touch();
-            fit.refit_all(2, &self.cover.points, self.job.distance);
-            self.debug(&fit, &format!("gaps {added}"));
-        }
+        self.debug_groups(&fit, groups, "refit");
+        self.stages.push(StageCount { level, stage: "exchanges won across".into(), count: wins });
         fit
+    }
+
+    fn debug_groups(&self, fit: &Fit, groups: &Option<Groups>, what: &str) {
+        if std::env::var_os("DBG").is_none() { return; }
+        if let Some(g) = groups {
+            let mut g = g.clone();
+            g.balls = self.balls(fit);
+            let w = g.worst(self.job.distance);
+            eprintln!("   {what} budget {:.4} worst {:.4}", g.budget / self.scale, w / self.scale);
+        }
     }
 
     fn debug(&self, fit: &Fit, what: &str) {
@@ -110,7 +147,7 @@ impl<'a> Levels<'a> {
     }
 
     /// Divides the balls of the deepest level.
-    fn next_level(&mut self, fit: &Fit, level: u32, enough: f64) -> Fit {
+    fn next_level(&mut self, fit: &Fit, level: u32, enough: f64) -> (Fit, Vec<usize>) {
         let divided: Vec<(Fit, u64)> = fit
             .parts
             .par_iter()
@@ -126,14 +163,16 @@ impl<'a> Levels<'a> {
             .collect();
         let wins = divided.iter().map(|f| f.1).sum();
         let mut next = Fit::default();
-        for (fit, _) in divided {
+        let mut of = Vec::new();
+        for (parent, (fit, _)) in divided.into_iter().enumerate() {
+            of.extend(fit.sites.iter().map(|_| parent));
             next.sites.extend(fit.sites);
             next.parts.extend(fit.parts);
             next.errors.extend(fit.errors);
         }
         self.stages.push(StageCount { level, stage: "exchanges won".into(), count: wins });
         self.stages.push(StageCount { level, stage: "balls".into(), count: next.sites.len() as u64 });
-        next
+        (next, of)
     }
 
     /// The points of a part covered by at most `branch` balls.
@@ -153,7 +192,7 @@ impl<'a> Levels<'a> {
             most,
             tries: TRIES * most,
         };
-        let (mut fit, wins) = exchange.run(fit);
+        let (mut fit, wins) = exchange.run(fit, &mut None);
         fit.assign(points, part);
         fit.refit(2, points, part, self.job.distance);
         fit.drop_empty();
@@ -168,24 +207,24 @@ impl<'a> Levels<'a> {
             self.job.progress.at(*done);
         }
     }
+}
 
-    /// Nested cells over the leaves `which`, `depth` levels of them.
-    fn nested(&self, balls: &[Ball], parts: &[Vec<u32>], which: Vec<u32>, depth: u32) -> Cell {
-        let branch = self.job.settings.branch as usize;
-        if which.len() <= branch {
-            return Cell::Inner(which.iter().map(|&k| Cell::Leaf(balls[k as usize])).collect());
+/// Nested cells over the leaves' balls; `parents` of each level, the deepest last.
+fn nested(balls: &[Ball], parents: &[Vec<usize>]) -> Cell {
+    let mut below: Vec<Cell> = balls.iter().map(|ball| Cell::Leaf(*ball)).collect();
+    for of in parents.iter().rev() {
+        let mut inside: Vec<Vec<Cell>> = Vec::new();
+        inside.resize_with(of.iter().max().map_or(0, |p| p + 1), Vec::new);
+        for (parent, cell) in of.iter().zip(below) {
+            inside[*parent].push(cell);
         }
-        let mut part: Vec<u32> = which.iter().flat_map(|&k| parts[k as usize].iter().copied()).collect();
-        part.sort_unstable();
-        let sites = self.divided(&part).0.sites;
-        let own: Vec<Ball> = which.iter().map(|&k| balls[k as usize]).collect();
-        let groups = grouped(&own, sites, branch.pow(depth - 1), self.job.distance);
-        let inner = |group: &Vec<u32>| {
-            let which = group.iter().map(|&n| which[n as usize]).collect();
-            self.nested(balls, parts, which, depth - 1)
-        };
-        Cell::Inner(groups.par_iter().map(inner).collect())
+        below = inside.into_iter().map(Cell::Inner).collect();
     }
+    below.pop().unwrap_or(Cell::Inner(Vec::new()))
+}
+
+fn slack() -> f64 {
+    std::env::var("SLACK").ok().and_then(|s| s.parse().ok()).unwrap_or(1.1)
 }
 
 /// At most `most` of the items, evenly.

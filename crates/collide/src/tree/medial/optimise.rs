@@ -4,12 +4,15 @@
 //! of those. After each exchange the balls that it touches are refitted; it is kept if their cost falls. Whatever it
 //! does not touch stays as it is, so that an exchange costs the same among 500 balls as among eight.
 
-use super::refit::{Fit, moved};
+use super::group::{Change, Groups};
+use super::refit::{Fit, moved, own};
 use super::site::Site;
 use crate::{MeshDistance, Vec3};
 
 /// After so many exchanges in a row that did not pay, the worst balls are left as they are.
 const FAILURES: usize = 12;
+/// Balls tried to burst for one that is split, where groups may refuse.
+const BURSTS: usize = 4;
 /// Candidates looked at for one half of a ball that is split.
 const LOOKED_AT: usize = 48;
 
@@ -26,8 +29,8 @@ pub(super) struct Exchange<'a> {
 }
 
 impl Exchange<'_> {
-    /// The fit after the exchanges that paid, and their number.
-    pub fn run(&self, mut fit: Fit) -> (Fit, u64) {
+    /// The fit after the exchanges that paid, and their number; `groups`, if there are any, follow.
+    pub fn run(&self, mut fit: Fit, groups: &mut Option<Groups>) -> (Fit, u64) {
         let mut missed: Vec<f64> = (0..fit.sites.len()).map(|k| self.missed(&fit, k).0).collect();
         // balls that were split in vain, until something near them changes
         let mut vain = vec![false; fit.sites.len()];
@@ -37,35 +40,54 @@ impl Exchange<'_> {
                 .filter(|&k| !vain[k])
                 .max_by(|&a, &b| fit.errors[a].total_cmp(&fit.errors[b]).then(b.cmp(&a)));
             let Some(worst) = worst.filter(|_| failures < FAILURES) else { break };
-            let burst = (fit.sites.len() >= self.most)
-                .then(|| (0..missed.len()).filter(|k| *k != worst).min_by(|&a, &b| missed[a].total_cmp(&missed[b])));
-            if burst == Some(None) || burst.flatten().is_some_and(|b| missed[b] >= fit.errors[worst]) {
-                break;
+            let done = self
+                .bursts(&fit, worst, &missed, groups.as_ref())
+                .into_iter()
+                .find_map(|burst| self.exchanged(&fit, worst, burst, groups));
+            let Some((places, after)) = done else {
+                vain[worst] = true;
+                failures += 1;
+                continue;
+            };
+            put_back(&mut fit, &places, after);
+            missed.resize(fit.sites.len(), 0.0);
+            vain.resize(fit.sites.len(), false);
+            for k in places {
+                missed[k] = self.missed(&fit, k).0;
+                vain[k] = false;
             }
-            match self.exchanged(&fit, worst, burst.flatten()) {
-                Some(touched) => {
-                    let changed = self.put_back(&mut fit, worst, burst.flatten(), touched);
-                    missed.resize(fit.sites.len(), 0.0);
-                    vain.resize(fit.sites.len(), false);
-                    for k in changed {
-                        missed[k] = self.missed(&fit, k).0;
-                        vain[k] = false;
-                    }
-                    (wins, failures) = (wins + 1, 0);
-                }
-                None => {
-                    vain[worst] = true;
-                    failures += 1;
-                }
+            if let Some(groups) = groups {
+                (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
             }
+            (wins, failures) = (wins + 1, 0);
         }
-        fit.drop_empty();
         (fit, wins)
+    }
+
+    /// Which balls to burst for a half of `worst`, in the order in which they are tried: those that are missed less
+    /// than `worst` errs, and one of the same group. None need be while there is room.
+    fn bursts(&self, fit: &Fit, worst: usize, missed: &[f64], groups: Option<&Groups>) -> Vec<Option<usize>> {
+        if fit.sites.len() < self.most {
+            return vec![None];
+        }
+        let mut order: Vec<usize> =
+            (0..missed.len()).filter(|&k| k != worst && missed[k] < fit.errors[worst]).collect();
+        order.sort_by(|&a, &b| missed[a].total_cmp(&missed[b]).then(a.cmp(&b)));
+        let same = groups.and_then(|g| order.iter().copied().find(|&k| g.of[k] == g.of[worst]));
+        order.truncate(if groups.is_some() { BURSTS } else { 1 });
+        order.extend(same.filter(|k| !order.contains(k)));
+        order.into_iter().map(Some).collect()
     }
 
     /// The touched balls after an exchange, with their places in `fit` (those of the halves last), if they cost less
     /// than before.
-    fn exchanged(&self, fit: &Fit, worst: usize, burst: Option<usize>) -> Option<(Vec<usize>, Fit)> {
+    fn exchanged(
+        &self,
+        fit: &Fit,
+        worst: usize,
+        burst: Option<usize>,
+        groups: &mut Option<Groups>,
+    ) -> Option<(Vec<usize>, Fit)> {
         let halves = self.halves(fit, worst)?;
         let mut touched: Vec<usize> = burst.map(|b| self.missed(fit, b).1).unwrap_or_default();
         touched.extend(self.missed(fit, worst).1);
@@ -80,25 +102,18 @@ impl Exchange<'_> {
         let mut after = Fit { sites: touched.iter().map(|&k| fit.sites[k]).chain(halves).collect(), ..Fit::default() };
         after.assign(self.points, &region);
         after.refit(3, self.points, &region, self.distance);
-        (after.cost(scale) < 0.995 * old).then_some((touched, after))
-    }
-
-    /// Puts what was touched back in its place; the places that changed.
-    fn put_back(&self, fit: &mut Fit, worst: usize, burst: Option<usize>, touched: (Vec<usize>, Fit)) -> Vec<usize> {
-        let (mut places, mut after) = touched;
-        places.push(worst);
-        places.push(burst.unwrap_or(fit.sites.len()));
-        if burst.is_none() {
-            fit.sites.push(after.sites[0]);
-            fit.parts.push(Vec::new());
-            fit.errors.push(0.0);
+        if after.cost(scale) >= 0.995 * old {
+            return None;
         }
-        for (n, &k) in places.iter().enumerate() {
-            fit.sites[k] = after.sites[n];
-            fit.parts[k] = std::mem::take(&mut after.parts[n]);
-            fit.errors[k] = after.errors[n];
+        touched.push(worst);
+        touched.push(burst.unwrap_or(fit.sites.len()));
+        if let Some(present) = groups {
+            let ball = |n: usize| after.sites[n].ball(&own(self.points, &after.parts[n]));
+            let last = touched.len() - 1;
+            let balls = (0..last).map(|n| (touched[n], ball(n))).collect();
+            *present = present.after(&Change { balls, new: (touched[last], ball(last)), split: worst }, self.distance)?;
         }
-        places
+        Some((touched, after))
     }
 
     /// Two sites for the two halves of the points of a part.
@@ -123,9 +138,9 @@ impl Exchange<'_> {
 
     /// Of the balls that touch at the points, and `old`, the one they need least of, moved.
     fn best_for(&self, part: &[u32], old: Site) -> Site {
-        let own: Vec<Vec3> = part.iter().map(|&i| self.points[i as usize]).collect();
+        let own = own(self.points, part);
         let some = part.iter().step_by(part.len().div_ceil(LOOKED_AT));
-        let best = some.map(|&i| self.candidates[i as usize]).fold((old.worst(&own), old), |best, c| {
+        let best = some.map(|&i| Site { fence: old.fence, ..self.candidates[i as usize] }).fold((old.worst(&own), old), |best, c| {
             let need = c.worst(&own);
             if need < best.0 { (need, c) } else { best }
         });
@@ -151,5 +166,19 @@ impl Exchange<'_> {
             }
         }
         (worst, takers)
+    }
+}
+
+/// Puts what was touched back in its places.
+fn put_back(fit: &mut Fit, places: &[usize], mut after: Fit) {
+    for (n, &k) in places.iter().enumerate() {
+        if k == fit.sites.len() {
+            fit.sites.push(after.sites[n]);
+            fit.parts.push(Vec::new());
+            fit.errors.push(0.0);
+        }
+        fit.sites[k] = after.sites[n];
+        fit.parts[k] = std::mem::take(&mut after.parts[n]);
+        fit.errors[k] = after.errors[n];
     }
 }

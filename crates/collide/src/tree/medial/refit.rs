@@ -5,6 +5,7 @@
 //! `max |p − c| + s(c)` over its own points. Neither half can raise the worst need.
 
 use super::site::Site;
+use crate::tree::simplex::simplex;
 use crate::{MeshDistance, Vec3};
 use rayon::prelude::*;
 
@@ -41,13 +42,13 @@ impl Fit {
         }
     }
 
-    /// Drops the sites without points.
-    pub fn drop_empty(&mut self) {
-        let mut kept = self.parts.iter().map(|p| !p.is_empty());
-        self.sites.retain(|_| kept.next().unwrap_or(false));
-        let mut kept = self.parts.iter().map(|p| !p.is_empty());
-        self.errors.retain(|_| kept.next().unwrap_or(false));
-        self.parts.retain(|p| !p.is_empty());
+    /// Drops the sites without points; which were kept.
+    pub fn drop_empty(&mut self) -> Vec<bool> {
+        let kept: Vec<bool> = self.parts.iter().map(|p| !p.is_empty()).collect();
+        keep(&mut self.sites, &kept);
+        keep(&mut self.errors, &kept);
+        keep(&mut self.parts, &kept);
+        kept
     }
 
     /// The greatest error.
@@ -85,7 +86,6 @@ impl Fit {
             self.sites = self.sites.par_iter().zip(&self.parts).map(moved_to).collect();
         }
         self.assign_all(points);
-        self.drop_empty();
     }
 
     /// Assigns all points there are, on all threads.
@@ -98,6 +98,12 @@ impl Fit {
             self.errors[k] = self.errors[k].max(need);
         }
     }
+}
+
+/// Keeps the items marked.
+pub(super) fn keep<T>(items: &mut Vec<T>, kept: &[bool]) {
+    let mut marks = kept.iter();
+    items.retain(|_| *marks.next().unwrap_or(&true));
 }
 
 /// The points of a part.
@@ -129,7 +135,7 @@ pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
     }
     let step = (start * 2.0).min(0.3 * radius).max(1e-3 * radius);
     let mut depth = site.depth;
-    let mut best = (site.center, start);
+    let mut best = (site.center, start + site.beyond(&site.center, radius));
     simplex(site.center, step, EVALUATIONS, |c| {
         let reach = own.iter().map(|p| (p - c).norm_squared()).fold(0.0, f64::max).sqrt();
         // depths differ by no more than the centres do
@@ -138,51 +144,12 @@ pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
             return bound;
         }
         let here = -distance.closest(c).signed_distance;
-        if reach - here < best.1 {
-            best = (*c, reach - here);
+        let cost = reach - here + site.beyond(c, reach);
+        if cost < best.1 {
+            best = (*c, cost);
             depth = here;
         }
-        reach - here
+        cost
     });
-    Site { center: best.0, depth }
-}
-
-/// Nelder and Mead in three dimensions, from a corner simplex of side `step`; `f` keeps the best itself.
-pub(super) fn simplex(start: Vec3, step: f64, evaluations: usize, mut f: impl FnMut(&Vec3) -> f64) {
-    let mut at = [start; 4];
-    for k in 0..3 {
-        at[k + 1][k] += step;
-    }
-    let mut corners = at.map(|c| (f(&c), c));
-    let mut used = 4;
-    while used < evaluations {
-        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let middle = (corners[0].1 + corners[1].1 + corners[2].1) / 3.0;
-        let away = middle - corners[3].1;
-        let mut tried = |t: f64| {
-            let c = middle + away * t;
-            (f(&c), c)
-        };
-        let reflected = tried(1.0);
-        used += 1;
-        let next = if reflected.0 < corners[0].0 {
-            used += 1;
-            let expanded = tried(2.0);
-            if expanded.0 < reflected.0 { expanded } else { reflected }
-        } else if reflected.0 < corners[2].0 {
-            reflected
-        } else {
-            used += 1;
-            if reflected.0 < corners[3].0 { tried(0.5) } else { tried(-0.5) }
-        };
-        if next.0 < corners[3].0 {
-            corners[3] = next;
-        } else {
-            for n in 1..4 {
-                let c = 0.5 * (corners[n].1 + corners[0].1);
-                corners[n] = (f(&c), c);
-            }
-            used += 3;
-        }
-    }
+    Site { center: best.0, depth, ..site }
 }

@@ -20,17 +20,28 @@ pub(super) struct Site {
     pub center: Vec3,
     /// How far below the surface it lies, metres; negative outside.
     pub depth: f64,
+    /// The ball of the level above in which it is to stay.
+    pub fence: Option<Ball>,
 }
+
+/// What a metre beyond the fence costs, in metres of need.
+const BEYOND: f64 = 4.0;
 
 impl Site {
     pub fn at(center: Vec3, distance: &MeshDistance) -> Site {
-        Site { center, depth: -distance.closest(&center).signed_distance }
+        Site { center, depth: -distance.closest(&center).signed_distance, fence: None }
+    }
+
+    /// The penalty of a ball about `c` of radius `r` that leaves the fence, metres.
+    #[inline]
+    pub fn beyond(&self, c: &Vec3, r: f64) -> f64 {
+        self.fence.map_or(0.0, |f| BEYOND * ((c - f.center).norm() + r - f.radius).max(0.0))
     }
 
     /// How far out of the solid the ball about this centre must reach to hold `p`, metres.
     #[inline]
     pub fn need(&self, p: &Vec3) -> f64 {
-        (p - self.center).norm() - self.depth
+        (p - self.center).norm() - self.depth + self.beyond(p, 0.0)
     }
 
     /// The greatest need of the points; `-∞` for none.
