@@ -21,6 +21,8 @@ mod site;
 mod spheres;
 pub(in crate::tree) mod voronoi;
 
+pub(super) use spheres::{CoverPoints, MedialBall};
+
 use super::builder::{Built, Job, TreeBuilder};
 use crate::MeshError;
 
