@@ -86,7 +86,7 @@ fn divided(region: &[u32], points: &[Vec3], most: usize, distance: &MeshDistance
         // points that were not looked at may lie in more cubes
         .filter(|parts| (2..=most).contains(&parts.len()))
         .take(FITTED)
-        .map(|parts| parts.into_iter().map(|own| Part::of(own, points, distance)).collect::<Vec<Part>>())
+        .map(|parts| parts.into_iter().map(|own| Part::of(own, None, points, distance)).collect::<Vec<Part>>())
         .min_by(|a, b| worst(a).total_cmp(&worst(b)))
         .unwrap_or_default()
 }

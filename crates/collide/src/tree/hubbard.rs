@@ -5,13 +5,13 @@
 //! whole solid. For each region, its points choose among the balls that hold them; then, of all pairs of neighbours,
 //! the pair is merged whose ball reaches out of the solid least, until as many are left as there may be children.
 //!
-//! Neighbours are balls that hold a point in common. A merged ball is about either old centre or the point
+//! Neighbours are groups some of whose points lie in one ball. A merged ball is about either old centre or the point
 //! half-way between, whichever reaches out less; those that are left are moved to where they reach out less still.
 
 use super::builder::{Built, Job, StageCount, TreeBuilder};
 use super::medial::CoverPoints;
 use super::medial::adaptive::Axis;
-use super::medial::MedialBall;
+use super::medial::{MedialBall, Want};
 use super::regions::{Part, build, cover_of};
 use crate::{MeshDistance, MeshError, Vec3};
 use std::cmp::Reverse;
@@ -19,6 +19,9 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 /// Samples that the balls are made of; about three balls each.
 const SAMPLES: usize = 2000;
+
+/// A ball that reaches further out, in diagonals, is over a hole between samples, and gets one more.
+const HOLE: f64 = 0.01;
 
 /// The builder.
 pub(super) struct Hubbard;
@@ -28,6 +31,7 @@ impl TreeBuilder for Hubbard {
         let cover = cover_of(job);
         let all: Vec<u32> = (0..cover.points.len() as u32).collect();
         let mut axis = Axis::new(&cover, &all, job.distance, SAMPLES);
+        axis.refine(&Want { target: HOLE * job.mesh.diagonal(), least: 0, most: SAMPLES });
         let balls = Balls { all: axis.balls(), holders: axis.holders(), cover: &cover, distance: job.distance };
         let most = job.settings.branch as usize;
         let mut built = build(job, &cover, &|region| balls.divide(region, most));
@@ -60,17 +64,17 @@ impl Balls<'_> {
         let mut merging = Merging { points: &self.cover.points, distance: self.distance, left: groups.len(), groups: &mut groups };
         merging.run(most);
         let parts = groups.into_iter().filter(|g| g.alive);
-        let parts: Vec<Part> = parts.map(|g| Part::of(g.points, &self.cover.points, self.distance)).collect();
+        let parts: Vec<Part> = parts.map(|g| Part::of(g.points, Some(g.center), &self.cover.points, self.distance)).collect();
         if parts.len() < 2 { Vec::new() } else { parts }
     }
 
-    /// Each point with the ball that holds most of the region, among those that hold it.
+    /// Each point with the ball that reaches out least, among those that hold it.
     fn groups(&self, region: &[u32]) -> Vec<Group> {
-        let mut held: BTreeMap<u32, u32> = BTreeMap::new();
-        for &i in region {
-            self.holders[i as usize].iter().for_each(|b| *held.entry(*b).or_default() += 1);
-        }
-        let chosen = |i: u32| self.holders[i as usize].iter().copied().max_by_key(|b| (held[b], Reverse(*b))).unwrap_or(0);
+        let outward = |b: u32| self.all[b as usize].outward;
+        let chosen = |i: u32| {
+            let holders = self.holders[i as usize].iter().copied();
+            holders.min_by(|&a, &b| outward(a).total_cmp(&outward(b)).then(a.cmp(&b))).unwrap_or(0)
+        };
         let mut number: BTreeMap<u32, u32> = BTreeMap::new();
         let mut groups: Vec<Group> = Vec::new();
         for &i in region {
@@ -84,10 +88,12 @@ impl Balls<'_> {
             }
             groups[g].points.push(i);
         }
+        // in the order of a ball's points, each group with the next that the ball holds some of
+        let mut last: BTreeMap<u32, u32> = BTreeMap::new();
         for &i in region {
             let own = number[&chosen(i)];
             for b in &self.holders[i as usize] {
-                if let Some(&other) = number.get(b).filter(|n| **n != own) {
+                if let Some(other) = last.insert(*b, own).filter(|other| *other != own) {
                     groups[own as usize].neighbors.insert(other);
                     groups[other as usize].neighbors.insert(own);
                 }

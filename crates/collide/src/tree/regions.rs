@@ -29,9 +29,9 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// The points with a ball that reaches out of the solid little: the small enclosing ball, moved to where
-    /// `max |p − c| + s(c)` is less, `s` the signed distance of the centre.
-    pub fn of(points: Vec<u32>, all: &[Vec3], distance: &MeshDistance) -> Part {
+    /// The points with a ball that reaches out of the solid little: the small enclosing ball, or the one about `center`,
+    /// moved to where `max |p − c| + s(c)` is less, `s` the signed distance of the centre.
+    pub fn of(points: Vec<u32>, center: Option<Vec3>, all: &[Vec3], distance: &MeshDistance) -> Part {
         let own: Vec<Vec3> = points.iter().map(|&i| all[i as usize]).collect();
         let start = around_points(&own);
         let mut best = Part { outward: f64::INFINITY, ball: start, points };
@@ -43,8 +43,9 @@ impl Part {
             }
             outward
         };
-        judge(&start.center);
-        simplex(start.center, 0.4 * start.radius, EVALUATIONS, &mut judge);
+        let known = judge(&start.center);
+        let from = center.filter(|c| judge(c) < known).unwrap_or(start.center);
+        simplex(from, 0.4 * start.radius, EVALUATIONS, &mut judge);
         best
     }
 }
@@ -60,7 +61,7 @@ pub(super) fn cover_of(job: &Job) -> CoverPoints {
 pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> Vec<Part> + Sync)) -> Built {
     let enough = job.settings.error * job.mesh.diagonal();
     let all: Vec<u32> = (0..cover.points.len() as u32).collect();
-    let mut leaves = vec![Part::of(all, &cover.points, job.distance)];
+    let mut leaves = vec![Part::of(all, None, &cover.points, job.distance)];
     let (mut parents, mut stages) = (Vec::new(), Vec::new());
     for level in 1..=job.settings.depth {
         let divided: Vec<Vec<Part>> = leaves

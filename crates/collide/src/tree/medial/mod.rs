@@ -21,7 +21,7 @@ mod site;
 mod spheres;
 pub(in crate::tree) mod voronoi;
 
-pub(super) use spheres::{CoverPoints, MedialBall};
+pub(super) use spheres::{CoverPoints, MedialBall, Want};
 
 use super::builder::{Built, Job, TreeBuilder};
 use crate::MeshError;
