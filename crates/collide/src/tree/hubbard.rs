@@ -23,6 +23,9 @@ const SAMPLES: usize = 2000;
 /// A ball that reaches further out, in diagonals, is over a hole between samples, and gets one more.
 const HOLE: f64 = 0.01;
 
+/// Points of a component that others are sought from.
+const LINKED_BY: usize = 32;
+
 /// The builder.
 pub(super) struct Hubbard;
 
@@ -99,6 +102,7 @@ impl Balls<'_> {
                 }
             }
         }
+        connect(&mut groups, region, &self.cover.points);
         groups
     }
 }
@@ -117,15 +121,7 @@ impl Merging<'_> {
             self.offer(a, &mut queue, |a, b| a < b);
         }
         while self.left > most {
-            let Some(Reverse((_, a, b))) = queue.pop() else {
-                if !self.bridge() {
-                    return;
-                }
-                for a in 0..self.groups.len() as u32 {
-                    self.offer(a, &mut queue, |a, b| a < b);
-                }
-                continue;
-            };
+            let Some(Reverse((_, a, b))) = queue.pop() else { return };
             if self.groups[a as usize].alive && self.groups[b as usize].alive {
                 let merged = self.merge(a, b);
                 self.offer(merged, &mut queue, |_, _| true);
@@ -176,20 +172,60 @@ impl Merging<'_> {
         self.left -= 1;
         new
     }
+}
 
-    /// Joins what has no neighbours in common: each group becomes a neighbour of the one with the closest centre. Whether there was a pair.
-    fn bridge(&mut self) -> bool {
-        let alive: Vec<u32> = (0..self.groups.len() as u32).filter(|&g| self.groups[g as usize].alive).collect();
-        let center = |g: u32| self.groups[g as usize].center;
-        let closest = |a: u32| {
-            let others = alive.iter().copied().filter(|&b| b != a);
-            others.min_by(|&x, &y| (center(x) - center(a)).norm_squared().total_cmp(&(center(y) - center(a)).norm_squared()))
-        };
-        let pairs: Vec<(u32, u32)> = alive.iter().filter_map(|&a| Some((a, closest(a)?))).collect();
-        for &(a, b) in &pairs {
-            self.groups[a as usize].neighbors.insert(b);
-            self.groups[b as usize].neighbors.insert(a);
-        }
-        !pairs.is_empty()
+/// Makes neighbours until all groups hang together: each component but the largest gets the group of the point closest to some of its own.
+fn connect(groups: &mut [Group], region: &[u32], points: &[Vec3]) {
+    let mut group_of: BTreeMap<u32, u32> = BTreeMap::new();
+    for (g, group) in groups.iter().enumerate() {
+        group.points.iter().for_each(|i| _ = group_of.insert(*i, g as u32));
     }
+    loop {
+        let (component, largest) = components(groups);
+        let mut own: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+        for (i, g) in &group_of {
+            own.entry(component[*g as usize]).or_default().push(*i);
+        }
+        if own.len() < 2 {
+            return;
+        }
+        for (c, inside) in own.iter().filter(|(c, _)| **c != largest) {
+            let mut best = (f64::INFINITY, 0, 0);
+            for i in inside.iter().step_by(inside.len().div_ceil(LINKED_BY)) {
+                for j in region.iter().filter(|j| component[group_of[j] as usize] != *c) {
+                    let square = (points[*i as usize] - points[*j as usize]).norm_squared();
+                    if square < best.0 {
+                        best = (square, group_of[i], group_of[j]);
+                    }
+                }
+            }
+            groups[best.1 as usize].neighbors.insert(best.2);
+            groups[best.2 as usize].neighbors.insert(best.1);
+        }
+    }
+}
+
+/// The component of each group, and which has most points.
+fn components(groups: &[Group]) -> (Vec<usize>, usize) {
+    let mut component = vec![usize::MAX; groups.len()];
+    let mut sizes = Vec::new();
+    for start in 0..groups.len() {
+        if component[start] != usize::MAX {
+            continue;
+        }
+        let (mut size, mut stack) = (0, vec![start]);
+        component[start] = sizes.len();
+        while let Some(g) = stack.pop() {
+            size += groups[g].points.len();
+            for &n in &groups[g].neighbors {
+                if component[n as usize] == usize::MAX {
+                    component[n as usize] = sizes.len();
+                    stack.push(n as usize);
+                }
+            }
+        }
+        sizes.push(size);
+    }
+    let largest = (0..sizes.len()).max_by_key(|&c| (sizes[c], Reverse(c))).unwrap_or(0);
+    (component, largest)
 }
