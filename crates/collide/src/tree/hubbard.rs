@@ -12,7 +12,7 @@ use super::builder::{Built, Job, StageCount, TreeBuilder};
 use super::medial::CoverPoints;
 use super::medial::adaptive::Axis;
 use super::medial::{MedialBall, Want};
-use super::regions::{Part, build, cover_of};
+use super::regions::{Part, build, cover_of, refitted};
 use crate::{MeshDistance, MeshError, Vec3};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
@@ -68,7 +68,7 @@ impl Balls<'_> {
         merging.run(most);
         let parts = groups.into_iter().filter(|g| g.alive);
         let parts: Vec<Part> = parts.map(|g| Part::of(g.points, Some(g.center), &self.cover.points, self.distance)).collect();
-        if parts.len() < 2 { Vec::new() } else { parts }
+        if parts.len() < 2 { Vec::new() } else { refitted(parts, &self.cover.points, self.distance) }
     }
 
     /// Each point with the ball that reaches out least, among those that hold it.
