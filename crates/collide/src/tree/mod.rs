@@ -12,17 +12,25 @@
 
 mod ball;
 mod builder;
+mod cache;
 mod close;
+mod file;
 mod grid;
 mod hubbard;
+mod levels;
 mod medial;
 mod octree;
+mod quality;
 mod regions;
 mod settings;
 mod simplex;
 mod verify;
 
 pub use builder::{Progress, StageCount};
+pub use cache::{CachedTree, TreeCache};
+pub use file::{MeshId, TreeFile, TreeFileError};
+pub use levels::LevelBall;
+pub use quality::{LevelQuality, QualitySettings};
 pub use settings::{Builder, TreeSettings};
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
@@ -159,6 +167,11 @@ impl SphereTree {
             nodes[n].radius = ball.radius;
             nodes[n].outward = ball.outward(distance);
         }
+        SphereTree::of_nodes(nodes)
+    }
+
+    /// Of nodes that are already a tree: breadth first, children neighbours.
+    fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()
             .filter(|n| n.is_leaf())
