@@ -80,14 +80,16 @@ pub(super) fn deep_around(balls: &[Ball], distance: &MeshDistance) -> Ball {
     let smallest = around_balls(balls);
     let holding = |c: &Vec3| balls.iter().map(|b| (b.center - c).norm() + b.radius).fold(0.0, f64::max);
     let mut best = (f64::INFINITY, smallest);
+    let lam = std::env::var("LAM").ok().and_then(|s| s.parse().ok()).unwrap_or(0.0);
     for step in [0.3, -0.1] {
         simplex(best.1.center, step * smallest.radius, 50, |c| {
             let radius = holding(c);
             let outward = radius + distance.closest(c).signed_distance;
-            if outward < best.0 {
-                best = (outward, Ball { center: *c, radius: radius * (1.0 + 1e-12) });
+            let cost = outward.max(0.0) + lam * radius;
+            if cost < best.0 {
+                best = (cost, Ball { center: *c, radius: radius * (1.0 + 1e-12) });
             }
-            outward
+            cost
         });
     }
     best.1

@@ -70,6 +70,7 @@ impl<'a> Levels<'a> {
         let mut fit = Fit { sites: vec![center], parts: vec![all], errors: vec![self.scale] };
         let enough = self.job.settings.error * self.scale;
         let mut parents = Vec::new();
+        let mut above: Option<Groups> = None;
         for level in 1..=self.job.settings.depth {
             if fit.worst() <= enough {
                 break;
@@ -77,7 +78,7 @@ impl<'a> Levels<'a> {
             let (next, of) = self.next_level(&fit, level, enough);
             let mut groups = (level > 1).then(|| {
                 let room = self.job.settings.branch as usize;
-                Groups::new(self.balls(&next), of.clone(), room, slack(), self.job.distance)
+                Groups::new(self.balls(&next), of.clone(), room, slack(), above.take(), self.job.distance)
             });
             self.debug(&next, "level");
             fit = self.exchanged(next, level, &mut groups);
@@ -96,8 +97,13 @@ impl<'a> Levels<'a> {
             }
             let kept = fit.drop_empty();
             fit.sites.iter_mut().for_each(|s| s.fence = None);
-            let mut of = groups.map_or(of, |g| g.of);
-            keep(&mut of, &kept);
+            if let Some(groups) = &mut groups {
+                keep(&mut groups.of, &kept);
+                keep(&mut groups.balls, &kept);
+            }
+            let mut of = of;
+            if let Some(groups) = &groups { of.clone_from(&groups.of); } else { keep(&mut of, &kept); }
+            above = groups;
             parents.push(of);
         }
         (fit, parents)
@@ -106,7 +112,7 @@ impl<'a> Levels<'a> {
     fn exchanged(&mut self, mut fit: Fit, level: u32, groups: &mut Option<Groups>) -> Fit {
         if let Some(groups) = groups {
             groups.balls = self.balls(&fit);
-            groups.worst(self.job.distance);
+            groups.refit(self.job.distance);
             (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
         }
         let exchange = Exchange {
@@ -132,8 +138,8 @@ impl<'a> Levels<'a> {
         if let Some(g) = groups {
             let mut g = g.clone();
             g.balls = self.balls(fit);
-            let w = g.worst(self.job.distance);
-            eprintln!("   {what} budget {:.4} worst {:.4}", g.budget / self.scale, w / self.scale);
+            g.refit(self.job.distance);
+            eprintln!("   {what} budget {:.4} worst {:.4} above {:.4}", g.budget / self.scale, g.worst() / self.scale, g.worst_above() / self.scale);
         }
     }
 
@@ -157,7 +163,10 @@ impl<'a> Levels<'a> {
                 if *error <= enough {
                     (Fit { sites: vec![*site], parts: vec![part.clone()], errors: vec![*error] }, 0)
                 } else {
-                    self.divided(part)
+                    // children stay within what the worst of the level reaches
+                    let reach = site.depth + fence_env() * fit.worst();
+                    let fence = (level > 1).then_some(Ball { center: site.center, radius: reach });
+                    self.divided(part, fence)
                 }
             })
             .collect();
@@ -176,12 +185,12 @@ impl<'a> Levels<'a> {
     }
 
     /// The points of a part covered by at most `branch` balls.
-    fn divided(&self, part: &[u32]) -> (Fit, u64) {
+    fn divided(&self, part: &[u32], fence: Option<Ball>) -> (Fit, u64) {
         let most = self.job.settings.branch as usize;
         let points = &self.cover.points;
         let some = every(part, LOOKED_AT);
         let candidates: Vec<Site> =
-            every(part, CANDIDATES).iter().map(|&i| self.candidates[i as usize]).collect();
+            every(part, CANDIDATES).iter().map(|&i| Site { fence, ..self.candidates[i as usize] }).collect();
         let chosen = expand(&candidates, &own(points, &some), most);
         let mut fit = Fit::of(chosen, points, &some);
         fit.refit(4, points, &some, self.job.distance);
@@ -221,6 +230,10 @@ fn nested(balls: &[Ball], parents: &[Vec<usize>]) -> Cell {
         below = inside.into_iter().map(Cell::Inner).collect();
     }
     below.pop().unwrap_or(Cell::Inner(Vec::new()))
+}
+
+fn fence_env() -> f64 {
+    std::env::var("FENCE").ok().and_then(|s| s.parse().ok()).unwrap_or(1.15)
 }
 
 fn slack() -> f64 {

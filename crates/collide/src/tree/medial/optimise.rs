@@ -155,8 +155,7 @@ impl Exchange<'_> {
             let p = &self.points[i as usize];
             let mut best = (f64::INFINITY, k);
             for (n, site) in fit.sites.iter().enumerate() {
-                let need = site.need(p);
-                if need < best.0 && n != k {
+                if let Some(need) = site.need_below(p, best.0).filter(|_| n != k) {
                     best = (need, n);
                 }
             }
