@@ -1,4 +1,4 @@
-//! Builds a tree and writes its levels as JSON: `tree_figures MESH DEPTH OUT`.
+//! Builds a tree and writes its levels as JSON: `tree_figures MESH DEPTH OUT [BUILDER]`.
 use std::io::Write;
 use tumble_collide::{Builder, SphereTree, TreeSettings, TriMesh};
 
@@ -6,7 +6,13 @@ fn main() {
     let args: Vec<String> = std::env::args().collect();
     let text = std::fs::read_to_string(&args[1]).expect("mesh");
     let mesh = TriMesh::from_obj(&text).expect("obj");
-    let settings = TreeSettings { builder: Builder::Medial, branch: 8, depth: args[2].parse().expect("depth"), error: 1e-4, even: false };
+    let builder = match args.get(4).map_or("medial", String::as_str) {
+        "grid" => Builder::Grid,
+        "hubbard" => Builder::Hubbard,
+        "octree" => Builder::Octree,
+        _ => Builder::Medial,
+    };
+    let settings = TreeSettings { builder, branch: 8, depth: args[2].parse().expect("depth"), error: 1e-4, even: false };
     let start = std::time::Instant::now();
     let (tree, stages) = SphereTree::build_watched(&mesh, &settings, &()).expect("tree");
     eprintln!("{:?} wall", start.elapsed());

@@ -13,8 +13,11 @@
 mod ball;
 mod builder;
 mod close;
+mod grid;
+mod hubbard;
 mod medial;
 mod octree;
+mod regions;
 mod settings;
 mod simplex;
 mod verify;
@@ -80,6 +83,8 @@ impl SphereTree {
         let builder: &dyn TreeBuilder = match settings.builder {
             Builder::Octree => &octree::Octree,
             Builder::Medial => &medial::Medial,
+            Builder::Hubbard => &hubbard::Hubbard,
+            Builder::Grid => &grid::Grid,
         };
         let built = builder.build(&Job { mesh, distance: &distance, settings, progress })?;
         let tree = SphereTree::flatten(&built.root, &distance, settings.builder != Builder::Octree);

@@ -7,8 +7,10 @@
 //! and divide the points among themselves. Then the leaves are refitted all together, made to cover the surface
 //! itself and not its samples (`close`), and the inner balls are put around their children.
 
+pub(in crate::tree) mod adaptive;
 mod candidates;
 mod cover_points;
+pub(in crate::tree) mod delaunay;
 mod expand;
 mod gaps;
 mod group;
@@ -17,6 +19,9 @@ mod optimise;
 mod refit;
 mod site;
 mod spheres;
+pub(in crate::tree) mod voronoi;
+
+pub(super) use spheres::{CoverPoints, MedialBall};
 
 use super::builder::{Built, Job, TreeBuilder};
 use crate::MeshError;
