@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
-use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_collide::{Pose, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble_core::solver::{self, Accuracy};
 use tumble_core::{ArticulatedBody, Closure, Look as CoreLook, ObjectId, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
 
@@ -90,7 +90,8 @@ pub enum BuildError {
 pub type Notes = Vec<String>;
 
 impl SceneFile {
-    /// The world at time 0, and what was mended in its meshes.
+    /// The world at time 0, and what was mended in its meshes. Sphere trees come from the cache that the environment names
+    /// ([`TreeCache::of_environment`]) where it has them.
     ///
     /// # Errors
     /// [`BuildError`]: a mesh is unreadable or open, a body has no volume, a constant is refused.
@@ -183,7 +184,9 @@ impl SceneFile {
         let mut settings = TreeSettings::default();
         settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
         settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
-        Shape::mesh(mesh, &settings).map_err(|e| wrong(e.to_string()))
+        let (shape, center, note) = Shape::mesh_cached(mesh, &settings, &TreeCache::of_environment()).map_err(|e| wrong(e.to_string()))?;
+        notes.extend(note.filter(|note| !notes.contains(note)));
+        Ok((shape, center))
     }
 
     fn triangles(&self, spec: &MeshSpec, wrong: &impl Fn(String) -> BuildError) -> Result<TriMesh, BuildError> {

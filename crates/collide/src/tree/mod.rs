@@ -12,17 +12,26 @@
 
 mod ball;
 mod builder;
+mod cache;
 mod close;
+mod enclose;
+mod file;
 mod grid;
 mod hubbard;
+mod levels;
 mod medial;
 mod octree;
+mod quality;
 mod regions;
 mod settings;
 mod simplex;
 mod verify;
 
 pub use builder::{Progress, StageCount};
+pub use cache::{CachedTree, TreeCache};
+pub use file::{MeshId, TreeFile, TreeFileError};
+pub use levels::LevelBall;
+pub use quality::{LevelQuality, QualitySettings};
 pub use settings::{Builder, TreeSettings};
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
@@ -152,13 +161,18 @@ impl SphereTree {
                         .iter()
                         .map(|c| Ball { center: c.center, radius: c.radius })
                         .collect();
-                    if deep { ball::deep_around(&children, distance) } else { ball::around_balls(&children) }
+                    if deep { ball::deep_around(&children, distance) } else { enclose::smallest_around(&children) }
                 }
             };
             nodes[n].center = ball.center;
             nodes[n].radius = ball.radius;
             nodes[n].outward = ball.outward(distance);
         }
+        SphereTree::of_nodes(nodes)
+    }
+
+    /// Of nodes that are already a tree: breadth first, children neighbours.
+    fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()
             .filter(|n| n.is_leaf())

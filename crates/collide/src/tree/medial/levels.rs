@@ -1,10 +1,10 @@
 //! The levels of the tree, from the root down.
 
 use super::candidates::touching;
-use super::expand::expand;
 use super::gaps::add_gaps;
 use super::group::Groups;
 use super::optimise::Exchange;
+use super::reduce::{WAYS, reduce};
 use super::refit::{Fit, keep, own};
 use super::site::Site;
 use super::spheres::CoverPoints;
@@ -31,6 +31,14 @@ pub(super) struct Levels<'a> {
     scale: f64,
     done: Mutex<f64>,
     pub stages: Vec<StageCount>,
+}
+
+/// A part covered by few balls.
+struct Divided {
+    fit: Fit,
+    /// The way of reducing that won.
+    way: Option<usize>,
+    exchanges: u64,
 }
 
 impl<'a> Levels<'a> {
@@ -129,7 +137,7 @@ impl<'a> Levels<'a> {
         fit.refit_all(3, &self.cover.points, self.job.distance);
         self.debug(&fit, "refit");
         self.debug_groups(&fit, groups, "refit");
-        self.stages.push(StageCount { level, stage: "exchanges won across".into(), count: wins });
+        self.count(level, "exchanges across", wins);
         fit
     }
 
@@ -154,14 +162,15 @@ impl<'a> Levels<'a> {
 
     /// Divides the balls of the deepest level.
     fn next_level(&mut self, fit: &Fit, level: u32, enough: f64) -> (Fit, Vec<usize>) {
-        let divided: Vec<(Fit, u64)> = fit
+        let divided: Vec<Divided> = fit
             .parts
             .par_iter()
             .zip(&fit.sites)
             .zip(&fit.errors)
             .map(|((part, site), error)| {
                 if *error <= enough {
-                    (Fit { sites: vec![*site], parts: vec![part.clone()], errors: vec![*error] }, 0)
+                    let fit = Fit { sites: vec![*site], parts: vec![part.clone()], errors: vec![*error] };
+                    Divided { fit, way: None, exchanges: 0 }
                 } else {
                     // children stay within what the worst of the level reaches
                     let reach = site.depth + fence_env() * fit.worst();
@@ -170,30 +179,31 @@ impl<'a> Levels<'a> {
                 }
             })
             .collect();
-        let wins = divided.iter().map(|f| f.1).sum();
+        for (n, way) in WAYS.iter().enumerate() {
+            self.count(level, way, divided.iter().filter(|d| d.way == Some(n)).count() as u64);
+        }
+        self.count(level, "exchanges", divided.iter().map(|d| d.exchanges).sum());
         let mut next = Fit::default();
         let mut of = Vec::new();
-        for (parent, (fit, _)) in divided.into_iter().enumerate() {
+        for (parent, Divided { fit, .. }) in divided.into_iter().enumerate() {
             of.extend(fit.sites.iter().map(|_| parent));
             next.sites.extend(fit.sites);
             next.parts.extend(fit.parts);
             next.errors.extend(fit.errors);
         }
-        self.stages.push(StageCount { level, stage: "exchanges won".into(), count: wins });
-        self.stages.push(StageCount { level, stage: "balls".into(), count: next.sites.len() as u64 });
+        self.count(level, "balls", next.sites.len() as u64);
         (next, of)
     }
 
     /// The points of a part covered by at most `branch` balls.
-    fn divided(&self, part: &[u32], fence: Option<Ball>) -> (Fit, u64) {
+    fn divided(&self, part: &[u32], fence: Option<Ball>) -> Divided {
         let most = self.job.settings.branch as usize;
         let points = &self.cover.points;
         let some = every(part, LOOKED_AT);
         let candidates: Vec<Site> =
             every(part, CANDIDATES).iter().map(|&i| Site { fence, ..self.candidates[i as usize] }).collect();
-        let chosen = expand(&candidates, &own(points, &some), most);
-        let mut fit = Fit::of(chosen, points, &some);
-        fit.refit(4, points, &some, self.job.distance);
+        let (mut fit, way) = reduce(&candidates, points, &some, most, self.job.distance);
+        fit.refit(2, points, &some, self.job.distance);
         let exchange = Exchange {
             points,
             candidates: &self.candidates,
@@ -201,12 +211,16 @@ impl<'a> Levels<'a> {
             most,
             tries: TRIES * most,
         };
-        let (mut fit, wins) = exchange.run(fit, &mut None);
+        let (mut fit, exchanges) = exchange.run(fit, &mut None);
         fit.assign(points, part);
         fit.refit(2, points, part, self.job.distance);
         fit.drop_empty();
         self.report(part.len());
-        (fit, wins)
+        Divided { fit, way: Some(way), exchanges }
+    }
+
+    fn count(&mut self, level: u32, stage: &str, count: u64) {
+        self.stages.push(StageCount { level, stage: stage.into(), count });
     }
 
     fn report(&self, points: usize) {

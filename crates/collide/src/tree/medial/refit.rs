@@ -35,6 +35,11 @@ impl Fit {
         self.parts.resize(self.sites.len(), Vec::new());
         self.parts.iter_mut().for_each(Vec::clear);
         self.errors = vec![0.0; self.sites.len()];
+        self.take(points, region);
+    }
+
+    /// Gives further points to the sites.
+    pub fn take(&mut self, points: &[Vec3], region: &[u32]) {
         for &i in region {
             let (need, k) = least(&self.sites, &points[i as usize]);
             self.parts[k].push(i);
