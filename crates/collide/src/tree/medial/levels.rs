@@ -1,5 +1,6 @@
 //! The levels of the tree, from the root down.
 
+use super::adaptive::Axis;
 use super::candidates::touching;
 use super::gaps::add_gaps;
 use super::group::Groups;
@@ -7,16 +8,22 @@ use super::optimise::Exchange;
 use super::reduce::{WAYS, reduce};
 use super::refit::{Fit, keep, own};
 use super::site::Site;
-use super::spheres::CoverPoints;
-use crate::Vec3;
+use super::spheres::{CoverPoints, Want};
 use crate::tree::ball::Ball;
 use crate::tree::close::closed;
 use crate::tree::builder::{Cell, Job, StageCount};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
-/// Candidates per region.
-const CANDIDATES: usize = 300;
+/// Candidates per region: medial balls, and balls that touch it.
+const MEDIAL: usize = 200;
+const TOUCHING: usize = 100;
+/// Sites that the medial balls begin with.
+const FIRST_SITES: usize = 100;
+/// Medial balls for each region that is to be divided, and bounds of their number.
+const BALLS_EACH: f64 = 120.0;
+const LEAST_BALLS: f64 = 1000.0;
+const MOST_BALLS: f64 = 8000.0;
 /// Points of a region that the reducers look at; the last refit looks at all.
 const LOOKED_AT: usize = 1200;
 /// Exchanges tried per ball.
@@ -27,7 +34,11 @@ const GAPS: [f64; 4] = [8e-3, 4e-3, 2e-3, 1e-3];
 pub(super) struct Levels<'a> {
     job: &'a Job<'a>,
     cover: CoverPoints,
+    /// Per cover point, the ball that touches there.
     candidates: Vec<Site>,
+    /// Adaptive medial balls, and per cover point those that hold it.
+    medial: Vec<Site>,
+    holders: Vec<Vec<u32>>,
     scale: f64,
     done: Mutex<f64>,
     pub stages: Vec<StageCount>,
@@ -47,7 +58,7 @@ impl<'a> Levels<'a> {
         let balls = (f64::from(job.settings.branch)).powi(job.settings.depth as i32);
         let cover = CoverPoints::on(job.mesh, (balls * 40.0).clamp(6000.0, 20_000.0) as usize);
         let mut levels =
-            Levels { job, cover, candidates: Vec::new(), scale, done: Mutex::new(0.0), stages: Vec::new() };
+            Levels { job, cover, candidates: Vec::new(), medial: Vec::new(), holders: Vec::new(), scale, done: Mutex::new(0.0), stages: Vec::new() };
         levels.touch();
         levels
     }
@@ -75,21 +86,24 @@ impl<'a> Levels<'a> {
     fn leaves(&mut self) -> (Fit, Vec<Vec<usize>>) {
         let all: Vec<u32> = (0..self.cover.points.len() as u32).collect();
         let center = Site::at(self.cover.points[0], self.job.distance);
-        let mut fit = Fit { sites: vec![center], parts: vec![all], errors: vec![self.scale] };
+        let mut fit = Fit { sites: vec![center], parts: vec![all.clone()], errors: vec![self.scale] };
         let enough = self.job.settings.error * self.scale;
         let mut parents = Vec::new();
         let mut above: Option<Groups> = None;
+        let mut axis = Axis::new(&self.cover, &all, self.job.distance, FIRST_SITES);
         for level in 1..=self.job.settings.depth {
             if fit.worst() <= enough {
                 break;
             }
+            self.adapt(&mut axis, &fit, level);
+            let room = fit.sites.len() * self.job.settings.branch as usize;
             let (next, of) = self.next_level(&fit, level, enough);
             let mut groups = (level > 1).then(|| {
                 let room = self.job.settings.branch as usize;
                 Groups::new(self.balls(&next), of.clone(), room, slack(), above.take(), self.job.distance)
             });
             self.debug(&next, "level");
-            fit = self.exchanged(next, level, &mut groups);
+            fit = self.exchanged(next, level, room, &mut groups);
             if level == self.job.settings.depth {
                 for gap in GAPS {
                     let balls = self.balls(&fit);
@@ -99,7 +113,7 @@ impl<'a> Levels<'a> {
                     self.debug(&fit, &format!("gaps {added}"));
         self.debug_groups(&fit, &groups, "gaps");
                     if gap == GAPS[1] {
-                        fit = self.exchanged(fit, level, &mut groups);
+                        fit = self.exchanged(fit, level, room, &mut groups);
                     }
                 }
             }
@@ -117,18 +131,45 @@ impl<'a> Levels<'a> {
         (fit, parents)
     }
 
-    fn exchanged(&mut self, mut fit: Fit, level: u32, groups: &mut Option<Groups>) -> Fit {
+    /// Refines the medial balls for the division of a level's balls.
+    fn adapt(&mut self, axis: &mut Axis, fit: &Fit, level: u32) {
+        let parts = fit.errors.len() as f64;
+        let least = (parts * BALLS_EACH).clamp(LEAST_BALLS, MOST_BALLS) as usize;
+        // half the mean error of the level
+        let target = 0.5 * fit.errors.iter().sum::<f64>() / parts;
+        axis.refine(&Want { target, least, most: least / 2 });
+        let balls = axis.balls();
+        self.medial = balls.iter().map(|b| Site::at(b.ball.center, self.job.distance)).collect();
+        self.holders = axis.holders();
+        self.stages.extend(axis.counts().stages(level));
+    }
+
+    /// Candidates for a region: medial balls that hold points of it, and balls that touch it.
+    fn candidates_of(&self, part: &[u32], fence: Option<Ball>) -> Vec<Site> {
+        let mut holders: Vec<u32> =
+            every(part, LOOKED_AT).iter().flat_map(|&i| self.holders[i as usize].iter().copied()).collect();
+        holders.sort_unstable();
+        holders.dedup();
+        let medial = every(&holders, MEDIAL).into_iter().map(|k| self.medial[k as usize]);
+        let touching = every(part, TOUCHING).into_iter().map(|i| self.candidates[i as usize]);
+        medial.chain(touching).map(|site| Site { fence, ..site }).collect()
+    }
+
+    fn exchanged(&mut self, mut fit: Fit, level: u32, room: usize, groups: &mut Option<Groups>) -> Fit {
         if let Some(groups) = groups {
             groups.balls = self.balls(&fit);
             groups.refit(self.job.distance);
             (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
         }
+        // as many as there is room for
+        let most = room.max(fit.sites.len());
         let exchange = Exchange {
             points: &self.cover.points,
             candidates: &self.candidates,
             distance: self.job.distance,
-            most: fit.sites.len(),
-            tries: 3 * fit.sites.len(),
+            most,
+            enough: self.job.settings.error * self.scale,
+            tries: TRIES * most,
         };
         self.debug_groups(&fit, groups, "before");
         let (mut fit, wins) = exchange.run(fit, groups);
@@ -200,8 +241,7 @@ impl<'a> Levels<'a> {
         let most = self.job.settings.branch as usize;
         let points = &self.cover.points;
         let some = every(part, LOOKED_AT);
-        let candidates: Vec<Site> =
-            every(part, CANDIDATES).iter().map(|&i| Site { fence, ..self.candidates[i as usize] }).collect();
+        let candidates = self.candidates_of(part, fence);
         let (mut fit, way) = reduce(&candidates, points, &some, most, self.job.distance);
         fit.refit(2, points, &some, self.job.distance);
         let exchange = Exchange {
@@ -209,6 +249,7 @@ impl<'a> Levels<'a> {
             candidates: &self.candidates,
             distance: self.job.distance,
             most,
+            enough: self.job.settings.error * self.scale,
             tries: TRIES * most,
         };
         let (mut fit, exchanges) = exchange.run(fit, &mut None);

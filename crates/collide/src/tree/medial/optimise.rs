@@ -24,6 +24,8 @@ pub(super) struct Exchange<'a> {
     pub distance: &'a MeshDistance,
     /// Greatest number of balls.
     pub most: usize,
+    /// Balls that reach out no further than this are left as they are, metres.
+    pub enough: f64,
     /// Exchanges tried.
     pub tries: usize,
 }
@@ -37,7 +39,7 @@ impl Exchange<'_> {
         let (mut wins, mut failures) = (0, 0);
         for _ in 0..self.tries {
             let worst = (0..fit.sites.len())
-                .filter(|&k| !vain[k])
+                .filter(|&k| !vain[k] && fit.errors[k] > self.enough)
                 .max_by(|&a, &b| fit.errors[a].total_cmp(&fit.errors[b]).then(b.cmp(&a)));
             let Some(worst) = worst.filter(|_| failures < FAILURES) else { break };
             let done = self
@@ -65,18 +67,16 @@ impl Exchange<'_> {
     }
 
     /// Which balls to burst for a half of `worst`, in the order in which they are tried: those that are missed less
-    /// than `worst` errs, and one of the same group. None need be while there is room.
+    /// than `worst` errs, and one of the same group. None need be while there is room; that is tried first.
     fn bursts(&self, fit: &Fit, worst: usize, missed: &[f64], groups: Option<&Groups>) -> Vec<Option<usize>> {
-        if fit.sites.len() < self.most {
-            return vec![None];
-        }
-        let mut order: Vec<usize> =
+                let mut order: Vec<usize> =
             (0..missed.len()).filter(|&k| k != worst && missed[k] < fit.errors[worst]).collect();
         order.sort_by(|&a, &b| missed[a].total_cmp(&missed[b]).then(a.cmp(&b)));
         let same = groups.and_then(|g| order.iter().copied().find(|&k| g.of[k] == g.of[worst]));
         order.truncate(if groups.is_some() { BURSTS } else { 1 });
         order.extend(same.filter(|k| !order.contains(k)));
-        order.into_iter().map(Some).collect()
+        let room = fit.sites.len() < self.most;
+        room.then_some(None).into_iter().chain(order.into_iter().map(Some)).collect()
     }
 
     /// The touched balls after an exchange, with their places in `fit` (those of the halves last), if they cost less
