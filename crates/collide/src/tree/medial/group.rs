@@ -5,12 +5,16 @@
 //! hands one of its balls to a neighbour, and so on, to a group with room; the chain is the one of least cost (Bellman
 //! and Ford). It is done only if the balls around all groups that change reach out no further than a budget.
 
+use super::refit::keep;
 use super::site::Site;
 use crate::MeshDistance;
 use crate::tree::ball::{Ball, deep_around};
 
 /// With more groups than this, balls are exchanged within groups only.
 const MOST_GROUPS: usize = 128;
+/// How far the ball around a group may reach out, as a multiple of what the worst group of its level needs before any
+/// exchange: for the level above the balls, and for those above that.
+const SLACK: [f64; 2] = [1.2, 1.05];
 
 /// The groups of a level.
 #[derive(Clone, Debug)]
@@ -41,12 +45,12 @@ pub(super) struct Change {
 }
 
 impl Groups {
-    /// Groups whose budget is `slack` times what the worst of them needs, below those of the level above.
+    /// Groups of balls, `of` saying which is whose, below those of the level above. Their budget is a little more than
+    /// the worst of them needs.
     pub fn new(
         balls: Vec<Ball>,
         of: Vec<usize>,
         room: usize,
-        slack: f64,
         above: Option<Groups>,
         distance: &MeshDistance,
     ) -> Groups {
@@ -57,14 +61,14 @@ impl Groups {
         let above = above.map(Box::new);
         let mut groups = Groups { room, budget: f64::INFINITY, of, balls, sites, around, above };
         groups.refit(distance);
-        groups.set_budget(slack);
+        groups.set_budget(SLACK[0]);
         groups
     }
 
     fn set_budget(&mut self, slack: f64) {
         self.budget = slack * self.worst();
         if let Some(above) = &mut self.above {
-            above.set_budget(slack);
+            above.set_budget(SLACK[1]);
         }
     }
 
@@ -78,13 +82,15 @@ impl Groups {
     }
 
     /// How far the balls around the groups reach out at most.
-    pub fn worst(&self) -> f64 {
+    fn worst(&self) -> f64 {
         self.around.iter().zip(&self.sites).map(|(b, s)| b.radius - s.depth).fold(0.0, f64::max)
     }
 
-    /// Of the level above: how far those balls reach out at most.
-    pub fn worst_above(&self) -> f64 {
-        self.above.as_ref().map_or(0.0, |a| a.worst())
+    /// Drops the balls that are not marked; the groups of the others.
+    pub fn keep(&mut self, kept: &[bool]) -> Vec<usize> {
+        keep(&mut self.of, kept);
+        keep(&mut self.balls, kept);
+        self.of.clone()
     }
 
     /// Within what a ball has to stay.

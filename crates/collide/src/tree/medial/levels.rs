@@ -26,8 +26,16 @@ const LEAST_BALLS: f64 = 1000.0;
 const MOST_BALLS: f64 = 8000.0;
 /// Points of a region that the reducers look at; the last refit looks at all.
 const LOOKED_AT: usize = 1200;
-/// Exchanges tried per ball.
+/// Exchanges tried per ball, and in one run.
 const TRIES: usize = 3;
+const MOST_TRIES: usize = 2000;
+/// Cover points: at least, at most while there are 40 for each leaf, at most while there are ten.
+const POINTS: (f64, f64, f64) = (6000.0, 20_000.0, 60_000.0);
+/// The balls that a ball is divided into stay within what it would be if it reached out so much farther than the worst
+/// of its level.
+const FENCE: f64 = 1.15;
+/// Shares of the work: dividing, exchanging, filling gaps.
+const SHARES: [f64; 3] = [0.4, 0.3, 0.25];
 /// Sizes of the gaps that are filled, one after the other; parts of the mesh's diagonal.
 const GAPS: [f64; 4] = [8e-3, 4e-3, 2e-3, 1e-3];
 
@@ -56,7 +64,8 @@ impl<'a> Levels<'a> {
     pub fn new(job: &'a Job<'a>) -> Levels<'a> {
         let scale = job.mesh.diagonal();
         let balls = (f64::from(job.settings.branch)).powi(job.settings.depth as i32);
-        let cover = CoverPoints::on(job.mesh, (balls * 40.0).clamp(6000.0, 20_000.0) as usize);
+        let points = (balls * 40.0).clamp(POINTS.0, POINTS.1).max((balls * 10.0).min(POINTS.2));
+        let cover = CoverPoints::on(job.mesh, points as usize);
         let mut levels =
             Levels { job, cover, candidates: Vec::new(), medial: Vec::new(), holders: Vec::new(), scale, done: Mutex::new(0.0), stages: Vec::new() };
         levels.touch();
@@ -85,50 +94,60 @@ impl<'a> Levels<'a> {
     /// The leaves, and of each level the balls' parents.
     fn leaves(&mut self) -> (Fit, Vec<Vec<usize>>) {
         let all: Vec<u32> = (0..self.cover.points.len() as u32).collect();
-        let center = Site::at(self.cover.points[0], self.job.distance);
-        let mut fit = Fit { sites: vec![center], parts: vec![all.clone()], errors: vec![self.scale] };
-        let enough = self.job.settings.error * self.scale;
-        let mut parents = Vec::new();
-        let mut above: Option<Groups> = None;
         let mut axis = Axis::new(&self.cover, &all, self.job.distance, FIRST_SITES);
+        let site = Site::at(self.cover.points[0], self.job.distance);
+        let mut fit = Fit { sites: vec![site], parts: vec![all], errors: vec![self.scale] };
+        let (mut parents, mut groups) = (Vec::new(), None);
         for level in 1..=self.job.settings.depth {
-            if fit.worst() <= enough {
+            if fit.worst() <= self.enough() {
                 break;
             }
-            self.adapt(&mut axis, &fit, level);
             let room = fit.sites.len() * self.job.settings.branch as usize;
-            let (next, of) = self.next_level(&fit, level, enough);
-            let mut groups = (level > 1).then(|| {
-                let room = self.job.settings.branch as usize;
-                Groups::new(self.balls(&next), of.clone(), room, slack(), above.take(), self.job.distance)
-            });
-            self.debug(&next, "level");
-            fit = self.exchanged(next, level, room, &mut groups);
-            if level == self.job.settings.depth {
-                for gap in GAPS {
-                    let balls = self.balls(&fit);
-                    let added = add_gaps(&mut self.cover, self.job.mesh, &balls, gap * self.scale);
-                    self.touch();
-                    fit.refit_all(2, &self.cover.points, self.job.distance);
-                    self.debug(&fit, &format!("gaps {added}"));
-        self.debug_groups(&fit, &groups, "gaps");
-                    if gap == GAPS[1] {
-                        fit = self.exchanged(fit, level, room, &mut groups);
-                    }
-                }
+            self.adapt(&mut axis, &fit, level);
+            let (next, of) = self.next_level(&fit, level);
+            let mut next_groups = self.grouped(&next, &of, groups.take());
+            fit = self.exchanged(next, level, room, next_groups.as_mut());
+            if level == self.job.settings.depth || fit.worst() <= self.enough() {
+                fit = self.filled(fit, level, room, next_groups.as_mut());
             }
-            let kept = fit.drop_empty();
             fit.sites.iter_mut().for_each(|s| s.fence = None);
-            if let Some(groups) = &mut groups {
-                keep(&mut groups.of, &kept);
-                keep(&mut groups.balls, &kept);
-            }
-            let mut of = of;
-            if let Some(groups) = &groups { of.clone_from(&groups.of); } else { keep(&mut of, &kept); }
-            above = groups;
-            parents.push(of);
+            let kept = fit.drop_empty();
+            parents.push(match &mut next_groups {
+                Some(groups) => groups.keep(&kept),
+                None => vec![0; fit.sites.len()],
+            });
+            groups = next_groups;
         }
         (fit, parents)
+    }
+
+    /// An outward error that needs no dividing, metres.
+    fn enough(&self) -> f64 {
+        self.job.settings.error * self.scale
+    }
+
+    /// The balls of a level in those of the level above, from the second on.
+    fn grouped(&self, fit: &Fit, of: &[usize], above: Option<Groups>) -> Option<Groups> {
+        // the first level's balls lie in the root and nowhere else
+        let root = of.iter().all(|g| *g == 0);
+        let branch = self.job.settings.branch as usize;
+        (!root).then(|| Groups::new(self.balls(fit), of.to_vec(), branch, above, self.job.distance))
+    }
+
+    /// The leaves once more, with cover points where the surface between the others was left bare.
+    fn filled(&mut self, mut fit: Fit, level: u32, room: usize, mut groups: Option<&mut Groups>) -> Fit {
+        for (n, gap) in GAPS.into_iter().enumerate() {
+            let balls = self.balls(&fit);
+            let added = add_gaps(&mut self.cover, self.job.mesh, &balls, gap * self.scale);
+            self.count(level, "gaps filled", added as u64);
+            self.touch();
+            fit.refit_all(2, &self.cover.points, self.job.distance);
+            if n == 1 {
+                fit = self.exchanged(fit, level, room, groups.as_deref_mut());
+            }
+            self.report(SHARES[2] / GAPS.len() as f64);
+        }
+        fit
     }
 
     /// Refines the medial balls for the division of a level's balls.
@@ -155,66 +174,47 @@ impl<'a> Levels<'a> {
         medial.chain(touching).map(|site| Site { fence, ..site }).collect()
     }
 
-    fn exchanged(&mut self, mut fit: Fit, level: u32, room: usize, groups: &mut Option<Groups>) -> Fit {
-        if let Some(groups) = groups {
+    /// Balls exchanged among all regions of a level, as far as its groups allow, and refitted together.
+    fn exchanged(&mut self, mut fit: Fit, level: u32, room: usize, groups: Option<&mut Groups>) -> Fit {
+        let mut groups = groups;
+        if let Some(groups) = groups.as_deref_mut() {
             groups.balls = self.balls(&fit);
             groups.refit(self.job.distance);
             (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
         }
-        // as many as there is room for
-        let most = room.max(fit.sites.len());
-        let exchange = Exchange {
+        let exchange = self.exchange(room.max(fit.sites.len()));
+        let (mut fit, exchanges) = exchange.run(fit, groups);
+        fit.refit_all(3, &self.cover.points, self.job.distance);
+        self.count(level, "exchanges across regions", exchanges);
+        self.report(SHARES[1] / f64::from(self.job.settings.depth));
+        fit
+    }
+
+    fn exchange(&self, most: usize) -> Exchange<'_> {
+        Exchange {
             points: &self.cover.points,
             candidates: &self.candidates,
             distance: self.job.distance,
             most,
-            enough: self.job.settings.error * self.scale,
-            tries: TRIES * most,
-        };
-        self.debug_groups(&fit, groups, "before");
-        let (mut fit, wins) = exchange.run(fit, groups);
-        self.debug_groups(&fit, groups, "after");
-        self.debug(&fit, &format!("exchanges {wins}"));
-        fit.refit_all(3, &self.cover.points, self.job.distance);
-        self.debug(&fit, "refit");
-        self.debug_groups(&fit, groups, "refit");
-        self.count(level, "exchanges across", wins);
-        fit
-    }
-
-    fn debug_groups(&self, fit: &Fit, groups: &Option<Groups>, what: &str) {
-        if std::env::var_os("DBG").is_none() { return; }
-        if let Some(g) = groups {
-            let mut g = g.clone();
-            g.balls = self.balls(fit);
-            g.refit(self.job.distance);
-            eprintln!("   {what} budget {:.4} worst {:.4} above {:.4}", g.budget / self.scale, g.worst() / self.scale, g.worst_above() / self.scale);
-        }
-    }
-
-    fn debug(&self, fit: &Fit, what: &str) {
-        if std::env::var_os("DBG").is_some() {
-            let mut e: Vec<f64> = fit.errors.iter().map(|e| e / self.scale).collect();
-            e.sort_by(|a, b| b.total_cmp(a));
-            let n = e.len();
-            eprintln!("{what}: {n} balls, errors {:.4} {:.4} {:.4} {:.4} {:.4}", e[0], e[n / 8], e[n / 4], e[n / 2], e[n - 1]);
+            enough: self.enough(),
+            tries: (TRIES * most).min(MOST_TRIES),
         }
     }
 
     /// Divides the balls of the deepest level.
-    fn next_level(&mut self, fit: &Fit, level: u32, enough: f64) -> (Fit, Vec<usize>) {
+    fn next_level(&mut self, fit: &Fit, level: u32) -> (Fit, Vec<usize>) {
         let divided: Vec<Divided> = fit
             .parts
             .par_iter()
             .zip(&fit.sites)
             .zip(&fit.errors)
             .map(|((part, site), error)| {
-                if *error <= enough {
+                if *error <= self.enough() {
                     let fit = Fit { sites: vec![*site], parts: vec![part.clone()], errors: vec![*error] };
                     Divided { fit, way: None, exchanges: 0 }
                 } else {
                     // children stay within what the worst of the level reaches
-                    let reach = site.depth + fence_env() * fit.worst();
+                    let reach = site.depth + FENCE * fit.worst();
                     let fence = (level > 1).then_some(Ball { center: site.center, radius: reach });
                     self.divided(part, fence)
                 }
@@ -244,19 +244,11 @@ impl<'a> Levels<'a> {
         let candidates = self.candidates_of(part, fence);
         let (mut fit, way) = reduce(&candidates, points, &some, most, self.job.distance);
         fit.refit(2, points, &some, self.job.distance);
-        let exchange = Exchange {
-            points,
-            candidates: &self.candidates,
-            distance: self.job.distance,
-            most,
-            enough: self.job.settings.error * self.scale,
-            tries: TRIES * most,
-        };
-        let (mut fit, exchanges) = exchange.run(fit, &mut None);
+        let (mut fit, exchanges) = self.exchange(most).run(fit, None);
         fit.assign(points, part);
         fit.refit(2, points, part, self.job.distance);
         fit.drop_empty();
-        self.report(part.len());
+        self.report(SHARES[0] * part.len() as f64 / (points.len() * self.job.settings.depth as usize) as f64);
         Divided { fit, way: Some(way), exchanges }
     }
 
@@ -264,10 +256,10 @@ impl<'a> Levels<'a> {
         self.stages.push(StageCount { level, stage: stage.into(), count });
     }
 
-    fn report(&self, points: usize) {
-        let share = points as f64 / (self.cover.points.len() * self.job.settings.depth as usize) as f64;
+    /// A further share of the work is done.
+    fn report(&self, share: f64) {
         if let Ok(mut done) = self.done.lock() {
-            *done = (*done + 0.95 * share).min(0.95);
+            *done = (*done + share).min(1.0);
             self.job.progress.at(*done);
         }
     }
@@ -275,24 +267,17 @@ impl<'a> Levels<'a> {
 
 /// Nested cells over the leaves' balls; `parents` of each level, the deepest last.
 fn nested(balls: &[Ball], parents: &[Vec<usize>]) -> Cell {
-    let mut below: Vec<Cell> = balls.iter().map(|ball| Cell::Leaf(*ball)).collect();
+    let mut below: Vec<Option<Cell>> = balls.iter().map(|ball| Some(Cell::Leaf(*ball))).collect();
     for of in parents.iter().rev() {
         let mut inside: Vec<Vec<Cell>> = Vec::new();
         inside.resize_with(of.iter().max().map_or(0, |p| p + 1), Vec::new);
         for (parent, cell) in of.iter().zip(below) {
-            inside[*parent].push(cell);
+            inside[*parent].extend(cell);
         }
-        below = inside.into_iter().map(Cell::Inner).collect();
+        // a ball all of whose points went to others has no cells
+        below = inside.into_iter().map(|cells| (!cells.is_empty()).then_some(Cell::Inner(cells))).collect();
     }
-    below.pop().unwrap_or(Cell::Inner(Vec::new()))
-}
-
-fn fence_env() -> f64 {
-    std::env::var("FENCE").ok().and_then(|s| s.parse().ok()).unwrap_or(1.15)
-}
-
-fn slack() -> f64 {
-    std::env::var("SLACK").ok().and_then(|s| s.parse().ok()).unwrap_or(1.1)
+    below.into_iter().flatten().next().unwrap_or(Cell::Inner(Vec::new()))
 }
 
 /// At most `most` of the items, evenly.

@@ -32,7 +32,7 @@ pub(super) struct Exchange<'a> {
 
 impl Exchange<'_> {
     /// The fit after the exchanges that paid, and their number; `groups`, if there are any, follow.
-    pub fn run(&self, mut fit: Fit, groups: &mut Option<Groups>) -> (Fit, u64) {
+    pub fn run(&self, mut fit: Fit, mut groups: Option<&mut Groups>) -> (Fit, u64) {
         let mut missed: Vec<f64> = (0..fit.sites.len()).map(|k| self.missed(&fit, k).0).collect();
         // balls that were split in vain, until something near them changes
         let mut vain = vec![false; fit.sites.len()];
@@ -43,9 +43,9 @@ impl Exchange<'_> {
                 .max_by(|&a, &b| fit.errors[a].total_cmp(&fit.errors[b]).then(b.cmp(&a)));
             let Some(worst) = worst.filter(|_| failures < FAILURES) else { break };
             let done = self
-                .bursts(&fit, worst, &missed, groups.as_ref())
+                .bursts(&fit, worst, &missed, groups.as_deref())
                 .into_iter()
-                .find_map(|burst| self.exchanged(&fit, worst, burst, groups));
+                .find_map(|burst| self.exchanged(&fit, worst, burst, groups.as_deref_mut()));
             let Some((places, after)) = done else {
                 vain[worst] = true;
                 failures += 1;
@@ -58,7 +58,7 @@ impl Exchange<'_> {
                 missed[k] = self.missed(&fit, k).0;
                 vain[k] = false;
             }
-            if let Some(groups) = groups {
+            if let Some(groups) = groups.as_deref() {
                 (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
             }
             (wins, failures) = (wins + 1, 0);
@@ -86,7 +86,7 @@ impl Exchange<'_> {
         fit: &Fit,
         worst: usize,
         burst: Option<usize>,
-        groups: &mut Option<Groups>,
+        groups: Option<&mut Groups>,
     ) -> Option<(Vec<usize>, Fit)> {
         let halves = self.halves(fit, worst)?;
         let mut touched: Vec<usize> = burst.map(|b| self.missed(fit, b).1).unwrap_or_default();
