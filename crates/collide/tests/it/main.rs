@@ -4,6 +4,7 @@ mod against_parry;
 mod bad_meshes;
 mod broad;
 mod hull;
+mod medial;
 mod mesh_contacts;
 mod meshes;
 mod primitives;
