@@ -14,6 +14,7 @@ mod ball;
 mod builder;
 mod cache;
 mod close;
+mod enclose;
 mod file;
 mod grid;
 mod hubbard;
@@ -160,7 +161,7 @@ impl SphereTree {
                         .iter()
                         .map(|c| Ball { center: c.center, radius: c.radius })
                         .collect();
-                    if deep { ball::deep_around(&children, distance) } else { ball::around_balls(&children) }
+                    if deep { ball::deep_around(&children, distance) } else { enclose::smallest_around(&children) }
                 }
             };
             nodes[n].center = ball.center;
