@@ -103,7 +103,7 @@ fn grids(points: &[Vec3]) -> Vec<Cubes> {
     for axes in frames {
         let bounds = crate::Aabb::around(points.iter().map(|p| axes * p));
         let side = (bounds.max - bounds.min).max();
-        if !(side > 0.0) {
+        if side <= 0.0 {
             continue;
         }
         for n in 0..SPACINGS {
