@@ -7,4 +7,5 @@ mod determinism;
 mod machines;
 mod outputs;
 mod picture;
+mod repair;
 mod scenes;
