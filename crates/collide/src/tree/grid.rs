@@ -7,7 +7,7 @@
 //! to the cube's points, not drawn around cubes, so that they are far smaller where the surface cuts a corner.
 
 use super::builder::{Built, Job, TreeBuilder};
-use super::regions::{Part, build, cover_of};
+use super::regions::{Part, build, cover_of, refitted, worst};
 use crate::{MeshDistance, MeshError, Mat3, Vec3};
 use nalgebra::{Rotation3, SymmetricEigen, Unit};
 
@@ -79,16 +79,16 @@ fn divided(region: &[u32], points: &[Vec3], most: usize, distance: &MeshDistance
     let mut ranked: Vec<(f64, Cubes)> =
         grids(&some).into_iter().filter_map(|cubes| Some((cubes.rank(&some, most)?, cubes))).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let worst = |parts: &[Part]| parts.iter().map(|p| p.outward).fold(0.0, f64::max);
-    ranked
+    let best = ranked
         .iter()
         .map(|(_, cubes)| cubes.parts(region, points))
         // points that were not looked at may lie in more cubes
         .filter(|parts| (2..=most).contains(&parts.len()))
         .take(FITTED)
-        .map(|parts| parts.into_iter().map(|own| Part::of(own, points, distance)).collect::<Vec<Part>>())
+        .map(|parts| parts.into_iter().map(|own| Part::of(own, None, points, distance)).collect::<Vec<Part>>())
         .min_by(|a, b| worst(a).total_cmp(&worst(b)))
-        .unwrap_or_default()
+        .unwrap_or_default();
+    refitted(best, points, distance)
 }
 
 /// The grids tried: along the axes given, along the principal axes, and these turned by 45° about each.
@@ -103,7 +103,7 @@ fn grids(points: &[Vec3]) -> Vec<Cubes> {
     for axes in frames {
         let bounds = crate::Aabb::around(points.iter().map(|p| axes * p));
         let side = (bounds.max - bounds.min).max();
-        if !(side > 0.0) {
+        if side <= 0.0 {
             continue;
         }
         for n in 0..SPACINGS {

@@ -16,6 +16,8 @@ const POINTS_EACH: f64 = 40.0;
 const POINTS: (f64, f64) = (4000.0, 24_000.0);
 /// A region of fewer points is a leaf. With the number of points it bounds the number of leaves.
 const FEWEST: usize = 4;
+/// Greatest number of rounds of [`refitted`].
+const REFITS: usize = 6;
 /// Evaluations of the search for a part's centre.
 const EVALUATIONS: usize = 60;
 
@@ -29,9 +31,9 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// The points with a ball that reaches out of the solid little: the small enclosing ball, moved to where
-    /// `max |p − c| + s(c)` is less, `s` the signed distance of the centre.
-    pub fn of(points: Vec<u32>, all: &[Vec3], distance: &MeshDistance) -> Part {
+    /// The points with a ball that reaches out of the solid little: the small enclosing ball, or the one about `center`,
+    /// moved to where `max |p − c| + s(c)` is less, `s` the signed distance of the centre.
+    pub fn of(points: Vec<u32>, center: Option<Vec3>, all: &[Vec3], distance: &MeshDistance) -> Part {
         let own: Vec<Vec3> = points.iter().map(|&i| all[i as usize]).collect();
         let start = around_points(&own);
         let mut best = Part { outward: f64::INFINITY, ball: start, points };
@@ -43,10 +45,41 @@ impl Part {
             }
             outward
         };
-        judge(&start.center);
-        simplex(start.center, 0.4 * start.radius, EVALUATIONS, &mut judge);
+        let known = judge(&start.center);
+        let from = center.filter(|c| judge(c) < known).unwrap_or(start.center);
+        simplex(from, 0.4 * start.radius, EVALUATIONS, &mut judge);
         best
     }
+}
+
+/// Points choose the ball that reaches out least to hold them, and balls are fitted anew, while that lowers how far the worst reaches out.
+pub(super) fn refitted(mut parts: Vec<Part>, all: &[Vec3], distance: &MeshDistance) -> Vec<Part> {
+    for _ in 0..REFITS {
+        let needs: Vec<(Vec3, f64)> = parts.iter().map(|p| (p.ball.center, p.outward - p.ball.radius)).collect();
+        let mut chosen: Vec<Vec<u32>> = vec![Vec::new(); parts.len()];
+        for &i in parts.iter().flat_map(|p| &p.points) {
+            let need = |k: usize| (all[i as usize] - needs[k].0).norm() + needs[k].1;
+            let least = (0..parts.len()).min_by(|&a, &b| need(a).total_cmp(&need(b))).unwrap_or(0);
+            chosen[least].push(i);
+        }
+        let centers = parts.iter().map(|p| p.ball.center);
+        let next: Vec<Part> = chosen
+            .into_iter()
+            .zip(centers)
+            .filter(|(points, _)| !points.is_empty())
+            .map(|(points, center)| Part::of(points, Some(center), all, distance))
+            .collect();
+        if worst(&next) >= worst(&parts) {
+            break;
+        }
+        parts = next;
+    }
+    parts
+}
+
+/// How far the parts' balls reach out, metres.
+pub(super) fn worst(parts: &[Part]) -> f64 {
+    parts.iter().map(|p| p.outward).fold(0.0, f64::max)
 }
 
 /// The cover points of a build.
@@ -60,7 +93,7 @@ pub(super) fn cover_of(job: &Job) -> CoverPoints {
 pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> Vec<Part> + Sync)) -> Built {
     let enough = job.settings.error * job.mesh.diagonal();
     let all: Vec<u32> = (0..cover.points.len() as u32).collect();
-    let mut leaves = vec![Part::of(all, &cover.points, job.distance)];
+    let mut leaves = vec![Part::of(all, None, &cover.points, job.distance)];
     let (mut parents, mut stages) = (Vec::new(), Vec::new());
     for level in 1..=job.settings.depth {
         let divided: Vec<Vec<Part>> = leaves

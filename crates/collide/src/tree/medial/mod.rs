@@ -53,7 +53,7 @@ mod spheres;
 mod tests;
 pub(in crate::tree) mod voronoi;
 
-pub(super) use spheres::{CoverPoints, MedialBall};
+pub(super) use spheres::{CoverPoints, MedialBall, Want};
 
 use super::builder::{Built, Job, TreeBuilder};
 use crate::MeshError;
