@@ -73,10 +73,10 @@ fn covers_and_nests_thin_and_scattered_solids() {
     }
 }
 
-/// One ball about the middle of a polyhedron that is inscribed in a sphere reaches out by the sagitta of its faces, so that no
-/// level needs more.
+/// One ball about the middle of a polyhedron that is inscribed in a sphere reaches out by the sagitta of its faces. Eight that
+/// share its points find that, but for what closing them over the surface between the points grows.
 #[test]
-fn a_ball_is_covered_by_itself() {
+fn a_ball_is_covered_by_balls_as_large() {
     let mesh = TriMesh::icosphere(1.0, 3);
     let depth = |t: usize| {
         let [a, b, c] = mesh.corners(t);
@@ -84,7 +84,7 @@ fn a_ball_is_covered_by_itself() {
     };
     let sagitta = 1.0 - (0..mesh.triangles.len()).map(depth).fold(f64::INFINITY, f64::min);
     let tree = SphereTree::build(&mesh, &settings(1)).unwrap();
-    assert!(tree.outward_error() <= sagitta * (1.0 + 1e-6), "{} of {sagitta}", tree.outward_error());
+    assert!(tree.outward_error() <= 1.1 * sagitta, "{} of {sagitta}", tree.outward_error());
 }
 
 #[test]

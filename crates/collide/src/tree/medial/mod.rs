@@ -49,6 +49,8 @@ mod reduce;
 mod refit;
 mod site;
 mod spheres;
+#[cfg(test)]
+mod tests;
 pub(in crate::tree) mod voronoi;
 
 pub(super) use spheres::{CoverPoints, MedialBall, Want};
