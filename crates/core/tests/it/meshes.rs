@@ -20,7 +20,7 @@ const REST: f64 = 0.5 * G / 240.0;
 /// 0.5 mm of where it was, and it never was deeper than the stated outward error of its tree.
 fn comes_to_rest(name: &str, mesh: &TriMesh, turn: Vec3, height: f64, seconds: f64) {
     for stepper in STEPPERS {
-        let (shape, _) = Shape::mesh(mesh.clone(), &TreeSettings::default()).unwrap();
+        let (shape, _) = Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap();
         let (error, Shape::Mesh(solid)) = (shape.tree().unwrap().outward_error(), &shape) else { unreachable!("made as a mesh") };
         let corners = solid.mesh().vertices.clone();
         let mut world = world(stepper, 1.0 / 240.0);
