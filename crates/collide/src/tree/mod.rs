@@ -13,6 +13,7 @@
 mod ball;
 mod builder;
 mod cache;
+mod cut;
 mod file;
 mod levels;
 mod octree;
@@ -22,6 +23,7 @@ mod verify;
 
 pub use builder::{Progress, StageCount};
 pub use cache::{CachedTree, TreeCache};
+pub use cut::grow_to_cover;
 pub use file::{MeshId, TreeFile, TreeFileError};
 pub use levels::LevelBall;
 pub use quality::{LevelQuality, QualitySettings};
