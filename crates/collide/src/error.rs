@@ -142,6 +142,14 @@ pub enum MeshError {
         /// The face named: one with an open edge (the fin) where there is one.
         face: usize,
     },
+    /// A surface that repair makes no solid of.
+    #[error("{error}; repair was asked for, but {why}")]
+    BeyondRepair {
+        /// What is wrong with the mesh as it was.
+        error: Box<MeshError>,
+        /// What kept it from being repaired.
+        why: String,
+    },
     /// A closed surface around nothing.
     #[error("the mesh is closed but encloses no volume ({volume:e} m³); it must be a solid")]
     NoVolume {

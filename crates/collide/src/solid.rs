@@ -37,10 +37,13 @@ impl MeshShape {
 
     fn with_tree(mut mesh: TriMesh, tree_of: impl FnOnce(&TriMesh) -> Result<SphereTree, MeshError>) -> Result<(MeshShape, Vec3), MeshError> {
         let report = mesh.check_closed()?;
-        let offset = mesh.mass_properties(1.0).center_of_mass;
+        let overlaps = report.crossing_faces > 0 || report.shells > 1;
+        let mass = if overlaps { mesh.union_mass_properties(1.0) } else { mesh.mass_properties(1.0) };
+        let offset = mass.center_of_mass;
         let mesh = mesh.translated(&-offset);
         // what rounding left of the offset is not worth a second shift
-        let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mesh.mass_properties(1.0) };
+        let mass = if overlaps { mass } else { mesh.mass_properties(1.0) };
+        let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mass };
         let tree = tree_of(&mesh)?;
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
         let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);

@@ -1,6 +1,7 @@
 //! One binary for all integration tests of the crate.
 
 mod against_parry;
+mod bad_meshes;
 mod broad;
 mod hull;
 mod mesh_contacts;
@@ -12,3 +13,4 @@ mod shared_meshes;
 mod tree_cache;
 mod tree_file;
 mod trees;
+mod winding;
