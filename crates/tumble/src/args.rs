@@ -96,6 +96,9 @@ pub struct SphereTreeOptions {
     /// Balls that reach at most this far outside are not divided further: a share of the mesh's diagonal, 0.0001 to 1.
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub error: Option<f64>,
+    /// Close holes and drop what dangles before building; what was done is said.
+    #[arg(long, conflicts_with = "urdf")]
+    pub repair: bool,
     /// Write the tree (JSON), or the URDF of spheres.
     #[arg(long, short, value_name = "FILE", visible_alias = "json")]
     pub output: Option<PathBuf>,

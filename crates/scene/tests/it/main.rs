@@ -9,4 +9,5 @@ mod pinocchio;
 mod robots;
 mod robust;
 mod shipped;
+mod spheres;
 mod urdf;

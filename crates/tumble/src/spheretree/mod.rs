@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::progress::Share;
 use std::path::Path;
 use std::time::Instant;
-use tumble::collide::{MeshId, QualitySettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
+use tumble::collide::{MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
 use tumble::scene::read_triangles;
 
 /// Builds, measures, prints and writes.
@@ -54,8 +54,13 @@ fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
     let mut mesh = read_triangles(path, &bytes).map_err(wrong)?;
-    let report = mesh.check_closed().map_err(|e| wrong(e.to_string()))?;
-    report.notes().iter().filter(|_| !options.quiet).for_each(|note| println!("{}: {note}", path.display()));
+    let notes = if options.repair {
+        mesh.repair(&RepairSettings::default()).map(|report| report.notes())
+    } else {
+        mesh.check_closed().map(|report| report.notes())
+    };
+    let notes = notes.map_err(|e| wrong(e.to_string()))?;
+    notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{}: {note}", path.display()));
     Ok(mesh)
 }
 

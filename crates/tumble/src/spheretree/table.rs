@@ -49,7 +49,7 @@ pub fn table(file: &TreeFile, verbose: bool) -> String {
 pub fn aligned(rows: impl Iterator<Item = Vec<String>>) -> String {
     let rows: Vec<Vec<String>> = rows.collect();
     let width = |k: usize| rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).max().unwrap_or(0);
-    let line = |row: &Vec<String>| row.iter().enumerate().map(|(k, cell)| format!("{cell:>1$}", width(k))).collect::<Vec<_>>().join("  ");
+    let line = |row: &Vec<String>| row.iter().enumerate().map(|(k, cell)| format!("{cell:>wide$}", wide = width(k))).collect::<Vec<_>>().join("  ");
     rows.iter().map(|row| line(row).trim_end().to_owned() + "\n").collect()
 }
 
