@@ -4,6 +4,7 @@
 //! by a falling share of the way; after `n` steps the radius is within `1/√n` of the least. The ball returned
 //! encloses exactly.
 
+use super::simplex::simplex;
 use crate::{MeshDistance, Vec3};
 
 const STEPS: usize = 100;
@@ -71,4 +72,23 @@ pub(super) fn around_balls(balls: &[Ball]) -> Ball {
         }
     }
     Ball { radius: best.radius * (1.0 + 1e-12), ..best }
+}
+
+/// Of the balls around balls the one that reaches out of the solid least, so far as a search finds it: its centre
+/// lies deeper than that of the smallest.
+pub(super) fn deep_around(balls: &[Ball], distance: &MeshDistance) -> Ball {
+    let smallest = around_balls(balls);
+    let holding = |c: &Vec3| balls.iter().map(|b| (b.center - c).norm() + b.radius).fold(0.0, f64::max);
+    let mut best = (f64::INFINITY, smallest);
+    for step in [0.3, -0.1] {
+        simplex(best.1.center, step * smallest.radius, 50, |c| {
+            let radius = holding(c);
+            let outward = radius + distance.closest(c).signed_distance;
+            if outward < best.0 {
+                best = (outward, Ball { center: *c, radius: radius * (1.0 + 1e-12) });
+            }
+            outward
+        });
+    }
+    best.1
 }

@@ -13,12 +13,18 @@
 mod ball;
 mod builder;
 mod cache;
+mod close;
 mod cut;
 mod file;
+mod grid;
+mod hubbard;
 mod levels;
+mod medial;
 mod octree;
 mod quality;
+mod regions;
 mod settings;
+mod simplex;
 mod verify;
 
 pub use builder::{Progress, StageCount};
@@ -86,9 +92,12 @@ impl SphereTree {
         let distance = MeshDistance::new(mesh);
         let builder: &dyn TreeBuilder = match settings.builder {
             Builder::Octree => &octree::Octree,
+            Builder::Medial => &medial::Medial,
+            Builder::Hubbard => &hubbard::Hubbard,
+            Builder::Grid => &grid::Grid,
         };
         let built = builder.build(&Job { mesh, distance: &distance, settings, progress })?;
-        let tree = SphereTree::flatten(&built.root, &distance);
+        let tree = SphereTree::flatten(&built.root, &distance, settings.builder != Builder::Octree);
         tree.check_nesting()?;
         tree.check_coverage(mesh)?;
         progress.at(1.0);
@@ -131,7 +140,7 @@ impl SphereTree {
     }
 
     /// Breadth first, so that children are neighbours; a cell with one child is replaced by it.
-    fn flatten(root: &Cell, distance: &MeshDistance) -> SphereTree {
+    fn flatten(root: &Cell, distance: &MeshDistance, deep: bool) -> SphereTree {
         let mut nodes = vec![empty_node(0)];
         let mut cells = vec![skip_single(root)];
         let mut next = 0;
@@ -153,7 +162,7 @@ impl SphereTree {
                         .iter()
                         .map(|c| Ball { center: c.center, radius: c.radius })
                         .collect();
-                    ball::around_balls(&children)
+                    if deep { ball::deep_around(&children, distance) } else { ball::around_balls(&children) }
                 }
             };
             nodes[n].center = ball.center;

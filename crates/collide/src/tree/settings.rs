@@ -28,6 +28,12 @@ pub enum Builder {
     /// Cells of an octree that the surface passes through.
     #[default]
     Octree,
+    /// Adaptive medial axis.
+    Medial,
+    /// Hubbard's medial axis: balls of a fixed set of samples, merged. Faster than the adaptive one and coarser.
+    Hubbard,
+    /// Balls of an oriented grid's cubes. Faster still.
+    Grid,
 }
 
 impl Default for TreeSettings {

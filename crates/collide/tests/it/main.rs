@@ -3,6 +3,7 @@
 mod against_parry;
 mod bad_meshes;
 mod broad;
+mod builders;
 mod hull;
 mod mesh_contacts;
 mod meshes;
