@@ -128,9 +128,9 @@ impl<'m> ShapeMaker<'m> {
     /// With the coarsest tree for what is only drawn, else with one from the cache.
     fn solid(&mut self, mesh: TriMesh, used: Use) -> Result<(Shape, Vec3), ShapeError> {
         if used == Use::Drawing {
-            return Shape::mesh(mesh, &TreeSettings { depth: 1, error: 1.0, ..TreeSettings::default() });
+            return Shape::mesh(mesh, &TreeSettings { depth: 1, error: 1.0, ..TreeSettings::octree() });
         }
-        let (shape, center, note) = Shape::mesh_cached(mesh, &TreeSettings::default(), &self.cache)?;
+        let (shape, center, note) = Shape::mesh_cached(mesh, &TreeSettings::octree(), &self.cache)?;
         note.into_iter().for_each(|note| self.notes.add("sphere trees", note));
         Ok((shape, center))
     }

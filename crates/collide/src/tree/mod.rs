@@ -15,6 +15,7 @@ mod builder;
 mod cache;
 mod close;
 mod cut;
+mod enclose;
 mod file;
 mod grid;
 mod hubbard;
@@ -162,7 +163,7 @@ impl SphereTree {
                         .iter()
                         .map(|c| Ball { center: c.center, radius: c.radius })
                         .collect();
-                    if deep { ball::deep_around(&children, distance) } else { ball::around_balls(&children) }
+                    if deep { ball::deep_around(&children, distance) } else { enclose::smallest_around(&children) }
                 }
             };
             nodes[n].center = ball.center;

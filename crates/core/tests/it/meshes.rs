@@ -20,7 +20,7 @@ const REST: f64 = 0.5 * G / 240.0;
 /// 0.5 mm of where it was, and it never was deeper than the stated outward error of its tree.
 fn comes_to_rest(name: &str, mesh: &TriMesh, turn: Vec3, height: f64, seconds: f64) {
     for stepper in STEPPERS {
-        let (shape, _) = Shape::mesh(mesh.clone(), &TreeSettings::default()).unwrap();
+        let (shape, _) = Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap();
         let (error, reach) = (shape.tree().unwrap().outward_error(), shape.bounding_radius());
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.2, 0.6);

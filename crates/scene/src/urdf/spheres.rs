@@ -6,7 +6,7 @@
 //! | shape | spheres |
 //! |---|---|
 //! | capsule | on its axis at equal distances `d`, of radius `√(R² + d²/4)`: they cover it and reach `√(R² + d²/4) − R` outside |
-//! | box, cylinder, mesh | the better of two: a cut of a sphere tree ([`SphereTree::cut`]), and the leaves of a tree of one level with that many branches |
+//! | box, cylinder, mesh | up to 64: a tree of one level with that many branches; more, or an octree: the best of the cuts ([`SphereTree::cut`]) of deeper trees |
 //! | open mesh | those of the mesh with its holes closed, else of its convex hull |
 //!
 //! Whatever made them, the spheres are then grown until they cover the surface as it was given, which is found by splitting its triangles until each piece
@@ -17,7 +17,7 @@ use std::path::Path;
 
 use roxmltree::Node;
 use tumble_core::collide::{
-    MeshDistance, MeshError, Pose, Progress, RepairSettings, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, grow_to_cover,
+    Builder, MeshDistance, MeshError, Pose, Progress, RepairSettings, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, grow_to_cover,
 };
 
 use super::link::{Context, read_shape};
@@ -226,21 +226,38 @@ fn cover_capsule(radius: f64, length: f64, most: usize, error: f64) -> Covered {
 fn cover_mesh(given: &TriMesh, solid: &TriMesh, most: usize, options: &SphereOptions) -> Result<Covered, String> {
     let distance = MeshDistance::new(solid);
     let diagonal = solid.diagonal();
-    let broad = TreeSettings { branch: most.clamp(2, MOST_BRANCHES) as u32, depth: 1, ..options.tree };
     let mut best: Option<Covered> = None;
-    for settings in [options.tree, broad] {
-        let cached = SphereTree::build_cached(solid, &settings, &options.cache).map_err(|e| e.to_string())?;
-        let tree = cached.tree;
-        let cut = tree.cut(most, options.error * diagonal);
-        let mut spheres: Vec<(Vec3, f64)> = cut.iter().map(|&n| (tree.nodes()[n].center, tree.nodes()[n].radius)).collect();
+    let mut take = |mut spheres: Vec<(Vec3, f64)>| {
         let grown = grow_to_cover(&mut spheres, given);
         let outward: Vec<f64> = spheres.iter().map(|(c, r)| (r + distance.closest(c).signed_distance).max(0.0)).collect();
         let covered = Covered { spheres, outward, grown };
         if best.as_ref().is_none_or(|best| covered.worst() < best.worst()) {
             best = Some(covered);
         }
+    };
+    let bounds = solid.aabb();
+    let middle = 0.5 * (bounds.min + bounds.max);
+    take(vec![(middle, solid.vertices.iter().map(|v| (v - middle).norm()).fold(0.0, f64::max))]);
+    for settings in trees(most, &options.tree) {
+        let tree = SphereTree::build_cached(solid, &settings, &options.cache).map_err(|e| e.to_string())?.tree;
+        take(tree.cut(most, options.error * diagonal).iter().map(|&n| (tree.nodes()[n].center, tree.nodes()[n].radius)).collect());
+        if tree.leaves().count() > most {
+            break;
+        }
     }
     best.ok_or_else(|| "no tree was built".into())
+}
+
+/// The trees worth trying for at most so many balls, coarse ones first. Leaves are tighter than the balls around them, so a tree with few more leaves
+/// than are wanted gives the best cut.
+fn trees(most: usize, usual: &TreeSettings) -> Vec<TreeSettings> {
+    if usual.builder != Builder::Octree && most <= MOST_BRANCHES {
+        return vec![TreeSettings { branch: most.max(2) as u32, depth: 1, ..*usual }];
+    }
+    let enough = (1..usual.depth).find(|d| (usual.branch as usize).saturating_pow(*d) >= most).unwrap_or(usual.depth);
+    let first = if usual.builder == Builder::Octree { 1 } else { enough };
+    let last = if usual.builder == Builder::Octree { usual.depth } else { enough };
+    (first..=last).map(|depth| TreeSettings { depth, ..*usual }).collect()
 }
 
 impl Covered {

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::progress::Share;
 use std::path::Path;
 use std::time::Instant;
-use tumble::collide::{MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
+use tumble::collide::{Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
 use tumble::scene::read_triangles;
 
 /// Builds, measures, prints and writes.
@@ -66,7 +66,11 @@ fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
 
 /// The method's usual settings with what the command line says instead.
 fn settings(options: &SphereTreeOptions) -> TreeSettings {
-    let usual = TreeSettings { builder: options.method.unwrap_or_default(), ..TreeSettings::default() };
+    let usual = match options.method {
+        Some(Builder::Octree) => TreeSettings::octree(),
+        Some(builder) => TreeSettings { builder, ..TreeSettings::default() },
+        None => TreeSettings::default(),
+    };
     TreeSettings {
         branch: options.branch.unwrap_or(usual.branch),
         depth: options.depth.unwrap_or(usual.depth),

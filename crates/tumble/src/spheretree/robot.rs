@@ -24,8 +24,7 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
     let how = SphereOptions {
         most: most as usize,
         error,
-        // trees are built as fine as their own settings say, and cut
-        tree: tumble::collide::TreeSettings { error: settings.error.min(error), ..settings },
+        tree: tumble::collide::TreeSettings { error: settings.error.min(error), even: false, ..settings },
         cache: super::cache(options),
         urdf: UrdfOptions::default(),
     };

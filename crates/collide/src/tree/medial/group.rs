@@ -5,12 +5,16 @@
 //! hands one of its balls to a neighbour, and so on, to a group with room; the chain is the one of least cost (Bellman
 //! and Ford). It is done only if the balls around all groups that change reach out no further than a budget.
 
+use super::refit::keep;
 use super::site::Site;
 use crate::MeshDistance;
 use crate::tree::ball::{Ball, deep_around};
 
 /// With more groups than this, balls are exchanged within groups only.
 const MOST_GROUPS: usize = 128;
+/// How far the ball around a group may reach out, as a multiple of what the worst group of its level needs before any
+/// exchange: for the level above the balls, and for those above that.
+const SLACK: [f64; 2] = [1.2, 1.05];
 
 /// The groups of a level.
 #[derive(Clone, Debug)]
@@ -24,6 +28,10 @@ pub(super) struct Groups {
     pub balls: Vec<Ball>,
     /// Centre of the ball around each group.
     sites: Vec<Site>,
+    /// The balls around the groups.
+    around: Vec<Ball>,
+    /// How those are grouped in turn.
+    above: Option<Box<Groups>>,
 }
 
 /// An exchange among balls, as the groups see it.
@@ -37,13 +45,52 @@ pub(super) struct Change {
 }
 
 impl Groups {
-    /// Groups whose budget is `slack` times what the worst of them needs.
-    pub fn new(balls: Vec<Ball>, of: Vec<usize>, room: usize, slack: f64, distance: &MeshDistance) -> Groups {
+    /// Groups of balls, `of` saying which is whose, below those of the level above. Their budget is a little more than
+    /// the worst of them needs.
+    pub fn new(
+        balls: Vec<Ball>,
+        of: Vec<usize>,
+        room: usize,
+        above: Option<Groups>,
+        distance: &MeshDistance,
+    ) -> Groups {
         let count = of.iter().max().map_or(0, |g| g + 1);
         let nowhere = Site { center: crate::Vec3::zeros(), depth: 0.0, fence: None };
-        let mut groups = Groups { room, budget: f64::INFINITY, of, balls, sites: vec![nowhere; count] };
-        groups.budget = slack * groups.worst(distance);
+        let sites = vec![nowhere; count];
+        let around = vec![Ball { center: nowhere.center, radius: 0.0 }; count];
+        let above = above.map(Box::new);
+        let mut groups = Groups { room, budget: f64::INFINITY, of, balls, sites, around, above };
+        groups.refit(distance);
+        groups.set_budget(SLACK[0]);
         groups
+    }
+
+    fn set_budget(&mut self, slack: f64) {
+        self.budget = slack * self.worst();
+        if let Some(above) = &mut self.above {
+            above.set_budget(SLACK[1]);
+        }
+    }
+
+    /// Fits all balls around groups anew, on all levels.
+    pub fn refit(&mut self, distance: &MeshDistance) {
+        (0..self.sites.len()).for_each(|g| self.fit(g, distance));
+        if let Some(above) = &mut self.above {
+            above.balls.clone_from(&self.around);
+            above.refit(distance);
+        }
+    }
+
+    /// How far the balls around the groups reach out at most.
+    fn worst(&self) -> f64 {
+        self.around.iter().zip(&self.sites).map(|(b, s)| b.radius - s.depth).fold(0.0, f64::max)
+    }
+
+    /// Drops the balls that are not marked; the groups of the others.
+    pub fn keep(&mut self, kept: &[bool]) -> Vec<usize> {
+        keep(&mut self.of, kept);
+        keep(&mut self.balls, kept);
+        self.of.clone()
     }
 
     /// Within what a ball has to stay.
@@ -52,20 +99,52 @@ impl Groups {
         Some(Ball { center: site.center, radius: site.depth + self.budget })
     }
 
-    /// How far the balls around the groups reach out at most, fitted anew.
-    pub fn worst(&mut self, distance: &MeshDistance) -> f64 {
-        (0..self.sites.len()).map(|g| self.fit(g, distance)).fold(0.0, f64::max)
+    /// Fits the ball around a group.
+    fn fit(&mut self, g: usize, distance: &MeshDistance) {
+        let own: Vec<Ball> = self.of.iter().zip(&self.balls).filter(|(of, _)| **of == g).map(|(_, b)| *b).collect();
+        if !own.is_empty() {
+            self.around[g] = deep_around(&own, distance);
+            self.sites[g] = Site::at(self.around[g].center, distance);
+        }
     }
 
-    /// Fits the ball around a group; how far it reaches out.
-    fn fit(&mut self, g: usize, distance: &MeshDistance) -> f64 {
-        let own: Vec<Ball> = self.of.iter().zip(&self.balls).filter(|(of, _)| **of == g).map(|(_, b)| *b).collect();
-        if own.is_empty() {
-            return 0.0;
+    /// Makes the groups hold their balls; whether they and all above stay within their budgets. A group is fitted
+    /// anew only where its present centre does not do.
+    fn hold(&mut self, mut stale: Vec<usize>, distance: &MeshDistance) -> bool {
+        stale.sort_unstable();
+        stale.dedup();
+        for &g in &stale {
+            let own = self.of.iter().zip(&self.balls).filter(|(of, _)| **of == g);
+            let reach = own.map(|(_, b)| (b.center - self.sites[g].center).norm() + b.radius).fold(0.0, f64::max);
+            self.around[g] = Ball { center: self.sites[g].center, radius: reach };
+            if reach - self.sites[g].depth > self.budget {
+                self.fit(g, distance);
+            }
+            if self.around[g].radius - self.sites[g].depth > self.budget {
+                return false;
+            }
         }
-        let ball = deep_around(&own, distance);
-        self.sites[g] = Site::at(ball.center, distance);
-        ball.radius - self.sites[g].depth
+        if self.above.is_none() {
+            return true;
+        }
+        stale.retain(|&g| {
+            let above = |groups: &Groups| groups.above.as_ref().is_none_or(|a| a.would_fit(g, &groups.around[g]));
+            if !above(self) {
+                self.fit(g, distance);
+            }
+            let fits = above(self);
+            if let Some(a) = &mut self.above {
+                a.balls[g] = self.around[g];
+            }
+            !fits
+        });
+        let Some(above) = &mut self.above else { return true };
+        above.hold(stale.into_iter().map(|g| above.of[g]).collect(), distance)
+    }
+
+    /// Whether `ball` in the place of ball `k` would lie within what its group may hold about its present centre.
+    fn would_fit(&self, k: usize, ball: &Ball) -> bool {
+        need(&self.sites[self.of[k]], ball) <= self.budget
     }
 
     /// The groups after a change, if it can be had within the budget.
@@ -86,7 +165,7 @@ impl Groups {
         let mut size = vec![0; next.sites.len()];
         next.of.iter().for_each(|&g| size[g] += 1);
         let mut stale: Vec<usize> =
-            change.balls.iter().map(|(k, _)| *k).filter(|&k| !next.fits(k)).map(|k| next.of[k]).collect();
+            change.balls.iter().map(|(k, _)| *k).filter(|&k| !next.would_fit(k, &next.balls[k])).map(|k| next.of[k]).collect();
         stale.push(home);
         if size[home] > next.room {
             for (ball, to) in next.chain(&size, home)? {
@@ -94,14 +173,7 @@ impl Groups {
                 stale.push(to);
             }
         }
-        stale.sort_unstable();
-        stale.dedup();
-        stale.into_iter().all(|g| next.fit(g, distance) <= next.budget).then_some(next)
-    }
-
-    /// Whether a ball lies within what its group may hold about its present centre.
-    fn fits(&self, k: usize) -> bool {
-        need(&self.sites[self.of[k]], &self.balls[k]) <= self.budget
+        next.hold(stale, distance).then_some(next)
     }
 
     /// Hand-overs `(ball, to)` from `full` to a group with room, of least total cost.

@@ -8,6 +8,7 @@
 //! itself and not its samples (`close`), and the inner balls are put around their children.
 
 pub(in crate::tree) mod adaptive;
+mod burst;
 mod candidates;
 mod cover_points;
 pub(in crate::tree) mod delaunay;
@@ -15,7 +16,9 @@ mod expand;
 mod gaps;
 mod group;
 mod levels;
+mod merge;
 mod optimise;
+mod reduce;
 mod refit;
 mod site;
 mod spheres;

@@ -24,26 +24,28 @@ pub(super) struct Exchange<'a> {
     pub distance: &'a MeshDistance,
     /// Greatest number of balls.
     pub most: usize,
+    /// Balls that reach out no further than this are left as they are, metres.
+    pub enough: f64,
     /// Exchanges tried.
     pub tries: usize,
 }
 
 impl Exchange<'_> {
     /// The fit after the exchanges that paid, and their number; `groups`, if there are any, follow.
-    pub fn run(&self, mut fit: Fit, groups: &mut Option<Groups>) -> (Fit, u64) {
+    pub fn run(&self, mut fit: Fit, mut groups: Option<&mut Groups>) -> (Fit, u64) {
         let mut missed: Vec<f64> = (0..fit.sites.len()).map(|k| self.missed(&fit, k).0).collect();
         // balls that were split in vain, until something near them changes
         let mut vain = vec![false; fit.sites.len()];
         let (mut wins, mut failures) = (0, 0);
         for _ in 0..self.tries {
             let worst = (0..fit.sites.len())
-                .filter(|&k| !vain[k])
+                .filter(|&k| !vain[k] && fit.errors[k] > self.enough)
                 .max_by(|&a, &b| fit.errors[a].total_cmp(&fit.errors[b]).then(b.cmp(&a)));
             let Some(worst) = worst.filter(|_| failures < FAILURES) else { break };
             let done = self
-                .bursts(&fit, worst, &missed, groups.as_ref())
+                .bursts(&fit, worst, &missed, groups.as_deref())
                 .into_iter()
-                .find_map(|burst| self.exchanged(&fit, worst, burst, groups));
+                .find_map(|burst| self.exchanged(&fit, worst, burst, groups.as_deref_mut()));
             let Some((places, after)) = done else {
                 vain[worst] = true;
                 failures += 1;
@@ -56,7 +58,7 @@ impl Exchange<'_> {
                 missed[k] = self.missed(&fit, k).0;
                 vain[k] = false;
             }
-            if let Some(groups) = groups {
+            if let Some(groups) = groups.as_deref() {
                 (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
             }
             (wins, failures) = (wins + 1, 0);
@@ -65,18 +67,16 @@ impl Exchange<'_> {
     }
 
     /// Which balls to burst for a half of `worst`, in the order in which they are tried: those that are missed less
-    /// than `worst` errs, and one of the same group. None need be while there is room.
+    /// than `worst` errs, and one of the same group. None need be while there is room; that is tried first.
     fn bursts(&self, fit: &Fit, worst: usize, missed: &[f64], groups: Option<&Groups>) -> Vec<Option<usize>> {
-        if fit.sites.len() < self.most {
-            return vec![None];
-        }
-        let mut order: Vec<usize> =
+                let mut order: Vec<usize> =
             (0..missed.len()).filter(|&k| k != worst && missed[k] < fit.errors[worst]).collect();
         order.sort_by(|&a, &b| missed[a].total_cmp(&missed[b]).then(a.cmp(&b)));
         let same = groups.and_then(|g| order.iter().copied().find(|&k| g.of[k] == g.of[worst]));
         order.truncate(if groups.is_some() { BURSTS } else { 1 });
         order.extend(same.filter(|k| !order.contains(k)));
-        order.into_iter().map(Some).collect()
+        let room = fit.sites.len() < self.most;
+        room.then_some(None).into_iter().chain(order.into_iter().map(Some)).collect()
     }
 
     /// The touched balls after an exchange, with their places in `fit` (those of the halves last), if they cost less
@@ -86,7 +86,7 @@ impl Exchange<'_> {
         fit: &Fit,
         worst: usize,
         burst: Option<usize>,
-        groups: &mut Option<Groups>,
+        groups: Option<&mut Groups>,
     ) -> Option<(Vec<usize>, Fit)> {
         let halves = self.halves(fit, worst)?;
         let mut touched: Vec<usize> = burst.map(|b| self.missed(fit, b).1).unwrap_or_default();
@@ -155,8 +155,7 @@ impl Exchange<'_> {
             let p = &self.points[i as usize];
             let mut best = (f64::INFINITY, k);
             for (n, site) in fit.sites.iter().enumerate() {
-                let need = site.need(p);
-                if need < best.0 && n != k {
+                if let Some(need) = site.need_below(p, best.0).filter(|_| n != k) {
                     best = (need, n);
                 }
             }

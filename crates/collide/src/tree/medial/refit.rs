@@ -35,6 +35,11 @@ impl Fit {
         self.parts.resize(self.sites.len(), Vec::new());
         self.parts.iter_mut().for_each(Vec::clear);
         self.errors = vec![0.0; self.sites.len()];
+        self.take(points, region);
+    }
+
+    /// Gives further points to the sites.
+    pub fn take(&mut self, points: &[Vec3], region: &[u32]) {
         for &i in region {
             let (need, k) = least(&self.sites, &points[i as usize]);
             self.parts[k].push(i);
@@ -113,14 +118,7 @@ pub(super) fn own(points: &[Vec3], part: &[u32]) -> Vec<Vec3> {
 
 /// The least need of the sites and which has it, the first of equals.
 fn least(sites: &[Site], p: &Vec3) -> (f64, usize) {
-    let mut best = (f64::INFINITY, 0);
-    for (k, site) in sites.iter().enumerate() {
-        let need = site.need(p);
-        if need < best.0 {
-            best = (need, k);
-        }
-    }
-    best
+    sites.iter().enumerate().fold((f64::INFINITY, 0), |best, (k, site)| site.need_below(p, best.0).map_or(best, |n| (n, k)))
 }
 
 /// The site moved to where its points need less.

@@ -44,6 +44,16 @@ impl Site {
         (p - self.center).norm() - self.depth + self.beyond(p, 0.0)
     }
 
+    /// The need of `p` if it is below `bar`; most are refused without a root.
+    #[inline]
+    pub fn need_below(&self, p: &Vec3, bar: f64) -> Option<f64> {
+        let radius = bar + self.depth;
+        if radius <= 0.0 || (p - self.center).norm_squared() >= radius * radius {
+            return None;
+        }
+        Some(self.need(p)).filter(|need| *need < bar)
+    }
+
     /// The greatest need of the points; `-∞` for none.
     pub fn worst(&self, points: &[Vec3]) -> f64 {
         let square = points.iter().map(|p| (p - self.center).norm_squared()).fold(f64::NEG_INFINITY, f64::max);
