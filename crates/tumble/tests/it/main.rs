@@ -8,3 +8,4 @@ mod machines;
 mod outputs;
 mod picture;
 mod scenes;
+mod spheretree;
