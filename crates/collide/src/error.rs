@@ -179,3 +179,27 @@ pub enum MeshError {
         what: String,
     },
 }
+
+impl MeshError {
+    /// The triangle that the error names, from 1 in the order of the mesh as it was given.
+    pub fn face(&self) -> Option<usize> {
+        match self {
+            MeshError::At { error, .. } | MeshError::BeyondRepair { error, .. } => error.face(),
+            MeshError::NotFiniteInFace { face, .. }
+            | MeshError::IndexOutOfRange { face, .. }
+            | MeshError::Open { face, .. }
+            | MeshError::NonManifold { face, .. } => Some(*face),
+            _ => None,
+        }
+    }
+
+    /// With the line of the triangle that it names, where `lines` (from [`TriMesh::from_obj_with_lines`]) tells.
+    ///
+    /// [`TriMesh::from_obj_with_lines`]: crate::TriMesh::from_obj_with_lines
+    pub fn at_line(self, lines: &[usize]) -> MeshError {
+        match self.face().and_then(|face| lines.get(face.checked_sub(1)?)) {
+            Some(&line) if !matches!(self, MeshError::At { .. }) => MeshError::At { line, error: Box::new(self) },
+            _ => self,
+        }
+    }
+}

@@ -277,7 +277,9 @@ pub(super) fn unbalanced(groups: &[Vec<EdgeUse>]) -> impl Iterator<Item = &Vec<E
 /// `face_of` gives the numbers that faces have for the user.
 fn refuse_unbalanced(groups: &[Vec<EdgeUse>], face_of: &[usize]) -> Result<(), MeshError> {
     let bad: Vec<&Vec<EdgeUse>> = unbalanced(groups).collect();
-    let Some(first) = bad.first() else { return Ok(()) };
+    if bad.is_empty() {
+        return Ok(());
+    }
     let open: Vec<EdgeUse> = bad.iter().filter(|g| g.len() == 1).map(|g| g[0]).collect();
     if let Some(shared) = bad.iter().find(|g| g.len() > 1) {
         // the dangling face is the one at this edge that also has an open edge
@@ -292,13 +294,14 @@ fn refuse_unbalanced(groups: &[Vec<EdgeUse>], face_of: &[usize]) -> Result<(), M
         });
     }
     let loops = joined(open.len(), |a, b| touches(&open[a], &open[b]));
+    let first = (0..open.len()).min_by_key(|&n| face_of[open[n].face]).unwrap_or(0);
     Err(MeshError::Open {
         edges: open.len(),
         holes: loops.iter().enumerate().filter(|(n, l)| n == *l).count(),
-        first_hole: loops.iter().filter(|l| **l == loops[0]).count(),
-        from: first[0].low + 1,
-        to: first[0].high + 1,
-        face: face_of[first[0].face] + 1,
+        first_hole: loops.iter().filter(|l| **l == loops[first]).count(),
+        from: open[first].low + 1,
+        to: open[first].high + 1,
+        face: face_of[open[first].face] + 1,
     })
 }
 

@@ -117,6 +117,8 @@ impl TriMesh {
                 *self = mesh;
                 return Ok(RepairReport { closed, ..report });
             }
+            // nothing is missing there that could be added
+            Err(refused @ (MeshError::Empty | MeshError::NoVolume { .. })) => return Err(refused),
             Err(refused) => refused,
         };
         match mesh.closed_up(settings, &mut report) {

@@ -8,7 +8,7 @@ use std::f32::consts::FRAC_PI_2;
 use tumble_collide::{SphereTree, TriMesh, Vec3};
 
 /// Of the camera: narrower than what frames the ball around the mesh's box, which most meshes leave half empty.
-const LENS_RAD: f32 = 0.52;
+const LENS_RAD: f32 = 0.58;
 
 /// The axis of a mesh that is up in its picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use crate::progress::Share;
 use std::path::Path;
 use std::time::Instant;
 use tumble::collide::{Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
-use tumble::scene::read_triangles;
+use tumble::scene::read_solid;
 
 /// Builds, measures, prints and writes.
 pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
@@ -53,13 +53,7 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
 fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
-    let mut mesh = read_triangles(path, &bytes).map_err(wrong)?;
-    let notes = if options.repair {
-        mesh.repair(&RepairSettings::default()).map(|report| report.notes())
-    } else {
-        mesh.check_closed().map(|report| report.notes())
-    };
-    let notes = notes.map_err(|e| wrong(e.to_string()))?;
+    let (mesh, notes) = read_solid(path, &bytes, options.repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
     notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{}: {note}", path.display()));
     Ok(mesh)
 }

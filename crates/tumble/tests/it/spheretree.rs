@@ -119,8 +119,8 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
 }
 
 const ROBOT: &str = r#"<robot name="two 1"><link name="a"><collision><origin xyz="0 0 0.5"/><geometry><box size="0.2 0.2 1"/></geometry></collision></link>
-<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
-<link name="b"><collision name="ball"><geometry><sphere radius="0.25"/></geometry></collision></link></robot>"#;
+<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>
+<link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial><collision name="ball"><geometry><sphere radius="0.25"/></geometry></collision></link></robot>"#;
 
 #[test]
 fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
