@@ -3,11 +3,14 @@
 //! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
 
 mod args;
+mod caves;
 mod check;
 mod failure;
 mod progress;
 mod run;
+mod shots;
 mod summary;
+mod video;
 
 use args::{Command, Tumble};
 use clap::Parser;
@@ -20,6 +23,7 @@ fn main() -> ExitCode {
         Command::Run(options) => run::run(&options),
         Command::Check(options) => check::check(&options),
         Command::Scenes => scenes(),
+        Command::Caves(options) => caves::caves(&options),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
