@@ -105,9 +105,8 @@ fn grid(image: &mut Image, screen: &Screen) {
 /// A frame at the rim, and in each corner a mark and its place in the cave.
 fn corners(image: &mut Image, screen: &Screen) {
     let (w, h) = (i64::from(image.width), i64::from(image.height));
-    rect(image, 0, 0, w, h, DARK);
-    rect(image, 1, 1, w - 2, h - 2, WHITE);
-    rect(image, 2, 2, w - 4, h - 4, DARK);
+    rect(image, 0, 0, w, h, WHITE);
+    rect(image, 1, 1, w - 2, h - 2, DARK);
     let arm = w.min(h) / 6;
     let thick = (w.min(h) / 160).max(1);
     let scale = (w / 420).max(1);
@@ -167,11 +166,13 @@ fn caption(image: &mut Image, cave: &Cave, facet: &Facet, screen: &Screen, patte
         _ => "BOTH EYES",
     };
     let node = facet.node.map_or("THIS MACHINE".to_owned(), |n| format!("NODE {}", cave.nodes[n].name.to_uppercase()));
-    let lines = [
+    let mut lines = vec![
         format!("{eye}  {node}"),
         format!("{} X {} PX  {wide:.3} X {high:.3} M", facet.size_px[0], facet.size_px[1]),
         format!("USER {}", cave.users[facet.user].name.to_uppercase()),
     ];
+    // a picture too small for them goes without
+    lines.retain(|line| text_width(line, small) < w * 9 / 10);
     let block = text_width(&name, scale).max(lines.iter().map(|l| text_width(l, small)).max().unwrap_or(0));
     let height = 9 * scale + 10 * small * lines.len() as i64;
     let top = (h - height) / 2;

@@ -220,7 +220,11 @@ fn differing(a: &Image, b: &Image) -> (usize, usize) {
             if far_apart(level(x, y), b.pixel(x, y).unwrap(), 1) {
                 count += 1;
                 let around = (y.saturating_sub(2)..=(y + 2).min(a.height - 1)).flat_map(|j| (x.saturating_sub(2)..=(x + 2).min(a.width - 1)).map(move |i| (i, j)));
-                inside += usize::from(!around.into_iter().any(|(i, j)| far_apart(level(i, j), level(x, y), 12)));
+                let alone = !around.into_iter().any(|(i, j)| far_apart(level(i, j), level(x, y), 12));
+                inside += usize::from(alone);
+                if alone {
+                    println!("  {x}, {y}: {:?} and {:?}", level(x, y), b.pixel(x, y).unwrap());
+                }
             }
         }
     }

@@ -2,6 +2,7 @@
 
 mod cameras;
 mod facets;
+mod goldens;
 mod lists;
 mod meshes;
 mod pictures;

@@ -165,13 +165,14 @@ fn a_scene_puts_its_cave_and_scales_it() {
 
 #[test]
 fn calibration_pictures_have_their_lines_where_a_tape_measures_them() {
-    // 2 m on 100 pixels: half metres are 25 pixels apart, and the middle cross at 50
-    let cave = cave("");
+    // 2 m on 400 pixels: half metres are 100 pixels apart, and the middle cross at 200
+    let mut cave = cave("");
+    cave.facets[0].size_px = [400, 400];
     let grid = calibration_picture(&cave, &cave.facets[0], CalibrationPattern::Grid);
-    assert_eq!((grid.width, grid.height), (100, 100));
+    assert_eq!((grid.width, grid.height), (400, 400));
     let white = |x: u32, y: u32| grid.pixel(x, y) == Some([255, 255, 255, 255]);
-    assert!((0..100).all(|i| white(i, 0) && white(i, 99) && white(0, i) && white(99, i)), "the rim");
-    assert!(white(24, 8) && white(75, 8) && !white(28, 8), "lines of half a metre");
+    assert!((0..400).all(|i| white(i, 0) && white(i, 399) && white(0, i) && white(399, i)), "the rim");
+    assert!(white(99, 30) && white(100, 30) && white(300, 30) && !white(103, 30) && !white(200, 30), "lines of half a metre");
     for shipped in shipped_caves() {
         let cave = shipped.read().unwrap();
         let facet = &cave.facets[0];
