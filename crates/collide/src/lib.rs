@@ -34,9 +34,12 @@ pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
 pub use contact::{Contact, NormalFrom};
 pub use error::{MeshError, ShapeError};
 pub use mass::MassProperties;
-pub use mesh::{ClosedReport, ClosestPoint, MeshDistance, TriMesh};
+pub use mesh::{ClosedReport, ClosestPoint, MeshDistance, RepairReport, RepairSettings, TriMesh, WindingNumber};
 pub use narrow::contacts;
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
-pub use tree::{Builder, Progress, SphereNode, SphereTree, StageCount, TreeSettings};
+pub use tree::{
+    Builder, CachedTree, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree, StageCount, TreeCache, TreeFile, TreeFileError,
+    TreeSettings,
+};

@@ -90,6 +90,9 @@ pub struct CheckOptions {
     /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf robots; .obj and .stl meshes.
     #[arg(required = true)]
     pub files: Vec<String>,
+    /// Repair meshes that are no solids: holes, fins, inner walls, debris. What was done is told; the file stays as it is.
+    #[arg(long)]
+    pub repair: bool,
 }
 
 #[derive(Args)]

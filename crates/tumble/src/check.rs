@@ -3,15 +3,15 @@
 use crate::args::CheckOptions;
 use crate::failure::Failure;
 use std::path::Path;
-use tumble::collide::{Shape, TreeSettings};
+use tumble::collide::{RepairSettings, Shape, TreeSettings};
 use tumble::scene::cave::{MOST_BYTES, is_cave, resolve_cave, shipped_caves};
-use tumble::scene::{read_triangles, resolve_scene, shipped, urdf};
+use tumble::scene::{read_solid, resolve_scene, shipped, urdf};
 
 /// Checks every file; all are looked at, and the first failure's code is kept.
 pub fn check(options: &CheckOptions) -> Result<(), Failure> {
     let mut outcome = Ok(());
     for file in &options.files {
-        match one(file) {
+        match one(file, options.repair) {
             Ok(said) => println!("{file}: {said}"),
             Err(failure) => {
                 if let Err(earlier) = std::mem::replace(&mut outcome, Err(failure)) {
@@ -23,10 +23,10 @@ pub fn check(options: &CheckOptions) -> Result<(), Failure> {
     outcome
 }
 
-fn one(file: &str) -> Result<String, Failure> {
+fn one(file: &str, repair: bool) -> Result<String, Failure> {
     let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     match extension.as_str() {
-        "obj" | "stl" => mesh(Path::new(file)),
+        "obj" | "stl" => mesh(Path::new(file), repair),
         "urdf" => robot(Path::new(file)),
         _ if looks_like_cave(file) => cave(file),
         _ => scene(file),
@@ -70,12 +70,11 @@ fn degrees(world: &tumble::core::World) -> usize {
     moving.filter_map(|id| view.span(*id)).map(|span| span.v.len()).sum()
 }
 
-fn mesh(path: &Path) -> Result<String, Failure> {
+fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
-    let mut mesh = read_triangles(path, &bytes).map_err(wrong)?;
-    let report = mesh.check_closed().map_err(|e| wrong(e.to_string()))?;
-    report.notes().iter().for_each(|note| println!("{}: {note}", path.display()));
+    let (mesh, notes) = read_solid(path, &bytes, repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
+    notes.iter().for_each(|note| println!("{}: {note}", path.display()));
     let (triangles, diagonal) = (mesh.triangles.len(), mesh.diagonal());
     let (shape, center) = Shape::mesh(mesh, &TreeSettings::default()).map_err(|e| wrong(e.to_string()))?;
     let error = shape.tree().map_or(0.0, |tree| tree.outward_error());

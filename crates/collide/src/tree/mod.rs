@@ -12,11 +12,19 @@
 
 mod ball;
 mod builder;
+mod cache;
+mod file;
+mod levels;
 mod octree;
+mod quality;
 mod settings;
 mod verify;
 
 pub use builder::{Progress, StageCount};
+pub use cache::{CachedTree, TreeCache};
+pub use file::{MeshId, TreeFile, TreeFileError};
+pub use levels::LevelBall;
+pub use quality::{LevelQuality, QualitySettings};
 pub use settings::{Builder, TreeSettings};
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
@@ -150,6 +158,11 @@ impl SphereTree {
             nodes[n].radius = ball.radius;
             nodes[n].outward = ball.outward(distance);
         }
+        SphereTree::of_nodes(nodes)
+    }
+
+    /// Of nodes that are already a tree: breadth first, children neighbours.
+    fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()
             .filter(|n| n.is_leaf())

@@ -1,9 +1,11 @@
 //! How a sphere tree is to be built.
 
 use crate::MeshError;
+use serde::{Deserialize, Serialize};
 
 /// How a tree is built.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct TreeSettings {
     /// Which method.
     pub builder: Builder,
@@ -20,7 +22,8 @@ pub struct TreeSettings {
 }
 
 /// The methods there are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Builder {
     /// Cells of an octree that the surface passes through.
     #[default]

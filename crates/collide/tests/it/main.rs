@@ -1,11 +1,16 @@
 //! One binary for all integration tests of the crate.
 
 mod against_parry;
+mod bad_meshes;
 mod broad;
 mod hull;
 mod mesh_contacts;
 mod meshes;
 mod primitives;
+mod quality;
 mod rng;
 mod shared_meshes;
+mod tree_cache;
+mod tree_file;
 mod trees;
+mod winding;

@@ -8,6 +8,7 @@ mod expansion;
 mod finding;
 mod pinocchio;
 mod robots;
+mod repair;
 mod robust;
 mod shipped;
 mod urdf;

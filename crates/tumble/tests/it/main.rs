@@ -8,4 +8,5 @@ mod determinism;
 mod machines;
 mod outputs;
 mod picture;
+mod repair;
 mod scenes;
