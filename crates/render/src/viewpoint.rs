@@ -29,7 +29,7 @@ pub struct Lens {
 pub struct Part {
     /// The number of the first pixel, to the right and down, in the plane that the picture shares with others.
     pub first_pixel: [i32; 2],
-    /// Pixels drawn beyond each edge and cut off again, so that occlusion sees past the edge.
+    /// Pixels drawn beyond each edge and cut off again, so that occlusion sees past the edge. It reaches no farther than this: 0 turns it off.
     pub rim_px: u32,
 }
 
