@@ -12,7 +12,7 @@ use tumble_peers::scene::RADIUS;
 /// Share of a box's smallest extent by which both make boxes fat.
 const ROOM: f64 = 0.1;
 /// Rounds of which the median counts; the two take turns.
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 3;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
@@ -71,5 +71,5 @@ fn both(kind: Kind, n: usize) -> [Cost; 2] {
 
 /// So many that the clock's ticks do not show.
 fn steps(n: usize) -> usize {
-    (2_000_000 / n).clamp(40, 1000)
+    (1_000_000 / n).clamp(60, 500)
 }

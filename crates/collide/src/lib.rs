@@ -41,5 +41,5 @@ pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
 pub use tree::{
     Builder, CachedTree, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree, StageCount, TreeCache, TreeFile, TreeFileError,
-    TreeSettings,
+    TreeSettings, grow_to_cover,
 };

@@ -136,7 +136,7 @@ impl<'m> ShapeMaker<'m> {
     }
 }
 
-fn read_file(path: &Path) -> Result<TriMesh, String> {
+pub(crate) fn read_file(path: &Path) -> Result<TriMesh, String> {
     let unread = |error: std::io::Error| format!("cannot be read: {error}");
     let size = std::fs::metadata(path).map_err(unread)?.len();
     if size > MOST_MESH_BYTES {
@@ -146,7 +146,7 @@ fn read_file(path: &Path) -> Result<TriMesh, String> {
 }
 
 /// Scaled along each axis; a mirrored mesh is turned outside out again.
-fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
+pub(crate) fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
     let scale = Vec3::from(scale);
     mesh.vertices.iter_mut().for_each(|v| v.component_mul_assign(&scale));
     if scale.product() < 0.0 {

@@ -14,6 +14,7 @@ mod ball;
 mod builder;
 mod cache;
 mod close;
+mod cut;
 mod enclose;
 mod file;
 mod grid;
@@ -29,6 +30,7 @@ mod verify;
 
 pub use builder::{Progress, StageCount};
 pub use cache::{CachedTree, TreeCache};
+pub use cut::grow_to_cover;
 pub use file::{MeshId, TreeFile, TreeFileError};
 pub use levels::LevelBall;
 pub use quality::{LevelQuality, QualitySettings};

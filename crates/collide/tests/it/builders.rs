@@ -35,8 +35,22 @@ fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings)
 #[test]
 fn public_meshes_are_covered_and_nested() {
     let names = [
-        "spot", "panda_link5", "torus", "wingnut", "fetch_gripper", "cow", "bunny", "fandisk", "fertility", "hand",
-        "low/bunny1500", "low/cow1500", "low/fandisk1500", "low/fertility1500", "low/hand1500", "armadillo",
+        "spot",
+        "panda_link5",
+        "torus",
+        "wingnut",
+        "fetch_gripper",
+        "cow",
+        "bunny",
+        "fandisk",
+        "fertility",
+        "hand",
+        "low/bunny1500",
+        "low/cow1500",
+        "low/fandisk1500",
+        "low/fertility1500",
+        "low/hand1500",
+        "armadillo",
     ];
     for name in names {
         let Some(text) = text(&format!("{name}.obj")) else { return };

@@ -10,4 +10,5 @@ mod robots;
 mod repair;
 mod robust;
 mod shipped;
+mod spheres;
 mod urdf;

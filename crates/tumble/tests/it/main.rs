@@ -9,3 +9,4 @@ mod outputs;
 mod picture;
 mod repair;
 mod scenes;
+mod spheretree;

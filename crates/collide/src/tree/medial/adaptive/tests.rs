@@ -29,8 +29,7 @@ fn check(mesh: &TriMesh, want: &Want) -> (Vec<MedialBall>, Counts) {
     axis.refine(want);
     assert_eq!(axis.balls(), balls);
     for (p, holders) in cover.points.iter().zip(axis.holders()) {
-        let strictly: Vec<u32> =
-            (0..balls.len() as u32).filter(|&k| far(&balls[k as usize], p) < -slack).collect();
+        let strictly: Vec<u32> = (0..balls.len() as u32).filter(|&k| far(&balls[k as usize], p) < -slack).collect();
         assert!(strictly.iter().all(|k| holders.contains(k)), "{p}");
         assert!(!holders.is_empty() && holders.iter().all(|&k| far(&balls[k as usize], p) <= 0.0));
     }
