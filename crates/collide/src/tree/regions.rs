@@ -88,8 +88,8 @@ pub(super) fn cover_of(job: &Job) -> CoverPoints {
     CoverPoints::on(job.mesh, (balls * POINTS_EACH).clamp(POINTS.0, POINTS.1) as usize)
 }
 
-/// Builds down to the settings' depth. `divide` parts a region (places in the cover, at least [`FEWEST`]) into at most `branch` parts; a region that it
-/// cannot part stays a leaf.
+/// Builds down to the settings' depth. `divide` parts a region (places in the cover, at least [`FEWEST`]) into at most
+/// `branch` parts; a region that it cannot part stays a leaf.
 pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> Vec<Part> + Sync)) -> Built {
     let enough = job.settings.error * job.mesh.diagonal();
     let all: Vec<u32> = (0..cover.points.len() as u32).collect();
