@@ -58,8 +58,15 @@ impl MeshDistance {
 
     /// The closest point of the solid's boundary and the signed distance.
     pub fn closest(&self, p: &Vec3) -> ClosestPoint {
+        self.closest_of(p, usize::MAX)
+    }
+
+    /// The closest point found when at most about `most` triangles are looked at, near ones first. That is all but always the
+    /// closest there is; from the middle of a ball, all triangles are about as far, and what is found is about that.
+    pub(crate) fn closest_of(&self, p: &Vec3, most: usize) -> ClosestPoint {
         let mut best = (f64::INFINITY, Vec3::zeros(), 0, 0);
-        self.search(0, p, &mut best);
+        let mut left = most;
+        self.search(0, p, &mut best, &mut left);
         let (square, point, n, feature) = best;
         let sign = if self.inside(p, &point, &self.normals[n][feature]) { -1.0 } else { 1.0 };
         ClosestPoint { point, signed_distance: sign * square.sqrt(), triangle: self.ids[n] as usize }
@@ -72,7 +79,7 @@ impl MeshDistance {
         }
     }
 
-    fn search(&self, node: usize, p: &Vec3, best: &mut (f64, Vec3, usize, usize)) {
+    fn search(&self, node: usize, p: &Vec3, best: &mut (f64, Vec3, usize, usize), left: &mut usize) {
         let here = &self.tree.nodes[node];
         if here.count > 0 {
             for n in here.range() {
@@ -82,6 +89,7 @@ impl MeshDistance {
                     *best = (square, q, n, feature);
                 }
             }
+            *left = left.saturating_sub(here.count as usize);
             return;
         }
         let mut children = [node + 1, here.second as usize].map(|c| (box_distance_squared(&self.tree.nodes[c].bounds, p), c));
@@ -89,8 +97,8 @@ impl MeshDistance {
             children.swap(0, 1);
         }
         for (square, child) in children {
-            if square < best.0 {
-                self.search(child, p, best);
+            if square < best.0 && *left > 0 {
+                self.search(child, p, best, left);
             }
         }
     }

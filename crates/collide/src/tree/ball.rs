@@ -5,6 +5,7 @@
 //! encloses exactly.
 
 use super::enclose::smallest_around;
+use super::medial::LOOKED_AT;
 use super::simplex::simplex;
 use crate::{MeshDistance, Vec3};
 
@@ -61,7 +62,7 @@ pub(super) fn deep_around(balls: &[Ball], distance: &MeshDistance) -> Ball {
         let start = best.1.center;
         simplex(start, step * smallest.radius, EVALUATIONS, |c| {
             let radius = balls.iter().map(|b| (b.center - c).norm() + b.radius).fold(0.0, f64::max);
-            let outward = radius + distance.closest(c).signed_distance;
+            let outward = radius + distance.closest_of(c, LOOKED_AT).signed_distance;
             if outward < best.0 {
                 best = (outward, Ball { center: *c, radius: radius * (1.0 + 1e-12) });
             }

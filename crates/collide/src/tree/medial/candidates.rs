@@ -6,7 +6,7 @@
 //! smaller one through `p` and `q`: `r ← |p − q|² / 2 n·(p − q)`. The centres lie on the medial axis, next to the
 //! Voronoi centres that sampling gives, and none is missed for want of samples.
 
-use super::site::Site;
+use super::site::{LOOKED_AT, Site};
 use super::spheres::CoverPoints;
 use crate::{MeshDistance, Vec3};
 
@@ -20,7 +20,7 @@ pub(super) fn touching(cover: &CoverPoints, i: u32, distance: &MeshDistance, lar
     let mut site = Site { center: p, depth: 0.0, fence: None };
     for _ in 0..STEPS {
         let center: Vec3 = p - n * radius;
-        let closest = distance.closest(&center);
+        let closest = distance.closest_of(&center, LOOKED_AT);
         site = Site { center, depth: -closest.signed_distance, fence: None };
         let reach = p - closest.point;
         let along = 2.0 * n.dot(&reach);

@@ -157,7 +157,7 @@ impl<'a> Levels<'a> {
         let target = 0.5 * fit.errors.iter().sum::<f64>() / parts;
         axis.refine(&Want { target, least, most: least / 2 });
         let balls = axis.balls();
-        self.medial = balls.iter().map(|b| Site::at(b.ball.center, self.job.distance)).collect();
+        self.medial = balls.iter().map(|b| Site::about(b.ball.center, self.job.distance)).collect();
         self.holders = axis.holders();
         self.stages.extend(axis.counts().stages(level));
     }

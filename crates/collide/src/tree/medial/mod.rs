@@ -53,6 +53,7 @@ mod spheres;
 mod tests;
 pub(in crate::tree) mod voronoi;
 
+pub(super) use site::LOOKED_AT;
 pub(super) use spheres::{CoverPoints, MedialBall, Want};
 
 use super::builder::{Built, Job, TreeBuilder};

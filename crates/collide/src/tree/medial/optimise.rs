@@ -144,7 +144,7 @@ impl Exchange<'_> {
             let need = c.worst(&own);
             if need < best.0 { (need, c) } else { best }
         });
-        moved(best.1, &own, self.distance)
+        moved(best.1.exact(self.distance), &own, self.distance)
     }
 
     /// The greatest need of the points of a part of all other sites, and which those are.

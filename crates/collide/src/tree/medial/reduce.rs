@@ -32,6 +32,7 @@ pub(super) fn reduce(
         burst(points, start, most),
     ];
     let fits = ways.map(|sites| {
+        let sites = sites.into_iter().map(|s| s.exact(distance)).collect();
         let mut fit = Fit::of(sites, points, region);
         fit.refit(PASSES, points, region, distance);
         fit

@@ -4,7 +4,7 @@
 //! each site by Nelder and Mead's simplex (*A simplex method for function minimization*, 1965) to lower
 //! `max |p − c| + s(c)` over its own points. Neither half can raise the worst need.
 
-use super::site::Site;
+use super::site::{LOOKED_AT, Site};
 use crate::tree::simplex::simplex;
 use crate::{MeshDistance, Vec3};
 use rayon::prelude::*;
@@ -133,7 +133,8 @@ pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
     }
     let step = (start * 2.0).min(0.3 * radius).max(1e-3 * radius);
     let mut depth = site.depth;
-    let mut best = (site.center, start + site.beyond(&site.center, radius));
+    let before = start + site.beyond(&site.center, radius);
+    let mut best = (site.center, before);
     simplex(site.center, step, EVALUATIONS, |c| {
         let reach = own.iter().map(|p| (p - c).norm_squared()).fold(0.0, f64::max).sqrt();
         // depths differ by no more than the centres do
@@ -141,7 +142,7 @@ pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
         if bound >= 2.0 * start {
             return bound;
         }
-        let here = -distance.closest(c).signed_distance;
+        let here = -distance.closest_of(c, LOOKED_AT).signed_distance;
         let cost = reach - here + site.beyond(c, reach);
         if cost < best.1 {
             best = (*c, cost);
@@ -149,5 +150,7 @@ pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
         }
         cost
     });
-    Site { center: best.0, depth, ..site }
+    // measured exactly, where the search may have looked at too little
+    let exact = if best.0 == site.center { site.depth } else { -distance.closest(&best.0).signed_distance };
+    if best.1 + depth - exact < before { Site { center: best.0, depth: exact, ..site } } else { site }
 }
