@@ -1,45 +1,34 @@
 //! Builds a tree and writes its levels as JSON: `tree_figures MESH DEPTH OUT [BUILDER]`.
-use std::io::Write;
+
+use std::error::Error;
 use tumble_collide::{Builder, SphereTree, TreeSettings, TriMesh};
 
-fn main() {
+fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().collect();
-    let text = std::fs::read_to_string(&args[1]).expect("mesh");
-    let mesh = TriMesh::from_obj(&text).expect("obj");
-    let builder = match args.get(4).map_or("medial", String::as_str) {
-        "grid" => Builder::Grid,
-        "hubbard" => Builder::Hubbard,
-        "octree" => Builder::Octree,
+    let [_, mesh, depth, out, rest @ ..] = &args[..] else { return Err("tree_figures MESH DEPTH OUT [BUILDER]".into()) };
+    let builder = match rest.first().map(String::as_str) {
+        Some("grid") => Builder::Grid,
+        Some("hubbard") => Builder::Hubbard,
+        Some("octree") => Builder::Octree,
         _ => Builder::Medial,
     };
-    let settings = TreeSettings { builder, branch: 8, depth: args[2].parse().expect("depth"), error: 1e-4, even: false };
-    let start = std::time::Instant::now();
-    let (tree, stages) = SphereTree::build_watched(&mesh, &settings, &()).expect("tree");
-    eprintln!("{:?} wall", start.elapsed());
+    let mesh = TriMesh::from_obj(&std::fs::read_to_string(mesh)?)?;
+    let settings = TreeSettings { builder, depth: depth.parse()?, ..TreeSettings::default() };
+    let (tree, stages) = SphereTree::build_watched(&mesh, &settings, &())?;
     for s in stages {
-        eprintln!("{s:?}");
+        println!("level {} {}: {}", s.level, s.stage, s.count);
     }
-    let mut out = std::fs::File::create(&args[3]).expect("out");
-    let nodes = tree.nodes();
-    let mut parent = vec![0_usize; nodes.len()];
-    for (n, node) in nodes.iter().enumerate() {
-        node.child_range().for_each(|c| parent[c] = n);
-    }
-    let mut levels = Vec::new();
-    let mut place = vec![usize::MAX; nodes.len()];
-    for level in 0..tree.levels() {
-        let mut rows = Vec::new();
-        let mut next = place.clone();
-        for (n, node) in nodes.iter().enumerate() {
-            if node.level == level || (node.level < level && node.is_leaf()) {
-                let up = if level == 0 { -1 } else if node.level == level { place[parent[n]] as i64 } else { place[n] as i64 };
-                next[n] = rows.len();
-                let c = node.center;
-                rows.push(format!(r#"{{"c":[{},{},{}],"r":{},"parent":{up}}}"#, c.x, c.y, c.z, node.radius));
-            }
-        }
-        place = next;
-        levels.push(format!("[{}]", rows.join(",")));
-    }
-    writeln!(out, r#"{{"levels":[{}]}}"#, levels.join(",")).expect("write");
+    let levels: Vec<_> = tree
+        .level_lists()
+        .iter()
+        .map(|level| {
+            let ball = |b: &tumble_collide::LevelBall| {
+                let parent = b.parent.map_or(-1, |p| p as i64);
+                serde_json::json!({ "c": [b.center.x, b.center.y, b.center.z], "r": b.radius, "parent": parent })
+            };
+            level.iter().map(ball).collect::<Vec<_>>()
+        })
+        .collect();
+    std::fs::write(out, serde_json::json!({ "levels": levels }).to_string())?;
+    Ok(())
 }

@@ -8,7 +8,7 @@
 
 use super::builder::{Built, Job, TreeBuilder};
 use super::regions::{Part, build, cover_of, refitted, worst};
-use crate::{MeshDistance, MeshError, Mat3, Vec3};
+use crate::{Mat3, MeshDistance, MeshError, Vec3};
 use nalgebra::{Rotation3, SymmetricEigen, Unit};
 
 /// Points of a region that grids are ranked by.
@@ -76,8 +76,7 @@ impl Cubes {
 fn divided(region: &[u32], points: &[Vec3], most: usize, distance: &MeshDistance) -> Vec<Part> {
     let looked_at: Vec<u32> = region.iter().copied().step_by(region.len().div_ceil(LOOKED_AT)).collect();
     let some: Vec<Vec3> = looked_at.iter().map(|&i| points[i as usize]).collect();
-    let mut ranked: Vec<(f64, Cubes)> =
-        grids(&some).into_iter().filter_map(|cubes| Some((cubes.rank(&some, most)?, cubes))).collect();
+    let mut ranked: Vec<(f64, Cubes)> = grids(&some).into_iter().filter_map(|cubes| Some((cubes.rank(&some, most)?, cubes))).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = ranked
         .iter()
@@ -103,7 +102,7 @@ fn grids(points: &[Vec3]) -> Vec<Cubes> {
     for axes in frames {
         let bounds = crate::Aabb::around(points.iter().map(|p| axes * p));
         let side = (bounds.max - bounds.min).max();
-        if !(side > 0.0) {
+        if side <= 0.0 {
             continue;
         }
         for n in 0..SPACINGS {

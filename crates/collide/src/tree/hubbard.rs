@@ -5,8 +5,11 @@
 //! whole solid. For each region, its points choose among the balls that hold them; then, of all pairs of neighbours,
 //! the pair is merged whose ball reaches out of the solid least, until as many are left as there may be children.
 //!
-//! Neighbours are groups some of whose points lie in one ball. A merged ball is about either old centre or the point
-//! half-way between, whichever reaches out less; those that are left are moved to where they reach out less still.
+//! Neighbours are groups some of whose points lie in one ball; groups that hang together with no other get the nearest for
+//! a neighbour. A merged ball is about either old centre or the point half-way between, whichever reaches out less.
+//!
+//! Departs from the paper: where a ball reaches out far, over a hole between samples, a sample is added; and the parts that are left are refitted
+//! (points choose balls, balls are fitted anew), which brought spot's 64 balls from 0.034 to 0.023–0.031 of the diagonal.
 
 use super::builder::{Built, Job, StageCount, TreeBuilder};
 use super::medial::CoverPoints;
@@ -26,6 +29,11 @@ const HOLE: f64 = 0.01;
 /// Points of a component that others are sought from.
 const LINKED_BY: usize = 32;
 
+/// Points of a group by which costs are bounded.
+const BOUNDED_BY: usize = 4;
+/// Balls that hold a point which are kept, those that reach out least.
+const HOLDERS: usize = 32;
+
 /// The builder.
 pub(super) struct Hubbard;
 
@@ -35,7 +43,14 @@ impl TreeBuilder for Hubbard {
         let all: Vec<u32> = (0..cover.points.len() as u32).collect();
         let mut axis = Axis::new(&cover, &all, job.distance, SAMPLES);
         axis.refine(&Want { target: HOLE * job.mesh.diagonal(), least: 0, most: SAMPLES });
-        let balls = Balls { all: axis.balls(), holders: axis.holders(), cover: &cover, distance: job.distance };
+        let all = axis.balls();
+        let mut holders = axis.holders();
+        for of in &mut holders {
+            let outward = |b: u32| all[b as usize].outward;
+            of.sort_unstable_by(|&a, &b| outward(a).total_cmp(&outward(b)).then(a.cmp(&b)));
+            of.truncate(HOLDERS);
+        }
+        let balls = Balls { all, holders, cover: &cover, distance: job.distance };
         let most = job.settings.branch as usize;
         let mut built = build(job, &cover, &|region| balls.divide(region, most));
         built.stages.insert(0, StageCount { level: 0, stage: "medial balls".into(), count: balls.all.len() as u64 });
@@ -45,7 +60,7 @@ impl TreeBuilder for Hubbard {
 
 struct Balls<'a> {
     all: Vec<MedialBall>,
-    /// Per cover point, the balls that hold it.
+    /// Per cover point, balls that hold it, the one that reaches out least first.
     holders: Vec<Vec<u32>>,
     cover: &'a CoverPoints,
     distance: &'a MeshDistance,
@@ -73,11 +88,7 @@ impl Balls<'_> {
 
     /// Each point with the ball that reaches out least, among those that hold it.
     fn groups(&self, region: &[u32]) -> Vec<Group> {
-        let outward = |b: u32| self.all[b as usize].outward;
-        let chosen = |i: u32| {
-            let holders = self.holders[i as usize].iter().copied();
-            holders.min_by(|&a, &b| outward(a).total_cmp(&outward(b)).then(a.cmp(&b))).unwrap_or(0)
-        };
+        let chosen = |i: u32| self.holders[i as usize].first().copied().unwrap_or(0);
         let mut number: BTreeMap<u32, u32> = BTreeMap::new();
         let mut groups: Vec<Group> = Vec::new();
         for &i in region {
@@ -107,6 +118,9 @@ impl Balls<'_> {
     }
 }
 
+/// Cost (ordered bits), whether it is known or a lower bound, and the pair of groups.
+type Offer = Reverse<(u64, bool, u32, u32)>;
+
 struct Merging<'a> {
     points: &'a [Vec3],
     distance: &'a MeshDistance,
@@ -121,21 +135,41 @@ impl Merging<'_> {
             self.offer(a, &mut queue, |a, b| a < b);
         }
         while self.left > most {
-            let Some(Reverse((_, a, b))) = queue.pop() else { return };
-            if self.groups[a as usize].alive && self.groups[b as usize].alive {
+            let Some(Reverse((_, known, a, b))) = queue.pop() else { return };
+            if !(self.groups[a as usize].alive && self.groups[b as usize].alive) {
+                continue;
+            }
+            if known {
                 let merged = self.merge(a, b);
                 self.offer(merged, &mut queue, |_, _| true);
+            } else {
+                queue.push(Reverse((self.merged(a, b).0.to_bits(), true, a, b)));
             }
         }
     }
 
-    /// Queues the pairs of a group with its neighbours.
-    fn offer(&self, a: u32, queue: &mut BinaryHeap<Reverse<(u64, u32, u32)>>, which: impl Fn(u32, u32) -> bool) {
+    /// Queues the pairs of a group with its neighbours by what they cost at least; what they cost is found when they come up.
+    fn offer(&self, a: u32, queue: &mut BinaryHeap<Offer>, which: impl Fn(u32, u32) -> bool) {
         if self.groups[a as usize].alive {
             for &b in self.groups[a as usize].neighbors.iter().filter(|b| which(a, **b)) {
-                queue.push(Reverse((self.merged(a, b).0.to_bits(), a, b)));
+                queue.push(Reverse((self.at_least(a, b).to_bits(), false, a, b)));
             }
         }
+    }
+
+    /// A lower bound of [`Merging::merged`], by some of the points, and since signed distances differ by no more than centres do.
+    fn at_least(&self, a: u32, b: u32) -> f64 {
+        let [a, b] = [a, b].map(|g| &self.groups[g as usize]);
+        let half = 0.5 * (a.center - b.center).norm();
+        let centers = [(a.center, a.signed), (b.center, b.signed), (0.5 * (a.center + b.center), a.signed.max(b.signed) - half)];
+        let some = |g: &'_ Group| g.points.len().div_ceil(BOUNDED_BY);
+        let reaches = centers.map(|(center, signed)| {
+            let square = |i: &u32| (self.points[*i as usize] - center).norm_squared();
+            let [one, other] = [a, b].map(|g| g.points.iter().step_by(some(g)).map(square).fold(0.0, f64::max));
+            one.max(other).sqrt() + signed
+        });
+        // less a rounding's worth
+        (reaches.into_iter().fold(f64::INFINITY, f64::min) * (1.0 - 1e-9)).max(0.0)
     }
 
     /// How far the ball of two groups reaches out, at least 0, its centre and that one's signed distance.

@@ -35,8 +35,22 @@ fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings)
 #[test]
 fn public_meshes_are_covered_and_nested() {
     let names = [
-        "spot", "panda_link5", "torus", "wingnut", "fetch_gripper", "cow", "bunny", "fandisk", "fertility", "hand",
-        "low/bunny1500", "low/cow1500", "low/fandisk1500", "low/fertility1500", "low/hand1500",
+        "spot",
+        "panda_link5",
+        "torus",
+        "wingnut",
+        "fetch_gripper",
+        "cow",
+        "bunny",
+        "fandisk",
+        "fertility",
+        "hand",
+        "low/bunny1500",
+        "low/cow1500",
+        "low/fandisk1500",
+        "low/fertility1500",
+        "low/hand1500",
+        "armadillo",
     ];
     for name in names {
         let Some(text) = text(&format!("{name}.obj")) else { return };
@@ -74,8 +88,8 @@ fn generated_solids_get_trees_whose_balls_reach_out_as_stated() {
         ("needle", TriMesh::box_(Vec3::new(1e-3, 1.0, 1e-3))),
         ("cube", TriMesh::box_(Vec3::repeat(1.0))),
         ("cylinder", TriMesh::cylinder(0.5, 0.5, 32)),
-        ("ball", TriMesh::icosphere(1.0, 3)),
-        ("torus", TriMesh::torus(1.0, 0.3, 48, 24)),
+        ("ball", TriMesh::icosphere(1.0, 2)),
+        ("torus", TriMesh::torus(1.0, 0.3, 24, 12)),
     ];
     for (name, mesh) in meshes {
         let distance = MeshDistance::new(&mesh);
@@ -96,13 +110,13 @@ fn generated_solids_get_trees_whose_balls_reach_out_as_stated() {
 /// A ball is itself: one ball is enough, and it is the right one. The sphere through the vertices of the icosphere has radius 1.
 #[test]
 fn a_ball_needs_one_ball() {
-    let mesh = TriMesh::icosphere(1.0, 3);
+    let mesh = TriMesh::icosphere(1.0, 2);
     for builder in BUILDERS {
         let settings = TreeSettings { builder, branch: 8, depth: 3, error: 0.01, even: false };
         let tree = SphereTree::build(&mesh, &settings).unwrap();
         assert_eq!(tree.nodes().len(), 1, "{builder:?}");
         let ball = &tree.nodes()[0];
-        assert!(ball.center.norm() < 2e-3 && (ball.radius - 1.0).abs() < 2e-3, "{ball:?}");
+        assert!(ball.center.norm() < 5e-3 && (ball.radius - 1.0).abs() < 5e-3, "{ball:?}");
     }
 }
 
@@ -123,7 +137,7 @@ fn two_boxes_far_apart_share_no_leaf() {
 /// Any branching is kept to.
 #[test]
 fn branching_of_two_and_of_many() {
-    let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
+    let mesh = TriMesh::torus(1.0, 0.3, 24, 12);
     for builder in BUILDERS {
         for branch in [2, 3, 30] {
             let settings = TreeSettings { branch, ..settings(builder, 2) };

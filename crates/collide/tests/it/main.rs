@@ -5,6 +5,7 @@ mod bad_meshes;
 mod broad;
 mod builders;
 mod hull;
+mod medial;
 mod mesh_contacts;
 mod meshes;
 mod primitives;

@@ -28,7 +28,7 @@ pub(super) fn touching(cover: &CoverPoints, i: u32, distance: &MeshDistance, lar
             break;
         }
         let next = reach.norm_squared() / along;
-        if !(next < radius * (1.0 - 1e-3)) {
+        if next >= radius * (1.0 - 1e-3) {
             break;
         }
         radius = next;

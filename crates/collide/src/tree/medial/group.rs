@@ -8,13 +8,16 @@
 use super::refit::keep;
 use super::site::Site;
 use crate::MeshDistance;
+use crate::tree::TreeSettings;
 use crate::tree::ball::{Ball, deep_around};
 
 /// With more groups than this, balls are exchanged within groups only.
 const MOST_GROUPS: usize = 128;
-/// How far the ball around a group may reach out, as a multiple of what the worst group of its level needs before any
-/// exchange: for the level above the balls, and for those above that.
-const SLACK: [f64; 2] = [1.2, 1.05];
+/// How far the balls above the leaves may reach out, as a multiple of what the worst of their level does before any
+/// exchange, all levels' parts together.
+const SLACK: f64 = 0.2;
+/// The same for balls two and more levels above those that are exchanged.
+const SLACK_ABOVE: f64 = 0.05;
 
 /// The groups of a level.
 #[derive(Clone, Debug)]
@@ -50,10 +53,12 @@ impl Groups {
     pub fn new(
         balls: Vec<Ball>,
         of: Vec<usize>,
-        room: usize,
+        settings: &TreeSettings,
         above: Option<Groups>,
         distance: &MeshDistance,
     ) -> Groups {
+        let levels = f64::from(settings.depth.max(2) - 1);
+        let room = settings.branch as usize;
         let count = of.iter().max().map_or(0, |g| g + 1);
         let nowhere = Site { center: crate::Vec3::zeros(), depth: 0.0, fence: None };
         let sites = vec![nowhere; count];
@@ -61,14 +66,14 @@ impl Groups {
         let above = above.map(Box::new);
         let mut groups = Groups { room, budget: f64::INFINITY, of, balls, sites, around, above };
         groups.refit(distance);
-        groups.set_budget(SLACK[0]);
+        groups.set_budget(1.0 + SLACK / levels);
         groups
     }
 
     fn set_budget(&mut self, slack: f64) {
         self.budget = slack * self.worst();
         if let Some(above) = &mut self.above {
-            above.set_budget(SLACK[1]);
+            above.set_budget(1.0 + SLACK_ABOVE);
         }
     }
 

@@ -6,7 +6,7 @@ use super::gaps::add_gaps;
 use super::group::Groups;
 use super::optimise::Exchange;
 use super::reduce::{WAYS, reduce};
-use super::refit::{Fit, keep, own};
+use super::refit::{Fit, own};
 use super::site::Site;
 use super::spheres::{CoverPoints, Want};
 use crate::tree::ball::Ball;
@@ -130,8 +130,7 @@ impl<'a> Levels<'a> {
     fn grouped(&self, fit: &Fit, of: &[usize], above: Option<Groups>) -> Option<Groups> {
         // the first level's balls lie in the root and nowhere else
         let root = of.iter().all(|g| *g == 0);
-        let branch = self.job.settings.branch as usize;
-        (!root).then(|| Groups::new(self.balls(fit), of.to_vec(), branch, above, self.job.distance))
+        (!root).then(|| Groups::new(self.balls(fit), of.to_vec(), self.job.settings, above, self.job.distance))
     }
 
     /// The leaves once more, with cover points where the surface between the others was left bare.

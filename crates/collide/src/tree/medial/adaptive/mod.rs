@@ -19,9 +19,9 @@
 //! Departs from the paper: best is least error, not the largest radius less distance; and it is sought among all balls that
 //! hold the point, not only those of the nearest site.
 
-mod witness;
 #[cfg(test)]
 mod tests;
+mod witness;
 
 use super::spheres::{CoverPoints, MedialBall, Want};
 use super::voronoi::Voronoi;
@@ -34,24 +34,6 @@ use std::collections::BinaryHeap;
 const NONE: u32 = u32::MAX;
 /// A ball is told to hold a point up to this part of its radius, and is grown by it.
 const SLACK: f64 = 1e-9;
-/// Sites to begin with, as a part of the balls asked for. A surface of `n` sites has about `3 n` inner balls.
-const FIRST: usize = 12;
-
-/// Balls that hold all cover points of `region` (indices), refined as `want` says, and what was done. Of the INTERNAL
-/// ones those that hold some of the points. The order of the balls is a function of the input alone.
-///
-/// For the regions of a tree it is cheaper to refine one [`Axis`] of all points, and to hand each region the balls that
-/// hold its points ([`Axis::holders`]).
-pub(in crate::tree) fn adaptive(
-    cover: &CoverPoints,
-    region: &[u32],
-    distance: &MeshDistance,
-    want: &Want,
-) -> (Vec<MedialBall>, Counts) {
-    let mut axis = Axis::new(cover, region, distance, want.least / FIRST);
-    axis.refine(want);
-    (axis.balls(), axis.counts())
-}
 
 /// What a refinement did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,6 +43,8 @@ pub(in crate::tree) struct Counts {
     pub cover: u64,
     /// Cover points that only a ball of no size holds, since floating point gives no other.
     pub alone: u64,
+    /// Sites that were there already.
+    pub duplicates: u64,
 }
 
 impl Counts {
@@ -71,6 +55,7 @@ impl Counts {
             ("internal balls", self.internal),
             ("cover balls", self.cover),
             ("points alone", self.alone),
+            ("duplicate sites", self.duplicates),
         ]
         .map(|(stage, count)| StageCount { level, stage: stage.into(), count })
         .into()
@@ -214,6 +199,7 @@ impl<'a> Axis<'a> {
             internal: self.internal as u64,
             cover: self.covering as u64,
             alone: self.witness.iter().filter(|w| **w == NONE).count() as u64,
+            duplicates: self.voronoi.as_ref().map_or(0, |v| v.delaunay.duplicates()) as u64,
         }
     }
 

@@ -3,6 +3,13 @@
 use super::*;
 use crate::TriMesh;
 
+/// The whole of it: the balls of a region and what was done.
+fn adaptive(cover: &CoverPoints, region: &[u32], distance: &MeshDistance, want: &Want) -> (Vec<MedialBall>, Counts) {
+    let mut axis = Axis::new(cover, region, distance, want.least / 12);
+    axis.refine(want);
+    (axis.balls(), axis.counts())
+}
+
 fn check(mesh: &TriMesh, want: &Want) -> (Vec<MedialBall>, Counts) {
     let cover = CoverPoints::on(mesh, 2000);
     let distance = MeshDistance::new(mesh);
@@ -18,12 +25,11 @@ fn check(mesh: &TriMesh, want: &Want) -> (Vec<MedialBall>, Counts) {
         assert!((b.outward - (b.ball.radius + s).max(0.0)).abs() <= 1e-7 * b.ball.radius);
     }
     assert_eq!(balls.len() as u64, counts.internal + counts.cover + counts.alone);
-    let mut axis = Axis::new(&cover, &region, &distance, want.least / FIRST);
+    let mut axis = Axis::new(&cover, &region, &distance, want.least / 12);
     axis.refine(want);
     assert_eq!(axis.balls(), balls);
     for (p, holders) in cover.points.iter().zip(axis.holders()) {
-        let strictly: Vec<u32> =
-            (0..balls.len() as u32).filter(|&k| far(&balls[k as usize], p) < -slack).collect();
+        let strictly: Vec<u32> = (0..balls.len() as u32).filter(|&k| far(&balls[k as usize], p) < -slack).collect();
         assert!(strictly.iter().all(|k| holders.contains(k)), "{p}");
         assert!(!holders.is_empty() && holders.iter().all(|&k| far(&balls[k as usize], p) <= 0.0));
     }

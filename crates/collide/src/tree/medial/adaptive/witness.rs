@@ -145,4 +145,3 @@ pub(super) fn chain(mut i: u32, next: &[u32], all: &mut Vec<u32>) {
         i = next[i as usize];
     }
 }
-

@@ -130,11 +130,6 @@ impl Delaunay {
         };
         self.cells[id as usize] = cell;
         self.stamps[id as usize] = 0;
-        for v in cell.vertices {
-            if v != GHOST {
-                self.cell_of[v as usize] = id;
-            }
-        }
         id
     }
 }

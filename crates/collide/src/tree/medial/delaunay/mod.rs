@@ -41,8 +41,6 @@ pub(in crate::tree) struct Delaunay {
     cells: Vec<Cell>,
     /// Dead cells, to be used again.
     free: Vec<u32>,
-    /// Per vertex a cell that has it; [`NONE`] for duplicates.
-    cell_of: Vec<u32>,
     /// What the last insertion made.
     made: Vec<u32>,
     /// What the last insertion took away; the ids may be given anew by the next.
@@ -65,7 +63,6 @@ impl Delaunay {
             points: points.to_vec(),
             cells: Vec::with_capacity(8 * points.len()),
             free: Vec::new(),
-            cell_of: vec![NONE; points.len()],
             made: Vec::new(),
             gone: Vec::new(),
             rim: Vec::new(),
@@ -93,19 +90,12 @@ impl Delaunay {
     pub fn insert(&mut self, p: Vec3, hint: u32) -> Option<u32> {
         let v = self.points.len() as u32;
         self.points.push(p);
-        self.cell_of.push(NONE);
         if self.insert_vertex(v, hint) {
             return Some(v);
         }
         self.points.pop();
-        self.cell_of.pop();
         self.duplicates += 1;
         None
-    }
-
-    /// Points by vertex.
-    pub fn points(&self) -> &[Vec3] {
-        &self.points
     }
 
     /// One more than the greatest cell; some below are ghosts or dead.
@@ -126,11 +116,6 @@ impl Delaunay {
     /// Points that were skipped since they were there.
     pub fn duplicates(&self) -> usize {
         self.duplicates
-    }
-
-    /// A cell with this vertex.
-    pub fn cell_of(&self, v: u32) -> Option<u32> {
-        self.cell_of.get(v as usize).copied().filter(|c| *c != NONE)
     }
 
     /// The four vertices, [`GHOST`] among them for a ghost.
@@ -154,6 +139,7 @@ impl Delaunay {
     }
 
     /// All tetrahedra.
+    #[cfg(test)]
     pub fn finite_cells(&self) -> impl Iterator<Item = u32> {
         (0..self.cells.len() as u32).filter(|&c| self.is_finite(c))
     }

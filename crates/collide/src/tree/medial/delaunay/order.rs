@@ -14,11 +14,8 @@ pub(super) fn order(points: &[Vec3]) -> Vec<u32> {
     let bounds = Aabb::around(points.iter().copied());
     let side = (bounds.max - bounds.min).max();
     let scale = if side > 0.0 { f64::from((1u32 << BITS) - 1) / side } else { 0.0 };
-    let mut keys: Vec<(u32, u64, u32)> = points
-        .iter()
-        .enumerate()
-        .map(|(n, p)| (round(n as u64), along_curve((p - bounds.min) * scale), n as u32))
-        .collect();
+    let mut keys: Vec<(u32, u64, u32)> =
+        points.iter().enumerate().map(|(n, p)| (round(n as u64), along_curve((p - bounds.min) * scale), n as u32)).collect();
     keys.sort_unstable();
     keys.into_iter().map(|k| k.2).collect()
 }
