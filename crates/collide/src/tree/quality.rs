@@ -206,7 +206,7 @@ impl<'a> Solid<'a> {
             };
             samples::fibonacci(count).into_par_iter().map(point).collect::<Vec<_>>()
         };
-        level.par_iter().enumerate().flat_map_iter(|item| of_ball(item)).collect()
+        level.par_iter().enumerate().flat_map_iter(of_ball).collect()
     }
 
     fn measure_volumes(&self, level: &[LevelBall], union: &BallUnion, row: &mut LevelQuality) {

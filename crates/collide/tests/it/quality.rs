@@ -1,7 +1,7 @@
 //! The quality report against closed forms and plain quadrature.
 
 use std::f64::consts::PI;
-use tumble_collide::{LevelBall, LevelQuality, QualitySettings, SphereTree, TreeSettings, TriMesh, Vec3};
+use tumble_collide::{LevelBall, LevelQuality, QualitySettings, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover};
 
 /// The figures of balls `(x, r)` with their centres on the x axis.
 fn on_axis(balls: &[(f64, f64)], mesh: &TriMesh) -> LevelQuality {
@@ -141,4 +141,28 @@ fn figures_are_the_same_bits_on_any_number_of_threads() {
         pool.install(|| format!("{:?}", tree.quality(&mesh, &QualitySettings::default())))
     };
     assert_eq!(on(1), on(4));
+}
+
+#[test]
+fn a_cut_of_any_size_covers() {
+    let mesh = TriMesh::torus(1.0, 0.3, 48, 24);
+    let tree = SphereTree::build(&mesh, &TreeSettings { depth: 4, ..TreeSettings::octree() }).unwrap();
+    let few = QualitySettings { sphere_samples: 2000, volume_samples: 2000, ..QualitySettings::default() };
+    for most in [1, 2, 9, 30, 200, 100_000] {
+        let cut = tree.cut(most, 0.0);
+        assert!(!cut.is_empty() && cut.len() <= most);
+        let level = cut.iter().map(|&n| LevelBall::new(tree.nodes()[n].center, tree.nodes()[n].radius)).collect();
+        assert_eq!(LevelQuality::of_levels(&[level], &mesh, &few)[0].coverage, 1.0, "{most}");
+    }
+    assert_eq!(tree.cut(1, 0.0), [0]);
+    assert_eq!(tree.cut(100_000, 0.0).len(), tree.leaves().count());
+}
+
+#[test]
+fn balls_grow_by_as_much_as_covering_needs() {
+    // one ball about a cube must reach the corners; balls that cover do not grow
+    let mesh = TriMesh::box_(Vec3::repeat(1.0));
+    let mut balls = [(Vec3::zeros(), 0.5)];
+    near("growth", grow_to_cover(&mut balls, &mesh), 3.0_f64.sqrt() - 0.5, 1e-12);
+    assert_eq!(grow_to_cover(&mut balls, &mesh), 0.0);
 }

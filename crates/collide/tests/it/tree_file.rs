@@ -164,7 +164,7 @@ fn obj(mesh: &TriMesh) -> String {
 
 /// A level as the outside program tells it: the keys of its answer, and how far ours may be from it. Both look at the same points of the balls, at
 /// others of the surface and of space.
-const KEYS: [(&str, fn(&LevelQuality) -> f64, f64); 12] = [
+const KEYS: [Key; 12] = [
     ("coverage", |q| q.coverage, 0.005),
     ("gap_max", |q| q.gap_max, 5e-4),
     ("vert_coverage", |q| q.vertex_coverage, 1e-9),
@@ -179,6 +179,8 @@ const KEYS: [(&str, fn(&LevelQuality) -> f64, f64); 12] = [
     ("nest_max", |q| q.nesting_max, 1e-9),
 ];
 type Said = [f64; 12];
+/// Name there, figure here, tolerance.
+type Key = (&'static str, fn(&LevelQuality) -> f64, f64);
 
 fn assert_agreement(ours: &[LevelQuality], its: &[Said]) {
     assert_eq!(ours.len(), its.len());

@@ -100,7 +100,7 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
     let robot = folder.write("robot.urdf", ROBOT);
     let cases: [(&[&str], &str); 10] = [
         (&[&none], "none.obj: cannot be read"),
-        (&[&open], "open.obj: the mesh is open"),
+        (&[&open], "the mesh is open: 3 edges"),
         (&[&mesh, "--method", "foo"], "unknown method foo, expected one of"),
         (&[&mesh, "--branch", "100"], "ring.obj: the branching of a sphere tree is 100, but must be 2 to 64"),
         (&[&mesh, "--depth", "0"], "the depth of a sphere tree is 0, but must be 1 to 9"),
