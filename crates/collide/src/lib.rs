@@ -12,7 +12,7 @@
 //! ```
 //! use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, contacts};
 //!
-//! let (ring, _offset) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::default())?;
+//! let (ring, _offset) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree())?;
 //! let mut found = Vec::new();
 //! contacts(&ring, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.001, &mut found);
 //! assert!(found.len() >= 3 && found.iter().all(|c| c.normal.z == 1.0));
@@ -41,5 +41,5 @@ pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
 pub use tree::{
     Builder, CachedTree, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree, StageCount, TreeCache, TreeFile, TreeFileError,
-    TreeSettings,
+    TreeSettings, grow_to_cover,
 };

@@ -116,7 +116,7 @@ impl CylinderShape {
         // the prism is around the cylinder, so that its tree covers the true surface
         let outer = radius / nalgebra::ComplexField::cos(std::f64::consts::PI / SIDES as f64);
         let mesh = TriMesh::cylinder(outer, half_length, SIDES);
-        let tree = SphereTree::build(&mesh, &TreeSettings::default())?;
+        let tree = SphereTree::build(&mesh, &TreeSettings::octree())?;
         let error = tree.outward_error();
         let (outer_radius, outer_half_length) = (outer + error, half_length + error);
         Ok(CylinderShape { radius, half_length, mesh, tree, outer_radius, outer_half_length })

@@ -33,7 +33,7 @@ mod mesh;
 mod viewpoint;
 
 pub use camera::Camera;
-pub use draw::{DebugDraw, Drawing, UnknownOverlay};
+pub use draw::{DebugDraw, Drawing, UnknownOverlay, UpAxis, tree_over_mesh};
 pub use error::RenderError;
 pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Warp, calibration_picture, unfold};
 pub use gpu::Renderer;

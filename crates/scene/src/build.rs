@@ -181,7 +181,7 @@ impl SceneFile {
         let (mut mesh, lines) = self.triangles(spec, &wrong)?;
         let told = make_solid(&mut mesh, &lines, spec.repair.then(RepairSettings::default).as_ref()).map_err(&wrong)?;
         notes.extend(told.into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
-        let mut settings = TreeSettings::default();
+        let mut settings = TreeSettings::octree();
         settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
         settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
         let (shape, center, note) = Shape::mesh_cached(mesh, &settings, &TreeCache::of_environment()).map_err(|e| wrong(e.to_string()))?;

@@ -128,15 +128,15 @@ impl<'m> ShapeMaker<'m> {
     /// With the coarsest tree for what is only drawn, else with one from the cache.
     fn solid(&mut self, mesh: TriMesh, used: Use) -> Result<(Shape, Vec3), ShapeError> {
         if used == Use::Drawing {
-            return Shape::mesh(mesh, &TreeSettings { depth: 1, error: 1.0, ..TreeSettings::default() });
+            return Shape::mesh(mesh, &TreeSettings { depth: 1, error: 1.0, ..TreeSettings::octree() });
         }
-        let (shape, center, note) = Shape::mesh_cached(mesh, &TreeSettings::default(), &self.cache)?;
+        let (shape, center, note) = Shape::mesh_cached(mesh, &TreeSettings::octree(), &self.cache)?;
         note.into_iter().for_each(|note| self.notes.add("sphere trees", note));
         Ok((shape, center))
     }
 }
 
-fn read_file(path: &Path) -> Result<TriMesh, String> {
+pub(crate) fn read_file(path: &Path) -> Result<TriMesh, String> {
     let unread = |error: std::io::Error| format!("cannot be read: {error}");
     let size = std::fs::metadata(path).map_err(unread)?.len();
     if size > MOST_MESH_BYTES {
@@ -146,7 +146,7 @@ fn read_file(path: &Path) -> Result<TriMesh, String> {
 }
 
 /// Scaled along each axis; a mirrored mesh is turned outside out again.
-fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
+pub(crate) fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
     let scale = Vec3::from(scale);
     mesh.vertices.iter_mut().for_each(|v| v.component_mul_assign(&scale));
     if scale.product() < 0.0 {

@@ -76,7 +76,7 @@ fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {
     let (mesh, notes) = read_solid(path, &bytes, repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
     notes.iter().for_each(|note| println!("{}: {note}", path.display()));
     let (triangles, diagonal) = (mesh.triangles.len(), mesh.diagonal());
-    let (shape, center) = Shape::mesh(mesh, &TreeSettings::default()).map_err(|e| wrong(e.to_string()))?;
+    let (shape, center) = Shape::mesh(mesh, &TreeSettings::octree()).map_err(|e| wrong(e.to_string()))?;
     let error = shape.tree().map_or(0.0, |tree| tree.outward_error());
     Ok(format!(
         "a closed mesh of {triangles} triangles, volume {:.6e} m³, centre of mass ({:.6}, {:.6}, {:.6}) m, sphere tree within {:.3} % of its diagonal",

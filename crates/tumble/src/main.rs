@@ -1,4 +1,4 @@
-//! The `tumble` command: run scenes, check files, list what is shipped.
+//! The `tumble` command: run scenes, check files, build sphere trees, list what is shipped.
 //!
 //! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
 
@@ -9,6 +9,7 @@ mod failure;
 mod progress;
 mod run;
 mod shots;
+mod spheretree;
 mod summary;
 mod video;
 
@@ -22,6 +23,7 @@ fn main() -> ExitCode {
     let outcome = match Tumble::parse().command {
         Command::Run(options) => run::run(&options),
         Command::Check(options) => check::check(&options),
+        Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),
         Command::Caves(options) => caves::caves(&options),
     };

@@ -3,7 +3,9 @@
 mod against_parry;
 mod bad_meshes;
 mod broad;
+mod builders;
 mod hull;
+mod medial;
 mod mesh_contacts;
 mod meshes;
 mod primitives;

@@ -119,7 +119,7 @@ fn broken_nesting_is_counted() {
 #[test]
 fn a_tree_covers_nests_and_keeps_its_stated_error() {
     let mesh = TriMesh::torus(1.0, 0.3, 48, 24);
-    let tree = SphereTree::build(&mesh, &TreeSettings { depth: 4, ..TreeSettings::default() }).unwrap();
+    let tree = SphereTree::build(&mesh, &TreeSettings { depth: 4, ..TreeSettings::octree() }).unwrap();
     let rows = tree.quality(&mesh, &QualitySettings::default());
     assert_eq!(rows.len(), tree.levels() as usize);
     for row in &rows {
@@ -135,7 +135,7 @@ fn a_tree_covers_nests_and_keeps_its_stated_error() {
 #[test]
 fn figures_are_the_same_bits_on_any_number_of_threads() {
     let mesh = TriMesh::torus(1.0, 0.3, 24, 12);
-    let tree = SphereTree::build(&mesh, &TreeSettings { depth: 3, ..TreeSettings::default() }).unwrap();
+    let tree = SphereTree::build(&mesh, &TreeSettings { depth: 3, ..TreeSettings::octree() }).unwrap();
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| format!("{:?}", tree.quality(&mesh, &QualitySettings::default())))

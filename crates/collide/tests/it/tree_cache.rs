@@ -37,7 +37,7 @@ fn ring() -> TriMesh {
 }
 
 fn settings() -> TreeSettings {
-    TreeSettings { depth: 2, error: 0.05, ..TreeSettings::default() }
+    TreeSettings { depth: 2, error: 0.05, ..TreeSettings::octree() }
 }
 
 fn cached(mesh: &TriMesh, cache: &TreeCache) -> CachedTree {

@@ -6,7 +6,7 @@ use tumble_collide::{LevelBall, LevelQuality, MeshId, QualitySettings, SphereTre
 
 fn file(mesh: &TriMesh, depth: u32) -> TreeFile {
     // an error at which some leaves are above the last level
-    let settings = TreeSettings { depth, error: 0.03, ..TreeSettings::default() };
+    let settings = TreeSettings { depth, error: 0.03, ..TreeSettings::octree() };
     let (tree, stages) = SphereTree::build_watched(mesh, &settings, &()).unwrap();
     let few = QualitySettings { surface_samples: 500, sphere_samples: 500, volume_samples: 500, ..QualitySettings::default() };
     TreeFile { name: "a \"ring\"\n".into(), mesh: MeshId::of(mesh), settings, stages, quality: tree.quality(mesh, &few), tree }

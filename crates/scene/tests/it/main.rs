@@ -11,4 +11,5 @@ mod robots;
 mod repair;
 mod robust;
 mod shipped;
+mod spheres;
 mod urdf;

@@ -10,3 +10,4 @@ mod outputs;
 mod picture;
 mod repair;
 mod scenes;
+mod spheretree;
