@@ -100,22 +100,6 @@ pub struct CheckOptions {
 }
 
 #[derive(Args)]
-pub struct CavesOptions {
-    /// Draw a calibration pattern: grid, corners, colours or name.
-    #[arg(long, value_name = "WHAT", requires_all = ["cave", "facet", "picture"])]
-    pub pattern: Option<CalibrationPattern>,
-    /// A cave file or the name of a shipped cave.
-    #[arg(long, value_name = "CAVE", requires = "pattern")]
-    pub cave: Option<String>,
-    /// The facet that the pattern is for.
-    #[arg(long, value_name = "NAME", requires = "pattern")]
-    pub facet: Option<String>,
-    /// Where the picture goes (PNG).
-    #[arg(long, value_name = "FILE", requires = "pattern")]
-    pub picture: Option<PathBuf>,
-}
-
-#[derive(Args)]
 pub struct SphereTreeOptions {
     /// A closed mesh: .obj, .stl or .dae.
     #[arg(required_unless_present = "urdf", conflicts_with = "urdf")]
@@ -171,6 +155,22 @@ pub struct SphereTreeOptions {
     /// Say nothing but errors.
     #[arg(long, short, conflicts_with = "verbose")]
     pub quiet: bool,
+}
+
+#[derive(Args)]
+pub struct CavesOptions {
+    /// Draw a calibration pattern: grid, corners, colours or name.
+    #[arg(long, value_name = "WHAT", requires_all = ["cave", "facet", "picture"])]
+    pub pattern: Option<CalibrationPattern>,
+    /// A cave file or the name of a shipped cave.
+    #[arg(long, value_name = "CAVE", requires = "pattern")]
+    pub cave: Option<String>,
+    /// The facet that the pattern is for.
+    #[arg(long, value_name = "NAME", requires = "pattern")]
+    pub facet: Option<String>,
+    /// Where the picture goes (PNG).
+    #[arg(long, value_name = "FILE", requires = "pattern")]
+    pub picture: Option<PathBuf>,
 }
 
 /// Overlays, or none for an empty word.
