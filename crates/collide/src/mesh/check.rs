@@ -222,7 +222,7 @@ impl TriMesh {
 
 /// One face's use of an edge.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct EdgeUse {
+pub(crate) struct EdgeUse {
     pub low: u32,
     pub high: u32,
     pub face: usize,
@@ -231,7 +231,7 @@ pub(super) struct EdgeUse {
 }
 
 /// The uses of each undirected edge, edges in ascending order.
-pub(super) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
+pub(crate) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
     let mut uses: Vec<EdgeUse> = Vec::with_capacity(3 * mesh.triangles.len());
     for (face, t) in mesh.triangles.iter().enumerate() {
         for k in 0..3 {
@@ -298,7 +298,7 @@ fn joined(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
 }
 
 /// How many pieces the surface has, connected over edges.
-fn count_shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> usize {
+pub(crate) fn count_shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> usize {
     let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
     fn root(parent: &mut [usize], mut f: usize) -> usize {
         while parent[f] != f {

@@ -9,7 +9,9 @@ mod obj;
 mod stl;
 
 pub use check::ClosedReport;
+pub(crate) use check::{count_shells, edge_groups};
 pub use distance::{ClosestPoint, MeshDistance};
+pub(crate) use distance::{closest_on_triangle, pseudonormals};
 
 use crate::{Aabb, MeshError, Vec3};
 

@@ -3,7 +3,7 @@
 //! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from it; the one that
 //! makes the greatest triangle; the one furthest out on the other side of it. Ties go to the earlier point.
 
-use crate::{Contact, Pose, Vec3};
+use crate::{Contact, NormalFrom, Pose, Vec3};
 
 /// Keeps at most four of `out[start..]`, in the order they were found.
 pub(super) fn to_four(out: &mut Vec<Contact>, start: usize) {
@@ -103,6 +103,9 @@ impl<'a> Collector<'a> {
         for contact in &mut self.out[self.start..] {
             contact.point = (pose_b * nalgebra::Point3::from(contact.point)).coords;
             contact.normal = pose_b.rotation * contact.normal;
+            if let NormalFrom::LineOfA(along) | NormalFrom::LineOfB(along) = &mut contact.normal_from {
+                *along = pose_b.rotation * *along;
+            }
         }
     }
 
