@@ -205,7 +205,9 @@ impl MeshField {
             let (distance, square) = ((p - point).norm(), opposition(normals, &normal));
             let nearer = |b: &(f64, f64, Hit)| distance < b.0 - self.touching || (distance < b.0 + self.touching && square < b.1);
             if best.as_ref().is_none_or(nearer) {
-                let distance_signed = if above > 0.0 { above } else { -distance };
+                // beyond an edge by less than counts, it is still above or below the face
+                let beside = (p - point - normal * above).norm();
+                let distance_signed = if above > 0.0 || beside < self.touching { above } else { -distance };
                 let hit = Hit { distance: distance_signed, normal, core: 0.0, feature: Feature::Face, facing: true };
                 best = Some((distance, square, hit));
             }

@@ -8,4 +8,5 @@ mod meshes;
 mod primitives;
 mod rng;
 mod shared_meshes;
+mod surface;
 mod trees;

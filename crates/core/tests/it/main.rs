@@ -24,6 +24,7 @@ mod free;
 mod friction;
 mod impacts;
 mod limits;
+mod mesh_boxes;
 mod meshes;
 mod paradox;
 mod regressions;
