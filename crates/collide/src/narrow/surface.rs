@@ -58,6 +58,8 @@ type Normals = ArrayVec<Vec3, 12>;
 const PIECE: f64 = 0.03;
 /// Slopes up to this are level.
 const LEVEL: f64 = 1e-7;
+/// Slopes across an edge down to this are rounding's.
+const ASIDE: f64 = 1e-6;
 /// Looks along a piece of an edge at most, for the minimum and for each end of a flat bottom.
 const LOOKS: usize = 20;
 
@@ -129,7 +131,7 @@ impl<'a> Pass<'a> {
             let at = self.place(&point.at);
             if self.field.bound(&at) <= found.limit() {
                 let normals: Normals = elements.normals_of(point).iter().map(|n| self.rotation * n).collect();
-                self.point(&at, 0.0, &normals, point.index, found);
+                self.point(&at, 0.0, &normals, elements.ways_of(point), point.index, found);
             }
         }
         if !self.field.linear() {
@@ -146,7 +148,8 @@ impl<'a> Pass<'a> {
         let signs = |corner: u32| Vec3::from_fn(|k, _| if corner >> k & 1 == 1 { 1.0 } else { -1.0 });
         for corner in 0..8 {
             let normals: Normals = (0..3).map(|k| self.rotation.column(k) * signs(corner)[k]).collect();
-            self.point(&self.place(&signs(corner).component_mul(half)), 0.0, &normals, corner, found);
+            let ways: [Vec3; 3] = std::array::from_fn(|k| Vec3::ith(k, -signs(corner)[k]));
+            self.point(&self.place(&signs(corner).component_mul(half)), 0.0, &normals, &ways, corner, found);
         }
         if self.field.linear() {
             return;
@@ -172,7 +175,7 @@ impl<'a> Pass<'a> {
 
     /// The end of a rounded body: every place of a mesh that it touches, the closest of others.
     fn core_point(&self, at: &Vec3, radius: f64, index: u32, found: &mut Collector) {
-        let Some(mesh) = self.mesh else { return self.point(at, radius, &[], index, found) };
+        let Some(mesh) = self.mesh else { return self.point(at, radius, &[], &[], index, found) };
         if self.field.bound(at) - radius > found.limit() {
             return;
         }
@@ -183,12 +186,18 @@ impl<'a> Pass<'a> {
         });
     }
 
-    fn point(&self, at: &Vec3, radius: f64, normals: &[Vec3], index: u32, found: &mut Collector) {
+    /// A point with its normals in the field's frame; `ways` are the directions of its edges in the element's own.
+    ///
+    /// Straight above or below a face it counts wherever it is. Near an edge or corner of the other body it counts only if it is
+    /// closest there: where one of its edges leads closer, that edge or its face makes the contact.
+    fn point(&self, at: &Vec3, radius: f64, normals: &[Vec3], ways: &[Vec3], index: u32, found: &mut Collector) {
         if self.field.bound(at) - radius > found.limit() {
             return;
         }
         let hit = self.field.hit(at, normals);
-        if hit.facing {
+        let down = self.rotation.tr_mul(&hit.normal);
+        let closest = hit.feature == Feature::Face || ways.iter().all(|way| down.dot(way) >= -ASIDE);
+        if hit.facing && closest {
             self.push(at, radius, &hit, point_normal(&hit), u64::from(index), found);
         }
     }
@@ -299,7 +308,7 @@ impl<'a> Pass<'a> {
         // two faces at depth `level` meet in an edge further up
         let distance = level * (a + b) / length;
         let hit = Hit { distance, normal: sum / length, ..nearest.hit };
-        if facing(line.normals, &hit.normal) {
+        if facing(line.normals, &hit.normal) && line.is_closest(&hit.normal) {
             self.push(&line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);
         }
     }
@@ -342,7 +351,7 @@ impl<'a> Pass<'a> {
     }
 
     fn push_level(&self, line: &Line, look: &Look, s: f64, part: u64, found: &mut Collector) {
-        if look.hit.facing {
+        if look.hit.facing && (look.hit.feature == Feature::Face || line.is_closest(&look.hit.normal)) {
             self.push(&line.at(s), line.radius, &look.hit, line_normal(line, &look.hit), line.feature(part), found);
         }
     }
@@ -464,6 +473,14 @@ impl Rim {
 impl Line<'_> {
     fn at(&self, s: f64) -> Vec3 {
         self.start + self.along * s
+    }
+
+    /// Whether going from the edge into either of its faces leads no closer.
+    fn is_closest(&self, normal: &Vec3) -> bool {
+        let [n1, n2] = self.normals else { return true };
+        let cos = n1.dot(n2);
+        // into the first face is −(n₂ − n₁ cos)
+        [n2 - n1 * cos, n1 - n2 * cos].iter().all(|out| normal.dot(out) <= ASIDE)
     }
 
     fn feature(&self, part: u64) -> u64 {

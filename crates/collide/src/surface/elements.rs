@@ -29,6 +29,9 @@ pub(crate) struct Point {
     /// Range of its outward normals in [`Elements::normals`].
     pub first: u32,
     pub count: u32,
+    /// Range of the directions of the searched edges that start here, in [`Elements::ways`].
+    pub first_way: u32,
+    pub ways: u32,
 }
 
 /// A straight edge.
@@ -47,6 +50,7 @@ pub(crate) struct Elements {
     pub points: Vec<Point>,
     pub edges: Vec<Edge>,
     pub normals: Vec<Vec3>,
+    pub ways: Vec<Vec3>,
     /// Per ball: where its points and edges begin and end.
     held: Vec<[u32; 4]>,
 }
@@ -56,8 +60,8 @@ impl Elements {
     pub fn new(mesh: &TriMesh, tree: &SphereTree) -> (Elements, Vec<[bool; 3]>) {
         let face: Vec<Vec3> = pseudonormals(mesh).iter().map(|n| n[0]).collect();
         let mut all = Elements::default();
-        let mut points = all.gather_points(mesh, &face, tree);
         let (mut edges, searched) = gather_edges(mesh, &face, tree);
+        let mut points = all.gather_points(mesh, &face, tree, &searched);
         points.sort_by_key(|p| (p.0, p.1.index));
         edges.sort_by_key(|e| (e.0, e.1.index));
         all.held = (0..tree.nodes().len() as u32)
@@ -89,8 +93,20 @@ impl Elements {
         &self.normals[point.first as usize..(point.first + point.count) as usize]
     }
 
+    pub fn ways_of(&self, point: &Point) -> &[Vec3] {
+        &self.ways[point.first_way as usize..(point.first_way + point.ways) as usize]
+    }
+
     /// The vertices, each with the ball that holds it.
-    fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], tree: &SphereTree) -> Vec<(u32, Point)> {
+    fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], tree: &SphereTree, searched: &[[bool; 3]]) -> Vec<(u32, Point)> {
+        let mut ways: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for k in (0..3).filter(|&k| searched[t][k]) {
+                let (from, to) = (triangle[k] as usize, triangle[(k + 1) % 3] as usize);
+                // the neighbour's triangle has the same edge the other way
+                ways[from].push((mesh.vertices[to] - mesh.vertices[from]).normalize());
+            }
+        }
         let mut around: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for &v in triangle {
@@ -106,8 +122,9 @@ impl Elements {
                 continue;
             }
             let at = mesh.vertices[v];
-            let point = Point { at, index: v as u32, first: self.normals.len() as u32, count: normals.len() as u32 };
+            let point = Point { at, index: v as u32, first: self.normals.len() as u32, count: normals.len() as u32, first_way: self.ways.len() as u32, ways: ways[v].len() as u32 };
             self.normals.extend(normals);
+            self.ways.extend(&ways[v]);
             points.push((holder(tree, &[at]), point));
         }
         points
