@@ -72,6 +72,8 @@ pub(crate) struct MeshField {
     boxes: MeshDistance,
     convex: bool,
     touching: f64,
+    /// How much further than the closest face another one may be that is taken instead.
+    around: f64,
 }
 
 /// A triangle's closest point.
@@ -88,7 +90,6 @@ struct Closest {
 struct Builder<'a> {
     field: &'a mut MeshField,
     band: f64,
-    around: f64,
     deepest: u32,
 }
 
@@ -110,13 +111,14 @@ impl MeshField {
             boxes: MeshDistance::new(mesh),
             convex: is_convex(mesh),
             touching: TOUCHING * diagonal,
+            around: AROUND * diagonal,
         };
         let all: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
         let (center, half) = (field.center, field.half);
         let lengths = (0..all.len()).map(|t| { let [a, b, _] = mesh.corners(t); (b - a).norm() });
         let mean = lengths.sum::<f64>() / all.len() as f64;
         let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
-        let mut builder = Builder { field: &mut field, band: BAND * diagonal, around: AROUND * diagonal, deepest };
+        let mut builder = Builder { field: &mut field, band: BAND * diagonal, deepest };
         builder.cell(0, center, half, &all, 0);
         field
     }
@@ -191,8 +193,9 @@ impl MeshField {
         Hit { distance: sign * length, normal, core: 0.0, feature, facing: true }
     }
 
-    /// The closest face among those listed that faces the element and has `p` behind it (or on it).
-    fn behind(&self, p: &Vec3, normals: &[Vec3], list: &[u32]) -> Option<Hit> {
+    /// The closest face among those listed that faces the element, has `p` behind it (or on it), and is not much further
+    /// than `nearest`: the far side of the solid is not meant.
+    fn behind(&self, p: &Vec3, normals: &[Vec3], list: &[u32], nearest: f64) -> Option<Hit> {
         let mut best: Option<(f64, f64, Hit)> = None;
         for &t in list {
             let t = t as usize;
@@ -203,6 +206,9 @@ impl MeshField {
             }
             let (point, _) = closest_on_triangle(p, &self.corners[t]);
             let (distance, square) = ((p - point).norm(), opposition(normals, &normal));
+            if distance > nearest.abs() + self.around {
+                continue;
+            }
             let nearer = |b: &(f64, f64, Hit)| distance < b.0 - self.touching || (distance < b.0 + self.touching && square < b.1);
             if best.as_ref().is_none_or(nearer) {
                 // beyond an edge by less than counts, it is still above or below the face
@@ -292,7 +298,7 @@ impl Field for MeshField {
         if clear || hit.distance > self.touching {
             return Hit { facing: clear, ..hit };
         }
-        self.behind(p, normals, list).unwrap_or(Hit { facing: facing(normals, &hit.normal), ..hit })
+        self.behind(p, normals, list, hit.distance).unwrap_or(Hit { facing: facing(normals, &hit.normal), ..hit })
     }
 
     fn convex(&self) -> bool {
@@ -312,7 +318,7 @@ impl Builder<'_> {
         let reach = 3.0_f64.sqrt() * half;
         let facing_first = self.field.normals[first as usize][0];
         let turned = |t: u32| self.field.normals[t as usize][0].dot(&facing_first) < OTHER_WAY;
-        near.retain(|&(d, t)| d <= least + 2.0 * reach || (d <= least + 2.0 * reach + self.around && turned(t)));
+        near.retain(|&(d, t)| d <= least + 2.0 * reach || (d <= least + 2.0 * reach + self.field.around && turned(t)));
         let kept: Vec<u32> = near.iter().map(|n| n.1).collect();
         let full = self.field.cells.len() > MOST_CELLS || self.field.lists.len() + kept.len() > MOST_LISTED;
         let far = least > 2.0 * reach + self.band;

@@ -5,6 +5,8 @@ use crate::Vec3;
 
 /// On the surface: within this of it, in sizes of the body.
 const TOUCHING: f64 = 1e-6;
+/// How much further than the closest face another one may be that is taken instead, in sizes of the body.
+const AROUND: f64 = 0.02;
 /// As much of a distance as is along a face's normal counts as straight above the face.
 const ABOVE: f64 = 1.0 - 5e-7;
 
@@ -96,7 +98,7 @@ impl Field for BoxField {
             let square = || opposition(normals, &sign(a)).total_cmp(&opposition(normals, &sign(b)));
             if (outside[a] - outside[b]).abs() < touching { square() } else { outside[b].total_cmp(&outside[a]) }
         };
-        let facing_one = (0..3).filter(|&k| facing(normals, &sign(k))).min_by(nearer);
+        let facing_one = (0..3).filter(|&k| facing(normals, &sign(k)) && outside[k] > outside.max() - AROUND * self.half.max()).min_by(nearer);
         let k = facing_one.unwrap_or(outside.imax());
         Hit { distance: outside[k], normal: sign(k), core: 0.0, feature: Feature::Face, facing: facing_one.is_some() }
     }
@@ -134,9 +136,10 @@ impl Field for CylinderField {
         }
         let square = opposition(normals, &outward) < opposition(normals, &up);
         let side_first = if (r - z).abs() < touching { square } else { r > z };
+        let near = |depth: f64| depth > r.max(z) - AROUND * self.radius.max(self.half_length);
         match (side.facing, end.facing) {
-            (true, false) => side,
-            (false, true) => end,
+            (true, false) if near(r) => side,
+            (false, true) if near(z) => end,
             _ if side_first => side,
             _ => end,
         }
