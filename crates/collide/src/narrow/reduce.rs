@@ -110,6 +110,7 @@ impl<'a> Collector<'a> {
     }
 
     fn reduce(&mut self) {
+        let slack = SLACK * self.band;
         let found = &mut self.out[self.start..];
         // `found[..kept]` are kept, `found[rest..]` are in no cluster yet
         let (mut kept, mut rest) = (0, 0);
@@ -118,7 +119,7 @@ impl<'a> Collector<'a> {
                 break;
             }
             let end = rest + gather_cluster(&mut found[rest..]);
-            let count = keep_hull(&mut found[rest..end]);
+            let count = keep_hull(&mut found[rest..end], slack);
             for n in 0..count {
                 found.swap(kept + n, rest + n);
             }
@@ -147,7 +148,9 @@ fn gather_cluster(found: &mut [Contact]) -> usize {
 }
 
 /// Moves to the front the deepest contact of a cluster (its first) and its support points; returns how many.
-fn keep_hull(cluster: &mut [Contact]) -> usize {
+///
+/// Of contacts that support within `slack` of one another, the one with the least feature is kept, so that the choice lasts.
+fn keep_hull(cluster: &mut [Contact], slack: f64) -> usize {
     let normal = cluster[0].normal;
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let v = normal.cross(&u);
@@ -155,7 +158,7 @@ fn keep_hull(cluster: &mut [Contact]) -> usize {
     for (tilt, n) in SUPPORTS {
         let (x, y) = DIRECTIONS[n];
         let way = (u * x + v * y) * tilt;
-        let support = best(cluster.len(), |n| way.dot(&cluster[n].point) - cluster[n].gap);
+        let support = best_named(cluster, slack, |c| way.dot(&c.point) - c.gap);
         if support >= kept {
             cluster.swap(kept, support);
             kept += 1;
@@ -163,6 +166,16 @@ fn keep_hull(cluster: &mut [Contact]) -> usize {
     }
     kept
 }
+
+/// Of the contacts whose score is within `slack` of the greatest, the one with the least feature.
+fn best_named(cluster: &[Contact], slack: f64, score: impl Fn(&Contact) -> f64) -> usize {
+    let most = cluster.iter().map(&score).fold(f64::NEG_INFINITY, f64::max);
+    let near = (0..cluster.len()).filter(|&n| score(&cluster[n]) >= most - slack);
+    near.min_by_key(|&n| cluster[n].feature).unwrap_or(0)
+}
+
+/// Differences of support that count as none, in bands ([`BAND`]): 1e-5 of the smaller body's radius.
+const SLACK: f64 = 2e-4;
 
 /// Tilts (tangents of their angles) and directions for which a cluster's support point is kept: all five for what the
 /// body rests on, three for what it may swing onto within a step. On a flat base the wide ones find the same points

@@ -15,7 +15,7 @@
 //!
 //! - a kink, two slopes: an edge of B (or the ridge between two faces, inside) is crossed. The normal is the combination of the two that is
 //!   perpendicular to the edge;
-//! - a flat bottom: the edge lies on a face. Its two ends are contacts, the corners of the area of contact, unless they are the
+//! - a face that the edge lies on, or slopes gently over. Its two ends are contacts, the corners of the area of contact, unless they are the
 //!   edge's own ends, which are points and speak for themselves.
 //!
 //! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
@@ -24,7 +24,7 @@
 use super::reduce::Collector;
 use crate::surface::elements::Elements;
 use crate::surface::field::MeshField;
-use crate::surface::{Feature, Field, Hit, facing};
+use crate::surface::{Feature, Field, Hit, OVERHANG, TOUCHING, facing};
 use crate::{Contact, Mat3, NormalFrom, Pose, SphereTree, Vec3};
 use arrayvec::ArrayVec;
 
@@ -56,8 +56,10 @@ type Normals = ArrayVec<Vec3, 12>;
 
 /// Pieces that an edge is halved into against a body that is not convex, in radii of the smaller body.
 const PIECE: f64 = 0.03;
-/// Slopes up to this are level.
+/// Slopes that differ by this are the same.
 const LEVEL: f64 = 1e-7;
+/// An edge that slopes less than this over a face lies on it.
+const LYING_EDGE: f64 = 0.15;
 /// Slopes across an edge down to this are rounding's.
 const ASIDE: f64 = 1e-6;
 /// Looks along a piece of an edge at most, for the minimum and for each end of a flat bottom.
@@ -100,6 +102,21 @@ struct Look {
     s: f64,
     slope: f64,
     hit: Hit,
+}
+
+impl Look {
+    /// Whether the line lies here on a face, or along a straight round side.
+    fn lies(&self) -> bool {
+        match self.hit.feature {
+            Feature::Face => self.hit.facing && self.slope.abs() < LYING_EDGE,
+            _ => self.slope.abs() <= LEVEL,
+        }
+    }
+
+    /// The tangent at another place.
+    fn height(&self, s: f64) -> f64 {
+        self.hit.distance + self.slope * (s - self.s)
+    }
 }
 
 impl<'a> Pass<'a> {
@@ -194,7 +211,7 @@ impl<'a> Pass<'a> {
         if self.field.bound(at) - radius > found.limit() {
             return;
         }
-        let hit = self.field.hit(at, normals);
+        let hit = self.field.hit(at, normals, OVERHANG);
         let down = self.rotation.tr_mul(&hit.normal);
         let closest = hit.feature == Feature::Face || ways.iter().all(|way| down.dot(way) >= -ASIDE);
         if hit.facing && closest {
@@ -253,21 +270,20 @@ impl<'a> Pass<'a> {
     }
 
     fn look(&self, line: &Line, s: f64) -> Look {
-        let hit = self.field.hit(&line.at(s), line.normals);
+        let hit = self.field.hit(&line.at(s), line.normals, TOUCHING);
         Look { s, slope: hit.normal.dot(&line.along), hit }
     }
 
-    /// The minimum between two looks, if it is not at one of them.
+    /// The minimum between two looks, if it is not at one of them, and where the line leaves a face that it lies on.
     fn search(&self, line: &Line, mut low: Look, mut high: Look, found: &mut Collector) {
-        let (level_low, level_high) = (low.slope >= -LEVEL, high.slope <= LEVEL);
-        if low.slope > LEVEL || high.slope < -LEVEL || (level_low && level_high) {
+        if high.slope - low.slope <= LEVEL {
             return;
         }
-        if level_low {
-            return self.end_of_level(line, &low, high, found);
-        }
-        if level_high {
-            return self.end_of_level(line, &high, low, found);
+        match (low.lies(), high.lies()) {
+            (true, false) => return self.end_of_face(line, &low, high, found),
+            (false, true) => return self.end_of_face(line, &high, low, found),
+            _ if low.slope > -LEVEL || high.slope < LEVEL => return,
+            _ => {}
         }
         let tolerance = 1e-9 * self.size;
         let limit = found.limit() + line.radius;
@@ -280,8 +296,8 @@ impl<'a> Pass<'a> {
                 break;
             }
             let look = self.look(line, s.clamp(low.s, high.s));
-            if look.slope.abs() <= LEVEL {
-                return self.level(line, &look, low, high, found);
+            if look.lies() || look.slope.abs() <= LEVEL {
+                return self.face(line, &look, low, high, found);
             }
             if look.slope < 0.0 {
                 low = look;
@@ -313,36 +329,38 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// A level place: its two ends.
-    fn level(&self, line: &Line, look: &Look, low: Look, high: Look, found: &mut Collector) {
-        let from = self.edge_of_level(line, look, low);
-        let to = self.edge_of_level(line, look, high);
+    /// A part that lies on a face: its two ends.
+    fn face(&self, line: &Line, look: &Look, low: Look, high: Look, found: &mut Collector) {
+        let from = self.leaves(line, look, low);
+        let to = self.leaves(line, look, high);
         if to - from < 1e-3 * self.size {
-            self.push_level(line, look, look.s, 1, found);
+            self.push_on_face(line, look, look.s, 1, found);
         } else {
-            self.push_level(line, look, from, 1, found);
-            self.push_level(line, look, to, 2, found);
+            self.push_on_face(line, look, from, 1, found);
+            self.push_on_face(line, look, to, 2, found);
         }
     }
 
-    /// The end of a level part that begins at `look`, on the side of `outer`.
-    fn end_of_level(&self, line: &Line, look: &Look, outer: Look, found: &mut Collector) {
-        let s = self.edge_of_level(line, look, outer);
+    /// The end of a part that lies on a face and begins at `look`, on the side of `outer`.
+    fn end_of_face(&self, line: &Line, look: &Look, outer: Look, found: &mut Collector) {
+        let s = self.leaves(line, look, outer);
         // at the very start it is the element's own end, or another piece's
         if (s - look.s).abs() > 1e-6 * self.size {
-            self.push_level(line, look, s, if outer.s > look.s { 2 } else { 1 }, found);
+            self.push_on_face(line, look, s, if outer.s > look.s { 2 } else { 1 }, found);
         }
     }
 
-    /// Where the tangent of `outer` comes down to the level of `look`.
-    fn edge_of_level(&self, line: &Line, look: &Look, mut outer: Look) -> f64 {
+    /// Where the line leaves the face that is under `look`, towards `outer`: where the tangents of the two meet.
+    fn leaves(&self, line: &Line, look: &Look, mut outer: Look) -> f64 {
         let tolerance = 1e-9 * self.size;
         for _ in 0..LOOKS {
-            if outer.hit.distance - look.hit.distance < tolerance || outer.slope.abs() <= LEVEL {
+            let turn = outer.slope - look.slope;
+            let rise = outer.hit.distance - look.height(outer.s);
+            if rise < tolerance || turn.abs() <= LEVEL {
                 return outer.s;
             }
-            let s = outer.s - (outer.hit.distance - look.hit.distance) / outer.slope;
-            if (s - look.s) * (outer.s - look.s) <= 0.0 {
+            let s = outer.s - rise / turn;
+            if (s - look.s) * (outer.s - look.s) <= 0.0 || (s - outer.s) * (look.s - outer.s) <= 0.0 {
                 return look.s;
             }
             outer = self.look(line, s);
@@ -350,9 +368,10 @@ impl<'a> Pass<'a> {
         outer.s
     }
 
-    fn push_level(&self, line: &Line, look: &Look, s: f64, part: u64, found: &mut Collector) {
-        if look.hit.facing && (look.hit.feature == Feature::Face || line.is_closest(&look.hit.normal)) {
-            self.push(&line.at(s), line.radius, &look.hit, line_normal(line, &look.hit), line.feature(part), found);
+    fn push_on_face(&self, line: &Line, look: &Look, s: f64, part: u64, found: &mut Collector) {
+        let hit = Hit { distance: look.height(s), ..look.hit };
+        if hit.facing && (hit.feature == Feature::Face || line.is_closest(&hit.normal)) {
+            self.push(&line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(part), found);
         }
     }
 
@@ -375,7 +394,7 @@ impl<'a> Pass<'a> {
         }
         let (x, y) = (self.rotation.column(0).into_owned(), self.rotation.column(1).into_owned());
         let ways: [Vec3; RIM] = std::array::from_fn(|n| x * RIM_POINTS[n].0 + y * RIM_POINTS[n].1);
-        let hits = ways.map(|way| self.field.hit(&rim.at(&way), &[way, rim.up]));
+        let hits = ways.map(|way| self.field.hit(&rim.at(&way), &[way, rim.up], OVERHANG));
         for n in 0..RIM {
             let hit = &hits[n];
             if hit.facing && across(&hit.normal, &rim.up).norm() < STEEP {
@@ -397,14 +416,14 @@ impl<'a> Pass<'a> {
                 return; // the fixed points will do
             }
             let mut next = down / tilt;
-            let mut look = self.field.hit(&rim.at(&next), &[next, rim.up]);
+            let mut look = self.field.hit(&rim.at(&next), &[next, rim.up], OVERHANG);
             // the way may turn back and forth over a ridge: half of it then
             for _ in 0..4 {
                 if look.distance <= hit.distance {
                     break;
                 }
                 next = (next + way).try_normalize(1e-9).unwrap_or(way);
-                look = self.field.hit(&rim.at(&next), &[next, rim.up]);
+                look = self.field.hit(&rim.at(&next), &[next, rim.up], OVERHANG);
             }
             let better = hit.distance - look.distance;
             if better <= 0.0 {

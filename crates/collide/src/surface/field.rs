@@ -13,7 +13,7 @@
 //! A cell also lists triangles a little further away that face another way: from an element on a ridge the closest face
 //! may be one that it cannot meet, and the next one is taken.
 
-use super::{Feature, Field, Hit, facing, opposition};
+use super::{Feature, Field, Hit, TOUCHING, facing, opposition};
 use crate::mesh::{closest_on_triangle, count_shells, edge_groups, pseudonormals};
 use crate::{Aabb, MeshDistance, TriMesh, Vec3};
 use arrayvec::ArrayVec;
@@ -28,8 +28,6 @@ const BAND: f64 = 0.01;
 const AROUND: f64 = 0.01;
 /// Another way: cosine between the normals below this.
 const OTHER_WAY: f64 = 0.5;
-/// The surface counts as touched at this distance, as a part of the diagonal.
-const TOUCHING: f64 = 1e-6;
 /// Cells are divided down to this half diagonal, in mean lengths of an edge.
 const FINEST: f64 = 0.3;
 /// Divisions at most.
@@ -72,6 +70,7 @@ pub(crate) struct MeshField {
     boxes: MeshDistance,
     convex: bool,
     touching: f64,
+    diagonal: f64,
     /// How much further than the closest face another one may be that is taken instead.
     around: f64,
 }
@@ -111,6 +110,7 @@ impl MeshField {
             boxes: MeshDistance::new(mesh),
             convex: is_convex(mesh),
             touching: TOUCHING * diagonal,
+            diagonal,
             around: AROUND * diagonal,
         };
         let all: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
@@ -195,13 +195,13 @@ impl MeshField {
 
     /// The closest face among those listed that faces the element, has `p` behind it (or on it), and is not much further
     /// than `nearest`: the far side of the solid is not meant.
-    fn behind(&self, p: &Vec3, normals: &[Vec3], list: &[u32], nearest: f64) -> Option<Hit> {
+    fn behind(&self, p: &Vec3, normals: &[Vec3], list: &[u32], nearest: f64, aside: f64) -> Option<Hit> {
         let mut best: Option<(f64, f64, Hit)> = None;
         for &t in list {
             let t = t as usize;
             let normal = self.normals[t][0];
             let above = normal.dot(&(p - self.corners[t][0]));
-            if above > self.touching || !facing(normals, &normal) {
+            if above > aside || !facing(normals, &normal) {
                 continue;
             }
             let (point, _) = closest_on_triangle(p, &self.corners[t]);
@@ -209,11 +209,11 @@ impl MeshField {
             if distance > nearest.abs() + self.around {
                 continue;
             }
-            let nearer = |b: &(f64, f64, Hit)| distance < b.0 - self.touching || (distance < b.0 + self.touching && square < b.1);
+            let nearer = |b: &(f64, f64, Hit)| distance < b.0 - aside || (distance < b.0 + aside && square < b.1);
             if best.as_ref().is_none_or(nearer) {
                 // beyond an edge by less than counts, it is still above or below the face
                 let beside = (p - point - normal * above).norm();
-                let distance_signed = if above > 0.0 || beside < self.touching { above } else { -distance };
+                let distance_signed = if above > 0.0 || beside < aside { above } else { -distance };
                 let hit = Hit { distance: distance_signed, normal, core: 0.0, feature: Feature::Face, facing: true };
                 best = Some((distance, square, hit));
             }
@@ -287,18 +287,19 @@ impl Field for MeshField {
         }
     }
 
-    fn hit(&self, p: &Vec3, normals: &[Vec3]) -> Hit {
+    fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit {
+        let beside = beside * self.diagonal;
         let list = self.locate(p).map_or(&[][..], |(cell, _)| &self.lists[cell.first as usize..][..cell.count as usize]);
         let closest = self.closest(p, list).unwrap_or_else(|| {
             let triangle = self.boxes.closest(p).triangle;
             self.closest_of(p, triangle)
         });
         let hit = self.describe(p, &closest);
-        let clear = facing(normals, &hit.normal) && (hit.feature == Feature::Face || hit.distance.abs() > self.touching);
-        if clear || hit.distance > self.touching {
+        let clear = facing(normals, &hit.normal) && (hit.feature == Feature::Face || hit.distance.abs() > beside);
+        if clear || hit.distance > beside {
             return Hit { facing: clear, ..hit };
         }
-        self.behind(p, normals, list, hit.distance).unwrap_or(Hit { facing: facing(normals, &hit.normal), ..hit })
+        self.behind(p, normals, list, hit.distance, beside).unwrap_or(Hit { facing: facing(normals, &hit.normal), ..hit })
     }
 
     fn convex(&self) -> bool {

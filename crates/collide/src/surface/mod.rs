@@ -76,13 +76,21 @@ pub(crate) fn opposition(normals: &[Vec3], normal: &Vec3) -> f64 {
     normals.iter().map(|n| n.dot(normal)).fold(0.0, f64::min)
 }
 
+/// How far beside a face a corner still counts as above it, as a part of the body's size.
+pub(crate) const OVERHANG: f64 = 1e-4;
+/// The same for a place on an edge: rounding.
+pub(crate) const TOUCHING: f64 = 1e-6;
+
 /// Signed distance of a solid.
 pub(crate) trait Field {
     /// At most the signed distance at `p`; cheap.
     fn bound(&self, p: &Vec3) -> f64;
     /// The closest part of the surface that an element with `normals` can meet (`facing`), or the closest of all where
     /// there is none such.
-    fn hit(&self, p: &Vec3, normals: &[Vec3]) -> Hit;
+    ///
+    /// A point this far beside a face (`beside`, as a part of the body's size) still counts as above or below it: what stands flush with an
+    /// edge keeps its contacts while it trembles.
+    fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit;
     /// Whether the solid is convex, and so its signed distance a convex function.
     fn convex(&self) -> bool;
     /// Whether the signed distance is linear: only points count.

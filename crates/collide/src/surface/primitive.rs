@@ -3,8 +3,6 @@
 use super::{Feature, Field, Hit, facing, opposition};
 use crate::Vec3;
 
-/// On the surface: within this of it, in sizes of the body.
-const TOUCHING: f64 = 1e-6;
 /// How much further than the closest face another one may be that is taken instead, in sizes of the body.
 const AROUND: f64 = 0.02;
 /// As much of a distance as is along a face's normal counts as straight above the face.
@@ -35,7 +33,7 @@ impl Field for HalfSpaceField {
         p.z
     }
 
-    fn hit(&self, p: &Vec3, normals: &[Vec3]) -> Hit {
+    fn hit(&self, p: &Vec3, normals: &[Vec3], _beside: f64) -> Hit {
         let normal = Vec3::z();
         Hit { distance: p.z, normal, core: 0.0, feature: Feature::Face, facing: facing(normals, &normal) }
     }
@@ -54,7 +52,7 @@ impl Field for RoundField {
         (p - Vec3::z() * p.z.clamp(-self.half_length, self.half_length)).norm() - self.radius
     }
 
-    fn hit(&self, p: &Vec3, normals: &[Vec3]) -> Hit {
+    fn hit(&self, p: &Vec3, normals: &[Vec3], _beside: f64) -> Hit {
         let offset = p - Vec3::z() * p.z.clamp(-self.half_length, self.half_length);
         let length = offset.norm();
         let normal = if length > 1e-12 * self.radius { offset / length } else { Vec3::x() };
@@ -73,8 +71,8 @@ impl Field for BoxField {
         if outside.max() > 0.0 { outside.sup(&Vec3::zeros()).norm() } else { outside.max() }
     }
 
-    fn hit(&self, p: &Vec3, normals: &[Vec3]) -> Hit {
-        let touching = TOUCHING * self.half.max();
+    fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit {
+        let touching = beside * self.half.max();
         let outside = p.abs() - self.half;
         let sign = |k: usize| Vec3::ith(k, if p[k] < 0.0 { -1.0 } else { 1.0 });
         let beyond = outside.sup(&Vec3::zeros());
@@ -114,8 +112,8 @@ impl Field for CylinderField {
         if r.max(z) > 0.0 { (r.max(0.0).powi(2) + z.max(0.0).powi(2)).sqrt() } else { r.max(z) }
     }
 
-    fn hit(&self, p: &Vec3, normals: &[Vec3]) -> Hit {
-        let touching = TOUCHING * self.radius.max(self.half_length);
+    fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit {
+        let touching = beside * self.radius.max(self.half_length);
         let across = Vec3::new(p.x, p.y, 0.0);
         let length = across.norm();
         let outward = if length > 1e-12 * self.radius { across / length } else { Vec3::x() };

@@ -93,19 +93,3 @@ fn a_cylinder_stands_and_rolls_on_a_block() {
         }
     }
 }
-
-#[test]
-fn debug_stack() {
-    let (mut world, shape) = (world("time_stepping", 1.0 / 60.0), mesh_cube(0.5));
-    ground(&mut world, 0.0, 0.5);
-    let place = |i: usize| Vec3::z() * (0.25 + 0.5 * i as f64);
-    let ids: Vec<_> = (0..10).map(|i| add(&mut world, &format!("box{i}"), &shape, Pose::from(place(i)))).collect();
-    for f in 0..1200 {
-        let r = *world.step().unwrap();
-        if f < 5 || f % 60 == 0 {
-            let v = ids.iter().map(|i| { let s = world.site(*i, 0).unwrap(); s.velocity.norm() + s.angular_velocity.norm() }).fold(0.0, f64::max);
-            println!("{f} contacts {} v {v:.2e} top {:?} pen {:.2e} unconv {} res {:.1e}", world.contacts().len(), position(&world, ids[9]) - place(9), r.max_penetration, r.unconverged, r.residual);
-            if f == 2 || f == 120 || (f == 300 && v < 1.0) { for c in world.contacts() { if c.a == ids[5] || c.b == ids[5] { println!("   {:?} n {:?} gap {:.2e} f {:?}", c.point, c.normal, c.gap, c.force); } } }
-        }
-    }
-}
