@@ -397,7 +397,7 @@ impl<'a> Pass<'a> {
         let hits = ways.map(|way| self.field.hit(&rim.at(&way), &[way, rim.up], OVERHANG));
         for n in 0..RIM {
             let hit = &hits[n];
-            if hit.facing && across(&hit.normal, &rim.up).norm() < STEEP {
+            if n % 3 == 0 && hit.facing && across(&hit.normal, &rim.up).norm() < STEEP {
                 self.push(&rim.at(&ways[n]), 0.0, hit, point_normal(hit), rim.feature(n as u64), found);
             }
             let (before, after) = (&hits[(n + RIM - 1) % RIM], &hits[(n + 1) % RIM]);
@@ -454,7 +454,7 @@ struct Rim {
     side: u64,
 }
 
-/// Fixed points on a rim.
+/// Places on a rim that are looked at; every third is a fixed point that carries.
 const RIM: usize = 12;
 /// Cosine and sine of multiples of 30°.
 const RIM_POINTS: [(f64, f64); RIM] = [

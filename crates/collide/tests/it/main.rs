@@ -9,4 +9,5 @@ mod primitives;
 mod rng;
 mod shared_meshes;
 mod surface;
+mod surface_parry;
 mod trees;
