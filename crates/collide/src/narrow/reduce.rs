@@ -72,6 +72,8 @@ pub(super) struct Collector<'a> {
     start: usize,
     limit: f64,
     band: f64,
+    /// The deepest overlap that no element faces.
+    spare: Option<Contact>,
 }
 
 /// The band, as a part of the smaller body's radius.
@@ -80,7 +82,7 @@ const BAND: f64 = 0.05;
 impl<'a> Collector<'a> {
     /// `radius` is that of the smaller body.
     pub fn new(margin: f64, radius: f64, out: &'a mut Vec<Contact>) -> Collector<'a> {
-        Collector { start: out.len(), out, limit: margin, band: BAND * radius }
+        Collector { start: out.len(), out, limit: margin, band: BAND * radius, spare: None }
     }
 
     /// Only contacts with a gap up to this are wanted.
@@ -97,8 +99,18 @@ impl<'a> Collector<'a> {
         self.out.push(contact);
     }
 
+    /// A deep overlap at a place that the element does not face: it counts only if nothing else overlaps.
+    pub fn push_spare(&mut self, contact: Contact) {
+        if contact.gap < -0.02 * self.band && self.spare.is_none_or(|s| contact.gap < s.gap) {
+            self.spare = Some(contact);
+        }
+    }
+
     /// Reduces what was gathered and turns it into world axes.
     pub fn finish(mut self, pose_b: &Pose) {
+        if self.out[self.start..].iter().all(|c| c.gap >= 0.0) {
+            self.out.extend(self.spare);
+        }
         self.reduce();
         for contact in &mut self.out[self.start..] {
             contact.point = (pose_b * nalgebra::Point3::from(contact.point)).coords;

@@ -214,13 +214,17 @@ impl<'a> Pass<'a> {
         let hit = self.field.hit(at, normals, OVERHANG);
         let down = self.rotation.tr_mul(&hit.normal);
         let closest = hit.feature == Feature::Face || ways.iter().all(|way| down.dot(way) >= -ASIDE);
-        if hit.facing && closest {
-            self.push(at, radius, &hit, point_normal(&hit), u64::from(index), found);
-        }
+        self.push_if(hit.facing && closest, at, radius, &hit, point_normal(&hit), u64::from(index), found);
     }
 
-    /// One contact: a core point of the element and what the field says there.
     fn push(&self, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64, found: &mut Collector) {
+        self.push_if(true, at, radius, hit, normal_from, feature, found);
+    }
+
+    /// One contact: a core point of the element and what the field says there. One that does not `fit` is kept in
+    /// reserve.
+    #[allow(clippy::too_many_arguments)]
+    fn push_if(&self, fits: bool, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64, found: &mut Collector) {
         let gap = hit.distance - radius;
         if !(gap <= found.limit()) {
             return;
@@ -234,10 +238,15 @@ impl<'a> Pass<'a> {
             core_b: hit.core,
             normal_from,
         };
-        found.push(match self.second {
+        let contact = match self.second {
             None => contact,
             Some(pose) => turned(contact, pose).flipped(),
-        });
+        };
+        if fits {
+            found.push(contact);
+        } else {
+            found.push_spare(contact);
+        }
     }
 
     fn edge(&self, ends: &[Vec3; 2], radius: f64, normals: &[Vec3], index: u32, found: &mut Collector) {
@@ -324,9 +333,8 @@ impl<'a> Pass<'a> {
         // two faces at depth `level` meet in an edge further up
         let distance = level * (a + b) / length;
         let hit = Hit { distance, normal: sum / length, ..nearest.hit };
-        if facing(line.normals, &hit.normal) && line.is_closest(&hit.normal) {
-            self.push(&line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);
-        }
+        let fits = facing(line.normals, &hit.normal) && line.is_closest(&hit.normal);
+        self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);
     }
 
     /// A part that lies on a face: its two ends.

@@ -1,4 +1,4 @@
-//! What of a body is held against the other's field: points, edges and rims, held by the balls of its sphere tree.
+//! What of a mesh is held against the other's field: points, edges and rims, held by the balls of its sphere tree.
 //!
 //! A point is held by one leaf that covers it; an edge by the smallest ball found that holds both its ends, and so all of
 //! it. A ball that is further than the margin from the other body skips all that it and its children hold.

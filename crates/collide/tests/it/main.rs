@@ -2,6 +2,7 @@
 
 mod against_parry;
 mod broad;
+mod debug;
 mod hull;
 mod mesh_contacts;
 mod meshes;
