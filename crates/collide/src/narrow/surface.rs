@@ -185,7 +185,7 @@ impl<'a> Pass<'a> {
         for (n, end) in ends.iter().enumerate().take(if half_length > 0.0 { 2 } else { 1 }) {
             self.core_point(&self.place(end), radius, n as u32, found);
         }
-        if half_length > 0.0 && !self.field.linear() {
+        if half_length > 0.0 && self.field.round() {
             self.edge(&ends, radius, &[], 0, found);
         }
     }
@@ -288,11 +288,14 @@ impl<'a> Pass<'a> {
         if high.slope - low.slope <= LEVEL {
             return;
         }
+        let mut on_face = low.lies() != high.lies();
         match (low.lies(), high.lies()) {
-            (true, false) => return self.end_of_face(line, &low, high, found),
-            (false, true) => return self.end_of_face(line, &high, low, found),
-            _ if low.slope > -LEVEL || high.slope < LEVEL => return,
+            (true, false) => self.end_of_face(line, &low, high, found),
+            (false, true) => self.end_of_face(line, &high, low, found),
             _ => {}
+        }
+        if low.slope > -LEVEL || high.slope < LEVEL {
+            return;
         }
         let tolerance = 1e-9 * self.size;
         let limit = found.limit() + line.radius;
@@ -305,8 +308,12 @@ impl<'a> Pass<'a> {
                 break;
             }
             let look = self.look(line, s.clamp(low.s, high.s));
-            if look.lies() || look.slope.abs() <= LEVEL {
-                return self.face(line, &look, low, high, found);
+            if !on_face && (look.lies() || look.slope.abs() <= LEVEL) {
+                on_face = true;
+                self.face(line, &look, low, high, found);
+            }
+            if look.slope.abs() <= LEVEL {
+                return;
             }
             if look.slope < 0.0 {
                 low = look;
@@ -325,6 +332,9 @@ impl<'a> Pass<'a> {
         let length = sum.norm();
         if !(length > 1e-9 * (a + b)) {
             return;
+        }
+        if self.look(line, s).hit.distance - level > 1e-6 * self.size {
+            return; // not convex here: what the tangents say is no place on the surface
         }
         let nearest = if low.hit.distance < high.hit.distance { low } else { high };
         if self.second.is_some() && matches!(nearest.hit.feature, Feature::Edge(_)) {
@@ -378,6 +388,9 @@ impl<'a> Pass<'a> {
 
     fn push_on_face(&self, line: &Line, look: &Look, s: f64, part: u64, found: &mut Collector) {
         let hit = Hit { distance: look.height(s), ..look.hit };
+        if line.radius > 0.0 && look.slope.abs() > ASIDE {
+            return; // the surface of a cylinder is its radius away across the axis alone
+        }
         if hit.facing && (hit.feature == Feature::Face || line.is_closest(&hit.normal)) {
             self.push(&line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(part), found);
         }
@@ -386,7 +399,7 @@ impl<'a> Pass<'a> {
     /// The axis, and on each rim fixed points and the lowest ones.
     fn cylinder(&self, radius: f64, half_length: f64, found: &mut Collector) {
         let ends = [-half_length, half_length].map(|z| Vec3::z() * z);
-        if !self.field.linear() {
+        if self.field.round() {
             self.edge(&ends, radius, &[], 0, found);
         }
         for side in 0..2 {

@@ -93,6 +93,10 @@ pub(crate) trait Field {
     fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit;
     /// Whether the solid is convex, and so its signed distance a convex function.
     fn convex(&self) -> bool;
+    /// Whether the surface is round about an axis, which has no edges to meet another axis with.
+    fn round(&self) -> bool {
+        false
+    }
     /// Whether the signed distance is linear: only points count.
     fn linear(&self) -> bool {
         false

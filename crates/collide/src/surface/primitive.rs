@@ -60,6 +60,10 @@ impl Field for RoundField {
         Hit { distance: length - self.radius, normal, core: self.radius, feature, facing: facing(normals, &normal) }
     }
 
+    fn round(&self) -> bool {
+        true
+    }
+
     fn convex(&self) -> bool {
         true
     }
@@ -141,6 +145,10 @@ impl Field for CylinderField {
             _ if side_first => side,
             _ => end,
         }
+    }
+
+    fn round(&self) -> bool {
+        true
     }
 
     fn convex(&self) -> bool {

@@ -2,7 +2,6 @@
 
 mod against_parry;
 mod broad;
-mod debug;
 mod hull;
 mod mesh_contacts;
 mod meshes;
