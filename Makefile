@@ -22,7 +22,7 @@ test-slow:
 
 references:
 	python3 -m venv target/python
-	target/python/bin/pip install --quiet pin example-robot-data
+	target/python/bin/pip install --quiet pin example-robot-data numpy scipy trimesh rtree
 
 lint:
 	@scripts/lint.sh

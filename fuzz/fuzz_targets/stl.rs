@@ -1,12 +1,21 @@
-//! An STL mesh, text or binary: read, checked, and where it is closed and small, measured.
+//! An STL mesh, text or binary: read, checked, repaired, and where that makes it a solid and it is small, measured.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tumble_collide::TriMesh;
+use tumble_collide::{MeshDistance, RepairSettings, TriMesh};
 
 fuzz_target!(|bytes: &[u8]| {
     let Ok(mut mesh) = TriMesh::from_stl(bytes) else { return };
-    if mesh.triangles.len() <= 2000 && mesh.check_closed().is_ok() {
+    if mesh.triangles.len() > 2000 {
+        return;
+    }
+    let mut mended = mesh.clone();
+    if mended.repair(&RepairSettings::default()).is_ok() {
+        assert!(mended.check_closed().is_ok(), "what comes out of repair is a solid");
+        let _ = mended.union_mass_properties(1.0);
+        let _ = MeshDistance::new(&mended).closest(&mended.vertices[0]);
+    }
+    if mesh.check_closed().is_ok() {
         let _ = mesh.mass_properties(1.0);
     }
 });

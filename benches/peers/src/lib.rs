@@ -1,6 +1,7 @@
 //! tumble beside its peers: the same scenes, the same clock, the same measure of error.
 
 pub mod articulated;
+pub mod broad;
 pub mod clock;
 pub mod measure;
 pub mod rapier;

@@ -65,11 +65,11 @@ pub fn pyramid(rows: usize) -> Scene {
 }
 
 /// splitmix64.
-struct Random(u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
     /// Between `−bound` and `bound`.
-    fn within(&mut self, bound: f64) -> f64 {
+    pub fn within(&mut self, bound: f64) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
         x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

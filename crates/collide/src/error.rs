@@ -142,6 +142,14 @@ pub enum MeshError {
         /// The face named: one with an open edge (the fin) where there is one.
         face: usize,
     },
+    /// A surface that repair makes no solid of.
+    #[error("{error}; repair was asked for, but {why}")]
+    BeyondRepair {
+        /// What is wrong with the mesh as it was.
+        error: Box<MeshError>,
+        /// What kept it from being repaired.
+        why: String,
+    },
     /// A closed surface around nothing.
     #[error("the mesh is closed but encloses no volume ({volume:e} m³); it must be a solid")]
     NoVolume {
@@ -170,4 +178,28 @@ pub enum MeshError {
         /// Which promise, and where.
         what: String,
     },
+}
+
+impl MeshError {
+    /// The triangle that the error names, from 1 in the order of the mesh as it was given.
+    pub fn face(&self) -> Option<usize> {
+        match self {
+            MeshError::At { error, .. } | MeshError::BeyondRepair { error, .. } => error.face(),
+            MeshError::NotFiniteInFace { face, .. }
+            | MeshError::IndexOutOfRange { face, .. }
+            | MeshError::Open { face, .. }
+            | MeshError::NonManifold { face, .. } => Some(*face),
+            _ => None,
+        }
+    }
+
+    /// With the line of the triangle that it names, where `lines` (from [`TriMesh::from_obj_with_lines`]) tells.
+    ///
+    /// [`TriMesh::from_obj_with_lines`]: crate::TriMesh::from_obj_with_lines
+    pub fn at_line(self, lines: &[usize]) -> MeshError {
+        match self.face().and_then(|face| lines.get(face.checked_sub(1)?)) {
+            Some(&line) if !matches!(self, MeshError::At { .. }) => MeshError::At { line, error: Box::new(self) },
+            _ => self,
+        }
+    }
 }

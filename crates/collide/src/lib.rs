@@ -12,7 +12,7 @@
 //! ```
 //! use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, contacts};
 //!
-//! let (ring, _offset) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::default())?;
+//! let (ring, _offset) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree())?;
 //! let mut found = Vec::new();
 //! contacts(&ring, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.001, &mut found);
 //! assert!(found.len() >= 3 && found.iter().all(|c| c.normal.z == 1.0));
@@ -35,9 +35,12 @@ pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
 pub use contact::{Contact, ContactMode, NormalFrom};
 pub use error::{MeshError, ShapeError};
 pub use mass::MassProperties;
-pub use mesh::{ClosedReport, ClosestPoint, MeshDistance, TriMesh};
+pub use mesh::{ClosedReport, ClosestPoint, MeshDistance, RepairReport, RepairSettings, TriMesh, WindingNumber};
 pub use narrow::{contacts, contacts_in};
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
-pub use tree::{Builder, Progress, SphereNode, SphereTree, StageCount, TreeSettings};
+pub use tree::{
+    Builder, CachedTree, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree, StageCount, TreeCache, TreeFile, TreeFileError,
+    TreeSettings, grow_to_cover,
+};

@@ -2,7 +2,7 @@
 
 use crate::shape::axis;
 use crate::surface::Surface;
-use crate::{Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeSettings, TriMesh, Vec3};
+use crate::{Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3};
 
 /// A closed mesh about its centre of mass, with its sphere tree.
 #[derive(Clone, Debug)]
@@ -28,13 +28,32 @@ impl PartialEq for MeshShape {
 impl MeshShape {
     /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
     /// tree. Also returns the offset that was subtracted from the vertices (metres).
-    pub fn new(mut mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
+    pub fn new(mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
+        MeshShape::with_tree(mesh, |mesh| SphereTree::build(mesh, settings))
+    }
+
+    /// The same with a tree from the cache where it has one; also returns what is to be said of the cache.
+    pub fn new_cached(mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<(MeshShape, Vec3, Option<String>), MeshError> {
+        let mut note = None;
+        let tree_of = |mesh: &TriMesh| {
+            let cached = SphereTree::build_cached(mesh, settings, cache)?;
+            note = cached.note;
+            Ok(cached.tree)
+        };
+        let (shape, offset) = MeshShape::with_tree(mesh, tree_of)?;
+        Ok((shape, offset, note))
+    }
+
+    fn with_tree(mut mesh: TriMesh, tree_of: impl FnOnce(&TriMesh) -> Result<SphereTree, MeshError>) -> Result<(MeshShape, Vec3), MeshError> {
         let report = mesh.check_closed()?;
-        let offset = mesh.mass_properties(1.0).center_of_mass;
+        let overlaps = report.crossing_faces > 0 || report.shells > 1;
+        let mass = if overlaps { mesh.union_mass_properties(1.0) } else { mesh.mass_properties(1.0) };
+        let offset = mass.center_of_mass;
         let mesh = mesh.translated(&-offset);
         // what rounding left of the offset is not worth a second shift
-        let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mesh.mass_properties(1.0) };
-        let tree = SphereTree::build(&mesh, settings)?;
+        let mass = if overlaps { mass } else { mesh.mass_properties(1.0) };
+        let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mass };
+        let tree = tree_of(&mesh)?;
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
         let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);
         let surface = Surface::new(&mesh, &tree);
@@ -112,7 +131,7 @@ impl CylinderShape {
         // the prism is around the cylinder, so that its tree covers the true surface
         let outer = radius / nalgebra::ComplexField::cos(std::f64::consts::PI / SIDES as f64);
         let mesh = TriMesh::cylinder(outer, half_length, SIDES);
-        let tree = SphereTree::build(&mesh, &TreeSettings::default())?;
+        let tree = SphereTree::build(&mesh, &TreeSettings::octree())?;
         let error = tree.outward_error();
         let (outer_radius, outer_half_length) = (outer + error, half_length + error);
         Ok(CylinderShape { radius, half_length, mesh, tree, outer_radius, outer_half_length })

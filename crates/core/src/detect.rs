@@ -4,7 +4,7 @@ use crate::collidable::ContactFrame;
 use crate::settings::Settings;
 use crate::site::Site;
 use crate::view::{Entry, Mode, ObjectId, Table};
-use tumble_collide::{Aabb, BroadPhase, Contact, ContactMode, NormalFrom, Vec3};
+use tumble_collide::{BroadPhase, Contact, ContactMode, NormalFrom, Vec3};
 
 /// How far two sphere trees look ahead in the `spheres` mode, as a share of the smaller one's radius.
 const TREE_REACH: f64 = 0.02;
@@ -97,11 +97,22 @@ fn gallop(entries: &[(Key, [f64; 3])], key: &Key) -> usize {
 #[derive(Default)]
 pub(crate) struct Scratch {
     proxies: Vec<u32>,
-    boxes: Vec<Aabb>,
     reach: Vec<f64>,
-    moving: Vec<bool>,
+    /// Who has which box of the broad phase: those of the last detection, and of this one. Ascending, as the site table is.
+    filed: Vec<Filed>,
+    gathered: Vec<Filed>,
+    /// Place in `proxies` of every handle.
+    place: Vec<u32>,
     pairs: Vec<[u32; 2]>,
     found: Vec<Contact>,
+}
+
+/// A part that has a box in the broad phase, under a handle.
+#[derive(Clone, Copy)]
+struct Filed {
+    /// Serial and part.
+    who: [u32; 2],
+    handle: u32,
 }
 
 /// What the detector reads.
@@ -120,20 +131,21 @@ impl Detector<'_> {
         out.clear();
         self.gather(horizon);
         let mut pairs = std::mem::take(&mut self.scratch.pairs);
-        self.broad.pairs(&self.scratch.boxes, &self.scratch.moving, &mut pairs);
+        self.broad.pairs(&mut pairs);
+        self.order_by_site(&mut pairs);
         for &[i, j] in &pairs {
             self.narrow(i as usize, j as usize, out);
         }
         self.scratch.pairs = pairs;
     }
 
-    /// One grown box per part that can meet anything.
+    /// One grown box per part that can meet anything, filed in the broad phase.
     fn gather(&mut self, horizon: f64) {
         let s = &mut *self.scratch;
         s.proxies.clear();
-        s.boxes.clear();
         s.reach.clear();
-        s.moving.clear();
+        s.gathered.clear();
+        let mut filed = s.filed.iter().peekable();
         for entry in self.table.iter().filter(|e| e.status.alive && e.status.collidable) {
             let Some(collidable) = entry.object.collidable() else { continue };
             for (part, index) in entry.span.site.clone().enumerate() {
@@ -143,12 +155,41 @@ impl Detector<'_> {
                 let turning = if bound.is_finite() { site.angular_velocity.norm() * bound } else { 0.0 };
                 let gain = horizon * horizon * site.acceleration.norm();
                 let reach = self.settings.drift_tolerance + horizon * (site.velocity.norm() + turning) + gain;
+                let bounds = shape.aabb(&site.pose).grown(reach);
+                let moving = entry.status.mode != Mode::Static;
+                let who = [entry.serial, part as u32];
+                while let Some(gone) = filed.next_if(|f| f.who < who) {
+                    self.broad.remove(gone.handle);
+                }
+                let handle = match filed.next_if(|f| f.who == who) {
+                    Some(known) => {
+                        self.broad.set(known.handle, &bounds, moving);
+                        known.handle
+                    }
+                    None => self.broad.insert(&bounds, moving),
+                };
                 s.proxies.push(index as u32);
-                s.boxes.push(shape.aabb(&site.pose).grown(reach));
                 s.reach.push(reach);
-                s.moving.push(entry.status.mode != Mode::Static);
+                s.gathered.push(Filed { who, handle });
             }
         }
+        filed.for_each(|gone| self.broad.remove(gone.handle));
+        std::mem::swap(&mut s.filed, &mut s.gathered);
+    }
+
+    /// Pairs of handles as pairs of places in `proxies`, ascending: what the broad phase remembers does not show. Already in order, as a rule.
+    fn order_by_site(&mut self, pairs: &mut [[u32; 2]]) {
+        let s = &mut *self.scratch;
+        let handles = s.filed.iter().map(|f| f.handle as usize + 1).max().unwrap_or(0);
+        s.place.resize(handles.max(s.place.len()), 0);
+        for (place, filed) in s.filed.iter().enumerate() {
+            s.place[filed.handle as usize] = place as u32;
+        }
+        for pair in pairs.iter_mut() {
+            let [i, j] = pair.map(|handle| s.place[handle as usize]);
+            *pair = [i.min(j), i.max(j)];
+        }
+        pairs.sort_unstable();
     }
 
     fn narrow(&mut self, i: usize, j: usize, out: &mut Vec<Touch>) {

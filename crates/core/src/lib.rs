@@ -44,7 +44,7 @@ pub use object::{
 };
 pub use rigid::{BodyError, RigidBody};
 pub use row_builder::RowBuilder;
-pub use settings::{Integrator, Settings, SettingsError, StepReport};
+pub use settings::{Integrator, OutOfReach, Settings, SettingsError, StepReport};
 pub use site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
 pub use step::{Backtracking, Frame, STEPPERS, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;

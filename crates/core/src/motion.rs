@@ -44,7 +44,7 @@ impl Motion<'_> {
         let (pinned, pinned_sites) = (self.pinned, &mut *self.pinned_sites);
         self.table.for_each_mut(|e| {
             refresh(e, x, sites);
-            if !pinned.is_empty() && e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity()) {
+            if !pinned.is_empty() && e.moves() {
                 refresh(e, pinned, pinned_sites);
             }
         });

@@ -91,7 +91,8 @@ pub trait Integratable {
     /// Positions move with generalized velocity `v` for `h` seconds; exact on rotations. Momentum stays.
     fn drift(&self, x: &mut [f64], v: &[f64], h: f64);
     /// Positions move by `h·v`, a displacement and no motion: kinetic energy stays, and linear momentum to second order at least. [`drift`](Self::drift)
-    /// where the state holds momenta; an object whose state holds velocities carries them along parallel to themselves.
+    /// where the mass matrix is constant; a rigid body that is turned scales its angular momentum, and an object whose state holds velocities carries them
+    /// along parallel to themselves.
     fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
         self.drift(x, v, h);
     }
@@ -109,7 +110,7 @@ pub trait Integratable {
     /// `j = Lᵀ·du`: the generalized impulse that a change of `u` means.
     fn recover(&self, du: &[f64], j: &mut [f64]);
     /// Whether its state holds velocities instead of momenta, because its mass matrix turns with its pose. `time_stepping` then asks for everything that
-    /// pushes it (mass matrix, rows, the velocity before the push) in the middle of the step.
+    /// pushes it (mass matrix, rows, the velocity before the push) in the middle of the step; of others where they meet something, if they do.
     fn holds_velocity(&self) -> bool {
         false
     }

@@ -223,6 +223,12 @@ impl RigidBody {
         numbers.iter().flat_map(|v| v.iter()).try_for_each(|&value| range("a position or velocity", value, true, "finite"))
     }
 
+    /// Twice the kinetic energy of its rotation, J.
+    fn spinning(&self, x: &[f64]) -> f64 {
+        let m = orientation(x).inverse_transform_vector(&vec3(&x[10..]));
+        m.dot(&(self.inertia.inverse * m))
+    }
+
     /// Angular velocity for an orientation and an angular momentum.
     fn omega(&self, q: &Quat, l: &Vec3) -> Vec3 {
         q * (self.inertia.inverse * q.inverse_transform_vector(l))
@@ -403,6 +409,16 @@ impl Integratable for RigidBody {
         add(&mut x[..3], &vec3(&v[3..]), h);
         let turned = rotation::turn(&orientation(x), &vec3(v), h);
         write_orientation(x, &turned);
+    }
+
+    fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
+        let before = self.spinning(x);
+        self.drift(x, v, h);
+        let after = self.spinning(x);
+        if before != after && after > 0.0 {
+            // turned under the momentum that it has, the body has another energy
+            x[10..13].iter_mut().for_each(|l| *l *= (before / after).sqrt());
+        }
     }
 
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {

@@ -7,6 +7,17 @@ use crate::site::Site;
 use crate::view::{Entry, Mode, ObjectId, Table};
 use tumble_collide::Vec3;
 
+/// What a row's velocity is of: rows of one kind in one constraint have one unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowKind {
+    /// Points: metres.
+    Point,
+    /// Rotations: radians.
+    Rotation,
+    /// An object's own coordinates, whatever they are.
+    Coordinate,
+}
+
 /// Collects rows. A row is started with [`row`](Self::row) and then told what it acts on; its velocity is the sum of what it was told.
 ///
 /// ```text
@@ -19,6 +30,8 @@ pub struct RowBuilder<'a> {
     /// Velocity of each row that comes from sides without freedoms (kinematic motion).
     pub(crate) bias: &'a mut Vec<f64>,
     pub(crate) targets: &'a mut Vec<RowTarget>,
+    /// Of each target.
+    pub(crate) kinds: &'a mut Vec<RowKind>,
     pub(crate) table: &'a Table,
     pub(crate) x: &'a [f64],
     pub(crate) sites: &'a [Site],
@@ -48,6 +61,7 @@ impl RowBuilder<'_> {
         self.rows.push_soft(target.set, target.compliance);
         self.bias.push(0.0);
         self.targets.push(target);
+        self.kinds.push(RowKind::Point);
         self
     }
 
@@ -68,12 +82,17 @@ impl RowBuilder<'_> {
         if !self.open(axis.iter()) {
             return self;
         }
+        self.is_of(RowKind::Rotation);
         let [_, b, c] = ContactFrame::new(Vec3::zeros(), *axis).axes;
         self.on_part(table.slots.get(id), part, |row, entry| {
             let p = row.sites[entry.span.site.start + part].position();
             row.point_side(entry, part, &(p + b), &[c], sign) && row.point_side(entry, part, &p, &[c], -sign)
         });
         self
+    }
+
+    fn is_of(&mut self, kind: RowKind) {
+        self.kinds.last_mut().into_iter().for_each(|last| *last = kind);
     }
 
     /// Lets `add` put its side of the row; refuses the row where the object is gone, has no such part, or is a third.
@@ -90,6 +109,7 @@ impl RowBuilder<'_> {
         if !self.open(jacobian.iter()) {
             return self;
         }
+        self.is_of(RowKind::Coordinate);
         let Some(entry) = table.slots.get(id) else {
             self.refuse("a row names an object that is not in the world".into());
             return self;

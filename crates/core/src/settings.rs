@@ -2,6 +2,7 @@
 
 use crate::collidable::Combine;
 use crate::solver::Accuracy;
+use crate::view::ObjectId;
 use tumble_collide::Vec3;
 
 /// How smooth motion is integrated between contacts.
@@ -104,6 +105,17 @@ impl Settings {
     }
 }
 
+/// A joint that could not be closed where it was led.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutOfReach {
+    /// The constraint.
+    pub closure: ObjectId,
+    /// How far it is open, metres; 0 where only its angle is.
+    pub distance: f64,
+    /// The same of its angle, rad, where its distance is not what is furthest off.
+    pub angle: f64,
+}
+
 /// What one frame took and how well it went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepReport {
@@ -129,6 +141,8 @@ pub struct StepReport {
     pub iterations: u32,
     /// Deepest penetration found by the narrow phase, metres.
     pub max_penetration: f64,
+    /// The joint that was furthest open where it cannot be closed; `None` where all could.
+    pub out_of_reach: Option<OutOfReach>,
 }
 
 impl StepReport {

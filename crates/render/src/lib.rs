@@ -31,7 +31,7 @@ mod material;
 mod mesh;
 
 pub use camera::Camera;
-pub use draw::{DebugDraw, Drawing, UnknownOverlay};
+pub use draw::{DebugDraw, Drawing, UnknownOverlay, UpAxis, tree_over_mesh};
 pub use error::RenderError;
 pub use gpu::Renderer;
 pub use image::Image;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
-use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_collide::{Pose, RepairSettings, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble_core::solver::{self, Accuracy};
 use tumble_core::{ArticulatedBody, Closure, Look as CoreLook, ObjectId, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
 
@@ -90,7 +90,8 @@ pub enum BuildError {
 pub type Notes = Vec<String>;
 
 impl SceneFile {
-    /// The world at time 0, and what was mended in its meshes.
+    /// The world at time 0, and what was mended in its meshes. Sphere trees come from the cache that the environment names
+    /// ([`TreeCache::of_environment`]) where it has them.
     ///
     /// # Errors
     /// [`BuildError`]: a mesh is unreadable or open, a body has no volume, a constant is refused.
@@ -177,18 +178,24 @@ impl SceneFile {
             _ => None,
         };
         let wrong = |why: String| BuildError::Mesh { scene: self.file.clone(), mesh: spec.name.clone(), file: file.clone(), why };
-        let mut mesh = self.triangles(spec, &wrong)?;
-        let report = mesh.check_closed().map_err(|e| wrong(e.to_string()))?;
-        notes.extend(report.notes().into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
-        let mut settings = TreeSettings::default();
+        let (mut mesh, lines) = self.triangles(spec, &wrong)?;
+        let told = make_solid(&mut mesh, &lines, spec.repair.then(RepairSettings::default).as_ref()).map_err(&wrong)?;
+        notes.extend(told.into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
+        let mut settings = TreeSettings::octree();
         settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
         settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
-        Shape::mesh(mesh, &settings).map_err(|e| wrong(e.to_string()))
+        let (shape, center, note) = Shape::mesh_cached(mesh, &settings, &TreeCache::of_environment()).map_err(|e| wrong(e.to_string()))?;
+        notes.extend(note.filter(|note| !notes.contains(note)));
+        Ok((shape, center))
     }
 
-    fn triangles(&self, spec: &MeshSpec, wrong: &impl Fn(String) -> BuildError) -> Result<TriMesh, BuildError> {
-        Ok(match &spec.source {
-            MeshSource::File { path, scale } => self.read_mesh(spec, path, wrong)?.scaled(*scale),
+    /// With the file's line of each triangle, where it has any.
+    fn triangles(&self, spec: &MeshSpec, wrong: &impl Fn(String) -> BuildError) -> Result<(TriMesh, Vec<usize>), BuildError> {
+        let made = match &spec.source {
+            MeshSource::File { path, scale } => {
+                let (mesh, lines) = self.read_mesh(spec, path, wrong)?;
+                return Ok((mesh.scaled(*scale), lines));
+            }
             MeshSource::Lathe { profile_m, segments } => {
                 let profile: Vec<(f64, f64)> = profile_m.iter().map(|[r, z]| (*r, *z)).collect();
                 TriMesh::lathe(&profile, *segments as usize).map_err(|e| wrong(e.to_string()))?
@@ -202,17 +209,18 @@ impl SceneFile {
                 TriMesh::capsule(*radius_m, 0.5 * length_m, *segments as usize, (*segments as usize / 4).max(2))
             }
             MeshSource::Box { size_m } => TriMesh::box_(0.5 * Vec3::from(*size_m)),
-        })
+        };
+        Ok((made, Vec::new()))
     }
 
-    fn read_mesh(&self, spec: &MeshSpec, path: &PathBuf, wrong: &impl Fn(String) -> BuildError) -> Result<TriMesh, BuildError> {
+    fn read_mesh(&self, spec: &MeshSpec, path: &PathBuf, wrong: &impl Fn(String) -> BuildError) -> Result<(TriMesh, Vec<usize>), BuildError> {
         let unread = |source| BuildError::MeshFile { scene: self.file.clone(), mesh: spec.name.clone(), file: path.clone(), source };
         let size = std::fs::metadata(path).map_err(unread)?.len();
         if size > MOST_MESH_BYTES {
             return Err(wrong(format!("the file has {size} bytes; the most that is read is {MOST_MESH_BYTES}")));
         }
         let bytes = std::fs::read(path).map_err(unread)?;
-        read_triangles(path, &bytes).map_err(wrong)
+        read_with_lines(path, &bytes).map_err(wrong)
     }
 
     fn body(&self, spec: &BodySpec, meshes: &[(Shape, Vec3)]) -> Result<RigidBody, BuildError> {
@@ -242,18 +250,41 @@ impl SceneFile {
     }
 }
 
+/// Reads OBJ, STL or COLLADA by the file's extension, and makes sure that it is a closed solid
+/// ([`TriMesh::check_closed`]), which is repaired where `repair` says how ([`TriMesh::repair`]). Also returns a sentence
+/// for each thing that was mended or that a user should know. The error names the first triangle that is wrong, and in
+/// an OBJ its line; the caller adds the file's name.
+pub fn read_solid(path: &std::path::Path, bytes: &[u8], repair: Option<&RepairSettings>) -> Result<(TriMesh, Vec<String>), String> {
+    let (mut mesh, lines) = read_with_lines(path, bytes)?;
+    let notes = make_solid(&mut mesh, &lines, repair)?;
+    Ok((mesh, notes))
+}
+
+fn make_solid(mesh: &mut TriMesh, lines: &[usize], repair: Option<&RepairSettings>) -> Result<Vec<String>, String> {
+    let notes = match repair {
+        Some(settings) => mesh.repair(settings).map(|report| report.notes()),
+        None => mesh.check_closed().map(|report| report.notes()),
+    };
+    notes.map_err(|e| e.at_line(lines).to_string())
+}
+
 /// Reads OBJ, STL or COLLADA by the file's extension.
 pub fn read_triangles(path: &std::path::Path, bytes: &[u8]) -> Result<TriMesh, String> {
+    Ok(read_with_lines(path, bytes)?.0)
+}
+
+/// The same with the line of each triangle; none where the format has no lines.
+fn read_with_lines(path: &std::path::Path, bytes: &[u8]) -> Result<(TriMesh, Vec<usize>), String> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     match extension.as_str() {
-        "stl" => TriMesh::from_stl(bytes).map_err(|e| e.to_string()),
+        "stl" => Ok((TriMesh::from_stl(bytes).map_err(|e| e.to_string())?, Vec::new())),
         "obj" => {
             let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is not UTF-8; an OBJ file is text", e.valid_up_to()))?;
-            TriMesh::from_obj(text).map_err(|e| e.to_string())
+            TriMesh::from_obj_with_lines(text).map_err(|e| e.to_string())
         }
         "dae" => {
             let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is not UTF-8; a COLLADA file is text", e.valid_up_to()))?;
-            collada::read(text)
+            Ok((collada::read(text)?, Vec::new()))
         }
         other => Err(format!("the extension is '{other}'; meshes are read from .obj, .stl and .dae")),
     }

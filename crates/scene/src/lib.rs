@@ -84,7 +84,7 @@ mod world;
 
 pub use articulated::ArticulatedSpec;
 pub use body::{BodySpec, MassSpec};
-pub use build::{BuildError, Notes, read_triangles};
+pub use build::{BuildError, Notes, read_solid, read_triangles};
 pub use closure::{ClosureKind, ClosureSpec, PartSpec};
 pub use error::{Invalid, Problem, SceneError};
 pub use file::{MOST_BYTES, SceneFile};

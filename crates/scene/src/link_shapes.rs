@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use tumble_core::articulated::LinkMass;
-use tumble_core::collide::{Pose, Shape, ShapeError, TreeSettings, TriMesh, Vec3};
+use tumble_core::collide::{Pose, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
 
 use crate::body::MassSpec;
 use crate::build::{MOST_MESH_BYTES, read_triangles};
@@ -28,11 +28,12 @@ pub(crate) struct Placed<'s> {
     pub(crate) visible: bool,
 }
 
-/// Makes shapes, and remembers those from files.
+/// Makes shapes, and remembers those from files. Trees come from the cache that the environment names.
 pub(crate) struct ShapeMaker<'m> {
     /// Meshes of the scene as solids, with the place of the centre of each.
     meshes: &'m [(Shape, Vec3)],
     files: BTreeMap<FileKey, Result<(Shape, Vec3), String>>,
+    cache: TreeCache,
     pub(crate) notes: NoteList,
 }
 
@@ -62,7 +63,7 @@ pub(crate) fn make(spec: &ShapeSpec, meshes: &[(Shape, Vec3)]) -> Result<(Shape,
 
 impl<'m> ShapeMaker<'m> {
     pub(crate) fn new(meshes: &'m [(Shape, Vec3)]) -> Self {
-        ShapeMaker { meshes, files: BTreeMap::new(), notes: NoteList::default() }
+        ShapeMaker { meshes, files: BTreeMap::new(), cache: TreeCache::of_environment(), notes: NoteList::default() }
     }
 
     /// All shapes of a link; what may be left out and cannot be read is, with a note. Where no picture of a link can be read its collision shapes
@@ -108,16 +109,12 @@ impl<'m> ShapeMaker<'m> {
 
     fn read(&mut self, path: &Path, scale: [f64; 3], used: Use) -> Result<(Shape, Vec3), String> {
         let mesh = stretched(read_file(path)?, scale);
-        let settings = match used {
-            Use::Drawing => TreeSettings { depth: 1, error: 1.0, ..TreeSettings::default() },
-            Use::Collision | Use::Hull => TreeSettings::default(),
-        };
         if used != Use::Hull {
-            if let Ok(made) = Shape::mesh(mesh.clone(), &settings) {
+            if let Ok(made) = self.solid(mesh.clone(), used) {
                 return Ok(made);
             }
             if used == Use::Drawing
-                && let Ok(made) = Shape::mesh(scales(&mesh), &settings)
+                && let Ok(made) = self.solid(scales(&mesh), used)
             {
                 return Ok(made);
             }
@@ -125,11 +122,21 @@ impl<'m> ShapeMaker<'m> {
             self.notes.add(path.display().to_string(), format!("its surface is not closed, so its convex hull {does}"));
         }
         let hull = mesh.convex_hull().map_err(|e| e.to_string())?;
-        Shape::mesh(hull, &settings).map_err(|e| e.to_string())
+        self.solid(hull, used).map_err(|e| e.to_string())
+    }
+
+    /// With the coarsest tree for what is only drawn, else with one from the cache.
+    fn solid(&mut self, mesh: TriMesh, used: Use) -> Result<(Shape, Vec3), ShapeError> {
+        if used == Use::Drawing {
+            return Shape::mesh(mesh, &TreeSettings { depth: 1, error: 1.0, ..TreeSettings::octree() });
+        }
+        let (shape, center, note) = Shape::mesh_cached(mesh, &TreeSettings::octree(), &self.cache)?;
+        note.into_iter().for_each(|note| self.notes.add("sphere trees", note));
+        Ok((shape, center))
     }
 }
 
-fn read_file(path: &Path) -> Result<TriMesh, String> {
+pub(crate) fn read_file(path: &Path) -> Result<TriMesh, String> {
     let unread = |error: std::io::Error| format!("cannot be read: {error}");
     let size = std::fs::metadata(path).map_err(unread)?.len();
     if size > MOST_MESH_BYTES {
@@ -139,7 +146,7 @@ fn read_file(path: &Path) -> Result<TriMesh, String> {
 }
 
 /// Scaled along each axis; a mirrored mesh is turned outside out again.
-fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
+pub(crate) fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
     let scale = Vec3::from(scale);
     mesh.vertices.iter_mut().for_each(|v| v.component_mul_assign(&scale));
     if scale.product() < 0.0 {

@@ -13,6 +13,9 @@ pub struct MeshSpec {
     pub name: String,
     /// Where its triangles come from.
     pub source: MeshSource,
+    /// Whether holes, fins and other defects that keep it from being a solid are repaired, and told; otherwise they are
+    /// an error.
+    pub repair: bool,
     /// Most levels of its sphere tree, 1 to 9; `None` leaves the choice to the builder.
     pub sphere_tree_depth: Option<u32>,
     /// How far the spheres may reach beyond the surface, as a part of the mesh's diagonal, 1e-4 to 1; `None`
@@ -112,11 +115,12 @@ impl MeshSpec {
             f.give_up();
             return None;
         };
+        let repair = f.flag_or("repair", false);
         let sphere_tree_depth = f.value("sphere_tree_depth").map(|v| f.as_integer("sphere_tree_depth", v, 1..=9));
         let sphere_tree_error = f.optional_number("sphere_tree_error", TREE_ERROR);
         let source = MeshSource::read(&mut f, kind, folder);
         f.finish();
-        Some(MeshSpec { name: name.to_owned(), source: source?, sphere_tree_depth, sphere_tree_error })
+        Some(MeshSpec { name: name.to_owned(), source: source?, repair, sphere_tree_depth, sphere_tree_error })
     }
 }
 

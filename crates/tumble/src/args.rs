@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use tumble::collide::Builder;
 use tumble::render::DebugDraw;
 use tumble::scene::{Integrator, Solver, Stepper};
 
@@ -19,6 +20,9 @@ pub enum Command {
     Run(RunOptions),
     /// Check scenes, URDF robots and meshes; nothing is run.
     Check(CheckOptions),
+    /// Build a sphere tree around a mesh, or replace a robot's collision geometry by spheres; say how good they are.
+    #[command(name = "spheretree")]
+    SphereTree(SphereTreeOptions),
     /// List the scenes that are shipped.
     Scenes,
 }
@@ -73,6 +77,67 @@ pub struct CheckOptions {
     /// Scene files, folders, names of shipped scenes; .urdf robots; .obj and .stl meshes.
     #[arg(required = true)]
     pub files: Vec<String>,
+    /// Repair meshes that are no solids: holes, fins, inner walls, debris. What was done is told; the file stays as it is.
+    #[arg(long)]
+    pub repair: bool,
+}
+
+#[derive(Args)]
+pub struct SphereTreeOptions {
+    /// A closed mesh: .obj, .stl or .dae.
+    #[arg(required_unless_present = "urdf", conflicts_with = "urdf")]
+    pub mesh: Option<PathBuf>,
+    /// How trees are built.
+    #[arg(long, value_name = "NAME", value_parser = method)]
+    pub method: Option<Builder>,
+    /// Greatest number of children of a ball, 2 to 64.
+    #[arg(long, value_name = "N")]
+    pub branch: Option<u32>,
+    /// Greatest number of subdivisions, 1 to 9.
+    #[arg(long, value_name = "N")]
+    pub depth: Option<u32>,
+    /// Balls that reach at most this far outside are not divided further: a share of the mesh's diagonal, 0.0001 to 1.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub error: Option<f64>,
+    /// Close holes and drop what dangles before building; what was done is said.
+    #[arg(long, conflicts_with = "urdf")]
+    pub repair: bool,
+    /// Write the tree (JSON), or the URDF of spheres.
+    #[arg(long, short, value_name = "FILE", visible_alias = "json")]
+    pub output: Option<PathBuf>,
+    /// Write a picture (PNG) of a level over the mesh.
+    #[arg(long, value_name = "FILE", conflicts_with = "urdf")]
+    pub picture: Option<PathBuf>,
+    /// The level of the picture, the root being 0 (default: the last).
+    #[arg(long, value_name = "N", requires = "picture")]
+    pub level: Option<u32>,
+    /// The axis that is up in the picture.
+    #[arg(long, value_name = "x|y|z", default_value = "z", value_parser = ["x", "y", "z"])]
+    pub up: String,
+    /// Size of the picture, pixels.
+    #[arg(long, value_name = "WxH", default_value = "960x720", value_parser = size)]
+    pub size: (u32, u32),
+    /// Keep built trees in this folder (default: $TUMBLE_CACHE, else the user's cache folder).
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+    /// Build even if the tree was built before, and keep nothing.
+    #[arg(long, conflicts_with = "cache")]
+    pub no_cache: bool,
+    /// Replace the collision geometry of every link of this robot by spheres.
+    #[arg(long, value_name = "ROBOT")]
+    pub urdf: Option<PathBuf>,
+    /// Most spheres per link; a link gets fewer where fewer are as good (default 32).
+    #[arg(long, value_name = "N", requires = "urdf", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub spheres: Option<u32>,
+    /// Also write the spheres for motion planners: yaml (cuRobo) or json (foam, VAMP) beside the output, or a file that ends in .yml or .json.
+    #[arg(long, value_name = "yaml|json|FILE", requires = "urdf", value_parser = planner)]
+    pub planner: Option<PathBuf>,
+    /// More figures, and what the stages of the builder did.
+    #[arg(long, short)]
+    pub verbose: bool,
+    /// Say nothing but errors.
+    #[arg(long, short, conflicts_with = "verbose")]
+    pub quiet: bool,
 }
 
 /// Overlays, or none for an empty word.
@@ -105,6 +170,21 @@ fn frame(text: &str) -> Result<f64, String> {
 fn solver(text: &str) -> Result<Solver, String> {
     let name = if text == "lcp" { "lcp_pyramid" } else { text };
     name.parse().map_err(|e: tumble::scene::UnknownName| e.to_string())
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(text, 1e-4, 1.0)
+}
+
+/// The names are those of the JSON of a tree.
+fn method(text: &str) -> Result<Builder, String> {
+    serde_json::from_value(text.into()).map_err(|e| e.to_string().replace("variant", "method").replace('`', ""))
+}
+
+fn planner(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or(text);
+    if ["yaml", "yml", "json"].contains(&ending) { Ok(path) } else { Err("wanted yaml, json, or a file that ends in .yml, .yaml or .json".into()) }
 }
 
 fn size(text: &str) -> Result<(u32, u32), String> {

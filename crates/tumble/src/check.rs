@@ -3,14 +3,14 @@
 use crate::args::CheckOptions;
 use crate::failure::Failure;
 use std::path::Path;
-use tumble::collide::{Shape, TreeSettings};
-use tumble::scene::{read_triangles, resolve_scene, urdf};
+use tumble::collide::{RepairSettings, Shape, TreeSettings};
+use tumble::scene::{read_solid, resolve_scene, urdf};
 
 /// Checks every file; all are looked at, and the first failure's code is kept.
 pub fn check(options: &CheckOptions) -> Result<(), Failure> {
     let mut outcome = Ok(());
     for file in &options.files {
-        match one(file) {
+        match one(file, options.repair) {
             Ok(said) => println!("{file}: {said}"),
             Err(failure) => {
                 if let Err(earlier) = std::mem::replace(&mut outcome, Err(failure)) {
@@ -22,10 +22,10 @@ pub fn check(options: &CheckOptions) -> Result<(), Failure> {
     outcome
 }
 
-fn one(file: &str) -> Result<String, Failure> {
+fn one(file: &str, repair: bool) -> Result<String, Failure> {
     let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     match extension.as_str() {
-        "obj" | "stl" => mesh(Path::new(file)),
+        "obj" | "stl" => mesh(Path::new(file), repair),
         "urdf" => robot(Path::new(file)),
         _ => scene(file),
     }
@@ -51,14 +51,13 @@ fn degrees(world: &tumble::core::World) -> usize {
     moving.filter_map(|id| view.span(*id)).map(|span| span.v.len()).sum()
 }
 
-fn mesh(path: &Path) -> Result<String, Failure> {
+fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
-    let mut mesh = read_triangles(path, &bytes).map_err(wrong)?;
-    let report = mesh.check_closed().map_err(|e| wrong(e.to_string()))?;
-    report.notes().iter().for_each(|note| println!("{}: {note}", path.display()));
+    let (mesh, notes) = read_solid(path, &bytes, repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
+    notes.iter().for_each(|note| println!("{}: {note}", path.display()));
     let (triangles, diagonal) = (mesh.triangles.len(), mesh.diagonal());
-    let (shape, center) = Shape::mesh(mesh, &TreeSettings::default()).map_err(|e| wrong(e.to_string()))?;
+    let (shape, center) = Shape::mesh(mesh, &TreeSettings::octree()).map_err(|e| wrong(e.to_string()))?;
     let error = shape.tree().map_or(0.0, |tree| tree.outward_error());
     Ok(format!(
         "a closed mesh of {triangles} triangles, volume {:.6e} m³, centre of mass ({:.6}, {:.6}, {:.6}) m, sphere tree within {:.3} % of its diagonal",

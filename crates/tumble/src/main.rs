@@ -1,4 +1,4 @@
-//! The `tumble` command: run scenes, check files, list what is shipped.
+//! The `tumble` command: run scenes, check files, build sphere trees, list what is shipped.
 //!
 //! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
 
@@ -7,6 +7,7 @@ mod check;
 mod failure;
 mod progress;
 mod run;
+mod spheretree;
 mod summary;
 
 use args::{Command, Tumble};
@@ -19,6 +20,7 @@ fn main() -> ExitCode {
     let outcome = match Tumble::parse().command {
         Command::Run(options) => run::run(&options),
         Command::Check(options) => check::check(&options),
+        Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),
     };
     match outcome {

@@ -2,6 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Between two plain lines.
@@ -47,6 +48,56 @@ impl Progress {
     pub fn done(self) {
         if let Progress::Bar(bar) = self {
             bar.finish_and_clear();
+        }
+    }
+}
+
+/// Shows what share of a piece of work is done, from whichever thread does it.
+pub enum Share {
+    Quiet,
+    Bar(ProgressBar),
+    Lines { what: String, last: Mutex<Instant> },
+}
+
+/// Parts of a bar.
+const PARTS: f64 = 1000.0;
+
+impl Share {
+    /// For the work named.
+    pub fn new(what: &str, quiet: bool) -> Share {
+        if quiet {
+            return Share::Quiet;
+        }
+        if !std::io::stderr().is_terminal() {
+            return Share::Lines { what: what.to_owned(), last: Mutex::new(Instant::now()) };
+        }
+        let style = ProgressStyle::with_template("{msg} {bar:40} {percent} %  {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar());
+        let bar = ProgressBar::new(PARTS as u64).with_style(style).with_message(what.to_owned());
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Share::Bar(bar)
+    }
+
+    /// Takes the bar away.
+    pub fn done(self) {
+        if let Share::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl tumble::collide::Progress for Share {
+    fn at(&self, share: f64) {
+        match self {
+            Share::Quiet => {}
+            Share::Bar(bar) => bar.set_position((PARTS * share) as u64),
+            Share::Lines { what, last } => {
+                // a line that another thread is about to write is enough
+                let Ok(mut last) = last.try_lock() else { return };
+                if last.elapsed() >= EVERY {
+                    *last = Instant::now();
+                    eprintln!("{what}: {:.0} %", 100.0 * share);
+                }
+            }
         }
     }
 }

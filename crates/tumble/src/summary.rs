@@ -1,7 +1,7 @@
 //! `--summary`: what a run took and how well it went, as JSON.
 
 use serde::Serialize;
-use tumble::core::{Energy, StepReport, World};
+use tumble::core::{Energy, OutOfReach, StepReport, World};
 
 /// The whole summary. Units stand in the names; quaternions are `x, y, z, w`.
 #[derive(Serialize)]
@@ -23,6 +23,9 @@ pub struct Summary {
     unconverged_solves: u64,
     rays: u64,
     max_penetration_m: f64,
+    /// Furthest that a joint was open where it could not be closed, and its name; 0 and none where all could.
+    out_of_reach_max_m: f64,
+    out_of_reach: Option<String>,
     tries_mean: f64,
     tries_max: u32,
     floor_hits: u64,
@@ -57,6 +60,7 @@ pub struct Tally {
     unconverged: u64,
     rays: u64,
     penetration: f64,
+    out_of_reach: Option<OutOfReach>,
     tries: u64,
     tries_max: u32,
     floor_hits: u64,
@@ -74,6 +78,8 @@ impl Tally {
         self.unconverged += report.unconverged as u64;
         self.rays += report.rays as u64;
         self.penetration = self.penetration.max(report.max_penetration);
+        let further = |o: &OutOfReach| self.out_of_reach.is_none_or(|worst| o.distance > worst.distance);
+        self.out_of_reach = report.out_of_reach.filter(further).or(self.out_of_reach);
         self.tries += report.tries as u64;
         self.tries_max = self.tries_max.max(report.tries);
         self.floor_hits += report.floor_hits as u64;
@@ -111,6 +117,8 @@ impl Tally {
             unconverged_solves: self.unconverged,
             rays: self.rays,
             max_penetration_m: self.penetration,
+            out_of_reach_max_m: self.out_of_reach.map_or(0.0, |o| o.distance),
+            out_of_reach: self.out_of_reach.and_then(|o| Some(world.object(o.closure)?.name().to_string())),
             tries_mean: self.per_step(self.tries),
             tries_max: self.tries_max,
             floor_hits: self.floor_hits,
@@ -145,6 +153,9 @@ impl Summary {
             "contacts {:.1} a frame (at most {}); residual at most {:.1e} m/s ({} solves unconverged, {} rays); penetration at most {:.2e} m\n",
             self.contacts_mean, self.contacts_max, self.solver_residual_max_m_per_s, self.unconverged_solves, self.rays, self.max_penetration_m
         );
+        if let Some(name) = &self.out_of_reach {
+            text += &format!("'{name}' was led out of reach: {:.3} m open at most\n", self.out_of_reach_max_m);
+        }
         if self.tries_max > 0 {
             text += &format!("tries {:.1} a frame (at most {}); {} floor hits\n", self.tries_mean, self.tries_max, self.floor_hits);
         }

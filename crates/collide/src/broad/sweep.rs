@@ -1,143 +1,179 @@
-//! Sweep and prune along one axis, with temporal coherence.
+//! Sweep and prune that uses coherence: what has not moved much is not looked at again.
 //!
-//! Boxes are kept sorted by their least coordinate on one axis. Between two steps the order barely changes,
-//! so an insertion sort of the old order is near O(n). A sweep in that order meets each box's successors
-//! until one begins beyond its end. Source: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6;
-//! Cohen et al., *I-COLLIDE* (1995). Departures: one axis only; unbounded boxes are kept aside, since
-//! they would overlap everything on the axis.
+//! | list | holds | changes |
+//! |---|---|---|
+//! | `tight` | the boxes as they were given, and `rounded` the same in short | when they are set |
+//! | `fat` | each box with some room around it | when the box has left it |
+//! | `cells` | space in cells, each with the fat boxes that reach it ([`Cells`]) | with the fat boxes |
+//! | `near` | the pairs of fat boxes that overlap | with the fat boxes |
+//!
+//! Every pair of boxes that overlap is a pair of fat boxes that do, so the answer is `near`, each pair compared by its tight boxes: linear
+//! in the boxes that are set and in what is near. A box that left its fat box is filed anew, and meets what lies in its cells.
+//! If many have, all cells are made anew and swept: near O(n) too, as a cell holds a few dozen boxes.
+//!
+//! Boxes that are not set cost nothing. What is remembered changes the speed alone, never the answer.
+//! Sources: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6, for coherence; fat boxes go back to Verlet's neighbour lists (1967).
 
-use super::BroadPhase;
-use crate::{Aabb, Vec3};
+use super::cells::{Cells, Entry};
+use super::fat::{Fat, Guess, Rounded, pair};
+use super::{BroadPhase, NOWHERE, proper};
+use crate::Aabb;
 
-/// Sorted-axis broad phase. What it remembers changes its speed only, never its answer.
+/// Room of a fat box in every direction, as a share of the box's smallest extent.
+const ROOM: f64 = 0.1;
+/// Everything is filed anew when one box in so many has left its fat box.
+const CROWD: usize = 4;
+
+/// The default broad phase.
 #[derive(Clone, Debug, Default)]
 pub struct SweepAndPrune {
-    /// Bounded boxes, ascending by `min[axis]` at the last call.
-    order: Vec<u32>,
-    /// Boxes with an infinite side.
-    unbounded: Vec<u32>,
-    axis: usize,
-    calls: u32,
-    /// This call's bounded boxes in that order, side by side in memory: the sweep reads nothing else.
-    sorted: Vec<Entry>,
+    tight: Vec<Aabb>,
+    rounded: Vec<Rounded>,
+    fat: Vec<Fat>,
+    state: Vec<State>,
+    /// Boxes to be filed anew.
+    changed: Vec<u32>,
+    /// Handles that no box has, and how many boxes there are.
+    free: Vec<u32>,
+    count: usize,
+    cells: Cells,
+    /// Ascending, as [`pair`] writes them.
+    near: Vec<u64>,
+    /// Working memory.
+    fresh: Vec<u64>,
 }
 
-/// A bounded box, the sweep's axis first, and whose it is.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    min: [f64; 3],
-    max: [f64; 3],
-    index: u32,
+/// What else is known of a handle.
+#[derive(Clone, Copy, Debug, Default)]
+struct State {
+    taken: bool,
     moving: bool,
+    /// It is among those changed.
+    changed: bool,
 }
-
-impl Entry {
-    fn new(bounds: &Aabb, axis: usize, index: u32, moving: bool) -> Entry {
-        let turned = |v: &Vec3| [v[axis], v[(axis + 1) % 3], v[(axis + 2) % 3]];
-        Entry { min: turned(&bounds.min), max: turned(&bounds.max), index, moving }
-    }
-
-    /// On the two axes that are not swept; `&`, not `&&`: four comparisons cost less than one branch that is guessed
-    /// wrong.
-    fn overlaps_across(&self, other: &Entry) -> bool {
-        (self.min[1] <= other.max[1])
-            & (other.min[1] <= self.max[1])
-            & (self.min[2] <= other.max[2])
-            & (other.min[2] <= self.max[2])
-    }
-}
-
-/// The axis is chosen anew once in so many calls.
-const AXIS_PERIOD: u32 = 64;
 
 impl BroadPhase for SweepAndPrune {
-    fn pairs(&mut self, boxes: &[Aabb], moving: &[bool], out: &mut Vec<[u32; 2]>) {
-        out.clear();
-        self.update_members(boxes);
-        self.update_axis(boxes);
-        self.sort(boxes, moving);
-        self.sweep(out);
-        self.meet_unbounded(boxes, moving, out);
-        out.sort_unstable();
+    fn insert(&mut self, bounds: &Aabb, moving: bool) -> u32 {
+        let handle = self.free.pop().unwrap_or_else(|| {
+            self.tight.push(NOWHERE);
+            self.rounded.push(Rounded::new(&NOWHERE));
+            self.fat.push(Fat::NOWHERE);
+            self.state.push(State::default());
+            self.tight.len() as u32 - 1
+        });
+        self.count += 1;
+        self.state[handle as usize].taken = true;
+        self.set(handle, bounds, moving);
+        handle
+    }
+
+    fn set(&mut self, handle: u32, bounds: &Aabb, moving: bool) {
+        let i = handle as usize;
+        let Some(state) = self.state.get_mut(i).filter(|s| s.taken) else { return };
+        self.tight[i] = proper(bounds);
+        self.rounded[i] = Rounded::new(&self.tight[i]);
+        if !state.changed && (state.moving != moving || !self.fat[i].holds(&self.tight[i])) {
+            state.changed = true;
+            self.changed.push(handle);
+        }
+        state.moving = moving;
+    }
+
+    fn remove(&mut self, handle: u32) {
+        let i = handle as usize;
+        let Some(state) = self.state.get_mut(i).filter(|s| s.taken) else { return };
+        if !state.changed {
+            self.changed.push(handle);
+        }
+        *state = State { taken: false, moving: false, changed: true };
+        self.tight[i] = NOWHERE;
+        self.rounded[i] = Rounded::new(&NOWHERE);
+        self.free.push(handle);
+        self.count -= 1;
+    }
+
+    fn pairs(&mut self, out: &mut Vec<[u32; 2]>) {
+        if CROWD * self.changed.len() > self.count || self.cells.is_worn() {
+            self.file_all();
+        } else if !self.changed.is_empty() {
+            self.file_changed();
+        }
+        self.compare(out);
     }
 }
 
 impl SweepAndPrune {
-    /// Drops boxes that are gone or became unbounded, appends those that are new.
-    fn update_members(&mut self, boxes: &[Aabb]) {
-        let bounded = |i: u32| boxes.get(i as usize).is_some_and(is_bounded);
-        self.order.retain(|&i| bounded(i));
-        self.unbounded.clear();
-        self.unbounded.extend((0..boxes.len() as u32).filter(|&i| !bounded(i)));
-        if self.order.len() + self.unbounded.len() != boxes.len() {
-            self.order.clear();
-            self.order.extend((0..boxes.len() as u32).filter(|&i| bounded(i)));
-            self.calls = 0;
+    /// Fat boxes, cells and near pairs of everything.
+    fn file_all(&mut self) {
+        self.changed.clear();
+        self.state.iter_mut().for_each(|s| s.changed = false);
+        for ((fat, tight), state) in self.fat.iter_mut().zip(&self.tight).zip(&self.state) {
+            *fat = Fat::around(tight, ROOM, state.moving, fat);
         }
+        let entries = self.fat.iter().enumerate().map(|(i, fat)| Entry { fat: *fat, handle: i as u32 });
+        self.near.clear();
+        self.cells.build(entries, &mut self.near);
+        self.near.sort_unstable();
     }
 
-    /// Sweeps along the axis on which the centres are spread most.
-    fn update_axis(&mut self, boxes: &[Aabb]) {
-        if self.calls.is_multiple_of(AXIS_PERIOD) {
-            let best = widest_axis(boxes, &self.order);
-            if best != self.axis || self.calls == 0 {
-                self.axis = best;
-                self.order.sort_by(|&i, &j| boxes[i as usize].min[best].total_cmp(&boxes[j as usize].min[best]));
-            }
+    /// The near pairs that overlap indeed. Every pair is written and only then counted or not: whether they do is anybody's guess.
+    fn compare(&self, out: &mut Vec<[u32; 2]>) {
+        out.clear();
+        out.resize(self.near.len(), [0; 2]);
+        let mut count = 0;
+        for pair in &self.near {
+            let [i, j] = [(pair >> 32) as u32, *pair as u32];
+            out[count] = [i, j];
+            let (a, b) = (&self.rounded[i as usize], &self.rounded[j as usize]);
+            let overlap = match a.overlaps(b) {
+                Guess::Perhaps => self.tight[i as usize].overlaps(&self.tight[j as usize]),
+                guess => guess == Guess::Yes,
+            };
+            count += usize::from(overlap);
         }
-        self.calls = self.calls % AXIS_PERIOD + 1;
+        out.truncate(count);
     }
 
-    /// Insertion sort of the old order: linear when it is nearly right.
-    fn sort(&mut self, boxes: &[Aabb], moving: &[bool]) {
-        let (axis, sorted) = (self.axis, &mut self.sorted);
-        sorted.clear();
-        sorted.extend(self.order.iter().map(|&i| Entry::new(&boxes[i as usize], axis, i, moving[i as usize])));
-        for n in 1..sorted.len() {
-            let (item, mut hole) = (sorted[n], n);
-            while hole > 0 && sorted[hole - 1].min[0] > item.min[0] {
-                sorted[hole] = sorted[hole - 1];
-                hole -= 1;
-            }
-            sorted[hole] = item;
+    /// The same, where only the changed boxes have to be looked at. A box is told of those that were filed before it.
+    fn file_changed(&mut self) {
+        let SweepAndPrune { tight, fat, state, changed, cells, near, fresh, .. } = self;
+        let mut count = 0;
+        for n in 0..near.len() {
+            let pair = near[n];
+            near[count] = pair;
+            count += usize::from(!(state[(pair >> 32) as usize].changed | state[pair as u32 as usize].changed));
         }
-        self.order.iter_mut().zip(sorted).for_each(|(i, entry)| *i = entry.index);
-    }
-
-    fn sweep(&self, out: &mut Vec<[u32; 2]>) {
-        for (n, a) in self.sorted.iter().enumerate() {
-            for b in self.sorted[n + 1..].iter().take_while(|b| b.min[0] <= a.max[0]) {
-                if a.overlaps_across(b) & (a.moving | b.moving) {
-                    out.push([a.index.min(b.index), a.index.max(b.index)]);
+        near.truncate(count);
+        fresh.clear();
+        changed.sort_unstable_by_key(|&handle| (cells.home(handle), handle));
+        for &handle in changed.iter() {
+            let i = handle as usize;
+            let old = fat[i];
+            fat[i] = Fat::around(&tight[i], ROOM, state[i].moving, &old);
+            state[i].changed = false;
+            cells.refile(handle, &old, &fat[i], |other| {
+                if !state[other as usize].changed {
+                    fresh.push(pair(handle, other));
                 }
-            }
+            });
         }
+        changed.clear();
+        fresh.sort_unstable();
+        merge(near, fresh);
     }
+}
 
-    fn meet_unbounded(&self, boxes: &[Aabb], moving: &[bool], out: &mut Vec<[u32; 2]>) {
-        for (n, &i) in self.unbounded.iter().enumerate() {
-            self.order.iter().for_each(|&j| push_if_overlapping(boxes, moving, i, j, out));
-            self.unbounded[n + 1..].iter().for_each(|&j| push_if_overlapping(boxes, moving, i, j, out));
+/// Works `fresh` into `list`; both ascend.
+fn merge(list: &mut Vec<u64>, fresh: &[u64]) {
+    let mut from = list.len();
+    list.resize(list.len() + fresh.len(), 0);
+    let mut to = list.len();
+    for &pair in fresh.iter().rev() {
+        while from > 0 && list[from - 1] > pair {
+            (from, to) = (from - 1, to - 1);
+            list[to] = list[from];
         }
+        to -= 1;
+        list[to] = pair;
     }
-}
-
-fn is_bounded(b: &Aabb) -> bool {
-    (0..3).all(|k| b.min[k].is_finite() && b.max[k].is_finite())
-}
-
-fn push_if_overlapping(boxes: &[Aabb], moving: &[bool], i: u32, j: u32, out: &mut Vec<[u32; 2]>) {
-    let (a, b) = (i as usize, j as usize);
-    if (moving[a] || moving[b]) && boxes[a].overlaps(&boxes[b]) {
-        out.push([i.min(j), i.max(j)]);
-    }
-}
-
-/// The axis with the greatest variance of the boxes' centres (twice the centre, the factor does not matter).
-fn widest_axis(boxes: &[Aabb], order: &[u32]) -> usize {
-    let n = order.len().max(1) as f64;
-    let centers = || order.iter().map(|&i| boxes[i as usize].min + boxes[i as usize].max);
-    let mean = centers().sum::<Vec3>() / n;
-    let variance = centers().map(|c| (c - mean).component_mul(&(c - mean))).sum::<Vec3>();
-    (0..3).fold(0, |best, k| if variance[k] > variance[best] { k } else { best })
 }

@@ -4,6 +4,8 @@
 //! each is a non-manifold edge with a well-defined volume, which is accepted and told.
 
 use super::TriMesh;
+use super::shells::shells;
+use super::union::Boundary;
 use crate::{MeshError, Vec3};
 
 /// What [`TriMesh::check_closed`] found and did.
@@ -23,8 +25,17 @@ pub struct ClosedReport {
     pub nonmanifold_edges: usize,
     /// Connected pieces of the surface.
     pub shells: usize,
-    /// Volume, m³.
+    /// Of these, how many lay outside all others and were turned outwards by themselves.
+    pub turned_shells: usize,
+    /// Faces that cross or touch others that are no neighbours (at least so many, where `crossing_capped`).
+    pub crossing_faces: usize,
+    /// Whether the search for those faces ended early, because they are too many.
+    pub crossing_capped: bool,
+    /// Volume of the solid that the surface goes around at least once, m³.
     pub volume: f64,
+    /// The share of the surface's area that could not be told to be the solid's boundary or not, 0 to 1. It is taken as
+    /// boundary; volume and mass are not exact then.
+    pub doubtful: f64,
 }
 
 impl ClosedReport {
@@ -37,15 +48,28 @@ impl ClosedReport {
             (self.flipped_faces, "faces were reversed to agree with their neighbours"),
             (self.nonmanifold_edges, "edges have four or more faces (accepted: the volume is well defined)"),
         ];
-        let mut notes: Vec<String> =
-            counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        let mut notes: Vec<String> = counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
         if self.turned {
             notes.push("the mesh was inside out and was turned".into());
         }
-        if self.shells > 1 {
+        if self.turned_shells > 0 {
+            notes.push(format!("{} shells were inside out and were turned", self.turned_shells));
+        }
+        if self.crossing_faces > 0 {
+            let least = if self.crossing_capped { "at least " } else { "" };
             notes.push(format!(
-                "the surface has {} separate shells; where they overlap the mass counts more than once",
-                self.shells
+                "{least}{} faces cross or touch others (accepted by winding number: the solid is what the surface goes around at \
+                 least once)",
+                self.crossing_faces
+            ));
+        }
+        if self.shells > 1 {
+            notes.push(format!("the surface has {} separate shells; the solid is their union", self.shells));
+        }
+        if self.doubtful > 0.0 {
+            notes.push(format!(
+                "{:.2} % of the surface crosses too many faces to be cut; volume, mass and depths there are not exact",
+                100.0 * self.doubtful
             ));
         }
         notes
@@ -81,15 +105,21 @@ impl TriMesh {
         let groups = edge_groups(&mesh);
         refuse_unbalanced(&groups, &face_of)?;
         report.nonmanifold_edges = groups.iter().filter(|g| g.len() > 2).count();
-        report.shells = count_shells(&mesh, &groups);
+        let (shell, count) = shells(&mesh, &groups);
+        report.shells = count;
         mesh = mesh.compacted();
-        report.volume = mesh.signed_volume();
-        if report.volume.abs() <= 1e-12 * mesh.diagonal().powi(3) {
-            return Err(MeshError::NoVolume { volume: report.volume });
-        }
-        if report.volume < 0.0 {
+        report.turned = mesh.signed_volume() < 0.0;
+        if report.turned {
             mesh.turn();
-            (report.turned, report.volume) = (true, -report.volume);
+        }
+        report.turned_shells = mesh.turn_shells(&shell, count);
+        let (boundary, _) = Boundary::of(&mesh);
+        report.crossing_faces = boundary.crossing_faces;
+        report.crossing_capped = boundary.capped;
+        report.doubtful = boundary.doubtful_area / mesh.area();
+        report.volume = boundary.moments(&mesh.middle()).volume;
+        if report.volume <= 1e-12 * mesh.diagonal().powi(3) {
+            return Err(MeshError::NoVolume { volume: report.volume });
         }
         Ok((mesh, report))
     }
@@ -101,14 +131,12 @@ impl TriMesh {
 
     /// Lets every triangle name the first in use of the vertices at the same place; also returns how many others
     /// there were. The vertices stay.
-    fn with_shared_vertices(&self) -> (TriMesh, usize) {
+    pub(super) fn with_shared_vertices(&self) -> (TriMesh, usize) {
         let mut order: Vec<u32> = self.triangles.iter().flatten().copied().collect();
         order.sort_unstable();
         order.dedup();
         let key = |v: u32| self.vertices[v as usize].map(|x| x + 0.0);
-        let compare = |a: &Vec3, b: &Vec3| {
-            (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
-        };
+        let compare = |a: &Vec3, b: &Vec3| (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal);
         order.sort_by(|&u, &v| compare(&key(u), &key(v)).then(u.cmp(&v)));
         let mut stands_for: Vec<u32> = (0..self.vertices.len() as u32).collect();
         let mut merged = 0;
@@ -133,7 +161,7 @@ impl TriMesh {
     }
 
     /// Keeps the triangles of which `keep` says so, and their numbers in `face_of`; returns how many went.
-    fn retain_faces(&mut self, face_of: &mut Vec<usize>, keep: impl Fn(usize) -> bool) -> usize {
+    pub(super) fn retain_faces(&mut self, face_of: &mut Vec<usize>, keep: impl Fn(usize) -> bool) -> usize {
         let before = self.triangles.len();
         let kept: Vec<usize> = (0..before).filter(|&t| keep(t)).collect();
         self.triangles = kept.iter().map(|&t| self.triangles[t]).collect();
@@ -141,7 +169,7 @@ impl TriMesh {
         before - kept.len()
     }
 
-    fn drop_degenerate(&mut self, collinear_too: bool, face_of: &mut Vec<usize>) -> usize {
+    pub(super) fn drop_degenerate(&mut self, collinear_too: bool, face_of: &mut Vec<usize>) -> usize {
         let before = self.clone();
         self.retain_faces(face_of, |t| {
             let ([i, j, k], [a, b, c]) = (before.triangles[t], before.corners(t));
@@ -153,13 +181,12 @@ impl TriMesh {
     }
 
     /// Drops a face that has the same corners in the same sense as an earlier one.
-    fn drop_duplicates(&mut self, face_of: &mut Vec<usize>) -> usize {
+    pub(super) fn drop_duplicates(&mut self, face_of: &mut Vec<usize>) -> usize {
         let smallest_first = |t: [u32; 3]| {
             let k = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
             [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
         };
-        let mut order: Vec<([u32; 3], usize)> =
-            self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
+        let mut order: Vec<([u32; 3], usize)> = self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
         order.sort_unstable();
         let mut repeats = vec![false; order.len()];
         order.windows(2).filter(|w| w[0].0 == w[1].0).for_each(|w| repeats[w[1].1] = true);
@@ -168,7 +195,7 @@ impl TriMesh {
 
     /// Spreads the winding of each shell's first face over edges of two faces, then turns each shell that was changed
     /// outwards.
-    fn unify_winding(&mut self) -> usize {
+    pub(super) fn unify_winding(&mut self) -> usize {
         let groups = edge_groups(self);
         let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.triangles.len()];
         for group in groups.iter().filter(|g| g.len() == 2) {
@@ -243,14 +270,16 @@ pub(crate) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
     uses.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)).map(<[EdgeUse]>::to_vec).collect()
 }
 
-fn unbalanced(groups: &[Vec<EdgeUse>]) -> impl Iterator<Item = &Vec<EdgeUse>> {
+pub(super) fn unbalanced(groups: &[Vec<EdgeUse>]) -> impl Iterator<Item = &Vec<EdgeUse>> {
     groups.iter().filter(|g| 2 * g.iter().filter(|u| u.forward).count() != g.len())
 }
 
 /// `face_of` gives the numbers that faces have for the user.
 fn refuse_unbalanced(groups: &[Vec<EdgeUse>], face_of: &[usize]) -> Result<(), MeshError> {
     let bad: Vec<&Vec<EdgeUse>> = unbalanced(groups).collect();
-    let Some(first) = bad.first() else { return Ok(()) };
+    if bad.is_empty() {
+        return Ok(());
+    }
     let open: Vec<EdgeUse> = bad.iter().filter(|g| g.len() == 1).map(|g| g[0]).collect();
     if let Some(shared) = bad.iter().find(|g| g.len() > 1) {
         // the dangling face is the one at this edge that also has an open edge
@@ -265,13 +294,14 @@ fn refuse_unbalanced(groups: &[Vec<EdgeUse>], face_of: &[usize]) -> Result<(), M
         });
     }
     let loops = joined(open.len(), |a, b| touches(&open[a], &open[b]));
+    let first = (0..open.len()).min_by_key(|&n| face_of[open[n].face]).unwrap_or(0);
     Err(MeshError::Open {
         edges: open.len(),
         holes: loops.iter().enumerate().filter(|(n, l)| n == *l).count(),
-        first_hole: loops.iter().filter(|l| **l == loops[0]).count(),
-        from: first[0].low + 1,
-        to: first[0].high + 1,
-        face: face_of[first[0].face] + 1,
+        first_hole: loops.iter().filter(|l| **l == loops[first]).count(),
+        from: open[first].low + 1,
+        to: open[first].high + 1,
+        face: face_of[open[first].face] + 1,
     })
 }
 
@@ -295,23 +325,4 @@ fn joined(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
         }
     }
     group
-}
-
-/// How many pieces the surface has, connected over edges.
-pub(crate) fn count_shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> usize {
-    let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
-    fn root(parent: &mut [usize], mut f: usize) -> usize {
-        while parent[f] != f {
-            parent[f] = parent[parent[f]];
-            f = parent[f];
-        }
-        f
-    }
-    for group in groups {
-        for pair in group.windows(2) {
-            let (a, b) = (root(&mut parent, pair[0].face), root(&mut parent, pair[1].face));
-            parent[a.max(b)] = a.min(b);
-        }
-    }
-    (0..parent.len()).filter(|&f| parent[f] == f).count()
 }

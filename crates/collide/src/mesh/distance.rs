@@ -1,17 +1,21 @@
-//! Signed distance to a closed mesh.
+//! Signed distance to the solid of a closed mesh.
 //!
-//! A binary tree of boxes finds the closest triangle; the sign comes from the angle-weighted pseudonormal of the
-//! closest feature. Source: Baerentzen and Aanaes, *Signed distance computation using the angle weighted
-//! pseudonormal* (2005); closest point on a triangle: Ericson, *Real-Time Collision Detection* (2005), §5.1.5. Where
-//! shells overlap, a point within the union may count as outside, never the other way round.
+//! A binary tree of boxes finds the closest piece of the solid's boundary. The sign comes from the angle-weighted
+//! pseudonormal of the closest feature (Baerentzen and Aanaes, *Signed distance computation using the angle weighted
+//! pseudonormal*, 2005); at features next to faces that cross others, or where the surface is pinched, from the
+//! winding number. Closest point on a triangle: Ericson, *Real-Time Collision Detection* (2005), §5.1.5.
+//!
+//! Where shells overlap or the surface crosses itself, the solid is what it goes around at least once: the union.
+//! What of the surface is buried in it is no boundary and is passed over. Faces that cross too many others to be cut
+//! are kept whole: next to those, a point inside may be told less than its depth, never more.
 
 use super::TriMesh;
+use super::boxes::BoxTree;
 use super::check::edge_groups;
+use super::union::{Boundary, Trust};
+use super::winding::WindingNumber;
 use crate::{Aabb, Vec3};
 use nalgebra::ComplexField;
-
-/// Triangles per leaf box.
-const LEAF: usize = 4;
 
 /// The closest point of a mesh to a query point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,44 +33,35 @@ pub struct ClosestPoint {
 pub struct MeshDistance {
     corners: Vec<[Vec3; 3]>,
     ids: Vec<u32>,
-    /// Per triangle: pseudonormals of its face, its edges (k to k+1) and its vertices.
+    /// Per piece: pseudonormals of its face, its edges (k to k+1) and its vertices; those in doubt are zero.
     normals: Vec<[Vec3; 7]>,
-    nodes: Vec<Node>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    bounds: Aabb,
-    /// Leaf: range of triangles. Inner: the left child is the next node, the right one is `second`.
-    first: u32,
-    count: u32,
-    second: u32,
+    tree: BoxTree,
+    /// Where the surface crosses itself, is pinched, or has more than one shell.
+    winding: Option<WindingNumber>,
 }
 
 impl MeshDistance {
     /// Prepares a closed, outward-wound mesh (see [`TriMesh::check_closed`]) of at least one triangle.
     pub fn new(mesh: &TriMesh) -> MeshDistance {
+        let (boundary, winding) = Boundary::of(mesh);
         let normals = pseudonormals(mesh);
-        let mut items: Vec<(Vec3, u32)> =
-            (0..mesh.triangles.len()).map(|t| (mesh.corners(t).iter().sum::<Vec3>() / 3.0, t as u32)).collect();
-        let mut nodes = Vec::new();
-        split(mesh, &mut items, 0, &mut nodes);
-        let ids: Vec<u32> = items.iter().map(|i| i.1).collect();
+        let tree = BoxTree::new(&boundary.pieces.iter().map(|p| p.corners).collect::<Vec<_>>());
+        let sorted: Vec<_> = tree.ids.iter().map(|&n| &boundary.pieces[n as usize]).collect();
         MeshDistance {
-            corners: ids.iter().map(|&t| mesh.corners(t as usize)).collect(),
-            normals: ids.iter().map(|&t| normals[t as usize]).collect(),
-            ids,
-            nodes,
+            corners: sorted.iter().map(|p| p.corners).collect(),
+            normals: sorted.iter().map(|p| trusted(&normals[p.face as usize], p.trust)).collect(),
+            ids: sorted.iter().map(|p| p.face).collect(),
+            tree,
+            winding,
         }
     }
 
-    /// The closest surface point and the signed distance.
+    /// The closest point of the solid's boundary and the signed distance.
     pub fn closest(&self, p: &Vec3) -> ClosestPoint {
         let mut best = (f64::INFINITY, Vec3::zeros(), 0, 0);
         self.search(0, p, &mut best);
         let (square, point, n, feature) = best;
-        let outward = self.normals[n][feature].dot(&(p - point));
-        let sign = if outward < 0.0 { -1.0 } else { 1.0 };
+        let sign = if self.inside(p, &point, &self.normals[n][feature]) { -1.0 } else { 1.0 };
         ClosestPoint { point, signed_distance: sign * square.sqrt(), triangle: self.ids[n] as usize }
     }
 
@@ -77,16 +72,16 @@ impl MeshDistance {
     }
 
     fn search_within(&self, node: usize, p: &Vec3, square: f64, each: &mut dyn FnMut(usize, Vec3, usize)) {
-        let here = &self.nodes[node];
-        // written so that a radius that is not a number finds nothing
-        if !(box_distance_squared(&here.bounds, p) <= square) {
+        let here = &self.tree.nodes[node];
+        let near = box_distance_squared(&here.bounds, p) <= square;
+        if !near {
             return;
         }
         if here.count == 0 {
             self.search_within(node + 1, p, square, each);
             return self.search_within(here.second as usize, p, square, each);
         }
-        for n in here.first as usize..(here.first + here.count) as usize {
+        for n in here.range() {
             let (q, feature) = closest_on_triangle(p, &self.corners[n]);
             if (p - q).norm_squared() <= square {
                 each(self.ids[n] as usize, q, feature);
@@ -94,10 +89,17 @@ impl MeshDistance {
         }
     }
 
+    fn inside(&self, p: &Vec3, closest: &Vec3, pseudonormal: &Vec3) -> bool {
+        match &self.winding {
+            Some(winding) if *pseudonormal == Vec3::zeros() => winding.contains(p),
+            _ => pseudonormal.dot(&(p - closest)) < 0.0,
+        }
+    }
+
     fn search(&self, node: usize, p: &Vec3, best: &mut (f64, Vec3, usize, usize)) {
-        let here = &self.nodes[node];
+        let here = &self.tree.nodes[node];
         if here.count > 0 {
-            for n in here.first as usize..(here.first + here.count) as usize {
+            for n in here.range() {
                 let (q, feature) = closest_on_triangle(p, &self.corners[n]);
                 let square = (p - q).norm_squared();
                 if square < best.0 {
@@ -106,8 +108,7 @@ impl MeshDistance {
             }
             return;
         }
-        let mut children =
-            [node + 1, here.second as usize].map(|c| (box_distance_squared(&self.nodes[c].bounds, p), c));
+        let mut children = [node + 1, here.second as usize].map(|c| (box_distance_squared(&self.tree.nodes[c].bounds, p), c));
         if children[1].0 < children[0].0 {
             children.swap(0, 1);
         }
@@ -119,22 +120,13 @@ impl MeshDistance {
     }
 }
 
-/// Builds the nodes of `items` in pre-order by halving along the longest side. Depth is at most 64 by halving.
-fn split(mesh: &TriMesh, items: &mut [(Vec3, u32)], first: usize, nodes: &mut Vec<Node>) {
-    let bounds = Aabb::around(items.iter().flat_map(|i| mesh.corners(i.1 as usize)));
-    let index = nodes.len();
-    nodes.push(Node { bounds, first: first as u32, count: items.len() as u32, second: 0 });
-    if items.len() <= LEAF {
-        return;
+/// Normals that tell no side are zero.
+fn trusted(normals: &[Vec3; 7], trust: Trust) -> [Vec3; 7] {
+    match trust {
+        Trust::All => *normals,
+        Trust::Face => std::array::from_fn(|k| if k == 0 { normals[0] } else { Vec3::zeros() }),
+        Trust::None => [Vec3::zeros(); 7],
     }
-    let axis = (bounds.max - bounds.min).imax();
-    let half = items.len() / 2;
-    items.select_nth_unstable_by(half, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
-    let (left, right) = items.split_at_mut(half);
-    split(mesh, left, first, nodes);
-    nodes[index].count = 0;
-    nodes[index].second = nodes.len() as u32;
-    split(mesh, right, first + half, nodes);
 }
 
 fn box_distance_squared(b: &Aabb, p: &Vec3) -> f64 {

@@ -8,44 +8,68 @@
 //! of a 3D solid body* (2004).
 
 use super::TriMesh;
+use super::union::Boundary;
 use crate::{MassProperties, Mat3, Vec3};
 
 impl TriMesh {
-    /// Signed volume, m³: positive if the triangles are wound outwards. Means something only for a closed mesh.
+    /// Signed volume, m³: positive if the triangles are wound outwards. Means something only for a closed mesh. What
+    /// the surface goes around twice counts twice.
     pub fn signed_volume(&self) -> f64 {
-        self.moments().0
+        self.moments().volume
     }
 
     /// Mass, centre of mass and inertia of the solid at a uniform `density` (kg/m³). The mesh must be closed and
-    /// wound outwards.
+    /// wound outwards. What the surface goes around twice counts twice; see [`TriMesh::union_mass_properties`].
     pub fn mass_properties(&self, density: f64) -> MassProperties {
-        let (volume, first, second) = self.moments();
-        let center = first / volume;
-        let about_center = second - center * center.transpose() * volume;
-        MassProperties {
-            mass: density * volume,
-            center_of_mass: self.middle() + center,
-            inertia: (Mat3::identity() * about_center.trace() - about_center) * density,
-        }
+        self.moments().mass_properties(&self.middle(), density)
     }
 
-    fn middle(&self) -> Vec3 {
+    /// The same where the surface crosses itself or shells overlap: of all that it goes around at least once, each
+    /// place counted once. Exact up to rounding, but for faces that cross more than 64 others, which count whole.
+    pub fn union_mass_properties(&self, density: f64) -> MassProperties {
+        Boundary::of(self).0.moments(&self.middle()).mass_properties(&self.middle(), density)
+    }
+
+    pub(super) fn middle(&self) -> Vec3 {
         let bounds = self.aabb();
         0.5 * (bounds.min + bounds.max)
     }
 
-    /// `∫ 1`, `∫ x`, `∫ x xᵀ` about the middle of the bounding box.
-    fn moments(&self) -> (f64, Vec3, Mat3) {
-        let o = self.middle();
+    /// About the middle of the bounding box.
+    fn moments(&self) -> Moments {
+        Moments::of((0..self.triangles.len()).map(|t| (self.corners(t), 1.0)), &self.middle())
+    }
+}
+
+/// `∫ 1`, `∫ x`, `∫ x xᵀ` about some origin.
+pub(super) struct Moments {
+    pub volume: f64,
+    first: Vec3,
+    second: Mat3,
+}
+
+impl Moments {
+    /// Of the solid within triangles, each counted so many times.
+    pub fn of(triangles: impl Iterator<Item = ([Vec3; 3], f64)>, origin: &Vec3) -> Moments {
         let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Mat3::zeros());
-        for t in 0..self.triangles.len() {
-            let [a, b, c] = self.corners(t).map(|p| p - o);
-            let d = a.dot(&b.cross(&c));
+        for (corners, weight) in triangles {
+            let [a, b, c] = corners.map(|p| p - origin);
+            let d = weight * a.dot(&b.cross(&c));
             let s = a + b + c;
             volume += d / 6.0;
             first += s * (d / 24.0);
             second += (s * s.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose()) * (d / 120.0);
         }
-        (volume, first, second)
+        Moments { volume, first, second }
+    }
+
+    fn mass_properties(&self, origin: &Vec3, density: f64) -> MassProperties {
+        let center = self.first / self.volume;
+        let about_center = self.second - center * center.transpose() * self.volume;
+        MassProperties {
+            mass: density * self.volume,
+            center_of_mass: origin + center,
+            inertia: (Mat3::identity() * about_center.trace() - about_center) * density,
+        }
     }
 }

@@ -1,17 +1,28 @@
 //! Triangle meshes: reading, checking, generating, integrating, measuring distance to.
 
+mod boxes;
 mod check;
+mod crossing;
 mod distance;
 mod generate;
+mod holes;
 mod hull;
 mod integrals;
 mod obj;
+mod pairing;
+mod repair;
+mod shells;
 mod stl;
+mod union;
+mod winding;
 
 pub use check::ClosedReport;
-pub(crate) use check::{count_shells, edge_groups};
+pub(crate) use check::edge_groups;
 pub use distance::{ClosestPoint, MeshDistance};
 pub(crate) use distance::{closest_on_triangle, pseudonormals};
+pub use repair::{RepairReport, RepairSettings};
+pub(crate) use shells::shells;
+pub use winding::WindingNumber;
 
 use crate::{Aabb, MeshError, Vec3};
 
@@ -41,6 +52,11 @@ impl TriMesh {
     /// Length of the diagonal of the bounding box, metres (0 for an empty mesh).
     pub fn diagonal(&self) -> f64 {
         if self.vertices.is_empty() { 0.0 } else { (self.aabb().max - self.aabb().min).norm() }
+    }
+
+    /// Area of all triangles, m².
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len()).map(|t| self.corners(t)).map(|[a, b, c]| 0.5 * (b - a).cross(&(c - a)).norm()).sum()
     }
 
     /// The same mesh moved by `offset` metres.

@@ -9,6 +9,12 @@ use crate::{MeshError, Vec3};
 impl TriMesh {
     /// Reads the text of an OBJ file. Errors name the line (from 1), and the vertex or face (from 1).
     pub fn from_obj(text: &str) -> Result<TriMesh, MeshError> {
+        Ok(TriMesh::from_obj_with_lines(text)?.0)
+    }
+
+    /// The same, with the line (from 1) of each triangle, for [`MeshError::at_line`]. A polygon of `n` corners is `n − 2`
+    /// triangles.
+    pub fn from_obj_with_lines(text: &str) -> Result<(TriMesh, Vec<usize>), MeshError> {
         let mut mesh = TriMesh::default();
         let mut faces = Vec::new();
         for (n, line) in text.lines().enumerate() {
@@ -25,10 +31,12 @@ impl TriMesh {
                 _ => {}
             }
         }
+        let mut lines = Vec::new();
         for (number, (line, corners)) in faces.iter().enumerate() {
             push_fan(&mut mesh, corners, *line, number + 1)?;
+            lines.resize(mesh.triangles.len(), *line);
         }
-        if mesh.triangles.is_empty() { Err(MeshError::Empty) } else { Ok(mesh) }
+        if mesh.triangles.is_empty() { Err(MeshError::Empty) } else { Ok((mesh, lines)) }
     }
 }
 

@@ -185,7 +185,7 @@ impl<'a> Pass<'a> {
         for (n, end) in ends.iter().enumerate().take(if half_length > 0.0 { 2 } else { 1 }) {
             self.core_point(&self.place(end), radius, n as u32, found);
         }
-        if half_length > 0.0 && self.field.round() {
+        if half_length > 0.0 && !self.field.linear() {
             self.edge(&ends, radius, &[], 0, found);
         }
     }

@@ -29,14 +29,19 @@ pub(super) fn tree_tree(
     let pair = Pair { a, b, a_in_b: pose_b.inv_mul(pose_a) };
     let smaller = a.nodes()[0].radius.min(b.nodes()[0].radius);
     let mut found = Collector::new(margin, smaller, out);
-    pair.visit(0, 0, &mut found);
+    pair.visit(0, &pair.place(0), 0, &mut found);
     found.finish(pose_b);
 }
 
 impl Pair<'_> {
-    fn visit(&self, na: usize, nb: usize, found: &mut Collector) {
+    /// The place of a ball of A as B sees it.
+    fn place(&self, na: usize) -> Vec3 {
+        (self.a_in_b * Point3::from(self.a.nodes()[na].center)).coords
+    }
+
+    /// A pair of balls, A's at `center_a`. It is placed once for all of B's balls that it is held against.
+    fn visit(&self, na: usize, center_a: &Vec3, nb: usize, found: &mut Collector) {
         let (a, b) = (&self.a.nodes()[na], &self.b.nodes()[nb]);
-        let center_a = (self.a_in_b * Point3::from(a.center)).coords;
         // a deep limit leaves nothing of balls that are too small to reach it
         let reach = (a.radius + b.radius + found.limit()).max(0.0);
         if (center_a - b.center).norm_squared() > reach * reach {
@@ -44,11 +49,11 @@ impl Pair<'_> {
         }
         if a.is_leaf() && b.is_leaf() {
             let feature = (na as u64) << 32 | nb as u64;
-            found.push(Contact::between_cores((center_a, a.radius), (b.center, b.radius), feature));
+            found.push(Contact::between_cores((*center_a, a.radius), (b.center, b.radius), feature));
         } else if b.is_leaf() || (!a.is_leaf() && a.radius >= b.radius) {
-            a.child_range().for_each(|child| self.visit(child, nb, found));
+            a.child_range().for_each(|child| self.visit(child, &self.place(child), nb, found));
         } else {
-            b.child_range().for_each(|child| self.visit(na, child, found));
+            b.child_range().for_each(|child| self.visit(na, center_a, child, found));
         }
     }
 }

@@ -14,22 +14,22 @@
 //! may be one that it cannot meet, and the next one is taken.
 
 use super::{Feature, Field, Hit, TOUCHING, facing, opposition};
-use crate::mesh::{closest_on_triangle, count_shells, edge_groups, pseudonormals};
+use crate::mesh::{closest_on_triangle, edge_groups, pseudonormals, shells};
 use crate::{Aabb, MeshDistance, TriMesh, Vec3};
 use arrayvec::ArrayVec;
 
 /// Lists up to this length are not divided.
-const SHORT: usize = 12;
+const SHORT: usize = 16;
 /// At the last level, or far from the surface, lists up to this length are kept.
 const LONG: usize = 96;
-/// Cells up to this far from the surface have lists, as a part of the diagonal.
-const BAND: f64 = 0.01;
+/// The outermost cell reaches this far beyond the mesh, as a part of the diagonal.
+const RIM: f64 = 0.02;
 /// Triangles up to this much further than the closest are listed if they face another way, as a part of the diagonal.
 const AROUND: f64 = 0.01;
 /// Another way: cosine between the normals below this.
 const OTHER_WAY: f64 = 0.5;
 /// Cells are divided down to this half diagonal, in mean lengths of an edge.
-const FINEST: f64 = 0.3;
+const FINEST: f64 = 0.6;
 /// Divisions at most.
 const DEEPEST: f64 = 9.0;
 /// Relative difference of squared distances that is rounding's.
@@ -88,7 +88,6 @@ struct Closest {
 
 struct Builder<'a> {
     field: &'a mut MeshField,
-    band: f64,
     deepest: u32,
 }
 
@@ -105,7 +104,7 @@ impl MeshField {
             cells: vec![Cell { distance: 0.0, children: 0, first: 0, count: 0 }],
             lists: Vec::new(),
             center: 0.5 * (bounds.min + bounds.max),
-            half: 0.5 * (bounds.max - bounds.min).max() + 2.0 * BAND * diagonal,
+            half: 0.5 * (bounds.max - bounds.min).max() + RIM * diagonal,
             bounds,
             boxes: MeshDistance::new(mesh),
             convex: is_convex(mesh),
@@ -118,7 +117,7 @@ impl MeshField {
         let lengths = (0..all.len()).map(|t| { let [a, b, _] = mesh.corners(t); (b - a).norm() });
         let mean = lengths.sum::<f64>() / all.len() as f64;
         let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
-        let mut builder = Builder { field: &mut field, band: BAND * diagonal, deepest };
+        let mut builder = Builder { field: &mut field, deepest };
         builder.cell(0, center, half, &all, 0);
         field
     }
@@ -322,7 +321,7 @@ impl Builder<'_> {
         near.retain(|&(d, t)| d <= least + 2.0 * reach || (d <= least + 2.0 * reach + self.field.around && turned(t)));
         let kept: Vec<u32> = near.iter().map(|n| n.1).collect();
         let full = self.field.cells.len() > MOST_CELLS || self.field.lists.len() + kept.len() > MOST_LISTED;
-        let far = least > 2.0 * reach + self.band;
+        let far = least > 2.0 * reach;
         if kept.len() <= SHORT || depth == self.deepest || far || full {
             if kept.len() <= LONG && !full {
                 self.field.cells[index].first = self.field.lists.len() as u32;
@@ -356,5 +355,5 @@ fn is_convex(mesh: &TriMesh) -> bool {
         let [p, q, r] = mesh.corners(a.face);
         let normal = (q - p).cross(&(r - p)).normalize();
         mesh.corners(b.face).iter().all(|x| normal.dot(&(x - p)) <= slack)
-    }) && count_shells(mesh, &groups) == 1
+    }) && shells(mesh, &groups).1 == 1
 }

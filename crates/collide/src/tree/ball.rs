@@ -1,12 +1,16 @@
-//! Small enclosing balls of points and of balls.
+//! Balls, and small enclosing ones of points.
 //!
 //! Source: Bădoiu and Clarkson, *Smaller core-sets for balls* (2003): step from the centre towards the farthest item,
 //! by a falling share of the way; after `n` steps the radius is within `1/√n` of the least. The ball returned
 //! encloses exactly.
 
+use super::enclose::smallest_around;
+use super::simplex::simplex;
 use crate::{MeshDistance, Vec3};
 
 const STEPS: usize = 100;
+/// Evaluations of each of the two searches for the centre of a ball that lies deep.
+const EVALUATIONS: usize = 40;
 
 /// A ball; metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,27 +52,21 @@ pub(super) fn around_points(points: &[Vec3]) -> Ball {
     best
 }
 
-/// A ball around balls, close to the smallest, grown by a rounding's worth so that containment holds in floating
-/// point.
-pub(super) fn around_balls(balls: &[Ball]) -> Ball {
-    let reach = |center: &Vec3, b: &Ball| (b.center - center).norm() + b.radius;
-    let holding = |center: Vec3| Ball { center, radius: balls.iter().map(|b| reach(&center, b)).fold(0.0, f64::max) };
-    let corners = balls.iter().flat_map(|b| [b.center.add_scalar(-b.radius), b.center.add_scalar(b.radius)]);
-    let bounds = crate::Aabb::around(corners);
-    let mut center = 0.5 * (bounds.min + bounds.max);
-    let mut best = holding(center);
-    for n in 0..STEPS {
-        let Some(far) = balls.iter().max_by(|p, q| reach(&center, p).total_cmp(&reach(&center, q))) else { break };
-        let offset = far.center - center;
-        let length = offset.norm();
-        if length > 0.0 {
-            // the farthest point of that ball
-            center += offset * ((length + far.radius) / length / (n + 2) as f64);
-        }
-        let ball = holding(center);
-        if ball.radius < best.radius {
-            best = ball;
-        }
+/// Of the balls around balls the one that reaches out of the solid least, so far as a search finds it: its centre
+/// lies deeper than that of the smallest.
+pub(super) fn deep_around(balls: &[Ball], distance: &MeshDistance) -> Ball {
+    let smallest = smallest_around(balls);
+    let mut best = (smallest.radius + distance.closest(&smallest.center).signed_distance, smallest);
+    for step in [0.3, -0.1] {
+        let start = best.1.center;
+        simplex(start, step * smallest.radius, EVALUATIONS, |c| {
+            let radius = balls.iter().map(|b| (b.center - c).norm() + b.radius).fold(0.0, f64::max);
+            let outward = radius + distance.closest(c).signed_distance;
+            if outward < best.0 {
+                best = (outward, Ball { center: *c, radius: radius * (1.0 + 1e-12) });
+            }
+            outward
+        });
     }
-    Ball { radius: best.radius * (1.0 + 1e-12), ..best }
+    best.1
 }

@@ -3,6 +3,7 @@
 use super::TreeSettings;
 use super::ball::Ball;
 use crate::{MeshDistance, MeshError, TriMesh};
+use serde::{Deserialize, Serialize};
 
 /// What a builder works on.
 pub(super) struct Job<'a> {
@@ -43,7 +44,8 @@ impl Progress for () {
 }
 
 /// How often a stage of a builder did its work at one level.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StageCount {
     /// Level of the balls that were made, the root being 0.
     pub level: u32,

@@ -12,11 +12,28 @@
 
 mod ball;
 mod builder;
+mod cache;
+mod close;
+mod cut;
+mod enclose;
+mod file;
+mod grid;
+mod hubbard;
+mod levels;
+mod medial;
 mod octree;
+mod quality;
+mod regions;
 mod settings;
+mod simplex;
 mod verify;
 
 pub use builder::{Progress, StageCount};
+pub use cache::{CachedTree, TreeCache};
+pub use cut::grow_to_cover;
+pub use file::{MeshId, TreeFile, TreeFileError};
+pub use levels::LevelBall;
+pub use quality::{LevelQuality, QualitySettings};
 pub use settings::{Builder, TreeSettings};
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
@@ -76,9 +93,12 @@ impl SphereTree {
         let distance = MeshDistance::new(mesh);
         let builder: &dyn TreeBuilder = match settings.builder {
             Builder::Octree => &octree::Octree,
+            Builder::Medial => &medial::Medial,
+            Builder::Hubbard => &hubbard::Hubbard,
+            Builder::Grid => &grid::Grid,
         };
         let built = builder.build(&Job { mesh, distance: &distance, settings, progress })?;
-        let tree = SphereTree::flatten(&built.root, &distance);
+        let tree = SphereTree::flatten(&built.root, &distance, settings.builder != Builder::Octree);
         tree.check_nesting()?;
         tree.check_coverage(mesh)?;
         progress.at(1.0);
@@ -121,7 +141,7 @@ impl SphereTree {
     }
 
     /// Breadth first, so that children are neighbours; a cell with one child is replaced by it.
-    fn flatten(root: &Cell, distance: &MeshDistance) -> SphereTree {
+    fn flatten(root: &Cell, distance: &MeshDistance, deep: bool) -> SphereTree {
         let mut nodes = vec![empty_node(0)];
         let mut cells = vec![skip_single(root)];
         let mut next = 0;
@@ -143,13 +163,18 @@ impl SphereTree {
                         .iter()
                         .map(|c| Ball { center: c.center, radius: c.radius })
                         .collect();
-                    ball::around_balls(&children)
+                    if deep { ball::deep_around(&children, distance) } else { enclose::smallest_around(&children) }
                 }
             };
             nodes[n].center = ball.center;
             nodes[n].radius = ball.radius;
             nodes[n].outward = ball.outward(distance);
         }
+        SphereTree::of_nodes(nodes)
+    }
+
+    /// Of nodes that are already a tree: breadth first, children neighbours.
+    fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()
             .filter(|n| n.is_leaf())

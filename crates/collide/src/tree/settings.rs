@@ -1,9 +1,11 @@
 //! How a sphere tree is to be built.
 
 use crate::MeshError;
+use serde::{Deserialize, Serialize};
 
 /// How a tree is built.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct TreeSettings {
     /// Which method.
     pub builder: Builder,
@@ -20,21 +22,33 @@ pub struct TreeSettings {
 }
 
 /// The methods there are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Builder {
-    /// Cells of an octree that the surface passes through.
-    #[default]
+    /// Cells of an octree that the surface passes through. The fastest, and the one whose flat faces can be even.
     Octree,
+    /// Adaptive medial axis. The tightest.
+    #[default]
+    Medial,
+    /// Hubbard's medial axis: balls of a fixed set of samples, merged. Faster than the adaptive one and coarser.
+    Hubbard,
+    /// Balls of an oriented grid's cubes. Faster still.
+    Grid,
 }
 
 impl Default for TreeSettings {
-    /// Outward error of 1 % of the diagonal, evenly.
+    /// The tightest tree of at most 8, 64 and 512 balls.
     fn default() -> TreeSettings {
-        TreeSettings { builder: Builder::Octree, branch: 8, depth: 7, error: 0.01, even: true }
+        TreeSettings { builder: Builder::Medial, branch: 8, depth: 3, error: 1e-4, even: false }
     }
 }
 
 impl TreeSettings {
+    /// An octree of an outward error of 1 % of the diagonal, evenly.
+    pub fn octree() -> TreeSettings {
+        TreeSettings { builder: Builder::Octree, branch: 8, depth: 7, error: 0.01, even: true }
+    }
+
     pub(super) fn check(&self) -> Result<(), MeshError> {
         if !(2..=64).contains(&self.branch) {
             return Err(MeshError::Settings {

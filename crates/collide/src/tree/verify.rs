@@ -24,13 +24,13 @@ impl SphereTree {
         Ok(())
     }
 
-    /// The leaves cover the surface of `mesh`. A triangle lies in a ball iff its corners do, so each is split 1:4
+    /// The leaves cover the surface of `mesh`. A triangle lies in a ball iff its corners do, so each is halved
     /// until every piece lies in one ball, or is tiny (1e-5 of the diagonal) and each of its corners lies in some
     /// ball.
     pub fn check_coverage(&self, mesh: &TriMesh) -> Result<(), MeshError> {
         let tiny = TINY * mesh.diagonal();
         for t in 0..mesh.triangles.len() {
-            if let Err(point) = self.cover(&mesh.corners(t), tiny, 40) {
+            if let Err(point) = self.cover(&mesh.corners(t), tiny, 80) {
                 let what = format!("triangle {} is not covered near ({}, {}, {})", t + 1, point.x, point.y, point.z);
                 return Err(MeshError::Tree { what });
             }
@@ -50,8 +50,11 @@ impl SphereTree {
                 None => Ok(()),
             };
         }
-        let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
-        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].iter().try_for_each(|t| self.cover(t, tiny, splits - 1))
+        // at the middle of the longest side, so that slivers make few pieces
+        let k = (0..3).find(|&k| (triangle[(k + 1) % 3] - triangle[k]).norm() == size).unwrap_or(0);
+        let [a, b, c] = [0, 1, 2].map(|n| triangle[(k + n) % 3]);
+        let middle = 0.5 * (a + b);
+        [[a, middle, c], [middle, b, c]].iter().try_for_each(|t| self.cover(t, tiny, splits - 1))
     }
 
     /// Whether one leaf below `node` holds all the points. Balls nest, so a node that does not hold them has no such

@@ -3,47 +3,210 @@
 use crate::rng::Rng;
 use tumble_collide::{Aabb, BroadPhase, BruteForce, SweepAndPrune, Vec3};
 
+/// Both broad phases under the same orders.
+#[derive(Default)]
+struct Both {
+    sweep: SweepAndPrune,
+    brute: BruteForce,
+    /// Handle here and there, box, moving.
+    filed: Vec<(u32, u32, Aabb, bool)>,
+}
+
+impl Both {
+    fn insert(&mut self, bounds: Aabb, moving: bool) {
+        self.filed.push((self.sweep.insert(&bounds, moving), self.brute.insert(&bounds, moving), bounds, moving));
+    }
+
+    fn set(&mut self, n: usize, bounds: Aabb, moving: bool) {
+        let filed = &mut self.filed[n];
+        (filed.2, filed.3) = (bounds, moving);
+        self.sweep.set(filed.0, &bounds, moving);
+        self.brute.set(filed.1, &bounds, moving);
+    }
+
+    fn remove(&mut self, n: usize) {
+        let (here, there, ..) = self.filed.swap_remove(n);
+        self.sweep.remove(here);
+        self.brute.remove(there);
+    }
+
+    /// The pairs of both, which must be the same boxes; how many they are.
+    fn check(&mut self, what: &str) -> usize {
+        let (mut found, mut expected) = (Vec::new(), Vec::new());
+        self.sweep.pairs(&mut found);
+        self.brute.pairs(&mut expected);
+        assert!(found.is_sorted() && found.iter().all(|[i, j]| i < j), "{what}: not in order");
+        // the two may number boxes differently
+        let mut names = vec![u32::MAX; self.filed.iter().map(|f| f.1 as usize + 1).max().unwrap_or(0)];
+        self.filed.iter().for_each(|f| names[f.1 as usize] = f.0);
+        for pair in &mut expected {
+            *pair = pair.map(|there| names[there as usize]);
+            pair.sort_unstable();
+        }
+        expected.sort_unstable();
+        assert_eq!(found, expected, "{what}");
+        found.len()
+    }
+}
+
+fn block(center: Vec3, half: Vec3) -> Aabb {
+    Aabb { min: center - half, max: center + half }
+}
+
+/// Mostly blocks; sometimes a huge one, a flat one, a point, one with infinite sides, one that is not a number, one turned inside out.
+fn any_box(rng: &mut Rng, space: f64) -> Aabb {
+    let (center, half) = (rng.vec(space), rng.vec(0.5).abs());
+    let mut b = block(center, half);
+    let k = rng.below(3);
+    match rng.below(24) {
+        0 => b = block(center, half * 20.0),
+        1 => b = block(center, Vec3::new(20.0, 20.0, 0.01)),
+        2 => b = block(center, Vec3::zeros()),
+        3 => (b.min, b.max[k]) = (Vec3::repeat(f64::NEG_INFINITY), f64::INFINITY),
+        4 => b.max[k] = f64::INFINITY,
+        5 => b.min[k] = f64::NAN,
+        6 => b.max[k] = f64::NAN,
+        7 => std::mem::swap(&mut b.min, &mut b.max),
+        8 => b = block(center * 1e300, Vec3::repeat(1e300)),
+        9 => b = block(center * 1e-300, Vec3::repeat(1e-310)),
+        10 => b = Aabb::around([]),
+        _ => {}
+    }
+    b
+}
+
+fn moved(b: &Aabb, by: Vec3) -> Aabb {
+    Aabb { min: b.min + by, max: b.max + by }
+}
+
 #[test]
-fn sweep_and_prune_equals_brute_force_over_random_walks() {
+fn equals_brute_force_over_random_histories() {
     let mut total = 0;
-    for seed in 0..20 {
+    for seed in 0..40 {
         let mut rng = Rng::new(seed);
-        let mut sweep = SweepAndPrune::default();
-        let mut world: Vec<(Aabb, bool)> = Vec::new();
-        let (mut expected, mut found) = (Vec::new(), Vec::new());
-        for _ in 0..150 {
-            change(&mut rng, &mut world);
-            let boxes: Vec<Aabb> = world.iter().map(|w| w.0).collect();
-            let moving: Vec<bool> = world.iter().map(|w| w.1).collect();
-            BruteForce.pairs(&boxes, &moving, &mut expected);
-            sweep.pairs(&boxes, &moving, &mut found);
-            assert_eq!(expected, found, "seed {seed}");
-            total += found.len();
+        let mut both = Both::default();
+        let space = [2.0, 4.0, 8.0][rng.below(3)];
+        let most = [3, 30, 300][rng.below(3)];
+        for step in 0..120 {
+            // quiet stretches, where few leave their fat boxes, and wild ones
+            let speed = [0.0, 0.002, 0.02, 1.0][step / 8 % 4];
+            for n in 0..both.filed.len() {
+                let (_, _, bounds, moving) = both.filed[n];
+                match rng.below(200) {
+                    0 => both.set(n, any_box(&mut rng, space), moving),
+                    1 => both.set(n, bounds, !moving),
+                    _ if moving => both.set(n, moved(&bounds, rng.vec(speed)), moving),
+                    _ => {}
+                }
+            }
+            for _ in 0..rng.below(most / 8 + 2) {
+                if both.filed.len() < most {
+                    let moving = rng.below(3) > 0;
+                    both.insert(any_box(&mut rng, space), moving);
+                }
+            }
+            for _ in 0..rng.below(3) {
+                if !both.filed.is_empty() {
+                    both.remove(rng.below(both.filed.len()));
+                }
+            }
+            if rng.below(60) == 0 {
+                (0..both.filed.len()).rev().for_each(|n| both.remove(n));
+            }
+            if rng.below(4) > 0 {
+                total += both.check(&format!("seed {seed}, step {step}"));
+            }
+        }
+    }
+    assert!(total > 100_000, "only {total} overlaps were met");
+}
+
+#[test]
+fn a_crowd_that_travels_is_followed() {
+    // the cells are cut and left behind as it goes: 4,000 boxes that move 30 times their own size
+    let mut rng = Rng::new(7);
+    let mut both = Both::default();
+    (0..4000).for_each(|_| both.insert(block(rng.vec(4.0), Vec3::repeat(0.15)), true));
+    let mut total = 0;
+    for step in 0..60 {
+        // one in ten at a time: too few for all to be filed anew
+        for n in (0..4000).filter(|n| n % 10 == step % 10) {
+            let bounds = moved(&both.filed[n].2, Vec3::new(1.5, 0.2, 0.0));
+            both.set(n, bounds, true);
+        }
+        if step % 6 == 5 {
+            total += both.check(&format!("step {step}"));
         }
     }
     assert!(total > 10_000, "only {total} overlaps were met");
 }
 
-fn change(rng: &mut Rng, world: &mut Vec<(Aabb, bool)>) {
-    for (b, _) in world.iter_mut() {
-        let step = rng.vec(0.2);
-        b.min += step;
-        b.max += step;
+#[test]
+fn many_boxes_in_one_place_all_meet() {
+    let mut both = Both::default();
+    (0..200).for_each(|_| both.insert(block(Vec3::zeros(), Vec3::repeat(0.5)), true));
+    assert_eq!(both.check("all at once"), 200 * 199 / 2);
+    (0..100).for_each(|_| both.insert(block(Vec3::repeat(0.1), Vec3::repeat(0.5)), true));
+    assert_eq!(both.check("more of them"), 300 * 299 / 2);
+    (0..250).for_each(|_| both.remove(0));
+    assert_eq!(both.check("fewer"), 50 * 49 / 2);
+}
+
+#[test]
+fn boxes_that_touch_are_a_pair_and_what_does_not_move_is_not() {
+    let mut both = Both::default();
+    for x in 0..100 {
+        both.insert(block(Vec3::new(f64::from(x), 0.0, 0.0), Vec3::repeat(0.5)), x % 3 == 0);
     }
-    for _ in 0..rng.below(4) {
-        let (center, half) = (rng.vec(4.0), rng.vec(1.0).abs());
-        let mut b = Aabb { min: center - half, max: center + half };
-        if rng.below(15) == 0 {
-            b = Aabb {
-                min: Vec3::repeat(f64::NEG_INFINITY),
-                max: Vec3::new(f64::INFINITY, f64::INFINITY, rng.vec(3.0).x),
-            };
+    // 99 neighbours touch; of them those between x = 1 and 2, 4 and 5 and so on do not move: 33
+    assert_eq!(both.check("a row"), 99 - 33);
+}
+
+#[test]
+fn the_answer_does_not_tell_the_history() {
+    let mut rng = Rng::new(3);
+    let mut old = SweepAndPrune::default();
+    let mut boxes: Vec<Aabb> = (0..500).map(|_| any_box(&mut rng, 4.0)).collect();
+    for b in &boxes {
+        old.insert(b, true);
+    }
+    let (mut found, mut fresh) = (Vec::new(), Vec::new());
+    for step in 0..50 {
+        for (i, b) in boxes.iter_mut().enumerate() {
+            *b = moved(b, rng.vec(0.01));
+            old.set(i as u32, b, true);
         }
-        let place = rng.below(world.len() + 1);
-        world.insert(place, (b, rng.below(3) > 0));
+        old.pairs(&mut found);
+        let mut new = SweepAndPrune::default();
+        for b in &boxes {
+            new.insert(b, true);
+        }
+        new.pairs(&mut fresh);
+        assert_eq!(found, fresh, "step {step}");
+        assert!(found.len() > 100);
     }
-    if !world.is_empty() && rng.below(3) == 0 {
-        let gone = rng.below(world.len());
-        world.swap_remove(gone);
-    }
+}
+
+#[test]
+fn nothing_and_handles_of_nobody() {
+    let mut sweep = SweepAndPrune::default();
+    let mut found = vec![[0, 1]];
+    sweep.pairs(&mut found);
+    assert!(found.is_empty());
+    let b = block(Vec3::zeros(), Vec3::repeat(1.0));
+    sweep.remove(3);
+    sweep.set(3, &b, true);
+    let (first, second) = (sweep.insert(&b, true), sweep.insert(&b, true));
+    sweep.pairs(&mut found);
+    assert_eq!(found, [[first, second]]);
+    sweep.remove(first);
+    sweep.remove(first);
+    sweep.set(first, &b, true);
+    sweep.pairs(&mut found);
+    assert!(found.is_empty());
+    // taken out and given again before anybody asked
+    sweep.remove(second);
+    let (third, fourth) = (sweep.insert(&b, false), sweep.insert(&b, true));
+    sweep.pairs(&mut found);
+    assert_eq!(found, [[third.min(fourth), third.max(fourth)]]);
 }

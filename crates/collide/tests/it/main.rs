@@ -1,13 +1,21 @@
 //! One binary for all integration tests of the crate.
 
 mod against_parry;
+mod bad_meshes;
 mod broad;
+mod builders;
+mod debug;
 mod hull;
+mod medial;
 mod mesh_contacts;
 mod meshes;
 mod primitives;
+mod quality;
 mod rng;
 mod shared_meshes;
 mod surface;
 mod surface_parry;
+mod tree_cache;
+mod tree_file;
 mod trees;
+mod winding;

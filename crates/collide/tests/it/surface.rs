@@ -18,7 +18,7 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> 
 }
 
 fn mesh_box(x: f64, y: f64, z: f64) -> Shape {
-    Shape::mesh(TriMesh::box_(Vec3::new(x, y, z)), &TreeSettings::default()).unwrap().0
+    Shape::mesh(TriMesh::box_(Vec3::new(x, y, z)), &TreeSettings::octree()).unwrap().0
 }
 
 fn turned(z: f64, angle: f64) -> Pose {
@@ -164,7 +164,7 @@ fn a_cylinder_on_a_block_touches_as_on_a_plane() {
 #[test]
 fn a_ball_in_a_groove_touches_both_sides() {
     // two blocks turned by 45° make a groove; here one concave mesh would do as well: a ring's hole and a ball in it
-    let (ring, _) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::default()).unwrap();
+    let (ring, _) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree()).unwrap();
     let ball = Shape::sphere(0.9).unwrap();
     // the ball sits on the hole: its centre is (0.9 + 0.25) from the tube's middle circle
     let height = (1.15_f64.powi(2) - 1.0).sqrt();

@@ -34,7 +34,7 @@ fn sample(name: &str, mesh: &TriMesh, tree: &SphereTree) {
 fn public_meshes_get_tight_trees() {
     for name in ["bunny", "spot", "torus", "panda_link5", "fandisk", "cow"] {
         let Some(mesh) = solid(name) else { return };
-        let tree = SphereTree::build(&mesh, &TreeSettings::default()).unwrap();
+        let tree = SphereTree::build(&mesh, &TreeSettings::octree()).unwrap();
         let relative: Vec<f64> = (0..tree.levels()).map(|l| tree.outward_error_at(l) / mesh.diagonal()).collect();
         let count = tree.leaves().count();
         eprintln!("{name}: {count} leaves, {} balls, error per level {relative:.4?}", tree.nodes().len());
@@ -57,7 +57,7 @@ fn generated_solids_get_tight_trees() {
         TriMesh::torus(1.0, 0.3, 48, 24),
     ];
     for mesh in meshes {
-        let tree = SphereTree::build(&mesh, &TreeSettings::default()).unwrap();
+        let tree = SphereTree::build(&mesh, &TreeSettings::octree()).unwrap();
         let count = tree.leaves().count();
         eprintln!(
             "{} faces: {count} leaves, error {:.4}",
@@ -72,7 +72,7 @@ fn generated_solids_get_tight_trees() {
 #[test]
 fn coverage_check_notices_a_hole() {
     // a tree of a smaller torus does not cover a larger one
-    let settings = TreeSettings { error: 0.02, ..TreeSettings::default() };
+    let settings = TreeSettings { error: 0.02, ..TreeSettings::octree() };
     let tree = SphereTree::build(&TriMesh::torus(1.0, 0.3, 48, 24), &settings).unwrap();
     assert!(matches!(tree.check_coverage(&TriMesh::torus(1.2, 0.3, 48, 24)), Err(MeshError::Tree { .. })));
 }
@@ -81,8 +81,8 @@ fn coverage_check_notices_a_hole() {
 fn settings_out_of_range_are_refused() {
     let mesh = TriMesh::box_(Vec3::repeat(1.0));
     for settings in [
-        TreeSettings { depth: 0, ..TreeSettings::default() },
-        TreeSettings { error: f64::NAN, ..TreeSettings::default() },
+        TreeSettings { depth: 0, ..TreeSettings::octree() },
+        TreeSettings { error: f64::NAN, ..TreeSettings::octree() },
     ] {
         assert!(matches!(SphereTree::build(&mesh, &settings), Err(MeshError::Settings { .. })));
     }
@@ -99,11 +99,11 @@ fn hard_meshes_and_fine_settings_still_cover() {
         TriMesh::torus(1.0, 0.01, 64, 8),
     ];
     for mesh in meshes {
-        let tree = SphereTree::build(&mesh, &TreeSettings::default()).unwrap();
+        let tree = SphereTree::build(&mesh, &TreeSettings::octree()).unwrap();
         eprintln!("{} leaves, error {:.4}", tree.leaves().count(), tree.outward_error() / mesh.diagonal());
         assert!(tree.outward_error() < 0.03 * mesh.diagonal());
     }
-    let fine = TreeSettings { error: 0.001, depth: 9, ..TreeSettings::default() };
+    let fine = TreeSettings { error: 0.001, depth: 9, ..TreeSettings::octree() };
     let mesh = TriMesh::torus(1.0, 0.3, 64, 32);
     assert!(SphereTree::build(&mesh, &fine).unwrap().outward_error() < 0.0011 * mesh.diagonal());
 }
@@ -112,7 +112,7 @@ fn hard_meshes_and_fine_settings_still_cover() {
 fn an_uneven_tree_is_tighter_on_the_mean() {
     let mesh = TriMesh::torus(1.0, 0.3, 48, 24);
     let mean = |even| {
-        let tree = SphereTree::build(&mesh, &TreeSettings { even, ..TreeSettings::default() }).unwrap();
+        let tree = SphereTree::build(&mesh, &TreeSettings { even, ..TreeSettings::octree() }).unwrap();
         tree.leaves().map(|l| l.outward).sum::<f64>() / tree.leaves().count() as f64 / mesh.diagonal()
     };
     assert!((mean(true) - 0.01).abs() < 1e-6);

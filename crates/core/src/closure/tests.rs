@@ -63,11 +63,11 @@ impl Pairing {
     }
 
     fn tell(&self, rows_of: impl FnOnce(&WorldView, &mut RowBuilder)) -> Told {
-        let (mut rows, mut bias, mut targets, mut problem) = (Rows::default(), Vec::new(), Vec::new(), None);
+        let (mut rows, mut bias, mut targets, mut kinds, mut problem) = (Rows::default(), Vec::new(), Vec::new(), Vec::new(), None);
         rows.clear(self.dof);
         let view = WorldView { time: 0.0, gravity: Vec3::zeros(), implicit: true, x: &self.x, sites: &self.sites, table: &self.table };
         let mut out = RowBuilder {
-            rows: &mut rows, bias: &mut bias, targets: &mut targets, table: &self.table, x: &self.x, sites: &self.sites, problem: &mut problem,
+            rows: &mut rows, bias: &mut bias, targets: &mut targets, kinds: &mut kinds, table: &self.table, x: &self.x, sites: &self.sites, problem: &mut problem,
             owner: ObjectId::default(),
         };
         rows_of(&view, &mut out);

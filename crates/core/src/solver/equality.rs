@@ -115,6 +115,12 @@ impl Equalities {
     }
 }
 
+/// The smallest pivot of a pivoted Cholesky factor of `k`, `e × e`, among rows that do not depend on others to one part in 1e8; `None` where there is none.
+pub(crate) fn smallest_pivot(k: &[f64], e: usize) -> Option<f64> {
+    let factor = Equalities::new(k, e, 1e-8);
+    (0..factor.rank()).map(|p| factor.column(p)[factor.order[p]].powi(2)).reduce(f64::min)
+}
+
 fn add_multiple(x: &[f64], scale: f64, to: &mut [f64]) {
     to.iter_mut().zip(x).for_each(|(to, x)| *to += scale * x);
 }

@@ -14,6 +14,7 @@ mod six;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use equality::smallest_pivot;
 pub use gauss_seidel::GaussSeidel;
 pub use island::Islands;
 pub use lcp::{LcpPyramid, LcpSliding, UNKNOWNS};

@@ -24,7 +24,7 @@ use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, p
 use super::hold::{self, Held};
 use super::impact::{self, Candidate};
 use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
-use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection};
+use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection, reach};
 use crate::detect::Touch;
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
@@ -101,15 +101,14 @@ impl Backtracking {
         detect(core, left, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
-        let hold = core.settings.stabilize_positions;
-        let drifted = |t: &RowTarget| if closing::is_joint(t) { hold && off(-t.error.abs()) } else { t.set == RowSet::HalfLine && off(t.error) };
+        let drifted = |t: &RowTarget| t.set == RowSet::HalfLine && off(t.error);
         if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
             projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance)?;
             core.motion().refresh();
             detect(core, left, &mut self.work.touches);
         }
         let recovery = core.settings.recovery_speed * left;
-        self.kept = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
+        self.kept = reach::left(&self.work, |i| self.work.targets[i].error, recovery);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
         core.motion().evaluate(time, &mut self.work.dp);

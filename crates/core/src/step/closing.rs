@@ -17,7 +17,8 @@
 //! joints: two hinges of a door agree about its axis only where both are closed, and rows taken beside that place would hold the door fast.
 
 use super::Workspace;
-use super::contacts::{displace, lay_rows, push, row_velocities, whiten, zero};
+use super::contacts::{lay_rows, push, row_velocities, shift, unwhiten_onto, whiten, zero};
+use super::reach;
 use crate::object::{Integratable, Level, RowTarget};
 use crate::rows::{RowSet, Rows};
 use crate::solver::{Accuracy, DIRECT_ROWS, GaussSeidel, RowSolver};
@@ -35,9 +36,11 @@ const SWEEPS: u32 = 25;
 const FINEST: f64 = 1e-12;
 /// A round that leaves more of the error than this is the last of its kind.
 const SLOW: f64 = 0.2;
-/// Compliance of rows that are off by a metre, as a share of their own response, and the most that is taken. What is redundant but for an error
+/// Compliance of rows that are off by a metre, as a share of their response, and the most that is taken. What is redundant but for an error
 /// responds with the square of it, far less, and is left alone; as the error goes so does the compliance (Levenberg and Marquardt).
-const SOFT: (f64, f64) = (10.0, 1e-3);
+const SOFT: (f64, f64) = (10.0, 0.1);
+/// What a round that made things worse multiplies the compliance by, what one that did not divides it by, and where no more is tried.
+const DAMPING: (f64, f64, f64) = (10.0, 3.0, 1e6);
 
 /// Whether a row is held in place.
 pub(super) fn is_joint(t: &RowTarget) -> bool {
@@ -55,14 +58,31 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
-    let outcome = onto(core, &mut rows, level, &errors);
+    // what is open is asked for half-way closer: whether that is out of reach shows here
+    let closer = if core.settings.stabilize_positions { core.settings.recovery_speed * ahead } else { 0.0 };
+    let aims = |closer: f64, rows: &Workspace| reach::left(rows, |i| errors[i], closer);
+    let aim = aims(closer, &rows);
+    let mut far = onto(core, &mut rows, level, &aim);
+    if far.as_ref().is_ok_and(|far| far.is_empty()) && Piece::all(core, &mut rows).iter().any(|p| p.direct() && reach::weak(&rows, &p.rows)) {
+        let mut end = Workspace::default();
+        let middle = core.x.clone();
+        core.motion().coast(ahead);
+        core.motion().refresh();
+        core.time += ahead;
+        lay_rows(core, &mut end, level, None)?;
+        let aim = aims(2.0 * closer, &end);
+        far = onto(core, &mut end, level, &aim);
+        core.x = middle;
+        core.motion().refresh();
+    }
     map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
     core.time = time;
     core.x = start;
     core.pin_again(pinned);
     core.motion().refresh();
     map_sides(core, &mut rows, |body, j, y| body.respond(j, y));
-    outcome.map(|_| (errors, rows))
+    reach::soften(&mut rows, &far?, reach::GIVING);
+    Ok((errors, rows))
 }
 
 /// What moves, in the order of its coordinates, in which it was added too.
@@ -87,8 +107,9 @@ fn map_sides(core: &Core, work: &mut Workspace, map: impl Fn(&dyn Integratable, 
     }
 }
 
-/// Moves the present state to where the joints have the errors given; `probe` has the rows there, sites and caches are those of it.
-fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) -> Result<(), StepError> {
+/// Moves the present state to where the joints have the errors given; `probe` has the rows there, sites and caches are those of it. The rows of joints that
+/// cannot have them, sorted.
+fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) -> Result<Vec<u32>, StepError> {
     let least = 1e-2 * core.settings.contact_tolerance;
     lay_rows(core, probe, level, None)?;
     let mut pieces = Piece::all(core, probe);
@@ -98,22 +119,28 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
         let mut dx = vec![0.0; core.dof];
         for piece in pieces.iter_mut().filter(|p| !p.done) {
             let worst = piece.largest(&off);
+            piece.rounds = piece.rounds.saturating_sub(1);
             if worst > piece.left.0 {
                 piece.copy(&kept, &mut core.x); // it was better before
+                piece.damp();
+                piece.done |= piece.rounds == 0;
+                continue;
             }
-            piece.done = worst > piece.left.0 || worst <= least || piece.rounds == 0;
-            (piece.left.0, piece.rounds) = (worst, piece.rounds.saturating_sub(1));
+            piece.left.0 = worst;
+            piece.done = worst <= least || piece.rounds == 0;
             if !piece.done {
-                soften(&mut probe.rows, &piece.rows, worst);
+                piece.soften(probe, worst);
                 solve(&probe.rows, &piece.rows, &off, &mut dx, 0.1 * least);
             }
         }
         kept.clone_from(&core.x);
-        displace(core, &dx, 1.0);
+        shift(core, &dx, 1.0);
         core.motion().refresh();
         lay_rows(core, probe, level, None)?;
     }
-    Ok(())
+    let mut far: Vec<u32> = pieces.iter().filter(|p| p.direct() && p.left.0 > core.settings.contact_tolerance).flat_map(|p| p.rows.clone()).collect();
+    far.sort_unstable();
+    Ok(far)
 }
 
 /// Closes the joints of `work`, whose rows were built at the state `start`, at the present state, `step.0` seconds later; `step.1` is the level of the
@@ -123,6 +150,7 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
         return Ok(());
     }
     let pushed = pushed(work);
+    let (arrived, mut moved) = (core.x.clone(), vec![0.0; core.dof]);
     let mut pieces = Piece::all(core, work);
     let mut probe = Workspace::default();
     let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
@@ -132,10 +160,10 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
         if pieces.iter().all(|p| p.done) {
             break;
         }
-        let before = core.x.clone();
-        open.newton(core, &mut probe, &pieces);
+        let (before, moved_before) = (core.x.clone(), moved.clone());
+        open.newton(core, &mut probe, &pieces, &mut moved);
         refresh_at(core, start);
-        open.chord(core, work, &pieces);
+        open.chord(core, work, &pieces, &mut moved);
         open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
         let mut worse = false;
         for piece in pieces.iter_mut().filter(|p| !p.done) {
@@ -144,21 +172,32 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
             if was.0 > 1.0 && left.1 > was.1.max(1.0) && !piece.place_first {
                 // with the place rows change, and velocities along them: one after the other
                 piece.copy(&before, &mut core.x);
+                piece.forget(&moved_before, &mut moved);
                 (worse, piece.place_first) = (true, true);
                 continue;
             }
             let share = if was.0 > 1.0 { left.0 / was.0 } else { left.1 / was.1 };
             if share < 1.0 {
                 piece.left = left;
+                piece.damping = (piece.damping / DAMPING.1).max(1.0);
             } else {
                 piece.copy(&before, &mut core.x);
-                (worse, piece.done) = (true, !piece.chord);
+                piece.forget(&moved_before, &mut moved);
+                worse = true;
+                if !piece.chord {
+                    piece.damp();
+                }
             }
             piece.chord &= share < SLOW;
         }
         if worse {
             open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
         }
+    }
+    let far = core.settings.contact_tolerance / open.least.0;
+    for piece in pieces.iter().filter(|p| p.direct() && p.left.0 > far) {
+        reach::go_as_moved(core, &piece.stretches, [start, &arrived], &moved, step.0);
+        reach::report(core, &probe, &piece.rows);
     }
     refresh_at(core, start);
     Ok(())
@@ -169,8 +208,8 @@ struct Piece {
     /// Joints, as indices of blocks; and of constraint rows.
     blocks: Vec<u32>,
     rows: Vec<u32>,
-    /// Its objects' stretches of the state.
-    stretches: Vec<Range<usize>>,
+    /// Its objects' stretches of the state, and of velocities.
+    stretches: Vec<(Range<usize>, Range<usize>)>,
     /// What is open: place, speed.
     left: (f64, f64),
     /// Rounds that may still be taken.
@@ -179,6 +218,8 @@ struct Piece {
     chord: bool,
     /// Whether velocities wait until the place is closed.
     place_first: bool,
+    /// What the compliance of its rows is multiplied by.
+    damping: f64,
     done: bool,
 }
 
@@ -191,17 +232,39 @@ impl Piece {
             let mut starts: Vec<u32> = blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides()).map(|s| s.u).collect();
             starts.sort_unstable();
             starts.dedup();
-            let stretches = starts.iter().filter_map(|u| entry_at(&entries, *u)).map(|e| e.span.x.clone()).collect();
+            let stretches = starts.iter().filter_map(|u| entry_at(&entries, *u)).map(|e| (e.span.x.clone(), e.span.v.clone())).collect();
             let rounds = if blocks.len() > DIRECT_ROWS { FEW_ROUNDS } else { ROUNDS };
             let rows = blocks.iter().map(|b| b - touches as u32).collect();
-            Piece { blocks: blocks.to_vec(), rows, stretches, left: (f64::INFINITY, f64::INFINITY), rounds, chord: true, place_first: false, done: false }
+            let left = (f64::INFINITY, f64::INFINITY);
+            Piece { blocks: blocks.to_vec(), rows, stretches, left, rounds, chord: true, place_first: false, damping: 1.0, done: false }
         };
         work.islands.iter().map(piece).collect()
     }
 
     /// Takes its objects' state over.
     fn copy(&self, from: &[f64], to: &mut [f64]) {
-        self.stretches.iter().for_each(|s| to[s.clone()].copy_from_slice(&from[s.clone()]));
+        self.stretches.iter().for_each(|(x, _)| to[x.clone()].copy_from_slice(&from[x.clone()]));
+    }
+
+    /// The same of how far they were moved.
+    fn forget(&self, from: &[f64], to: &mut [f64]) {
+        self.stretches.iter().for_each(|(_, v)| to[v.clone()].copy_from_slice(&from[v.clone()]));
+    }
+
+    /// Whether it is small enough to be solved directly: what is not may be open because there was too little time.
+    fn direct(&self) -> bool {
+        self.blocks.len() <= DIRECT_ROWS
+    }
+
+    /// Goes shorter ways from now on.
+    fn damp(&mut self) {
+        self.damping *= DAMPING.0;
+        self.done |= self.damping > DAMPING.2;
+    }
+
+    /// Gives its rows, in `probe`, the compliance for such an error: they may not agree.
+    fn soften(&self, probe: &mut Workspace, error: f64) {
+        reach::soften(probe, &self.rows, (SOFT.0 * error).min(SOFT.1) * self.damping);
     }
 
     /// Whether only its place is closed in this round.
@@ -263,20 +326,20 @@ impl Open {
     }
 
     /// A round with the rows of the step, in the caches that they were built with.
-    fn chord(&self, core: &mut Core, work: &Workspace, pieces: &[Piece]) {
+    fn chord(&self, core: &mut Core, work: &Workspace, pieces: &[Piece], moved: &mut [f64]) {
         let touches = work.touches.len();
-        self.apply(core, &work.rows, touches, pieces.iter().filter(|p| !p.done && p.chord).map(|p| (&p.blocks[..], p.moves_first())));
+        self.apply(core, &work.rows, touches, pieces.iter().filter(|p| !p.done && p.chord).map(|p| (&p.blocks[..], p.moves_first())), moved);
     }
 
     /// A round with the rows of the present, where those of the step have got too little done.
-    fn newton(&self, core: &mut Core, probe: &mut Workspace, pieces: &[Piece]) {
+    fn newton(&self, core: &mut Core, probe: &mut Workspace, pieces: &[Piece], moved: &mut [f64]) {
         for piece in pieces.iter().filter(|p| !p.done && !p.chord) {
-            soften(&mut probe.rows, &piece.rows, piece.largest(&self.place));
+            piece.soften(probe, piece.largest(&self.place));
         }
-        self.apply(core, &probe.rows, 0, pieces.iter().filter(|p| !p.done && !p.chord).map(|p| (&p.rows[..], p.moves_first())));
+        self.apply(core, &probe.rows, 0, pieces.iter().filter(|p| !p.done && !p.chord).map(|p| (&p.rows[..], p.moves_first())), moved);
     }
 
-    fn apply<'p>(&self, core: &mut Core, rows: &Rows, touches: usize, pieces: impl Iterator<Item = (&'p [u32], bool)>) {
+    fn apply<'p>(&self, core: &mut Core, rows: &Rows, touches: usize, pieces: impl Iterator<Item = (&'p [u32], bool)>, moved: &mut [f64]) {
         let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
         let mut c = [vec![0.0; rows.len], vec![0.0; rows.len]];
         for (i, block) in rows.blocks[touches..].iter().enumerate() {
@@ -289,7 +352,8 @@ impl Open {
                 }
             }
         }
-        displace(core, &dx, 1.0);
+        unwhiten_onto(core, &dx, moved);
+        shift(core, &dx, 1.0);
         push(core, &dv);
     }
 }
@@ -310,14 +374,6 @@ fn pushed(work: &mut Workspace) -> Vec<bool> {
         }
     }
     pushed
-}
-
-/// Gives rows that may not agree the compliance for such an error.
-fn soften(rows: &mut Rows, blocks: &[u32], error: f64) {
-    for &b in blocks {
-        let own = rows.own(&rows.blocks[b as usize], 0, 0);
-        rows.blocks[b as usize].compliance = (SOFT.0 * error).min(SOFT.1) * own;
-    }
 }
 
 fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64) {

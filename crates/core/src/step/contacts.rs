@@ -4,8 +4,8 @@ use super::closing;
 use super::projection::Projection;
 use crate::detect::{Detector, Touch};
 use crate::motion::coast;
-use crate::object::{Level, RowTarget};
-use crate::row_builder::{RowBuilder, constraints};
+use crate::object::{Integratable, Level, RowTarget};
+use crate::row_builder::{RowBuilder, RowKind, constraints};
 use crate::rows::{RowSet, Rows};
 use crate::site::Site;
 use crate::solver::{Accuracy, Islands, residual};
@@ -23,6 +23,8 @@ pub(crate) struct Workspace {
     pub bias: Vec<f64>,
     /// Targets of the constraints' rows, after those of the touches.
     pub targets: Vec<RowTarget>,
+    /// What each target is of.
+    pub kinds: Vec<RowKind>,
     /// One-sided rows that their constraints locate, at the present state.
     pub limits: Vec<Limit>,
     /// First target of each constraint, and the end.
@@ -137,7 +139,7 @@ pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: 
     lay_touches(core, work);
     let mut problem = None;
     let mut builder = RowBuilder {
-        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, kinds: &mut work.kinds, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
         owner: ObjectId::default(),
     };
     let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
@@ -170,8 +172,9 @@ fn lay_touches(core: &Core, work: &mut Workspace) {
     work.rows.clear(core.dof);
     work.bias.clear();
     work.targets.clear();
+    work.kinds.clear();
     let mut builder = RowBuilder {
-        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut None,
+        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, kinds: &mut work.kinds, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut None,
         owner: ObjectId::default(),
     };
     for touch in &work.touches {
@@ -182,7 +185,7 @@ fn lay_touches(core: &Core, work: &mut Workspace) {
         for (site, point, sign) in [(touch.a, touch.contact.point, 1.0), (touch.b, touch.point_b(), -1.0)] {
             let (owner, index) = (core.owners[site as usize], site as usize);
             let entry = &core.table.slots[owner.id];
-            let pinned = core.pinned_sites().filter(|_| entry.object.integratable().is_some_and(|b| b.holds_velocity()));
+            let pinned = core.pinned_sites().filter(|_| entry.moves());
             // the arm stays as it was found: the lowest point of a ball that spins does not turn with it
             let point = pinned.map_or(point, |sites| point + sites[index].position() - core.sites[index].position());
             builder.sites = pinned.unwrap_or(&core.sites);
@@ -203,7 +206,7 @@ fn adopt(core: &Core, work: &mut Workspace, made: Workspace) {
         }
     }
     work.bias.extend(made.bias);
-    (work.targets, work.first) = (made.targets, made.first);
+    (work.targets, work.kinds, work.first) = (made.targets, made.kinds, made.first);
     make_room(work);
 }
 
@@ -245,7 +248,7 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
     zero(du, core.dof);
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
-        let x = if body.holds_velocity() { core.pinned().unwrap_or(&core.x) } else { &core.x };
+        let x = core.pinned().unwrap_or(&core.x);
         body.whiten(&x[entry.span.x.clone()], &mut u[v.clone()]);
         body.whiten_rate(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
@@ -269,11 +272,11 @@ pub(crate) fn coasting(core: &Core, h: f64) -> Vec<f64> {
 
 /// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
 pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
-    let mut out = vec![0.0; core.dof];
+    let (mut out, x) = (vec![0.0; core.dof], core.pinned().unwrap_or(&core.x));
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
         let mut turning = vec![0.0; v.len()];
-        body.gyroscopic(&core.x[entry.span.x.clone()], &mut turning);
+        body.gyroscopic(&x[entry.span.x.clone()], &mut turning);
         body.whiten_rate(&turning, &mut out[v]);
     }
     out
@@ -306,16 +309,34 @@ pub(crate) fn push(core: &mut Core, du: &[f64]) -> Vec<f64> {
     dp
 }
 
-/// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy.
+/// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy: what overlaps goes apart and takes nothing from it.
 pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
+    each_displaced(core, u, |body, x, v| body.displace(x, v, h));
+}
+
+/// The same along the rows of a step, which is how joints are closed: momenta stay, and what that does to the energy the next step undoes.
+pub(crate) fn shift(core: &mut Core, u: &[f64], h: f64) {
+    each_displaced(core, u, |body, x, v| if body.holds_velocity() { body.displace(x, v, h) } else { body.drift(x, v, h) });
+}
+
+/// `v += L⁻¹·u`.
+pub(crate) fn unwhiten_onto(core: &Core, u: &[f64], v: &mut [f64]) {
     for entry in core.table.iter().filter(|e| e.moves()) {
-        let (Some(body), v) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
-        if v.iter().all(|x| *x == 0.0) {
-            continue;
+        let (Some(body), range) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        let mut velocity = vec![0.0; range.len()];
+        body.unwhiten(&u[range.clone()], &mut velocity);
+        v[range].iter_mut().zip(&velocity).for_each(|(v, more)| *v += more);
+    }
+}
+
+fn each_displaced(core: &mut Core, u: &[f64], go: impl Fn(&dyn Integratable, &mut [f64], &[f64])) {
+    for entry in core.table.iter().filter(|e| e.moves()) {
+        let (Some(body), u) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
+        if u.iter().any(|u| *u != 0.0) {
+            let mut velocity = vec![0.0; u.len()];
+            body.unwhiten(u, &mut velocity);
+            go(body, &mut core.x[entry.span.x.clone()], &velocity);
         }
-        let mut velocity = vec![0.0; v.len()];
-        body.unwhiten(v, &mut velocity);
-        body.displace(&mut core.x[entry.span.x.clone()], &velocity, h);
     }
 }
 

@@ -15,7 +15,7 @@
 
 use super::Workspace;
 use super::closing::is_joint;
-use super::contacts::{build_rows, displace, limits, push, row_velocities, whiten, zero};
+use super::contacts::{build_rows, limits, push, row_velocities, shift, whiten, zero};
 use crate::object::Level;
 use crate::rows::RowSet;
 use crate::solver::{Accuracy, GaussSeidel, RowSolver};
@@ -92,7 +92,7 @@ pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64
             GaussSeidel.solve(&probe.rows, blocks, c, &mut probe.lambda, du, accuracy);
         }
     }
-    displace(core, &dx, 1.0);
+    shift(core, &dx, 1.0);
     push(core, &dv);
     core.motion().refresh();
     Ok(())

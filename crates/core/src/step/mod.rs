@@ -8,6 +8,7 @@ mod hold;
 mod impact;
 mod locate;
 mod projection;
+mod reach;
 mod time_stepping;
 
 pub use backtracking::Backtracking;

@@ -39,7 +39,8 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
     if let Displacement::Step { start, h, .. } = displacement {
         ask_limits(core, work, start, h)?;
     }
-    let (touches, hold) = (work.touches.len(), core.settings.stabilize_positions);
+    // in place, joints stay as they are: what is open of them is closed at the end of the sub-step
+    let (touches, hold) = (work.touches.len(), core.settings.stabilize_positions && !in_place);
     let violation = |b: usize, c: &[f64]| -> f64 {
         let v = c[work.rows.blocks[b].row as usize];
         match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
@@ -127,7 +128,7 @@ impl Projection {
                     t => (t.set, t.error.clamp(-recovery, recovery)),
                 },
             };
-            self.rows.push_block(set);
+            self.rows.push_soft(set, block.compliance); // joints out of reach give way here too
             for side in block.sides() {
                 let response = work.rows.response(side, 0);
                 if let Some(y) = self.rows.side(side.u as usize, side.dof as usize) {

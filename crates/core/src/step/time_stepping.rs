@@ -12,16 +12,17 @@
 //! With `τ = h/2` the displacement is the mean of the old and the new velocity: second order on lasting contacts too (a block slides to its
 //! stop as it should). With an impact the two coasts and the term `(τ − h/2)·h·a` add up to the parabola before and the parabola after.
 //!
-//! Objects whose state holds velocities (articulated bodies) are pushed where they are at `x_½`: the mass matrix, the rows and the velocity before the
-//! push are those of the middle. Coasting keeps kinetic energy, a push by contacts takes some, and displacement leaves it: nothing here feeds it. So they
-//! coast h/2 and h/2 whenever their impacts are, and are displaced by the rest, (τ − h/2)·(v_0 − v_1), at the end.
+//! What is pushed is pushed where it is then: mass matrix, rows and the velocity before the push are those of `x_½`, or of `x_0` coasted τ where there is an
+//! impact. Coasting keeps kinetic energy, a push by contacts takes some, and displacement leaves it: nothing here feeds it.
+//! Objects whose state holds velocities (articulated bodies) are pushed at `x_½` whenever their impacts are, so as to have their caches made once; they
+//! coast h/2 and h/2, and are displaced by the rest, (τ − h/2)·(v_0 − v_1), at the end.
 //!
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, coasting, detect, displace, gyroscopic, impulses, push, row_velocities, solve, warm_start, whiten, zero};
+use super::contacts::{build_rows, coasting, detect, gyroscopic, impulses, push, row_velocities, shift, solve, warm_start, whiten, zero};
 use super::impact::{self, Candidate};
-use super::{closing, hold};
+use super::{closing, hold, reach};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
@@ -74,7 +75,7 @@ impl TimeStepping {
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
         whiten(core, &self.work.dp, h, &mut u, &mut du_force);
-        let mut after = self.impacts(core, h, &u, &du_force);
+        let mut after = self.impacts(core, h, &mut u, &mut du_force)?;
         self.look_again(core, h, &u, &after)?;
         self.contacts(core, h, &mut after, &du_force);
         self.commit(core, h, &u, &after, &du_force)?;
@@ -99,15 +100,16 @@ impl TimeStepping {
         Ok(())
     }
 
-    /// Times the impacts that free motion meets within the step and resolves them; the whitened velocity after them, forces not yet added.
-    fn impacts(&mut self, core: &mut Core, h: f64, u: &[f64], du_force: &[f64]) -> Vec<f64> {
+    /// Times the impacts that free motion meets within the step and resolves them; the whitened velocity after them, forces not yet added. Where there are
+    /// any, rows and whitened velocities are made anew for where they are.
+    fn impacts(&mut self, core: &mut Core, h: f64, u: &mut Vec<f64>, du_force: &mut Vec<f64>) -> Result<Vec<f64>, StepError> {
         let work = &mut self.work;
         self.share.clear();
         self.share.resize(core.dof, -1.0);
         zero(&mut self.impact, work.rows.len);
         self.candidates.clear();
         if work.touches.iter().all(|t| t.restitution <= 0.0) {
-            return u.to_vec();
+            return Ok(u.to_vec());
         }
         let (mut before, mut gain, mut meets) = (Vec::new(), Vec::new(), Vec::new());
         row_velocities(&work.rows, &work.bias, u, &mut before);
@@ -124,14 +126,32 @@ impl TimeStepping {
             self.candidates.push(Candidate { takes_part: gap <= core.settings.drift_tolerance, rest_speed, restitution: touch.restitution });
         }
         if self.share.iter().all(|s| *s < 0.0) {
-            return u.to_vec();
+            return Ok(u.to_vec());
         }
         self.first_impacts(&meets);
+        self.pin_at_impacts(core, h);
         let work = &mut self.work;
+        build_rows(core, work, Level::Velocity { h }, 0.5 * h)?;
+        whiten(core, &work.dp, h, u, du_force);
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.share[i].max(0.0) * du_force[i]).collect();
         let mut after = at_impact.clone();
         impact::resolve(core, work, &self.candidates, IMPACT_PASSES, &mut after, &mut self.impact);
-        (0..u.len()).map(|i| u[i] + (after[i] - at_impact[i])).collect()
+        Ok((0..u.len()).map(|i| u[i] + (after[i] - at_impact[i])).collect())
+    }
+
+    /// Pins what meets something where it does so.
+    fn pin_at_impacts(&self, core: &mut Core, h: f64) {
+        let (mut x, _) = core.unpin();
+        for entry in core.table.iter().filter(|e| !in_the_middle(e)) {
+            let share = entry.span.v.clone().next().map_or(-1.0, |i| self.share[i]);
+            if share >= 0.0 {
+                let x = &mut x[entry.span.x.clone()];
+                x.copy_from_slice(&self.x0[entry.span.x.clone()]);
+                coast(entry, x, h * share);
+            }
+        }
+        core.pin(x);
+        core.motion().refresh();
     }
 
     /// What was struck may now reach what it did not before: finds those contacts too, and lays the rows anew. They push this step (nothing is
@@ -205,7 +225,7 @@ impl TimeStepping {
         }
         let (turning, coasting) = if work.targets.is_empty() { Default::default() } else { (gyroscopic(core), coasting(core, 0.5 * h)) };
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
-            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &coasting) - h * work.rows.row_velocity(block, 0, &turning);
+            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &coasting) - 0.5 * h * work.rows.row_velocity(block, 0, &turning);
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
@@ -221,8 +241,6 @@ impl TimeStepping {
     fn commit(&mut self, core: &mut Core, h: f64, u0: &[f64], u1: &[f64], du_force: &[f64]) -> Result<(), StepError> {
         let share = |i: usize| if self.share[i] < 0.0 { 0.5 } else { self.share[i] };
         let change: Vec<f64> = u1.iter().zip(u0).map(|(a, b)| a - b).collect();
-        // pushed elsewhere than in the middle, another mass matrix would make energy of the push
-        let in_the_middle = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
         let before = |e: &Entry| e.span.v.clone().next().filter(|_| !in_the_middle(e)).map_or(0.5, share);
         for entry in core.table.iter() {
             coast(entry, &mut core.x[entry.span.x.clone()], h * before(entry));
@@ -232,18 +250,18 @@ impl TimeStepping {
             coast(entry, &mut core.x[entry.span.x.clone()], h * (1.0 - before(entry)));
         }
         let parabola: Vec<f64> = (0..core.dof).map(|i| (share(i) - 0.5) * du_force[i]).collect();
-        let mut shift = parabola.clone();
+        let mut rest = parabola.clone();
         for i in core.table.iter().filter(|e| in_the_middle(e)).flat_map(|e| e.span.v.clone()) {
-            shift[i] -= (share(i) - 0.5) * change[i];
+            rest[i] -= (share(i) - 0.5) * change[i];
         }
-        displace(core, &shift, h);
+        shift(core, &rest, h);
         let mean: Vec<f64> = (0..core.dof).map(|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]).collect();
         let recovery = core.settings.recovery_speed * h;
         let least = core.settings.contact_tolerance;
         projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean: &mean, h }, recovery, least)?;
         let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
         core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
-        let kept: Vec<f64> = self.work.targets.iter().map(|t| t.error - t.error.clamp(-recovery, recovery)).collect();
+        let kept = reach::left(&self.work, |i| self.work.targets[i].error, recovery);
         closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();
         if !self.work.limits.is_empty() {
@@ -253,6 +271,11 @@ impl TimeStepping {
         }
         core.check_finite(&dp)
     }
+}
+
+/// Whether all that pushes the object does so in the middle of the step, impacts too: links, whose caches cost more than to be made twice.
+fn in_the_middle(entry: &Entry) -> bool {
+    entry.moves() && entry.object.integratable().is_some_and(|b| b.holds_velocity())
 }
 
 /// The share of the step after which `gap + v·t + ½·(dv/h)·t²` first reaches 0 while closing, for `gap/h`, `v` and `dv`; `None` if it does not.

@@ -94,7 +94,7 @@ pub struct Core {
     pub(crate) held: Vec<f64>,
     /// Contact forces that hold over the sub-step, per site, of objects whose state holds velocities; empty for none.
     pub(crate) held_wrenches: Vec<Wrench>,
-    /// Where the caches of objects whose state holds velocities are kept, whatever state is refreshed; empty for none. And their sites there.
+    /// Where the caches of what moves are kept, whatever state is refreshed; empty for none. And the sites there.
     pub(crate) pinned: (Vec<f64>, Vec<Site>),
     pub(crate) forces: Forces,
     pub(crate) settings: Settings,
@@ -118,12 +118,10 @@ impl Core {
         self.held_wrenches.clear();
     }
 
-    /// Keeps the caches of objects whose state holds velocities at `middle` until [`unpin`](Self::unpin): their impulses act in the middle of a
-    /// step, as momentum kicks do for others. Sites still follow the state.
-    pub(crate) fn pin(&mut self, middle: Vec<f64>) {
-        if self.table.iter().any(|e| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity())) {
-            self.pinned = (middle, self.sites.clone());
-        }
+    /// Keeps the caches of what moves at the state `x` until [`unpin`](Self::unpin): where in a step impulses act. From the next refresh on; sites still
+    /// follow the state.
+    pub(crate) fn pin(&mut self, x: Vec<f64>) {
+        self.pinned = (x, self.sites.clone());
     }
 
     /// Lets the caches follow again from the next refresh on; what was pinned, to be put back.
@@ -140,7 +138,7 @@ impl Core {
         Some(&self.pinned.0).filter(|x| !x.is_empty())
     }
 
-    /// The sites of the pinned caches; only those of objects whose state holds velocities are there.
+    /// The sites of the pinned caches; only those of what moves are there.
     pub(crate) fn pinned_sites(&self) -> Option<&Vec<Site>> {
         Some(&self.pinned.1).filter(|x| !x.is_empty())
     }

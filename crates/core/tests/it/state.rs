@@ -88,6 +88,35 @@ fn objects_come_and_go_in_mid_run() {
 }
 
 #[test]
+fn bodies_that_came_and_went_leave_no_trace_in_a_fork() {
+    for stepper in STEPPERS {
+        let mut world = messy(stepper);
+        // what the broad phase remembers is of bodies that are gone, switched off or elsewhere; a fork and a restored world begin without
+        let mut copies: Vec<World> = Vec::new();
+        let mut contacts = 0;
+        for frame in 0..60 {
+            if frame % 5 == 0 {
+                let gone = world.find(&format!("body{}", frame / 5)).unwrap();
+                if frame % 10 == 0 { world.remove(gone).map(drop).unwrap() } else { world.set_collidable(gone, false).unwrap() }
+                let place = Pose::translation(0.1 * (frame % 3) as f64, 0.0, 1.0 + 0.1 * frame as f64);
+                world.add(RigidBody::with_mass(format!("late{frame}"), cube(0.3), 2.0).unwrap().surface(0.2, 0.4).at(place)).unwrap();
+                copies = vec![world.fork(), world.fork()];
+                let saved = world.save();
+                run(&mut copies[1], 1);
+                copies[1].restore(&saved).unwrap();
+            }
+            run(&mut world, 1);
+            contacts += world.contacts().len();
+            for copy in &mut copies {
+                run(copy, 1);
+                assert_eq!(bits(&world), bits(copy), "{stepper}: frame {frame}");
+            }
+        }
+        assert!(contacts > 200, "{stepper}: only {contacts} contacts were met");
+    }
+}
+
+#[test]
 fn a_kinematic_body_follows_its_motion_and_pushes() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);

@@ -2,8 +2,10 @@
 
 mod overlay;
 mod surface;
+mod tree;
 
 pub use overlay::{DebugDraw, UnknownOverlay};
+pub use tree::{UpAxis, tree_over_mesh};
 
 use crate::{Camera, DrawList, Ground, Light, MeshData, MeshId, RenderError, Sky};
 use nalgebra::{Isometry3, Point3, Vector3};

@@ -57,7 +57,7 @@ const NORMAL: f32 = 0.4;
 const LOOK_AHEAD: f64 = 0.1;
 
 /// Neighbouring balls of a tree take these in turn, so that each is told from the next.
-const SHELL_COLORS: [[f32; 3]; 6] = [[0.95, 0.45, 0.10], [0.10, 0.55, 0.95], [0.95, 0.80, 0.10], [0.60, 0.25, 0.85], [0.15, 0.75, 0.40], [0.90, 0.20, 0.40]];
+pub(super) const SHELL_COLORS: [[f32; 3]; 6] = [[0.95, 0.45, 0.10], [0.10, 0.55, 0.95], [0.95, 0.80, 0.10], [0.60, 0.25, 0.85], [0.15, 0.75, 0.40], [0.90, 0.20, 0.40]];
 
 impl DebugDraw {
     pub(super) fn draw(&self, world: &World, list: &mut DrawList) {

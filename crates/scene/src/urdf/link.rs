@@ -120,7 +120,7 @@ fn read_shapes(link: &Element<'_, '_>, context: &mut Context<'_>) -> Vec<LinkSha
 }
 
 /// A `<visual>` or `<collision>`; `None` where it is left out or wrong.
-fn read_shape(element: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<LinkShape> {
+pub(super) fn read_shape(element: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<LinkShape> {
     let pose = read_origin(element);
     let geometry = element.required("geometry", "<geometry> with a box, cylinder, sphere, capsule or mesh")?;
     let geometry = read_geometry(&geometry, collides, context)?;

@@ -26,6 +26,7 @@
 mod files;
 mod joint;
 mod link;
+mod spheres;
 mod tree;
 mod xml;
 
@@ -44,6 +45,8 @@ use crate::link::{LinkSpec, Surface};
 use crate::link_shapes::ShapeMaker;
 use crate::log::Log;
 use crate::notes::NoteList;
+pub use spheres::{LinkSpheres, SphereOptions, SphereRobot, spherize};
+
 use joint::JointElement;
 use link::{Context, LinkElement, read_color};
 use tree::TreeBuilder;
@@ -211,17 +214,22 @@ pub(crate) struct Robot {
 
 /// Reads a file; without `shapes` no mesh is looked for.
 pub(crate) fn read_file(path: &Path, options: &UrdfOptions, shapes: bool) -> Result<Robot, UrdfError> {
+    read_text(&text_of(path)?, path, options, shapes)
+}
+
+/// The text of a file.
+fn text_of(path: &Path) -> Result<String, UrdfError> {
     let unread = |source| UrdfError::Read { file: path.to_path_buf(), source };
     let mut bytes = Vec::new();
     std::fs::File::open(path).map_err(unread)?.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
     if bytes.len() as u64 > MOST_BYTES {
         return Err(UrdfError::TooLarge { file: path.to_path_buf() });
     }
-    let text = std::str::from_utf8(&bytes).map_err(|error| {
-        let byte = error.valid_up_to();
-        UrdfError::NotUtf8 { file: path.to_path_buf(), line: 1 + bytes[..byte].iter().filter(|&&b| b == b'\n').count(), byte }
-    })?;
-    read_text(text, path, options, shapes)
+    String::from_utf8(bytes).map_err(|error| {
+        let byte = error.utf8_error().valid_up_to();
+        let line = 1 + error.as_bytes()[..byte].iter().filter(|&&b| b == b'\n').count();
+        UrdfError::NotUtf8 { file: path.to_path_buf(), line, byte }
+    })
 }
 
 /// Reads a text; `path` is shown in messages, and meshes are looked for from its folder.

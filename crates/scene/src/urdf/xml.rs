@@ -47,6 +47,11 @@ impl<'a, 'd> Element<'a, 'd> {
         Element { log, node }
     }
 
+    /// As the parser has it.
+    pub(crate) fn node(&self) -> Node<'a, 'd> {
+        self.node
+    }
+
     /// Its tag.
     pub(crate) fn tag(&self) -> &'a str {
         self.node.tag_name().name()

@@ -7,6 +7,8 @@ mod expansion;
 mod finding;
 mod pinocchio;
 mod robots;
+mod repair;
 mod robust;
 mod shipped;
+mod spheres;
 mod urdf;

@@ -7,4 +7,6 @@ mod determinism;
 mod machines;
 mod outputs;
 mod picture;
+mod repair;
 mod scenes;
+mod spheretree;

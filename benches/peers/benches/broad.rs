@@ -1,0 +1,75 @@
+//! CPU time per step of the broad phase, tumble beside parry's bounding volume hierarchy in one run.
+//!
+//! ```text
+//! cargo bench --bench broad                                          the curve, and all kinds of crowds at 1,000, 10,000 and 100,000
+//! cargo bench --bench broad -- --svg ../../docs/images/broad.svg     the same, and the curve as a picture
+//! cargo bench --bench broad -- --tumble slow 100000                  one case of tumble alone, for a profiler
+//! ```
+
+use tumble_peers::broad::{Cost, Follower, Kind, Sweep, Tree, follow, write_curve};
+use tumble_peers::scene::RADIUS;
+
+/// Share of a box's smallest extent by which both make boxes fat.
+const ROOM: f64 = 0.1;
+/// Rounds of which the median counts; the two take turns.
+const ROUNDS: usize = 3;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["--tumble", kind, n] => {
+            let kind = Kind::ALL.into_iter().find(|k| k.1 == kind).expect("a kind of crowd as the table names it").0;
+            let n = n.parse().expect("a number of boxes");
+            let cost = follow(&mut Sweep::default(), kind, n, steps(n));
+            println!("{:.1} µs per step, {} pairs", cost.step, cost.pairs);
+        }
+        ["--svg", path] => std::fs::write(path, write_curve(&curves())).expect("the picture can be written"),
+        _ => drop(curves()),
+    }
+    if arguments.first().is_none_or(|a| a != "--tumble") {
+        kinds();
+    }
+}
+
+/// Slow crowds of growing size.
+fn curves() -> [(&'static str, &'static str, Vec<(f64, f64)>); 2] {
+    println!("CPU µs per step, boxes in a cube of constant density that move by 1 % of their radius per step; medians of {ROUNDS} rounds.\n");
+    println!("| boxes | tumble | per box, ns | parry | ratio | pairs |\n|---|---|---|---|---|---|");
+    let mut curves = [("tumble", "#1060c0", Vec::new()), ("parry (Rapier)", "#c05010", Vec::new())];
+    for n in [1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000] {
+        let [ours, theirs] = both(Kind::Slow, n);
+        println!("| {n} | {:.1} | {:.1} | {:.1} | {:.2} | {} |", ours.step, 1e3 * ours.step / n as f64, theirs.step, ours.step / theirs.step, ours.pairs);
+        curves[0].2.push((n as f64, ours.step));
+        curves[1].2.push((n as f64, theirs.step));
+    }
+    curves
+}
+
+/// Every kind of crowd.
+fn kinds() {
+    println!("\nCPU µs per step, tumble (parry).\n\n| crowd | 1,000 | 10,000 | 100,000 |\n|---|---|---|---|");
+    for (kind, name) in Kind::ALL {
+        let cell = |n: usize| {
+            let [ours, theirs] = both(kind, n);
+            format!("{:.0} ({:.0})", ours.step, theirs.step)
+        };
+        println!("| {name} | {} | {} | {} |", cell(1000), cell(10_000), cell(100_000));
+    }
+}
+
+fn both(kind: Kind, n: usize) -> [Cost; 2] {
+    let mut costs = [Vec::new(), Vec::new()];
+    for _ in 0..ROUNDS {
+        costs[0].push(follow(&mut Sweep::default(), kind, n, steps(n)));
+        costs[1].push(follow(&mut Tree::new(ROOM * 2.0 * RADIUS) as &mut dyn Follower, kind, n, steps(n)));
+    }
+    costs.map(|mut c| {
+        c.sort_by(|a, b| a.step.total_cmp(&b.step));
+        c[c.len() / 2]
+    })
+}
+
+/// So many that the clock's ticks do not show.
+fn steps(n: usize) -> usize {
+    (1_000_000 / n).clamp(60, 500)
+}

@@ -1,0 +1,129 @@
+//! Crowds of boxes in motion, and the broad phases that follow them: tumble's, and the bounding volume hierarchy of parry (Rapier's).
+
+mod curve;
+mod crowd;
+
+pub use crowd::{Crowd, Kind};
+pub use curve::write as write_curve;
+
+use crate::clock::Clock;
+use rapier3d_f64::parry::bounding_volume::Aabb as ParryBox;
+use rapier3d_f64::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
+use tumble_collide::{Aabb, BroadPhase, SweepAndPrune};
+
+/// Something that is told of boxes and tells pairs.
+pub trait Follower {
+    /// Takes in all boxes.
+    fn start(&mut self, crowd: &Crowd);
+    /// Takes in those that moved, and tells how many pairs there are now.
+    fn step(&mut self, crowd: &Crowd) -> usize;
+}
+
+/// tumble: the pairs of the boxes themselves, sorted.
+#[derive(Default)]
+pub struct Sweep {
+    broad: SweepAndPrune,
+    handles: Vec<u32>,
+    pairs: Vec<[u32; 2]>,
+}
+
+impl Follower for Sweep {
+    fn start(&mut self, crowd: &Crowd) {
+        self.handles = crowd.boxes.iter().zip(&crowd.moving).map(|(b, moving)| self.broad.insert(b, *moving)).collect();
+    }
+
+    fn step(&mut self, crowd: &Crowd) -> usize {
+        for (i, b) in crowd.boxes.iter().enumerate().filter(|(i, _)| crowd.moving[*i]) {
+            if crowd.replaced[i] {
+                self.broad.remove(self.handles[i]);
+                self.handles[i] = self.broad.insert(b, true);
+            } else {
+                self.broad.set(self.handles[i], b, true);
+            }
+        }
+        self.broad.pairs(&mut self.pairs);
+        self.pairs.len()
+    }
+}
+
+/// parry's tree with the margin of its change detection; all pairs of leaves, in no order, those of two static boxes too.
+pub struct Tree {
+    tree: Bvh,
+    workspace: BvhWorkspace,
+    margin: f64,
+    pairs: Vec<[u32; 2]>,
+    steps: u32,
+}
+
+impl Tree {
+    /// A margin in metres, the same as tumble's fat boxes have.
+    pub fn new(margin: f64) -> Tree {
+        Tree { tree: Bvh::new(), workspace: BvhWorkspace::default(), margin, pairs: Vec::new(), steps: 0 }
+    }
+}
+
+/// The tree's quality is looked after once in so many steps.
+const OPTIMIZED: u32 = 8;
+
+impl Follower for Tree {
+    fn start(&mut self, crowd: &Crowd) {
+        let leaves: Vec<ParryBox> = crowd.boxes.iter().map(theirs).collect();
+        self.tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves);
+    }
+
+    fn step(&mut self, crowd: &Crowd) -> usize {
+        for (i, b) in crowd.boxes.iter().enumerate().filter(|(i, _)| crowd.moving[*i]) {
+            if crowd.replaced[i] {
+                self.tree.remove(i as u32);
+            }
+            self.tree.insert_or_update_partially(theirs(b), i as u32, self.margin);
+        }
+        self.tree.refit(&mut self.workspace);
+        self.steps += 1;
+        if self.steps.is_multiple_of(OPTIMIZED) {
+            self.tree.optimize_incremental(&mut self.workspace);
+            self.tree.refit(&mut self.workspace);
+        }
+        self.pairs.clear();
+        let pairs = &mut self.pairs;
+        self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |i, j| pairs.push([i, j]));
+        self.pairs.len()
+    }
+}
+
+fn theirs(b: &Aabb) -> ParryBox {
+    let corner = |v: &tumble_collide::Vec3| rapier3d_f64::math::Vector::new(v.x, v.y, v.z);
+    ParryBox::new(corner(&b.min), corner(&b.max))
+}
+
+/// What following a crowd costs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cost {
+    /// Microseconds of CPU per step, the motion of the boxes taken off.
+    pub step: f64,
+    /// Pairs after the last step.
+    pub pairs: usize,
+}
+
+/// Follows a crowd for `steps` after as many to settle in.
+pub fn follow(follower: &mut dyn Follower, kind: Kind, n: usize, steps: usize) -> Cost {
+    let clock = Clock::new();
+    let mut crowd = Crowd::new(kind, n);
+    follower.start(&crowd);
+    let mut pairs = 0;
+    for _ in 0..steps {
+        crowd.advance();
+        pairs = follower.step(&crowd);
+    }
+    let start = clock.seconds();
+    for _ in 0..steps {
+        crowd.advance();
+        pairs = follower.step(&crowd);
+    }
+    let followed = clock.seconds();
+    for _ in 0..steps {
+        crowd.advance();
+    }
+    let moved = clock.seconds() - followed;
+    Cost { step: 1e6 * (followed - start - moved) / steps as f64, pairs }
+}

@@ -1,0 +1,120 @@
+//! Fat boxes: what the cells file. A box may move inside its fat box and nobody need be told.
+
+use crate::Aabb;
+
+/// A box in `f32`, rounded outwards (metres, world axes), and whether it moves, as eight numbers that are compared at once:
+///
+/// ```text
+/// box      min x, y, z   −max x, y, z   0 if it moves, else 1    0
+/// seeker   max x, y, z   −min x, y, z   1 if it moves, else 0    0         a pair: box ≤ seeker, number by number
+/// ```
+///
+/// A box whose sides are not numbers is nowhere: it meets nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fat([f32; 8]);
+
+/// How much of the room is shifted ahead.
+const AHEAD: f64 = 0.5;
+
+/// A fat box as it looks for others.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seeker([f32; 8]);
+
+impl Fat {
+    pub const NOWHERE: Fat = Fat([f32::NAN; 8]);
+    pub const EVERYWHERE: Fat = Fat([f32::NEG_INFINITY; 8]);
+
+    /// The box with room to move by `share` of its smallest extent in every direction, of which part is shifted to the side on which it
+    /// left an `old` fat box: what has moved that way may well go on.
+    pub fn around(tight: &Aabb, share: f64, moving: bool, old: &Fat) -> Fat {
+        let extent = tight.max - tight.min;
+        let smallest = extent.x.min(extent.y).min(extent.z);
+        let room = if smallest.is_finite() { share * smallest } else { 0.0 };
+        let side = |k: usize| {
+            let way = 0.5 * (tight.min[k] + tight.max[k] - f64::from(old.min(k)) - f64::from(old.max(k)));
+            // false for what is not a number
+            let ahead = if way.abs() < 4.0 * room { (AHEAD * way).clamp(-AHEAD * room, AHEAD * room) } else { 0.0 };
+            (down(tight.min[k] - room + ahead), down(-tight.max[k] - room - ahead))
+        };
+        let [x, y, z] = [side(0), side(1), side(2)];
+        Fat([x.0, y.0, z.0, x.1, y.1, z.1, if moving { 0.0 } else { 1.0 }, 0.0])
+    }
+
+    /// Whether the box lies inside.
+    pub fn holds(&self, tight: &Aabb) -> bool {
+        let side = |k: usize| (f64::from(self.min(k)) <= tight.min[k]) & (tight.max[k] <= f64::from(self.max(k)));
+        side(0) & side(1) & side(2)
+    }
+
+    pub fn is_somewhere(&self) -> bool {
+        (0..3).all(|k| self.min(k) <= self.max(k))
+    }
+
+    pub fn seeker(&self) -> Seeker {
+        let [a, b, c, d, e, f, still, _] = self.0;
+        Seeker([-d, -e, -f, -a, -b, -c, 1.0 - still, 0.0])
+    }
+
+    /// Whether the two share a point and one of them moves. No branches: eight comparisons cost less than one that is guessed wrong.
+    #[inline(always)]
+    pub fn meets(&self, seeker: &Seeker) -> bool {
+        self.0.iter().zip(&seeker.0).fold(true, |all, (a, b)| all & (a <= b))
+    }
+
+    pub fn min(&self, axis: usize) -> f32 {
+        self.0[axis]
+    }
+
+    pub fn max(&self, axis: usize) -> f32 {
+        -self.0[axis + 3]
+    }
+
+    /// The parts of it to either side of a plane.
+    pub fn cut(&self, axis: usize, at: f32) -> [Fat; 2] {
+        let (mut low, mut high) = (*self, *self);
+        (low.0[axis + 3], high.0[axis]) = (-at, at);
+        [low, high]
+    }
+}
+
+/// A box in `f32`, rounded to the nearest, in the order of [`Fat`]: half as much to read, and most pairs are told by it. Rounding keeps order: where
+/// the rounded sides differ, the sides do too, and in the same sense.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rounded([f32; 8]);
+
+/// What the rounded boxes know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Guess {
+    No,
+    Yes,
+    /// Sides that are equal but for rounding.
+    Perhaps,
+}
+
+impl Rounded {
+    pub fn new(b: &Aabb) -> Rounded {
+        let (min, max) = (b.min.map(|x| x as f32), b.max.map(|x| -(x as f32)));
+        Rounded([min.x, min.y, min.z, max.x, max.y, max.z, -1.0, -1.0])
+    }
+
+    /// Whether the boxes share a point.
+    #[inline(always)]
+    pub fn overlaps(&self, other: &Rounded) -> Guess {
+        let [a, b, c, d, e, f, g, h] = other.0;
+        let seeker = [-d, -e, -f, -a, -b, -c, -g, -h];
+        let not_above = self.0.iter().zip(&seeker).fold(true, |all, (a, b)| all & (a <= b));
+        let below = self.0.iter().zip(&seeker).fold(true, |all, (a, b)| all & (a < b));
+        if not_above != below { Guess::Perhaps } else if below { Guess::Yes } else { Guess::No }
+    }
+}
+
+/// A pair as one number, the lesser handle first: ascending numbers are ascending pairs.
+pub(super) fn pair(a: u32, b: u32) -> u64 {
+    u64::from(a.min(b)) << 32 | u64::from(a.max(b))
+}
+
+/// The greatest `f32` not above `x`.
+fn down(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) > x { near.next_down() } else { near }
+}

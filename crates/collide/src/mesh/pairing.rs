@@ -1,0 +1,154 @@
+//! Which face goes on over which edge: the surface as pieces with rims.
+//!
+//! Each face uses its three edges in a direction. A use is paired with one of the same edge in the other direction;
+//! what stays without is a rim. Where more than two faces meet, two uses of the same sheet (faces connected over plain
+//! edges) are paired first, then those of the larger sheets: a fin or an inner wall stays over. The corners of faces
+//! that are joined over pairs form fans; around an open fan exactly one rim comes in and one goes out, so rims close
+//! to loops without choice.
+
+use super::TriMesh;
+use super::check::{EdgeUse, edge_groups};
+
+/// No partner.
+pub(super) const RIM: u32 = u32::MAX;
+
+/// Use `3t + k` is that of edge `k` (corners k to k+1) of triangle `t`.
+pub(super) struct Pairing {
+    /// The use on the other side, or [`RIM`].
+    pub partner: Vec<u32>,
+    /// The piece of each face: faces connected over pairs, counted from 0.
+    pub piece: Vec<u32>,
+    pub pieces: usize,
+    /// Whether a piece has a rim at an edge where other faces go on.
+    pub dangles: Vec<bool>,
+}
+
+impl Pairing {
+    pub fn of(mesh: &TriMesh) -> Pairing {
+        let groups = edge_groups(mesh);
+        let faces = mesh.triangles.len();
+        let (sheet, sheets) = components(faces, groups.iter().filter(|g| opposite(g)).map(|g| (g[0].face, g[1].face)));
+        let mut area = vec![0.0; sheets];
+        for t in 0..faces {
+            let [a, b, c] = mesh.corners(t);
+            area[sheet[t] as usize] += (b - a).cross(&(c - a)).norm();
+        }
+        let mut partner = vec![RIM; 3 * faces];
+        let mut join = |a: &EdgeUse, b: &EdgeUse| {
+            let (a, b) = (use_of(mesh, a), use_of(mesh, b));
+            (partner[a], partner[b]) = (b as u32, a as u32);
+        };
+        for group in &groups {
+            pair_group(group, &sheet, &area, &mut join);
+        }
+        let over_pairs = (0..3 * faces).filter(|&u| partner[u] != RIM).map(|u| (u / 3, partner[u] as usize / 3));
+        let (piece, pieces) = components(faces, over_pairs);
+        let mut dangles = vec![false; pieces];
+        for group in groups.iter().filter(|g| g.len() > 1) {
+            for lone in group.iter().filter(|u| partner[use_of(mesh, u)] == RIM) {
+                dangles[piece[lone.face] as usize] = true;
+            }
+        }
+        Pairing { partner, piece, pieces, dangles }
+    }
+
+    /// Whether each piece has a rim.
+    pub fn open(&self) -> Vec<bool> {
+        let mut open = vec![false; self.pieces];
+        for (u, _) in self.partner.iter().enumerate().filter(|(_, p)| **p == RIM) {
+            open[self.piece[u / 3] as usize] = true;
+        }
+        open
+    }
+
+    /// The loops of rims, each as uses in the order in which a face that fills the hole goes round, against the uses.
+    pub fn loops(&self) -> Vec<Vec<u32>> {
+        let mut seen = vec![false; self.partner.len()];
+        let mut loops = Vec::new();
+        for start in 0..self.partner.len() as u32 {
+            if self.partner[start as usize] != RIM || seen[start as usize] {
+                continue;
+            }
+            let (mut rim, mut at) = (Vec::new(), start);
+            while !seen[at as usize] {
+                seen[at as usize] = true;
+                rim.push(at);
+                at = self.rim_before(at);
+            }
+            loops.push(rim);
+        }
+        loops
+    }
+
+    /// The rim that ends where `rim` starts: round the fan of that corner.
+    fn rim_before(&self, rim: u32) -> u32 {
+        let before = |u: u32| u / 3 * 3 + (u % 3 + 2) % 3;
+        let mut at = before(rim);
+        for _ in 0..self.partner.len() {
+            match self.partner[at as usize] {
+                RIM => return at,
+                other => at = before(other),
+            }
+        }
+        at
+    }
+}
+
+fn use_of(mesh: &TriMesh, u: &EdgeUse) -> usize {
+    let (from, to) = if u.forward { (u.low, u.high) } else { (u.high, u.low) };
+    let t = mesh.triangles[u.face];
+    3 * u.face + (0..3).find(|&k| t[k] == from && t[(k + 1) % 3] == to).unwrap_or(0)
+}
+
+fn opposite(group: &[EdgeUse]) -> bool {
+    group.len() == 2 && group[0].forward != group[1].forward
+}
+
+/// Pairs the uses of one edge.
+fn pair_group(group: &[EdgeUse], sheet: &[u32], area: &[f64], join: &mut impl FnMut(&EdgeUse, &EdgeUse)) {
+    let mut left: Vec<&EdgeUse> = group.iter().collect();
+    let size = |u: &EdgeUse| area[sheet[u.face] as usize];
+    left.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.face.cmp(&b.face)));
+    for same_sheet in [true, false] {
+        let mut n = 0;
+        while n < left.len() {
+            let fits = |u: &&EdgeUse| u.forward != left[n].forward && (!same_sheet || sheet[u.face] == sheet[left[n].face]);
+            match left[n + 1..].iter().position(fits) {
+                Some(m) => {
+                    join(left[n], left[n + 1 + m]);
+                    left.remove(n + 1 + m);
+                    left.remove(n);
+                }
+                None => n += 1,
+            }
+        }
+    }
+}
+
+/// Numbers the connected sets of `0..count` by their first members.
+fn components(count: usize, edges: impl Iterator<Item = (usize, usize)>) -> (Vec<u32>, usize) {
+    let mut parent: Vec<usize> = (0..count).collect();
+    fn root(parent: &mut [usize], mut f: usize) -> usize {
+        while parent[f] != f {
+            parent[f] = parent[parent[f]];
+            f = parent[f];
+        }
+        f
+    }
+    for (a, b) in edges {
+        let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+        parent[a.max(b)] = a.min(b);
+    }
+    let mut number = vec![0; count];
+    let mut found = 0;
+    for f in 0..count {
+        let r = root(&mut parent, f);
+        number[f] = if r == f {
+            found += 1;
+            found - 1
+        } else {
+            number[r]
+        };
+    }
+    (number, found as usize)
+}

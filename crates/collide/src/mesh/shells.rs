@@ -1,0 +1,95 @@
+//! The connected pieces of a closed surface, and which of them are inside out.
+//!
+//! A shell of negative volume is a cavity if it lies within another; one that reaches outside all others can only be
+//! inside out. It is turned, and with it the shells that lie wholly within it, which were wound to suit it.
+
+use super::TriMesh;
+use super::check::EdgeUse;
+use super::winding::{WindingNumber, solid_angle};
+use crate::Vec3;
+use std::f64::consts::PI;
+
+/// Faces of a shell at which it is asked where the shell lies.
+const SAMPLES: usize = 32;
+
+/// The shell of each face, counted from 0 in the order of their first faces, and how many there are. Faces are
+/// connected over edges.
+pub(crate) fn shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> (Vec<u32>, usize) {
+    let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
+    fn root(parent: &mut [usize], mut f: usize) -> usize {
+        while parent[f] != f {
+            parent[f] = parent[parent[f]];
+            f = parent[f];
+        }
+        f
+    }
+    for group in groups {
+        for pair in group.windows(2) {
+            let (a, b) = (root(&mut parent, pair[0].face), root(&mut parent, pair[1].face));
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    let mut count = 0;
+    let mut shell = vec![0; parent.len()];
+    for f in 0..parent.len() {
+        // a root comes before the others of its set
+        let r = root(&mut parent, f);
+        shell[f] = if r == f {
+            count += 1;
+            count - 1
+        } else {
+            shell[r]
+        };
+    }
+    (shell, count as usize)
+}
+
+impl TriMesh {
+    /// Turns shells that are inside out one by one; returns how many were.
+    pub(super) fn turn_shells(&mut self, shell: &[u32], count: usize) -> usize {
+        let mut members: Vec<Vec<usize>> = vec![Vec::new(); count];
+        shell.iter().enumerate().for_each(|(face, &s)| members[s as usize].push(face));
+        let negative: Vec<bool> = members.iter().map(|faces| self.volume_of(faces) < 0.0).collect();
+        if !negative.contains(&true) {
+            return 0;
+        }
+        let all = WindingNumber::new(self);
+        let outside = |faces: &Vec<usize>| {
+            samples(faces).any(|face| {
+                let p = self.centroid(face);
+                let own: f64 = faces.iter().filter(|&&f| f != face).map(|&f| solid_angle(&p, &self.corners(f))).sum();
+                (all.without(&p, &[face as u32]) - own / (4.0 * PI)).abs() < 0.5
+            })
+        };
+        let mut turned: Vec<bool> = members.iter().zip(&negative).map(|(faces, negative)| *negative && outside(faces)).collect();
+        let those: Vec<[u32; 3]> = (0..shell.len()).filter(|&f| turned[shell[f] as usize]).map(|f| self.triangles[f]).collect();
+        if those.is_empty() {
+            return 0;
+        }
+        let around = WindingNumber::new(&TriMesh { vertices: self.vertices.clone(), triangles: those });
+        for (s, faces) in members.iter().enumerate().filter(|(s, _)| !negative[*s]) {
+            turned[s] = samples(faces).all(|face| around.at(&self.centroid(face)) < -0.5);
+        }
+        for (face, triangle) in self.triangles.iter_mut().enumerate() {
+            if turned[shell[face] as usize] {
+                triangle.swap(1, 2);
+            }
+        }
+        turned.iter().filter(|t| **t).count()
+    }
+
+    fn centroid(&self, face: usize) -> Vec3 {
+        self.corners(face).iter().sum::<Vec3>() / 3.0
+    }
+
+    /// Signed, m³, of some faces that close a solid.
+    fn volume_of(&self, faces: &[usize]) -> f64 {
+        let origin = faces.first().map_or(Vec3::zeros(), |&f| self.corners(f)[0]);
+        faces.iter().map(|&f| self.corners(f).map(|p| p - origin)).map(|[a, b, c]| a.dot(&b.cross(&c)) / 6.0).sum()
+    }
+}
+
+fn samples(faces: &[usize]) -> impl Iterator<Item = usize> + '_ {
+    let step = faces.len().div_ceil(SAMPLES).max(1);
+    faces.iter().copied().step_by(step)
+}

@@ -1,0 +1,352 @@
+//! The boundary of the solid that a closed surface goes around at least once.
+//!
+//! Where shells overlap, or a surface crosses itself, some of it is buried. Faces that cross others are cut along the
+//! planes of those others, so that each piece lies on one side of every other face. A piece's centre `c` then tells
+//! for the whole of it: with the faces through `c` left out,
+//!
+//! ```text
+//! front = w(c) − J/2        back = w(c) + J/2        J = Σ ±1 over the faces through c, + where they face alike
+//! ```
+//!
+//! are the winding numbers in front of the piece and behind it, with no step off the surface. The piece bounds the
+//! solid if one of them is above 1/2 and the other is not; it is then counted `1/|J|` times, since each of the faces
+//! that lie on each other there has such a piece. Faces that cross none are told patch by patch.
+//!
+//! Integrals over the boundary's pieces are exact for the union, whatever the number of times it is gone around.
+
+use super::TriMesh;
+use super::check::{EdgeUse, edge_groups};
+use super::closest_on_triangle;
+use super::crossing::Crossings;
+use super::integrals::Moments;
+use super::winding::WindingNumber;
+use crate::Vec3;
+
+/// Faces with more others across them than this are not cut.
+const MOST_PARTNERS: usize = 64;
+/// Pieces of one face.
+const MOST_PIECES: usize = 512;
+/// Pieces per face of the mesh, on average, and a floor for small meshes; further faces are not cut.
+const MOST_CUT: usize = 4;
+const FEWEST_CUT: usize = 200_000;
+/// Faces closer than this part of the diagonal lie on each other.
+const SAME_PLACE: f64 = 1e-10;
+/// A winding number farther than this from an integer is not believed.
+const DOUBT: f64 = 0.2;
+
+/// A triangle of the boundary.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    pub corners: [Vec3; 3],
+    /// The face that it is, or is a part of.
+    pub face: u32,
+    /// How often it counts in an integral over the boundary, 0 to 1.
+    pub weight: f64,
+    /// Which normals tell the side that a point is on.
+    pub trust: Trust,
+}
+
+/// How far the normals of a piece tell which side is which.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Trust {
+    /// Not at all.
+    None,
+    /// Above its middle, but not at edges and corners.
+    Face,
+    /// Everywhere: the faces around all its corners are whole, and lie round each in one fan.
+    All,
+}
+
+/// The boundary of a closed mesh's solid.
+#[derive(Clone, Debug)]
+pub(super) struct Boundary {
+    pub pieces: Vec<Piece>,
+    pub crossing_faces: usize,
+    /// Whether there may be more of these.
+    pub capped: bool,
+    /// Whether some of the surface is no boundary, or counts other than once.
+    pub differs: bool,
+    /// Area of what was kept without being sure, m².
+    pub doubtful_area: f64,
+}
+
+impl Boundary {
+    /// Of a closed mesh (see [`TriMesh::check_closed`]).
+    pub fn of(mesh: &TriMesh) -> (Boundary, Option<WindingNumber>) {
+        let crossings = Crossings::of(mesh);
+        let groups = edge_groups(mesh);
+        let patches = patches(mesh, &groups, &crossings);
+        let split = pinched(mesh, &groups);
+        let simple = crossings.pairs.is_empty() && !crossings.capped && patches.count == 1;
+        let winding = (!simple || split.contains(&true)).then(|| WindingNumber::new(mesh));
+        let mut boundary = Boundary {
+            pieces: Vec::with_capacity(mesh.triangles.len()),
+            crossing_faces: crossings.faces(),
+            capped: crossings.capped,
+            differs: false,
+            doubtful_area: 0.0,
+        };
+        match &winding {
+            Some(winding) if !simple => boundary.cut(mesh, &crossings, &patches, winding),
+            _ => (0..mesh.triangles.len()).for_each(|t| boundary.keep(t, mesh.corners(t), Told::Bounds(1.0))),
+        }
+        if boundary.pieces.is_empty() {
+            // a surface around nothing: there is a distance, and no inside
+            (0..mesh.triangles.len()).for_each(|t| boundary.keep(t, mesh.corners(t), Told::Doubtful));
+        }
+        boundary.trust(mesh, split);
+        (boundary, winding)
+    }
+
+    /// Integrals over the solid, about `origin`.
+    pub fn moments(&self, origin: &Vec3) -> Moments {
+        Moments::of(self.pieces.iter().map(|p| (p.corners, p.weight)), origin)
+    }
+
+    fn cut(&mut self, mesh: &TriMesh, crossings: &Crossings, patches: &Patches, winding: &WindingNumber) {
+        let mut partners = vec![Vec::new(); mesh.triangles.len()];
+        for &(a, b) in &crossings.pairs {
+            partners[a as usize].push(b);
+            partners[b as usize].push(a);
+        }
+        let tolerance = SAME_PLACE * mesh.diagonal();
+        let most = (MOST_CUT * mesh.triangles.len()).max(FEWEST_CUT);
+        let mut cut = 0;
+        let mut outcome: Vec<Option<Told>> = vec![None; patches.count];
+        for face in 0..mesh.triangles.len() {
+            let others = &partners[face];
+            if crossings.capped {
+                self.keep(face, mesh.corners(face), Told::Doubtful);
+            } else if others.is_empty() {
+                let told = *outcome[patches.of[face] as usize].get_or_insert_with(|| {
+                    let largest = patches.largest[patches.of[face] as usize];
+                    tell(mesh, winding, largest, &mesh.corners(largest), &[], tolerance)
+                });
+                self.keep(face, mesh.corners(face), told);
+            } else if let Some(parts) = parts(mesh, face, others).filter(|_| cut <= most) {
+                cut += parts.len();
+                for part in parts {
+                    self.keep(face, part, tell(mesh, winding, face, &part, others, tolerance));
+                }
+            } else {
+                self.keep(face, mesh.corners(face), Told::Doubtful);
+            }
+        }
+    }
+
+    fn keep(&mut self, face: usize, corners: [Vec3; 3], told: Told) {
+        let weight = match told {
+            Told::Buried => 0.0,
+            Told::Bounds(share) => share.abs(),
+            Told::Doubtful => {
+                self.doubtful_area += 0.5 * area_vector(&corners).norm();
+                1.0
+            }
+        };
+        self.differs |= weight != 1.0;
+        if weight != 0.0 {
+            let faces_out = matches!(told, Told::Bounds(share) if share > 0.0);
+            let trust = if faces_out { Trust::Face } else { Trust::None };
+            self.pieces.push(Piece { corners, face: face as u32, weight, trust });
+        }
+    }
+
+    /// Where all faces around all corners of a face are whole and trusted, so are the normals of its edges and corners.
+    fn trust(&mut self, mesh: &TriMesh, mut pinched: Vec<bool>) {
+        let mut whole = vec![false; mesh.triangles.len()];
+        for piece in self.pieces.iter().filter(|p| p.weight == 1.0 && p.trust == Trust::Face) {
+            whole[piece.face as usize] = piece.corners == mesh.corners(piece.face as usize);
+        }
+        for (triangle, whole) in mesh.triangles.iter().zip(&whole) {
+            triangle.iter().for_each(|&v| pinched[v as usize] |= !whole);
+        }
+        for piece in self.pieces.iter_mut().filter(|p| whole[p.face as usize]) {
+            if mesh.triangles[piece.face as usize].iter().all(|&v| !pinched[v as usize]) {
+                piece.trust = Trust::All;
+            }
+        }
+    }
+}
+
+/// What a piece is to the solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Told {
+    /// Solid, or none, on both sides.
+    Buried,
+    /// Its boundary, of which it is such a share; negative where the solid is in front of it.
+    Bounds(f64),
+    /// Taken as its boundary for safety.
+    Doubtful,
+}
+
+fn tell(mesh: &TriMesh, winding: &WindingNumber, face: usize, part: &[Vec3; 3], others: &[u32], tolerance: f64) -> Told {
+    let center = part.iter().sum::<Vec3>() / 3.0;
+    let normal = area_vector(&mesh.corners(face));
+    let mut through = vec![face as u32];
+    let mut jump = 1.0;
+    for &other in others {
+        let corners = mesh.corners(other as usize);
+        let facing = area_vector(&corners);
+        let aligned = normal.cross(&facing).norm() <= 1e-6 * normal.norm() * facing.norm();
+        if aligned && (closest_on_triangle(&center, &corners).0 - center).norm() <= tolerance {
+            through.push(other);
+            jump += normal.dot(&facing).signum();
+        }
+    }
+    let middle = winding.without(&center, &through);
+    let (front, back) = (middle - 0.5 * jump, middle + 0.5 * jump);
+    if (front - front.round()).abs() > DOUBT || normal.norm() == 0.0 {
+        return Told::Doubtful;
+    }
+    if (front > 0.5) == (back > 0.5) { Told::Buried } else { Told::Bounds(1.0 / jump) }
+}
+
+/// A face cut along the planes of others, and of the edges of those that lie in its own plane; `None` if they are
+/// too many.
+fn parts(mesh: &TriMesh, face: usize, others: &[u32]) -> Option<Vec<[Vec3; 3]>> {
+    let corners = mesh.corners(face);
+    if others.len() > MOST_PARTNERS {
+        return None;
+    }
+    let normal = area_vector(&corners);
+    let mut pieces = vec![corners.to_vec()];
+    for &other in others {
+        let across = mesh.corners(other as usize);
+        let facing = area_vector(&across);
+        if normal.cross(&facing).norm() <= 1e-9 * normal.norm() * facing.norm() {
+            for k in 0..3 {
+                let (from, to) = (across[k], across[(k + 1) % 3]);
+                pieces = cut(pieces, &across, &from, &normal.cross(&(to - from)));
+            }
+        } else {
+            pieces = cut(pieces, &across, &across[0], &facing);
+        }
+        if pieces.len() > MOST_PIECES {
+            return None;
+        }
+    }
+    Some(pieces.iter().flat_map(|p| (1..p.len() - 1).map(|k| [p[0], p[k], p[k + 1]])).collect())
+}
+
+/// Cuts those convex pieces that could meet the triangle `across` by the plane through `at` along `normal`.
+fn cut(pieces: Vec<Vec<Vec3>>, across: &[Vec3; 3], at: &Vec3, normal: &Vec3) -> Vec<Vec<Vec3>> {
+    let bounds = crate::Aabb::around(*across);
+    let mut after = Vec::with_capacity(pieces.len() + 1);
+    for piece in pieces {
+        let own = crate::Aabb::around(piece.iter().copied());
+        let heights: Vec<f64> = piece.iter().map(|p| (p - at).dot(normal)).collect();
+        let near = (0..3).all(|k| own.min[k] <= bounds.max[k] && bounds.min[k] <= own.max[k]);
+        if !near || heights.iter().all(|h| *h >= 0.0) || heights.iter().all(|h| *h <= 0.0) {
+            after.push(piece);
+            continue;
+        }
+        after.extend([1.0, -1.0].map(|sign| half(&piece, &heights, sign)).into_iter().filter(|p| p.len() >= 3));
+    }
+    after
+}
+
+/// What of a convex piece lies where `sign · height ≥ 0`.
+fn half(piece: &[Vec3], heights: &[f64], sign: f64) -> Vec<Vec3> {
+    let mut kept = Vec::with_capacity(piece.len() + 1);
+    for n in 0..piece.len() {
+        let m = (n + 1) % piece.len();
+        let (h, g) = (sign * heights[n], sign * heights[m]);
+        if h >= 0.0 {
+            kept.push(piece[n]);
+        }
+        if h * g < 0.0 {
+            // from the same end for both halves, so that they share the very point
+            let (low, high) = if heights[n] < heights[m] { (n, m) } else { (m, n) };
+            let share = heights[low] / (heights[low] - heights[high]);
+            kept.push(piece[low] + (piece[high] - piece[low]) * share);
+        }
+    }
+    kept
+}
+
+/// Twice the area, along the normal.
+fn area_vector([a, b, c]: &[Vec3; 3]) -> Vec3 {
+    (b - a).cross(&(c - a))
+}
+
+/// Faces that cross none, joined over edges of two faces: all of a patch has the same on either side.
+struct Patches {
+    /// Of each face; means nothing for one that crosses.
+    of: Vec<u32>,
+    /// The face of each patch that is largest.
+    largest: Vec<usize>,
+    count: usize,
+}
+
+fn patches(mesh: &TriMesh, groups: &[Vec<EdgeUse>], crossings: &Crossings) -> Patches {
+    let mut crosses = vec![false; mesh.triangles.len()];
+    for &(a, b) in &crossings.pairs {
+        (crosses[a as usize], crosses[b as usize]) = (true, true);
+    }
+    let mut neighbours = vec![Vec::new(); mesh.triangles.len()];
+    for group in groups.iter().filter(|g| g.len() == 2 && !crosses[g[0].face] && !crosses[g[1].face]) {
+        neighbours[group[0].face].push(group[1].face);
+        neighbours[group[1].face].push(group[0].face);
+    }
+    let mut patches = Patches { of: vec![u32::MAX; mesh.triangles.len()], largest: Vec::new(), count: 0 };
+    let area = |t: usize| area_vector(&mesh.corners(t)).norm_squared();
+    for seed in 0..mesh.triangles.len() {
+        if patches.of[seed] != u32::MAX || crosses[seed] {
+            continue;
+        }
+        let patch = patches.count as u32;
+        patches.count += 1;
+        patches.of[seed] = patch;
+        let (mut open, mut largest) = (vec![seed], seed);
+        while let Some(face) = open.pop() {
+            if area(face) > area(largest) {
+                largest = face;
+            }
+            for &next in &neighbours[face] {
+                if patches.of[next] == u32::MAX {
+                    patches.of[next] = patch;
+                    open.push(next);
+                }
+            }
+        }
+        patches.largest.push(largest);
+    }
+    patches
+}
+
+/// Which vertices have more than one fan of faces around them, an edge of more than two, or a face without area.
+fn pinched(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> Vec<bool> {
+    let mut pinched = vec![false; mesh.vertices.len()];
+    for (_, triangle) in mesh.triangles.iter().enumerate().filter(|(t, _)| area_vector(&mesh.corners(*t)) == Vec3::zeros()) {
+        triangle.iter().for_each(|&v| pinched[v as usize] = true);
+    }
+    // corners of faces, joined over the edges that meet there: one set per fan
+    let mut parent: Vec<u32> = (0..3 * mesh.triangles.len() as u32).collect();
+    fn root(parent: &mut [u32], mut n: u32) -> u32 {
+        while parent[n as usize] != n {
+            parent[n as usize] = parent[parent[n as usize] as usize];
+            n = parent[n as usize];
+        }
+        n
+    }
+    let corner = |face: usize, v: u32| (3 * face + mesh.triangles[face].iter().position(|&w| w == v).unwrap_or(0)) as u32;
+    for group in groups {
+        for v in [group[0].low, group[0].high] {
+            if group.len() != 2 {
+                pinched[v as usize] = true;
+                continue;
+            }
+            let [a, b] = [corner(group[0].face, v), corner(group[1].face, v)].map(|c| root(&mut parent, c));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut fan = vec![u32::MAX; mesh.vertices.len()];
+    for n in 0..parent.len() as u32 {
+        let v = mesh.triangles[n as usize / 3][n as usize % 3] as usize;
+        if root(&mut parent, n) == n {
+            pinched[v] |= fan[v] != u32::MAX;
+            fan[v] = n;
+        }
+    }
+    pinched
+}

@@ -1,0 +1,284 @@
+//! A tree as a JSON text, with what it was made of and how good it is.
+//!
+//! ```json
+//! {
+//!   "format": "tumble sphere tree", "version": 1, "name": "bunny.obj", "units": "m",
+//!   "mesh": {"blake3": "…", "triangles": 6598, "diagonal": 2.4897},
+//!   "settings": {"builder": "octree", "branch": 8, "depth": 3, "error": 0.01, "even": true},
+//!   "stages": [{"level": 3, "stage": "leaves", "count": 402}],
+//!   "quality": [{"level": 0, "spheres": 1, "coverage": 1.0, …}],
+//!   "levels": [[{"c": [x, y, z], "r": R, "out": E}], [{"c": [x, y, z], "r": R, "out": E, "parent": 0}, …], …]
+//! }
+//! ```
+//!
+//! Every level stands for the solid by itself: a leaf above the last level is repeated in each level below, as the only child of itself.
+//! Numbers are written with as many digits as give the same bits back. What is read is checked as if it came from an enemy: sizes are
+//! capped, numbers finite, parents there and in order, children inside their parents.
+
+use super::{LevelQuality, SphereNode, SphereTree, StageCount, TreeSettings};
+use crate::{TriMesh, Vec3};
+use serde::{Deserialize, Serialize};
+use std::fmt::Write;
+use thiserror::Error;
+
+/// Most bytes of a text that is read: 512 MiB.
+pub const MOST_BYTES: usize = 512 << 20;
+/// Most balls of a tree that is read.
+const MOST_BALLS: usize = 1 << 23;
+/// Most levels of a tree that is read.
+const MOST_LEVELS: usize = 64;
+/// Centres up to this from the origin and radii up to this are read, metres.
+const FARTHEST: f64 = 1e10;
+const FORMAT: &str = "tumble sphere tree";
+/// The version of the format that is written and read.
+const VERSION: u32 = 1;
+
+/// A tree and what is known of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TreeFile {
+    /// The name of the mesh, such as its file's.
+    pub name: String,
+    /// What it was built around.
+    pub mesh: MeshId,
+    /// How it was built.
+    pub settings: TreeSettings,
+    /// What the builder's stages did.
+    pub stages: Vec<StageCount>,
+    /// The figures of its levels; may be left empty.
+    pub quality: Vec<LevelQuality>,
+    /// The tree.
+    pub tree: SphereTree,
+}
+
+/// What tells one mesh from another.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshId {
+    /// BLAKE3 of the vertices' bits and the triangles, in hexadecimal.
+    pub blake3: String,
+    /// How many triangles it has.
+    pub triangles: usize,
+    /// Diagonal of its bounding box, metres.
+    pub diagonal: f64,
+}
+
+/// Why a text is no tree.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum TreeFileError {
+    /// The text is too long.
+    #[error("the text has {0} bytes; a sphere tree may have {MOST_BYTES}")]
+    TooLong(usize),
+    /// No JSON, or not the keys of a tree.
+    #[error("{0}")]
+    Json(String),
+    /// Another kind of file, or of another time.
+    #[error("it is a \"{format}\" of version {version}; what is read is a \"{FORMAT}\" of version {VERSION}")]
+    Format {
+        /// As it says.
+        format: String,
+        /// As it says.
+        version: u32,
+    },
+    /// Units other than metres.
+    #[error("units are \"{0}\"; a sphere tree is in \"m\"")]
+    Units(String),
+    /// Too many or too few.
+    #[error("there are {count} {what}; wanted {wanted}")]
+    Count {
+        /// Of what.
+        what: &'static str,
+        /// As found.
+        count: usize,
+        /// What would be right.
+        wanted: String,
+    },
+    /// A ball that cannot be.
+    #[error("ball {ball} of level {level}: {what}")]
+    Ball {
+        /// From 0.
+        level: usize,
+        /// From 0.
+        ball: usize,
+        /// What is wrong with it, and what would be right.
+        what: String,
+    },
+    /// A promise that the tree breaks.
+    #[error("{0}")]
+    Tree(String),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Text {
+    format: String,
+    version: u32,
+    name: String,
+    units: String,
+    mesh: MeshId,
+    settings: TreeSettings,
+    stages: Vec<StageCount>,
+    quality: Vec<LevelQuality>,
+    levels: Vec<Vec<TextBall>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TextBall {
+    c: [f64; 3],
+    r: f64,
+    out: f64,
+    #[serde(default = "no_parent")]
+    parent: i64,
+}
+
+fn no_parent() -> i64 {
+    -1
+}
+
+impl MeshId {
+    /// Of a mesh.
+    pub fn of(mesh: &TriMesh) -> MeshId {
+        let mut hash = blake3::Hasher::new();
+        hash.update(&(mesh.vertices.len() as u64).to_le_bytes());
+        mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]).for_each(|x| _ = hash.update(&x.to_bits().to_le_bytes()));
+        mesh.triangles.iter().flatten().for_each(|n| _ = hash.update(&n.to_le_bytes()));
+        MeshId { blake3: hash.finalize().to_hex().to_string(), triangles: mesh.triangles.len(), diagonal: mesh.diagonal() }
+    }
+}
+
+impl TreeFile {
+    /// The text: the head in some lines, then one ball per line.
+    pub fn to_json(&self) -> String {
+        let mut text = String::from("{\n");
+        let mut key = |name: &str, value: String| _ = writeln!(text, "\"{name}\": {value},");
+        key("format", json(FORMAT));
+        key("version", json(&VERSION));
+        key("name", json(&self.name));
+        key("units", json("m"));
+        key("mesh", json(&self.mesh));
+        key("settings", json(&self.settings));
+        key("stages", lines(self.stages.iter().map(json)));
+        key("quality", lines(self.quality.iter().map(json)));
+        let levels = self.tree.level_lists();
+        let levels: Vec<String> = levels
+            .iter()
+            .map(|level| {
+                lines(level.iter().map(|b| {
+                    let [x, y, z] = [b.center.x, b.center.y, b.center.z].map(|x| json(&x));
+                    let parent = b.parent.map_or(String::new(), |p| format!(",\"parent\":{p}"));
+                    format!("{{\"c\":[{x},{y},{z}],\"r\":{},\"out\":{}{parent}}}", json(&b.radius), json(&self.tree.nodes()[b.node].outward))
+                }))
+            })
+            .collect();
+        _ = writeln!(text, "\"levels\": [{}]\n}}", levels.join(", "));
+        text
+    }
+
+    /// Reads and checks a text.
+    ///
+    /// # Errors
+    /// [`TreeFileError`] says what is wrong, where, and what would be right. That the tree fits a mesh is not looked at.
+    pub fn from_json(text: &str) -> Result<TreeFile, TreeFileError> {
+        if text.len() > MOST_BYTES {
+            return Err(TreeFileError::TooLong(text.len()));
+        }
+        let text: Text = serde_json::from_str(text).map_err(|e| TreeFileError::Json(e.to_string()))?;
+        if (text.format.as_str(), text.version) != (FORMAT, VERSION) {
+            return Err(TreeFileError::Format { format: text.format, version: text.version });
+        }
+        if text.units != "m" {
+            return Err(TreeFileError::Units(text.units));
+        }
+        let tree = read_levels(&text.levels)?;
+        tree.check_nesting().map_err(|e| TreeFileError::Tree(e.to_string()))?;
+        Ok(TreeFile { name: text.name, mesh: text.mesh, settings: text.settings, stages: text.stages, quality: text.quality, tree })
+    }
+}
+
+/// `null` for what JSON cannot say; a tree that was built holds no such number.
+fn json<T: Serialize + ?Sized>(value: &T) -> String {
+    serde_json::to_string(value).unwrap_or_else(|_| "null".into())
+}
+
+fn lines(items: impl Iterator<Item = String>) -> String {
+    format!("[\n{}\n]", items.collect::<Vec<_>>().join(",\n"))
+}
+
+fn read_levels(levels: &[Vec<TextBall>]) -> Result<SphereTree, TreeFileError> {
+    let count = |what, count, wanted: String| Err(TreeFileError::Count { what, count, wanted });
+    if levels.is_empty() || levels.len() > MOST_LEVELS {
+        return count("levels", levels.len(), format!("1 to {MOST_LEVELS}"));
+    }
+    if levels[0].len() != 1 {
+        return count("balls in level 0", levels[0].len(), "1, the root".into());
+    }
+    let balls = levels.iter().map(Vec::len).sum();
+    if balls > MOST_BALLS {
+        return count("balls", balls, format!("at most {MOST_BALLS}"));
+    }
+    let mut nodes: Vec<SphereNode> = Vec::with_capacity(balls);
+    // for every ball of the level above its node, and whether it was carried down to there
+    let mut above: Vec<(usize, bool)> = Vec::new();
+    for (number, level) in levels.iter().enumerate() {
+        above = read_level(number, level, &above, &mut nodes)?;
+    }
+    Ok(SphereTree::of_nodes(nodes))
+}
+
+fn read_level(number: usize, level: &[TextBall], above: &[(usize, bool)], nodes: &mut Vec<SphereNode>) -> Result<Vec<(usize, bool)>, TreeFileError> {
+    let mut placed = Vec::with_capacity(level.len());
+    for (n, ball) in level.iter().enumerate() {
+        let wrong = |what: String| TreeFileError::Ball { level: number, ball: n, what };
+        let node = read_ball(number, ball).map_err(wrong)?;
+        let parent = read_parent(number, n, level, above.len()).map_err(wrong)?;
+        let Some((parent, carried)) = parent.map(|p| above[p]) else {
+            placed.push((nodes.len(), false));
+            nodes.push(node);
+            continue;
+        };
+        let alone = [n.checked_sub(1), Some(n + 1)].iter().flatten().all(|m| level.get(*m).is_none_or(|other| other.parent != ball.parent));
+        let of = &nodes[parent];
+        let same = alone && (node.center, node.radius, node.outward) == (of.center, of.radius, of.outward);
+        if same {
+            placed.push((parent, true));
+        } else if carried {
+            return Err(wrong("its parent repeats the ball above it, as only a leaf is".into()));
+        } else {
+            let index = nodes.len();
+            let of = &mut nodes[parent];
+            of.first_child = if of.children == 0 { index as u32 } else { of.first_child };
+            of.children += 1;
+            let level = of.level + 1;
+            nodes.push(SphereNode { level, ..node });
+            placed.push((index, false));
+        }
+    }
+    Ok(placed)
+}
+
+fn read_ball(number: usize, ball: &TextBall) -> Result<SphereNode, String> {
+    let [x, y, z] = ball.c;
+    if let Some(bad) = ball.c.iter().find(|x| x.is_nan() || x.abs() > FARTHEST) {
+        return Err(format!("its centre has the coordinate {bad}; wanted at most {FARTHEST:e} m"));
+    }
+    for (what, value) in [("radius `r`", ball.r), ("outward error `out`", ball.out)] {
+        if !(0.0..=FARTHEST).contains(&value) {
+            return Err(format!("its {what} is {value}; wanted 0 to {FARTHEST:e} m"));
+        }
+    }
+    Ok(SphereNode { center: Vec3::new(x, y, z), radius: ball.r, outward: ball.out, first_child: 0, children: 0, level: number as u32 })
+}
+
+/// The parent's index in the level above; `None` for the root. Parents must not fall along a level, so that siblings are neighbours.
+fn read_parent(number: usize, n: usize, level: &[TextBall], above: usize) -> Result<Option<usize>, String> {
+    let parent = level[n].parent;
+    if number == 0 {
+        return if parent == -1 { Ok(None) } else { Err(format!("its parent is {parent}; the root has none")) };
+    }
+    let index = usize::try_from(parent).ok().filter(|p| *p < above);
+    let index = index.ok_or_else(|| format!("its parent is {parent}; wanted 0 to {}", above - 1))?;
+    if n > 0 && level[n - 1].parent > parent {
+        return Err(format!("its parent {parent} comes after {}; balls stand in the order of their parents", level[n - 1].parent));
+    }
+    Ok(Some(index))
+}

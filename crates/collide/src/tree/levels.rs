@@ -1,0 +1,44 @@
+//! A tree as a list of levels, each of which stands for the solid: the form of files and of the quality report.
+
+use super::SphereTree;
+use crate::Vec3;
+
+/// One ball of a level. A leaf above the level is carried down: it is its own parent, once per level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelBall {
+    /// Mesh frame, metres.
+    pub center: Vec3,
+    /// Metres.
+    pub radius: f64,
+    /// Index into the level above; `None` in the first level.
+    pub parent: Option<usize>,
+    /// Index into [`SphereTree::nodes`].
+    pub node: usize,
+}
+
+impl LevelBall {
+    /// A ball without a parent and of no tree.
+    pub fn new(center: Vec3, radius: f64) -> LevelBall {
+        LevelBall { center, radius, parent: None, node: 0 }
+    }
+}
+
+impl SphereTree {
+    /// The balls of [`SphereTree::at_level`] for every level from the root's on, with their parents. Balls stand in the order of their
+    /// parents, so that the children of one ball are neighbours.
+    pub fn level_lists(&self) -> Vec<Vec<LevelBall>> {
+        let ball = |node: usize, parent| LevelBall { center: self.nodes[node].center, radius: self.nodes[node].radius, parent, node };
+        let mut lists = vec![vec![ball(0, None)]];
+        for _ in 1..self.levels() {
+            let above = &lists[lists.len() - 1];
+            let below = above.iter().enumerate().flat_map(|(parent, b)| {
+                let leaf = self.nodes[b.node].is_leaf();
+                let nodes = if leaf { b.node..b.node + 1 } else { self.nodes[b.node].child_range() };
+                nodes.map(move |node| (node, parent))
+            });
+            let below = below.map(|(node, parent)| ball(node, Some(parent))).collect();
+            lists.push(below);
+        }
+        lists
+    }
+}

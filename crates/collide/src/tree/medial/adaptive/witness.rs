@@ -1,0 +1,147 @@
+//! Flags and witnesses of the balls: who holds which point.
+
+use super::{Axis, NONE, SLACK};
+use crate::Vec3;
+use crate::tree::ball::Ball;
+use std::cmp::Reverse;
+
+impl Axis<'_> {
+    /// The tetrahedra that the last insertion made.
+    pub(super) fn made(&self) -> Vec<u32> {
+        let Some(voronoi) = self.voronoi.as_ref() else { return Vec::new() };
+        voronoi.delaunay.made().iter().copied().filter(|&c| voronoi.delaunay.is_finite(c)).collect()
+    }
+
+    /// Flags a new cell, if it is INTERNAL.
+    pub(super) fn welcome(&mut self, cell: u32) {
+        if self.voronoi.as_ref().and_then(|v| v.ball(cell)).is_some_and(|b| b.internal) {
+            self.inner[cell as usize] = true;
+            self.internal += 1;
+            self.enqueue(cell);
+        }
+    }
+
+    /// Judges anew the points of a COVER ball.
+    pub(super) fn judge_again(&mut self, cell: u32) {
+        if self.inner[cell as usize] || self.first[cell as usize] == NONE {
+            return;
+        }
+        let mut points = Vec::new();
+        chain(self.first[cell as usize], &self.next, &mut points);
+        self.first[cell as usize] = NONE;
+        self.covering -= 1;
+        for i in points {
+            self.witness[i as usize] = NONE;
+            self.judge(i, cell);
+        }
+    }
+
+    /// Finds a point its witness: the first INTERNAL ball met that holds it, or else the one of least error. The cell it
+    /// lies in, walking from `hint`.
+    pub(super) fn judge(&mut self, i: u32, hint: u32) -> u32 {
+        let mut best = (f64::INFINITY, NONE);
+        let home = self.each_holder(i, hint, |c, axis| {
+            if axis.inner[c as usize] {
+                best.1 = c;
+                return false;
+            }
+            let error = axis.error(c);
+            if error < best.0 {
+                best = (error, c);
+            }
+            true
+        });
+        if best.1 != NONE {
+            self.entrust(i, best.1);
+        }
+        home
+    }
+
+    /// Calls `visit` for all cells whose balls hold point `i`, until it says no. The cell it lies in, walking from `hint`.
+    pub(super) fn each_holder(&mut self, i: u32, hint: u32, mut visit: impl FnMut(u32, &mut Self) -> bool) -> u32 {
+        let Some(voronoi) = self.voronoi.as_ref() else { return NONE };
+        let p = self.points[i as usize];
+        let home = voronoi.delaunay.locate(&p, hint);
+        self.search += 1;
+        self.seen[home as usize] = self.search;
+        let mut stack = vec![home];
+        while let Some(c) = stack.pop() {
+            if self.holds(c, i) && !visit(c, self) {
+                break;
+            }
+            let Some(voronoi) = self.voronoi.as_ref() else { break };
+            for n in voronoi.delaunay.across(c) {
+                // on through slivers that have no ball
+                let on = voronoi.delaunay.is_finite(n) && voronoi.ball(n).is_none_or(|b| holds(&b.ball, &p));
+                if on && self.seen[n as usize] != self.search {
+                    self.seen[n as usize] = self.search;
+                    stack.push(n);
+                }
+            }
+        }
+        home
+    }
+
+    /// Makes a ball the witness of a point.
+    pub(super) fn entrust(&mut self, i: u32, cell: u32) {
+        let c = cell as usize;
+        if self.first[c] == NONE && !self.inner[c] {
+            self.covering += 1;
+            self.enqueue(cell);
+        }
+        self.witness[i as usize] = cell;
+        self.next[i as usize] = self.first[c];
+        self.first[c] = i;
+    }
+
+    /// Queues a flagged ball, once.
+    pub(super) fn enqueue(&mut self, cell: u32) {
+        let life = self.lives[cell as usize];
+        if self.queued[cell as usize] != life {
+            self.queued[cell as usize] = life;
+            let error = self.error(cell);
+            self.queue.push((error.to_bits(), Reverse(cell), life));
+        }
+    }
+
+    pub(super) fn is_flagged(&self, cell: u32) -> bool {
+        self.inner[cell as usize] || self.first[cell as usize] != NONE
+    }
+
+    /// Whether a flagged ball is of the region: it holds some point of it.
+    pub(super) fn matters(&self, cell: u32) -> bool {
+        !self.partial || self.first[cell as usize] != NONE || (0..self.points.len() as u32).any(|i| self.holds(cell, i))
+    }
+
+    /// Upper bound of how far the ball reaches out of the solid, metres.
+    pub(super) fn error(&mut self, cell: u32) -> f64 {
+        let Some(voronoi) = self.voronoi.as_mut() else { return 0.0 };
+        let signed = voronoi.signed_distance(cell);
+        voronoi.ball(cell).map_or(0.0, |b| (b.ball.radius + signed).max(0.0))
+    }
+
+    pub(super) fn holds(&self, cell: u32, i: u32) -> bool {
+        self.voronoi.as_ref().and_then(|v| v.ball(cell)).is_some_and(|b| holds(&b.ball, &self.points[i as usize]))
+    }
+
+    pub(super) fn grow_tables(&mut self) {
+        let count = self.voronoi.as_ref().map_or(0, |v| v.delaunay.cell_count());
+        self.first.resize(count, NONE);
+        self.inner.resize(count, false);
+        self.lives.resize(count, 0);
+        self.queued.resize(count, NONE);
+        self.seen.resize(count, 0);
+    }
+}
+
+fn holds(ball: &Ball, p: &Vec3) -> bool {
+    (p - ball.center).norm_squared() <= ball.radius * ball.radius * (1.0 + SLACK)
+}
+
+/// Appends a chain of points to `all`.
+pub(super) fn chain(mut i: u32, next: &[u32], all: &mut Vec<u32>) {
+    while i != NONE {
+        all.push(i);
+        i = next[i as usize];
+    }
+}

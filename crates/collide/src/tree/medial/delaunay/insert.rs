@@ -1,0 +1,139 @@
+//! Putting in one point: the cells whose spheres hold it are taken out, and the hole is filled with cells around it.
+//!
+//! Source: Bowyer, *Computing Dirichlet tessellations*, and Watson, *Computing the n-dimensional Delaunay tessellation*
+//! (both 1981).
+//!
+//! **Ties.** A cell goes only if the point is *strictly* inside its sphere. That is the symbolic perturbation of
+//! Devillers and Teillaud (*Perturbations for Delaunay and weighted Delaunay 3D triangulations*, 2011) in which each
+//! point is lifted by far more than all before it, so that the hole is connected and star-shaped whatever lies on
+//! one sphere. A facet in one plane with the point is never on its rim: in that plane both of its cells' spheres
+//! are the facet's circle, so that both go or both stay. A ghost goes if the point is strictly beyond its facet; in
+//! the facet's plane the circle decides, which is to say the sphere of the finite cell behind it. With that no
+//! flat cell is ever made.
+
+use super::predicates::in_sphere;
+use super::{Cell, Delaunay, GHOST, NONE};
+
+/// Set in `across` of a cell that goes: the entry is the new cell on that facet.
+const NEW: u32 = 1 << 31;
+
+impl Delaunay {
+    /// Inserts vertex `v`, whose point is there, walking from `hint`; whether it was: a duplicate is not.
+    pub(super) fn insert_vertex(&mut self, v: u32, hint: u32) -> bool {
+        let p = self.points[v as usize];
+        self.gone.clear();
+        self.made.clear();
+        let start = self.locate(&p, hint);
+        let corners = self.cells[start as usize].vertices;
+        if corners.iter().any(|&c| c != GHOST && self.points[c as usize] == p) {
+            return false;
+        }
+        self.dig(start, v);
+        self.fill(v);
+        self.glue();
+        for &c in &self.gone {
+            self.cells[c as usize].vertices = [GHOST; 4];
+            self.free.push(c);
+        }
+        true
+    }
+
+    /// Collects the cells that go (`gone`) and the facets around the hole (`rim`).
+    fn dig(&mut self, start: u32, v: u32) {
+        let p = self.points[v as usize];
+        self.stamp += 2;
+        let (goes, stays) = (self.stamp, self.stamp + 1);
+        self.stamps[start as usize] = goes;
+        self.rim.clear();
+        self.gone.push(start);
+        let mut next = 0;
+        while let Some(&c) = self.gone.get(next) {
+            next += 1;
+            for k in 0..4 {
+                let n = self.cells[c as usize].across[k];
+                if self.stamps[n as usize] < goes {
+                    let conflict = self.in_conflict(n, &p);
+                    self.stamps[n as usize] = if conflict { goes } else { stays };
+                    if conflict {
+                        self.gone.push(n);
+                    }
+                }
+                if self.stamps[n as usize] == stays {
+                    self.rim.push((c, k));
+                }
+            }
+        }
+    }
+
+    fn in_conflict(&self, c: u32, p: &crate::Vec3) -> bool {
+        if let Some(k) = self.ghost_corner(c) {
+            let side = self.side(c, k, p);
+            let behind = self.cells[c as usize].across[k];
+            return if side == 0.0 { self.in_conflict(behind, p) } else { side > 0.0 };
+        }
+        in_sphere(self.cells[c as usize].vertices.each_ref().map(|&v| &self.points[v as usize]), p) > 0.0
+    }
+
+    /// One new cell on each facet of the rim, with corner `k` put at the new vertex.
+    fn fill(&mut self, v: u32) {
+        for r in 0..self.rim.len() {
+            let (c, k) = self.rim[r];
+            let old = self.cells[c as usize];
+            let mut cell = Cell { vertices: old.vertices, across: [NONE; 4] };
+            cell.vertices[k] = v;
+            cell.across[k] = old.across[k];
+            let id = self.add(cell);
+            let outside = &mut self.cells[old.across[k] as usize].across;
+            outside.iter_mut().filter(|n| **n == c).for_each(|n| *n = id);
+            self.cells[c as usize].across[k] = NEW | id;
+            self.made.push(id);
+        }
+    }
+
+    /// Joins the new cells to one another: around each edge of the rim, through the cells that go, to the rim's other
+    /// facet at that edge.
+    fn glue(&mut self) {
+        for r in 0..self.rim.len() {
+            let ((c, k), id) = (self.rim[r], self.made[r]);
+            for j in (0..4).filter(|&j| j != k) {
+                if self.cells[id as usize].across[j] != NONE {
+                    continue;
+                }
+                let (mut at, mut exit, mut kept) = (c, j, k);
+                // the number of cells that go bounds the turn
+                let other = loop {
+                    let next = self.cells[at as usize].across[exit];
+                    if next & NEW != 0 {
+                        break next ^ NEW;
+                    }
+                    let pivot = self.cells[at as usize].vertices[kept];
+                    let cell = &self.cells[next as usize];
+                    kept = position(&cell.across, at);
+                    exit = position(&cell.vertices, pivot);
+                    at = next;
+                };
+                self.cells[id as usize].across[j] = other;
+                self.cells[other as usize].across[kept] = id;
+            }
+        }
+    }
+
+    /// Adds a cell, in the place of a dead one if there is one.
+    pub(super) fn add(&mut self, cell: Cell) -> u32 {
+        let id = match self.free.pop() {
+            Some(id) => id,
+            None => {
+                self.cells.push(cell);
+                self.stamps.push(0);
+                self.cells.len() as u32 - 1
+            }
+        };
+        self.cells[id as usize] = cell;
+        self.stamps[id as usize] = 0;
+        id
+    }
+}
+
+fn position(items: &[u32; 4], item: u32) -> usize {
+    items.iter().position(|&i| i == item).unwrap_or(0)
+}

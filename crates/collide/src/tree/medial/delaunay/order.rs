@@ -1,0 +1,40 @@
+//! The order in which points are inserted: rounds that double, each along a space-filling curve.
+//!
+//! Source: Amenta, Choi and Rote, *Incremental constructions con BRIO* (2003). Rounds keep the expected work of the
+//! randomised construction, the curve keeps each point close to the one before. The dice are a hash of the index, so
+//! that the order is a function of the points alone.
+
+use crate::{Aabb, Vec3};
+
+/// Bits of the curve per axis.
+const BITS: u32 = 20;
+
+/// All indices of `points`, in the order in which to insert them.
+pub(super) fn order(points: &[Vec3]) -> Vec<u32> {
+    let bounds = Aabb::around(points.iter().copied());
+    let side = (bounds.max - bounds.min).max();
+    let scale = if side > 0.0 { f64::from((1u32 << BITS) - 1) / side } else { 0.0 };
+    let mut keys: Vec<(u32, u64, u32)> =
+        points.iter().enumerate().map(|(n, p)| (round(n as u64), along_curve((p - bounds.min) * scale), n as u32)).collect();
+    keys.sort_unstable();
+    keys.into_iter().map(|k| k.2).collect()
+}
+
+/// The last round takes half of the points, the one before a quarter, and so on.
+fn round(n: u64) -> u32 {
+    64 - hash(n).trailing_zeros()
+}
+
+/// The finaliser of splitmix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014).
+fn hash(n: u64) -> u64 {
+    let x = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+/// Place on Morton's curve: the bits of the three coordinates in turn.
+fn along_curve(p: Vec3) -> u64 {
+    let [x, y, z] = [p.x as u64, p.y as u64, p.z as u64];
+    (0..BITS).rev().fold(0, |key, b| key << 3 | (x >> b & 1) << 2 | (y >> b & 1) << 1 | (z >> b & 1))
+}

@@ -1,0 +1,253 @@
+//! How good a tree of balls is: the figures of each level against the solid, measured on samples.
+//!
+//! The measure knows nothing of how the tree was built, and takes any balls. `L` is the union of a level's balls, `M` the solid inside the
+//! mesh, `D` the diagonal of its bounding box, `d_M` the signed distance to `M` (above 0 outside), `d_L(p) = minᵢ |p − cᵢ| − rᵢ`:
+//!
+//! | figure | meaning |
+//! |---|---|
+//! | coverage | share of surface samples with `d_L ≤ tolerance` |
+//! | gap | `max(0, d_L)` over surface samples, over `D`: how far what is bare is from `L` |
+//! | protrusion | `max(0, d_M)` over the exposed boundary of `L`, weighted by area, over `D` |
+//! | sphere error | per ball the largest `d_M` of any of its points, exposed or not, over `D` (the measure of Bradshaw and O'Sullivan) |
+//! | volume ratio | `vol L / vol M`; outside is `vol(L ∖ M) / vol M`, missing `vol(M ∖ L) / vol M` |
+//! | nesting | balls that stick out of their parent by more than the tolerance (or have none), and by how much, over `D` |
+//!
+//! Samples are deterministic and evenly spread; results are the same bits on any number of threads. Being samples, they tell a little less
+//! than the worst: [`SphereTree::outward_error_at`] is the bound above it, [`SphereTree::check_coverage`] the proof of coverage.
+
+mod samples;
+mod union;
+
+use super::SphereTree;
+use super::levels::LevelBall;
+use crate::{Aabb, MeshDistance, TriMesh, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use union::BallUnion;
+
+/// Most samples of one kind.
+const MOST_SAMPLES: usize = 1 << 26;
+/// A point this part of `D` below the surface of another ball is not exposed.
+const EXPOSED: f64 = 1e-9;
+
+/// How many samples are taken. Counts above 67 million count as that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QualitySettings {
+    /// On the surface of the mesh.
+    pub surface_samples: usize,
+    /// On all balls of a level together, in proportion to their areas.
+    pub sphere_samples: usize,
+    /// On each ball at least.
+    pub least_on_a_sphere: usize,
+    /// In the box around mesh and balls.
+    pub volume_samples: usize,
+    /// What counts as covered and as nested, as a part of the diagonal.
+    pub tolerance: f64,
+}
+
+impl Default for QualitySettings {
+    /// 20,000 on the surface, 60,000 (48 at least) on the balls, 131,072 in the volume; tolerance 1e-6.
+    fn default() -> QualitySettings {
+        QualitySettings { surface_samples: 20_000, sphere_samples: 60_000, least_on_a_sphere: 48, volume_samples: 1 << 17, tolerance: 1e-6 }
+    }
+}
+
+/// The figures of one level; lengths over the diagonal of the mesh's bounding box.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevelQuality {
+    /// 0 for the root.
+    pub level: u32,
+    /// Balls that stand for the solid at this level.
+    pub spheres: usize,
+    /// Share of the surface inside the balls, 0 to 1.
+    pub coverage: f64,
+    /// Mean over the surface of how far bare points are from the balls.
+    pub gap_mean: f64,
+    /// The 95th percentile of the same.
+    pub gap_p95: f64,
+    /// The most.
+    pub gap_max: f64,
+    /// Share of vertices inside the balls.
+    pub vertex_coverage: f64,
+    /// The most that a vertex is from the balls.
+    pub vertex_gap_max: f64,
+    /// The most that the exposed boundary of the balls is outside the solid.
+    pub protrusion_max: f64,
+    /// The 95th percentile by area.
+    pub protrusion_p95: f64,
+    /// The mean by area.
+    pub protrusion_mean: f64,
+    /// The most that any ball reaches outside.
+    pub sphere_worst: f64,
+    /// The mean over balls of the most that each reaches outside.
+    pub sphere_mean: f64,
+    /// Volume of the union over that of the solid.
+    pub volume_ratio: f64,
+    /// Volume of the union outside the solid, over that of the solid.
+    pub outside: f64,
+    /// Volume of the solid outside the union, over that of the solid.
+    pub missing: f64,
+    /// Balls outside their parents.
+    pub nesting_broken: usize,
+    /// The most that one is.
+    pub nesting_max: f64,
+}
+
+impl SphereTree {
+    /// Measures every level of the tree against its mesh: closed, outward-wound, not empty.
+    pub fn quality(&self, mesh: &TriMesh, settings: &QualitySettings) -> Vec<LevelQuality> {
+        LevelQuality::of_levels(&self.level_lists(), mesh, settings)
+    }
+}
+
+impl LevelQuality {
+    /// Measures any balls, level by level; `node` is not looked at. A level without balls has no figures; a parent that is not there
+    /// (below the first level) counts as broken nesting.
+    pub fn of_levels(levels: &[Vec<LevelBall>], mesh: &TriMesh, settings: &QualitySettings) -> Vec<LevelQuality> {
+        let solid = Solid::new(mesh, settings);
+        let above = std::iter::once(None).chain(levels.iter().map(Some));
+        levels.iter().zip(above).enumerate().map(|(n, (level, above))| solid.measure(n, level, above.map(Vec::as_slice))).collect()
+    }
+}
+
+/// The mesh, made ready to be compared with.
+struct Solid<'a> {
+    mesh: &'a TriMesh,
+    distance: MeshDistance,
+    diagonal: f64,
+    volume: f64,
+    surface: Vec<Vec3>,
+    settings: QualitySettings,
+}
+
+/// A point on a ball: which ball, the area it stands for, how far it is outside the solid, whether no other ball hides it.
+struct BoundaryPoint {
+    ball: usize,
+    area: f64,
+    outside: f64,
+    exposed: bool,
+}
+
+impl<'a> Solid<'a> {
+    fn new(mesh: &'a TriMesh, settings: &QualitySettings) -> Solid<'a> {
+        let count = |n: usize| n.clamp(1, MOST_SAMPLES);
+        let settings = QualitySettings {
+            surface_samples: count(settings.surface_samples),
+            sphere_samples: count(settings.sphere_samples),
+            least_on_a_sphere: count(settings.least_on_a_sphere).min(1 << 16),
+            volume_samples: count(settings.volume_samples),
+            ..*settings
+        };
+        Solid {
+            distance: MeshDistance::new(mesh),
+            diagonal: mesh.diagonal(),
+            volume: mesh.signed_volume().abs(),
+            surface: samples::on_surface(mesh, settings.surface_samples),
+            mesh,
+            settings,
+        }
+    }
+
+    fn measure(&self, number: usize, level: &[LevelBall], above: Option<&[LevelBall]>) -> LevelQuality {
+        let mut row = LevelQuality { level: number as u32, spheres: level.len(), ..LevelQuality::default() };
+        if level.is_empty() {
+            return row;
+        }
+        let union = BallUnion::new(level.iter().map(|b| (b.center, b.radius)).collect());
+        self.measure_gaps(&union, &mut row);
+        self.measure_protrusion(level, &union, &mut row);
+        self.measure_volumes(level, &union, &mut row);
+        self.measure_nesting(level, above, &mut row);
+        row
+    }
+
+    fn measure_gaps(&self, union: &BallUnion, row: &mut LevelQuality) {
+        let (share, gaps) = self.gaps(union, &self.surface);
+        (row.coverage, row.gap_max) = (share, largest(&gaps));
+        row.gap_mean = gaps.iter().sum::<f64>() / gaps.len() as f64;
+        row.gap_p95 = percentile_95(gaps.iter().map(|g| (*g, 1.0)).collect());
+        let (share, gaps) = self.gaps(union, &self.mesh.vertices);
+        (row.vertex_coverage, row.vertex_gap_max) = (share, largest(&gaps));
+    }
+
+    /// Share of the points within the tolerance, and the gaps of all.
+    fn gaps(&self, union: &BallUnion, points: &[Vec3]) -> (f64, Vec<f64>) {
+        let gaps: Vec<f64> = points.par_iter().map(|p| union.distance(p).max(0.0) / self.diagonal).collect();
+        let covered = gaps.iter().filter(|g| **g <= self.settings.tolerance).count();
+        (covered as f64 / gaps.len() as f64, gaps)
+    }
+
+    fn measure_protrusion(&self, level: &[LevelBall], union: &BallUnion, row: &mut LevelQuality) {
+        let points = self.boundary(level, union);
+        let mut worst = vec![0.0_f64; level.len()];
+        points.iter().for_each(|p| worst[p.ball] = worst[p.ball].max(p.outside));
+        (row.sphere_worst, row.sphere_mean) = (largest(&worst), worst.iter().sum::<f64>() / worst.len() as f64);
+        let exposed: Vec<(f64, f64)> = points.iter().filter(|p| p.exposed).map(|p| (p.outside, p.area)).collect();
+        let area: f64 = exposed.iter().map(|p| p.1).sum();
+        if area > 0.0 {
+            row.protrusion_mean = exposed.iter().map(|p| p.0 * p.1).sum::<f64>() / area;
+        }
+        row.protrusion_max = exposed.iter().map(|p| p.0).fold(0.0, f64::max);
+        row.protrusion_p95 = percentile_95(exposed);
+    }
+
+    /// Points on all balls, in the balls' order.
+    fn boundary(&self, level: &[LevelBall], union: &BallUnion) -> Vec<BoundaryPoint> {
+        let square: f64 = level.iter().map(|b| b.radius * b.radius).sum::<f64>().max(f64::MIN_POSITIVE);
+        let of_ball = |(ball, b): (usize, &LevelBall)| {
+            let share = self.settings.sphere_samples as f64 * (b.radius * b.radius / square);
+            let count = (share as usize).max(self.settings.least_on_a_sphere);
+            let area = b.radius * b.radius / count as f64;
+            let point = |u: Vec3| {
+                let p = b.center + u * b.radius;
+                let outside = self.distance.closest(&p).signed_distance.max(0.0) / self.diagonal;
+                BoundaryPoint { ball, area, outside, exposed: !union.holds(&p, EXPOSED * self.diagonal) }
+            };
+            samples::fibonacci(count).into_par_iter().map(point).collect::<Vec<_>>()
+        };
+        level.par_iter().enumerate().flat_map_iter(|item| of_ball(item)).collect()
+    }
+
+    fn measure_volumes(&self, level: &[LevelBall], union: &BallUnion, row: &mut LevelQuality) {
+        let corners = level.iter().flat_map(|b| [b.center.add_scalar(-b.radius), b.center.add_scalar(b.radius)]);
+        let bounds = Aabb::around(corners.chain(self.mesh.vertices.iter().copied()));
+        let points = samples::in_box(&bounds, self.settings.volume_samples);
+        let in_mesh = samples::inside(&self.distance, &points, &bounds);
+        let in_union: Vec<bool> = points.par_iter().map(|p| union.holds(p, 0.0)).collect();
+        let one = (bounds.max - bounds.min).product() / points.len() as f64 / self.volume;
+        let count = |wanted: fn(bool, bool) -> bool| in_union.iter().zip(&in_mesh).filter(|(l, m)| wanted(**l, **m)).count() as f64 * one;
+        row.volume_ratio = count(|l, _| l);
+        row.outside = count(|l, m| l && !m);
+        row.missing = count(|l, m| m && !l);
+    }
+
+    fn measure_nesting(&self, level: &[LevelBall], above: Option<&[LevelBall]>, row: &mut LevelQuality) {
+        let Some(above) = above else { return };
+        for b in level {
+            let Some(parent) = b.parent.and_then(|p| above.get(p)) else {
+                row.nesting_broken += 1;
+                continue;
+            };
+            let excess = ((b.center - parent.center).norm() + b.radius - parent.radius) / self.diagonal;
+            row.nesting_broken += usize::from(excess > self.settings.tolerance);
+            row.nesting_max = row.nesting_max.max(excess);
+        }
+    }
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+/// The least value that is not exceeded by 95 % of the weight; 0 for none. Items are (value, weight).
+fn percentile_95(mut items: Vec<(f64, f64)>) -> f64 {
+    items.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let wanted = 0.95 * items.iter().map(|i| i.1).sum::<f64>();
+    let mut sum = 0.0;
+    let found = items.iter().find(|(_, weight)| {
+        sum += weight;
+        sum >= wanted
+    });
+    found.map_or(0.0, |i| i.0)
+}

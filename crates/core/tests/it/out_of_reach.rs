@@ -1,0 +1,130 @@
+//! Closures that are led to where they cannot be: what hangs on them stays sane, lags behind, and closes again.
+
+use crate::articulated_world::{hinged, rod, world};
+use crate::common::*;
+use tumble_core::collide::{Pose, Shape, Vec3};
+use tumble_core::*;
+
+/// A chain of so many links of 0.2 m from the origin, whose end a hand leads.
+struct Led {
+    world: World,
+    chain: ObjectId,
+    hand: ObjectId,
+    closure: ObjectId,
+    links: usize,
+    /// What was last said of it.
+    reported: Option<OutOfReach>,
+}
+
+const LENGTH: f64 = 0.2;
+
+impl Led {
+    /// Hung up in a zigzag of `angle` from −z, and pinned to the hand where it ends.
+    fn new(stepper: &str, links: usize, angle: f64) -> Led {
+        let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
+        let q: Vec<f64> = (0..links).map(|i| if i == 0 { angle } else if i % 2 == 1 { -2.0 * angle } else { 2.0 * angle }).collect();
+        let chain = ArticulatedBody::new("chain", hinged(links, LENGTH, rod(1.0, LENGTH))).with_positions(&q).unwrap();
+        let chain = world.add(chain).unwrap();
+        let last = world.site(chain, links - 1).unwrap().pose;
+        let end = last.translation.vector - LENGTH * (last.rotation * Vec3::z());
+        let mut hand = RigidBody::fixture("hand", sphere(0.01)).at(Pose::translation(end.x, end.y, end.z));
+        hand.meets = 0;
+        let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
+        let pin = Closure::point_at("pin", &world, Some((chain, links - 1)), Some((hand, 0)), end).unwrap();
+        let closure = world.add(pin).unwrap();
+        Led { world, chain, hand, closure, links, reported: None }
+    }
+
+    fn misfit(&self) -> f64 {
+        self.world.get::<Closure>(self.closure).unwrap().misfit(&self.world.view()).unwrap().distance
+    }
+
+    /// Fastest joint, rad/s.
+    fn fastest(&self) -> f64 {
+        self.world.state_of(self.chain).unwrap()[self.links..].iter().fold(0.0, |a: f64, v| a.max(v.abs()))
+    }
+
+    /// Leads the hand for so many seconds; the fastest joint and the largest misfit on the way.
+    fn lead(&mut self, velocity: Vec3, seconds: f64) -> (f64, f64) {
+        let (mut fastest, mut misfit): (f64, f64) = (0.0, 0.0);
+        for _ in 0..(seconds * 240.0).round() as usize {
+            self.world.set_velocity(self.hand, velocity, Vec3::zeros()).unwrap();
+            let report = *self.world.step().unwrap();
+            self.reported = report.out_of_reach.or(self.reported);
+            fastest = fastest.max(self.fastest());
+            misfit = misfit.max(self.misfit());
+        }
+        (fastest, misfit)
+    }
+}
+
+/// How far a hand is from what the chain's end can come to: the chain turns in the plane y = 0.
+fn lag(hand: &Vec3, reach: f64) -> f64 {
+    hand.y.hypot((hand.x.hypot(hand.z) - reach).max(0.0))
+}
+
+#[test]
+fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
+    // it was flung about at 1e10 rad/s, stayed folded where that left it, and nothing was said
+    let speed = 0.5;
+    // the last bend of two links, L·θ²/4 = v·h, is gone in one step; of more, that many times as fast
+    let crossing = |links: usize| links as f64 * (4.0 * speed * 240.0 / LENGTH).sqrt();
+    for stepper in STEPPERS {
+        for links in [2, 5] {
+            let reach = links as f64 * LENGTH;
+            for along in [Vec3::new(0.0, 0.0, -1.0), Vec3::new(0.6, 0.0, -0.8), Vec3::new(0.0, 0.6, -0.8)] {
+                let name = format!("{stepper}, {links} links, along {along:?}");
+                let mut led = Led::new(stepper, links, 0.5);
+                let (across, _) = led.lead(speed * along, 1.0);
+                let (out, _) = led.lead(speed * along, 1.0);
+                let hand = position(&led.world, led.hand);
+                let (misfit, expected, reported) = (led.misfit(), lag(&hand, reach), led.reported.unwrap());
+                let end = led.world.site(led.chain, links - 1).unwrap().pose;
+                let bent = (end.rotation * -Vec3::z()).angle(&Vec3::new(hand.x, 0.0, hand.z));
+                let (back, _) = led.lead(-speed * along, 2.0);
+                let (rest, _) = led.lead(Vec3::zeros(), 0.5);
+                println!("{name}: {across:.1} rad/s across, {out:.2} out, {back:.1} back; lags {misfit:.6} m, {:.1e} off, {bent:.1e} rad; closed to {:.1e} m, {rest:.1e} rad/s", misfit - expected, led.misfit());
+                // across the plane nothing is in reach from the start: there the chain is still coming to lie straight
+                let straight = if along.y == 0.0 { 4.0 * speed / LENGTH } else { crossing(links) };
+                assert!(across < crossing(links) && back < crossing(links) && out < straight, "{name}: {across}, {out}, {back} rad/s");
+                assert!((misfit - expected).abs() < 1e-3 && bent < 3e-2, "{name}: {misfit} m for {expected} m, bent by {bent} rad");
+                assert!(reported.closure == led.closure && reported.distance == misfit, "{name}: {reported:?}");
+                assert!(led.misfit() < 2e-9, "{name}: open by {:e} m", led.misfit());
+            }
+        }
+    }
+}
+
+#[test]
+fn rigid_bars_pinned_in_a_row_share_what_is_out_of_reach() {
+    for stepper in STEPPERS {
+        let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
+        let bar = |i: usize| {
+            let mut body = RigidBody::with_mass(format!("bar {i}"), Shape::cuboid(Vec3::new(0.1, 0.01, 0.01)).unwrap(), 1.0).unwrap();
+            body.meets = 0;
+            body.at(Pose::translation(0.1 + 0.2 * i as f64, 0.0, 0.0))
+        };
+        let bars: Vec<ObjectId> = (0..3).map(|i| world.add(bar(i)).unwrap()).collect();
+        let mut hand = RigidBody::fixture("hand", sphere(0.01)).at(Pose::translation(0.6, 0.0, 0.0));
+        hand.meets = 0;
+        let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
+        let parts = [None, Some((bars[0], 0)), Some((bars[1], 0)), Some((bars[2], 0)), Some((hand, 0))];
+        let pins: Vec<ObjectId> = (0..4).map(|i| {
+            let pin = Closure::point_at(format!("pin {i}"), &world, parts[i], parts[i + 1], Vec3::new(0.2 * i as f64, 0.0, 0.0)).unwrap();
+            world.add(pin).unwrap()
+        }).collect();
+        let (mut fastest, mut said): (f64, f64) = (0.0, 0.0);
+        for velocity in [0.5, -0.5, 0.0] {
+            for _ in 0..240 {
+                world.set_velocity(hand, Vec3::new(velocity, 0.0, 0.0), Vec3::zeros()).unwrap();
+                said = said.max(world.step().unwrap().out_of_reach.map_or(0.0, |o| o.distance));
+                fastest = bars.iter().map(|id| world.site(*id, 0).unwrap().angular_velocity.norm()).fold(fastest, f64::max);
+            }
+        }
+        let open = pins.iter().map(|id| world.get::<Closure>(*id).unwrap().misfit(&world.view()).unwrap().distance).fold(0.0, f64::max);
+        assert!(fastest < 2.0 * (4.0 * 0.5 * 240.0 / 0.2f64).sqrt(), "{stepper}: {fastest} rad/s");
+        assert!(said > 0.5 / 4.0 - 1e-3 && said < 0.5, "{stepper}: {said} m is said, of 0.5 m shared by four pins");
+        assert!(open < 1e-7, "{stepper}: {open:e} m are open");
+        println!("{stepper}: {fastest:.2} rad/s at most, {said:.3} m out of reach, {open:.1e} m open at the end");
+    }
+}

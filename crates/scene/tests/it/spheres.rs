@@ -1,0 +1,225 @@
+//! Robots of spheres: what is replaced, what stays, and that no point of the collision surface is bare.
+
+use std::path::PathBuf;
+use tumble_core::collide::{Pose, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
+use tumble_core::Object;
+use tumble_scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfError, UrdfOptions, load, spherize};
+
+const ROBOT: &str = r#"<?xml version="1.0"?>
+<!-- a robot of every shape -->
+<robot name="shapes" xmlns:drake="http://drake.mit.edu">
+  <material name="red"><color rgba="0.8 0.1 0.1 1"/></material>
+  <link name="base"/>
+  <joint name="mount" type="fixed"><parent link="base"/><child link="arm"/></joint>
+  <link name="arm">
+    <inertial><mass value="3"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>
+    <visual><geometry><box size="1 1 1"/></geometry></visual>
+    <collision name="block" group="a&amp;b">
+      <!-- keep me -->
+      <origin xyz="0.1 -0.2 0.3" rpy="0.3 -0.4 0.5"/>
+      <geometry><box size="0.4 0.2 0.1"/></geometry>
+      <drake:proximity_properties><drake:mu_static value="0.9"/></drake:proximity_properties>
+    </collision>
+    <collision><origin xyz="0 0 1" rpy="1 0 0"/><geometry><cylinder radius="0.05" length="0.6"/></geometry></collision>
+    <collision name="pad"><origin xyz="0 1 0"/><geometry><sphere radius="0.06"/></geometry></collision>
+  </link>
+  <joint name="j" type="continuous"><parent link="arm"/><child link="tip"/><origin xyz="0 0 0.5"/></joint>
+  <link name="tip">
+    <inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>
+    <collision><origin xyz="0 0 0.4" rpy="0 1 0"/><geometry><capsule radius="0.05" length="0.3"/></geometry></collision>
+    <collision><origin rpy="0 0 1"/><geometry><mesh filename="ring.obj" scale="0.1 -0.2 0.1"/></geometry></collision>
+    <collision><origin xyz="1 0 0"/><geometry><mesh filename="bowl.obj"/></geometry></collision>
+  </link>
+  <transmission name="t"><actuator name="m"/></transmission>
+</robot>
+"#;
+
+fn obj(mesh: &TriMesh) -> String {
+    let vertices = mesh.vertices.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
+    let faces = mesh.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
+    vertices.chain(faces).collect()
+}
+
+fn ring() -> TriMesh {
+    TriMesh::torus(1.0, 0.3, 24, 12)
+}
+
+/// The lower half of a ball, open above.
+fn bowl() -> TriMesh {
+    let mut ball = TriMesh::uv_sphere(0.2, 16, 12);
+    let below = |t: &[u32; 3]| t.iter().all(|&v| ball.vertices[v as usize].z < 1e-9);
+    ball.triangles = ball.triangles.iter().filter(|t| below(t)).copied().collect();
+    ball
+}
+
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str, robot: &str) -> Folder {
+        let path = std::env::temp_dir().join(format!("tumble-spheres-{test}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        std::fs::write(path.join("ring.obj"), obj(&ring())).unwrap();
+        std::fs::write(path.join("bowl.obj"), obj(&bowl())).unwrap();
+        std::fs::write(path.join("robot.urdf"), robot).unwrap();
+        Folder(path)
+    }
+
+    fn spherize(&self, options: &SphereOptions) -> Result<SphereRobot, UrdfError> {
+        spherize(self.0.join("robot.urdf"), options, &())
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn options(most: usize) -> SphereOptions {
+    let tree = TreeSettings { depth: 4, ..TreeSettings::octree() };
+    SphereOptions { most, error: 1e-3, tree, cache: TreeCache::off(), urdf: UrdfOptions::default() }
+}
+
+/// The pose of an origin: roll, pitch and yaw about fixed axes.
+fn at(xyz: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
+    Pose::from_parts(Vec3::from(xyz).into(), nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+}
+
+/// Points of the surface of a mesh: the corners of its triangles, and points inside its triangles.
+fn points(mesh: &TriMesh, pose: Pose) -> Vec<Vec3> {
+    let inside = |t: usize| {
+        let [a, b, c] = mesh.corners(t);
+        [(0.2, 0.3), (0.6, 0.2), (0.1, 0.8), (0.5, 0.5), (1.0 / 3.0, 1.0 / 3.0)].map(|(u, v)| a + (b - a) * u + (c - a) * v)
+    };
+    let corners = (0..mesh.triangles.len()).flat_map(|t| mesh.corners(t));
+    let all = corners.chain((0..mesh.triangles.len()).flat_map(inside));
+    all.map(|p| (pose * nalgebra::Point3::from(p)).coords).collect()
+}
+
+/// Points of the surface by formula, as the text of [`ROBOT`] says.
+fn surface(link: &str) -> Vec<Vec3> {
+    let scaled = |mesh: TriMesh, by: Vec3| TriMesh { vertices: mesh.vertices.iter().map(|v| v.component_mul(&by)).collect(), ..mesh };
+    // fine meshes whose vertices lie on the true cylinder and capsule; points within their triangles lie a little inside
+    match link {
+        "arm" => [
+            points(&TriMesh::box_(Vec3::new(0.2, 0.1, 0.05)), at([0.1, -0.2, 0.3], [0.3, -0.4, 0.5])),
+            points(&TriMesh::cylinder(0.05, 0.3, 360), at([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])),
+            points(&TriMesh::icosphere(0.06 * (1.0 - 1e-12), 3), at([0.0, 1.0, 0.0], [0.0; 3])),
+        ]
+        .concat(),
+        _ => [
+            points(&TriMesh::capsule(0.05, 0.15, 90, 30), at([0.0, 0.0, 0.4], [0.0, 1.0, 0.0])),
+            points(&scaled(ring(), Vec3::new(0.1, -0.2, 0.1)), at([0.0; 3], [0.0, 0.0, 1.0])),
+            points(&bowl(), at([1.0, 0.0, 0.0], [0.0; 3])),
+        ]
+        .concat(),
+    }
+}
+
+fn assert_covered(link: &LinkSpheres) {
+    for p in surface(&link.name) {
+        let gap = link.spheres.iter().map(|(c, r)| (p - c).norm() - r).fold(f64::INFINITY, f64::min);
+        assert!(gap <= 0.0, "{}: {p:?} is {gap:e} m outside all {} spheres", link.name, link.spheres.len());
+    }
+}
+
+#[test]
+fn no_point_of_the_collision_surface_is_bare_with_any_number_of_spheres() {
+    let folder = Folder::new("covered", ROBOT);
+    let mut last = f64::INFINITY;
+    for most in [3, 64, 300, 1000] {
+        let robot = folder.spherize(&options(most)).unwrap();
+        assert_eq!(robot.links.iter().map(|l| (l.name.as_str(), l.shapes)).collect::<Vec<_>>(), [("arm", 3), ("tip", 3)]);
+        for link in &robot.links {
+            assert!(link.spheres.len() <= most.max(3), "{}: {} of {most}", link.name, link.spheres.len());
+            assert_eq!(link.spheres.len(), link.outward.len());
+            assert_covered(link);
+        }
+        let worst = robot.links.iter().flat_map(|l| l.outward.iter().copied()).fold(0.0, f64::max);
+        // one sphere around all, then ever tighter ones
+        assert!(worst < last, "{most}: {worst} after {last}");
+        last = worst;
+        eprintln!("at most {most}: {:?} spheres, {:.1} mm outside", robot.links.iter().map(|l| l.spheres.len()).collect::<Vec<_>>(), 1e3 * worst);
+    }
+}
+
+#[test]
+fn what_is_written_is_what_our_own_reader_reads() {
+    let folder = Folder::new("roundtrip", ROBOT);
+    let robot = folder.spherize(&options(40)).unwrap();
+    let out = folder.0.join("out.urdf");
+    std::fs::write(&out, &robot.text).unwrap();
+    let (before, _) = load(folder.0.join("robot.urdf"), &UrdfOptions::default()).unwrap();
+    let (body, notes) = load(&out, &UrdfOptions::default()).unwrap();
+    assert_eq!((before.model(), notes), (body.model(), Vec::<String>::new()));
+    // the arm is fixed to the base, the tip is the one link that moves: two parts
+    let collidable = body.collidable().unwrap();
+    let mut read: Vec<f64> = Vec::new();
+    for part in 0..collidable.parts() {
+        match collidable.shape(part) {
+            Some(Shape::Sphere { radius }) => read.push(*radius),
+            Some(other) => panic!("{other:?}"),
+            None => {}
+        }
+    }
+    let mut radii: Vec<f64> = robot.links.iter().flat_map(|l| l.spheres.iter().map(|s| s.1)).collect();
+    radii.sort_by(f64::total_cmp);
+    read.sort_by(f64::total_cmp);
+    assert_eq!(read, radii);
+}
+
+#[test]
+fn all_else_of_the_file_stays() {
+    let folder = Folder::new("kept", ROBOT);
+    let text = folder.spherize(&options(60)).unwrap().text;
+    let is_new = |line: &&str| line.trim_start().starts_with("<collision") && line.contains("<sphere");
+    let spheres: Vec<&str> = text.lines().filter(is_new).collect();
+    // without the new lines, what stands before and after the replaced elements is there to the letter
+    for kept in [
+        "<!-- a robot of every shape -->",
+        "<visual><geometry><box size=\"1 1 1\"/></geometry></visual>",
+        "<!-- keep me -->",
+        "<collision name=\"pad\"><origin xyz=\"0 1 0\"/><geometry><sphere radius=\"0.06\"/></geometry></collision>",
+        "<transmission name=\"t\"><actuator name=\"m\"/></transmission>",
+        "<material name=\"red\"><color rgba=\"0.8 0.1 0.1 1\"/></material>",
+    ] {
+        assert_eq!(text.matches(kept).count(), 1, "{kept}");
+    }
+    assert!(!text.contains("cylinder") && !text.contains("<capsule") && !text.contains("<mesh"));
+    let blocks: Vec<&&str> = spheres.iter().filter(|line| line.contains("name=\"block_")).collect();
+    assert!(blocks.len() > 1);
+    for block in blocks {
+        assert!(block.starts_with("    <collision name=\"block_"), "{block}");
+        assert!(block.contains("group=\"a&amp;b\"") && block.contains("<drake:proximity_properties><drake:mu_static value=\"0.9\"/></drake:proximity_properties>"));
+    }
+    // a robot of spheres alone is left to the letter
+    let again = Folder::new("again", &text);
+    assert_eq!(again.spherize(&options(60)).unwrap().text, text);
+}
+
+#[test]
+fn a_capsule_is_covered_by_formula() {
+    let robot = r#"<robot name="r"><link name="l"><collision><geometry><capsule radius="0.1" length="0.6"/></geometry></collision></link></robot>"#;
+    let folder = Folder::new("capsule", robot);
+    for (most, reach) in [(1, 0.3), (2, (0.01_f64 + 0.09).sqrt() - 0.1), (4, (0.01_f64 + 0.01).sqrt() - 0.1)] {
+        let made = folder.spherize(&options(most)).unwrap();
+        let link = &made.links[0];
+        assert_eq!(link.spheres.len(), most);
+        assert!(link.outward.iter().all(|o| (o - reach).abs() < 1e-12), "{:?} {reach}", link.outward);
+        assert!(link.spheres.iter().all(|(c, r)| c.z.abs() <= 0.3 && (r - 0.1 - reach).abs() < 1e-8));
+    }
+    // with an error it takes as many as that needs
+    let loose = SphereOptions { most: 1000, error: 0.01, ..options(1) };
+    let link = folder.spherize(&loose).unwrap().links.remove(0);
+    assert!(link.outward.iter().all(|o| *o <= 0.01 * 0.8) && link.spheres.len() < 20, "{}", link.spheres.len());
+}
+
+#[test]
+fn a_robot_with_faults_is_refused_as_by_the_reader() {
+    let folder = Folder::new("faults", &ROBOT.replace("radius=\"0.06\"", "radius=\"-1\""));
+    let error = folder.spherize(&options(8)).unwrap_err().to_string();
+    assert!(error.contains("robot.urdf:17") && error.contains("`radius`"), "{error}");
+    let folder = Folder::new("missing", &ROBOT.replace("ring.obj", "none.obj"));
+    let error = folder.spherize(&options(8)).unwrap_err().to_string();
+    assert!(error.contains("none.obj"), "{error}");
+}

@@ -1,0 +1,92 @@
+//! `tumble spheretree`: build a tree around a mesh and say how good it is; or a robot of spheres.
+
+mod picture;
+mod robot;
+mod table;
+
+use crate::args::SphereTreeOptions;
+use crate::failure::Failure;
+use crate::progress::Share;
+use std::path::Path;
+use std::time::Instant;
+use tumble::collide::{Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
+use tumble::scene::read_solid;
+
+/// Builds, measures, prints and writes.
+pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
+    match (&options.mesh, &options.urdf) {
+        (_, Some(urdf)) => robot::spherize(urdf, options),
+        (Some(mesh), None) => of_mesh(mesh, options),
+        (None, None) => Err(Failure::input("wanted a mesh, or --urdf ROBOT")),
+    }
+}
+
+fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
+    let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
+    let mesh = read(path, options)?;
+    let settings = settings(options);
+    let (clock, progress) = (Instant::now(), Share::new("building", options.quiet));
+    let built = SphereTree::build_cached_watched(&mesh, &settings, &cache(options), &progress);
+    progress.done();
+    let built = built.map_err(|e| wrong(e.to_string()))?;
+    let seconds = clock.elapsed().as_secs_f64();
+    built.note.iter().filter(|_| !options.quiet).for_each(|note| eprintln!("{note}"));
+    let quality = built.tree.quality(&mesh, &QualitySettings::default());
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let file = TreeFile { name, mesh: MeshId::of(&mesh), settings, stages: built.stages, quality, tree: built.tree };
+    if !options.quiet {
+        let from = if built.found { "from the cache".into() } else { format!("built in {seconds:.2} s") };
+        println!("{}: {} triangles, volume {:.6e} m³, diagonal {:.6} m; {from}", path.display(), mesh.triangles.len(), mesh.signed_volume(), mesh.diagonal());
+        print!("{}", table::table(&file, options.verbose));
+    }
+    if let Some(output) = &options.output {
+        write(output, file.to_json().as_bytes())?;
+        say(options, "tree", output);
+    }
+    match &options.picture {
+        Some(output) => picture::picture(&mesh, &file.tree, output, options),
+        None => Ok(()),
+    }
+}
+
+/// The mesh, mended where that is harmless, which is said.
+fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
+    let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
+    let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let (mesh, notes) = read_solid(path, &bytes, options.repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
+    notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{}: {note}", path.display()));
+    Ok(mesh)
+}
+
+/// The method's usual settings with what the command line says instead.
+fn settings(options: &SphereTreeOptions) -> TreeSettings {
+    let usual = match options.method {
+        Some(Builder::Octree) => TreeSettings::octree(),
+        Some(builder) => TreeSettings { builder, ..TreeSettings::default() },
+        None => TreeSettings::default(),
+    };
+    TreeSettings {
+        branch: options.branch.unwrap_or(usual.branch),
+        depth: options.depth.unwrap_or(usual.depth),
+        error: options.error.unwrap_or(usual.error),
+        ..usual
+    }
+}
+
+fn cache(options: &SphereTreeOptions) -> TreeCache {
+    match &options.cache {
+        _ if options.no_cache => TreeCache::off(),
+        Some(folder) => TreeCache::at(folder),
+        None => TreeCache::of_environment(),
+    }
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
+}
+
+fn say(options: &SphereTreeOptions, what: &str, path: &Path) {
+    if !options.quiet {
+        println!("{what}: {}", path.display());
+    }
+}

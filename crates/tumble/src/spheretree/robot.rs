@@ -1,0 +1,112 @@
+//! `--urdf`: a robot whose collision geometry is spheres, and the lists that motion planners read.
+
+use super::table::{aligned, percent};
+use crate::args::SphereTreeOptions;
+use crate::failure::Failure;
+use crate::progress::Share;
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use tumble::scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfOptions, spherize as cover};
+
+/// Spheres per link unless told otherwise.
+const MOST: u32 = 32;
+/// Most spheres per link where only an error is asked for.
+const MOST_FOR_ERROR: u32 = 10_000;
+/// The error that is good enough unless told otherwise, as a share of a shape's diagonal.
+const ERROR: f64 = 1e-3;
+
+/// Reads a robot, covers its links by spheres, prints and writes.
+pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
+    let most = options.spheres.unwrap_or(if options.error.is_some() { MOST_FOR_ERROR } else { MOST });
+    let error = options.error.unwrap_or(ERROR);
+    let settings = super::settings(options);
+    let how = SphereOptions {
+        most: most as usize,
+        error,
+        tree: tumble::collide::TreeSettings { error: settings.error.min(error), even: false, ..settings },
+        cache: super::cache(options),
+        urdf: UrdfOptions::default(),
+    };
+    let planner = planner_file(path, options)?;
+    let progress = Share::new("covering", options.quiet);
+    let robot = cover(path, &how, &progress);
+    progress.done();
+    let robot = robot?;
+    if !options.quiet {
+        robot.notes.iter().for_each(|note| println!("{note}"));
+        print!("{}", table(&robot));
+    }
+    if let Some(output) = &options.output {
+        super::write(output, robot.text.as_bytes())?;
+        super::say(options, "robot", output);
+    }
+    if let Some((output, yaml)) = planner {
+        let text = if yaml { planner_yaml(&robot) } else { planner_json(&robot) };
+        super::write(&output, text.as_bytes())?;
+        super::say(options, "spheres", &output);
+    }
+    Ok(())
+}
+
+/// Where the planner's list goes, and whether it is YAML. A bare format stands for a file beside the output.
+fn planner_file(path: &Path, options: &SphereTreeOptions) -> Result<Option<(PathBuf, bool)>, Failure> {
+    let Some(planner) = &options.planner else { return Ok(None) };
+    let (file, ending) = match planner.extension() {
+        Some(ending) => (planner.clone(), ending.to_owned()),
+        None => {
+            let beside = options.output.as_deref().ok_or_else(|| {
+                let name = path.file_stem().unwrap_or_default().to_string_lossy();
+                Failure::input(format!("--planner {0} has no --output to lie beside; name a file, such as --planner {name}.{0}", planner.display()))
+            })?;
+            let ending = if planner.as_os_str() == "json" { "json" } else { "yml" };
+            (beside.with_extension(ending), ending.into())
+        }
+    };
+    Ok(Some((file, ending != "json")))
+}
+
+fn table(robot: &SphereRobot) -> String {
+    let heads = ["link", "shapes", "spheres", "outside at most mm", "mean mm", "covered %"];
+    let worst = |link: &LinkSpheres| link.outward.iter().copied().fold(0.0, f64::max);
+    let mean = |link: &LinkSpheres| link.outward.iter().sum::<f64>() / link.outward.len().max(1) as f64;
+    let row = |link: &LinkSpheres| {
+        let (shapes, spheres) = (link.shapes.to_string(), link.spheres.len().to_string());
+        vec![link.name.clone(), shapes, spheres, format!("{:.2}", 1e3 * worst(link)), format!("{:.2}", 1e3 * mean(link)), percent(1.0)]
+    };
+    let rows = std::iter::once(heads.map(str::to_owned).to_vec()).chain(robot.links.iter().map(row));
+    let total: usize = robot.links.iter().map(|l| l.spheres.len()).sum();
+    let mut text = aligned(rows);
+    _ = writeln!(text, "{total} spheres; 100 % of the collision surface of each link lies inside the spheres of that link: proved piece by piece, not sampled");
+    text
+}
+
+/// What cuRobo reads: `collision_spheres`, by link a list of `center` and `radius`. Names are quoted, so that no name is taken for a number.
+fn planner_yaml(robot: &SphereRobot) -> String {
+    let mut text = format!("robot: {}\ncollision_spheres:\n", Value::from(robot.name.as_str()));
+    for link in &robot.links {
+        _ = writeln!(text, "  {}:", Value::from(link.name.as_str()));
+        for (c, radius) in &link.spheres {
+            _ = writeln!(text, "    - center: [{}, {}, {}]\n      radius: {}", float(c.x), float(c.y), float(c.z), float(*radius));
+        }
+    }
+    text
+}
+
+/// With a point, so that YAML takes it for no integer.
+fn float(x: f64) -> String {
+    Value::from(x).to_string()
+}
+
+/// What foam writes: by link the errors (here how far spheres reach outside, metres) and `spheres` of `origin` and `radius`.
+fn planner_json(robot: &SphereRobot) -> String {
+    let sphere = |(c, radius): &(tumble::collide::Vec3, f64)| json!({"origin": [c.x, c.y, c.z], "radius": radius});
+    let link = |link: &LinkSpheres| {
+        let worst = link.outward.iter().copied().fold(0.0, f64::max);
+        let best = link.outward.iter().copied().fold(f64::INFINITY, f64::min);
+        let mean = link.outward.iter().sum::<f64>() / link.outward.len().max(1) as f64;
+        json!({"mean": mean, "best": best.min(worst), "worst": worst, "spheres": link.spheres.iter().map(sphere).collect::<Vec<_>>()})
+    };
+    let links: Map<String, Value> = robot.links.iter().map(|l| (l.name.clone(), link(l))).collect();
+    format!("{:#}\n", Value::Object(links))
+}

@@ -1,0 +1,155 @@
+//! `tumble spheretree`: tables, files, pictures, the cache under several processes, robots, and what is said of wrong input.
+
+use crate::common::*;
+use serde_json::Value;
+use tumble::collide::{SphereTree, TreeFile, TreeSettings, TriMesh};
+
+fn obj(mesh: &TriMesh) -> String {
+    let vertices = mesh.vertices.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
+    let faces = mesh.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
+    vertices.chain(faces).collect()
+}
+
+fn ring() -> TriMesh {
+    TriMesh::torus(1.0, 0.3, 16, 8)
+}
+
+/// The words after the mesh for a quick tree.
+const QUICK: [&str; 4] = ["--method", "octree", "--depth", "2"];
+
+#[test]
+fn the_table_and_the_file_say_what_the_library_says() {
+    let folder = Folder::new("spheretree");
+    let (mesh, out) = (folder.write("ring.obj", obj(&ring())), text(&folder.path("tree.json")));
+    let said = succeed(&[&["spheretree", &mesh, "--no-cache", "-v", "--json", &out][..], &QUICK].concat());
+    let file = TreeFile::from_json(&std::fs::read_to_string(&out).unwrap()).unwrap();
+    let tree = SphereTree::build(&ring(), &TreeSettings { depth: 2, ..TreeSettings::octree() }).unwrap();
+    assert_eq!((file.name.as_str(), &file.tree), ("ring.obj", &tree));
+    assert_eq!(file.quality.len(), tree.levels() as usize);
+    assert!(file.quality.iter().all(|q| q.coverage == 1.0 && q.nesting_broken == 0));
+    for level in 0..tree.levels() {
+        let row: Vec<&str> = said.lines().map(|line| line.split_whitespace().collect::<Vec<_>>()).find(|row| row.first() == Some(&level.to_string().as_str())).unwrap()[..3].to_vec();
+        assert_eq!(row, [level.to_string(), tree.at_level(level).count().to_string(), "100.00".into()], "{said}");
+    }
+    assert!(said.contains("level 2: ") && said.contains("leaves"), "{said}");
+    assert_eq!(succeed(&[&["spheretree", &mesh, "--no-cache", "-q"][..], &QUICK].concat()), "");
+}
+
+#[test]
+fn many_processes_share_a_cache_and_all_write_the_same() {
+    let folder = Folder::new("spheretree-cache");
+    let (mesh, cache) = (folder.write("ring.obj", obj(&ring())), text(&folder.path("cache")));
+    let output = |n: usize| text(&folder.path(&format!("tree{n}.json")));
+    let run = |n: usize| command(&[&["spheretree", &mesh, "-q", "--cache", &cache, "-o", &output(n)][..], &QUICK].concat()).spawn().unwrap();
+    let children: Vec<_> = (0..6).map(run).collect();
+    for mut child in children {
+        assert!(child.wait().unwrap().success());
+    }
+    let first = std::fs::read(output(0)).unwrap();
+    assert!((1..6).all(|n| std::fs::read(output(n)).unwrap() == first));
+    assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 1);
+    let said = succeed(&[&["spheretree", &mesh, "--cache", &cache][..], &QUICK].concat());
+    assert!(said.contains("from the cache"), "{said}");
+    // what the environment names is used where nothing is typed
+    let mut named = command(&[&["spheretree", &mesh][..], &QUICK].concat());
+    let said = String::from_utf8(named.env("TUMBLE_CACHE", &cache).output().unwrap().stdout).unwrap();
+    assert!(said.contains("from the cache"), "{said}");
+    let said = String::from_utf8(named.env("TUMBLE_CACHE", "off").output().unwrap().stdout).unwrap();
+    assert!(said.contains("built in"), "{said}");
+}
+
+#[test]
+fn a_damaged_file_of_the_cache_is_told_and_built_anew() {
+    let folder = Folder::new("spheretree-damage");
+    let (mesh, cache) = (folder.write("ring.obj", obj(&ring())), text(&folder.path("cache")));
+    let words = [&["spheretree", &mesh, "--cache", &cache][..], &QUICK].concat();
+    succeed(&words);
+    let file = std::fs::read_dir(&cache).unwrap().next().unwrap().unwrap().path();
+    let good = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &good[..good.len() / 2]).unwrap();
+    let out = tumble(&words);
+    let (said, told) = (String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
+    assert!(out.status.success() && said.contains("built in") && told.contains("is built anew"), "{said}{told}");
+    assert_eq!(std::fs::read(&file).unwrap(), good);
+}
+
+#[test]
+fn a_picture_of_a_level_is_written() {
+    let folder = Folder::new("spheretree-picture");
+    let (mesh, picture) = (folder.write("ring.obj", obj(&ring())), text(&folder.path("level.png")));
+    let out = tumble(&[&["spheretree", &mesh, "-q", "--no-cache", "--picture", &picture, "--level", "1", "--size", "64x48"][..], &QUICK].concat());
+    let told = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{told}");
+    if told.contains("No picture:") {
+        // past the harness, which keeps what passing tests print
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter; {told}\n"));
+        return;
+    }
+    assert_eq!(std::fs::read(&picture).unwrap()[16..24], [0, 0, 0, 64, 0, 0, 0, 48]);
+}
+
+#[test]
+fn wrong_input_ends_with_2_and_says_what_would_be_right() {
+    let folder = Folder::new("spheretree-wrong");
+    let mesh = folder.write("ring.obj", obj(&ring()));
+    let mut open = ring();
+    open.triangles.pop();
+    let open = folder.write("open.obj", obj(&open));
+    let none = text(&folder.path("none.obj"));
+    let level = text(&folder.path("level.png"));
+    let robot = folder.write("robot.urdf", ROBOT);
+    let cases: [(&[&str], &str); 10] = [
+        (&[&none], "none.obj: cannot be read"),
+        (&[&open], "open.obj: the mesh is open"),
+        (&[&mesh, "--method", "foo"], "unknown method foo, expected one of"),
+        (&[&mesh, "--branch", "100"], "ring.obj: the branching of a sphere tree is 100, but must be 2 to 64"),
+        (&[&mesh, "--depth", "0"], "the depth of a sphere tree is 0, but must be 1 to 9"),
+        (&[&mesh, "--error", "2"], "wanted a number from 0.0001 to 1"),
+        (&[&mesh, "--method", "octree", "--depth", "2", "--picture", &level, "--level", "7"], "--level is 7; the tree has levels 0 to 2"),
+        (&["--urdf", &none], "cannot read the URDF"),
+        (&["--urdf", &robot, "--planner", "xml"], "wanted yaml, json, or a file that ends in .yml, .yaml or .json"),
+        (&["--urdf", &robot, "--planner", "yaml"], "name a file, such as --planner robot.yaml"),
+    ];
+    for (words, said) in cases {
+        let told = fail_often(&[&["spheretree", "--no-cache"], words].concat(), 2);
+        assert!(told.contains(said), "{words:?}: {told}");
+    }
+    let said = succeed(&[&["spheretree", &open, "--no-cache", "--repair"][..], &QUICK].concat());
+    assert!(said.contains("1 hole(s) were filled"), "{said}");
+}
+
+const ROBOT: &str = r#"<robot name="two 1"><link name="a"><collision><origin xyz="0 0 0.5"/><geometry><box size="0.2 0.2 1"/></geometry></collision></link>
+<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>
+<link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial><collision name="ball"><geometry><sphere radius="0.25"/></geometry></collision></link></robot>"#;
+
+#[test]
+fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
+    let folder = Folder::new("spheretree-robot");
+    let robot = folder.write("robot.urdf", ROBOT);
+    let (out, yaml, list) = (text(&folder.path("out.urdf")), text(&folder.path("out.yml")), text(&folder.path("list.json")));
+    let said = succeed(&["spheretree", "--no-cache", "--urdf", &robot, "--output", &out, "--planner", "yaml", "--spheres", "12"]);
+    assert!(said.contains("100 % of the collision surface of each link lies inside"), "{said}");
+    succeed(&["spheretree", "--no-cache", "-q", "--urdf", &robot, "--planner", &list, "--spheres", "12"]);
+    assert!(succeed(&["check", &out]).contains("a robot of 2 links"));
+    let list: Value = json(list.as_ref());
+    let (a, b) = (list["a"]["spheres"].as_array().unwrap(), list["b"]["spheres"].as_array().unwrap());
+    assert!(a.len() > 1 && a.len() <= 12 && list["a"]["worst"].as_f64() >= list["a"]["mean"].as_f64());
+    assert_eq!(b, serde_json::json!([{"origin": [0.0, 0.0, 0.0], "radius": 0.25}]).as_array().unwrap());
+    // the YAML has the same numbers in the layout of cuRobo
+    let wanted: String = std::iter::once("robot: \"two 1\"\ncollision_spheres:\n".to_string())
+        .chain([("a", a), ("b", b)].into_iter().flat_map(|(name, spheres)| {
+            let rows = spheres.iter().map(|s| {
+                let c = &s["origin"];
+                format!("    - center: [{}, {}, {}]\n      radius: {}\n", c[0], c[1], c[2], s["radius"])
+            });
+            std::iter::once(format!("  \"{name}\":\n")).chain(rows).collect::<Vec<_>>()
+        }))
+        .collect();
+    assert_eq!(std::fs::read_to_string(yaml).unwrap(), wanted);
+    // the corners of the box are inside: 0.1 across, 0 and 1 along
+    for corner in 0..8 {
+        let p = [0, 1, 2].map(|k| if corner >> k & 1 == 1 { [0.1, 0.1, 1.0][k] } else { [-0.1, -0.1, 0.0][k] });
+        let gap = |s: &Value| (0..3).map(|k| (p[k] - s["origin"][k].as_f64().unwrap()).powi(2)).sum::<f64>().sqrt() - s["radius"].as_f64().unwrap();
+        assert!(a.iter().any(|s| gap(s) <= 0.0), "{p:?}");
+    }
+}
