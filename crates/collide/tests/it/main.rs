@@ -4,7 +4,6 @@ mod against_parry;
 mod bad_meshes;
 mod broad;
 mod builders;
-mod debug;
 mod hull;
 mod medial;
 mod mesh_contacts;
