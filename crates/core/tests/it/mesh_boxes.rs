@@ -13,7 +13,9 @@ fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
 }
 
 fn run(world: &mut World, seconds: f64) {
-    (0..(seconds * 60.0) as usize).for_each(|_| drop(world.step().unwrap()));
+    (0..(seconds * 60.0) as usize).for_each(|_| {
+        world.step().unwrap();
+    });
 }
 
 #[test]
