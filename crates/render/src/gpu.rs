@@ -7,7 +7,8 @@ mod shadow;
 mod targets;
 mod upload;
 
-use crate::{DrawList, Image, MAX_PIXELS, MAX_SIDE, RenderError};
+use crate::facet::cut;
+use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
 use pipelines::Pipelines;
 use std::sync::{Arc, Mutex, PoisonError};
 use targets::Targets;
@@ -52,15 +53,35 @@ impl Renderer {
     /// # Errors
     /// A size or a list that cannot be drawn, or a device that fails. The renderer stays usable.
     pub fn render(&mut self, list: &DrawList, width: u32, height: u32) -> Result<Image, RenderError> {
+        self.render_from(&list.camera, list, width, height)
+    }
+
+    /// The same, seen from elsewhere than the list's camera.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`], or a point of view that is none.
+    pub fn render_from(&mut self, from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Result<Image, RenderError> {
         self.check_size(width, height)?;
         list.validate()?;
-        let (view, projection) = list.camera.matrices(width as f32 / height as f32)?;
+        let mut lens = from.lens(width as f32 / height as f32)?;
+        // only occlusion looks beyond the edge
+        let rim = lens.part.map_or(0, |part| if list.settings.occlusion_m == Some(0.0) { 0 } else { part.rim_px });
+        lens.part = lens.part.map(|part| Part { rim_px: rim, ..part });
+        if rim == 0 {
+            return self.draw(list, &lens, width, height);
+        }
+        self.check_size(width + 2 * rim, height + 2 * rim)?;
+        Ok(cut(&self.draw(list, &lens.widened(width, height, rim), width + 2 * rim, height + 2 * rim)?, rim))
+    }
+
+    /// Draws all pixels of a view.
+    fn draw(&mut self, list: &DrawList, lens: &Lens, width: u32, height: u32) -> Result<Image, RenderError> {
         let fits = self.targets.as_ref().is_some_and(|t| t.fits(width, height, list.settings.shadow_map_size));
         if !fits {
             self.targets = None; // frees the old ones first
         }
         let targets = self.targets.get_or_insert_with(|| Targets::new(&self.gpu.device, width, height, list.settings.shadow_map_size));
-        let frame = Frame::new(&self.gpu, &self.pipelines, &mut self.meshes, targets, list, &view, &projection)?;
+        let frame = Frame::new(&self.gpu, &self.pipelines, &mut self.meshes, targets, list, lens)?;
         self.gpu.complaint()?;
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         frame.draw_shadows(&mut encoder, &self.pipelines, targets);

@@ -24,15 +24,18 @@
 mod camera;
 mod draw;
 mod error;
+mod facet;
 mod gpu;
 mod image;
 mod list;
 mod material;
 mod mesh;
+mod viewpoint;
 
 pub use camera::Camera;
 pub use draw::{DebugDraw, Drawing, UnknownOverlay, UpAxis, tree_over_mesh};
 pub use error::RenderError;
+pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Warp, calibration_picture, unfold};
 pub use gpu::Renderer;
 pub use image::Image;
 pub use list::{
@@ -41,6 +44,7 @@ pub use list::{
 };
 pub use material::{Material, Pattern, Shader};
 pub use mesh::{MAX_MESH_VERTICES, MeshData};
+pub use viewpoint::{Lens, Part, Viewpoint};
 
 /// The longest side of a picture, in pixels (the device may allow less).
 pub const MAX_SIDE: u32 = 16384;

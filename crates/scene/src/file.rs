@@ -16,7 +16,7 @@ use crate::grid::{self, MOST_BODIES};
 use crate::log::Log;
 use crate::material::MaterialSpec;
 use crate::mesh::MeshSpec;
-use crate::view::{CameraSpec, GroundSpec, LightSpec, SkySpec};
+use crate::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::world::WorldSettings;
 use tumble_core::collide::ContactMode;
 
@@ -52,6 +52,8 @@ pub struct SceneFile {
     pub closures: Vec<ClosureSpec>,
     /// `[camera]`; `None` leaves the view to the renderer.
     pub camera: Option<CameraSpec>,
+    /// `[cave]`; `None` leaves the place of a cave to the camera.
+    pub cave: Option<CavePlace>,
     /// `[[light]]`; a sun where there is none.
     pub lights: Vec<LightSpec>,
     /// `[sky]`.
@@ -120,6 +122,7 @@ impl SceneFile {
         let articulated = read_articulated(&mut f, &library, &place, &mut names);
         let closures = read_closures(&mut f, &Objects { bodies: &bodies, articulated: &articulated }, &mut names);
         let camera = read_table(&mut f, "camera", CameraSpec::read);
+        let cave = read_table(&mut f, "cave", CavePlace::read);
         let mut lights: Vec<LightSpec> =
             f.tables("light", MOST_LIGHTS).into_iter().filter_map(LightSpec::read).collect();
         if lights.is_empty() {
@@ -138,6 +141,7 @@ impl SceneFile {
             articulated,
             closures,
             camera,
+            cave,
             lights,
             sky,
             ground,
@@ -154,7 +158,7 @@ pub(crate) struct Place<'a> {
 }
 
 /// The tree of a TOML text; `None`, with the problems recorded, if it is no TOML.
-fn parse_toml<'a>(log: &Log<'_>, text: &'a str) -> Option<DeTable<'a>> {
+pub(crate) fn parse_toml<'a>(log: &Log<'_>, text: &'a str) -> Option<DeTable<'a>> {
     let (root, errors) = match text.len() > RECOVERED_BYTES {
         true => DeTable::parse(text).map_or_else(|error| (None, vec![error]), |root| (Some(root), Vec::new())),
         false => {
@@ -198,7 +202,7 @@ fn in_our_words(message: &str) -> (String, String) {
 }
 
 /// The table `[key]`, if it is there.
-fn read_table<'a, T>(f: &mut Fields<'a>, key: &'static str, read: impl FnOnce(Fields<'a>) -> T) -> Option<T> {
+pub(crate) fn read_table<'a, T>(f: &mut Fields<'a>, key: &'static str, read: impl FnOnce(Fields<'a>) -> T) -> Option<T> {
     let value = f.value(key)?;
     Fields::of(f.log, value, format!("[{key}]"), &format!("[{key}]")).map(read)
 }

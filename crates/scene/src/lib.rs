@@ -41,7 +41,8 @@
 //!
 //! `[[articulated]]` is [`ArticulatedSpec`], a tree of links written out or taken from a URDF ([`urdf`]), and `[[closure]]` is
 //! [`ClosureSpec`], which closes loops. `[meshes.NAME]` is [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its common keys;
-//! `[[light]]`, `[sky]` and `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]. The table of
+//! `[[light]]`, `[sky]` and `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]; `[cave]` is [`CavePlace`], and caves have files of
+//! their own ([`cave`]). The table of
 //! all keys is `scenes/README.md`.
 //!
 //! ```
@@ -57,6 +58,7 @@ mod articulated;
 mod assemble;
 mod body;
 mod build;
+pub mod cave;
 mod bound;
 mod closure;
 mod collada;
@@ -95,6 +97,6 @@ pub use material::MaterialSpec;
 pub use mesh::{MeshSource, MeshSpec};
 pub use shape::ShapeSpec;
 pub use shipped::{SceneSource, Shipped, resolve_scene, shipped};
-pub use view::{CameraSpec, GroundSpec, LightKind, LightSpec, SkySpec};
+pub use view::{CameraSpec, CavePlace, GroundSpec, LightKind, LightSpec, SkySpec};
 pub use tumble_core::{Combine, Mode};
 pub use world::{Integrator, Solver, Stepper, UnknownName, WorldSettings};

@@ -1,4 +1,4 @@
-//! `[camera]`, `[[light]]`, `[sky]`, `[ground]`: what the picture is taken with. Nothing here moves a body.
+//! `[camera]`, `[[light]]`, `[sky]`, `[ground]`, `[cave]`: what the picture is taken with. Nothing here moves a body.
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
@@ -54,6 +54,52 @@ impl CameraSpec {
             let message = format!("`near_m` of {} is {}, `far_m` {}", f.what, self.near_m, self.far_m);
             f.log.report(f.span.clone(), message, "wanted near_m less than far_m");
         }
+    }
+}
+
+/// `[cave]`: where the frame of a cave lies in the scene, upright. `x_scene = origin + scale · Rz(heading) · x_cave`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CavePlace {
+    /// Where the cave's origin is (by custom the floor below its middle), m, world axes.
+    pub origin_m: [f64; 3],
+    /// The turn about the vertical, counter-clockwise from above, degrees: at 0 the cave's y axis is the world's.
+    pub heading_deg: f64,
+    /// Metres of the scene to a metre of the cave, 1e-6 to 1e6. Default 1.
+    pub scale: f64,
+}
+
+impl CavePlace {
+    pub(crate) fn read(mut f: Fields<'_>) -> Self {
+        let place = CavePlace {
+            origin_m: f.vector("origin_m", Bound::ANY),
+            heading_deg: f.number_or("heading_deg", Bound::ANY, 0.0),
+            scale: f.number_or("scale", Bound::new(1e-6, 1e6, "a factor from 1e-6 to 1e6"), 1.0),
+        };
+        f.finish();
+        place
+    }
+
+    /// The place at which `eye` of the cave (m, cave axes), facing `forward`, is at `eye_m` of the scene and faces along `towards`, as far
+    /// as an upright cave can: the part of `towards` across the vertical counts, and where there is none the heading is 0.
+    pub fn standing(eye: [f64; 3], forward: [f64; 3], eye_m: [f64; 3], towards: [f64; 3]) -> Self {
+        let bearing = |v: [f64; 3]| (v[0].hypot(v[1]) > 1e-9).then(|| libm::atan2(-v[0], v[1]));
+        let heading = bearing(towards).zip(bearing(forward)).map_or(0.0, |(to, from)| to - from);
+        let place = CavePlace { origin_m: [0.0; 3], heading_deg: heading.to_degrees(), scale: 1.0 };
+        let [x, y, z] = place.to_scene(eye);
+        CavePlace { origin_m: [eye_m[0] - x, eye_m[1] - y, eye_m[2] - z], ..place }
+    }
+
+    /// A point of the cave in the scene, m.
+    pub fn to_scene(&self, point: [f64; 3]) -> [f64; 3] {
+        let [x, y, z] = self.turned(point);
+        let [ox, oy, oz] = self.origin_m;
+        [ox + self.scale * x, oy + self.scale * y, oz + self.scale * z]
+    }
+
+    /// A direction of the cave in the scene.
+    pub fn turned(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let (s, c) = libm::sincos(self.heading_deg.to_radians());
+        [c * x - s * y, s * x + c * y, z]
     }
 }
 

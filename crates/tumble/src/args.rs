@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use tumble::collide::Builder;
-use tumble::render::DebugDraw;
+use tumble::render::{CalibrationPattern, DebugDraw};
 use tumble::scene::{Integrator, Solver, Stepper};
 
 /// Real-time dynamics for interactive and immersive environments.
@@ -18,13 +18,15 @@ pub struct Tumble {
 pub enum Command {
     /// Simulate a scene; record it, sum it up, take a picture of its end.
     Run(RunOptions),
-    /// Check scenes, URDF robots and meshes; nothing is run.
+    /// Check scenes, caves, URDF robots and meshes; nothing is run.
     Check(CheckOptions),
     /// Build a sphere tree around a mesh, or replace a robot's collision geometry by spheres; say how good they are.
     #[command(name = "spheretree")]
     SphereTree(SphereTreeOptions),
     /// List the scenes that are shipped.
     Scenes,
+    /// List the caves that are shipped, or draw a calibration pattern for a facet.
+    Caves(CavesOptions),
 }
 
 #[derive(Args)]
@@ -55,9 +57,24 @@ pub struct RunOptions {
     /// Write a picture of the last frame (PNG).
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
-    /// Size of the picture, pixels.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
-    pub size: (u32, u32),
+    /// Size of the picture, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
+    /// Draw for a cave: all its facets, unfolded into one picture. A cave file or the name of a shipped cave.
+    #[arg(long, value_name = "CAVE")]
+    pub cave: Option<String>,
+    /// Draw this facet of the cave alone, as its projector gets it.
+    #[arg(long, value_name = "NAME")]
+    pub facet: Option<String>,
+    /// Write pictures of the run into a folder: frame_000000.png and so on.
+    #[arg(long, value_name = "DIR")]
+    pub frames_dir: Option<PathBuf>,
+    /// Write a video of the run (needs the program ffmpeg; the ending says the kind, such as .mp4).
+    #[arg(long, value_name = "FILE")]
+    pub video: Option<PathBuf>,
+    /// Frames of the video, and pictures in the folder, per simulated second.
+    #[arg(long, value_name = "N", default_value = "30", value_parser = pace)]
+    pub fps: f64,
     /// Draw over the picture: contacts, normals, velocities, forces, tree=LEVEL, all; with commas between them.
     #[arg(long, value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
@@ -74,7 +91,7 @@ pub struct RunOptions {
 
 #[derive(Args)]
 pub struct CheckOptions {
-    /// Scene files, folders, names of shipped scenes; .urdf robots; .obj and .stl meshes.
+    /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf robots; .obj and .stl meshes.
     #[arg(required = true)]
     pub files: Vec<String>,
     /// Repair meshes that are no solids: holes, fins, inner walls, debris. What was done is told; the file stays as it is.
@@ -140,6 +157,22 @@ pub struct SphereTreeOptions {
     pub quiet: bool,
 }
 
+#[derive(Args)]
+pub struct CavesOptions {
+    /// Draw a calibration pattern: grid, corners, colours or name.
+    #[arg(long, value_name = "WHAT", requires_all = ["cave", "facet", "picture"])]
+    pub pattern: Option<CalibrationPattern>,
+    /// A cave file or the name of a shipped cave.
+    #[arg(long, value_name = "CAVE", requires = "pattern")]
+    pub cave: Option<String>,
+    /// The facet that the pattern is for.
+    #[arg(long, value_name = "NAME", requires = "pattern")]
+    pub facet: Option<String>,
+    /// Where the picture goes (PNG).
+    #[arg(long, value_name = "FILE", requires = "pattern")]
+    pub picture: Option<PathBuf>,
+}
+
 /// Overlays, or none for an empty word.
 #[derive(Clone, Copy, Default)]
 pub struct Overlays(pub DebugDraw);
@@ -165,6 +198,10 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 fn frame(text: &str) -> Result<f64, String> {
     number(text, 1e-6, 1.0)
+}
+
+fn pace(text: &str) -> Result<f64, String> {
+    number(text, 0.01, 1000.0)
 }
 
 fn solver(text: &str) -> Result<Solver, String> {

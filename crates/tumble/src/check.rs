@@ -4,7 +4,8 @@ use crate::args::CheckOptions;
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{RepairSettings, Shape, TreeSettings};
-use tumble::scene::{read_solid, resolve_scene, urdf};
+use tumble::scene::cave::{MOST_BYTES, is_cave, resolve_cave, shipped_caves};
+use tumble::scene::{read_solid, resolve_scene, shipped, urdf};
 
 /// Checks every file; all are looked at, and the first failure's code is kept.
 pub fn check(options: &CheckOptions) -> Result<(), Failure> {
@@ -27,6 +28,7 @@ fn one(file: &str, repair: bool) -> Result<String, Failure> {
     match extension.as_str() {
         "obj" | "stl" => mesh(Path::new(file), repair),
         "urdf" => robot(Path::new(file)),
+        _ if looks_like_cave(file) => cave(file),
         _ => scene(file),
     }
 }
@@ -36,6 +38,23 @@ fn robot(path: &Path) -> Result<String, Failure> {
     notes.iter().for_each(|note| println!("{note}"));
     let (links, model) = (body.model().frames().len(), body.model());
     Ok(format!("a robot of {links} links, {} degrees of freedom on a fixed base, {:.6} kg that move", model.dof(), model.mass()))
+}
+
+/// A file is a cave where it has a table that caves have and scenes have not; a name where it is a shipped cave's and no scene's.
+fn looks_like_cave(file: &str) -> bool {
+    let path = Path::new(file);
+    if path.is_file() {
+        let small = path.metadata().is_ok_and(|about| about.len() <= MOST_BYTES);
+        return small && std::fs::read_to_string(path).is_ok_and(|text| is_cave(&text));
+    }
+    let shipped_cave = shipped_caves().iter().any(|cave| file == cave.name || file == format!("caves/{}.toml", cave.name));
+    shipped_cave && !path.is_dir() && !shipped().iter().any(|scene| scene.name == file)
+}
+
+fn cave(name: &str) -> Result<String, Failure> {
+    let cave = resolve_cave(name)?.load()?;
+    cave.notes().iter().for_each(|note| println!("{note}"));
+    Ok(cave.summary())
 }
 
 fn scene(name: &str) -> Result<String, Failure> {

@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use tumble::scene::SceneError;
+use tumble::scene::cave::CaveError;
 use tumble::scene::urdf::UrdfError;
 
 /// Why the command stopped.
@@ -41,6 +42,12 @@ impl Failure {
 
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Failure {
+        Failure::Input(error.report(std::io::stderr().is_terminal()))
+    }
+}
+
+impl From<CaveError> for Failure {
+    fn from(error: CaveError) -> Failure {
         Failure::Input(error.report(std::io::stderr().is_terminal()))
     }
 }

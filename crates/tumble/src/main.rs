@@ -3,12 +3,15 @@
 //! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
 
 mod args;
+mod caves;
 mod check;
 mod failure;
 mod progress;
 mod run;
+mod shots;
 mod spheretree;
 mod summary;
+mod video;
 
 use args::{Command, Tumble};
 use clap::Parser;
@@ -22,6 +25,7 @@ fn main() -> ExitCode {
         Command::Check(options) => check::check(&options),
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),
+        Command::Caves(options) => caves::caves(&options),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

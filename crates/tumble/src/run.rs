@@ -3,13 +3,13 @@
 use crate::args::RunOptions;
 use crate::failure::Failure;
 use crate::progress::Progress;
+use crate::shots::{Shots, write_png};
 use crate::summary::{State, Summary, Tally};
 use std::path::Path;
 use std::time::Instant;
 use tumble::core::World;
 use tumble::net::record::{Recorder, RecorderOptions};
 use tumble::net::world::{entities, poses};
-use tumble::render::{Drawing, RenderError, Renderer};
 use tumble::scene::{SceneFile, resolve_scene};
 
 /// Runs a scene.
@@ -18,9 +18,10 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     let (mut world, notes) = scene.build().map_err(Failure::input)?;
     notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     restore(&mut world, options)?;
+    let mut shots = Shots::new(&scene, options)?;
     let mut recorder = recorder(&world, &scene, options)?;
     let start = State::of(&world);
-    let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), &scene, options)?;
+    let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), shots.as_mut(), &scene, options)?;
     finish_recording(recorder, options)?;
     if let Some(path) = &options.save {
         write(path, &world.save())?;
@@ -30,7 +31,7 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
         print!("{}", summary.lines());
     }
     write_summary(&summary, options)?;
-    picture(&world, &scene, options)
+    pictures(&world, shots, options)
 }
 
 /// The scene with what the command line says instead.
@@ -59,7 +60,13 @@ fn recorder(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<Op
 }
 
 /// Steps to the end; what was tallied, simulated seconds, and seconds of the clock spent in steps.
-fn simulate(world: &mut World, mut recorder: Option<&mut Recorder>, scene: &SceneFile, options: &RunOptions) -> Result<(Tally, f64, f64), Failure> {
+fn simulate(
+    world: &mut World,
+    mut recorder: Option<&mut Recorder>,
+    mut shots: Option<&mut Shots>,
+    scene: &SceneFile,
+    options: &RunOptions,
+) -> Result<(Tally, f64, f64), Failure> {
     let frames = (scene.world.seconds / scene.world.dt_s).round() as u64;
     let (begin, mut tally, mut wall) = (world.time(), Tally::default(), 0.0);
     let mut progress = Progress::new(frames, options.quiet);
@@ -67,7 +74,9 @@ fn simulate(world: &mut World, mut recorder: Option<&mut Recorder>, scene: &Scen
         Some(r) => r.frame(world.time(), world.frame(), &poses(world), &world.save()).map_err(|e| Failure::run("recording", e)),
         None => Ok(()),
     };
+    let mut shoot = |world: &World| shots.as_mut().map_or(Ok(()), |shots| shots.frame(world, begin));
     record(world)?;
+    shoot(world)?;
     for frame in 1..=frames {
         let clock = Instant::now();
         let report = *world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
@@ -75,6 +84,7 @@ fn simulate(world: &mut World, mut recorder: Option<&mut Recorder>, scene: &Scen
         tally.add(&report, taken);
         wall += taken;
         record(world)?;
+        shoot(world)?;
         progress.at(frame, world.time());
     }
     progress.done();
@@ -96,21 +106,20 @@ fn write_summary(summary: &Summary, options: &RunOptions) -> Result<(), Failure>
     Ok(())
 }
 
-/// Renders the last frame. Without a graphics adapter everything else still counts, and the message says what brings one.
-fn picture(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<(), Failure> {
-    let Some(path) = &options.picture else { return Ok(()) };
-    let list = Drawing::new(scene).list(world, &options.debug_draw.0).map_err(|e| Failure::run("the picture", e))?;
-    let mut renderer = match Renderer::new() {
-        Ok(renderer) => renderer,
-        Err(error @ RenderError::NoAdapter { .. }) => {
-            eprintln!("No picture: {error}");
-            return Ok(());
-        }
-        Err(error) => return Err(Failure::run("the picture", error)),
-    };
-    let image = renderer.render(&list, options.size.0, options.size.1).map_err(|e| Failure::run("the picture", e))?;
-    image.write_png(path).map_err(|e| Failure::run("the picture", e))?;
-    say(options, "picture", path);
+/// Ends the video and takes the picture of the last frame.
+fn pictures(world: &World, shots: Option<Shots>, options: &RunOptions) -> Result<(), Failure> {
+    let Some(mut shots) = shots else { return Ok(()) };
+    let count = shots.finish_frames()?;
+    if let Some(folder) = &options.frames_dir {
+        say(options, &format!("{count} frames"), folder);
+    }
+    if let Some(path) = &options.video {
+        say(options, "video", path);
+    }
+    if let Some(path) = &options.picture {
+        write_png(&shots.take(world)?, path)?;
+        say(options, "picture", path);
+    }
     Ok(())
 }
 

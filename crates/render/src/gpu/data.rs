@@ -2,7 +2,7 @@
 
 use crate::list::debug::Stroke;
 use crate::material::linear3;
-use crate::{Instance, Material, Shader, Sphere};
+use crate::{Instance, Material, Part, Shader, Sphere};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
 
 /// Numbers per mesh instance, sphere and stroke.
@@ -20,6 +20,8 @@ pub struct Eye {
     per_pixel: f64,
     per_ndc: [f64; 2],
     size: [f64; 2],
+    /// Number of the first pixel for dither, and the most pixels that occlusion reaches.
+    grid: [f64; 3],
 }
 
 impl Eye {
@@ -27,8 +29,8 @@ impl Eye {
     ///
     /// With `A` the upper left 2 x 2 of the projection, `o` its last column and `s` the view depth, a perspective point of the picture `n` sees
     /// `x(s) = A⁻¹(−o) + s A⁻¹(n + c)`, with `c` the third column; a parallel one sees `x(s) = A⁻¹(n − o) + s A⁻¹c`.
-    pub fn new(view: &Matrix4<f32>, projection: &Matrix4<f32>, width: u32, height: u32) -> Self {
-        let (view, p) = (view.cast::<f64>(), projection.cast::<f64>());
+    pub fn new(view: &Matrix4<f64>, projection: &Matrix4<f64>, width: u32, height: u32) -> Self {
+        let p = *projection;
         let perspective = p[(3, 3)] == 0.0;
         let inverse = p.fixed_view::<2, 2>(0, 0).try_inverse().unwrap_or(Matrix2::identity());
         let column = |j: usize| inverse * Vector2::new(p[(0, j)], p[(1, j)]);
@@ -52,7 +54,16 @@ impl Eye {
             per_ndc: [ex.norm(), ey.norm()],
             per_pixel: 2.0 * ey.norm() / f64::from(height),
             size: [f64::from(width), f64::from(height)],
+            grid: [0.0, 0.0, 0.25 * f64::from(height)],
         }
+    }
+
+    /// The same as a part of a whole whose pixels are numbered from elsewhere, with a rim that occlusion may not reach beyond.
+    pub fn numbered(mut self, part: &Part) -> Self {
+        // far from 0, so that numbers stay positive; a multiple of the tiles of noise
+        let number = |first: i32| f64::from((first - part.rim_px as i32 + 65_536).rem_euclid(131_072));
+        self.grid = [number(part.first_pixel[0]), number(part.first_pixel[1]), f64::from(part.rim_px.saturating_sub(3))];
+        self
     }
 
     /// How many picture widths and heights a metre across the view covers (at view depth 1, where perspective).
@@ -71,6 +82,8 @@ impl Eye {
         out.extend([w, h, 1.0 / w, 1.0 / h].map(|x| x as f32));
         let (slope, fixed) = if self.perspective { (self.per_pixel, 0.0) } else { (0.0, self.per_pixel) };
         out.extend([f32::from(u8::from(self.perspective)), slope as f32, fixed as f32, 0.0]);
+        let [x, y, reach] = self.grid;
+        out.extend([x as f32, y as f32, reach as f32, 0.0]);
         out
     }
 }

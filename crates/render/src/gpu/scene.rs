@@ -14,10 +14,12 @@ pub fn shadow_eyes(list: &DrawList, seen: Option<&Bounds>) -> Vec<(usize, Eye)> 
 }
 
 /// Reach of ambient occlusion in metres; 0 for none.
-pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>) -> f32 {
+pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>, part: bool) -> f32 {
     match (list.settings.occlusion_m, list.sky.ambient > 0.0) {
         (_, false) => 0.0,
         (Some(reach), _) => reach,
+        // all there is may be wide: then the usual size of a thing says how far it darkens its neighbours
+        (None, _) if part => seen.map_or(0.0, |b| (ball_of(b).1 / 12.0).min(4.0 * list.usual_radius())),
         (None, _) => seen.map_or(0.0, |b| ball_of(b).1 / 12.0),
     }
 }

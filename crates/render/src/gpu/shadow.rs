@@ -37,7 +37,7 @@ fn sun(direction: &Vector3<f32>, list: &DrawList, seen: &Bounds, (lo, hi): &Boun
     }
     // room for the filter at the rim, and never without extent
     let margin = (max - min) * 0.02 + Vector3::repeat(1e-3 + 1e-4 * extent.norm());
-    Eye::new(&view, &orthographic(min - margin, max + margin), size, size)
+    Eye::new(&view.cast(), &orthographic(min - margin, max + margin).cast(), size, size)
 }
 
 /// Perspective view from a lamp outside the box around what throws shadows, looking at the box's nearest point, with a frustum that just holds its corners.
@@ -75,7 +75,7 @@ fn lamp(position: &Point3<f32>, casters: &Bounds, size: u32) -> Option<Eye> {
         0.0, 0.0, far / (near - far), near * far / (near - far), //
         0.0, 0.0, -1.0, 0.0,
     );
-    Some(Eye::new(&view, &projection, size, size))
+    Some(Eye::new(&view.cast(), &projection.cast(), size, size))
 }
 
 fn view_matrix(side: &Vector3<f32>, up: &Vector3<f32>, back: &Vector3<f32>, at: &Point3<f32>) -> Matrix4<f32> {

@@ -6,7 +6,7 @@ use super::targets::Targets;
 use super::{Gpu, scene};
 use crate::list::bounds::Bounds;
 use crate::list::debug::strokes;
-use crate::{DebugSphere, DrawList, MAX_SHADOWS, MeshData, RenderError, SphereStyle};
+use crate::{DebugSphere, DrawList, Lens, MAX_SHADOWS, MeshData, RenderError, SphereStyle};
 use nalgebra::Matrix4;
 use std::ops::Range;
 use std::sync::Arc;
@@ -99,14 +99,18 @@ impl Frame {
         meshes: &mut MeshCache,
         targets: &Targets,
         list: &DrawList,
-        view: &Matrix4<f32>,
-        projection: &Matrix4<f32>,
+        lens: &Lens,
     ) -> Result<Self, RenderError> {
-        let eye = Eye::new(view, projection, targets.width, targets.height);
-        let seen = list.visible_box(&(projection * view));
+        let alone = Eye::new(&lens.view, &lens.projection, targets.width, targets.height);
+        let (view, projection): (Matrix4<f32>, Matrix4<f32>) = (lens.view.cast(), lens.projection.cast());
+        // views that are parts of one whole fit everything to what is the same for all of them
+        let (eye, seen) = match &lens.part {
+            Some(part) => (alone.numbered(part), list.whole_box()),
+            None => (alone, list.visible_box(&(projection * view))),
+        };
         let seen = seen.as_ref();
         let shadows = scene::shadow_eyes(list, seen);
-        let reach = scene::occlusion_reach(list, seen);
+        let reach = scene::occlusion_reach(list, seen, lens.part.is_some());
         let occlusion = reach > 0.0;
         let buffers = meshes.sync(gpu, &list.meshes)?;
         let (groups, instances) = group_instances(gpu, list, &buffers)?;
@@ -140,7 +144,7 @@ impl Frame {
             ground: ground(gpu, list, seen)?,
             spheres,
             casting_spheres,
-            shells: shell_batch(gpu, list, view)?,
+            shells: shell_batch(gpu, list, &view)?,
             strokes: stroke_batch(gpu, list, false)?,
             strokes_on_top: stroke_batch(gpu, list, true)?,
         })

@@ -54,6 +54,16 @@ impl DrawList {
         union(self.items(true).map(|item| item.1).filter(seen)).or_else(|| self.bounding_box(false))
     }
 
+    /// The box around what counts of the whole world, wherever one looks: what throws shadows, without what flew off; everything where there is no such thing.
+    pub(crate) fn whole_box(&self) -> Option<Bounds> {
+        self.main_box().or_else(|| self.bounding_box(false))
+    }
+
+    /// The median radius of what throws shadows, m; 0 where nothing does.
+    pub(crate) fn usual_radius(&self) -> f32 {
+        median(self.items(true).map(|item| ball_of(&item.1).1))
+    }
+
     /// What throws shadows near the `seen` box: each one's corners in the world, as points to be transformed, with a radius around them.
     pub(crate) fn casters_near(&self, seen: &Bounds) -> impl Iterator<Item = (Vec<Point3<f32>>, f32, Bounds)> {
         let (middle, radius) = ball_of(seen);

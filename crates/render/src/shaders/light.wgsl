@@ -110,7 +110,7 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     slope = select(clamp(slope, vec2f(-8.0), vec2f(8.0)), vec2f(0.0), ndc.z < 1e-6);
     let bias = 1e-5 + (abs(slope.x) + abs(slope.y)) * 0.75 / texels;
 
-    let turn = 6.2831853 * fract(52.9829189 * fract(dot(floor(pixel), vec2f(0.06711056, 0.00583715))));
+    let turn = 6.2831853 * fract(52.9829189 * fract(dot(floor(pixel) + view.grid.xy, vec2f(0.06711056, 0.00583715))));
     let s = select(shadow_depth_to_s(sh, ndc.z), clip.w, sh.scale.z > 0.5);
     let per_metre = sh.scale.xy / mix(1.0, s, sh.scale.z);
     let s_near = shadow_depth_to_s(sh, 1.0);

@@ -37,10 +37,10 @@ fn step_along(p: vec2i, d: vec2i, middle: vec3f) -> vec3f {
     if (dot(n, ray_at(at.xy).dir) > 0.0) { n = -n; }
     let r = reach.x;
     let r2 = r * r;
-    let pixels = min(r / footprint_at(s), 0.25 * view.size.y);
+    let pixels = min(r / footprint_at(s), view.grid.z);
     if (pixels < 1.0) { return vec4f(1.0); }
     // 16 turns in a 4 x 4 tile, averaged away by the blur
-    let tile = u32(p.x & 3) + 4u * u32(p.y & 3);
+    let tile = (u32(p.x) + u32(view.grid.x)) % 4u + 4u * ((u32(p.y) + u32(view.grid.y)) % 4u);
     let turn = 6.2831853 * f32((tile * 7u) % 16u) / 16.0;
     var sum = 0.0;
     for (var i = 0u; i < TAPS; i++) {

@@ -11,6 +11,8 @@ struct View {
     size: vec4f,
     // x: 1 for perspective, 0 for parallel; y: metres per pixel per metre of view depth; z: metres per pixel (parallel)
     lens: vec4f,
+    // x, y: number of the first pixel, for noise that runs on from picture to picture; z: most pixels that occlusion reaches
+    grid: vec4f,
 };
 @group(0) @binding(0) var<uniform> view: View;
 

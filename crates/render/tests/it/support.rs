@@ -2,10 +2,15 @@
 
 use nalgebra::Point3;
 use std::sync::{Mutex, OnceLock, PoisonError};
-use tumble_render::{Camera, DrawList, Image, Light, RenderError, Renderer, Settings, Sky};
+use tumble_render::{Camera, DrawList, Image, Light, RenderError, Renderer, Settings, Sky, Viewpoint};
 
 /// The picture of a list, or `None` (said visibly) without an adapter. One renderer serves all tests.
 pub fn picture(list: &DrawList, width: u32, height: u32) -> Option<Image> {
+    picture_from(&list.camera, list, width, height)
+}
+
+/// The same, seen from elsewhere than the list's camera.
+pub fn picture_from(from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Option<Image> {
     static SHARED: OnceLock<Option<Mutex<Renderer>>> = OnceLock::new();
     let shared = SHARED.get_or_init(|| renderer().map(Mutex::new));
     let Some(shared) = shared else {
@@ -14,7 +19,7 @@ pub fn picture(list: &DrawList, width: u32, height: u32) -> Option<Image> {
         return None;
     };
     let mut renderer = shared.lock().unwrap_or_else(PoisonError::into_inner);
-    Some(renderer.render(list, width, height).expect("the list is valid"))
+    Some(renderer.render_from(from, list, width, height).expect("the list is valid"))
 }
 
 /// Whether spheres have exact edges: OpenGL, the fallback, draws them in whole pixels. Said visibly where not.

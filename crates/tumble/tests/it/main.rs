@@ -2,6 +2,7 @@
 
 mod articulated_scenes;
 mod bad_input;
+mod caves;
 mod common;
 mod determinism;
 mod machines;

@@ -1,0 +1,202 @@
+//! Pictures to set up projectors by: grid, corners, colours, name. Drawn on the screen's own metres, so that a tape measure checks them.
+
+use super::compose::{blank, combined, flipped};
+use super::font::{text_width, write};
+use crate::Image;
+use std::fmt;
+use std::str::FromStr;
+use tumble_scene::cave::{Cave, Facet, Screen};
+
+/// What a calibration picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CalibrationPattern {
+    /// Lines every 0.1 m, stronger ones every 0.5 m from the middle, a circle, the diagonals: straightness, squareness, size.
+    Grid,
+    /// Marks in the corners with their place in the cave, a frame one pixel wide at the rim: that nothing is cut off.
+    Corners,
+    /// Bars and ramps: that projectors agree in colour and brightness.
+    Colours,
+    /// The facet's name, large, with its node, user, size: that the right picture is on the right screen, the right way up.
+    Name,
+}
+
+const NAMES: [(&str, CalibrationPattern); 4] = [
+    ("grid", CalibrationPattern::Grid),
+    ("corners", CalibrationPattern::Corners),
+    ("colours", CalibrationPattern::Colours),
+    ("name", CalibrationPattern::Name),
+];
+
+impl FromStr for CalibrationPattern {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        NAMES.iter().find(|(name, _)| *name == word).map(|(_, pattern)| *pattern).ok_or_else(|| "wanted grid, corners, colours or name".into())
+    }
+}
+
+impl fmt::Display for CalibrationPattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(NAMES.iter().find(|(_, pattern)| pattern == self).map_or("", |(name, _)| name))
+    }
+}
+
+const BLACK: [u8; 4] = [0, 0, 0, 255];
+const WHITE: [u8; 4] = [255, 255, 255, 255];
+const GREY: [u8; 4] = [96, 96, 96, 255];
+const DARK: [u8; 4] = [48, 48, 48, 255];
+const RED: [u8; 4] = [255, 64, 48, 255];
+const GREEN: [u8; 4] = [64, 220, 96, 255];
+const BLUE: [u8; 4] = [80, 144, 255, 255];
+const YELLOW: [u8; 4] = [255, 220, 64, 255];
+
+/// The pattern on a facet: both eyes where it is in stereo (each says which it is), mirrored as the facet is, not bent or darkened.
+pub fn calibration_picture(cave: &Cave, facet: &Facet, pattern: CalibrationPattern) -> Image {
+    let screen = &cave.screens[facet.screen];
+    let eyes = facet.stereo.sides().iter().map(|side| one_eye(cave, facet, screen, pattern, *side)).collect();
+    flipped(combined(eyes, facet.stereo), facet.flip)
+}
+
+fn one_eye(cave: &Cave, facet: &Facet, screen: &Screen, pattern: CalibrationPattern, side: f64) -> Image {
+    let [w, h] = facet.size_px;
+    let mut image = blank(w, h, BLACK);
+    match pattern {
+        CalibrationPattern::Grid => grid(&mut image, screen),
+        CalibrationPattern::Corners => corners(&mut image, screen),
+        CalibrationPattern::Colours => colours(&mut image),
+        CalibrationPattern::Name => {}
+    }
+    caption(&mut image, cave, facet, screen, pattern, side);
+    image
+}
+
+/// Lines by metres from the middle, a circle that fits, and the diagonals.
+fn grid(image: &mut Image, screen: &Screen) {
+    let [wide, high] = screen.size_m();
+    let per_metre = [f64::from(image.width) / wide, f64::from(image.height) / high];
+    let middle = [0.5 * f64::from(image.width), 0.5 * f64::from(image.height)];
+    let circle = 0.48 * wide.min(high);
+    for y in 0..image.height {
+        for x in 0..image.width {
+            let off = [f64::from(x) + 0.5 - middle[0], f64::from(y) + 0.5 - middle[1]];
+            let [mx, my] = [off[0] / per_metre[0], off[1] / per_metre[1]];
+            // distance in pixels from the nearest line of a spacing
+            let near = |spacing: f64| (0..2).map(|k| (off[k] - (off[k] / per_metre[k] / spacing).round() * spacing * per_metre[k]).abs()).fold(f64::MAX, f64::min);
+            let (fine, coarse) = (near(0.1), near(0.5));
+            let ring = (mx.hypot(my) - circle).abs() * per_metre[0].min(per_metre[1]);
+            let diagonal = (off[0] * middle[1]).abs() - (off[1] * middle[0]).abs();
+            let diagonal = diagonal.abs() / middle[0].hypot(middle[1]);
+            let color = match () {
+                _ if x == 0 || y == 0 || x + 1 == image.width || y + 1 == image.height => Some(WHITE),
+                _ if off[0].abs().min(off[1].abs()) < 1.6 => Some(YELLOW),
+                _ if ring < 1.2 => Some(GREEN),
+                _ if coarse < 1.1 => Some(WHITE),
+                _ if diagonal < 0.8 => Some(BLUE),
+                _ if fine < 0.6 => Some(GREY),
+                _ => None,
+            };
+            if let Some(color) = color {
+                put(image, x.into(), y.into(), color);
+            }
+        }
+    }
+}
+
+/// A frame at the rim, and in each corner a mark and its place in the cave.
+fn corners(image: &mut Image, screen: &Screen) {
+    let (w, h) = (i64::from(image.width), i64::from(image.height));
+    rect(image, 0, 0, w, h, WHITE);
+    rect(image, 1, 1, w - 2, h - 2, DARK);
+    let arm = w.min(h) / 6;
+    let thick = (w.min(h) / 160).max(1);
+    let scale = (w / 420).max(1);
+    let named = [
+        ("UPPER LEFT", screen.upper_left_m, false, false, RED),
+        ("UPPER RIGHT", screen.upper_right_m(), true, false, GREEN),
+        ("LOWER LEFT", screen.lower_left_m, false, true, BLUE),
+        ("LOWER RIGHT", screen.lower_right_m, true, true, YELLOW),
+    ];
+    for (name, place, right, low, color) in named {
+        rect(image, if right { w - arm } else { 0 }, if low { h - thick } else { 0 }, arm, thick, color);
+        rect(image, if right { w - thick } else { 0 }, if low { h - arm } else { 0 }, thick, arm, color);
+        for (line, text) in [name.to_owned(), format!("{:.3} {:.3} {:.3} M", place.x, place.y, place.z)].iter().enumerate() {
+            let inset = 4 * thick;
+            let x = if right { w - inset - text_width(text, scale) } else { inset };
+            let down = inset + 10 * scale * line as i64;
+            let y = if low { h - inset - 20 * scale + 10 * scale * line as i64 } else { down };
+            write(image, text, x, y, scale, color);
+        }
+    }
+}
+
+/// Bars of the primaries, and ramps from black to full in each and in grey.
+fn colours(image: &mut Image) {
+    let (w, h) = (i64::from(image.width), i64::from(image.height));
+    let full = |r: u8, g: u8, b: u8| [255 * r, 255 * g, 255 * b, 255];
+    let bars = [full(1, 1, 1), full(1, 1, 0), full(0, 1, 1), full(0, 1, 0), full(1, 0, 1), full(1, 0, 0), full(0, 0, 1), full(0, 0, 0)];
+    for (i, color) in bars.iter().enumerate() {
+        let (from, to) = (w * i as i64 / 8, w * (i as i64 + 1) / 8);
+        rect(image, from, 0, to - from, h / 3, *color);
+    }
+    for (row, mask) in [[1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]].iter().enumerate() {
+        let (top, bottom) = (h / 3 + h * row as i64 / 6, h / 3 + h * (row as i64 + 1) / 6);
+        for x in 0..w {
+            // the lower half in 16 steps, so that clipping at either end is seen
+            let level = (255 * x / (w - 1).max(1)) as u8;
+            let step = (17 * (16 * x / w)) as u8;
+            let color = |v: u8| [v * mask[0], v * mask[1], v * mask[2], 255];
+            rect(image, x, top, 1, (bottom - top) / 2, color(level));
+            rect(image, x, (top + bottom) / 2, 1, bottom - (top + bottom) / 2, color(step));
+        }
+    }
+}
+
+/// The facet's name in the middle, what it is below, and an arrow that points up.
+fn caption(image: &mut Image, cave: &Cave, facet: &Facet, screen: &Screen, pattern: CalibrationPattern, side: f64) {
+    let (w, h) = (i64::from(image.width), i64::from(image.height));
+    let large = pattern == CalibrationPattern::Name;
+    let name = facet.name.to_uppercase();
+    let room = if large { w * 9 / 10 } else { w / 3 };
+    let scale = (room / text_width(&name, 1).max(1)).clamp(1, h / if large { 24 } else { 60 }.max(1)).max(1);
+    let small = (w / 420).clamp(1, 6);
+    let [wide, high] = screen.size_m();
+    let eye = match side {
+        s if s < 0.0 => "LEFT EYE",
+        s if s > 0.0 => "RIGHT EYE",
+        _ => "BOTH EYES",
+    };
+    let node = facet.node.map_or("THIS MACHINE".to_owned(), |n| format!("NODE {}", cave.nodes[n].name.to_uppercase()));
+    let mut lines = vec![
+        format!("{eye}  {node}"),
+        format!("{} X {} PX  {wide:.3} X {high:.3} M", facet.size_px[0], facet.size_px[1]),
+        format!("USER {}", cave.users[facet.user].name.to_uppercase()),
+    ];
+    // a picture too small for them goes without
+    lines.retain(|line| text_width(line, small) < w * 9 / 10);
+    let block = text_width(&name, scale).max(lines.iter().map(|l| text_width(l, small)).max().unwrap_or(0));
+    let height = 9 * scale + 10 * small * lines.len() as i64;
+    let top = (h - height) / 2;
+    let pad = 4 * small;
+    rect(image, (w - block) / 2 - pad, top - pad - 8 * small, block + 2 * pad, height + 2 * pad + 8 * small, BLACK);
+    for row in 0..6 * small {
+        rect(image, w / 2 - row / 2, top - 8 * small + row, row.max(1), 1, RED);
+    }
+    write(image, &name, (w - text_width(&name, scale)) / 2, top, scale, WHITE);
+    for (i, line) in lines.iter().enumerate() {
+        write(image, line, (w - text_width(line, small)) / 2, top + 9 * scale + 10 * small * i as i64, small, YELLOW);
+    }
+}
+
+pub(super) fn put(image: &mut Image, x: i64, y: i64, color: [u8; 4]) {
+    if (0..i64::from(image.width)).contains(&x) && (0..i64::from(image.height)).contains(&y) {
+        let at = 4 * (y as usize * image.width as usize + x as usize);
+        image.rgba[at..at + 4].copy_from_slice(&color);
+    }
+}
+
+pub(super) fn rect(image: &mut Image, x: i64, y: i64, w: i64, h: i64, color: [u8; 4]) {
+    let rows = y.max(0)..(y + h).min(i64::from(image.height));
+    for row in rows {
+        (x.max(0)..(x + w).min(i64::from(image.width))).for_each(|column| put(image, column, row, color));
+    }
+}

@@ -1,0 +1,21 @@
+//! Pictures of caves: what each eye sees through each screen.
+//!
+//! [`FacetView`] is the projection; [`CaveView`] is a cave that stands in a scene, and draws its facets one by one or unfolded side by
+//! side; [`Warp`] and [`Blend`] bend and darken finished pictures for projectors; [`Pattern`](CalibrationPattern) helps to set them up.
+
+mod blend;
+mod calibration;
+mod compose;
+mod font;
+mod perspective;
+mod unfold;
+mod view;
+mod warp;
+
+pub use blend::Blend;
+pub(crate) use compose::cut;
+pub use calibration::{CalibrationPattern, calibration_picture};
+pub use perspective::FacetView;
+pub use unfold::{Tile, unfold};
+pub use view::{CaveView, RIM_PX};
+pub use warp::Warp;

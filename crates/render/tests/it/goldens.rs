@@ -1,0 +1,82 @@
+//! Pictures of all shipped scenes, and of one cave, beside ones that were looked at and kept: one set per interface (Vulkan, OpenGL), because
+//! they differ in edges. `TUMBLE_KEEP_PICTURES=1` writes them anew (`make goldens`); then look at them before they are committed.
+//!
+//! The measure: pictures are made 4 times smaller in linear light, which forgives a pixel's edge, and may then differ by [`MEAN_LEVELS`] on the average and by
+//! [`MOST_LEVELS`] anywhere.
+
+use crate::support::renderer;
+use std::path::PathBuf;
+use tumble_render::{CaveView, DebugDraw, Drawing, Image, Renderer};
+use tumble_scene::cave::resolve_cave;
+
+const SIZE: [u32; 2] = [192, 108];
+const MEAN_LEVELS: f64 = 1.0;
+const MOST_LEVELS: f64 = 24.0;
+/// Moments of a scene that are looked at, frames.
+const FRAMES: u64 = 24;
+
+fn pictures(renderer: &mut Renderer) -> Vec<(String, Image)> {
+    let mut out = Vec::new();
+    for shipped in tumble_scene::shipped() {
+        let scene = shipped.read().unwrap();
+        let (mut world, _) = scene.build().unwrap();
+        (0..FRAMES).for_each(|_| {
+            world.step().unwrap();
+        });
+        let list = Drawing::new(&scene).list(&world, &DebugDraw::default()).unwrap();
+        out.push((shipped.name.to_owned(), renderer.render(&list, SIZE[0], SIZE[1]).unwrap()));
+        if shipped.name == "billiards" {
+            let cave = CaveView::new(resolve_cave("cube4").unwrap().load().unwrap(), &scene).unwrap();
+            out.push(("billiards-cube4".to_owned(), cave.draw_unfolded(renderer, &list, SIZE).unwrap()));
+        }
+    }
+    out
+}
+
+/// Mean light of blocks of 4 x 4 pixels, as levels of 0 to 255 in the curve of sRGB.
+fn small(image: &Image) -> Vec<f64> {
+    let linear = |c: u8| (f64::from(c) / 255.0).powf(2.2);
+    let block = |x: u32, y: u32, k: usize| (0..16).filter_map(|i| image.pixel(4 * x + i % 4, 4 * y + i / 4)).map(|p| linear(p[k])).sum::<f64>() / 16.0;
+    let blocks = (0..image.height / 4).flat_map(|y| (0..image.width / 4).map(move |x| (x, y)));
+    blocks.flat_map(|(x, y)| [0, 1, 2].map(|k| 255.0 * block(x, y, k).powf(1.0 / 2.2))).collect()
+}
+
+#[test]
+fn pictures_of_shipped_scenes_are_those_that_were_looked_at() {
+    let Some(mut renderer) = renderer() else { return };
+    let interface = if renderer.adapter().contains("Gl)") { "opengl" } else { "vulkan" };
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/goldens").join(interface);
+    let keep = std::env::var_os("TUMBLE_KEEP_PICTURES").is_some();
+    if !keep && !folder.is_dir() {
+        // past the harness, which keeps what passing tests print
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no pictures are kept for {interface}\n"));
+        return;
+    }
+    let mut wrong = Vec::new();
+    for (name, image) in pictures(&mut renderer) {
+        let path = folder.join(format!("{name}.png"));
+        if keep {
+            std::fs::create_dir_all(&folder).unwrap();
+            image.write_png(&path).unwrap();
+            continue;
+        }
+        let kept = Image::read_png(&path).unwrap_or_else(|e| panic!("{e}; `make goldens` writes it"));
+        assert_eq!((image.width, image.height), (kept.width, kept.height), "{name}");
+        let (a, b) = (small(&image), small(&kept));
+        let off: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).collect();
+        let (mean, most) = (off.iter().sum::<f64>() / off.len() as f64, off.iter().copied().fold(0.0, f64::max));
+        if mean > MEAN_LEVELS || most > MOST_LEVELS {
+            let seen = std::env::temp_dir().join(format!("tumble-{name}.png"));
+            image.write_png(&seen).unwrap();
+            wrong.push(format!("{name}: {mean:.2} levels off on the average, {most:.1} at most; it is in {}", seen.display()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}\nif that is meant: `make goldens`", wrong.join("\n"));
+}
+
+#[test]
+fn the_measure_sees_what_moved() {
+    let square = |from: u32| Image { width: 64, height: 64, rgba: (0..64 * 64u32).flat_map(|i| if (from..from + 16).contains(&(i % 64)) && i / 64 < 16 { [200, 200, 200, 255] } else { [60, 60, 60, 255] }).collect() };
+    let most = |a: &Image, b: &Image| small(a).iter().zip(small(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(most(&square(8), &square(8)) == 0.0 && most(&square(8), &square(12)) > MOST_LEVELS);
+}

@@ -1,0 +1,188 @@
+//! What happens to finished pictures of facets: both eyes, mirrors, warps, blends, calibration.
+
+use crate::support::renderer;
+use nalgebra::{Point3, Vector3};
+use tumble_render::{Blend, CalibrationPattern, CaveView, DrawList, Image, Light, Material, Warp, calibration_picture};
+use tumble_scene::SceneFile;
+use tumble_scene::cave::{Cave, shipped_caves};
+
+/// A picture whose every pixel is different.
+fn colorful(width: u32, height: u32) -> Image {
+    let pixel = |x: u32, y: u32| [(7 * x + 3 * y) as u8, (x * y) as u8, (40 + 11 * y) as u8, 255];
+    Image { width, height, rgba: (0..height).flat_map(|y| (0..width).flat_map(move |x| pixel(x, y))).collect() }
+}
+
+const UNIT: &str = "v 0 0\nv 1 0\nv 1 1\nv 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+
+#[test]
+fn a_warp_that_changes_nothing_changes_no_byte() {
+    let image = colorful(37, 23);
+    assert_eq!(Warp::from_obj(format!("{UNIT}f 1/1 2/2 3/3 4/4\n").as_bytes()).unwrap().apply(&image), image);
+    let mut pfm = b"PF\n5 4\n-1.0\n".to_vec();
+    for y in 0..4 {
+        for x in 0..5 {
+            for value in [x as f32 / 4.0, y as f32 / 3.0, 0.0] {
+                pfm.extend(value.to_le_bytes());
+            }
+        }
+    }
+    assert_eq!(Warp::from_pfm(&pfm).unwrap().apply(&image), image);
+}
+
+#[test]
+fn a_mirroring_warp_mirrors_and_a_half_leaves_the_rest_black() {
+    let image = colorful(20, 10);
+    let mirrored = Warp::from_obj(format!("{UNIT}f 1/2 2/1 3/4 4/3\n").as_bytes()).unwrap().apply(&image);
+    let half = Warp::from_obj("v 0 0\nv 0.5 0\nv 0.5 1\nv 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n".as_bytes()).unwrap().apply(&image);
+    for y in 0..10 {
+        for x in 0..20 {
+            assert_eq!(mirrored.pixel(x, y), image.pixel(19 - x, y));
+        }
+        assert!((10..20).all(|x| half.pixel(x, y) == Some([0, 0, 0, 255])));
+        // the fourth pixel shows what lies between the seventh and the eighth
+        let between = |k: usize| (image.pixel(6, y).unwrap()[k], image.pixel(7, y).unwrap()[k]);
+        let got = half.pixel(3, y).unwrap();
+        assert!((0..3).all(|k| got[k] >= between(k).0.min(between(k).1) && got[k] <= between(k).0.max(between(k).1)));
+    }
+}
+
+#[test]
+fn bad_warps_say_what_is_wrong_and_where() {
+    let obj = |text: &str| Warp::from_obj(text.as_bytes()).unwrap_err();
+    assert!(obj("v 0 0\nv 1 zero\n").starts_with("line 2: wanted `v x y`"));
+    assert!(obj(&format!("{UNIT}f 1/1 2/2 9/3\n")).contains("line 9: the corner `9/3` names no `v` above it, of which there are 4"));
+    assert!(obj(&format!("{UNIT}f 1/1 2/2\n")).contains("a face of 2 corners"));
+    assert!(obj("# nothing\n").contains("has no faces"));
+    let pfm = |bytes: &[u8]| Warp::from_pfm(bytes).unwrap_err();
+    assert!(pfm(b"PF\n3").contains("cut off"));
+    assert!(pfm(b"PF\n1 9 -1.0\n").contains("the side 1"));
+    assert!(pfm(b"PF\n4 4 -1.0\nxx").contains("2 bytes of floats, wanted 192"));
+    assert!(pfm(b"PF\n9999999 4 -1.0\n").contains("wanted 2 to 1024"));
+    let error = Warp::load(std::path::Path::new("/nowhere/a.obj")).unwrap_err().to_string();
+    assert!(error.starts_with("/nowhere/a.obj: the warp grid cannot be read"), "{error}");
+}
+
+#[test]
+fn a_blend_takes_its_share_of_the_light() {
+    let folder = std::env::temp_dir().join(format!("tumble-blend-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("mask.png");
+    // 255 keeps all, 0 nothing, 51 a fifth of the light
+    let mask = Image { width: 3, height: 1, rgba: vec![255, 255, 255, 255, 0, 0, 0, 255, 51, 51, 51, 255] };
+    mask.write_png(&path).unwrap();
+    let mut image = Image { width: 3, height: 1, rgba: [255, 200, 100, 255].repeat(3) };
+    Blend::load(&path, [3, 1]).unwrap().apply(&mut image);
+    assert_eq!(image.rgba[..8], [255, 200, 100, 255, 0, 0, 0, 255]);
+    // a fifth of full light: 1.055 * 0.2^(1/2.4) - 0.055 = 0.4845 of 255
+    assert_eq!(image.rgba[8], 124);
+    let error = Blend::load(&path, [4, 1]).unwrap_err().to_string();
+    assert!(error.contains("the blend mask is 3 x 1 pixels, and the facet's picture 4 x 1"), "{error}");
+    assert!(Blend::load(&folder.join("none.png"), [3, 1]).is_err());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+fn cave(facet: &str) -> Cave {
+    let text = format!(
+        "[[user]]\nname = \"u\"\neye_m = [0, 0, 1]\ninterpupillary_m = 0.1\n[[screen]]\nname = \"s\"\nlower_left_m = [-1, 2, 0]\nlower_right_m = [1, 2, 0]\nupper_left_m = [-1, 2, 2]\n[[facet]]\nname = \"f\"\nscreen = \"s\"\nsize_px = [100, 100]\n{facet}\n"
+    );
+    Cave::parse(&text, "my.toml").unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A scene with its cave at the origin.
+fn empty_scene() -> SceneFile {
+    SceneFile::parse("[cave]\norigin_m = [0, 0, 0]\n", "my.toml").unwrap()
+}
+
+/// A white ball, unlit surroundings: 4 m ahead at eye height, behind the screen.
+fn ball() -> DrawList {
+    let mut list = crate::support::bare(tumble_render::Camera::default());
+    list.add_sphere(Point3::new(0.0, 4.0, 1.0), 0.2, nalgebra::UnitQuaternion::identity(), Material::unlit([1.0; 3]));
+    list.lights.push(Light::sun(Vector3::y(), 1.0));
+    list
+}
+
+fn middle(image: &Image, channel: usize, from: u32, to: u32) -> f64 {
+    let lit: Vec<f64> = (0..image.height).flat_map(|y| (from..to).map(move |x| (x, y))).filter(|&(x, y)| image.pixel(x, y).unwrap()[channel] > 128).map(|(x, _)| f64::from(x) + 0.5).collect();
+    lit.iter().sum::<f64>() / lit.len() as f64
+}
+
+#[test]
+fn eyes_see_the_ball_apart_by_what_similar_triangles_say() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut draw = |facet: &str| {
+        let view = CaveView::new(cave(facet), &empty_scene()).unwrap();
+        view.draw(&mut renderer, &ball(), &view.cave().facets[0]).unwrap()
+    };
+    // eyes 0.1 m apart, screen at 2 m, ball at 4 m: its pictures on the screen are 0.05 m apart, at 50 pixels to the metre; the left eye sees it left... of
+    // its own axis to the right: at -0.05 + 0.05 * 2 / 4 = -0.025 m
+    let side = draw("stereo = \"side_by_side\"");
+    assert_eq!((side.width, side.height), (200, 100));
+    let (left, right) = (middle(&side, 0, 0, 100), middle(&side, 0, 100, 200) - 100.0);
+    assert!((left - 48.75).abs() < 0.1 && (right - 51.25).abs() < 0.1, "{left} {right}");
+    let below = draw("stereo = \"top_bottom\"");
+    assert_eq!((below.width, below.height), (100, 200));
+    assert_eq!(below.rgba[..4 * 100 * 50], side.rgba.chunks_exact(800).take(50).flat_map(|row| row[..400].to_vec()).collect::<Vec<u8>>()[..]);
+    let red_cyan = draw("stereo = \"anaglyph\"");
+    assert_eq!((red_cyan.width, red_cyan.height), (100, 100));
+    assert!((middle(&red_cyan, 0, 0, 100) - left).abs() < 1e-9 && (middle(&red_cyan, 2, 0, 100) - right).abs() < 1e-9);
+    let mono = draw("");
+    assert!((middle(&mono, 0, 0, 100) - 50.0).abs() < 0.1);
+}
+
+#[test]
+fn flips_mirror_the_finished_picture() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut list = ball();
+    list.add_sphere(Point3::new(0.8, 4.0, 1.6), 0.3, nalgebra::UnitQuaternion::identity(), Material::unlit([0.2, 0.9, 0.4]));
+    let mut draw = |flip: &str| {
+        let view = CaveView::new(cave(&format!("flip = \"{flip}\"")), &empty_scene()).unwrap();
+        view.draw(&mut renderer, &list, &view.cave().facets[0]).unwrap()
+    };
+    let (plain, across, upward, both) = (draw("none"), draw("horizontal"), draw("vertical"), draw("both"));
+    for (x, y) in (0..100).flat_map(|y| (0..100).map(move |x| (x, y))) {
+        assert_eq!(plain.pixel(x, y), across.pixel(99 - x, y));
+        assert_eq!(plain.pixel(x, y), upward.pixel(x, 99 - y));
+        assert_eq!(plain.pixel(x, y), both.pixel(99 - x, 99 - y));
+    }
+    assert_ne!(plain, across);
+}
+
+#[test]
+fn a_scene_puts_its_cave_and_scales_it() {
+    // a quarter turn to the left and doubled: the cave's y is the world's -x
+    let scene = SceneFile::parse("[cave]\norigin_m = [10, 20, 30]\nheading_deg = 90\nscale = 2\n", "my.toml").unwrap();
+    let view = CaveView::new(cave(""), &scene).unwrap();
+    let eye = view.eye(&view.cave().facets[0], 0.0).unwrap();
+    // the screen's middle is at (0, 2, 1) of the cave
+    let ndc = eye.project(&Point3::new(10.0 - 4.0, 20.0, 32.0)).unwrap();
+    assert!(ndc.x.abs() < 1e-12 && ndc.y.abs() < 1e-12, "{ndc:?}");
+    // without [cave] the user stands with the eye at the camera, upright, facing as it does: here along x
+    let scene = SceneFile::parse("[camera]\neye_m = [1, 2, 3]\ntarget_m = [4, 2, 1]\n", "my.toml").unwrap();
+    let view = CaveView::new(cave(""), &scene).unwrap();
+    let ndc = view.eye(&view.cave().facets[0], 0.0).unwrap().project(&Point3::new(9.0, 2.0, 3.0)).unwrap();
+    assert!(ndc.x.abs() < 1e-12 && ndc.y.abs() < 1e-12, "{ndc:?}");
+}
+
+#[test]
+fn calibration_pictures_have_their_lines_where_a_tape_measures_them() {
+    // 2 m on 400 pixels: half metres are 100 pixels apart, and the middle cross at 200
+    let mut cave = cave("");
+    cave.facets[0].size_px = [400, 400];
+    let grid = calibration_picture(&cave, &cave.facets[0], CalibrationPattern::Grid);
+    assert_eq!((grid.width, grid.height), (400, 400));
+    let white = |x: u32, y: u32| grid.pixel(x, y) == Some([255, 255, 255, 255]);
+    assert!((0..400).all(|i| white(i, 0) && white(i, 399) && white(0, i) && white(399, i)), "the rim");
+    assert!(white(99, 30) && white(100, 30) && white(300, 30) && !white(103, 30) && !white(200, 30), "lines of half a metre");
+    for shipped in shipped_caves() {
+        let cave = shipped.read().unwrap();
+        let facet = &cave.facets[0];
+        let pictures = ["grid", "corners", "colours", "name"].map(|word| calibration_picture(&cave, facet, word.parse().unwrap()));
+        for picture in &pictures {
+            assert_eq!([picture.width, picture.height], facet.whole_px());
+            let lit = picture.rgba.chunks_exact(4).filter(|p| p[..3].iter().any(|&c| c > 60)).count();
+            assert!(lit * 300 > picture.rgba.len() / 4, "{} pixels are lit", lit);
+        }
+        assert!((0..4).all(|i| (0..i).all(|j| pictures[i] != pictures[j])));
+    }
+    assert!("gird".parse::<CalibrationPattern>().is_err());
+}

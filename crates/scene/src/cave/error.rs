@@ -1,0 +1,87 @@
+//! Why a cave could not be read.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use super::Cave;
+use crate::error::{Invalid, Problem};
+use crate::suggest::{listed, nearest};
+
+/// Why a cave could not be read, or what of it could not be found.
+#[derive(Debug, Error)]
+pub enum CaveError {
+    /// The file could not be opened or read.
+    #[error("{}: cannot read the cave: {source}; give the path of a cave file or the name of a shipped one", file.display())]
+    Read {
+        /// The path that was tried.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is larger than any cave may be.
+    #[error("{}: the file is larger than {limit} bytes, the most a cave may have", file.display())]
+    TooLarge {
+        /// The path that was tried.
+        file: PathBuf,
+        /// The most bytes allowed.
+        limit: u64,
+    },
+    /// The file is not text.
+    #[error("{}: byte {byte} of the file is not UTF-8; a cave is a UTF-8 text in TOML", file.display())]
+    NotUtf8 {
+        /// The path that was tried.
+        file: PathBuf,
+        /// Offset of the first bad byte, from 0.
+        byte: usize,
+    },
+    /// Neither a path nor the name of a shipped cave.
+    #[error("no cave `{name}`: {hint}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// What there is instead.
+        hint: String,
+    },
+    /// A facet that the cave has not.
+    #[error("{file}: no facet `{name}`; {hint}")]
+    NoFacet {
+        /// The cave's file.
+        file: String,
+        /// What was asked for.
+        name: String,
+        /// What there is instead.
+        hint: String,
+    },
+    /// The text was read, and is wrong in one or more places.
+    #[error("{0}")]
+    Invalid(Box<Invalid>),
+}
+
+impl CaveError {
+    /// The error as a full report for a person; escape codes for colour only if `color`.
+    pub fn report(&self, color: bool) -> String {
+        match self {
+            CaveError::Invalid(invalid) => invalid.report(color),
+            other => format!("Error: {other}\n"),
+        }
+    }
+
+    /// The problems of the text, in the order of the file; empty for the other kinds of error.
+    pub fn problems(&self) -> &[Problem] {
+        match self {
+            CaveError::Invalid(invalid) => &invalid.problems,
+            _ => &[],
+        }
+    }
+
+    pub(crate) fn no_facet(cave: &Cave, name: &str) -> CaveError {
+        let names = cave.facets.iter().map(|facet| facet.name.as_str());
+        let all = listed(names.clone().take(20), "and");
+        let hint = match nearest(name, names) {
+            Some(near) => format!("did you mean `{near}`? It has {all}"),
+            None => format!("it has {all}"),
+        };
+        CaveError::NoFacet { file: cave.file.clone(), name: name.to_owned(), hint }
+    }
+}

@@ -1,0 +1,201 @@
+//! `[[facet]]`: one picture on one screen, for one user, drawn by one node.
+
+use std::path::{Path, PathBuf};
+
+use super::checks;
+use super::parts::{Node, Screen, User, read_name};
+use crate::bound::Bound;
+use crate::fields::{Fields, Names};
+
+/// How both eyes come into one picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stereo {
+    /// One picture from the point between the eyes.
+    Mono,
+    /// The left eye's picture to the left of the right eye's: twice as wide.
+    SideBySide,
+    /// The left eye's picture above the right eye's: twice as high.
+    TopBottom,
+    /// Red from the left eye, green and blue from the right: for red and cyan glasses.
+    Anaglyph,
+}
+
+/// Mirroring of the finished picture, for mirrors and projection from behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flip {
+    /// As it is.
+    None,
+    /// Left and right change places.
+    Horizontal,
+    /// Top and bottom change places.
+    Vertical,
+    /// Both: turned by half a turn.
+    Both,
+}
+
+/// Where the picture goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Output {
+    /// A window without a frame at this place of the desktop, pixels from its top left corner.
+    Window {
+        /// Pixels from the left and from the top; may be negative.
+        position_px: [i32; 2],
+    },
+    /// Into memory only.
+    Offscreen,
+}
+
+impl Stereo {
+    pub(crate) const NAMES: Names<Self> =
+        &[("mono", Stereo::Mono), ("side_by_side", Stereo::SideBySide), ("top_bottom", Stereo::TopBottom), ("anaglyph", Stereo::Anaglyph)];
+
+    /// The sides of the eyes that are drawn: −1 left, 0 between, +1 right.
+    pub fn sides(self) -> &'static [f64] {
+        if self == Stereo::Mono { &[0.0] } else { &[-1.0, 1.0] }
+    }
+
+    /// The size of the whole from that of one eye's picture, pixels.
+    pub fn whole_px(self, [width, height]: [u32; 2]) -> [u32; 2] {
+        match self {
+            Stereo::Mono | Stereo::Anaglyph => [width, height],
+            Stereo::SideBySide => [2 * width, height],
+            Stereo::TopBottom => [width, 2 * height],
+        }
+    }
+}
+
+impl Flip {
+    pub(crate) const NAMES: Names<Self> =
+        &[("none", Flip::None), ("horizontal", Flip::Horizontal), ("vertical", Flip::Vertical), ("both", Flip::Both)];
+}
+
+#[derive(Clone, Copy)]
+enum Target {
+    Window,
+    Offscreen,
+}
+const TARGETS: Names<Target> = &[("window", Target::Window), ("offscreen", Target::Offscreen)];
+
+/// One picture on one screen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facet {
+    /// Unique among facets.
+    pub name: String,
+    /// Index of the screen.
+    pub screen: usize,
+    /// Index of the user whose eyes it is drawn for. Default the first.
+    pub user: usize,
+    /// Index of the node that draws it; `None` for the machine that runs the world.
+    pub node: Option<usize>,
+    /// Where the picture goes. Default a window at 0, 0.
+    pub output: Output,
+    /// Width and height of one eye's picture, pixels, 1 to 16384 each.
+    pub size_px: [u32; 2],
+    /// Nearest depth drawn, from the eye along the screen's normal, m. Default 0.05.
+    pub near_m: f64,
+    /// Farthest depth drawn, likewise. Default 500.
+    pub far_m: f64,
+    /// Default mono.
+    pub stereo: Stereo,
+    /// Default none.
+    pub flip: Flip,
+    /// Whether the others wait for it (`lockstep`). Default true.
+    pub critical: bool,
+    /// A grid that bends the finished picture: OBJ or PFM.
+    pub warp_file: Option<PathBuf>,
+    /// A picture that darkens the finished one where projectors overlap: PNG.
+    pub blend_file: Option<PathBuf>,
+}
+
+/// The longest side of a picture, pixels.
+const MAX_SIDE: u32 = 16384;
+
+impl Facet {
+    pub(crate) fn read(mut f: Fields<'_>, users: &[User], screens: &[Screen], nodes: &[Node], folder: &Path) -> Option<Facet> {
+        let name = read_name(&mut f)?;
+        let problems = f.log.count();
+        let screen = match f.text("screen", "the name of a [[screen]]") {
+            Some((typed, value)) => reference(&f, "screen", typed, value, screens.iter().map(|s| s.name.as_str()).collect()),
+            None => None,
+        };
+        let user = f.optional_text("user").map_or(Some(0), |(typed, value)| reference(&f, "user", typed, value, users.iter().map(|u| u.name.as_str()).collect()));
+        let node = f.optional_text("node").map(|(typed, value)| reference(&f, "node", typed, value, nodes.iter().map(|n| n.name.as_str()).collect()));
+        let output = match f.choice_or("output", TARGETS, Target::Window) {
+            Target::Window => Output::Window { position_px: position(&mut f) },
+            Target::Offscreen => Output::Offscreen,
+        };
+        let size_px = size(&mut f);
+        let facet = Facet {
+            name,
+            screen: screen.unwrap_or(usize::MAX),
+            user: user.unwrap_or(usize::MAX),
+            node: node.flatten(),
+            output,
+            size_px,
+            near_m: f.number_or("near_m", NEAR, 0.05),
+            far_m: f.number_or("far_m", Bound::POSITIVE, 500.0),
+            stereo: f.choice_or("stereo", Stereo::NAMES, Stereo::Mono),
+            flip: f.choice_or("flip", Flip::NAMES, Flip::None),
+            critical: f.flag_or("critical", true),
+            warp_file: file(&mut f, "warp_file", folder, &["obj", "pfm"]),
+            blend_file: file(&mut f, "blend_file", folder, &["png"]),
+        };
+        let parts = (screens.get(facet.screen), users.get(facet.user));
+        if let (true, (Some(screen), Some(user))) = (f.log.count() == problems, parts) {
+            checks::facet(&facet, screen, user, &mut f);
+        }
+        f.finish();
+        Some(facet)
+    }
+
+    /// The size of the target with both eyes in it, pixels.
+    pub fn whole_px(&self) -> [u32; 2] {
+        self.stereo.whole_px(self.size_px)
+    }
+}
+
+const NEAR: Bound = Bound::new(1e-4, 1e6, "a length from 0.0001 m on");
+
+/// The index of `typed` among `known`; `None`, with the problem recorded, where it is not there.
+fn reference(f: &Fields<'_>, key: &str, typed: &str, value: &crate::fields::Value<'_>, known: Vec<&str>) -> Option<usize> {
+    let found = known.iter().position(|name| *name == typed);
+    if found.is_none() && known.is_empty() {
+        f.wrong(key, value, format!("a table [[{key}]] of this name, and there is none at all"));
+    } else if found.is_none() {
+        f.unknown_name(key, value, typed, known);
+    }
+    found
+}
+
+/// `size_px`: two whole numbers.
+fn size(f: &mut Fields<'_>) -> [u32; 2] {
+    let Some(value) = f.required("size_px", "width and height in pixels, such as [1920, 1080]") else { return [1, 1] };
+    match value.get_ref().as_array().filter(|items| items.len() == 2) {
+        Some(items) => std::array::from_fn(|k| items.get(k).map_or(1, |item| f.as_integer("size_px", item, 1..=MAX_SIDE))),
+        None => {
+            f.wrong("size_px", value, "width and height in pixels, such as [1920, 1080]");
+            [1, 1]
+        }
+    }
+}
+
+/// `position_px`: two whole numbers, negative ones too.
+fn position(f: &mut Fields<'_>) -> [i32; 2] {
+    let problems = f.log.count();
+    let place: [f64; 2] = f.vector_or("position_px", Bound::new(-1e6, 1e6, "a number of pixels from -1e6 to 1e6"), [0.0; 2]);
+    if f.log.count() == problems && place.iter().any(|x| x.fract() != 0.0) {
+        let message = format!("`position_px` of {} has parts of pixels", f.what);
+        f.log.report(f.span.clone(), message, "wanted two whole numbers");
+    }
+    place.map(|x| x as i32)
+}
+
+/// A file beside the cave, known by its ending. Whether it can be read is seen when it is used.
+fn file(f: &mut Fields<'_>, key: &'static str, folder: &Path, endings: &[&'static str]) -> Option<PathBuf> {
+    let (text, value) = f.optional_text(key)?;
+    let ending = Path::new(text).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    if !endings.contains(&ending.as_str()) {
+        f.wrong(key, value, format!("a file that ends in .{}", endings.join(" or .")));
+    }
+    Some(folder.join(text))
+}

@@ -1,0 +1,168 @@
+//! `[[user]]`, `[[screen]]`, `[[node]]`: who looks, at what, and which machines draw it.
+
+use std::net::IpAddr;
+
+use nalgebra::{Point3, Vector3};
+
+use super::checks;
+use crate::bound::Bound;
+use crate::fields::Fields;
+
+/// Somebody who looks at the screens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct User {
+    /// Unique among users.
+    pub name: String,
+    /// The point between the eyes, m, cave axes.
+    pub eye_m: Point3<f64>,
+    /// Where the user faces: a unit vector. Default y. Stereo eyes stand to the right and left of it; mono does not use it.
+    pub forward: Vector3<f64>,
+    /// Up for the user: a unit vector. Default z.
+    pub up: Vector3<f64>,
+    /// Distance between the pupils, m, 0 to 0.2. Default 0.063.
+    pub interpupillary_m: f64,
+}
+
+const PUPILS: Bound = Bound::new(0.0, 0.2, "a length from 0 to 0.2 m");
+
+impl User {
+    pub(crate) fn read(mut f: Fields<'_>) -> Option<User> {
+        let name = read_name(&mut f)?;
+        let problems = f.log.count();
+        let user = User {
+            name,
+            eye_m: Point3::from(f.vector("eye_m", Bound::ANY)),
+            forward: Vector3::from(f.direction_or("forward", [0.0, 1.0, 0.0])),
+            up: Vector3::from(f.direction_or("up", [0.0, 0.0, 1.0])),
+            interpupillary_m: f.number_or("interpupillary_m", PUPILS, 0.063),
+        };
+        if f.log.count() == problems && user.forward.cross(&user.up).norm() < 1e-3 {
+            let message = format!("`forward` of {} lies along its `up`", f.what);
+            f.log.report(f.span.clone(), message, "wanted two directions, best perpendicular to each other");
+        }
+        f.finish();
+        Some(user)
+    }
+
+    /// To the user's right: a unit vector.
+    pub fn right(&self) -> Vector3<f64> {
+        self.forward.cross(&self.up).normalize()
+    }
+
+    /// The eye to the `side` (−1 left, 0 between, +1 right): `eye + side · ipd / 2 · right`, m, cave axes.
+    pub fn eye(&self, side: f64) -> Point3<f64> {
+        self.eye_m + self.right() * (0.5 * side * self.interpupillary_m)
+    }
+}
+
+/// A flat rectangle that is looked at from its front.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Screen {
+    /// Unique among screens.
+    pub name: String,
+    /// As seen by who looks at it, m, cave axes.
+    pub lower_left_m: Point3<f64>,
+    /// As seen by who looks at it, m, cave axes.
+    pub lower_right_m: Point3<f64>,
+    /// As seen by who looks at it, m, cave axes.
+    pub upper_left_m: Point3<f64>,
+}
+
+impl Screen {
+    pub(crate) fn read(mut f: Fields<'_>) -> Option<Screen> {
+        let name = read_name(&mut f)?;
+        let problems = f.log.count();
+        let screen = Screen {
+            name,
+            lower_left_m: Point3::from(f.vector("lower_left_m", Bound::ANY)),
+            lower_right_m: Point3::from(f.vector("lower_right_m", Bound::ANY)),
+            upper_left_m: Point3::from(f.vector("upper_left_m", Bound::ANY)),
+        };
+        if f.log.count() == problems {
+            checks::screen(&screen, &f);
+        }
+        f.finish();
+        Some(screen)
+    }
+
+    /// Along the lower edge, from left to right, m.
+    pub fn across(&self) -> Vector3<f64> {
+        self.lower_right_m - self.lower_left_m
+    }
+
+    /// Along the left edge, from below to above, m.
+    pub fn upward(&self) -> Vector3<f64> {
+        self.upper_left_m - self.lower_left_m
+    }
+
+    /// The corner that the file does not name, m.
+    pub fn upper_right_m(&self) -> Point3<f64> {
+        self.upper_left_m + self.across()
+    }
+
+    /// Towards who looks at it: a unit vector.
+    pub fn normal(&self) -> Vector3<f64> {
+        self.across().cross(&self.upward()).normalize()
+    }
+
+    /// Width and height, m.
+    pub fn size_m(&self) -> [f64; 2] {
+        [self.across().norm(), self.upward().norm()]
+    }
+
+    /// How far in front of the screen's plane a point is, m; negative behind it.
+    pub fn distance_m(&self, point: &Point3<f64>) -> f64 {
+        (point - self.lower_left_m).dot(&self.normal())
+    }
+}
+
+/// A machine that draws facets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// Unique among nodes.
+    pub name: String,
+    /// An IP address, or a host name.
+    pub address: String,
+    /// UDP port on which it listens, 1 to 65535. Default 47100.
+    pub port: u16,
+}
+
+impl Node {
+    pub(crate) fn read(mut f: Fields<'_>) -> Option<Node> {
+        let name = read_name(&mut f)?;
+        let address = f.text("address", "an IP address or a host name, such as \"127.0.0.1\"");
+        if let Some((text, value)) = address.filter(|(text, _)| !is_address(text)) {
+            let port = text.rsplit_once(':').is_some_and(|(host, port)| is_address(host) && port.parse::<u16>().is_ok());
+            f.wrong("address", value, if port { "an address without its port; that is `port`" } else { "an IP address or a host name" });
+        }
+        let port = f.integer_or("port", 1..=65535, 47100);
+        f.finish();
+        Some(Node { name, address: address.map_or(String::new(), |(text, _)| text.to_owned()), port: port as u16 })
+    }
+
+    /// Whether it is this machine by its address: 127.x.x.x, ::1 or `localhost`.
+    pub fn is_local(&self) -> bool {
+        self.address == "localhost" || self.address.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
+    }
+}
+
+/// An IP address, or a host name: letters, digits, hyphens, and dots between them.
+fn is_address(text: &str) -> bool {
+    let label = |label: &str| !label.is_empty() && label.len() <= 63 && label.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+    text.parse::<IpAddr>().is_ok() || (text.len() <= 253 && text.split('.').all(label))
+}
+
+/// The `name` of a table, which from then on is called by it; `None`, with the problems recorded, where there is none.
+pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
+    let kind = f.what.split(' ').next().unwrap_or("part").to_owned();
+    let Some((name, value)) = f.text("name", "a text") else {
+        // what else may stand here does not depend on the name, but an unnamed part helps nobody
+        return Some(String::new());
+    };
+    let right = (1..=64).contains(&name.chars().count()) && name.chars().all(|c| c.is_alphanumeric() || "_- .".contains(c)) && name.trim() == name;
+    if !right {
+        f.wrong("name", value, "1 to 64 letters, digits, and _ - . or blanks inside");
+    }
+    f.what = format!("{kind} \"{name}\"");
+    Some(name.to_owned())
+}

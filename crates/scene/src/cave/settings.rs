@@ -1,0 +1,124 @@
+//! `[sync]`, `[security]`, `[recording]`: how the processes of a cave keep together.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::Cave;
+use crate::fields::{Fields, Names};
+use crate::log::Log;
+
+/// What carries the frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// Memory that processes of one machine share.
+    SharedMemory,
+    /// Datagrams, between machines.
+    Udp,
+}
+
+/// When a frame is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// When every critical facet has drawn it: all show the same frame.
+    Lockstep,
+    /// As soon as it is drawn: each facet shows the newest it has.
+    Latest,
+}
+
+const TRANSPORTS: Names<Transport> = &[("shared_memory", Transport::SharedMemory), ("udp", Transport::Udp)];
+const MODES: Names<Mode> = &[("lockstep", Mode::Lockstep), ("latest", Mode::Latest)];
+
+/// `[sync]`. All keys have defaults.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sync {
+    /// Default `shared_memory`.
+    pub transport: Transport,
+    /// Default `lockstep`.
+    pub mode: Mode,
+    /// How long the start waits for facets, ms, 1 to 600 000. Default 10 000.
+    pub connect_timeout_ms: u32,
+    /// How long a frame waits for a facet, ms, 1 to 60 000. Default 100.
+    pub ready_timeout_ms: u32,
+    /// A facet not heard of for so long is dropped, and may come back, ms, 1 to 600 000. Default 2000.
+    pub drop_timeout_ms: u32,
+    /// Frames kept for who missed some, 1 to 1024. Default 8.
+    pub history_frames: u32,
+}
+
+impl Default for Sync {
+    fn default() -> Self {
+        Sync {
+            transport: Transport::SharedMemory,
+            mode: Mode::Lockstep,
+            connect_timeout_ms: 10_000,
+            ready_timeout_ms: 100,
+            drop_timeout_ms: 2000,
+            history_frames: 8,
+        }
+    }
+}
+
+impl Sync {
+    pub(crate) fn read(mut f: Fields<'_>) -> Sync {
+        let usual = Sync::default();
+        let sync = Sync {
+            transport: f.choice_or("transport", TRANSPORTS, usual.transport),
+            mode: f.choice_or("mode", MODES, usual.mode),
+            connect_timeout_ms: f.integer_or("connect_timeout_ms", 1..=600_000, usual.connect_timeout_ms),
+            ready_timeout_ms: f.integer_or("ready_timeout_ms", 1..=60_000, usual.ready_timeout_ms),
+            drop_timeout_ms: f.integer_or("drop_timeout_ms", 1..=600_000, usual.drop_timeout_ms),
+            history_frames: f.integer_or("history_frames", 1..=1024, usual.history_frames),
+        };
+        if sync.drop_timeout_ms < sync.ready_timeout_ms {
+            let message = format!("`drop_timeout_ms` of {} is {}, `ready_timeout_ms` {}", f.what, sync.drop_timeout_ms, sync.ready_timeout_ms);
+            f.log.report(f.span.clone(), message, "wanted a facet to be dropped no sooner than a frame stops waiting for it");
+        }
+        f.finish();
+        sync
+    }
+}
+
+/// `[security]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Security {
+    /// A file with the key that all nodes share. The key itself never stands in a cave file.
+    pub key_file: PathBuf,
+}
+
+impl Security {
+    pub(crate) fn read(mut f: Fields<'_>, folder: &Path) -> Option<Security> {
+        let key = f.text("key_file", "the path of a file that holds the key").map(|(text, _)| folder.join(text));
+        f.finish();
+        key.map(|key_file| Security { key_file })
+    }
+}
+
+/// `[recording]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recording {
+    /// The recording (MCAP).
+    pub file: PathBuf,
+    /// Every so many frames are recorded, 1 to 10 000. Default 1.
+    pub every_frames: u32,
+}
+
+impl Recording {
+    pub(crate) fn read(mut f: Fields<'_>, folder: &Path) -> Option<Recording> {
+        let file = f.text("file", "the path of an .mcap file").map(|(text, _)| folder.join(text));
+        let every_frames = f.integer_or("every_frames", 1..=10_000, 1);
+        f.finish();
+        file.map(|file| Recording { file, every_frames })
+    }
+}
+
+/// Shared memory ends at the machine, and nothing leaves it without a key.
+pub(crate) fn check_reach(cave: &Cave, log: &Log<'_>, place: &Range<usize>) {
+    let Some(far) = cave.nodes.iter().find(|node| !node.is_local()) else { return };
+    if cave.sync.transport == Transport::SharedMemory {
+        let message = format!("node \"{}\" is at {}, and `transport` of [sync] is shared_memory, which ends at this machine", far.name, far.address);
+        log.report(place.clone(), message, "wanted transport = \"udp\", or nodes at 127.0.0.1");
+    } else if cave.security.is_none() {
+        let message = format!("node \"{}\" is at {}, and there is no [security]", far.name, far.address);
+        log.report(place.clone(), message, "wanted [security] with a key_file; without one only nodes at 127.0.0.1 are spoken to");
+    }
+}

@@ -1,0 +1,92 @@
+//! The caves that come with tumble, and finding a cave by path or by name.
+
+use std::path::{Path, PathBuf};
+
+use super::{Cave, CaveError};
+use crate::file::description;
+use crate::suggest::{listed, nearest};
+
+/// A cave that is built into the library.
+#[derive(Clone, Copy, Debug)]
+pub struct ShippedCave {
+    /// The name of its file under `caves/`, without the ending.
+    pub name: &'static str,
+    /// The whole text.
+    pub text: &'static str,
+}
+
+macro_rules! shipped_caves {
+    ($($name:literal),* $(,)?) => {
+        &[$(ShippedCave { name: $name, text: include_str!(concat!("../../../../caves/", $name, ".toml")) }),*]
+    };
+}
+
+const SHIPPED: &[ShippedCave] = shipped_caves!["wall3", "cube4", "cube6", "cylinder5", "sphere5"];
+
+/// The caves that come with tumble.
+pub fn shipped_caves() -> &'static [ShippedCave] {
+    SHIPPED
+}
+
+impl ShippedCave {
+    /// One line that says what the cave is.
+    pub fn description(&self) -> String {
+        description(self.text)
+    }
+
+    /// Reads the cave.
+    ///
+    /// # Errors
+    /// None for the caves as they are; the type is that of [`Cave::parse`].
+    pub fn read(&self) -> Result<Cave, CaveError> {
+        Cave::parse(self.text, &format!("caves/{}.toml", self.name))
+    }
+}
+
+/// Where a cave was found.
+#[derive(Clone, Debug)]
+pub enum CaveSource {
+    /// A file.
+    Path(PathBuf),
+    /// Built in.
+    Shipped(ShippedCave),
+}
+
+impl CaveSource {
+    /// Reads the cave.
+    ///
+    /// # Errors
+    /// As [`Cave::load`].
+    pub fn load(&self) -> Result<Cave, CaveError> {
+        match self {
+            CaveSource::Path(path) => Cave::load(path),
+            CaveSource::Shipped(cave) => cave.read(),
+        }
+    }
+}
+
+/// Finds a cave: the path of a file, or the name of a shipped one. `caves/NAME.toml` of a shipped cave is found from anywhere.
+///
+/// # Errors
+/// [`CaveError::Unknown`] for a name that is not shipped, [`CaveError::Read`] for a path where nothing is.
+pub fn resolve_cave(name_or_path: &str) -> Result<CaveSource, CaveError> {
+    let path = Path::new(name_or_path);
+    if path.is_file() {
+        return Ok(CaveSource::Path(path.to_path_buf()));
+    }
+    let named = |cave: &&ShippedCave| name_or_path == cave.name || name_or_path == format!("caves/{}.toml", cave.name);
+    if let Some(cave) = SHIPPED.iter().find(named) {
+        return Ok(CaveSource::Shipped(*cave));
+    }
+    if name_or_path.contains(['/', '\\']) || name_or_path.ends_with(".toml") {
+        let source = std::fs::metadata(path).err().unwrap_or(std::io::ErrorKind::InvalidInput.into());
+        return Err(CaveError::Read { file: path.to_path_buf(), source });
+    }
+    let names = SHIPPED.iter().map(|cave| cave.name);
+    let all = listed(names.clone(), "and");
+    let hint = match nearest(name_or_path, names) {
+        Some(near) => format!("did you mean `{near}`? Shipped are {all}"),
+        None => format!("shipped are {all}; or give the path of a cave file"),
+    };
+    Err(CaveError::Unknown { name: name_or_path.to_owned(), hint })
+}

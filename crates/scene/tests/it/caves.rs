@@ -1,0 +1,272 @@
+//! Cave files: what is read, what is refused and where, what is only noted; the shipped ones and the schema.
+
+use std::collections::BTreeSet;
+use toml::de::{DeTable, DeValue};
+use tumble_scene::cave::{Cave, Flip, Output, Stereo, Transport, gaps, is_cave, resolve_cave, shipped_caves};
+
+const SMALL: &str = "
+[[user]]
+name = \"u\"
+eye_m = [0, 0, 1.5]
+[[screen]]
+name = \"s\"
+lower_left_m = [-1, 2, 0.5]
+lower_right_m = [1, 2, 0.5]
+upper_left_m = [-1, 2, 2.0]
+[[facet]]
+name = \"f\"
+screen = \"s\"
+size_px = [800, 600]
+";
+
+/// The only problem of a text: its place, and what is said.
+fn problem(text: &str) -> (usize, String) {
+    let error = Cave::parse(text, "my.toml").expect_err("it is wrong");
+    assert_eq!(error.problems().len(), 1, "{error}");
+    (error.problems()[0].line, error.to_string())
+}
+
+#[test]
+fn a_small_cave_has_its_defaults() {
+    let cave = Cave::parse(SMALL, "my.toml").unwrap();
+    let facet = &cave.facets[0];
+    assert_eq!((facet.screen, facet.user, facet.node), (0, 0, None));
+    assert_eq!((facet.stereo, facet.flip, facet.critical), (Stereo::Mono, Flip::None, true));
+    assert_eq!(facet.output, Output::Window { position_px: [0, 0] });
+    assert_eq!((facet.near_m, facet.far_m, facet.size_px), (0.05, 500.0, [800, 600]));
+    assert_eq!((cave.sync.transport, cave.sync.ready_timeout_ms, cave.users[0].interpupillary_m), (Transport::SharedMemory, 100, 0.063));
+    // 2 m x 1.5 m and 800 x 600: square pixels, one screen: nothing to say
+    assert!(cave.notes().is_empty(), "{:?}", cave.notes());
+    // the right eye is 31.5 mm to the right of who faces y
+    let eye = cave.users[0].eye(1.0);
+    assert!((eye.x - 0.0315).abs() < 1e-15 && eye.y == 0.0 && eye.z == 1.5);
+}
+
+#[test]
+fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
+    let cases = [
+        ("interpupillary = 0.06", "eye_m = [0, 0, 1.5]\ninterpupillary = 0.06", "eye_m = [0, 0, 1.5]", 5, "unknown key `interpupillary` in user \"u\"; did you mean `interpupillary_m`?"),
+        ("a screen by another name", "screen = \"t\"", "screen = \"s\"", 12, "did you mean `s`?"),
+        ("no such stereo", "size_px = [800, 600]\nstereo = \"side_by\"", "size_px = [800, 600]", 14, "did you mean `side_by_side`?"),
+        ("no pixels", "size_px = [0, 600]", "size_px = [800, 600]", 13, "a whole number from 1 to 16384"),
+        ("one number of pixels", "size_px = [600]", "size_px = [800, 600]", 13, "width and height in pixels"),
+        ("not square", "upper_left_m = [-0.9, 2, 2.0]", "upper_left_m = [-1, 2, 2.0]", 5, "is not square: its edges meet at 86.186 degrees"),
+        ("no area", "upper_left_m = [-1, 2, 0.5]", "upper_left_m = [-1, 2, 2.0]", 5, "has no area: `upper_left_m`"),
+        ("behind", "eye_m = [0, 2.25, 1.5]", "eye_m = [0, 0, 1.5]", 12, "the eye of user \"u\" is 0.250 m behind screen \"s\""),
+        ("not finite", "eye_m = [0, nan, 1.5]", "eye_m = [0, 0, 1.5]", 4, "a finite number"),
+        ("near beyond far", "size_px = [800, 600]\nnear_m = 9\nfar_m = 3", "size_px = [800, 600]", 10, "`near_m` of facet \"f\" is 9, `far_m` 3"),
+        ("a warp by another ending", "size_px = [800, 600]\nwarp_file = \"a.png\"", "size_px = [800, 600]", 14, "a file that ends in .obj or .pfm"),
+        ("along up", "eye_m = [0, 0, 1.5]\nforward = [0, 0, 1]", "eye_m = [0, 0, 1.5]", 2, "`forward` of user \"u\" lies along its `up`"),
+    ];
+    for (what, wrong, right, line, said) in cases {
+        assert_eq!(SMALL.matches(right).count(), 1, "{what}");
+        let (at, message) = problem(&SMALL.replace(right, wrong));
+        assert!(at == line && message.contains(said), "{what}: line {at}, {message}");
+    }
+    let (line, message) = problem(&format!("{SMALL}[[facet]]\nname = \"f\"\nscreen = \"s\"\nsize_px = [8, 6]\n"));
+    assert!(line == 15 && message.contains("a second facet \"f\"; the first is at line 11"), "{line}: {message}");
+    let (_, message) = problem("description = \"nothing\"\n[[user]]\nname = \"u\"\neye_m = [0, 0, 1]\n[[screen]]\nname = \"s\"\nlower_left_m = [0, 1, 0]\nlower_right_m = [1, 1, 0]\nupper_left_m = [0, 1, 1]\n");
+    assert!(message.contains("has no `facet`"), "{message}");
+}
+
+#[test]
+fn swapped_corners_are_told_as_an_eye_behind_the_screen() {
+    let text = SMALL.replace("lower_left_m = [-1,", "lower_left_m = [1,").replace("lower_right_m = [1,", "lower_right_m = [-1,").replace("upper_left_m = [-1,", "upper_left_m = [1,");
+    let (_, message) = problem(&text);
+    assert!(message.contains("2.000 m behind") && message.contains("left and right may be swapped"), "{message}");
+}
+
+#[test]
+fn nothing_leaves_the_machine_without_a_key() {
+    let far = "[[node]]\nname = \"n\"\naddress = \"10.0.0.7\"\n";
+    let (_, message) = problem(&format!("{SMALL}{far}"));
+    assert!(message.contains("shared_memory, which ends at this machine"), "{message}");
+    let (_, message) = problem(&format!("{SMALL}{far}[sync]\ntransport = \"udp\"\n"));
+    assert!(message.contains("there is no [security]"), "{message}");
+    let cave = Cave::parse(&format!("{SMALL}{far}[sync]\ntransport = \"udp\"\n[security]\nkey_file = \"wall.key\"\n"), "walls/my.toml").unwrap();
+    assert_eq!(cave.security.unwrap().key_file, std::path::Path::new("walls/wall.key"));
+    let (_, message) = problem(&format!("{SMALL}[[node]]\nname = \"n\"\naddress = \"10.0.0.7:99\"\n"));
+    assert!(message.contains("an address without its port"), "{message}");
+}
+
+#[test]
+fn gaps_are_what_a_tape_measure_says() {
+    // a second screen to the right, turned by 90 degrees, 3 mm too far back and 4 mm too far right: 5 mm
+    let second = "[[screen]]\nname = \"t\"\nlower_left_m = [1.004, 1.997, 0.5]\nlower_right_m = [1.004, 0, 0.5]\nupper_left_m = [1.004, 1.997, 2.0]\n";
+    let cave = Cave::parse(&format!("{SMALL}{second}"), "my.toml").unwrap();
+    let found = gaps(&cave.screens);
+    assert_eq!(found.len(), 1);
+    assert!((found[0].gap_m - 0.005).abs() < 1e-12 && found[0].first == (0, 1) && found[0].second == (1, 3), "{found:?}");
+    let notes = cave.notes().join("\n");
+    assert!(notes.contains("right edge of \"s\" and left edge of \"t\": 5.000 mm apart") && notes.contains("screen \"t\" has no facet"), "{notes}");
+    let wide = Cave::parse(&SMALL.replace("[800, 600]", "[1000, 600]"), "my.toml").unwrap().notes().join("\n");
+    assert!(wide.contains("1.250 times denser across than upward; 1000 x 750 would be square"), "{wide}");
+}
+
+#[test]
+fn shipped_caves_are_whole_and_found_from_anywhere() {
+    // screens, facets, and pairs of edges that meet: a cube's 12 edges, of which 4 and 6 faces share so many
+    let known = [("wall3", 3, 2), ("cube4", 4, 5), ("cube6", 6, 12), ("cylinder5", 5, 4), ("sphere5", 5, 4)];
+    assert_eq!(shipped_caves().iter().map(|c| c.name).collect::<Vec<_>>(), known.map(|k| k.0));
+    for (name, screens, edges) in known {
+        for written in [name.to_owned(), format!("caves/{name}.toml")] {
+            let cave = resolve_cave(&written).unwrap().load().unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!((cave.screens.len(), cave.facets.len()), (screens, screens), "{name}");
+            let found = gaps(&cave.screens);
+            assert_eq!(found.len(), edges, "{name}");
+            assert!(found.iter().all(|gap| gap.gap_m < 1e-8), "{name}: {found:?}");
+            // nothing but those edges is noted
+            assert_eq!(cave.notes().len(), edges, "{name}: {:?}", cave.notes());
+        }
+        assert!(!shipped_caves().iter().any(|c| c.description().is_empty()));
+    }
+    let error = resolve_cave("cube5").unwrap_err().to_string();
+    assert!(error.contains("did you mean `cube"), "{error}");
+    assert!(resolve_cave("nowhere/cube4.toml").unwrap_err().to_string().contains("cannot read the cave"));
+    let error = resolve_cave("cube4").unwrap().load().unwrap().facet("floors").unwrap_err().to_string();
+    assert!(error.contains("did you mean `floor`?"), "{error}");
+}
+
+#[test]
+fn caves_and_scenes_are_told_apart() {
+    assert!(shipped_caves().iter().all(|cave| is_cave(cave.text)));
+    assert!(!tumble_scene::shipped().iter().any(|scene| is_cave(scene.text)));
+    assert!(is_cave("[[screen]]\nname = [[[\n") && !is_cave("") && !is_cave("[cave]\norigin_m = [0, 0, 0]\n"));
+}
+
+#[test]
+fn half_a_cave_is_an_error_and_never_a_panic() {
+    for cave in shipped_caves() {
+        for cut in (0..cave.text.len()).step_by(37).filter(|&cut| cave.text.is_char_boundary(cut)) {
+            if let Err(error) = Cave::parse(&cave.text[..cut], "cut.toml") {
+                assert!(!error.report(false).is_empty());
+            }
+        }
+    }
+}
+
+// The schema.
+
+fn schema() -> serde_json::Value {
+    serde_json::from_str(include_str!("../../../../caves/cave.schema.json")).unwrap()
+}
+
+/// What is wrong with a value by the few words of JSON Schema that ours uses; any other word is a mistake of ours.
+fn violations(schema: &serde_json::Value, root: &serde_json::Value, value: &DeValue<'_>, at: &str, out: &mut Vec<String>) {
+    let number = |v: &DeValue<'_>| match v {
+        DeValue::Float(f) => f.as_str().parse::<f64>().ok(),
+        DeValue::Integer(i) => i.as_str().parse::<f64>().ok(),
+        _ => None,
+    };
+    let mut wrong = |what: String| out.push(format!("{at}: {what}"));
+    for (word, rule) in schema.as_object().unwrap() {
+        match word.as_str() {
+            "$schema" | "$id" | "$defs" | "title" | "description" | "default" | "required" | "additionalProperties" | "properties" | "items" | "minItems" | "maxItems" => {}
+            "$ref" => {
+                let name = rule.as_str().unwrap().strip_prefix("#/$defs/").unwrap();
+                violations(&root["$defs"][name], root, value, at, out);
+                return;
+            }
+            "type" => {
+                let fits = match rule.as_str().unwrap() {
+                    "object" => matches!(value, DeValue::Table(_)),
+                    "array" => matches!(value, DeValue::Array(_)),
+                    "string" => matches!(value, DeValue::String(_)),
+                    "boolean" => matches!(value, DeValue::Boolean(_)),
+                    "integer" => matches!(value, DeValue::Integer(_)),
+                    "number" => number(value).is_some(),
+                    other => panic!("type {other}"),
+                };
+                if !fits {
+                    wrong(format!("is no {rule}"));
+                    return;
+                }
+            }
+            "enum" => {
+                if !rule.as_array().unwrap().iter().any(|one| one.as_str() == value.as_str()) {
+                    wrong(format!("is none of {rule}"));
+                }
+            }
+            "minimum" if number(value).unwrap() < rule.as_f64().unwrap() => wrong(format!("is below {rule}")),
+            "maximum" if number(value).unwrap() > rule.as_f64().unwrap() => wrong(format!("is above {rule}")),
+            "exclusiveMinimum" if number(value).unwrap() <= rule.as_f64().unwrap() => wrong(format!("is not above {rule}")),
+            "minimum" | "maximum" | "exclusiveMinimum" => {}
+            other => panic!("the test knows no word `{other}` of schemas"),
+        }
+    }
+    if let DeValue::Table(table) = value {
+        for required in schema["required"].as_array().into_iter().flatten() {
+            if table.get(required.as_str().unwrap()).is_none() {
+                out.push(format!("{at}: has no {required}"));
+            }
+        }
+        for (key, item) in table.iter() {
+            match schema["properties"].get(key.get_ref().as_ref()) {
+                Some(rule) => violations(rule, root, item.get_ref(), &format!("{at}/{}", key.get_ref()), out),
+                None if schema["additionalProperties"] == false => out.push(format!("{at}: unknown key {}", key.get_ref())),
+                None => {}
+            }
+        }
+    }
+    if let DeValue::Array(items) = value {
+        let count = items.len() as u64;
+        if schema["minItems"].as_u64().is_some_and(|least| count < least) || schema["maxItems"].as_u64().is_some_and(|most| count > most) {
+            out.push(format!("{at}: has {count} entries"));
+        }
+        if schema["items"].is_object() {
+            items.iter().enumerate().for_each(|(i, item)| violations(&schema["items"], root, item.get_ref(), &format!("{at}[{i}]"), out));
+        }
+    }
+}
+
+fn against_schema(text: &str) -> Vec<String> {
+    let (schema, table) = (schema(), DeTable::parse(text).unwrap());
+    let mut out = Vec::new();
+    violations(&schema, &schema, &DeValue::Table(table.into_inner()), "", &mut out);
+    out
+}
+
+#[test]
+fn shipped_caves_satisfy_the_schema_and_wrong_ones_do_not() {
+    for cave in shipped_caves() {
+        assert_eq!(against_schema(cave.text), Vec::<String>::new(), "{}", cave.name);
+    }
+    for (right, wrong) in [("eye_m = [0, 0, 1.5]", "eye = [0, 0, 1.5]"), ("size_px = [800, 600]", "size_px = [0, 600]"), ("screen = \"s\"", "screen = 3"), ("eye_m = [0, 0, 1.5]", "eye_m = [0, 0]")] {
+        let text = SMALL.replace(right, wrong);
+        assert!(!against_schema(&text).is_empty() && Cave::parse(&text, "my.toml").is_err(), "{wrong}");
+    }
+}
+
+/// The keys that the parser knows in a table, from what it says of an unknown one: those that are there, and those it names as free.
+fn known_keys(text: &str, table: &str) -> BTreeSet<String> {
+    let error = Cave::parse(text, "my.toml").expect_err("there is an unknown key");
+    let problem = error.problems().iter().find(|p| p.message.contains("`zzzzzzzzzzzz`") && p.message.contains(table)).unwrap_or_else(|| panic!("{table}: {error}"));
+    let list = problem.wanted.split_once(": ").map_or_else(|| problem.wanted.split_once("only ").map_or("", |(_, list)| list), |(_, list)| list);
+    list.split('`').filter(|word| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c == '_')).map(str::to_owned).collect()
+}
+
+#[test]
+fn schema_and_parser_know_the_same_keys() {
+    let odd = "zzzzzzzzzzzz = 1\n";
+    let schema = schema();
+    let tables = [
+        (format!("{odd}{SMALL}"), "the cave", "", vec!["user", "screen", "facet"]),
+        (SMALL.replace("name = \"u\"\n", &format!("name = \"u\"\n{odd}")), "user", "user", vec!["name", "eye_m"]),
+        (SMALL.replace("name = \"s\"\nlower", &format!("name = \"s\"\n{odd}lower")), "screen", "screen", vec!["name", "lower_left_m", "lower_right_m", "upper_left_m"]),
+        (format!("{SMALL}{odd}"), "facet", "facet", vec!["name", "screen", "size_px"]),
+        (format!("{SMALL}[[node]]\nname = \"n\"\naddress = \"127.0.0.1\"\n{odd}"), "node", "node", vec!["name", "address"]),
+        (format!("{SMALL}[sync]\n{odd}"), "sync", "sync", vec![]),
+        (format!("{SMALL}[security]\nkey_file = \"k\"\n{odd}"), "security", "security", vec!["key_file"]),
+        (format!("{SMALL}[recording]\nfile = \"k\"\n{odd}"), "recording", "recording", vec!["file"]),
+    ];
+    for (text, called, name, present) in tables {
+        let rule = if name.is_empty() { &schema } else { &schema["$defs"][name] };
+        let in_schema: BTreeSet<String> = rule["properties"].as_object().unwrap().keys().cloned().collect();
+        let mut in_parser = known_keys(&text, called);
+        in_parser.extend(present.iter().map(|key| (*key).to_owned()));
+        assert_eq!(in_parser, in_schema, "{called}");
+        let required: BTreeSet<&str> = rule["required"].as_array().into_iter().flatten().filter_map(|key| key.as_str()).collect();
+        assert_eq!(required, present.iter().copied().collect(), "{called}: required keys");
+        assert_eq!(rule["additionalProperties"], false, "{called}");
+    }
+}

@@ -1,0 +1,26 @@
+//! `tumble caves`: what is shipped, and calibration pictures.
+
+use crate::args::CavesOptions;
+use crate::failure::Failure;
+use crate::shots::write_png;
+use tumble::render::calibration_picture;
+use tumble::scene::cave::{resolve_cave, shipped_caves};
+
+/// Lists the shipped caves, or draws a calibration pattern.
+pub fn caves(options: &CavesOptions) -> Result<(), Failure> {
+    let Some(pattern) = options.pattern else {
+        for cave in shipped_caves() {
+            println!("{:<12} {}", cave.name, cave.description());
+        }
+        return Ok(());
+    };
+    // clap lets no pattern through without these
+    let (Some(name), Some(facet), Some(path)) = (&options.cave, &options.facet, &options.picture) else {
+        return Err(Failure::input("--pattern wants --cave FILE, --facet NAME and --picture FILE"));
+    };
+    let cave = resolve_cave(name)?.load()?;
+    let facet = cave.facet(facet)?;
+    write_png(&calibration_picture(&cave, facet, pattern), path)?;
+    println!("picture: {}", path.display());
+    Ok(())
+}

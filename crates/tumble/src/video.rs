@@ -1,0 +1,150 @@
+//! A video by the `ffmpeg` program: frames go in through its standard input, its complaints come out.
+//!
+//! Nothing waits for ever: a frame that is not taken within [`PATIENCE`], or an end that takes longer, is a failure, and the child is always
+//! ended and reaped.
+
+use crate::failure::Failure;
+use std::io::{ErrorKind, Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tumble::render::Image;
+
+/// How long ffmpeg may take for one frame, or for the end.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Between two looks.
+const PAUSE: Duration = Duration::from_millis(2);
+/// Bytes of ffmpeg's complaints that are kept.
+const MOST_SAID: usize = 4096;
+
+/// A video that is being written.
+pub struct Video {
+    child: Child,
+    frames: Option<SyncSender<Vec<u8>>>,
+    writer: Option<JoinHandle<()>>,
+    said: Option<JoinHandle<String>>,
+    size: [u32; 2],
+}
+
+impl Video {
+    /// Whether there is an `ffmpeg` to be started.
+    pub fn probe() -> Result<(), Failure> {
+        let started = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        match started {
+            Ok(mut child) => wait(&mut child, PATIENCE).map(|_| ()),
+            Err(e) => Err(missing(&e)),
+        }
+    }
+
+    /// Starts one of this size, pixels, at so many frames per second.
+    pub fn start(path: &Path, size: [u32; 2], per_second: f64) -> Result<Video, Failure> {
+        let mut command = Command::new("ffmpeg");
+        command.args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
+        command.args(["-s", &format!("{}x{}", size[0], size[1]), "-r", &per_second.to_string(), "-i", "pipe:0"]);
+        // even sides, and the pixel format that players know
+        command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]).arg("--").arg(path);
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().map_err(|e| missing(&e))?;
+        let (send, receive) = sync_channel(2);
+        let (input, complaints) = (child.stdin.take(), child.stderr.take());
+        let writer = input.map(|input| std::thread::spawn(move || pour(input, &receive)));
+        let said = complaints.map(|from| std::thread::spawn(move || listen(from)));
+        Ok(Video { child, frames: Some(send), writer, said, size })
+    }
+
+    /// The next frame.
+    pub fn add(&mut self, image: &Image) -> Result<(), Failure> {
+        if [image.width, image.height] != self.size {
+            return Err(Failure::run("the video", format!("a frame of {} x {} pixels in a video of {} x {}", image.width, image.height, self.size[0], self.size[1])));
+        }
+        let (mut frame, begin) = (image.rgba.clone(), Instant::now());
+        loop {
+            let Some(frames) = &self.frames else { return Err(self.failed("it has ended")) };
+            match frames.try_send(frame) {
+                Ok(()) => return Ok(()),
+                Err(TrySendError::Disconnected(_)) => return Err(self.failed("ffmpeg ended early")),
+                Err(TrySendError::Full(_)) if begin.elapsed() > PATIENCE => return Err(self.failed("ffmpeg takes no more frames")),
+                Err(TrySendError::Full(back)) => frame = back,
+            }
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    /// Waits for the last frames to be written.
+    pub fn finish(mut self) -> Result<(), Failure> {
+        drop(self.frames.take());
+        match wait(&mut self.child, PATIENCE) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(self.failed("ffmpeg failed")),
+            Err(_) => Err(self.failed("ffmpeg does not come to an end")),
+        }
+    }
+
+    /// Ends the child and tells what it said.
+    fn failed(&mut self, what: &str) -> Failure {
+        self.end();
+        let said = self.said.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        let said = said.trim();
+        Failure::run("the video", if said.is_empty() { format!("{what}, and said nothing") } else { format!("{what}: {said}") })
+    }
+
+    fn end(&mut self) {
+        drop(self.frames.take());
+        let _ = self.child.kill(); // it may have ended by itself
+        let _ = self.child.wait();
+        if let Some(writer) = self.writer.take() {
+            let _ = writer.join(); // its pipe is closed
+        }
+    }
+}
+
+impl Drop for Video {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+fn pour(mut input: std::process::ChildStdin, frames: &Receiver<Vec<u8>>) {
+    // a child that is gone breaks the pipe; whoever sends next hears of it
+    while let Ok(frame) = frames.recv() {
+        if input.write_all(&frame).is_err() {
+            return;
+        }
+    }
+}
+
+/// The last of what was said.
+fn listen(mut from: std::process::ChildStderr) -> String {
+    let (mut said, mut piece) = (Vec::new(), [0; 1024]);
+    while let Ok(count @ 1..) = from.read(&mut piece) {
+        said.extend_from_slice(&piece[..count]);
+        let extra = said.len().saturating_sub(MOST_SAID);
+        said.drain(..extra);
+    }
+    String::from_utf8_lossy(&said).into_owned()
+}
+
+/// Whether the child succeeded; one that takes too long is ended.
+fn wait(child: &mut Child, patience: Duration) -> Result<bool, Failure> {
+    let begin = Instant::now();
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return Ok(status.success()),
+            Ok(None) if begin.elapsed() < patience => std::thread::sleep(PAUSE),
+            Ok(None) => {
+                let _ = child.kill(); // it may have ended just now
+                let _ = child.wait();
+                return Err(Failure::run("the video", "ffmpeg does not answer"));
+            }
+            Err(e) => return Err(Failure::run("the video", e)),
+        }
+    }
+}
+
+fn missing(error: &std::io::Error) -> Failure {
+    match error.kind() {
+        ErrorKind::NotFound => Failure::run("the video", "there is no ffmpeg; on Debian and Ubuntu: apt-get install ffmpeg; or write pictures with --frames-dir"),
+        _ => Failure::run("the video", format!("ffmpeg cannot be started: {error}")),
+    }
+}

@@ -1,0 +1,154 @@
+//! Caves by the command: lists, checks, facets, frames, videos, and what goes wrong.
+
+use crate::common::*;
+use std::process::Command;
+
+const CAVE: &str = "
+[[user]]
+name = \"u\"
+eye_m = [0, 0, 1.5]
+[[screen]]
+name = \"s\"
+lower_left_m = [-1, 2, 0.5]
+lower_right_m = [1, 2, 0.5]
+upper_left_m = [-1, 2, 2.0]
+[[facet]]
+name = \"f\"
+screen = \"s\"
+size_px = [80, 60]
+";
+
+/// Whether there is an adapter; said visibly where not.
+fn pictured(said: &str) -> bool {
+    if said.contains("No picture:") {
+        // past the harness, which keeps what passing tests print
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter; {said}\n"));
+        return false;
+    }
+    true
+}
+
+/// Width and height of a PNG.
+fn png_size(path: &std::path::Path) -> [u32; 2] {
+    let bytes = std::fs::read(path).unwrap();
+    assert_eq!(bytes[..8], *b"\x89PNG\r\n\x1a\n");
+    [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()))
+}
+
+#[test]
+fn shipped_caves_are_listed_and_checked() {
+    let said = succeed(&["caves"]);
+    for name in ["wall3", "cube4", "cube6", "cylinder5", "sphere5"] {
+        assert!(said.lines().any(|line| line.starts_with(name)), "{said}");
+    }
+    let said = succeed(&["check", "cube4", "caves/sphere5.toml", "billiards"]);
+    assert!(said.contains("cube4: a cave of 4 facets on 4 screens, 1 user, all on this machine"), "{said}");
+    assert!(said.contains("right edge of \"front\" and left edge of \"right\": 0.000 mm apart"), "{said}");
+    assert!(said.contains("caves/sphere5.toml: a cave of 5 facets") && said.contains("billiards: a scene of"), "{said}");
+}
+
+#[test]
+fn a_file_is_checked_as_what_it_is() {
+    let folder = Folder::new("cave-check");
+    let cave = folder.write("wall.toml", CAVE);
+    assert!(succeed(&["check", &cave]).contains("a cave of 1 facet on 1 screen"));
+    let wrong = folder.write("wrong.toml", CAVE.replace("eye_m", "eye"));
+    let said = fail(&["check", &wrong], 2);
+    assert!(said.contains("wrong.toml:4:1") && said.contains("did you mean `eye_m`?"), "{said}");
+}
+
+#[test]
+fn what_is_wrong_with_a_cave_ends_with_code_2_before_anything_runs() {
+    let folder = Folder::new("cave-wrong");
+    let picture = text(&folder.path("out.png"));
+    let run = |more: &[&str]| fail(&[&["run", "stack", "--quiet", "--seconds", "1000"], more].concat(), 2);
+    assert!(run(&["--cave", "cube4", "--facet", "fronts", "--picture", &picture]).contains("did you mean `front`?"));
+    assert!(run(&["--cave", "cube5", "--picture", &picture]).contains("no cave `cube5`"));
+    assert!(run(&["--cave", "/nowhere/a.toml", "--picture", &picture]).contains("cannot read the cave"));
+    assert!(run(&["--facet", "front", "--picture", &picture]).contains("--cave FILE"));
+    assert!(run(&["--cave", "cube4"]).contains("--picture FILE"));
+    assert!(run(&["--cave", "cube4", "--facet", "front", "--size", "80x60", "--picture", &picture]).contains("size_px"));
+    let with = |line: &str| folder.write("a.toml", CAVE.replace("size_px = [80, 60]", &format!("size_px = [80, 60]\n{line}")));
+    assert!(run(&["--cave", &with("warp_file = \"none.obj\""), "--picture", &picture]).contains("none.obj: the warp grid cannot be read"));
+    assert!(run(&["--cave", &with("blend_file = \"none.png\""), "--picture", &picture]).contains("none.png: the blend mask cannot be read"));
+    folder.write("bad.obj", "v 0 0\nv 1 x\n");
+    assert!(run(&["--cave", &with("warp_file = \"bad.obj\""), "--picture", &picture]).contains("bad.obj: line 2"));
+    let empty = folder.write("b.toml", CAVE.replace("[80, 60]", "[80, 0]"));
+    assert!(run(&["--cave", &empty, "--picture", &picture]).contains("from 1 to 16384"));
+    assert!(!folder.path("out.png").exists());
+    assert!(fail(&["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "fron", "--picture", &picture], 2).contains("did you mean `front`?"));
+    assert!(fail(&["caves", "--pattern", "grid"], 2).contains("--cave"));
+}
+
+#[test]
+fn facets_have_their_size_and_unfolded_caves_fit() {
+    let folder = Folder::new("cave-pictures");
+    let picture = folder.path("out.png");
+    let stereo = folder.write("a.toml", CAVE.replace("size_px", "stereo = \"side_by_side\"\nsize_px"));
+    for (cave, more, size) in [(stereo.as_str(), vec!["--facet", "f"], [160, 60]), ("cube6", vec!["--size", "200x200"], [200, 150])] {
+        let out = tumble(&[&["run", "stack", "--quiet", "--seconds", "0", "--cave", cave, "--picture", &text(&picture)], &more[..]].concat());
+        let said = String::from_utf8(out.stderr).unwrap();
+        assert!(out.status.success(), "{said}");
+        if !pictured(&said) {
+            return;
+        }
+        assert_eq!(png_size(&picture), size, "{cave}");
+    }
+    succeed(&["caves", "--pattern", "name", "--cave", &stereo, "--facet", "f", "--picture", &text(&picture)]);
+    assert_eq!(png_size(&picture), [160, 60]);
+}
+
+#[test]
+fn frames_come_at_an_even_pace_of_simulated_time() {
+    let folder = Folder::new("frames");
+    let out = tumble(&["run", "incline", "--quiet", "--seconds", "0.25", "--size", "32x24", "--fps", "20", "--frames-dir", &text(&folder.path("frames"))]);
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert!(out.status.success(), "{said}");
+    if pictured(&said) {
+        // at 0, 0.05, … 0.25 s
+        let mut names: Vec<String> = std::fs::read_dir(folder.path("frames")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        assert_eq!(names, (0..6).map(|k| format!("frame_{k:06}.png")).collect::<Vec<_>>());
+        assert!(names.iter().all(|name| png_size(&folder.path("frames").join(name)) == [32, 24]));
+    }
+}
+
+/// Runs with a program of this text as `ffmpeg`.
+#[cfg(unix)]
+fn with_ffmpeg(folder: &Folder, script: Option<&str>) -> (Option<i32>, String) {
+    use std::os::unix::fs::PermissionsExt;
+    let bin = folder.path("bin");
+    std::fs::create_dir_all(&bin).unwrap();
+    let path = match script {
+        Some(script) => {
+            let program = bin.join("ffmpeg");
+            std::fs::write(&program, script).unwrap();
+            std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+            format!("{}:/usr/bin:/bin", bin.display())
+        }
+        None => text(&bin),
+    };
+    let mut command: Command = command(&["run", "incline", "--quiet", "--seconds", "0.2", "--size", "31x24", "--fps", "20", "--video", &text(&folder.path("out.mp4"))]);
+    let out = command.env("PATH", path).output().unwrap();
+    (out.status.code(), String::from_utf8(out.stderr).unwrap())
+}
+
+#[cfg(unix)]
+#[test]
+fn a_video_gets_every_frame_and_its_failures_are_told() {
+    let folder = Folder::new("video");
+    let (code, said) = with_ffmpeg(&folder, None);
+    assert!(code == Some(1) && said.contains("there is no ffmpeg") && said.contains("apt-get install ffmpeg"), "{said}");
+    // one that keeps the raw frames: the path is its last argument
+    let keeps = "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\nfor last; do :; done\nexec cat > \"$last\"\n";
+    let (code, said) = with_ffmpeg(&folder, Some(keeps));
+    assert_eq!(code, Some(0), "{said}");
+    if !pictured(&said) {
+        return;
+    }
+    assert_eq!(std::fs::read(folder.path("out.mp4")).unwrap().len(), 5 * 31 * 24 * 4);
+    // one that reads a little and complains
+    let fails = "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\nhead -c 100 > /dev/null\necho 'Unknown encoder quux' >&2\nexit 3\n";
+    let (code, said) = with_ffmpeg(&folder, Some(fails));
+    assert!(code == Some(1) && said.contains("Unknown encoder quux"), "{said}");
+}
