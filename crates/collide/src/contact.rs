@@ -40,6 +40,26 @@ pub enum NormalFrom {
     Edges,
 }
 
+/// How meshes and cylinders collide.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ContactMode {
+    /// Points and edges of each body against the exact signed distance of the other: flat faces stay flat, gaps and
+    /// normals are those of the surfaces. The gap of two crossing edges of finely triangulated smooth meshes may be
+    /// too large by 2e-4 of a diagonal.
+    #[default]
+    Surface,
+    /// The thesis's mode: point and normal from the two leaf balls. No contact is missed; gaps are too small by at most
+    /// the trees' outward errors ([`crate::SphereTree::outward_error`]).
+    Spheres,
+}
+
+impl ContactMode {
+    /// The mode of a pair: `Spheres` if either side asks for it.
+    pub fn of_pair(self, other: ContactMode) -> ContactMode {
+        if self == ContactMode::Spheres { self } else { other }
+    }
+}
+
 impl Contact {
     /// The same contact with A and B exchanged.
     pub(crate) fn flipped(self) -> Contact {

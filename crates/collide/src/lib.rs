@@ -28,14 +28,15 @@ mod narrow;
 mod pose;
 mod shape;
 mod solid;
+mod surface;
 mod tree;
 
 pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
-pub use contact::{Contact, NormalFrom};
+pub use contact::{Contact, ContactMode, NormalFrom};
 pub use error::{MeshError, ShapeError};
 pub use mass::MassProperties;
 pub use mesh::{ClosedReport, ClosestPoint, MeshDistance, RepairReport, RepairSettings, TriMesh, WindingNumber};
-pub use narrow::contacts;
+pub use narrow::{contacts, contacts_in};
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};

@@ -1,19 +1,28 @@
 //! The shapes that carry a sphere tree: meshes and cylinders.
 
 use crate::shape::axis;
+use crate::surface::Surface;
 use crate::{Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3};
 
 /// A closed mesh about its centre of mass, with its sphere tree.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct MeshShape {
     mesh: TriMesh,
     tree: SphereTree,
+    surface: Surface,
     /// At density 1.
     unit_mass: MassProperties,
     bounding_radius: f64,
     /// The same for the leaves.
     leaf_radius: f64,
     report: ClosedReport,
+}
+
+/// The rest is made of these two.
+impl PartialEq for MeshShape {
+    fn eq(&self, other: &MeshShape) -> bool {
+        (&self.mesh, &self.tree) == (&other.mesh, &other.tree)
+    }
 }
 
 impl MeshShape {
@@ -47,7 +56,8 @@ impl MeshShape {
         let tree = tree_of(&mesh)?;
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
         let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);
-        Ok((MeshShape { mesh, tree, unit_mass, bounding_radius, leaf_radius, report }, offset))
+        let surface = Surface::new(&mesh, &tree);
+        Ok((MeshShape { mesh, tree, surface, unit_mass, bounding_radius, leaf_radius, report }, offset))
     }
 
     /// The surface; its centre of mass is the origin.
@@ -58,6 +68,11 @@ impl MeshShape {
     /// The balls around the surface.
     pub fn tree(&self) -> &SphereTree {
         &self.tree
+    }
+
+    /// Elements and field of the `surface` contact mode.
+    pub(crate) fn surface(&self) -> &Surface {
+        &self.surface
     }
 
     /// What was found and mended when the mesh was read; its notes are for the user.

@@ -2,7 +2,7 @@
 
 use crate::object::Integratable;
 use crate::site::Site;
-use tumble_collide::{Shape, Vec3};
+use tumble_collide::{ContactMode, Shape, Vec3};
 
 /// A kind of collidable object, 0 to 63 (thesis `CollisionObjectType`): pairs are filtered by it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -94,6 +94,11 @@ pub trait Collidable {
     fn kind(&self, part: usize) -> CollisionKind;
     /// Whether a part meets parts of that kind. Two parts meet when both say so.
     fn collides_with(&self, part: usize, other: CollisionKind) -> bool;
+    /// How a part's mesh or cylinder collides; a pair goes by spheres if either side says so.
+    fn contact_mode(&self, part: usize) -> ContactMode {
+        let _ = part;
+        ContactMode::Surface
+    }
     /// Whether impulses can move a part at all: not what of a moving object is fixed to the world.
     fn part_moves(&self, part: usize) -> bool {
         let _ = part;

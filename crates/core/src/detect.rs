@@ -4,9 +4,9 @@ use crate::collidable::ContactFrame;
 use crate::settings::Settings;
 use crate::site::Site;
 use crate::view::{Entry, Mode, ObjectId, Table};
-use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
+use tumble_collide::{BroadPhase, Contact, ContactMode, NormalFrom, Vec3};
 
-/// How far two sphere trees look ahead, as a share of the smaller one's radius.
+/// How far two sphere trees look ahead in the `spheres` mode, as a share of the smaller one's radius.
 const TREE_REACH: f64 = 0.02;
 
 /// Who owns a row of the site table.
@@ -204,14 +204,15 @@ impl Detector<'_> {
         let (site_a, site_b) = (&self.sites[a as usize], &self.sites[b as usize]);
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
         let mut margin = self.scratch.reach[i] + self.scratch.reach[j];
-        if let (Some(_), Some(_)) = (shape_a.tree(), shape_b.tree()) {
+        let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
+        if mode == ContactMode::Spheres && let (Some(_), Some(_)) = (shape_a.tree(), shape_b.tree()) {
             // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
             let size = shape_a.bounding_radius().min(shape_b.bounding_radius());
             margin = margin.min(2.0 * self.settings.drift_tolerance + TREE_REACH * size);
         }
         let found = &mut self.scratch.found;
         found.clear();
-        tumble_collide::contacts(shape_a, &site_a.pose, shape_b, &site_b.pose, margin, found);
+        tumble_collide::contacts_in(mode, shape_a, &site_a.pose, shape_b, &site_b.pose, margin, found);
         let (ma, mb) = (body_a.material(part_a), body_b.material(part_b));
         let friction = self.settings.combine_friction.of(ma.friction, mb.friction);
         let restitution = self.settings.combine_restitution.of(ma.restitution, mb.restitution);

@@ -17,7 +17,7 @@ use crate::sync;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::view::WorldView;
 use nalgebra::{Quaternion, SymmetricEigen, Translation3, Unit};
-use tumble_collide::{Mat3, Pose, Quat, Shape, Vec3};
+use tumble_collide::{ContactMode, Mat3, Pose, Quat, Shape, Vec3};
 
 /// What is wrong with the constants of a body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -75,6 +75,8 @@ pub struct RigidBody {
     pub linear_damping: f64,
     /// Angular damping, 1/s: a torque `−c·L`.
     pub angular_damping: f64,
+    /// How its mesh or cylinder collides.
+    pub contact_mode: ContactMode,
     /// Its kind, for filtering.
     pub kind: CollisionKind,
     /// Kinds it meets, one bit each.
@@ -121,7 +123,7 @@ impl RigidBody {
         let cache = Cache { respond: inertia.inverse_root, recover: inertia.root };
         let visuals = vec![Visual { part: 0, pose: Pose::identity(), shape: shape.clone(), look: Default::default() }];
         Ok(RigidBody {
-            name, shape, mass, root_mass: mass.sqrt(), inertia, material: Material::default(), linear_damping: 0.0, angular_damping: 0.0,
+            name, shape, mass, root_mass: mass.sqrt(), inertia, material: Material::default(), contact_mode: ContactMode::default(), linear_damping: 0.0, angular_damping: 0.0,
             kind: CollisionKind::default(), meets: u64::MAX, initial_pose: Pose::identity(), initial_velocity: Vec3::zeros(),
             initial_angular_velocity: Vec3::zeros(), fixture: false, visuals, cache,
         })
@@ -176,6 +178,12 @@ impl RigidBody {
     /// Sets restitution (0 to 1) and friction (at least 0).
     pub fn surface(mut self, restitution: f64, friction: f64) -> Self {
         self.material = Material { restitution, friction };
+        self
+    }
+
+    /// Sets how its mesh or cylinder collides.
+    pub fn colliding_by(mut self, mode: ContactMode) -> Self {
+        self.contact_mode = mode;
         self
     }
 
@@ -461,6 +469,10 @@ impl Collidable for RigidBody {
 
     fn kind(&self, _part: usize) -> CollisionKind {
         self.kind
+    }
+
+    fn contact_mode(&self, _part: usize) -> ContactMode {
+        self.contact_mode
     }
 
     fn collides_with(&self, _part: usize, other: CollisionKind) -> bool {

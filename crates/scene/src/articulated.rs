@@ -60,7 +60,7 @@ impl ArticulatedSpec {
     pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, place: &Place<'_>) -> Option<ArticulatedSpec> {
         let name = read_name(&mut f).unwrap_or_default();
         let base = rotation::read_pose(&mut f);
-        let surface = Surface::read(&mut f, library, &Surface::default());
+        let surface = Surface::read(&mut f, library, &Surface { contacts: library.contacts, ..Surface::default() });
         let floating = f.flag_or("floating", false);
         let mut spec = ArticulatedSpec {
             base, part_overlaps: f.value("urdf").is_some(), ..ArticulatedSpec::of(name, Vec::new())

@@ -93,7 +93,7 @@ fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Resul
     let surface = &placed.spec.surface;
     if placed.spec.collides {
         let material = Material { restitution: surface.restitution, friction: surface.friction };
-        body.add_collider(link, Collider { material, ..Collider::new(placed.shape.clone(), placed.pose) })?;
+        body.add_collider(link, Collider { material, contact_mode: surface.contacts, ..Collider::new(placed.shape.clone(), placed.pose) })?;
     }
     if placed.visible {
         let look: Look = look(&surface.look, &placed.center);

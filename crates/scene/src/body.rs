@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use tumble_core::Mode;
+use tumble_core::collide::ContactMode;
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
@@ -10,6 +11,7 @@ use crate::look::Look;
 use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, MaterialSpec, RESTITUTION};
 use crate::rotation;
 use crate::shape::ShapeSpec;
+use crate::world::CONTACTS;
 
 /// Most bytes of a body's name: 64 with the final zero in which it travels between processes.
 pub(crate) const MOST_NAME_BYTES: usize = 63;
@@ -51,6 +53,8 @@ pub struct BodySpec {
     pub friction: f64,
     /// The body's own, else its material's, else 0.
     pub restitution: f64,
+    /// How its mesh or cylinder collides. Default: as the world says.
+    pub contacts: ContactMode,
     /// Rate at which velocity decays, 1/s: `dv/dt = −c v`. Default 0.
     pub linear_damping_per_s: f64,
     /// Rate at which angular velocity decays, 1/s. Default 0.
@@ -70,6 +74,8 @@ pub(crate) struct Library<'a> {
     pub(crate) meshes: BTreeMap<&'a str, Option<usize>>,
     pub(crate) material_names: BTreeMap<&'a str, usize>,
     pub(crate) materials: &'a [MaterialSpec],
+    /// The world's.
+    pub(crate) contacts: ContactMode,
 }
 
 impl BodySpec {
@@ -97,6 +103,7 @@ impl BodySpec {
             material,
             friction: f.number_or("friction", FRICTION, friction),
             restitution: f.number_or("restitution", RESTITUTION, restitution),
+            contacts: f.choice_or("contacts", CONTACTS, library.contacts),
             linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             collides: f.flag_or("collides", true),

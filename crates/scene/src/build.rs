@@ -238,6 +238,7 @@ impl SceneFile {
             .at(pose)
             .moving(Vec3::from(spec.velocity_m_per_s), Vec3::from(spec.angular_velocity_rad_per_s))
             .surface(spec.restitution, spec.friction)
+            .colliding_by(spec.contacts)
             .drawn_as(visuals(spec, shape, &center));
         body.linear_damping = spec.linear_damping_per_s;
         body.angular_damping = spec.angular_damping_per_s;

@@ -18,6 +18,7 @@ use crate::material::MaterialSpec;
 use crate::mesh::MeshSpec;
 use crate::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::world::WorldSettings;
+use tumble_core::collide::ContactMode;
 
 /// Most bytes of a scene file: 16 MiB.
 pub const MOST_BYTES: u64 = 16 << 20;
@@ -115,7 +116,7 @@ impl SceneFile {
         let materials = read_named(&mut f, "materials", |name, table| Some(MaterialSpec::read(name, table)));
         let meshes = read_named(&mut f, "meshes", |name, table| MeshSpec::read(name, table, folder));
         let materials: Vec<MaterialSpec> = materials.into_iter().filter_map(|(_, material)| material).collect();
-        let library = library(&meshes, &materials);
+        let library = library(&meshes, &materials, world.contacts);
         let mut names = BTreeMap::new();
         let bodies = read_bodies(&mut f, &library, &mut names);
         let articulated = read_articulated(&mut f, &library, &place, &mut names);
@@ -226,11 +227,11 @@ fn read_named<'a, T>(
     tables.entries().map(one).collect()
 }
 
-fn library<'a>(meshes: &[(&'a str, Option<MeshSpec>)], materials: &'a [MaterialSpec]) -> Library<'a> {
+fn library<'a>(meshes: &[(&'a str, Option<MeshSpec>)], materials: &'a [MaterialSpec], contacts: ContactMode) -> Library<'a> {
     let mut right = 0..;
     let meshes = meshes.iter().map(|(name, mesh)| (*name, mesh.as_ref().and_then(|_| right.next()))).collect();
     let material_names = materials.iter().enumerate().map(|(index, m)| (m.name.as_str(), index)).collect();
-    Library { meshes, material_names, materials }
+    Library { meshes, material_names, materials, contacts }
 }
 
 /// All bodies, those of grids included, each with a name of its own.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use toml::de::DeValue;
 use tumble_core::Joint;
 use tumble_core::articulated::LinkMass;
-use tumble_core::collide::{Mat3, Pose, Vec3};
+use tumble_core::collide::{ContactMode, Mat3, Pose, Vec3};
 
 use crate::body::{Library, MOST_NAME_BYTES, MassSpec, read_material, read_name};
 use crate::bound::Bound;
@@ -15,6 +15,7 @@ use crate::look::{Color, Look, as_color};
 use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, RESTITUTION};
 use crate::rotation;
 use crate::shape::ShapeSpec;
+use crate::world::CONTACTS;
 
 /// Most shapes of one link.
 const MOST_SHAPES: usize = 1000;
@@ -110,13 +111,15 @@ pub struct Surface {
     pub friction: f64,
     /// Newton's coefficient.
     pub restitution: f64,
+    /// How its meshes and cylinders collide.
+    pub contacts: ContactMode,
     /// Look.
     pub look: Look,
 }
 
 impl Default for Surface {
     fn default() -> Surface {
-        Surface { friction: DEFAULT_FRICTION, restitution: DEFAULT_RESTITUTION, look: Look::default() }
+        Surface { friction: DEFAULT_FRICTION, restitution: DEFAULT_RESTITUTION, contacts: ContactMode::default(), look: Look::default() }
     }
 }
 
@@ -129,6 +132,7 @@ impl Surface {
         Surface {
             friction: f.number_or("friction", FRICTION, friction),
             restitution: f.number_or("restitution", RESTITUTION, restitution),
+            contacts: f.choice_or("contacts", CONTACTS, base.contacts),
             look: Look::read(f, look),
         }
     }

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 use tumble_core::Combine;
+use tumble_core::collide::ContactMode;
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
@@ -74,6 +75,9 @@ const COMBINE: Names<Combine> = &[
     ("product", Combine::Product),
     ("geometric_mean", Combine::GeometricMean),
 ];
+
+/// How meshes and cylinders collide: the words of `contacts`.
+pub(crate) const CONTACTS: Names<ContactMode> = &[("surface", ContactMode::Surface), ("spheres", ContactMode::Spheres)];
 
 impl From<Integrator> for tumble_core::Integrator {
     fn from(integrator: Integrator) -> Self {
@@ -161,6 +165,8 @@ pub struct WorldSettings {
     pub combine_restitution: Combine,
     /// Friction of a pair from those of its bodies. Default `geometric_mean`.
     pub combine_friction: Combine,
+    /// How meshes and cylinders collide that say nothing of their own. Default `surface`.
+    pub contacts: ContactMode,
 }
 
 impl Default for WorldSettings {
@@ -178,6 +184,7 @@ impl Default for WorldSettings {
             contact_tolerance_m: 1e-7,
             combine_restitution: Combine::Min,
             combine_friction: Combine::GeometricMean,
+            contacts: ContactMode::Surface,
         }
     }
 }
@@ -203,6 +210,7 @@ impl WorldSettings {
             contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, usual.contact_tolerance_m),
             combine_restitution: f.choice_or("combine_restitution", COMBINE, usual.combine_restitution),
             combine_friction: f.choice_or("combine_friction", COMBINE, usual.combine_friction),
+            contacts: f.choice_or("contacts", CONTACTS, usual.contacts),
         };
         f.finish();
         world

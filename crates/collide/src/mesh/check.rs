@@ -249,7 +249,7 @@ impl TriMesh {
 
 /// One face's use of an edge.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct EdgeUse {
+pub(crate) struct EdgeUse {
     pub low: u32,
     pub high: u32,
     pub face: usize,
@@ -258,7 +258,7 @@ pub(super) struct EdgeUse {
 }
 
 /// The uses of each undirected edge, edges in ascending order.
-pub(super) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
+pub(crate) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
     let mut uses: Vec<EdgeUse> = Vec::with_capacity(3 * mesh.triangles.len());
     for (face, t) in mesh.triangles.iter().enumerate() {
         for k in 0..3 {

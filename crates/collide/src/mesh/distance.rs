@@ -72,6 +72,30 @@ impl MeshDistance {
         ClosestPoint { point, signed_distance: sign * square.sqrt(), triangle: self.ids[n] as usize }
     }
 
+    /// Calls `each` with the index of every triangle within `radius` metres of `p`, its closest point and that point's
+    /// feature (see [`closest_on_triangle`]).
+    pub(crate) fn within(&self, p: &Vec3, radius: f64, each: &mut dyn FnMut(usize, Vec3, usize)) {
+        self.search_within(0, p, radius * radius, each);
+    }
+
+    fn search_within(&self, node: usize, p: &Vec3, square: f64, each: &mut dyn FnMut(usize, Vec3, usize)) {
+        let here = &self.tree.nodes[node];
+        let near = box_distance_squared(&here.bounds, p) <= square;
+        if !near {
+            return;
+        }
+        if here.count == 0 {
+            self.search_within(node + 1, p, square, each);
+            return self.search_within(here.second as usize, p, square, each);
+        }
+        for n in here.range() {
+            let (q, feature) = closest_on_triangle(p, &self.corners[n]);
+            if (p - q).norm_squared() <= square {
+                each(self.ids[n] as usize, q, feature);
+            }
+        }
+    }
+
     fn inside(&self, p: &Vec3, closest: &Vec3, pseudonormal: &Vec3) -> bool {
         match &self.winding {
             Some(winding) if *pseudonormal == Vec3::zeros() => winding.contains(p),
@@ -118,7 +142,7 @@ fn box_distance_squared(b: &Aabb, p: &Vec3) -> f64 {
 }
 
 /// Face (0), edges (1–3) and vertices (4–6) of every triangle.
-fn pseudonormals(mesh: &TriMesh) -> Vec<[Vec3; 7]> {
+pub(crate) fn pseudonormals(mesh: &TriMesh) -> Vec<[Vec3; 7]> {
     let face: Vec<Vec3> = (0..mesh.triangles.len())
         .map(|t| {
             let [a, b, c] = mesh.corners(t);

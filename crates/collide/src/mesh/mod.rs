@@ -17,11 +17,12 @@ mod union;
 mod winding;
 
 pub use check::ClosedReport;
+pub(crate) use check::edge_groups;
 pub use distance::{ClosestPoint, MeshDistance};
+pub(crate) use distance::{closest_on_triangle, pseudonormals};
 pub use repair::{RepairReport, RepairSettings};
+pub(crate) use shells::shells;
 pub use winding::WindingNumber;
-
-use distance::closest_on_triangle;
 
 use crate::{Aabb, MeshError, Vec3};
 

@@ -14,7 +14,7 @@ const SAMPLES: usize = 32;
 
 /// The shell of each face, counted from 0 in the order of their first faces, and how many there are. Faces are
 /// connected over edges.
-pub(super) fn shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> (Vec<u32>, usize) {
+pub(crate) fn shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> (Vec<u32>, usize) {
     let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
     fn root(parent: &mut [usize], mut f: usize) -> usize {
         while parent[f] != f {

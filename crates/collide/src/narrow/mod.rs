@@ -9,26 +9,43 @@ mod half_space;
 mod reduce;
 mod segment;
 mod sphere;
+mod surface;
 mod tree;
 
-use crate::{Contact, Pose, Shape};
+use crate::surface::Field;
+use crate::surface::primitive::{BoxField, CylinderField, HalfSpaceField, RoundField};
+use crate::{Contact, ContactMode, Pose, Shape};
+use surface::{Body, Source};
+
+/// [`contacts_in`] the default mode, `surface`.
+pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    contacts_in(ContactMode::Surface, a, pose_a, b, pose_b, margin, out);
+}
 
 /// Appends to `out` all contacts between `a` and `b` whose gap is at most `margin` metres (`margin ≥ 0`).
 ///
 /// Normals point from B towards A. Exact among half-space, sphere, box and capsule, and for a cylinder on a
-/// half-space. Elsewhere a mesh or cylinder stands for itself by the leaves of its sphere tree: no contact is missed,
-/// and gaps are too small by at most the trees' outward errors ([`crate::SphereTree::outward_error`]). Manifolds are
+/// half-space. Where a mesh or another cylinder takes part, the mode decides: see [`ContactMode`]. Manifolds are
 /// reduced to the few points that matter. Does not allocate beyond the growth of `out`. A pose that is not finite
 /// touches nothing.
-pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+#[allow(clippy::too_many_arguments)]
+pub fn contacts_in(
+    mode: ContactMode,
+    a: &Shape,
+    pose_a: &Pose,
+    b: &Shape,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     if !(is_finite(pose_a) && is_finite(pose_b)) {
         return;
     }
     let start = out.len();
     if rank(a) <= rank(b) {
-        ordered(a, pose_a, b, pose_b, margin, out);
+        ordered(mode, a, pose_a, b, pose_b, margin, out);
     } else {
-        ordered(b, pose_b, a, pose_a, margin, out);
+        ordered(mode, b, pose_b, a, pose_a, margin, out);
         out[start..].iter_mut().for_each(|c| *c = c.flipped());
     }
 }
@@ -49,7 +66,7 @@ fn rank(shape: &Shape) -> u8 {
     }
 }
 
-fn ordered(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
     use Shape::{Box, Capsule, Cylinder, HalfSpace, Sphere};
     match (a, b) {
         (Sphere { radius: ra }, Sphere { radius: rb }) => sphere::sphere_sphere(*ra, pose_a, *rb, pose_b, margin, out),
@@ -73,11 +90,40 @@ fn ordered(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out:
         (Box { half_extents }, HalfSpace) => half_space::cuboid(half_extents, pose_a, pose_b, margin, out),
         (HalfSpace, HalfSpace) => {}
         (Cylinder(c), HalfSpace) => cylinder::half_space((c.radius(), c.half_length()), pose_a, pose_b, margin, out),
+        _ if mode == ContactMode::Surface => with_body(a, &mut |a| {
+            with_body(b, &mut |b| surface::surface(a, pose_a, b, pose_b, margin, out))
+        }),
         _ => match (a.tree(), b.tree()) {
             (Some(tree_a), Some(tree_b)) => tree::tree_tree(tree_a, pose_a, tree_b, pose_b, margin, out),
             (Some(tree_a), None) => tree::tree_primitive(tree_a, pose_a, b, pose_b, margin, out),
             // ranks put every other combination the other way round
             _ => debug_assert!(false, "pair out of order"),
         },
+    }
+}
+
+/// What the `surface` mode knows of a shape.
+fn with_body(shape: &Shape, then: &mut dyn FnMut(&Body)) {
+    let radius = shape.bounding_radius();
+    let mut go = |source: Source, field: &dyn Field| then(&Body { source, field, mesh: None, radius });
+    match shape {
+        Shape::HalfSpace => go(Source::Nothing, &HalfSpaceField),
+        Shape::Sphere { radius } => {
+            go(Source::Round { radius: *radius, half_length: 0.0 }, &RoundField { radius: *radius, half_length: 0.0 })
+        }
+        Shape::Capsule { radius, half_length } => {
+            let (radius, half_length) = (*radius, *half_length);
+            go(Source::Round { radius, half_length }, &RoundField { radius, half_length })
+        }
+        Shape::Box { half_extents } => go(Source::Box(*half_extents), &BoxField { half: *half_extents }),
+        Shape::Cylinder(c) => {
+            let (radius, half_length) = (c.radius(), c.half_length());
+            go(Source::Cylinder { radius, half_length }, &CylinderField { radius, half_length })
+        }
+        Shape::Mesh(mesh) => {
+            let surface = mesh.surface();
+            let source = Source::Mesh(mesh.tree(), &surface.elements);
+            then(&Body { source, field: &surface.field, mesh: Some(&surface.field), radius })
+        }
     }
 }

@@ -3,7 +3,7 @@
 //! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from it; the one that
 //! makes the greatest triangle; the one furthest out on the other side of it. Ties go to the earlier point.
 
-use crate::{Contact, Pose, Vec3};
+use crate::{Contact, NormalFrom, Pose, Vec3};
 
 /// Keeps at most four of `out[start..]`, in the order they were found.
 pub(super) fn to_four(out: &mut Vec<Contact>, start: usize) {
@@ -72,6 +72,8 @@ pub(super) struct Collector<'a> {
     start: usize,
     limit: f64,
     band: f64,
+    /// The deepest overlap that no element faces.
+    spare: Option<Contact>,
 }
 
 /// The band, as a part of the smaller body's radius.
@@ -80,7 +82,7 @@ const BAND: f64 = 0.05;
 impl<'a> Collector<'a> {
     /// `radius` is that of the smaller body.
     pub fn new(margin: f64, radius: f64, out: &'a mut Vec<Contact>) -> Collector<'a> {
-        Collector { start: out.len(), out, limit: margin, band: BAND * radius }
+        Collector { start: out.len(), out, limit: margin, band: BAND * radius, spare: None }
     }
 
     /// Only contacts with a gap up to this are wanted.
@@ -97,16 +99,30 @@ impl<'a> Collector<'a> {
         self.out.push(contact);
     }
 
+    /// A deep overlap at a place that the element does not face: it counts only if nothing else overlaps.
+    pub fn push_spare(&mut self, contact: Contact) {
+        if contact.gap < -0.02 * self.band && self.spare.is_none_or(|s| contact.gap < s.gap) {
+            self.spare = Some(contact);
+        }
+    }
+
     /// Reduces what was gathered and turns it into world axes.
     pub fn finish(mut self, pose_b: &Pose) {
+        if self.out[self.start..].iter().all(|c| c.gap >= 0.0) {
+            self.out.extend(self.spare);
+        }
         self.reduce();
         for contact in &mut self.out[self.start..] {
             contact.point = (pose_b * nalgebra::Point3::from(contact.point)).coords;
             contact.normal = pose_b.rotation * contact.normal;
+            if let NormalFrom::LineOfA(along) | NormalFrom::LineOfB(along) = &mut contact.normal_from {
+                *along = pose_b.rotation * *along;
+            }
         }
     }
 
     fn reduce(&mut self) {
+        let slack = SLACK * self.band;
         let found = &mut self.out[self.start..];
         // `found[..kept]` are kept, `found[rest..]` are in no cluster yet
         let (mut kept, mut rest) = (0, 0);
@@ -115,7 +131,7 @@ impl<'a> Collector<'a> {
                 break;
             }
             let end = rest + gather_cluster(&mut found[rest..]);
-            let count = keep_hull(&mut found[rest..end]);
+            let count = keep_hull(&mut found[rest..end], slack);
             for n in 0..count {
                 found.swap(kept + n, rest + n);
             }
@@ -144,7 +160,9 @@ fn gather_cluster(found: &mut [Contact]) -> usize {
 }
 
 /// Moves to the front the deepest contact of a cluster (its first) and its support points; returns how many.
-fn keep_hull(cluster: &mut [Contact]) -> usize {
+///
+/// Of contacts that support within `slack` of one another, the one with the least feature is kept, so that the choice lasts.
+fn keep_hull(cluster: &mut [Contact], slack: f64) -> usize {
     let normal = cluster[0].normal;
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let v = normal.cross(&u);
@@ -152,7 +170,7 @@ fn keep_hull(cluster: &mut [Contact]) -> usize {
     for (tilt, n) in SUPPORTS {
         let (x, y) = DIRECTIONS[n];
         let way = (u * x + v * y) * tilt;
-        let support = best(cluster.len(), |n| way.dot(&cluster[n].point) - cluster[n].gap);
+        let support = best_named(cluster, slack, |c| way.dot(&c.point) - c.gap);
         if support >= kept {
             cluster.swap(kept, support);
             kept += 1;
@@ -160,6 +178,16 @@ fn keep_hull(cluster: &mut [Contact]) -> usize {
     }
     kept
 }
+
+/// Of the contacts whose score is within `slack` of the greatest, the one with the least feature.
+fn best_named(cluster: &[Contact], slack: f64, score: impl Fn(&Contact) -> f64) -> usize {
+    let most = cluster.iter().map(&score).fold(f64::NEG_INFINITY, f64::max);
+    let near = (0..cluster.len()).filter(|&n| score(&cluster[n]) >= most - slack);
+    near.min_by_key(|&n| cluster[n].feature).unwrap_or(0)
+}
+
+/// Differences of support that count as none, in bands ([`BAND`]): 1e-5 of the smaller body's radius.
+const SLACK: f64 = 2e-4;
 
 /// Tilts (tangents of their angles) and directions for which a cluster's support point is kept: all five for what the
 /// body rests on, three for what it may swing onto within a step. On a flat base the wide ones find the same points

@@ -12,6 +12,8 @@ mod primitives;
 mod quality;
 mod rng;
 mod shared_meshes;
+mod surface;
+mod surface_parry;
 mod tree_cache;
 mod tree_file;
 mod trees;

@@ -1,4 +1,4 @@
-//! Contacts of sphere trees against parry's distance to the mesh itself: none missed, none invented beyond the stated
+//! Contacts of sphere trees (the `spheres` mode) against parry's distance to the mesh itself: none missed, none invented beyond the stated
 //! error.
 
 use crate::against_parry::{to_parry, vector};
@@ -6,7 +6,7 @@ use crate::rng::Rng;
 use crate::shared_meshes::text;
 use parry3d_f64::query;
 use parry3d_f64::shape::{Ball, Capsule, Cuboid, Shape as ParryShape, TriMesh as ParryMesh};
-use tumble_collide::{Contact, NormalFrom, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
+use tumble_collide::{Contact, ContactMode, NormalFrom, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in};
 
 struct Both {
     name: &'static str,
@@ -62,7 +62,7 @@ fn bodies() -> Vec<Both> {
 
 fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
     let mut out = Vec::new();
-    contacts(a, pa, b, pb, margin, &mut out);
+    contacts_in(ContactMode::Spheres, a, pa, b, pb, margin, &mut out);
     for c in &out {
         assert!(
             (c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= margin && c.point.iter().all(|x| x.is_finite()),
@@ -191,13 +191,15 @@ fn a_ball_lies_in_a_cup() {
 fn poses_that_are_not_numbers_do_no_harm() {
     let all = bodies();
     let mut out = Vec::new();
+    let mode = ContactMode::Spheres;
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         for a in &all {
             for b in &all {
                 out.clear();
-                contacts(&a.ours, &Pose::translation(bad, 0.0, 0.0), &b.ours, &Pose::identity(), 0.1, &mut out);
-                contacts(&b.ours, &Pose::identity(), &a.ours, &Pose::translation(0.0, bad, 0.0), 0.1, &mut out);
-                contacts(
+                contacts_in(mode, &a.ours, &Pose::translation(bad, 0.0, 0.0), &b.ours, &Pose::identity(), 0.1, &mut out);
+                contacts_in(mode, &b.ours, &Pose::identity(), &a.ours, &Pose::translation(0.0, bad, 0.0), 0.1, &mut out);
+                contacts_in(
+                    mode,
                     &a.ours,
                     &Pose::translation(bad, 0.0, 0.0),
                     &Shape::half_space(),

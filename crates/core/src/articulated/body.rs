@@ -13,7 +13,7 @@ use crate::collidable::{CollisionKind, Material};
 use crate::object::Visual;
 use nalgebra::Quaternion;
 use std::sync::{Mutex, MutexGuard};
-use tumble_collide::{Pose, Quat, Shape, Vec3};
+use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
 /// What is wrong with an articulated body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -73,6 +73,8 @@ pub struct Collider {
     pub shape: Shape,
     /// Surface constants.
     pub material: Material,
+    /// How its mesh or cylinder collides.
+    pub contact_mode: ContactMode,
     /// Its kind, for filtering.
     pub kind: CollisionKind,
     /// Kinds it meets, one bit each.
@@ -82,7 +84,7 @@ pub struct Collider {
 impl Collider {
     /// A shape with the usual surface that meets everything.
     pub fn new(shape: Shape, pose: Pose) -> Collider {
-        Collider { pose, shape, material: Material::default(), kind: CollisionKind::default(), meets: u64::MAX }
+        Collider { pose, shape, material: Material::default(), contact_mode: ContactMode::default(), kind: CollisionKind::default(), meets: u64::MAX }
     }
 }
 

@@ -12,7 +12,7 @@ use crate::rigid::vec3;
 use crate::rotation;
 use crate::sync;
 use crate::view::WorldView;
-use tumble_collide::{Pose, Shape, Vec3};
+use tumble_collide::{ContactMode, Pose, Shape, Vec3};
 
 impl Object for ArticulatedBody {
     fn name(&self) -> &str {
@@ -228,6 +228,10 @@ impl Collidable for ArticulatedBody {
 
     fn kind(&self, part: usize) -> CollisionKind {
         self.collider(part).map_or(CollisionKind::default(), |p| p.collider.kind)
+    }
+
+    fn contact_mode(&self, part: usize) -> ContactMode {
+        self.collider(part).map_or(ContactMode::default(), |p| p.collider.contact_mode)
     }
 
     fn collides_with(&self, part: usize, other: CollisionKind) -> bool {

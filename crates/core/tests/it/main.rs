@@ -25,6 +25,7 @@ mod free;
 mod friction;
 mod impacts;
 mod limits;
+mod mesh_boxes;
 mod meshes;
 mod out_of_reach;
 mod paradox;

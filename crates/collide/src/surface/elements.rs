@@ -1,0 +1,179 @@
+//! What of a mesh is held against the other's field: points, edges and rims, held by the balls of its sphere tree.
+//!
+//! A point is held by one leaf that covers it; an edge by the smallest ball found that holds both its ends, and so all of
+//! it. A ball that is further than the margin from the other body skips all that it and its children hold.
+//!
+//! **Which edges.** An edge of length `L` that turns by `θ` (the angle between its faces' normals) is left out where
+//! `θ·L/4 ≤ ε`. Where two edges cross at distance `g`, the ends of the first have at least one at distance
+//! `g + L₁·θ₂/4` or less from the other body (its slopes to the two sides differ by at most `θ₂`), and the other way round.
+//! If both edges were left out, the least of these is at most `√(θ₁L₁·θ₂L₂)/4 ≤ ε`: a finely triangulated smooth surface
+//! needs only its vertices, and the gap is overestimated by `ε` at most (to first order in θ).
+
+use crate::mesh::{edge_groups, pseudonormals};
+use crate::{SphereTree, TriMesh, Vec3};
+use nalgebra::ComplexField;
+
+/// `ε`: how much too large the gap of two crossing edges may be, as a part of the diagonal.
+pub(crate) const EDGE_ERROR: f64 = 2e-4;
+/// Normals of one vertex that are within this cosine of another one are left out.
+const ALIKE: f64 = 0.98;
+/// Normals kept per vertex at most.
+const MOST_NORMALS: usize = 12;
+
+/// A point of the surface, with the normals around it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Point {
+    pub at: Vec3,
+    /// Names it.
+    pub index: u32,
+    /// Range of its outward normals in [`Elements::normals`].
+    pub first: u32,
+    pub count: u32,
+    /// Range of the directions of the searched edges that start here, in [`Elements::ways`].
+    pub first_way: u32,
+    pub ways: u32,
+}
+
+/// A straight edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Edge {
+    pub ends: [Vec3; 2],
+    /// Outward normals of its faces.
+    pub normals: [Vec3; 2],
+    /// Names it.
+    pub index: u32,
+}
+
+/// All of a mesh, grouped by the tree's balls.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Elements {
+    pub points: Vec<Point>,
+    pub edges: Vec<Edge>,
+    pub normals: Vec<Vec3>,
+    pub ways: Vec<Vec3>,
+    /// Per ball: where its points and edges begin and end.
+    held: Vec<[u32; 4]>,
+}
+
+impl Elements {
+    /// Also returns, per triangle, which of its edges (k to k+1) are among the elements.
+    pub fn new(mesh: &TriMesh, tree: &SphereTree) -> (Elements, Vec<[bool; 3]>) {
+        let face: Vec<Vec3> = pseudonormals(mesh).iter().map(|n| n[0]).collect();
+        let mut all = Elements::default();
+        let (mut edges, searched) = gather_edges(mesh, &face, tree);
+        let mut points = all.gather_points(mesh, &face, tree, &searched);
+        points.sort_by_key(|p| (p.0, p.1.index));
+        edges.sort_by_key(|e| (e.0, e.1.index));
+        all.held = (0..tree.nodes().len() as u32)
+            .map(|node| {
+                let place = |list: &dyn Fn(u32) -> usize| [list(node) as u32, list(node + 1) as u32];
+                let [a, b] = place(&|n| points.partition_point(|p| p.0 < n));
+                let [c, d] = place(&|n| edges.partition_point(|e| e.0 < n));
+                [a, b, c, d]
+            })
+            .collect();
+        all.points = points.into_iter().map(|p| p.1).collect();
+        all.edges = edges.into_iter().map(|e| e.1).collect();
+        (all, searched)
+    }
+
+    /// The points that ball `node` holds.
+    pub fn points_of(&self, node: usize) -> &[Point] {
+        let [a, b, ..] = self.held[node];
+        &self.points[a as usize..b as usize]
+    }
+
+    /// The edges that ball `node` holds.
+    pub fn edges_of(&self, node: usize) -> &[Edge] {
+        let [_, _, c, d] = self.held[node];
+        &self.edges[c as usize..d as usize]
+    }
+
+    pub fn normals_of(&self, point: &Point) -> &[Vec3] {
+        &self.normals[point.first as usize..(point.first + point.count) as usize]
+    }
+
+    pub fn ways_of(&self, point: &Point) -> &[Vec3] {
+        &self.ways[point.first_way as usize..(point.first_way + point.ways) as usize]
+    }
+
+    /// The vertices, each with the ball that holds it.
+    fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], tree: &SphereTree, searched: &[[bool; 3]]) -> Vec<(u32, Point)> {
+        let mut ways: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for k in (0..3).filter(|&k| searched[t][k]) {
+                let (from, to) = (triangle[k] as usize, triangle[(k + 1) % 3] as usize);
+                // the neighbour's triangle has the same edge the other way
+                ways[from].push((mesh.vertices[to] - mesh.vertices[from]).normalize());
+            }
+        }
+        let mut around: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for &v in triangle {
+                let normals = &mut around[v as usize];
+                if normals.len() < MOST_NORMALS && normals.iter().all(|n| n.dot(&face[t]) < ALIKE) {
+                    normals.push(face[t]);
+                }
+            }
+        }
+        let mut points = Vec::new();
+        for (v, normals) in around.iter().enumerate() {
+            if normals.is_empty() {
+                continue;
+            }
+            let at = mesh.vertices[v];
+            let point = Point { at, index: v as u32, first: self.normals.len() as u32, count: normals.len() as u32, first_way: self.ways.len() as u32, ways: ways[v].len() as u32 };
+            self.normals.extend(normals);
+            self.ways.extend(&ways[v]);
+            points.push((holder(tree, &[at]), point));
+        }
+        points
+    }
+}
+
+/// The edges that turn outwards by enough, each with the ball that holds it.
+fn gather_edges(mesh: &TriMesh, face: &[Vec3], tree: &SphereTree) -> (Vec<(u32, Edge)>, Vec<[bool; 3]>) {
+    let mut searched = vec![[false; 3]; mesh.triangles.len()];
+    let mut edges = Vec::new();
+    let error = EDGE_ERROR * mesh.diagonal();
+    for (index, group) in edge_groups(mesh).iter().enumerate() {
+        let ends = [group[0].low, group[0].high].map(|v| mesh.vertices[v as usize]);
+        let normals = [face[group[0].face], face[group[group.len() - 1].face]];
+        let apart = mesh.corners(group[group.len() - 1].face);
+        // more than two faces, or a convex edge: the other face is below the first one's plane
+        let reach = apart.iter().map(|c| normals[0].dot(&(c - ends[0]))).fold(0.0, f64::min);
+        let turn = ComplexField::acos(normals[0].dot(&normals[1]).clamp(-1.0, 1.0));
+        let length = (ends[1] - ends[0]).norm();
+        let wanted = group.len() > 2 || (reach < -1e-9 * length && 0.25 * turn * length > error);
+        if !wanted {
+            continue;
+        }
+        for u in group {
+            let t = mesh.triangles[u.face];
+            let from = if u.forward { u.low } else { u.high };
+            if let Some(k) = (0..3).find(|&k| t[k] == from && t[(k + 1) % 3] == u.low + u.high - from) {
+                searched[u.face][k] = true;
+            }
+        }
+        edges.push((holder(tree, &ends), Edge { ends, normals, index: index as u32 }));
+    }
+    (edges, searched)
+}
+
+/// The smallest ball found, going down, that holds all `points`; the root where rounding leaves none.
+fn holder(tree: &SphereTree, points: &[Vec3]) -> u32 {
+    let nodes = tree.nodes();
+    let holds = |n: usize| points.iter().all(|p| (p - nodes[n].center).norm() <= nodes[n].radius * (1.0 + 1e-9));
+    let (mut best, mut stack) = (0, vec![0]);
+    while let Some(n) = stack.pop() {
+        if n > 0 && !holds(n) {
+            continue;
+        }
+        let better = n > 0 && (nodes[n].level, -nodes[n].radius) > (nodes[best].level, -nodes[best].radius);
+        if better {
+            best = n;
+        }
+        stack.extend(nodes[n].child_range());
+    }
+    best as u32
+}

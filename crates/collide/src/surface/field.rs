@@ -1,0 +1,359 @@
+//! The signed distance of a mesh by an octree: each cell near the surface lists the few triangles that can be closest to
+//! a point in it.
+//!
+//! ```text
+//! c, r     centre of a cell and half its diagonal        d_c   distance of c
+//! t listed   iff   dist(c, t) ≤ d_c + 2r                 (|d(p) − d(c)| ≤ |p − c| ≤ r, for each triangle and for all)
+//! d(p) ≥ d_c − |p − c|                                   signed: the bound by which elements are culled
+//! ```
+//!
+//! So distances are exact: nothing is interpolated. A cell is divided until its list is short; far from the surface it
+//! has no list, only `d_c`, and a query there asks the tree of boxes ([`MeshDistance`]).
+//!
+//! A cell also lists triangles a little further away that face another way: from an element on a ridge the closest face
+//! may be one that it cannot meet, and the next one is taken.
+
+use super::{Feature, Field, Hit, TOUCHING, facing, opposition};
+use crate::mesh::{closest_on_triangle, edge_groups, pseudonormals, shells};
+use crate::{Aabb, MeshDistance, TriMesh, Vec3};
+use arrayvec::ArrayVec;
+
+/// Lists up to this length are not divided.
+const SHORT: usize = 16;
+/// At the last level, or far from the surface, lists up to this length are kept.
+const LONG: usize = 96;
+/// The outermost cell reaches this far beyond the mesh, as a part of the diagonal.
+const RIM: f64 = 0.02;
+/// Triangles up to this much further than the closest are listed if they face another way, as a part of the diagonal.
+const AROUND: f64 = 0.01;
+/// Another way: cosine between the normals below this.
+const OTHER_WAY: f64 = 0.5;
+/// Cells are divided down to this half diagonal, in mean lengths of an edge.
+const FINEST: f64 = 0.6;
+/// Divisions at most.
+const DEEPEST: f64 = 9.0;
+/// Relative difference of squared distances that is rounding's.
+const SAME: f64 = 1e-11;
+/// As much of the squared distance as is along a face's normal counts as straight above the face.
+const ABOVE: f64 = 1.0 - 1e-6;
+/// Cells and listed triangles at most; beyond, the tree of boxes answers.
+const MOST_CELLS: usize = 1 << 20;
+const MOST_LISTED: usize = 1 << 23;
+
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    /// Signed distance at the centre.
+    distance: f64,
+    /// The first of eight children; 0 if there are none.
+    children: u32,
+    first: u32,
+    /// Length of the list; 0 where there is none.
+    count: u32,
+}
+
+/// The field of a mesh.
+#[derive(Clone, Debug)]
+pub(crate) struct MeshField {
+    triangles: Vec<[u32; 3]>,
+    corners: Vec<[Vec3; 3]>,
+    /// Triangles around each vertex.
+    valence: Vec<u32>,
+    /// Pseudonormals of the face, its edges and its corners: [`pseudonormals`].
+    normals: Vec<[Vec3; 7]>,
+    /// Whether the edges of each triangle (k to k+1) are elements.
+    searched: Vec<[bool; 3]>,
+    cells: Vec<Cell>,
+    lists: Vec<u32>,
+    center: Vec3,
+    half: f64,
+    bounds: Aabb,
+    boxes: MeshDistance,
+    convex: bool,
+    touching: f64,
+    diagonal: f64,
+    /// How much further than the closest face another one may be that is taken instead.
+    around: f64,
+}
+
+/// A triangle's closest point.
+#[derive(Clone, Copy)]
+struct Closest {
+    square: f64,
+    /// Square of the distance from its plane.
+    above: f64,
+    point: Vec3,
+    triangle: usize,
+    feature: usize,
+}
+
+struct Builder<'a> {
+    field: &'a mut MeshField,
+    deepest: u32,
+}
+
+impl MeshField {
+    /// `searched`: which edges of each triangle are elements.
+    pub fn new(mesh: &TriMesh, searched: Vec<[bool; 3]>) -> MeshField {
+        let (bounds, diagonal) = (mesh.aabb(), mesh.diagonal());
+        let mut field = MeshField {
+            triangles: mesh.triangles.clone(),
+            valence: valence(mesh),
+            corners: (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect(),
+            normals: pseudonormals(mesh).into_iter().map(|n| n.map(|v| v.try_normalize(0.0).unwrap_or_default())).collect(),
+            searched,
+            cells: vec![Cell { distance: 0.0, children: 0, first: 0, count: 0 }],
+            lists: Vec::new(),
+            center: 0.5 * (bounds.min + bounds.max),
+            half: 0.5 * (bounds.max - bounds.min).max() + RIM * diagonal,
+            bounds,
+            boxes: MeshDistance::new(mesh),
+            convex: is_convex(mesh),
+            touching: TOUCHING * diagonal,
+            diagonal,
+            around: AROUND * diagonal,
+        };
+        let all: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+        let (center, half) = (field.center, field.half);
+        let lengths = (0..all.len()).map(|t| { let [a, b, _] = mesh.corners(t); (b - a).norm() });
+        let mean = lengths.sum::<f64>() / all.len() as f64;
+        let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
+        let mut builder = Builder { field: &mut field, deepest };
+        builder.cell(0, center, half, &all, 0);
+        field
+    }
+
+    /// The smallest cell that holds `p`, and its centre; `None` outside all.
+    fn locate(&self, p: &Vec3) -> Option<(&Cell, Vec3)> {
+        let (mut center, mut half, mut cell) = (self.center, self.half, &self.cells[0]);
+        // written so that what is not a number is outside
+        if !((p - center).amax() <= half) {
+            return None;
+        }
+        while cell.children > 0 {
+            half *= 0.5;
+            let mut octant = 0;
+            for k in 0..3 {
+                let above = p[k] >= center[k];
+                octant |= usize::from(above) << k;
+                center[k] += if above { half } else { -half };
+            }
+            cell = &self.cells[cell.children as usize + octant];
+        }
+        Some((cell, center))
+    }
+
+    /// The closest of the listed triangles; of those that share the closest point, the one that faces `p` most squarely.
+    fn closest(&self, p: &Vec3, list: &[u32]) -> Option<Closest> {
+        let mut best: Option<Closest> = None;
+        let mut limit = f64::INFINITY;
+        for &t in list {
+            let t = t as usize;
+            let above = self.normals[t][0].dot(&(p - self.corners[t][0])).powi(2);
+            if above > limit {
+                continue;
+            }
+            let (point, feature) = closest_on_triangle(p, &self.corners[t]);
+            let square = (p - point).norm_squared();
+            let better = |b: &Closest| square < b.square * (1.0 - SAME) || (square <= b.square * (1.0 + SAME) && above > b.above);
+            if best.as_ref().is_none_or(better) {
+                best = Some(Closest { square, above, point, triangle: t, feature });
+                limit = square * (1.0 + SAME);
+            }
+        }
+        best
+    }
+
+    fn closest_of(&self, p: &Vec3, triangle: usize) -> Closest {
+        let (point, feature) = closest_on_triangle(p, &self.corners[triangle]);
+        let above = self.normals[triangle][0].dot(&(p - self.corners[triangle][0])).powi(2);
+        Closest { square: (p - point).norm_squared(), above, point, triangle, feature }
+    }
+
+    /// What a triangle's closest point makes of `p`.
+    fn describe(&self, p: &Vec3, found: &Closest) -> Hit {
+        let (face, normal) = (self.normals[found.triangle][0], self.normals[found.triangle][found.feature]);
+        let (offset, length) = (p - found.point, found.square.sqrt());
+        let sign = if normal.dot(&offset) < 0.0 { -1.0 } else { 1.0 };
+        let flat = found.feature == 0 || normal.dot(&face) > 1.0 - 1e-9 || (found.above > ABOVE * found.square && length > self.touching);
+        let normal = match flat {
+            true => face,
+            false if length > self.touching => offset * (sign / length),
+            false => normal,
+        };
+        let feature = match found.feature {
+            _ if flat => Feature::Face,
+            k @ 1..=3 => {
+                let c = &self.corners[found.triangle];
+                let along = (c[k % 3] - c[k - 1]).normalize();
+                if self.searched[found.triangle][k - 1] { Feature::Edge(along) } else { Feature::Line(along) }
+            }
+            _ => Feature::Point,
+        };
+        Hit { distance: sign * length, normal, core: 0.0, feature, facing: true }
+    }
+
+    /// The closest face among those listed that faces the element, has `p` behind it (or on it), and is not much further
+    /// than `nearest`: the far side of the solid is not meant.
+    fn behind(&self, p: &Vec3, normals: &[Vec3], list: &[u32], nearest: f64, aside: f64) -> Option<Hit> {
+        let mut best: Option<(f64, f64, Hit)> = None;
+        for &t in list {
+            let t = t as usize;
+            let normal = self.normals[t][0];
+            let above = normal.dot(&(p - self.corners[t][0]));
+            if above > aside || !facing(normals, &normal) {
+                continue;
+            }
+            let (point, _) = closest_on_triangle(p, &self.corners[t]);
+            let (distance, square) = ((p - point).norm(), opposition(normals, &normal));
+            if distance > nearest.abs() + self.around {
+                continue;
+            }
+            let nearer = |b: &(f64, f64, Hit)| distance < b.0 - aside || (distance < b.0 + aside && square < b.1);
+            if best.as_ref().is_none_or(nearer) {
+                // beyond an edge by less than counts, it is still above or below the face
+                let beside = (p - point - normal * above).norm();
+                let distance_signed = if above > 0.0 || beside < aside { above } else { -distance };
+                let hit = Hit { distance: distance_signed, normal, core: 0.0, feature: Feature::Face, facing: true };
+                best = Some((distance, square, hit));
+            }
+        }
+        best.map(|b| b.2)
+    }
+
+    /// Calls `each` with a number that names the feature and the hit of every local minimum of the distance from `p` (outside
+    /// the solid) within `radius`: a closest point inside a triangle, or on an edge or corner if all triangles there agree
+    /// that it is closest. Where very many are in reach, only those nearest.
+    pub fn minima(&self, p: &Vec3, mut radius: f64, each: &mut dyn FnMut(u64, Hit)) {
+        let closest = self.boxes.closest(p);
+        let least = closest.signed_distance;
+        if least < 0.0 {
+            return each(closest.triangle as u64, self.describe(p, &self.closest_of(p, closest.triangle)));
+        }
+        let mut near = ArrayVec::<(u64, u32), MOST_NEAR>::new();
+        for _ in 0..8 {
+            near.clear();
+            let mut all = true;
+            self.boxes.within(p, radius, &mut |t, _, feature| {
+                all &= near.try_push((self.name(t, feature), t as u32)).is_ok();
+            });
+            if all {
+                break;
+            }
+            radius = 0.5 * (radius + least);
+            near.clear();
+        }
+        if near.is_empty() && radius >= least {
+            return each(closest.triangle as u64, self.describe(p, &self.closest_of(p, closest.triangle)));
+        }
+        near.sort_unstable();
+        for same in near.chunk_by(|a, b| a.0 == b.0) {
+            let wanted = match same[0].0 >> 62 {
+                0 => 1,
+                1 => 2,
+                _ => self.valence[(same[0].0 & 0xffff_ffff) as usize] as usize,
+            };
+            if same.len() >= wanted {
+                let hit = self.describe(p, &self.closest_of(p, same[0].1 as usize));
+                if hit.distance >= 0.0 {
+                    each(same[0].0, hit);
+                }
+            }
+        }
+    }
+
+    /// A number for a feature of triangle `t`, the same from all triangles that share it.
+    fn name(&self, t: usize, feature: usize) -> u64 {
+        let v = self.triangles[t];
+        match feature {
+            0 => t as u64,
+            k @ 1..=3 => {
+                let (a, b) = (u64::from(v[k - 1]), u64::from(v[k % 3]));
+                1 << 62 | a.min(b) << 31 | a.max(b)
+            }
+            k => 2 << 62 | u64::from(v[k - 4]),
+        }
+    }
+}
+
+/// Triangles near a core point at most.
+const MOST_NEAR: usize = 512;
+
+impl Field for MeshField {
+    fn bound(&self, p: &Vec3) -> f64 {
+        match self.locate(p) {
+            Some((cell, center)) => cell.distance - (p - center).norm(),
+            None => (p - p.zip_zip_map(&self.bounds.min, &self.bounds.max, |x, low, high| x.clamp(low, high))).norm(),
+        }
+    }
+
+    fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit {
+        let beside = beside * self.diagonal;
+        let list = self.locate(p).map_or(&[][..], |(cell, _)| &self.lists[cell.first as usize..][..cell.count as usize]);
+        let closest = self.closest(p, list).unwrap_or_else(|| {
+            let triangle = self.boxes.closest(p).triangle;
+            self.closest_of(p, triangle)
+        });
+        let hit = self.describe(p, &closest);
+        let clear = facing(normals, &hit.normal) && (hit.feature == Feature::Face || hit.distance.abs() > beside);
+        if clear || hit.distance > beside {
+            return Hit { facing: clear, ..hit };
+        }
+        self.behind(p, normals, list, hit.distance, beside).unwrap_or(Hit { facing: facing(normals, &hit.normal), ..hit })
+    }
+
+    fn convex(&self) -> bool {
+        self.convex
+    }
+}
+
+impl Builder<'_> {
+    fn cell(&mut self, index: usize, center: Vec3, half: f64, list: &[u32], depth: u32) {
+        let mut near: Vec<(f64, u32)> = list
+            .iter()
+            .map(|&t| ((closest_on_triangle(&center, &self.field.corners[t as usize]).0 - center).norm(), t))
+            .collect();
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let Some(&(least, first)) = near.first() else { return };
+        self.field.cells[index].distance = self.field.describe(&center, &self.field.closest_of(&center, first as usize)).distance;
+        let reach = 3.0_f64.sqrt() * half;
+        let facing_first = self.field.normals[first as usize][0];
+        let turned = |t: u32| self.field.normals[t as usize][0].dot(&facing_first) < OTHER_WAY;
+        near.retain(|&(d, t)| d <= least + 2.0 * reach || (d <= least + 2.0 * reach + self.field.around && turned(t)));
+        let kept: Vec<u32> = near.iter().map(|n| n.1).collect();
+        let full = self.field.cells.len() > MOST_CELLS || self.field.lists.len() + kept.len() > MOST_LISTED;
+        let far = least > 2.0 * reach;
+        if kept.len() <= SHORT || depth == self.deepest || far || full {
+            if kept.len() <= LONG && !full {
+                self.field.cells[index].first = self.field.lists.len() as u32;
+                self.field.cells[index].count = kept.len() as u32;
+                self.field.lists.extend(kept);
+            }
+            return;
+        }
+        let children = self.field.cells.len();
+        self.field.cells[index].children = children as u32;
+        self.field.cells.extend([Cell { distance: 0.0, children: 0, first: 0, count: 0 }; 8]);
+        for octant in 0..8 {
+            let side = Vec3::from_fn(|k, _| if octant >> k & 1 == 1 { 0.5 } else { -0.5 });
+            self.cell(children + octant, center + side * half, 0.5 * half, &kept, depth + 1);
+        }
+    }
+}
+
+fn valence(mesh: &TriMesh) -> Vec<u32> {
+    let mut count = vec![0; mesh.vertices.len()];
+    mesh.triangles.iter().flatten().for_each(|&v| count[v as usize] += 1);
+    count
+}
+
+/// Whether every edge is convex or flat and the surface is one piece.
+fn is_convex(mesh: &TriMesh) -> bool {
+    let slack = 1e-9 * mesh.diagonal();
+    let groups = edge_groups(mesh);
+    groups.iter().all(|group| {
+        let [a, b] = group[..] else { return false };
+        let [p, q, r] = mesh.corners(a.face);
+        let normal = (q - p).cross(&(r - p)).normalize();
+        mesh.corners(b.face).iter().all(|x| normal.dot(&(x - p)) <= slack)
+    }) && shells(mesh, &groups).1 == 1
+}

@@ -1,0 +1,176 @@
+//! The `surface` mode: flat faces, aligned and crossed blocks, cylinders.
+
+use crate::rng::Rng;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+use tumble_collide::{Contact, NormalFrom, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
+
+fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
+    let mut out = Vec::new();
+    contacts(a, pa, b, pb, margin, &mut out);
+    for c in &out {
+        assert!((c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= margin && c.point.iter().all(|x| x.is_finite()), "{c:?}");
+    }
+    let mut names: Vec<u64> = out.iter().map(|c| c.feature).collect();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), out.len(), "features are distinct: {out:?}");
+    out
+}
+
+fn mesh_box(x: f64, y: f64, z: f64) -> Shape {
+    Shape::mesh(TriMesh::box_(Vec3::new(x, y, z)), &TreeSettings::octree()).unwrap().0
+}
+
+fn turned(z: f64, angle: f64) -> Pose {
+    Pose::from_parts(Vec3::new(0.0, 0.0, z).into(), Quat::from_scaled_axis(Vec3::z() * angle))
+}
+
+/// Extent of the points in the horizontal plane.
+fn spread(found: &[Contact]) -> Vec3 {
+    let low = found.iter().fold(Vec3::repeat(9.0), |m, c| m.inf(&c.point));
+    let high = found.iter().fold(Vec3::repeat(-9.0), |m, c| m.sup(&c.point));
+    high - low
+}
+
+#[test]
+fn a_mesh_box_touches_a_plane_with_its_four_corners() {
+    let shape = mesh_box(0.5, 0.3, 0.2);
+    let mut rng = Rng::new(1);
+    for _ in 0..200 {
+        let pose = turned(0.2 + 1e-5, rng.between(0.0, 6.3));
+        let found = ask(&shape, &pose, &Shape::half_space(), &Pose::identity(), 1e-3);
+        assert_eq!(found.len(), 4, "{found:?}");
+        for c in &found {
+            assert!((c.gap - 1e-5).abs() < 1e-12 && c.normal == Vec3::z() && c.normal_from == NormalFrom::FaceOfB);
+        }
+    }
+}
+
+#[test]
+fn blocks_of_the_same_size_meet_face_to_face() {
+    // each as a mesh and as a primitive, aligned, and the upper one moved a little, either way
+    let (mesh, block) = (mesh_box(0.5, 0.5, 0.5), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
+    for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
+        for shift in [0.0, 1e-9, -1e-9, 1e-7, -1e-5, 1e-3, 0.2] {
+            for gap in [1e-4, 1e-7, 0.0, -1e-7, -1e-4] {
+                let upper = Pose::translation(shift, -0.5 * shift, 1.0 + gap);
+                let found = ask(a, &upper, b, &Pose::identity(), 1e-3);
+                assert!(found.iter().all(|c| (c.normal - Vec3::z()).norm() < 1e-6), "{shift} {gap}: {found:?}");
+                assert!(found.iter().all(|c| (c.gap - gap).abs() < 1e-9), "{shift} {gap}: {found:?}");
+                let wide = spread(&found);
+                assert!(wide.x > 1.0 - shift.abs() - 1e-6 && wide.y > 1.0 - 0.5 * shift.abs() - 1e-6, "{shift} {gap}: {found:?}");
+                assert!((4..=9).contains(&found.len()));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_block_turned_on_another_touches_where_the_edges_cross() {
+    let (mesh, block) = (mesh_box(0.5, 0.5, 0.5), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
+    for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
+        for gap in [1e-4, 0.0, -1e-4] {
+            let found = ask(a, &turned(1.0 + gap, FRAC_PI_4), b, &Pose::identity(), 1e-3);
+            assert!(found.len() >= 4, "{found:?}");
+            // the octagon in which the two squares overlap has its corners at (½, ½·tan 22.5°) and the like
+            for c in &found {
+                let (x, y) = (c.point.x.abs(), c.point.y.abs());
+                assert!((x.max(y) - 0.5).abs() < 1e-3 && (x.min(y) - 0.5 * (FRAC_PI_4 / 2.0).tan()).abs() < 1e-3, "{c:?}");
+                assert!((c.normal - Vec3::z()).norm() < 1e-3 && (c.gap - gap).abs() < 1e-6, "{gap}: {c:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_bar_across_a_bar_has_the_corners_of_their_common_square() {
+    // no corner of either is near the other
+    let (mesh, block) = (mesh_box(1.0, 0.1, 0.1), Shape::cuboid(Vec3::new(1.0, 0.1, 0.1)).unwrap());
+    for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
+        for gap in [1e-4, 0.0, -1e-4] {
+            let found = ask(a, &turned(0.2 + gap, FRAC_PI_2), b, &Pose::identity(), 1e-3);
+            assert!(found.len() >= 4 && found.len() <= 9, "{found:?}");
+            for c in &found {
+                assert!((c.point.x.abs() - 0.1).abs() < 1e-3 && (c.point.y.abs() - 0.1).abs() < 1e-3, "{gap}: {c:?}");
+                assert!((c.normal - Vec3::z()).norm() < 1e-3 && (c.gap - gap).abs() < 1e-6, "{gap}: {c:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn crossed_edges_meet_at_one_point() {
+    // two blocks on edge, one along x, one along y: closest at the crossing, at ½√2 from each axis
+    let reach = 0.5 * 2.0_f64.sqrt();
+    let (mesh, block) = (mesh_box(1.0, 0.5, 0.5), Shape::cuboid(Vec3::new(1.0, 0.5, 0.5)).unwrap());
+    let on_edge = |z: f64, yaw: f64| {
+        let turn = Quat::from_scaled_axis(Vec3::z() * yaw) * Quat::from_scaled_axis(Vec3::x() * FRAC_PI_4);
+        Pose::from_parts(Vec3::new(0.07, 0.11, z).into(), turn)
+    };
+    for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
+        for gap in [1e-3, 1e-6, -1e-6, -1e-3, -2e-2] {
+            let found = ask(a, &on_edge(2.0 * reach + gap, FRAC_PI_2), b, &on_edge(0.0, 0.0), 2e-3);
+            let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).unwrap();
+            assert!((deepest.gap - gap).abs() < 1e-7 + 1e-3 * gap.abs(), "{gap}: {found:?}");
+            assert!((deepest.normal - Vec3::z()).norm() < 1e-3, "{gap}: {found:?}");
+            assert!((deepest.point.x - 0.07).abs() < 1e-2 && (deepest.point.y - 0.11).abs() < 1e-2, "{gap}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_thin_plate_is_not_seen_from_its_other_side() {
+    // a plate 1 mm thick lies on a block; its lower corners are near the block's top, its upper ones not
+    let (plate, block) = (mesh_box(0.2, 0.2, 0.0005), mesh_box(0.5, 0.5, 0.5));
+    for gap in [1e-4, 0.0, -1e-4] {
+        let found = ask(&plate, &Pose::translation(0.0, 0.0, 0.5005 + gap), &block, &Pose::identity(), 5e-4);
+        assert!(found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z > 0.999), "{gap}: {found:?}");
+        // the same from below, and a block that hangs from the plate's underside
+        let found = ask(&block, &Pose::translation(0.0, 0.0, -0.5005 - gap), &plate, &Pose::identity(), 5e-4);
+        assert!(found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z < -0.999), "{gap}: {found:?}");
+    }
+}
+
+#[test]
+fn a_cylinder_on_a_block_touches_as_on_a_plane() {
+    let cylinder = Shape::cylinder(0.2, 0.3).unwrap();
+    for block in [mesh_box(1.0, 1.0, 0.1), Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()] {
+        let mut rng = Rng::new(9);
+        for case in 0..300 {
+            let standing = case % 3 == 0;
+            let turn = match case % 3 {
+                0 => Quat::from_scaled_axis(Vec3::z() * rng.between(0.0, 6.0)),
+                1 => Quat::from_scaled_axis(Vec3::z() * rng.between(0.0, 6.0)) * Quat::from_scaled_axis(Vec3::x() * FRAC_PI_2),
+                _ => rng.pose(1.0).rotation,
+            };
+            let axis = turn * Vec3::z();
+            let reach = 0.3 * axis.z.abs() + 0.2 * (1.0 - axis.z * axis.z).max(0.0).sqrt();
+            let gap = rng.between(-1e-3, 1e-3);
+            let pose = Pose::from_parts(Vec3::new(0.1, -0.2, 0.1 + reach + gap).into(), turn);
+            let found = ask(&cylinder, &pose, &block, &Pose::identity(), 2e-3);
+            let least = found.iter().map(|c| c.gap).fold(9.0, f64::min);
+            assert!((least - gap).abs() < 1e-8, "case {case}: {least} but {gap}: {found:?}");
+            assert!(found.iter().all(|c| (c.normal - Vec3::z()).norm() < 1e-9), "case {case}: {found:?}");
+            let wide = spread(&found);
+            match case % 3 {
+                0 => assert!(standing && found.len() >= 4 && wide.x > 0.27 && wide.y > 0.27, "{found:?}"),
+                1 => assert!(wide.norm() > 0.5, "{found:?}"),
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ball_in_a_groove_touches_both_sides() {
+    // two blocks turned by 45° make a groove; here one concave mesh would do as well: a ring's hole and a ball in it
+    let (ring, _) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree()).unwrap();
+    let ball = Shape::sphere(0.9).unwrap();
+    // the ball sits on the hole: its centre is (0.9 + 0.25) from the tube's middle circle
+    let height = (1.15_f64.powi(2) - 1.0).sqrt();
+    let found = ask(&ball, &Pose::translation(0.0, 0.0, height), &ring, &Pose::identity(), 0.01);
+    assert!(found.len() >= 3, "{found:?}");
+    let sum: Vec3 = found.iter().map(|c| c.normal).sum();
+    assert!(found.iter().all(|c| c.gap.abs() < 0.01 && c.normal.z > 0.3), "{found:?}");
+    assert!(sum.xy().norm() < 0.5 * found.len() as f64, "on all sides: {found:?}");
+}

@@ -1,0 +1,260 @@
+//! The `surface` mode against parry's distances and brute force, over random poses near contact: what was missed, what
+//! was invented, how far the depths are apart. `TUMBLE_SLOW=1` takes 10,000 poses per pair of kinds.
+//!
+//! Apart, the reference is parry's distance. Overlapping, it is the deepest point of either surface in the other
+//! solid, by brute force over vertices and points inside the triangles, with signed distances that the mode does not
+//! use: [`MeshDistance`] and formulas written here.
+
+use crate::against_parry::{to_parry, vector};
+use crate::rng::Rng;
+use crate::shared_meshes::text;
+use nalgebra::Point3;
+use parry3d_f64::math::Vector;
+use parry3d_f64::query;
+use parry3d_f64::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Shape as ParryShape, TriMesh as ParryMesh};
+use tumble_collide::{Contact, MeshDistance, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
+
+/// What the mode states: 2e-4 of a diagonal per mesh (they are 1 m), and parry's own rounding.
+const ERROR: f64 = 4e-4 + 1e-5;
+const MARGIN: f64 = 0.02;
+/// Overlaps up to this deep have the depth of the deepest point; in deeper ones it may be that of another place.
+const SHALLOW: f64 = 0.02;
+
+struct Body {
+    name: &'static str,
+    ours: Shape,
+    theirs: Box<dyn ParryShape>,
+    distance: Option<MeshDistance>,
+    /// Points of the surface, for brute force.
+    samples: Vec<Vec3>,
+}
+
+fn solid(name: &'static str, mesh: TriMesh) -> Body {
+    let scale = 1.0 / mesh.diagonal();
+    let (ours, _) = Shape::mesh(mesh.scaled(scale), &TreeSettings::octree()).unwrap();
+    let Shape::Mesh(shape) = &ours else { panic!("{name} is no mesh") };
+    let mesh = shape.mesh();
+    let vertices = mesh.vertices.iter().map(vector).collect();
+    let theirs = Box::new(ParryMesh::new(vertices, mesh.triangles.clone()).unwrap());
+    let mut samples = mesh.vertices.clone();
+    for t in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(t);
+        let steps = ((b - a).norm().max((c - a).norm()) / 0.05).ceil().clamp(2.0, 12.0) as u32;
+        for i in 0..=steps {
+            for j in 0..=steps - i {
+                samples.push(a + (b - a) * (f64::from(i) / f64::from(steps)) + (c - a) * (f64::from(j) / f64::from(steps)));
+            }
+        }
+    }
+    let distance = Some(MeshDistance::new(mesh));
+    Body { name, theirs, distance, samples, ours }
+}
+
+fn primitives() -> Vec<Body> {
+    let body = |name, ours, theirs: Box<dyn ParryShape>| Body { name, ours, theirs, distance: None, samples: Vec::new() };
+    // parry's cylinder is along y: a prism of many sides is as good
+    let prism = TriMesh::cylinder(0.1, 0.15, 720);
+    let prism = ConvexPolyhedron::from_convex_hull(&prism.vertices.iter().map(vector).collect::<Vec<_>>()).unwrap();
+    let half = Vec3::new(0.15, 0.1, 0.2);
+    vec![
+        body("ball", Shape::sphere(0.15).unwrap(), Box::new(Ball::new(0.15))),
+        body("capsule", Shape::capsule(0.05, 0.2).unwrap(), Box::new(Capsule::new_z(0.2, 0.05))),
+        body("block", Shape::cuboid(half).unwrap(), Box::new(Cuboid::new(vector(&half)))),
+        body("cylinder", Shape::cylinder(0.1, 0.15).unwrap(), Box::new(prism)),
+    ]
+}
+
+fn meshes() -> Vec<Body> {
+    let mut all = vec![
+        solid("box mesh", TriMesh::box_(Vec3::new(0.2, 0.3, 0.1))),
+        solid("ring", TriMesh::torus(1.0, 0.3, 32, 16)),
+        solid("round", TriMesh::icosphere(1.0, 3)),
+        solid("wedge", TriMesh::lathe(&[(0.0, 0.0), (0.5, 0.0), (0.1, 0.8), (0.0, 0.9)], 5).unwrap()),
+    ];
+    for (name, file) in [("bunny", "bunny.obj"), ("spot", "spot.obj"), ("link", "panda_link5.obj")] {
+        if let Some(obj) = text(file) {
+            all.push(solid(name, TriMesh::from_obj(&obj).unwrap()));
+        }
+    }
+    all
+}
+
+/// Signed distance of a body at a point of its own frame.
+fn signed(body: &Body, p: &Vec3) -> f64 {
+    if let Some(distance) = &body.distance {
+        return distance.closest(p).signed_distance;
+    }
+    let corner = |q: Vec3| q.sup(&Vec3::zeros()).norm() + q.max().min(0.0);
+    match &body.ours {
+        Shape::Sphere { radius } => p.norm() - radius,
+        Shape::Capsule { radius, half_length } => (p - Vec3::z() * p.z.clamp(-half_length, *half_length)).norm() - radius,
+        Shape::Box { half_extents } => corner(p.abs() - half_extents),
+        Shape::Cylinder(c) => corner(Vec3::new(p.xy().norm() - c.radius(), p.z.abs() - c.half_length(), f64::NEG_INFINITY)),
+        _ => panic!("no formula"),
+    }
+}
+
+fn deepest_sample(a: &Body, pa: &Pose, b: &Body, pb: &Pose) -> f64 {
+    let least = |x: &Body, px: &Pose, y: &Body, py: &Pose| {
+        let to = py.inv_mul(px);
+        x.samples.iter().map(|p| signed(y, &(to * Point3::from(*p)).coords)).fold(f64::INFINITY, f64::min)
+    };
+    least(a, pa, b, pb).min(least(b, pb, a, pa))
+}
+
+#[derive(Default, Debug)]
+struct Counts {
+    apart: u32,
+    near: u32,
+    overlapping: u32,
+    missed: u32,
+    invented: u32,
+    shallow: u32,
+    /// Of deep overlaps, of shallow ones.
+    shallower: [u32; 2],
+    turned: u32,
+    worst_apart: f64,
+    worst_depth: f64,
+}
+
+fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
+    let mut out = Vec::new();
+    contacts(a, pa, b, pb, MARGIN, &mut out);
+    assert!(out.len() <= 72 && out.iter().all(|c| c.gap <= MARGIN && (c.normal.norm() - 1.0).abs() < 1e-9));
+    out
+}
+
+/// Random poses at about the distance where the two touch: parry's distance says how far to go.
+fn compare(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts: &mut Counts) {
+    for case in 0..cases {
+        let (pa, pb) = (rng.pose(0.3), rng.pose(0.3));
+        let way = rng.direction();
+        let far = Pose::from_parts((pb.translation.vector + way * 3.0).into(), pa.rotation);
+        // as far along the way as parry says is free, a few times; then near, or a little or much too far
+        let mut pa = far;
+        for _ in 0..4 {
+            let free = query::distance(&to_parry(&pa), &*a.theirs, &to_parry(&pb), &*b.theirs).unwrap().distance;
+            pa.translation.vector -= way * free;
+        }
+        pa.translation.vector -= way * if case % 4 == 0 { rng.between(0.0, 0.2) } else { rng.between(-0.02, 0.02) };
+        let (qa, qb) = (to_parry(&pa), to_parry(&pb));
+        let distance = query::distance(&qa, &*a.theirs, &qb, &*b.theirs).unwrap().distance;
+        let found = ask(&a.ours, &pa, &b.ours, &pb);
+        let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap));
+        let gap = deepest.map_or(f64::INFINITY, |c| c.gap);
+        let label = || eprintln!("{} on {}, case {case}: {gap} but {distance}", a.name, b.name);
+        let inside = |x: &Body, px: &Pose, y: &Body, py: &Pose| {
+            let p = x.samples.first().copied().unwrap_or_default();
+            signed(y, &(py.inv_mul(px) * Point3::from(p)).coords) < 0.0
+        };
+        // parry's meshes are hollow
+        let contained = distance > 0.0 && (inside(a, &pa, b, &pb) || inside(b, &pb, a, &pa));
+        if distance > ERROR && !contained {
+            counts.apart += 1;
+            if distance < MARGIN - ERROR {
+                counts.near += 1;
+                if gap > distance + ERROR {
+                    counts.missed += 1;
+                    label();
+                } else {
+                    counts.worst_apart = counts.worst_apart.max((gap - distance).abs());
+                }
+            }
+            if gap < distance - ERROR {
+                counts.invented += 1;
+                label();
+            }
+            if let Some(contact) = deepest.filter(|_| distance > 1e-3 && (gap - distance).abs() < 1e-6) {
+                counts.turned += turned(contact, &qa, a, &qb, b);
+            }
+        } else if (distance <= 0.0 || contained) && case % (cases / brute.min(cases)) == 0 {
+            counts.overlapping += 1;
+            let truth = deepest_sample(a, &pa, b, &pb);
+            if gap > ERROR {
+                counts.missed += 1;
+                label();
+            }
+            if truth > -SHALLOW && gap > truth + ERROR {
+                eprintln!("{} on {}, case {case}: depth {gap} but {truth}", a.name, b.name);
+            }
+            let shallow = truth > -SHALLOW;
+            counts.shallow += u32::from(shallow);
+            if gap > truth + ERROR {
+                counts.shallower[usize::from(shallow)] += 1;
+                counts.worst_depth = counts.worst_depth.max(gap - truth);
+            }
+        }
+    }
+}
+
+/// 1 if the normal is more than 1° from the line between parry's closest points.
+fn turned(contact: &Contact, qa: &parry3d_f64::math::Pose, a: &Body, qb: &parry3d_f64::math::Pose, b: &Body) -> u32 {
+    let Ok(query::ClosestPoints::WithinMargin(x, y)) = query::closest_points(qa, &*a.theirs, qb, &*b.theirs, 1.0) else { return 0 };
+    let line: Vector = x - y;
+    let line = Vec3::new(line.x, line.y, line.z).normalize();
+    u32::from(line.dot(&contact.normal) < 1.0_f64.to_radians().cos())
+}
+
+fn all_pairs(primitive: usize, mesh: usize, brute: usize) {
+    let (meshes, primitives) = (meshes(), primitives());
+    let mut total = Counts::default();
+    for (i, b) in primitives.iter().enumerate() {
+        let mut counts = Counts::default();
+        for (j, a) in meshes.iter().enumerate() {
+            compare(a, b, primitive / meshes.len() + 1, brute, &mut Rng::new((10 * i + j) as u64), &mut counts);
+        }
+        println!("meshes on {}: {counts:?}", b.name);
+        add(&mut total, &counts);
+    }
+    let mut counts = Counts::default();
+    let pairs = meshes.len() * (meshes.len() + 1) / 2;
+    for (i, a) in meshes.iter().enumerate() {
+        for (j, b) in meshes[..=i].iter().enumerate() {
+            compare(a, b, mesh / pairs + 1, brute, &mut Rng::new((1000 + 10 * i + j) as u64), &mut counts);
+        }
+    }
+    println!("meshes on meshes: {counts:?}");
+    add(&mut total, &counts);
+    assert!(total.near > 50 && total.overlapping > 50, "{total:?}");
+    assert_eq!((total.missed, total.invented, total.turned, total.shallower[1]), (0, 0, 0, 0), "{total:?}");
+}
+
+fn add(total: &mut Counts, c: &Counts) {
+    total.near += c.near;
+    total.overlapping += c.overlapping;
+    total.missed += c.missed;
+    total.invented += c.invented;
+    total.turned += c.turned;
+    total.shallower[1] += c.shallower[1];
+}
+
+#[test]
+fn surface_contacts_agree_with_parry() {
+    all_pairs(300, 120, 3);
+}
+
+#[test]
+fn surface_contacts_agree_with_parry_full_length() {
+    if std::env::var_os("TUMBLE_SLOW").is_some() {
+        all_pairs(10_000, 10_000, 100);
+    }
+}
+
+#[test]
+fn meshes_on_a_half_space_are_exact() {
+    let slow = std::env::var_os("TUMBLE_SLOW").is_some();
+    let mut rng = Rng::new(4);
+    for body in meshes() {
+        let Shape::Mesh(shape) = &body.ours else { continue };
+        for _ in 0..if slow { 2000 } else { 200 } {
+            let turn: Quat = rng.pose(1.0).rotation;
+            let lowest = shape.mesh().vertices.iter().map(|v| (turn * v).z).fold(f64::INFINITY, f64::min);
+            let gap = rng.between(-0.1, 0.9 * MARGIN);
+            let pose = Pose::from_parts(Vec3::new(0.3, 0.2, gap - lowest).into(), turn);
+            let found = ask(&body.ours, &pose, &Shape::half_space(), &Pose::identity());
+            let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+            assert!((least - gap).abs() < 1e-12, "{}: {least} but {gap}", body.name);
+            assert!(found.iter().all(|c| c.normal == Vec3::z()));
+        }
+    }
+}
