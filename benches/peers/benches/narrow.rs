@@ -1,0 +1,169 @@
+//! CPU time of one query of two touching meshes: tumble's contact modes beside parry's queries of triangle meshes, in one run.
+//!
+//! ```text
+//! cargo bench --bench narrow                                the table
+//! cargo bench --bench narrow -- --tumble 2000               the surface mode alone, so many rounds, for a profiler
+//! ```
+//!
+//! Two tori, and two bunnies where the public meshes are (`TUMBLE_MESHES`, or a `shared/meshes` above), each 0.1 m in diagonal. They are turned at
+//! random and brought together until they touch, then 1 mm apart, or 1 mm (1 % of the diagonal) into each other. Margin 1 mm.
+
+use rapier3d_f64::parry::math::{Pose as ParryPose, Rotation, Vector};
+use rapier3d_f64::parry::query::{self, ContactManifold, ContactManifoldsWorkspace, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use rapier3d_f64::parry::shape::TriMesh as ParryMesh;
+use std::f64::consts::TAU;
+use std::hint::black_box;
+use std::path::PathBuf;
+use tumble_collide::{ContactMode, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in};
+use tumble_peers::clock::Clock;
+
+/// Margin, and what the bodies are apart or overlap by, metres.
+const MARGIN: f64 = 1e-3;
+/// Poses per row, of which the median counts.
+const POSES: u64 = 15;
+/// Seconds of CPU that one figure takes, about.
+const PATIENCE: f64 = 0.01;
+
+struct Body {
+    name: String,
+    ours: Shape,
+    theirs: ParryMesh,
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let bodies: Vec<Body> = [bunny(), Some(body("torus", TriMesh::torus(1.0, 0.35, 96, 34)))].into_iter().flatten().collect();
+    if let [flag, rounds] = &arguments[..]
+        && flag == "--tumble"
+    {
+        return alone(&bodies[0], rounds.parse().expect("a number of rounds"));
+    }
+    println!("\nCPU µs per query, margin 1 mm, medians of {POSES} poses (worst).\n");
+    println!("| pair | pose | surface | spheres | parry contact | manifolds, first | manifolds, kept | distance | contact / surface |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for body in &bodies {
+        for (pose, into) in [("1 mm apart", -MARGIN), ("touching", 0.0), ("1 % overlap", MARGIN)] {
+            row(body, pose, into);
+        }
+    }
+}
+
+fn row(body: &Body, name: &str, into: f64) {
+    let mut figures: Vec<[f64; 6]> = (0..POSES).map(|n| measure(body, &touching(body, n, into))).collect();
+    let medians: [(f64, f64); 6] = std::array::from_fn(|k| {
+        figures.sort_by(|a, b| a[k].total_cmp(&b[k]));
+        (figures[figures.len() / 2][k], figures[figures.len() - 1][k])
+    });
+    let cells: String = medians.iter().map(|(median, worst)| format!(" {median:.0} ({worst:.0}) |")).collect();
+    println!("| two of {} | {name} |{cells} {:.1} |", body.name, medians[2].0 / medians[0].0);
+}
+
+/// µs of all queries of one pose.
+fn measure(body: &Body, pose: &Pose) -> [f64; 6] {
+    let (fixed, theirs) = (ParryPose::IDENTITY, to_parry(pose));
+    let mut found = Vec::new();
+    let mut by = |mode| {
+        time(|| {
+            found.clear();
+            contacts_in(mode, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
+            black_box(&found);
+        })
+    };
+    let (surface, spheres) = (by(ContactMode::Surface), by(ContactMode::Spheres));
+    let mesh = &body.theirs;
+    let contact = time(|| { black_box(query::contact(&theirs, mesh, &fixed, mesh, MARGIN)).ok(); });
+    let first = time(|| manifolds(mesh, &theirs, &mut Vec::new(), &mut None));
+    let (mut kept, mut workspace) = (Vec::new(), None);
+    manifolds(mesh, &theirs, &mut kept, &mut workspace);
+    let again = time(|| manifolds(mesh, &theirs, &mut kept, &mut workspace));
+    let distance = time(|| { black_box(query::distance(&theirs, mesh, &fixed, mesh)).ok(); });
+    [surface, spheres, contact, first, again, distance]
+}
+
+fn manifolds(mesh: &ParryMesh, pose: &ParryPose, kept: &mut Vec<ContactManifold<(), ()>>, workspace: &mut Option<ContactManifoldsWorkspace>) {
+    DefaultQueryDispatcher.contact_manifolds(pose, mesh, mesh, MARGIN, kept, workspace).expect("two meshes");
+    black_box(kept);
+}
+
+/// CPU µs per call, the median of three runs.
+fn time(mut call: impl FnMut()) -> f64 {
+    let clock = Clock::new();
+    let mut run = |times: usize| {
+        let before = clock.seconds();
+        (0..times).for_each(|_| call());
+        (clock.seconds() - before) / times as f64
+    };
+    let times = (PATIENCE / 3.0 / run(1).max(1e-7)).ceil().min(10_000.0) as usize;
+    let mut runs = [run(times), run(times), run(times)];
+    runs.sort_by(f64::total_cmp);
+    1e6 * runs[1]
+}
+
+/// The `n`th pose of the first body where it touches the second, moved `into` it, metres.
+fn touching(body: &Body, n: u64, into: f64) -> Pose {
+    let mut state = n.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let turn = Quat::from_scaled_axis(Vec3::new(random() - 0.5, random() - 0.5, random() - 0.5) * TAU);
+    let (z, around) = (2.0 * random() - 1.0, TAU * random());
+    let way = Vec3::new((1.0 - z * z).sqrt() * around.cos(), (1.0 - z * z).sqrt() * around.sin(), z);
+    let mut pose = Pose::from_parts((way * 0.3).into(), turn);
+    // parry's distance says how far the way is free
+    for _ in 0..60 {
+        let free = query::distance(&to_parry(&pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs).expect("two meshes").distance;
+        pose.translation.vector -= way * free;
+        if free < 1e-7 {
+            break;
+        }
+    }
+    pose.translation.vector -= way * into;
+    pose
+}
+
+fn alone(body: &Body, rounds: usize) {
+    let poses: Vec<Pose> = (0..5).flat_map(|n| [-MARGIN, 0.0, MARGIN].map(|into| touching(body, n, into))).collect();
+    let clock = Clock::new();
+    let mut found = Vec::new();
+    let before = clock.seconds();
+    for pose in (0..rounds).flat_map(|_| &poses) {
+        found.clear();
+        contacts_in(ContactMode::Surface, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
+        black_box(&found);
+    }
+    println!("{:.1} µs per query, mean of {} poses", 1e6 * (clock.seconds() - before) / (rounds * poses.len()) as f64, poses.len());
+}
+
+fn bunny() -> Option<Body> {
+    let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let folder = std::env::var_os("TUMBLE_MESHES").map(PathBuf::from).or_else(|| here.ancestors().map(|a| a.join("shared/meshes")).find(|p| p.is_dir()));
+    let Some(folder) = folder else {
+        println!("SKIPPED bunny: no shared/meshes above {} and TUMBLE_MESHES is not set", here.display());
+        return None;
+    };
+    let text = std::fs::read_to_string(folder.join("bunny.obj")).expect("bunny.obj in that folder");
+    Some(body("bunny", TriMesh::from_obj(&text).expect("a mesh")))
+}
+
+fn body(name: &str, mesh: TriMesh) -> Body {
+    let scale = 0.1 / mesh.diagonal();
+    let mesh = mesh.scaled(scale);
+    let clock = Clock::new();
+    let before = clock.seconds();
+    let (ours, _) = Shape::mesh(mesh, &TreeSettings::octree()).expect("a closed mesh");
+    let Shape::Mesh(solid) = &ours else { unreachable!("a mesh was made") };
+    let mesh = solid.mesh();
+    println!("{name}: {} triangles, shape made in {:.2} s of CPU", mesh.triangles.len(), clock.seconds() - before);
+    let theirs = ParryMesh::new(mesh.vertices.iter().map(vector).collect(), mesh.triangles.clone()).expect("a mesh");
+    Body { name: format!("{name} ({} triangles)", mesh.triangles.len()), ours, theirs }
+}
+
+fn to_parry(pose: &Pose) -> ParryPose {
+    let q = pose.rotation.coords;
+    ParryPose::from_parts(vector(&pose.translation.vector), Rotation::from_xyzw(q.x, q.y, q.z, q.w))
+}
+
+fn vector(v: &Vec3) -> Vector {
+    Vector::new(v.x, v.y, v.z)
+}
