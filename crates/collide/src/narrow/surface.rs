@@ -22,11 +22,12 @@
 //! search of a face we do not need, since edges and vertices of both bodies are exact.
 
 use super::reduce::Collector;
-use crate::surface::elements::Elements;
+use crate::surface::elements::{Edge, Elements};
 use crate::surface::field::MeshField;
 use crate::surface::{Feature, Field, Hit, OVERHANG, TOUCHING, facing};
 use crate::{Contact, Mat3, NormalFrom, Pose, SphereTree, Vec3};
 use arrayvec::ArrayVec;
+use std::cell::Cell;
 
 /// A body as the pass sees it that takes its elements.
 pub(super) enum Source<'a> {
@@ -84,7 +85,12 @@ struct Pass<'a> {
     size: f64,
     /// In the second pass, where the field is A's: the pose of A in B.
     second: Option<&'a Pose>,
+    /// What a mesh's field says of points of a mesh, by their names: each is the end of several edges.
+    seen: [Cell<Option<(u32, Hit)>>; SEEN],
 }
+
+/// Points that are remembered.
+const SEEN: usize = 128;
 
 /// A straight element in the frame of the field.
 struct Line<'a> {
@@ -94,6 +100,8 @@ struct Line<'a> {
     radius: f64,
     normals: &'a [Vec3],
     index: u32,
+    /// The edge of a mesh that it is.
+    edge: Option<&'a Edge>,
 }
 
 /// A look at a place on a line.
@@ -122,7 +130,7 @@ impl Look {
 impl<'a> Pass<'a> {
     fn new(pose: &'a Pose, other: &Body<'a>, size: f64, second: Option<&'a Pose>) -> Pass<'a> {
         let rotation = *pose.rotation.to_rotation_matrix().matrix();
-        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second }
+        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, seen: [const { Cell::new(None) }; SEEN] }
     }
 
     fn run(&self, source: &Source, found: &mut Collector) {
@@ -148,12 +156,12 @@ impl<'a> Pass<'a> {
             let at = self.place(&point.at);
             if self.field.bound(&at) <= found.limit() {
                 let normals: Normals = elements.normals_of(point).iter().map(|n| self.rotation * n).collect();
-                self.point(&at, 0.0, &normals, elements.ways_of(point), point.index, found);
+                self.vertex(&at, &normals, elements.ways_of(point), point.index, found);
             }
         }
         if !self.field.linear() {
             for edge in elements.edges_of(index) {
-                self.edge(&edge.ends, 0.0, &edge.normals, edge.index, found);
+                self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
             }
         }
         for child in ball.child_range() {
@@ -175,7 +183,7 @@ impl<'a> Pass<'a> {
             for k in (0..3).filter(|&k| corner >> k & 1 == 0) {
                 let ends = [corner, corner | 1 << k].map(|c| signs(c).component_mul(half));
                 let normals = [1, 2].map(|n| Vec3::ith((k + n) % 3, signs(corner)[(k + n) % 3]));
-                self.edge(&ends, 0.0, &normals, 3 * corner + k as u32, found);
+                self.edge(&ends, 0.0, &normals, 3 * corner + k as u32, None, found);
             }
         }
     }
@@ -186,7 +194,7 @@ impl<'a> Pass<'a> {
             self.core_point(&self.place(end), radius, n as u32, found);
         }
         if half_length > 0.0 && !self.field.linear() {
-            self.edge(&ends, radius, &[], 0, found);
+            self.edge(&ends, radius, &[], 0, None, found);
         }
     }
 
@@ -211,7 +219,27 @@ impl<'a> Pass<'a> {
         if self.field.bound(at) - radius > found.limit() {
             return;
         }
-        let hit = self.field.hit(at, normals, OVERHANG);
+        self.point_at(at, radius, self.field.hit(at, normals, OVERHANG), ways, index, found);
+    }
+
+    /// A point of a mesh, known to be in reach.
+    fn vertex(&self, at: &Vec3, normals: &[Vec3], ways: &[Vec3], index: u32, found: &mut Collector) {
+        self.point_at(at, 0.0, self.hit_of(at, Some(index), normals, OVERHANG), ways, index, found);
+    }
+
+    /// What the field says of a place that may have a name.
+    fn hit_of(&self, at: &Vec3, name: Option<u32>, normals: &[Vec3], beside: f64) -> Hit {
+        let (Some(mesh), Some(name)) = (self.mesh, name) else { return self.field.hit(at, normals, beside) };
+        let seen = &self.seen[name as usize % SEEN];
+        let nearest = match seen.get() {
+            Some((n, hit)) if n == name => hit,
+            _ => mesh.nearest(at),
+        };
+        seen.set(Some((name, nearest)));
+        mesh.hit_by(at, nearest, normals, beside)
+    }
+
+    fn point_at(&self, at: &Vec3, radius: f64, hit: Hit, ways: &[Vec3], index: u32, found: &mut Collector) {
         let down = self.rotation.tr_mul(&hit.normal);
         let closest = hit.feature == Feature::Face || ways.iter().all(|way| down.dot(way) >= -ASIDE);
         self.push_if(hit.facing && closest, at, radius, &hit, point_normal(&hit), u64::from(index), found);
@@ -249,14 +277,15 @@ impl<'a> Pass<'a> {
         }
     }
 
-    fn edge(&self, ends: &[Vec3; 2], radius: f64, normals: &[Vec3], index: u32, found: &mut Collector) {
+    #[allow(clippy::too_many_arguments)]
+    fn edge(&self, ends: &[Vec3; 2], radius: f64, normals: &[Vec3], index: u32, edge: Option<&Edge>, found: &mut Collector) {
         let [start, end] = ends.map(|p| self.place(&p));
         let (middle, length) = (0.5 * (start + end), (end - start).norm());
         if length <= 0.0 || self.field.bound(&middle) - 0.5 * length - radius > found.limit() {
             return;
         }
         let normals: Normals = normals.iter().map(|n| self.rotation * n).collect();
-        let line = Line { start, along: (end - start) / length, length, radius, normals: &normals, index };
+        let line = Line { start, along: (end - start) / length, length, radius, normals: &normals, index, edge };
         if self.field.convex() {
             let ends = [0.0, length].map(|s| self.look(&line, s));
             self.search(&line, ends[0], ends[1], found);
@@ -279,7 +308,9 @@ impl<'a> Pass<'a> {
     }
 
     fn look(&self, line: &Line, s: f64) -> Look {
-        let hit = self.field.hit(&line.at(s), line.normals, TOUCHING);
+        let end = if s == 0.0 { Some(0) } else if s == line.length { Some(1) } else { None };
+        let name = end.and_then(|end: usize| line.edge.map(|edge| edge.points[end]));
+        let hit = self.hit_of(&line.at(s), name, line.normals, TOUCHING);
         Look { s, slope: hit.normal.dot(&line.along), hit }
     }
 
@@ -295,6 +326,9 @@ impl<'a> Pass<'a> {
             _ => {}
         }
         if low.slope > -LEVEL || high.slope < LEVEL {
+            return;
+        }
+        if ends_will_do(line, &low, &high) {
             return;
         }
         let tolerance = 1e-9 * self.size;
@@ -400,7 +434,7 @@ impl<'a> Pass<'a> {
     fn cylinder(&self, radius: f64, half_length: f64, found: &mut Collector) {
         let ends = [-half_length, half_length].map(|z| Vec3::z() * z);
         if self.field.round() {
-            self.edge(&ends, radius, &[], 0, found);
+            self.edge(&ends, radius, &[], 0, None, found);
         }
         for side in 0..2 {
             let up = self.rotation.column(2) * if side == 0 { -1.0 } else { 1.0 };
@@ -538,6 +572,14 @@ fn meeting(low: &Look, high: &Look) -> (f64, f64) {
     let fall = high.hit.distance - low.hit.distance + low.slope * low.s - high.slope * high.s;
     let s = fall / (low.slope - high.slope);
     (s, low.hit.distance + low.slope * (s - low.s))
+}
+
+/// Whether an edge of a smooth surface is no deeper than one of its ends, which counts, by more than the stated error.
+fn ends_will_do(line: &Line, low: &Look, high: &Look) -> bool {
+    let Some(edge) = line.edge else { return false };
+    let end = if low.hit.distance < high.hit.distance { low } else { high };
+    let whole = low.s == 0.0 && high.s == line.length;
+    whole && end.hit.feature == Feature::Face && end.hit.facing && end.hit.distance - meeting(low, high).1 < edge.spared
 }
 
 /// What the normal of a point's contact turns with.

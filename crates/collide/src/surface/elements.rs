@@ -15,6 +15,9 @@ use nalgebra::ComplexField;
 
 /// `ε`: how much too large the gap of two crossing edges may be, as a part of the diagonal.
 pub(crate) const EDGE_ERROR: f64 = 2e-4;
+/// An edge is a smooth surface's if it turns by less, radians, and is shorter than this part of the diagonal.
+const SMOOTH: f64 = 0.5;
+const SHORT: f64 = 0.05;
 /// Normals of one vertex that are within this cosine of another one are left out.
 const ALIKE: f64 = 0.98;
 /// Normals kept per vertex at most.
@@ -38,6 +41,10 @@ pub(crate) struct Point {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Edge {
     pub ends: [Vec3; 2],
+    /// Names of the points at its ends.
+    pub points: [u32; 2],
+    /// Its own contact may be left out if an end is no further by this, metres: `ε` on a smooth surface, else 0.
+    pub spared: f64,
     /// Outward normals of its faces.
     pub normals: [Vec3; 2],
     /// Names it.
@@ -148,6 +155,8 @@ fn gather_edges(mesh: &TriMesh, face: &[Vec3], tree: &SphereTree) -> (Vec<(u32, 
         if !wanted {
             continue;
         }
+        let smooth = group.len() == 2 && turn < SMOOTH && length < SHORT * mesh.diagonal();
+        let spared = if smooth { error } else { 0.0 };
         for u in group {
             let t = mesh.triangles[u.face];
             let from = if u.forward { u.low } else { u.high };
@@ -155,7 +164,7 @@ fn gather_edges(mesh: &TriMesh, face: &[Vec3], tree: &SphereTree) -> (Vec<(u32, 
                 searched[u.face][k] = true;
             }
         }
-        edges.push((holder(tree, &ends), Edge { ends, normals, index: index as u32 }));
+        edges.push((holder(tree, &ends), Edge { ends, points: [group[0].low, group[0].high], spared, normals, index: index as u32 }));
     }
     (edges, searched)
 }

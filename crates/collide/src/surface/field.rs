@@ -36,6 +36,8 @@ const DEEPEST: f64 = 9.0;
 const SAME: f64 = 1e-11;
 /// As much of the squared distance as is along a face's normal counts as straight above the face.
 const ABOVE: f64 = 1.0 - 1e-6;
+/// Keeps a distance rounded to single precision below it.
+const BELOW: f64 = 1.0 - 2e-7;
 /// Cells and listed triangles at most; beyond, the tree of boxes answers.
 const MOST_CELLS: usize = 1 << 20;
 const MOST_LISTED: usize = 1 << 23;
@@ -64,6 +66,8 @@ pub(crate) struct MeshField {
     searched: Vec<[bool; 3]>,
     cells: Vec<Cell>,
     lists: Vec<u32>,
+    /// At most the distance of each listed triangle from its cell's centre; it rises along a list.
+    nearer: Vec<f32>,
     center: Vec3,
     half: f64,
     bounds: Aabb,
@@ -103,6 +107,7 @@ impl MeshField {
             searched,
             cells: vec![Cell { distance: 0.0, children: 0, first: 0, count: 0 }],
             lists: Vec::new(),
+            nearer: Vec::new(),
             center: 0.5 * (bounds.min + bounds.max),
             half: 0.5 * (bounds.max - bounds.min).max() + RIM * diagonal,
             bounds,
@@ -142,11 +147,18 @@ impl MeshField {
         Some((cell, center))
     }
 
-    /// The closest of the listed triangles; of those that share the closest point, the one that faces `p` most squarely.
-    fn closest(&self, p: &Vec3, list: &[u32]) -> Option<Closest> {
+    /// The closest of a cell's listed triangles; of those that share the closest point, the one that faces `p` most squarely.
+    ///
+    /// The list is in the order of the distance from the centre `c`: `dist(p, t) ≥ dist(c, t) − |p − c|` ends the search.
+    fn closest(&self, p: &Vec3, cell: &Cell, center: &Vec3) -> Option<Closest> {
         let mut best: Option<Closest> = None;
         let mut limit = f64::INFINITY;
-        for &t in list {
+        let mut furthest = f64::INFINITY;
+        let aside = (p - center).norm();
+        for (&t, &nearer) in self.list(cell).iter().zip(&self.nearer[cell.first as usize..]) {
+            if f64::from(nearer) > furthest {
+                break;
+            }
             let t = t as usize;
             let above = self.normals[t][0].dot(&(p - self.corners[t][0])).powi(2);
             if above > limit {
@@ -158,9 +170,32 @@ impl MeshField {
             if best.as_ref().is_none_or(better) {
                 best = Some(Closest { square, above, point, triangle: t, feature });
                 limit = square * (1.0 + SAME);
+                furthest = limit.sqrt() + aside;
             }
         }
         best
+    }
+
+    fn list(&self, cell: &Cell) -> &[u32] {
+        &self.lists[cell.first as usize..][..cell.count as usize]
+    }
+
+    /// The closest part of the surface, whatever an element faces.
+    pub fn nearest(&self, p: &Vec3) -> Hit {
+        let closest = self.locate(p).and_then(|(cell, center)| self.closest(p, cell, &center));
+        self.describe(p, &closest.unwrap_or_else(|| self.closest_of(p, self.boxes.closest(p).triangle)))
+    }
+
+    /// [`Field::hit`], told [`MeshField::nearest`].
+    pub fn hit_by(&self, p: &Vec3, hit: Hit, normals: &[Vec3], beside: f64) -> Hit {
+        let beside = beside * self.diagonal;
+        let faces = facing(normals, &hit.normal);
+        let clear = faces && (hit.feature == Feature::Face || hit.distance.abs() > beside);
+        if clear || hit.distance > beside {
+            return Hit { facing: clear, ..hit };
+        }
+        let list = self.locate(p).map_or(&[][..], |(cell, _)| self.list(cell));
+        self.behind(p, normals, list, hit.distance, beside).unwrap_or(Hit { facing: faces, ..hit })
     }
 
     fn closest_of(&self, p: &Vec3, triangle: usize) -> Closest {
@@ -287,18 +322,7 @@ impl Field for MeshField {
     }
 
     fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit {
-        let beside = beside * self.diagonal;
-        let list = self.locate(p).map_or(&[][..], |(cell, _)| &self.lists[cell.first as usize..][..cell.count as usize]);
-        let closest = self.closest(p, list).unwrap_or_else(|| {
-            let triangle = self.boxes.closest(p).triangle;
-            self.closest_of(p, triangle)
-        });
-        let hit = self.describe(p, &closest);
-        let clear = facing(normals, &hit.normal) && (hit.feature == Feature::Face || hit.distance.abs() > beside);
-        if clear || hit.distance > beside {
-            return Hit { facing: clear, ..hit };
-        }
-        self.behind(p, normals, list, hit.distance, beside).unwrap_or(Hit { facing: facing(normals, &hit.normal), ..hit })
+        self.hit_by(p, self.nearest(p), normals, beside)
     }
 
     fn convex(&self) -> bool {
@@ -327,6 +351,7 @@ impl Builder<'_> {
                 self.field.cells[index].first = self.field.lists.len() as u32;
                 self.field.cells[index].count = kept.len() as u32;
                 self.field.lists.extend(kept);
+                self.field.nearer.extend(near.iter().map(|n| (n.0 * BELOW) as f32));
             }
             return;
         }
