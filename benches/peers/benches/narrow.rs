@@ -20,7 +20,7 @@ use tumble_peers::clock::Clock;
 /// Margin, and what the bodies are apart or overlap by, metres.
 const MARGIN: f64 = 1e-3;
 /// Poses per row, of which the median counts.
-const POSES: u64 = 15;
+const POSES: u64 = 9;
 /// Seconds of CPU that one figure takes, about.
 const PATIENCE: f64 = 0.01;
 

@@ -294,14 +294,15 @@ impl<'a> Pass<'a> {
         }
     }
 
+    /// A piece that may be in reach.
     fn halve(&self, line: &Line, from: f64, to: f64, found: &mut Collector) {
-        let middle = 0.5 * (from + to);
-        if self.field.bound(&line.at(middle)) - 0.5 * (to - from) - line.radius > found.limit() {
-            return;
-        }
         if to - from > PIECE * self.size && to - from > 1e-3 * line.length {
-            self.halve(line, from, middle, found);
-            self.halve(line, middle, to, found);
+            let middle = 0.5 * (from + to);
+            for (from, to) in [(from, middle), (middle, to)] {
+                if self.field.bound(&line.at(0.5 * (from + to))) - 0.5 * (to - from) - line.radius <= found.limit() {
+                    self.halve(line, from, to, found);
+                }
+            }
         } else {
             self.search(line, self.look(line, from), self.look(line, to), found);
         }
@@ -316,7 +317,7 @@ impl<'a> Pass<'a> {
 
     /// The minimum between two looks, if it is not at one of them, and where the line leaves a face that it lies on.
     fn search(&self, line: &Line, mut low: Look, mut high: Look, found: &mut Collector) {
-        if high.slope - low.slope <= LEVEL {
+        if high.slope - low.slope <= LEVEL || ends_will_do(line, &low, &high) {
             return;
         }
         let mut on_face = low.lies() != high.lies();
@@ -326,9 +327,6 @@ impl<'a> Pass<'a> {
             _ => {}
         }
         if low.slope > -LEVEL || high.slope < LEVEL {
-            return;
-        }
-        if ends_will_do(line, &low, &high) {
             return;
         }
         let tolerance = 1e-9 * self.size;
@@ -579,7 +577,9 @@ fn ends_will_do(line: &Line, low: &Look, high: &Look) -> bool {
     let Some(edge) = line.edge else { return false };
     let end = if low.hit.distance < high.hit.distance { low } else { high };
     let whole = low.s == 0.0 && high.s == line.length;
-    whole && end.hit.feature == Feature::Face && end.hit.facing && end.hit.distance - meeting(low, high).1 < edge.spared
+    let turns = low.slope < 0.0 && high.slope > 0.0;
+    let least = if turns { meeting(low, high).1 } else { end.hit.distance };
+    whole && end.hit.feature == Feature::Face && end.hit.facing && end.hit.distance - least < edge.spared
 }
 
 /// What the normal of a point's contact turns with.

@@ -8,6 +8,9 @@
 //! `g + L₁·θ₂/4` or less from the other body (its slopes to the two sides differ by at most `θ₂`), and the other way round.
 //! If both edges were left out, the least of these is at most `√(θ₁L₁·θ₂L₂)/4 ≤ ε`: a finely triangulated smooth surface
 //! needs only its vertices, and the gap is overestimated by `ε` at most (to first order in θ).
+//!
+//! A short edge that turns little is [`Edge::spared`]: it makes no contact of its own where one of its ends is on a face and at most `ε`
+//! further from the other body. The least gap is then known to the same `ε`.
 
 use crate::mesh::{edge_groups, pseudonormals};
 use crate::{SphereTree, TriMesh, Vec3};
@@ -17,7 +20,7 @@ use nalgebra::ComplexField;
 pub(crate) const EDGE_ERROR: f64 = 2e-4;
 /// An edge is a smooth surface's if it turns by less, radians, and is shorter than this part of the diagonal.
 const SMOOTH: f64 = 0.5;
-const SHORT: f64 = 0.05;
+const SHORT: f64 = 0.03;
 /// Normals of one vertex that are within this cosine of another one are left out.
 const ALIKE: f64 = 0.98;
 /// Normals kept per vertex at most.

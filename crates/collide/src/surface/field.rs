@@ -117,13 +117,13 @@ impl MeshField {
             diagonal,
             around: AROUND * diagonal,
         };
-        let all: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+        let all: Vec<(f64, u32)> = (0..mesh.triangles.len() as u32).map(|t| (0.0, t)).collect();
         let (center, half) = (field.center, field.half);
         let lengths = (0..all.len()).map(|t| { let [a, b, _] = mesh.corners(t); (b - a).norm() });
         let mean = lengths.sum::<f64>() / all.len() as f64;
         let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
         let mut builder = Builder { field: &mut field, deepest };
-        builder.cell(0, center, half, &all, 0);
+        builder.cell(0, center, half, &all, f64::INFINITY, 0);
         field
     }
 
@@ -331,26 +331,28 @@ impl Field for MeshField {
 }
 
 impl Builder<'_> {
-    fn cell(&mut self, index: usize, center: Vec3, half: f64, list: &[u32], depth: u32) {
-        let mut near: Vec<(f64, u32)> = list
-            .iter()
-            .map(|&t| ((closest_on_triangle(&center, &self.field.corners[t as usize]).0 - center).norm(), t))
-            .collect();
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let Some(&(least, first)) = near.first() else { return };
-        self.field.cells[index].distance = self.field.describe(&center, &self.field.closest_of(&center, first as usize)).distance;
+    /// `list`: the triangles that count in the parent, with their distances from its centre, which is `moved` from this one.
+    fn cell(&mut self, index: usize, center: Vec3, half: f64, list: &[(f64, u32)], moved: f64, depth: u32) {
+        let from_center = |t: u32| (closest_on_triangle(&center, &self.field.corners[t as usize]).0 - center).norm();
+        let order = |a: &&(f64, u32), b: &&(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         let reach = 3.0_f64.sqrt() * half;
+        let Some(guess) = list.iter().min_by(order) else { return };
+        // no more than this counts, and no triangle came closer than it was moved
+        let most = from_center(guess.1) + 2.0 * reach + self.field.around;
+        let mut near: Vec<(f64, u32)> = list.iter().filter(|n| n.0 - moved <= most).map(|n| (from_center(n.1), n.1)).collect();
+        let Some(&(least, first)) = near.iter().min_by(order) else { return };
+        self.field.cells[index].distance = self.field.describe(&center, &self.field.closest_of(&center, first as usize)).distance;
         let facing_first = self.field.normals[first as usize][0];
         let turned = |t: u32| self.field.normals[t as usize][0].dot(&facing_first) < OTHER_WAY;
         near.retain(|&(d, t)| d <= least + 2.0 * reach || (d <= least + 2.0 * reach + self.field.around && turned(t)));
-        let kept: Vec<u32> = near.iter().map(|n| n.1).collect();
-        let full = self.field.cells.len() > MOST_CELLS || self.field.lists.len() + kept.len() > MOST_LISTED;
+        let full = self.field.cells.len() > MOST_CELLS || self.field.lists.len() + near.len() > MOST_LISTED;
         let far = least > 2.0 * reach;
-        if kept.len() <= SHORT || depth == self.deepest || far || full {
-            if kept.len() <= LONG && !full {
+        if near.len() <= SHORT || depth == self.deepest || far || full {
+            if near.len() <= LONG && !full {
+                near.sort_unstable_by(|a, b| order(&a, &b));
                 self.field.cells[index].first = self.field.lists.len() as u32;
-                self.field.cells[index].count = kept.len() as u32;
-                self.field.lists.extend(kept);
+                self.field.cells[index].count = near.len() as u32;
+                self.field.lists.extend(near.iter().map(|n| n.1));
                 self.field.nearer.extend(near.iter().map(|n| (n.0 * BELOW) as f32));
             }
             return;
@@ -360,7 +362,7 @@ impl Builder<'_> {
         self.field.cells.extend([Cell { distance: 0.0, children: 0, first: 0, count: 0 }; 8]);
         for octant in 0..8 {
             let side = Vec3::from_fn(|k, _| if octant >> k & 1 == 1 { 0.5 } else { -0.5 });
-            self.cell(children + octant, center + side * half, 0.5 * half, &kept, depth + 1);
+            self.cell(children + octant, center + side * half, 0.5 * half, &near, 0.5 * reach, depth + 1);
         }
     }
 }
