@@ -22,7 +22,7 @@ const MARGIN: f64 = 1e-3;
 /// Poses per row, of which the median counts.
 const POSES: u64 = 5;
 /// Seconds of CPU that one figure takes, about.
-const PATIENCE: f64 = 0.01;
+const PATIENCE: f64 = 0.15;
 
 struct Body {
     name: String,
