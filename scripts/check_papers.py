@@ -18,7 +18,7 @@ CODE = re.compile(r"`([^`\n]+)`")
 # What in backticks is meant as a path of this repository: it begins with one of its folders, or is one of its root files.
 PATHLIKE = re.compile(r"^[\w.@-]+(?:/[\w.@*-]+)*/?$")
 RUN = re.compile(r"^(?:cargo run --release(?: --quiet)?(?: --locked)? -- |tumble |target/release/tumble )(.*)$")
-TEST = re.compile(r"^\w+::([a-z0-9]+(?:_[a-z0-9]+){2,})$")
+TEST = re.compile(r"^[a-z]\w*::([a-z0-9]+(?:_[a-z0-9]+){2,})$")
 MADE = ("out/", "target/")  # what builds and runs leave behind
 BUILT = {".git", "target", "out", "__pycache__", ".venv"}
 

@@ -12,6 +12,10 @@ case "${1:-}" in
         ;;
 esac
 
+# Sphere trees that tests build stay in this checkout.
+TUMBLE_CACHE="$PWD/target/trees"
+export TUMBLE_CACHE
+
 tests="--release --workspace --locked --lib --bins --tests --examples"
 
 stage set-up scripts/setup.sh

@@ -20,6 +20,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     quiet_drivers();
+    end_with_the_reader();
     let outcome = match Tumble::parse().command {
         Command::Run(options) => run::run(&options),
         Command::Check(options) => check::check(&options),
@@ -43,6 +44,18 @@ fn quiet_drivers() {
         // SAFETY: the first thing that the process does; no other thread exists that could read the environment.
         unsafe { std::env::set_var("XDG_RUNTIME_DIR", std::env::temp_dir()) };
     }
+}
+
+/// Who reads what is printed may have enough before the end, as `head` has: the process then ends, without a word.
+fn end_with_the_reader() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let message = panic.payload().downcast_ref::<String>();
+        if message.is_some_and(|m| m.starts_with("failed printing to stdout") && m.contains("Broken pipe")) {
+            std::process::exit(0);
+        }
+        usual(panic);
+    }));
 }
 
 fn scenes() -> Result<(), Failure> {

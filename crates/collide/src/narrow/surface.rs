@@ -254,7 +254,7 @@ impl<'a> Pass<'a> {
     #[allow(clippy::too_many_arguments)]
     fn push_if(&self, fits: bool, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64, found: &mut Collector) {
         let gap = hit.distance - radius;
-        if !(gap <= found.limit()) {
+        if gap.is_nan() || gap > found.limit() {
             return;
         }
         let contact = Contact {
@@ -362,7 +362,7 @@ impl<'a> Pass<'a> {
         let (a, b) = (high.slope, -low.slope);
         let sum = low.hit.normal * a + high.hit.normal * b;
         let length = sum.norm();
-        if !(length > 1e-9 * (a + b)) {
+        if length.is_nan() || length <= 1e-9 * (a + b) {
             return;
         }
         if self.look(line, s).hit.distance - level > 1e-6 * self.size {

@@ -131,7 +131,8 @@ impl MeshField {
     fn locate(&self, p: &Vec3) -> Option<(&Cell, Vec3)> {
         let (mut center, mut half, mut cell) = (self.center, self.half, &self.cells[0]);
         // written so that what is not a number is outside
-        if !((p - center).amax() <= half) {
+        let out = (p - center).amax();
+        if out.is_nan() || out > half {
             return None;
         }
         while cell.children > 0 {

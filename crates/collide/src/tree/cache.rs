@@ -190,10 +190,19 @@ impl<'a> Entry<'a> {
     }
 }
 
+/// Whether a file has a name that only this cache gives: 64 hexadecimal digits and what a tree or an unfinished one ends in.
+fn is_ours(path: &Path) -> bool {
+    let Some((name, rest)) = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.split_at_checked(64)) else { return false };
+    let hexadecimal = name.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b));
+    let mut parts = rest.split('.').skip(1);
+    let number = |part: Option<&str>| part.is_some_and(|p| !p.is_empty() && p.bytes().all(|b| b.is_ascii_digit()));
+    let unfinished = number(parts.next()) && number(parts.next()) && parts.next() == Some(UNFINISHED) && parts.next().is_none();
+    hexadecimal && (rest.strip_prefix('.') == Some(EXTENSION) || unfinished)
+}
+
 /// Removes our files, oldest first, until the rest has at most `most_bytes`. What another process removes meanwhile is gone, and as well.
 fn remove_oldest(folder: &Path, most_bytes: u64) {
-    let ours = |path: &Path| path.extension().is_some_and(|e| e == EXTENSION || e == UNFINISHED);
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).filter(|path| ours(path));
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).filter(|path| is_ours(path));
     let mut files: Vec<(SystemTime, PathBuf, u64)> =
         entries.filter_map(|path| fs::metadata(&path).ok().filter(fs::Metadata::is_file).and_then(|m| Some((m.modified().ok()?, path, m.len())))).collect();
     files.sort_unstable();

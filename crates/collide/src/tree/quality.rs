@@ -142,7 +142,7 @@ impl<'a> Solid<'a> {
         Solid {
             distance: MeshDistance::new(mesh),
             diagonal: mesh.diagonal(),
-            volume: mesh.signed_volume().abs(),
+            volume: mesh.union_mass_properties(1.0).mass.abs(),
             surface: samples::on_surface(mesh, settings.surface_samples),
             mesh,
             settings,

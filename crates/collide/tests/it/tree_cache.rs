@@ -195,3 +195,20 @@ fn the_oldest_go_first() {
     assert_eq!(found, [true, true, true]);
     assert!(!cached(&boxes[0], &keep_three).found);
 }
+
+#[test]
+fn files_of_others_stay_whatever_their_names_end_in() {
+    let folder = Folder::new();
+    let ours = cached(&TriMesh::box_(Vec3::repeat(1.0)), &folder.cache());
+    assert!(!ours.found);
+    let kept = folder.files();
+    let hex = "0123456789abcdef".repeat(4);
+    let unfinished = folder.0.join(format!("{hex}.7.1.tmp"));
+    let others = ["oak.tree".to_owned(), "work.tmp".to_owned(), format!("{hex}.tree.tmp"), format!("{hex}0.tree"), format!("{hex}.x.1.tmp"), hex.clone()];
+    others.iter().for_each(|name| fs::write(folder.0.join(name), vec![0; 1000]).unwrap());
+    fs::write(&unfinished, vec![0; 1000]).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    cached(&TriMesh::box_(Vec3::repeat(2.0)), &folder.cache().with_most_bytes(1));
+    assert!(others.iter().all(|name| folder.0.join(name).exists()));
+    assert!(!kept[0].exists() && !unfinished.exists());
+}

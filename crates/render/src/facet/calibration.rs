@@ -53,8 +53,8 @@ const YELLOW: [u8; 4] = [255, 220, 64, 255];
 /// The pattern on a facet: both eyes where it is in stereo (each says which it is), mirrored as the facet is, not bent or darkened.
 pub fn calibration_picture(cave: &Cave, facet: &Facet, pattern: CalibrationPattern) -> Image {
     let screen = &cave.screens[facet.screen];
-    let eyes = facet.stereo.sides().iter().map(|side| one_eye(cave, facet, screen, pattern, *side)).collect();
-    flipped(combined(eyes, facet.stereo), facet.flip)
+    let eyes = facet.stereo.sides().iter().map(|side| flipped(one_eye(cave, facet, screen, pattern, *side), facet.flip)).collect();
+    combined(eyes, facet.stereo)
 }
 
 fn one_eye(cave: &Cave, facet: &Facet, screen: &Screen, pattern: CalibrationPattern, side: f64) -> Image {

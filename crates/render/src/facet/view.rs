@@ -83,7 +83,8 @@ impl CaveView {
         if let Some(blend) = index.and_then(|i| self.blends[i].as_ref()) {
             eyes.iter_mut().for_each(|eye| blend.apply(eye));
         }
-        Ok(flipped(combined(eyes, facet.stereo), facet.flip))
+        // each eye by itself: mirroring the whole would give each the other's half
+        Ok(combined(eyes.into_iter().map(|eye| flipped(eye, facet.flip)).collect(), facet.stereo))
     }
 
     /// All facets unfolded into one picture of at most `most` pixels: what the point between the eyes sees, neither bent nor mirrored.

@@ -175,8 +175,11 @@ fn corner(word: &str, places: &[[f64; 2]], sources: &[[f64; 2]]) -> Result<Corne
     Ok((pick(place, places, "v")?, pick(source, sources, "vt")?))
 }
 
-/// Size and byte order, and the floats.
-fn pfm_header(bytes: &[u8]) -> Result<(([usize; 2], bool), &[u8]), String> {
+/// Size, and whether the floats are little-endian.
+type PfmHeader = ([usize; 2], bool);
+
+/// The header, and the floats.
+fn pfm_header(bytes: &[u8]) -> Result<(PfmHeader, &[u8]), String> {
     let mut words = Vec::new();
     let mut at = 0;
     while words.len() < 4 {

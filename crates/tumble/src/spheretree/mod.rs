@@ -16,6 +16,9 @@ use tumble::scene::read_solid;
 pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
     match (&options.mesh, &options.urdf) {
         (_, Some(urdf)) => robot::spherize(urdf, options),
+        (Some(_), None) if options.planner.is_some() || options.spheres.is_some() => {
+            Err(Failure::input("--planner and --spheres go with --urdf ROBOT, not with a mesh"))
+        }
         (Some(mesh), None) => of_mesh(mesh, options),
         (None, None) => Err(Failure::input("wanted a mesh, or --urdf ROBOT")),
     }
@@ -36,7 +39,8 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     let file = TreeFile { name, mesh: MeshId::of(&mesh), settings, stages: built.stages, quality, tree: built.tree };
     if !options.quiet {
         let from = if built.found { "from the cache".into() } else { format!("built in {seconds:.2} s") };
-        println!("{}: {} triangles, volume {:.6e} m³, diagonal {:.6} m; {from}", path.display(), mesh.triangles.len(), mesh.signed_volume(), mesh.diagonal());
+        let volume = mesh.union_mass_properties(1.0).mass;
+        println!("{}: {} triangles, volume {volume:.6e} m³, diagonal {:.6} m; {from}", path.display(), mesh.triangles.len(), mesh.diagonal());
         print!("{}", table::table(&file, options.verbose));
     }
     if let Some(output) = &options.output {
