@@ -9,7 +9,7 @@ use crate::{Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, Sph
 pub struct MeshShape {
     mesh: TriMesh,
     tree: SphereTree,
-    surface: Surface,
+    surface: Option<Surface>,
     /// At density 1.
     unit_mass: MassProperties,
     bounding_radius: f64,
@@ -56,7 +56,9 @@ impl MeshShape {
         let tree = tree_of(&mesh)?;
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
         let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);
-        let surface = Surface::new(&mesh, &tree);
+        // buried faces are no surface of the union: such a mesh stands for itself by its balls
+        let buried = report.crossing_faces > 0 || (unit_mass.mass - mesh.signed_volume()).abs() > 1e-9 * unit_mass.mass;
+        let surface = (!buried).then(|| Surface::new(&mesh, &tree));
         Ok((MeshShape { mesh, tree, surface, unit_mass, bounding_radius, leaf_radius, report }, offset))
     }
 
@@ -70,9 +72,9 @@ impl MeshShape {
         &self.tree
     }
 
-    /// Elements and field of the `surface` contact mode.
-    pub(crate) fn surface(&self) -> &Surface {
-        &self.surface
+    /// Elements and field of the `surface` contact mode; `None` where shells of the mesh cross or hold each other, which then collides by its balls.
+    pub(crate) fn surface(&self) -> Option<&Surface> {
+        self.surface.as_ref()
     }
 
     /// What was found and mended when the mesh was read; its notes are for the user.

@@ -90,7 +90,7 @@ fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose
         (Box { half_extents }, HalfSpace) => half_space::cuboid(half_extents, pose_a, pose_b, margin, out),
         (HalfSpace, HalfSpace) => {}
         (Cylinder(c), HalfSpace) => cylinder::half_space((c.radius(), c.half_length()), pose_a, pose_b, margin, out),
-        _ if mode == ContactMode::Surface => with_body(a, &mut |a| {
+        _ if mode == ContactMode::Surface && has_surface(a) && has_surface(b) => with_body(a, &mut |a| {
             with_body(b, &mut |b| surface::surface(a, pose_a, b, pose_b, margin, out))
         }),
         _ => match (a.tree(), b.tree()) {
@@ -100,6 +100,11 @@ fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose
             _ => debug_assert!(false, "pair out of order"),
         },
     }
+}
+
+/// Whether a shape can collide by its surface: all but meshes with buried faces.
+fn has_surface(shape: &Shape) -> bool {
+    !matches!(shape, Shape::Mesh(mesh) if mesh.surface().is_none())
 }
 
 /// What the `surface` mode knows of a shape.
@@ -121,7 +126,7 @@ fn with_body(shape: &Shape, then: &mut dyn FnMut(&Body)) {
             go(Source::Cylinder { radius, half_length }, &CylinderField { radius, half_length })
         }
         Shape::Mesh(mesh) => {
-            let surface = mesh.surface();
+            let Some(surface) = mesh.surface() else { return };
             let source = Source::Mesh(mesh.tree(), &surface.elements);
             then(&Body { source, field: &surface.field, mesh: Some(&surface.field), radius })
         }
