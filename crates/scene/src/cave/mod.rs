@@ -12,7 +12,7 @@
 //! let cave = tumble_scene::cave::resolve_cave("cube4")?.load()?;
 //! assert_eq!(cave.facets.len(), 4);
 //! let error = tumble_scene::cave::Cave::parse("[[screen]]\nnme = \"front\"\n", "my.toml").unwrap_err();
-//! assert!(error.to_string().starts_with("my.toml:2:1: unknown key `nme` in screen 1; did you mean `name`?"));
+//! assert!(error.to_string().contains("my.toml:2:1: unknown key `nme` in screen 1; did you mean `name`?"));
 //! # Ok::<(), tumble_scene::cave::CaveError>(())
 //! ```
 
