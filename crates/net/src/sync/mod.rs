@@ -1,0 +1,3 @@
+//! NetSync: one server simulates, one process per facet draws, and every facet shows the same frame (thesis §IV.A.6, §IV.C).
+
+pub mod transport;
