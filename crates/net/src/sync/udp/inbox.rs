@@ -37,8 +37,6 @@ pub struct Inbox {
     ready: VecDeque<(Delivery, Vec<u8>)>,
     ready_bytes: usize,
     superseded: u64,
-    /// A message became complete since the last look.
-    completed: bool,
 }
 
 impl Inbox {
@@ -51,18 +49,12 @@ impl Inbox {
             ready: VecDeque::new(),
             ready_bytes: 0,
             superseded: 0,
-            completed: false,
         }
     }
 
     /// What an acknowledgement says: messages before these are complete.
     pub fn complete(&self) -> [u32; 2] {
         self.next
-    }
-
-    /// Whether a message became complete since this was asked last.
-    pub fn take_completed(&mut self) -> bool {
-        std::mem::take(&mut self.completed)
     }
 
     /// Newest messages that a later one replaced; counted since this was asked last.
@@ -143,7 +135,6 @@ impl Inbox {
         if !self.assemblies[channel].get(&part.message).is_some_and(Assembly::whole) {
             return;
         }
-        self.completed = true;
         if part.channel == Channel::Newest && let Some(assembly) = self.assemblies[channel].remove(&part.message) {
             self.held -= assembly.held();
             let gone: Vec<u32> = self.assemblies[channel].keys().copied().filter(|k| before(*k, part.message)).collect();

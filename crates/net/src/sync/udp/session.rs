@@ -12,9 +12,9 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Packets that may arrive before they are acknowledged, while no message becomes complete.
+/// Packets that may arrive before they are acknowledged at once.
 const PACKETS_PER_ACK: u32 = 8;
-/// How long an acknowledgement may wait for company.
+/// How long an acknowledgement may wait for a message that it can travel with: what is answered at once costs no packet of its own.
 const ACK_DELAY: Duration = Duration::from_micros(500);
 const BODY: usize = MAX_DATAGRAM - HEADER - TAG;
 
@@ -110,8 +110,7 @@ impl Session {
         }
         if wants_ack {
             self.unacknowledged += 1;
-            let at_once = self.inbox.take_completed() || self.unacknowledged >= PACKETS_PER_ACK;
-            let due = if at_once { now } else { now + ACK_DELAY };
+            let due = if self.unacknowledged >= PACKETS_PER_ACK { now } else { now + ACK_DELAY };
             self.ack_due = Some(self.ack_due.map_or(due, |old| old.min(due)));
         }
         Ok(())
