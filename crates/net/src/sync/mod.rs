@@ -63,9 +63,11 @@ pub mod publisher;
 mod puppet;
 pub mod quantise;
 pub mod server;
+pub mod shm;
 pub mod simulate;
 pub mod table;
 pub mod transport;
+pub mod udp;
 mod viewer;
 pub mod wire;
 
