@@ -2,9 +2,11 @@
 
 mod bodies;
 mod core;
+mod pull;
 mod snapshot;
 
 pub use self::core::{ContactPoint, Core, StepError};
+pub use pull::Pull;
 pub use snapshot::SnapshotError;
 
 use crate::detect::{Owner, Scratch, WarmStarts};
