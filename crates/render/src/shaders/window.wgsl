@@ -1,7 +1,7 @@
 // A rectangle of one picture into a rectangle of another, pixel by pixel.
 struct Place {
-    to: vec4f,   // upper left corner and size, pixels of the target
-    from: vec4f, // upper left corner in the source; z, w: 1 where mirrored
+    rect: vec4f, // upper left corner and size, pixels of the target
+    source: vec4f, // upper left corner in the source; z, w: 1 where mirrored
     how: vec4f,  // x: 1 where the target keeps numbers as they are and wants sRGB
 };
 @group(0) @binding(0) var<uniform> place: Place;
@@ -18,9 +18,9 @@ fn srgb(c: vec3f) -> vec3f {
 
 @fragment
 fn fs_place(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    let p = floor(at.xy - place.to.xy);
-    let mirrored = place.to.zw - vec2f(1.0) - p;
-    let q = select(p, mirrored, place.from.zw > vec2f(0.5));
-    let c = textureLoad(picture, vec2i(q + place.from.xy), 0);
+    let p = floor(at.xy - place.rect.xy);
+    let mirrored = place.rect.zw - vec2f(1.0) - p;
+    let q = select(p, mirrored, place.source.zw > vec2f(0.5));
+    let c = textureLoad(picture, vec2i(q + place.source.xy), 0);
     return vec4f(select(c.rgb, srgb(c.rgb), place.how.x > 0.5), c.a);
 }

@@ -58,6 +58,8 @@ pub struct Viewer {
     stale: bool,
     ended: bool,
     shown: u64,
+    /// Of the window.
+    size_px: [u32; 2],
     times: Times,
 }
 
@@ -137,6 +139,7 @@ impl Viewer {
             stale: true,
             ended: false,
             shown: 0,
+            size_px: [0; 2],
             times: Times { turn: now, picture: None, told: None },
             world,
         })
@@ -145,7 +148,7 @@ impl Viewer {
     /// After the window is closed: the last status line, and the picture of the end if it is wanted.
     pub fn finish(&mut self) -> Result<Option<Image>, Failure> {
         if self.log.wanted() {
-            let status = self.status([0, 0]);
+            let status = self.status();
             self.log.tell(status, true)?;
         }
         match self.trouble.take() {
@@ -314,7 +317,7 @@ impl Viewer {
         Ok(())
     }
 
-    fn status(&self, size_px: [u32; 2]) -> Status {
+    fn status(&self) -> Status {
         let held = self.hand.as_ref().and_then(|hand| hand.held(&self.world));
         Status {
             frame: self.world.frame(),
@@ -323,7 +326,7 @@ impl Viewer {
             speed: self.pace.speed(),
             behind_s: self.pace.behind_s,
             shown: self.shown,
-            size_px,
+            size_px: self.size_px,
             eye_m: self.user.eye(),
             forward: self.user.forward(),
             camera: self.presets.name().to_string(),
@@ -338,12 +341,12 @@ impl Viewer {
         }
     }
 
-    fn tell(&mut self, now: Instant, size_px: [u32; 2]) -> Result<(), Failure> {
+    fn tell(&mut self, now: Instant) -> Result<(), Failure> {
         if !self.log.wanted() {
             return Ok(());
         }
         let due = self.times.told.is_none_or(|told| now - told >= IDLE);
-        let status = self.status(size_px);
+        let status = self.status();
         if due {
             self.times.told = Some(now);
         }
@@ -366,10 +369,9 @@ impl Viewer {
 impl WindowApp for Viewer {
     type Error = Failure;
 
-    fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+    fn opened(&mut self, _screen: &mut Screen) -> Result<(), Failure> {
         // opening took its time; the simulation starts now
         self.times.turn = Instant::now();
-        let _ = screen;
         Ok(())
     }
 
@@ -411,6 +413,7 @@ impl WindowApp for Viewer {
 
     fn turn(&mut self, screen: &mut Screen) -> Result<Next, Failure> {
         let now = Instant::now();
+        self.size_px = screen.size_px();
         let passed = (now - self.times.turn).as_secs_f64();
         self.times.turn = now;
         if self.user.moves() {
@@ -428,7 +431,7 @@ impl WindowApp for Viewer {
         if self.stale || self.limits.pictures.is_some() {
             self.draw(screen)?;
         }
-        self.tell(now, screen.size_px())?;
+        self.tell(now)?;
         if self.is_over() {
             self.take_last(screen)?;
             return Ok(Next::End);
