@@ -8,3 +8,4 @@ mod outside;
 mod recover;
 mod roundtrip;
 mod support;
+mod sync;
