@@ -215,3 +215,32 @@ fn the_hash_is_read_from_the_world() {
     assert_ne!(pair.mirror.hash(), hash);
     assert_ne!(pair.mirror.hash(), published.hash, "the time differs: 0 here, a step there");
 }
+
+/// One bit of anything that can be seen makes another scene; what cannot be seen does not.
+#[test]
+fn the_hash_of_a_scene_sees_what_can_be_seen() {
+    use tumble_net::sync::scene_hash;
+    let hash = |change: &dyn Fn(&mut World)| {
+        let mut world = scene();
+        change(&mut world);
+        scene_hash("text", &world)
+    };
+    let same = hash(&|_| {});
+    assert_eq!(same, scene_hash("text", &scene()));
+    assert_ne!(same, scene_hash("text ", &scene()));
+    let find = |w: &World, name: &str| w.find(name).unwrap();
+    let up = |w: &mut World| w.set_pose(find(w, "ball 0"), Pose::translation(0.0, 0.0, 1.0 + f64::EPSILON)).unwrap();
+    let gone = |w: &mut World| drop(w.remove(find(w, "post")).unwrap());
+    let dead = |w: &mut World| w.set_alive(find(w, "post"), false).unwrap();
+    let wider = |w: &mut World| {
+        let id = find(w, "ball 4");
+        w.remove(id).unwrap();
+        let pose = Pose::translation(1.2, 0.0, 1.8);
+        w.add(RigidBody::with_mass("ball 4", Shape::sphere(0.1000001).unwrap(), 1.0).unwrap().at(pose)).unwrap();
+    };
+    let changes: [&dyn Fn(&mut World); 4] = [&up, &gone, &dead, &wider];
+    let hashes: Vec<_> = changes.iter().map(|change| hash(*change)).collect();
+    assert!(hashes.iter().all(|h| *h != same) && (0..4).all(|k| !hashes[..k].contains(&hashes[k])));
+    let faster = |w: &mut World| w.set_velocity(find(w, "ball 0"), Vec3::x(), Vec3::zeros()).unwrap();
+    assert_eq!(hash(&faster), same);
+}
