@@ -4,6 +4,7 @@ use super::facet::{FacetOptions, FacetSession, Task};
 use super::input::Input;
 use super::messages::FacetCounts;
 use super::publisher::PublishError;
+use super::recording::Recorded;
 use super::server::{SeatCounts, ServerEvent, ServerOptions, ServerSession, Standing};
 use super::transport::{FacetLink, FacetNumber, LinkCounters, LinkError, ServerLink};
 use super::viewer::Viewer;
@@ -67,6 +68,25 @@ impl<L: ServerLink> Server<L> {
             self.turn(Duration::from_millis(5))?;
         }
         Ok(frame)
+    }
+
+    /// Publishes a frame as it was recorded, and waits like [`frame`](Self::frame).
+    ///
+    /// # Errors
+    /// The link's.
+    pub fn replay(&mut self, recorded: &Recorded) -> Result<(), SessionError> {
+        self.turn(Duration::ZERO)?;
+        self.session.publish_recorded(self.now(), recorded);
+        self.flush()?;
+        while !self.session.idle() {
+            self.turn(Duration::from_millis(5))?;
+        }
+        Ok(())
+    }
+
+    /// The session, to be asked.
+    pub fn session(&self) -> &ServerSession {
+        &self.session
     }
 
     /// Looks after the link until `until` from the start ([`now`](Self::now)): the time between two frames.

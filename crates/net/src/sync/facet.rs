@@ -12,6 +12,7 @@ use super::input::Input;
 use super::messages::{Done, FacetCounts, Join, Refusal, count};
 use super::mirror::Mirror;
 use super::server::Pace;
+use super::table::Snapshot;
 use super::transport::{Delivery, LinkEvent};
 use super::viewer::Viewer;
 use super::wire::{Fault, HEADER_BYTES, Hash, Header, Kind, VERSION, later, message, open};
@@ -115,6 +116,8 @@ pub struct FacetSession {
     pending: Option<Pending>,
     /// Came before its list of objects, or before the answer to JOIN.
     early: Option<Pending>,
+    /// A list of objects that came while a frame is being drawn: it waits, since that frame is of the old one.
+    list: Option<Pending>,
     /// Applied, and being drawn: frame and when it came.
     drawing: Option<(u64, Duration)>,
     /// Drawn: frame, what READY said, when it was drawn.
@@ -131,7 +134,7 @@ impl FacetSession {
     pub fn new(options: FacetOptions, base: World) -> FacetSession {
         let mut session = FacetSession {
             options, mirror: Mirror::new(base), phase: Phase::Joining, lost: false, run: 0, join: 0, asked: None, heard: Duration::ZERO,
-            beaten: Duration::ZERO, resynced: None, listed: None, newest: None, pending: None, early: None, drawing: None, held: None, show: false,
+            beaten: Duration::ZERO, resynced: None, listed: None, newest: None, pending: None, early: None, list: None, drawing: None, held: None, show: false,
             shown: None, counts: FacetCounts::default(), out: Vec::new(), close: false,
         };
         session.join_anew();
@@ -200,6 +203,11 @@ impl FacetSession {
         self.show = self.options.pace == Pace::Latest || self.pending.is_some();
         if self.options.pace == Pace::Lockstep {
             self.answer(Kind::Ready, frame, &done);
+        }
+        if let Some(Pending { header, message, .. }) = self.list.take()
+            && self.on_snapshot(now, &header, &message).is_err()
+        {
+            count(&mut self.counts.refused);
         }
     }
 
@@ -274,7 +282,7 @@ impl FacetSession {
         self.options.seed = self.options.seed.wrapping_add(1);
         (self.phase, self.run, self.join, self.asked) = (Phase::Joining, 0, mixed(self.options.seed), None);
         (self.listed, self.newest, self.resynced) = (None, None, None);
-        (self.pending, self.early, self.drawing, self.held, self.show, self.shown) = (None, None, None, None, false, None);
+        (self.pending, self.early, self.list, self.drawing, self.held, self.show, self.shown) = (None, None, None, None, None, false, None);
     }
 
     fn on_message(&mut self, now: Duration, bytes: &[u8]) {
@@ -299,7 +307,13 @@ impl FacetSession {
         let about_us = header.join == self.join;
         let live = self.phase == Phase::Live && header.run == self.run;
         match header.kind {
-            Kind::Snapshot if about_us && (live || self.phase == Phase::Joining) => return self.on_snapshot(now, &header, payload),
+            Kind::Snapshot if about_us && (live || self.phase == Phase::Joining) => {
+                if self.drawing.is_some() {
+                    self.list = Some(Pending { header, message: payload.to_vec(), arrived: now });
+                } else {
+                    self.on_snapshot(now, &header, payload)?;
+                }
+            }
             Kind::Refused if about_us => self.phase = Phase::Over(Over::Refused(Refusal::read(payload)?.0)),
             Kind::Rejoin if about_us && self.phase == Phase::Live => self.lose(),
             Kind::Rejoin if about_us => {}
@@ -322,6 +336,10 @@ impl FacetSession {
         self.heard = now;
         if let Some(listed) = self.listed.filter(|listed| !later(header.frame, *listed)) {
             count(if listed == header.frame { &mut self.counts.duplicate } else { &mut self.counts.stale });
+            return Ok(());
+        }
+        if self.phase == Phase::Live && Some(Snapshot::revision_of(payload)?) == self.mirror.revision() {
+            count(&mut self.counts.duplicate);
             return Ok(());
         }
         self.mirror.apply_snapshot(payload)?;
@@ -421,7 +439,7 @@ fn micros(duration: Duration) -> u32 {
 }
 
 /// A number that looks nothing like its neighbours: splitmix64.
-fn mixed(seed: u64) -> u64 {
+pub(crate) fn mixed(seed: u64) -> u64 {
     let mut z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

@@ -15,9 +15,10 @@
 use super::input::Input;
 use super::messages::{Done, FacetCounts, Join, Refusal, count};
 use super::publisher::{PublishError, Publisher};
+use super::recording::Recorded;
 use super::transport::{Closed, Delivery, FacetNumber, LinkEvent, MAX_FACETS};
 use super::viewer::Viewer;
-use super::wire::{Fault, Hash, Header, Kind, later, message, open};
+use super::wire::{Fault, HEADER_BYTES, Hash, Header, Kind, later, message, open};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -177,6 +178,9 @@ enum Stage {
 /// One stream of frames: for those that draw, or for replicas.
 struct Stream {
     publisher: Publisher,
+    snapshot: Arc<Vec<u8>>,
+    /// Frame that brought the list of objects.
+    listed: Option<u64>,
     state: Arc<Vec<u8>>,
     hashes: VecDeque<(u64, Hash)>,
 }
@@ -208,7 +212,7 @@ impl ServerSession {
             synced: false, ready: None, presented: None, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(),
         };
         let places = options.seats.iter().map(place).collect();
-        let stream = |exact| Stream { publisher: Publisher::new(base, exact, 0), state: Arc::default(), hashes: VecDeque::new() };
+        let stream = |exact| Stream { publisher: Publisher::new(base, exact, 0), snapshot: Arc::default(), listed: None, state: Arc::default(), hashes: VecDeque::new() };
         let next = options.first_frame;
         ServerSession {
             options, places, streams: [stream(false), stream(true)], frame: None, next, time_s: 0.0, stage: Stage::Idle, out: Vec::new(),
@@ -269,29 +273,67 @@ impl ServerSession {
     pub fn publish(&mut self, now: Duration, world: &World, viewer: &Viewer) -> Result<u64, PublishError> {
         self.give_up();
         let frame = self.next;
+        let replicas = self.there().any(|(_, p)| p.exact);
+        for exact in [false, true] {
+            let stream = &mut self.streams[exact as usize];
+            stream.state = Arc::default();
+            if exact && !replicas {
+                continue; // no replica, no work
+            }
+            let published = stream.publisher.publish(world, viewer, frame)?;
+            let list = published.fresh.then(|| stream.publisher.snapshot());
+            self.time_s = world.time();
+            self.take(exact, frame, list, &published.state, published.hash);
+        }
+        self.send_frame(now, frame);
+        Ok(frame)
+    }
+
+    /// Publishes a frame as it was recorded, under its number. One session either simulates or replays. Replicas get nothing: recordings hold poses.
+    pub fn publish_recorded(&mut self, now: Duration, recorded: &Recorded) {
+        self.give_up();
+        self.time_s = recorded.time_s;
+        self.take(false, recorded.frame, recorded.snapshot.clone(), &recorded.state, recorded.hash);
+        self.send_frame(now, recorded.frame);
+    }
+
+    /// The frame published last, as a recording keeps it; `fresh`: with its list of objects even if that is an old one.
+    pub fn recorded(&self, fresh: bool) -> Option<Recorded> {
+        let (frame, stream) = (self.frame?, &self.streams[0]);
+        let state = stream.state.get(HEADER_BYTES..)?.to_vec();
+        let snapshot = (fresh || stream.listed == Some(frame)).then(|| stream.snapshot.clone());
+        Some(Recorded { frame, time_s: self.time_s, snapshot, state, hash: stream.hashes.back()?.1 })
+    }
+
+    /// Keeps a frame for sending.
+    fn take(&mut self, exact: bool, frame: u64, list: Option<Arc<Vec<u8>>>, state: &[u8], hash: Hash) {
+        let head = self.head(Kind::State, 0, frame);
+        let stream = &mut self.streams[exact as usize];
+        if let Some(list) = list {
+            (stream.snapshot, stream.listed) = (list, Some(frame));
+        }
+        stream.state = Arc::new(message(&head, |out| out.extend(state)));
+        stream.hashes.push_back((frame, hash));
+        while stream.hashes.len() > self.options.history {
+            stream.hashes.pop_front();
+        }
+    }
+
+    /// Sends the frame that was kept, with its list of objects if that is new.
+    fn send_frame(&mut self, now: Duration, frame: u64) {
         let first = self.frame.is_none();
-        (self.time_s, self.stage) = (world.time(), Stage::Idle);
+        (self.frame, self.next, self.stage) = (Some(frame), frame.wrapping_add(1), Stage::Idle);
         for exact in [false, true] {
             let to: Vec<FacetNumber> = self.there().filter(|(_, p)| p.exact == exact).map(|(k, _)| k).collect();
-            if exact && to.is_empty() {
-                self.streams[1].state = Arc::default(); // no replica, no work
-                continue;
-            }
-            let published = self.streams[exact as usize].publisher.publish(world, viewer, frame)?;
-            let state = self.head(Kind::State, 0, frame);
-            let stream = &mut self.streams[exact as usize];
-            stream.state = Arc::new(message(&state, |out| out.extend(&published.state)));
-            stream.hashes.push_back((frame, published.hash));
-            while stream.hashes.len() > self.options.history {
-                stream.hashes.pop_front();
-            }
-            if published.fresh {
+            let stream = &self.streams[exact as usize];
+            let (fresh, state) = (stream.listed == Some(frame), stream.state.clone());
+            if fresh {
                 to.iter().for_each(|&k| self.send_snapshot(k));
             }
-            let (delivery, message) = (self.state_delivery(), self.streams[exact as usize].state.clone());
-            self.send(to, delivery, message);
+            if !state.is_empty() {
+                self.send(to, self.state_delivery(), state);
+            }
         }
-        (self.frame, self.next) = (Some(frame), frame.wrapping_add(1));
         for place in self.places.iter_mut().filter(|p| p.standing != Standing::Absent) {
             place.sent = now;
             if first && place.standing == Standing::Following {
@@ -302,7 +344,6 @@ impl ServerSession {
             self.stage = Stage::Ready(now);
         }
         self.advance(now);
-        Ok(frame)
     }
 
     /// Tells all facets that the run is over.
@@ -623,7 +664,7 @@ impl ServerSession {
 
     fn send_snapshot(&mut self, facet: FacetNumber) {
         let place = &self.places[facet as usize];
-        let (snapshot, join) = (self.streams[place.exact as usize].publisher.snapshot(), place.join);
+        let (snapshot, join) = (self.streams[place.exact as usize].snapshot.clone(), place.join);
         if !snapshot.is_empty() {
             self.send_to(facet, Kind::Snapshot, join, self.frame.unwrap_or(self.next), |out| out.extend(snapshot.iter()));
         }

@@ -63,7 +63,7 @@ pub struct Network {
 impl Network {
     /// The same seed and the same calls give the same deliveries.
     pub fn new(seed: u64, weather: Weather) -> Network {
-        Network { dice: seed | 1, weather, parted: Vec::new(), under_way: BTreeMap::new(), count: 0, damage: Damage::default() }
+        Network { dice: super::facet::mixed(seed) | 1, weather, parted: Vec::new(), under_way: BTreeMap::new(), count: 0, damage: Damage::default() }
     }
 
     /// Changes the weather for what is sent from now on.

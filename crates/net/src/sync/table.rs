@@ -83,6 +83,14 @@ pub(crate) fn put_snapshot_head(out: &mut Vec<u8>, revision: u32, exact: bool, c
 }
 
 impl<'a> Snapshot<'a> {
+    /// The number of its list alone.
+    ///
+    /// # Errors
+    /// [`Fault::Malformed`].
+    pub fn revision_of(payload: &[u8]) -> Result<u32, Fault> {
+        Bytes(payload).u32()
+    }
+
     /// Takes a payload apart.
     ///
     /// # Errors

@@ -9,3 +9,4 @@ mod recover;
 mod roundtrip;
 mod support;
 mod udp;
+mod sync;
