@@ -141,6 +141,11 @@ fn node(name: &str) -> Result<Node<Service>, LinkError> {
     builder.create::<Service>().map_err(|why| unusable(&why))
 }
 
+/// A node removes what is stale when it begins.
+pub fn clean_up() -> Result<(), LinkError> {
+    node("tumble clean-up").map(|node| _ = node.try_cleanup_dead_nodes())
+}
+
 /// A folder of this user alone, made if need be; and the user's number.
 pub fn folder() -> Result<(PathBuf, u32), LinkError> {
     let user = std::fs::metadata("/proc/self").map_err(|why| LinkError::Io { what: "/proc/self".into(), why })?.uid();
