@@ -2,6 +2,7 @@
 # A server and its facets in network namespaces of their own, over sealed UDP, with a bad network between them; prints the table of latency and loss.
 #   sudo scripts/netns.sh [--frames 6000] [--bytes 16384] [--facets 1] [--rate 60] [--loss 0.05] [--reorder 0.1] [--duplicate 0.02] [--delay-ms 1] [--netem]
 # The bad network is a relay process in a third namespace; with --netem it is the kernel's own (a kernel with sch_netem).
+runtime="${XDG_RUNTIME_DIR:-}"
 . "$(dirname "$0")/env.sh"
 
 frames=6000 bytes=16384 facets=1 rate=60 loss=0.05 reorder=0.1 duplicate=0.02 delay=1 netem=""
@@ -37,6 +38,7 @@ finish() {
     [ -z "$children" ] || kill $children 2>/dev/null || true
     for space in "$server" "$middle" "$facet"; do ip netns del "$space" 2>/dev/null || true; done
     rm -f "$key"
+    [ -n "$runtime" ] || rm -rf "$XDG_RUNTIME_DIR"
 }
 trap finish EXIT
 trap 'exit 130' INT TERM
