@@ -8,4 +8,7 @@ mod outside;
 mod recover;
 mod roundtrip;
 mod support;
+mod shm;
 mod udp;
+mod udp_hostile;
+mod udp_socket;
