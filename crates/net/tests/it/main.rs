@@ -8,5 +8,8 @@ mod outside;
 mod recover;
 mod roundtrip;
 mod support;
+mod shm;
 mod udp;
 mod sync;
+mod udp_hostile;
+mod udp_socket;

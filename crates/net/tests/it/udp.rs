@@ -25,6 +25,8 @@ pub struct Cave {
     pub server: ServerMachine,
     pub facets: Vec<FacetMachine>,
     pub network: Network,
+    /// What the facets sent, while this is something.
+    pub recorded: Option<Vec<Vec<u8>>>,
 }
 
 impl Cave {
@@ -35,14 +37,17 @@ impl Cave {
             let settings = FacetSettings { facet, server: SERVER, timing, numbering };
             FacetMachine::new(Duration::ZERO, settings, SharedKey::new(KEY), Entropy::seeded(seed + 1 + u64::from(facet)))
         };
-        Cave { now: Duration::ZERO, server, facets: (0..facets).map(facet).collect(), network: Network::new(seed, faults) }
+        Cave { now: Duration::ZERO, server, facets: (0..facets).map(facet).collect(), network: Network::new(seed, faults), recorded: None }
     }
 
     pub fn transmit(&mut self) {
         let (now, network) = (self.now, &mut self.network);
         self.server.transmit(now, &mut |to, datagram| network.send(now, SERVER, to, datagram));
         for (k, facet) in self.facets.iter_mut().enumerate() {
-            facet.transmit(now, &mut |to, datagram| network.send(now, facet_address(k as u16), to, datagram));
+            facet.transmit(now, &mut |to, datagram| {
+                self.recorded.iter_mut().for_each(|recorded| recorded.push(datagram.to_vec()));
+                network.send(now, facet_address(k as u16), to, datagram)
+            });
         }
     }
 
@@ -136,14 +141,15 @@ fn stream(frames: u64, length: usize, seed: u64, faults: Faults, numbering: Numb
     outcome
 }
 
-fn frames(short: u64, long: u64) -> u64 {
+pub fn frames(short: u64, long: u64) -> u64 {
     if std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1") { long } else { short }
 }
 
 #[test]
 fn a_bad_network_delivers_each_frame_once_in_order_and_soon_full_length() {
     for (length, seed) in [(400, 1), (1 << 10, 2), (4 << 10, 3), (16 << 10, 4), (64 << 10, 5)] {
-        let outcome = stream(frames(4_000, 100_000), length, seed, BAD, Numbering::default());
+        let long = if length > 16 << 10 { 10_000 } else { 100_000 };
+        let outcome = stream(frames(2_000, long), length, seed, BAD, Numbering::default());
         assert!(outcome.quantile(0.999) < Duration::from_millis(12), "{length}: {:?}", outcome.quantile(0.999));
         // Around 400 bytes and their answer stand 200 of headers and seals: no redundancy could be paid, and none is sent.
         let most = if length < 1024 { 1.75 } else { 1.6 };
@@ -170,4 +176,97 @@ fn the_same_seed_gives_the_same_run() {
 fn message_numbers_wrap_at_u32() {
     let numbering = Numbering { sequence: u64::from(u32::MAX) - 500, message: u32::MAX - 300 };
     stream(1_000, 3000, 5, BAD, numbering);
+}
+
+/// Runs for a while; what the facet and the server reported.
+fn run_for(cave: &mut Cave, seconds: f64) -> (Vec<LinkEvent>, Vec<LinkEvent>) {
+    let end = cave.now + Duration::from_secs_f64(seconds);
+    let (mut facet, mut server) = (Vec::new(), Vec::new());
+    while cave.now < end {
+        cave.advance(end);
+        facet.extend(std::iter::from_fn(|| cave.facets[0].poll()).map(|(event, _)| event));
+        server.extend(std::iter::from_fn(|| cave.server.poll()).map(|(_, event, _)| event));
+    }
+    (facet, server)
+}
+
+#[test]
+fn a_parted_network_closes_and_opens_again() {
+    let mut cave = Cave::new(1, 10, BAD, Numbering::default());
+    cave.connect();
+    assert_eq!(run_for(&mut cave, 60.0), (vec![], vec![]), "an idle connection stays");
+    cave.network.parted = true;
+    let silent = LinkEvent::Closed(Closed::Silent);
+    assert_eq!(run_for(&mut cave, 2.3), (vec![silent], vec![silent]));
+    assert_eq!(run_for(&mut cave, 10.0), (vec![], vec![]));
+    cave.network.parted = false;
+    assert_eq!(run_for(&mut cave, 1.0), (vec![LinkEvent::Opened], vec![LinkEvent::Opened]));
+}
+
+#[test]
+fn a_server_or_facet_started_again_is_found_within_a_second() {
+    let mut cave = Cave::new(1, 11, BAD, Numbering::default());
+    cave.connect();
+    let timing = Timing::default();
+    let settings = ServerSettings { facets: 1, timing, numbering: Numbering::default() };
+    cave.server = ServerMachine::new(settings, SharedKey::new(KEY), Entropy::seeded(99));
+    assert_eq!(run_for(&mut cave, 1.0), (vec![LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened], vec![LinkEvent::Opened]));
+    let settings = FacetSettings { facet: 0, server: SERVER, timing, numbering: Numbering::default() };
+    cave.facets[0] = FacetMachine::new(cave.now, settings, SharedKey::new(KEY), Entropy::seeded(98));
+    assert_eq!(run_for(&mut cave, 1.0), (vec![LinkEvent::Opened], vec![LinkEvent::Closed(Closed::Replaced), LinkEvent::Opened]));
+    let now = cave.now;
+    let network = &mut cave.network;
+    cave.server.close(now, 0, &mut |to, datagram| network.send(now, SERVER, to, datagram));
+    let (facet, server) = run_for(&mut cave, 1.0);
+    assert_eq!(facet, [LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened]);
+    assert_eq!(server, [LinkEvent::Closed(Closed::ByUs), LinkEvent::Opened]);
+}
+
+#[test]
+fn of_newest_messages_the_last_arrives_and_none_comes_late() {
+    let mut cave = Cave::new(1, 12, BAD, Numbering::default());
+    cave.connect();
+    let (mut last, mut count) = (None, 0);
+    // More than the window lets through: 64 KiB a millisecond.
+    for k in 0..1500u64 {
+        if k < 1000 {
+            assert!(cave.server.send(0, Delivery::Newest, &message(k, 64 << 10).into()));
+        }
+        let end = cave.now + Duration::from_millis(1);
+        while cave.now < end {
+            cave.advance(end);
+        }
+        while let Some((event, bytes)) = cave.facets[0].poll() {
+            assert!(event == LinkEvent::Message && bytes == message(number(&bytes), 64 << 10));
+            assert!(last.is_none_or(|last| number(&bytes) > last));
+            last = Some(number(&bytes));
+            count += 1;
+        }
+    }
+    assert_eq!(last, Some(999));
+    let replaced = cave.server.counters(0).superseded + cave.facets[0].counters().superseded;
+    assert!(count > 100 && count + replaced == 1000, "{count} came, {replaced} were replaced");
+}
+
+#[test]
+fn long_messages_arrive_whole_and_a_facet_that_takes_nothing_is_let_go() {
+    let mut cave = Cave::new(1, 13, BAD, Numbering::default());
+    cave.connect();
+    assert!(!cave.server.send(0, Delivery::Reliable, &Arc::from(vec![0; MAX_MESSAGE_BYTES + 1])));
+    assert!(!cave.server.send(0, Delivery::Reliable, &Arc::from([])));
+    let long = message(5, MAX_MESSAGE_BYTES);
+    assert!(cave.server.send(0, Delivery::Reliable, &Arc::from(&long[..])));
+    let mut got = None;
+    while got.is_none() {
+        cave.advance(cave.now + Duration::from_secs(1));
+        got = cave.facets[0].poll();
+        assert!(cave.now < Duration::from_secs(30));
+    }
+    assert!(got == Some((LinkEvent::Message, long.clone())));
+    let mut sent = 0;
+    while cave.server.send(0, Delivery::Reliable, &Arc::from(&long[..])) {
+        sent += 1;
+        assert!(sent <= 4, "64 MiB may wait");
+    }
+    assert_eq!(cave.server.poll().map(|(_, event, _)| event), Some(LinkEvent::Closed(Closed::Overrun)));
 }

@@ -1,6 +1,6 @@
 //! A facet's end of shared memory.
 
-use super::order::{Kept, Memory, Order};
+use super::order::{Memory, Order};
 use super::ports::Ports;
 use super::wire::{HEAD, Head, Kind};
 use super::{ASK, PING, SILENCE, draw};
@@ -224,7 +224,7 @@ impl FacetLink for ShmFacet {
             let more = chunks.peek().is_some();
             let head = Head { newest, more, number: self.memory.next(), ..self.head(Kind::Piece) };
             self.tell(head, chunk)?;
-            self.memory.keep(Kept { mask: 0, newest, more, data: chunk.to_vec() });
+            self.memory.keep(0, newest, more, chunk);
         }
         self.memory.trim(MEMORY);
         self.counters.messages_out += 1;
@@ -233,6 +233,9 @@ impl FacetLink for ShmFacet {
 
     fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<LinkEvent>, LinkError> {
         message.clear();
+        if let Stage::Connected { order, .. } = &mut self.stage {
+            order.lend(std::mem::take(message));
+        }
         let end = self.start.elapsed() + timeout;
         loop {
             if let Some(event) = self.next_event(message) {

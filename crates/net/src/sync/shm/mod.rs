@@ -23,6 +23,13 @@ pub const SILENCE: Duration = Duration::from_secs(2);
 /// A facet that looks for its server asks this often.
 pub const ASK: Duration = Duration::from_millis(50);
 
+/// Removes what killed processes of this user left in shared memory and in the folder. A launcher calls it after it has killed a process.
+///
+/// Errors: iceoryx2 or the system refuses.
+pub fn clean_up() -> Result<(), crate::sync::transport::LinkError> {
+    ports::clean_up()
+}
+
 /// A number that no other process draws.
 fn draw() -> Result<u64, crate::sync::transport::LinkError> {
     Ok(crate::sync::udp::Entropy::system()?.next_u64())

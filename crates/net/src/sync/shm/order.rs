@@ -33,6 +33,8 @@ pub struct Memory {
     first: u64,
     kept: VecDeque<Kept>,
     bytes: usize,
+    /// A buffer to use again: fresh memory costs more than the copy.
+    spare: Vec<u8>,
 }
 
 impl Memory {
@@ -42,29 +44,32 @@ impl Memory {
     }
 
     /// Remembers the piece that was sent as [`next`](Self::next).
-    pub fn keep(&mut self, kept: Kept) {
-        self.bytes += kept.data.len();
-        self.kept.push_back(kept);
+    pub fn keep(&mut self, mask: u64, newest: bool, more: bool, bytes: &[u8]) {
+        let mut data = std::mem::take(&mut self.spare);
+        data.clear();
+        data.extend_from_slice(bytes);
+        self.bytes += data.len();
+        self.kept.push_back(Kept { mask, newest, more, data });
+    }
+
+    fn forget_first(&mut self) -> bool {
+        let Some(kept) = self.kept.pop_front() else { return false };
+        self.bytes -= kept.data.len();
+        self.first += 1;
+        if self.spare.capacity() < kept.data.capacity() {
+            self.spare = kept.data;
+        }
+        true
     }
 
     /// Forgets all before `number`.
     pub fn forget_before(&mut self, number: u64) {
-        while self.first < number
-            && let Some(kept) = self.kept.pop_front()
-        {
-            self.bytes -= kept.data.len();
-            self.first += 1;
-        }
+        while self.first < number && self.forget_first() {}
     }
 
     /// Forgets beyond the cap; what is first then. Everyone who lacks an earlier piece cannot be served any more.
     pub fn trim(&mut self, pieces: usize) -> u64 {
-        while (self.bytes > MAX_QUEUED_BYTES || self.kept.len() > pieces)
-            && let Some(kept) = self.kept.pop_front()
-        {
-            self.bytes -= kept.data.len();
-            self.first += 1;
-        }
+        while (self.bytes > MAX_QUEUED_BYTES || self.kept.len() > pieces) && self.forget_first() {}
         self.first
     }
 
@@ -142,6 +147,14 @@ impl Order {
         Some((self.next, until))
     }
 
+    /// A buffer to build the next message in, where there is none.
+    pub fn lend(&mut self, buffer: Vec<u8>) {
+        if self.partial.is_empty() && self.partial.capacity() < buffer.capacity() {
+            self.partial = buffer;
+            self.partial.clear();
+        }
+    }
+
     /// Whether something is missing.
     pub fn has_gap(&self) -> bool {
         !self.pending.is_empty()
@@ -180,8 +193,8 @@ mod tests {
                 for _ in 0..round % 23 {
                     let number = memory.next();
                     let kept = Kept { mask: 1 << (number % 3 / 2), newest: false, more: number % 3 == 0, data: vec![number as u8; 3] };
-                    buffer.push_back((head(number, &kept), kept.data.clone()));
-                    memory.keep(kept);
+                    memory.keep(kept.mask, false, kept.more, &kept.data);
+                    buffer.push_back((head(number, &kept), kept.data));
                 }
             }
             while buffer.len() > 8 {
@@ -206,7 +219,7 @@ mod tests {
     fn what_is_forgotten_cannot_be_asked_for() {
         let mut memory = Memory::default();
         for _ in 0..10 {
-            memory.keep(Kept { mask: 1, newest: false, more: false, data: vec![0] });
+            memory.keep(1, false, false, &[0]);
         }
         memory.forget_before(4);
         let asked = |number| Head { number, until: u64::MAX, ..Head::new(Kind::Again, 1) };

@@ -6,7 +6,7 @@
 
 use crate::sync::transport::{FacetNumber, LinkError};
 use iceoryx2::node::{Node, NodeBuilder};
-use iceoryx2::port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
+use iceoryx2::port::{listener::Listener, listener::ListenerWaitError, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::{AllocationStrategy, Config, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
 use iceoryx2::service::ipc_threadsafe::Service;
 use std::fmt::Debug;
@@ -112,8 +112,11 @@ impl Ports {
 
     /// Waits until the other side wakes this one, at most `timeout`.
     pub fn wait(&self, timeout: Duration) -> Result<(), LinkError> {
-        self.listener.timed_wait(|_| {}, timeout).map_err(|why| failed("wait", why))?;
-        Ok(())
+        match self.listener.timed_wait(|_| {}, timeout) {
+            // A signal ends the wait early: this process was stopped and goes on, or is being watched.
+            Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
+            Err(why) => Err(failed("wait", why)),
+        }
     }
 
     /// Removes what killed processes left.
@@ -139,6 +142,11 @@ fn node(name: &str) -> Result<Node<Service>, LinkError> {
     let name = name.try_into().map_err(|why| unusable(&why))?;
     let builder = NodeBuilder::new().name(&name).config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
     builder.create::<Service>().map_err(|why| unusable(&why))
+}
+
+/// A node removes what is stale when it begins.
+pub fn clean_up() -> Result<(), LinkError> {
+    node("tumble clean-up").map(|node| _ = node.try_cleanup_dead_nodes())
 }
 
 /// A folder of this user alone, made if need be; and the user's number.

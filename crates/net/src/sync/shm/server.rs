@@ -1,6 +1,6 @@
 //! The server's end of shared memory.
 
-use super::order::{Kept, Memory, Order};
+use super::order::{Memory, Order};
 use super::ports::Ports;
 use super::wire::{HEAD, Head, Kind};
 use super::{PING, SILENCE, draw};
@@ -80,7 +80,7 @@ impl ShmServer {
             for counters in of_mask(&mut self.counters, mask) {
                 counters.bytes_out += (HEAD + chunk.len()) as u64;
             }
-            self.memory.keep(Kept { mask, newest, more, data: chunk.to_vec() });
+            self.memory.keep(mask, newest, more, chunk);
         }
         self.sent = self.start.elapsed();
         let first = self.memory.trim(MEMORY);

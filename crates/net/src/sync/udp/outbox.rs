@@ -5,7 +5,8 @@
 //! ```text
 //! srtt   ← 7/8 srtt + 1/8 sample          var ← 3/4 var + 1/4 |srtt − sample|          (RFC 6298; smoothed round trip and its deviation)
 //! loss_delay = srtt + max(2 var, 0.5 ms)
-//! timeout    = (srtt + 4 var + 1 ms) · 2^max(0, k − 2)     k: time-outs in a row, at most 250 ms
+//! timeout    = srtt + min(4 var, 4 ms) + 1 ms              for the first two time-outs in a row
+//!            = (srtt + 4 var + 1 ms) · 2^(k − 2)           for those after k, at most 250 ms
 //! ```
 //!
 //! What is lost is sent again, twice where the budget allows: at a loss of 5 % a repair then fails 0.25 % of the time, for 5 % more bytes, and it is the repair
@@ -255,7 +256,10 @@ impl Outbox {
         if self.largest.is_some_and(|largest| sent.sequence < largest) {
             return sent.at + self.srtt + (2 * self.var).max(RESOLUTION / 2);
         }
-        let timeout = (self.srtt + 4 * self.var + RESOLUTION) * (1 << self.timeouts.saturating_sub(2).min(8));
+        let timeout = match self.timeouts.checked_sub(2) {
+            None => self.srtt + (4 * self.var).min(4 * RESOLUTION) + RESOLUTION,
+            Some(more) => (self.srtt + 4 * self.var + RESOLUTION) * (1 << more.min(8)),
+        };
         sent.at + timeout.min(LONGEST_TIMEOUT)
     }
 
