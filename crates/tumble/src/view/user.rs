@@ -208,7 +208,9 @@ impl User {
     /// Faster (1) or slower (-1), in steps of 1, 2, 5, 10.
     pub fn change_speed(&mut self, by: i32) {
         let factor = if by > 0 { 1.8 } else { 1.0 / 1.8 };
-        self.speed = round_speed(self.speed * factor).clamp(0.001, 1000.0);
+        for _ in 0..by.abs().min(20) {
+            self.speed = round_speed(self.speed * factor).clamp(0.001, 1000.0);
+        }
     }
 }
 

@@ -68,6 +68,8 @@ pub struct Viewer {
 struct Pointer {
     at_px: [f64; 2],
     turning: bool,
+    /// Of the wheel, what is not yet a whole notch.
+    wheel: f64,
 }
 
 /// Text over the picture.
@@ -234,7 +236,12 @@ impl Viewer {
     fn wheel(&mut self, screen: &Screen, up: f64) {
         match &mut self.hand {
             Some(hand) => hand.reach(1.1f64.powf(-up)),
-            None => self.user.change_speed(if up > 0.0 { 1 } else { -1 }),
+            None => {
+                self.pointer.wheel += up;
+                let notches = self.pointer.wheel.trunc();
+                self.pointer.wheel -= notches;
+                self.user.change_speed(notches as i32);
+            }
         }
         self.move_hand(screen);
         self.stale = true;
