@@ -6,7 +6,7 @@ use super::unfold::{Tile, unfold};
 use super::{Blend, Warp};
 use crate::{DrawList, Image, RenderError, Renderer};
 use nalgebra::{Point3, Vector3};
-use tumble_scene::cave::{Cave, Facet};
+use tumble_scene::cave::{Cave, Facet, User};
 use tumble_scene::{CavePlace, SceneFile};
 
 /// Pixels drawn beyond the edges of a facet and cut off again: what occlusion may reach across an edge.
@@ -52,6 +52,11 @@ impl CaveView {
     /// Puts it elsewhere in the scene.
     pub fn stand(&mut self, place: CavePlace) {
         self.place = place;
+    }
+
+    /// The users, to be moved as they move: what is drawn next is seen by their new eyes.
+    pub fn users_mut(&mut self) -> &mut [User] {
+        &mut self.cave.users
     }
 
     /// Whether a facet's picture is bent or darkened for its projector.
