@@ -19,6 +19,8 @@ use tumble::scene::cave::Mode;
 
 /// Between two looks at signals, pipe and picture.
 const TURN: Duration = Duration::from_millis(50);
+/// Waiting for a server that is no longer than this is not worth a word.
+const MOMENT: Duration = Duration::from_secs(1);
 
 /// Runs a facet until the run is over.
 pub fn run(options: &FacetOptions) -> Result<(), Failure> {
@@ -121,6 +123,35 @@ fn watch_stdin() -> Result<Arc<AtomicBool>, Failure> {
     Ok(gone)
 }
 
+/// How long there has been no server, and what was said about it.
+#[derive(Default)]
+struct Alone {
+    since: Option<(Waiting, Instant)>,
+    said: bool,
+}
+
+impl Alone {
+    fn look(&mut self, task: &Task, watch: &Watch) -> Result<(), Failure> {
+        let Task::Wait(why @ (Waiting::Server | Waiting::Lost)) = *task else {
+            if self.since.take().is_some() && std::mem::take(&mut self.said) {
+                watch.say("has its server");
+            }
+            return Ok(());
+        };
+        let (_, since) = *self.since.filter(|(before, _)| *before == why).get_or_insert((why, Instant::now()));
+        self.since = Some((why, since));
+        if since.elapsed() > watch.patience {
+            let what = if why == Waiting::Lost { "the server is lost and did not come back" } else { "no server answers" };
+            return Err(Failure::run(&watch.title(), format!("{what}, {:.0} s long", watch.patience.as_secs_f64())));
+        }
+        if !self.said && (why == Waiting::Lost || since.elapsed() > MOMENT) {
+            watch.say(if why == Waiting::Lost { "has lost its server, keeps the last picture and looks for it" } else { "waits for the server" });
+            self.said = true;
+        }
+        Ok(())
+    }
+}
+
 struct Running {
     facet: Facet<FacetEnd>,
     painter: Option<Painter>,
@@ -146,7 +177,7 @@ fn failed(error: SessionError) -> Failure {
 
 impl Running {
     fn go(&mut self) -> Result<(), Failure> {
-        let (mut alone_since, mut said) = (Instant::now(), None);
+        let mut alone = Alone::default();
         loop {
             if self.watch.orphaned() {
                 return Err(Failure::run(&self.watch.title(), "its launcher is gone"));
@@ -155,19 +186,7 @@ impl Running {
                 return Ok(());
             }
             let task = self.facet.next(if self.drawing.is_some() { Duration::ZERO } else { TURN }).map_err(failed)?;
-            if let Task::Wait(why @ (Waiting::Server | Waiting::Lost)) = task {
-                let since = if said == Some(why) { alone_since } else { Instant::now() };
-                if said != Some(why) {
-                    self.watch.say(if why == Waiting::Lost { "lost its server, shows the last picture, looks for it" } else { "waits for the server" });
-                    (alone_since, said) = (since, Some(why));
-                }
-                if since.elapsed() > self.watch.patience {
-                    let what = if why == Waiting::Lost { "the server is lost and did not come back" } else { "no server answers" };
-                    return Err(Failure::run(&self.watch.title(), format!("{what}, {:.0} s long", self.watch.patience.as_secs_f64())));
-                }
-            } else if said.take() == Some(Waiting::Lost) {
-                self.watch.say("is back");
-            }
+            alone.look(&task, &self.watch)?;
             match task {
                 // what was begun is finished first, also where nobody waits for it any more
                 Task::Wait(_) | Task::Draw if self.drawing.is_some() => self.see_the_picture()?,

@@ -27,8 +27,6 @@ pub struct Painter {
     drawing: Drawing,
     orders: SyncSender<Order>,
     pictures: Receiver<Result<Image, RenderError>>,
-    /// Of the graphics adapter.
-    pub adapter: String,
 }
 
 impl Painter {
@@ -48,12 +46,12 @@ impl Painter {
                         return;
                     }
                 };
-                let _ = ready.send(Ok(renderer.adapter().to_owned()));
+                let _ = ready.send(Ok(()));
                 paint(view, facet, &mut renderer, &wanted, &done);
             })
             .map_err(|e| Failure::run("drawing", e))?;
-        let adapter = started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
-        Ok(Painter { drawing: Drawing::new(&setting.scene), orders, pictures, adapter })
+        started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
+        Ok(Painter { drawing: Drawing::new(&setting.scene), orders, pictures })
     }
 
     /// Begins a picture of the world; with the frame's number in it, if it is to be stamped.
