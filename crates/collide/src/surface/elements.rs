@@ -9,6 +9,9 @@
 //! If both edges were left out, the least of these is at most `√(θ₁L₁·θ₂L₂)/4 ≤ ε`: a finely triangulated smooth surface
 //! needs only its vertices, and the gap is overestimated by `ε` at most (to first order in θ).
 //!
+//! That supposes flat faces on both sides. A cylinder of radius `R` falls away from the middle of an edge by `L²/8R`, however little the edge
+//! turns: the edges left out ([`Elements::fine_edges_of`]) are searched against cylinders alone, where a search is cheap.
+//!
 //! A short edge that turns little is [`Edge::spared`]: it makes no contact of its own where one of its ends is on a face and at most `ε`
 //! further from the other body. The least gap is then known to the same `ε`.
 
@@ -48,6 +51,8 @@ pub(crate) struct Edge {
     pub points: [u32; 2],
     /// Its own contact may be left out if an end is no further by this, metres: `ε` on a smooth surface, else 0.
     pub spared: f64,
+    /// Whether it turns so little that only cylinders are held against it.
+    pub fine: bool,
     /// Outward normals of its faces.
     pub normals: [Vec3; 2],
     /// Names it.
@@ -61,8 +66,8 @@ pub(crate) struct Elements {
     pub edges: Vec<Edge>,
     pub normals: Vec<Vec3>,
     pub ways: Vec<Vec3>,
-    /// Per ball: where its points and edges begin and end.
-    held: Vec<[u32; 4]>,
+    /// Per ball: where its points begin and end, its edges begin, the fine ones among them begin and end.
+    held: Vec<[u32; 5]>,
 }
 
 impl Elements {
@@ -73,13 +78,14 @@ impl Elements {
         let (mut edges, searched) = gather_edges(mesh, &face, tree);
         let mut points = all.gather_points(mesh, &face, tree, &searched);
         points.sort_by_key(|p| (p.0, p.1.index));
-        edges.sort_by_key(|e| (e.0, e.1.index));
+        edges.sort_by_key(|e| (e.0, e.1.fine, e.1.index));
         all.held = (0..tree.nodes().len() as u32)
             .map(|node| {
                 let place = |list: &dyn Fn(u32) -> usize| [list(node) as u32, list(node + 1) as u32];
                 let [a, b] = place(&|n| points.partition_point(|p| p.0 < n));
-                let [c, d] = place(&|n| edges.partition_point(|e| e.0 < n));
-                [a, b, c, d]
+                let [c, e] = place(&|n| edges.partition_point(|e| e.0 < n));
+                let d = edges.partition_point(|e| e.0 < node || (e.0 == node && !e.1.fine)) as u32;
+                [a, b, c, d, e]
             })
             .collect();
         all.points = points.into_iter().map(|p| p.1).collect();
@@ -95,8 +101,14 @@ impl Elements {
 
     /// The edges that ball `node` holds.
     pub fn edges_of(&self, node: usize) -> &[Edge] {
-        let [_, _, c, d] = self.held[node];
+        let [_, _, c, d, _] = self.held[node];
         &self.edges[c as usize..d as usize]
+    }
+
+    /// Those of a smooth surface that only cylinders are held against.
+    pub fn fine_edges_of(&self, node: usize) -> &[Edge] {
+        let [.., d, e] = self.held[node];
+        &self.edges[d as usize..e as usize]
     }
 
     pub fn normals_of(&self, point: &Point) -> &[Vec3] {
@@ -154,20 +166,21 @@ fn gather_edges(mesh: &TriMesh, face: &[Vec3], tree: &SphereTree) -> (Vec<(u32, 
         let reach = apart.iter().map(|c| normals[0].dot(&(c - ends[0]))).fold(0.0, f64::min);
         let turn = ComplexField::acos(normals[0].dot(&normals[1]).clamp(-1.0, 1.0));
         let length = (ends[1] - ends[0]).norm();
-        let wanted = group.len() > 2 || (reach < -1e-9 * length && 0.25 * turn * length > error);
-        if !wanted {
+        let convex = reach < -1e-9 * length;
+        if group.len() == 2 && !convex {
             continue;
         }
+        let fine = group.len() == 2 && 0.25 * turn * length <= error;
         let smooth = group.len() == 2 && turn < SMOOTH && length < SHORT * mesh.diagonal();
         let spared = if smooth { error } else { 0.0 };
-        for u in group {
+        for u in group.iter().filter(|_| !fine) {
             let t = mesh.triangles[u.face];
             let from = if u.forward { u.low } else { u.high };
             if let Some(k) = (0..3).find(|&k| t[k] == from && t[(k + 1) % 3] == u.low + u.high - from) {
                 searched[u.face][k] = true;
             }
         }
-        edges.push((holder(tree, &ends), Edge { ends, points: [group[0].low, group[0].high], spared, normals, index: index as u32 }));
+        edges.push((holder(tree, &ends), Edge { ends, points: [group[0].low, group[0].high], spared, fine, normals, index: index as u32 }));
     }
     (edges, searched)
 }

@@ -126,7 +126,7 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
 
 /// Random poses at about the distance where the two touch: parry's distance says how far to go.
 fn compare(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts: &mut Counts) {
-    for case in 0..cases {
+    for case in 0..cases.min(std::env::var("CASES").map_or(usize::MAX, |c| c.parse().unwrap())) {
         let (pa, pb) = (rng.pose(0.3), rng.pose(0.3));
         let way = rng.direction();
         let far = Pose::from_parts((pb.translation.vector + way * 3.0).into(), pa.rotation);
@@ -142,7 +142,16 @@ fn compare(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts
         let found = ask(&a.ours, &pa, &b.ours, &pb);
         let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap));
         let gap = deepest.map_or(f64::INFINITY, |c| c.gap);
-        let label = || eprintln!("{} on {}, case {case}: {gap} but {distance}", a.name, b.name);
+        let label = || {
+            eprintln!("{} on {}, case {case}: {gap} but {distance}", a.name, b.name);
+            if let Ok(query::ClosestPoints::WithinMargin(x, y)) = query::closest_points(&qa, &*a.theirs, &qb, &*b.theirs, 1.0) {
+                let f = |v: Vector| Point3::new(v.x, v.y, v.z);
+                let (xw, yw) = (f(x), f(y));
+                eprintln!("   in mesh {:?} {:?}", (pa.inverse() * xw).coords, pa.inverse().rotation * (yw - xw).normalize());
+                eprintln!("   in cyl {:?} {:?}  of {:?}", (pb.inverse() * yw).coords, pb.inverse().rotation * (xw - yw).normalize(), pb.inv_mul(&pa));
+                for c in &found { eprintln!("   {c:?}"); }
+            }
+        };
         let inside = |x: &Body, px: &Pose, y: &Body, py: &Pose| {
             let p = x.samples.first().copied().unwrap_or_default();
             signed(y, &(py.inv_mul(px) * Point3::from(p)).coords) < 0.0
@@ -201,6 +210,7 @@ fn on_primitive(name: &str, poses: usize, brute: usize) {
     let (i, b) = primitives.iter().enumerate().find(|(_, b)| b.name == name).unwrap();
     let mut counts = Counts::default();
     for (j, a) in meshes.iter().enumerate() {
+        if std::env::var("MESH").is_ok_and(|m| m != a.name) { continue; }
         compare(a, b, poses / meshes.len() + 1, brute, &mut Rng::new((10 * i + j) as u64), &mut counts);
     }
     println!("meshes on {name}: {counts:?}");

@@ -24,8 +24,10 @@ pub(super) const PIECE: f64 = 0.03;
 pub(super) const LEVEL: f64 = 1e-7;
 /// An edge that slopes less than this over a face lies on it.
 const LYING_EDGE: f64 = 0.15;
-/// Looks along a piece of an edge at most, for the minimum and for each end of a flat bottom.
+/// Looks for the end of a flat bottom at most.
 const LOOKS: usize = 20;
+/// Looks for the minimum at most: a third of them halve what is left.
+const MOST_LOOKS: usize = 90;
 
 /// A straight element in the frame of the field.
 struct Line<'a> {
@@ -117,21 +119,32 @@ impl Pass<'_> {
         }
         let tolerance = 1e-9 * self.size;
         let limit = found.limit() + line.radius;
-        for _ in 0..LOOKS {
+        for n in 0..MOST_LOOKS {
             let (s, level) = meeting(&low, &high);
-            if level > limit {
+            let least = low.hit.distance.min(high.hit.distance);
+            // tangents that meet above what was seen are no bound: not convex here
+            let convex = level <= least + tolerance;
+            if convex && level > limit {
                 return;
             }
-            if low.hit.distance.min(high.hit.distance) - level < tolerance || high.s - low.s < tolerance {
+            if (convex && least - level < tolerance) || high.s - low.s < tolerance {
                 break;
             }
-            let look = self.look(line, s.clamp(low.s, high.s));
-            if !on_face && (look.lies() || look.slope.abs() <= LEVEL) {
+            let s = match n % 3 {
+                0 if convex => s.clamp(low.s, high.s),
+                1 => low.s - low.slope * (high.s - low.s) / (high.slope - low.slope),
+                _ => 0.5 * (low.s + high.s),
+            };
+            let look = self.look(line, s);
+            if look.lies() && !on_face {
                 on_face = true;
                 self.face(line, &look, low, high, found);
+                if look.slope.abs() <= LEVEL {
+                    return;
+                }
             }
             if look.slope.abs() <= LEVEL {
-                return;
+                return self.bottom(line, look.s, look.hit, found);
             }
             if look.slope < 0.0 {
                 low = look;
@@ -151,16 +164,16 @@ impl Pass<'_> {
         if length.is_nan() || length <= 1e-9 * (a + b) {
             return;
         }
-        if self.look(line, s).hit.distance - level > 1e-6 * self.size {
-            return; // not convex here: what the tangents say is no place on the surface
-        }
         let nearest = if low.hit.distance < high.hit.distance { low } else { high };
         if self.second.is_some() && matches!(nearest.hit.feature, Feature::Edge(_)) {
             return; // that edge has found it
         }
         // two faces at depth `level` meet in an edge further up
         let distance = level * (a + b) / length;
-        let hit = Hit { distance, normal: sum / length, ..nearest.hit };
+        self.bottom(line, s, Hit { distance, normal: sum / length, ..nearest.hit }, found);
+    }
+
+    fn bottom(&self, line: &Line, s: f64, hit: Hit, found: &mut Collector) {
         let fits = facing(line.normals, &hit.normal) && line.is_closest(&hit.normal);
         self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);
     }

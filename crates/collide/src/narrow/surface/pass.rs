@@ -67,6 +67,9 @@ impl<'a> Pass<'a> {
             for edge in elements.edges_of(index) {
                 self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
             }
+            for edge in if self.field.bent() { elements.fine_edges_of(index) } else { &[] } {
+                self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
+            }
         }
         for child in ball.child_range() {
             self.node(tree, elements, child, found);
