@@ -38,6 +38,8 @@ const SAME: f64 = 1e-11;
 const ABOVE: f64 = 1.0 - 1e-6;
 /// Keeps a distance rounded to single precision below it.
 const BELOW: f64 = 1.0 - 2e-7;
+/// Divisions that are passed at once on the way down.
+const TOP: usize = 4;
 /// Cells and listed triangles at most; beyond, the tree of boxes answers.
 const MOST_CELLS: usize = 1 << 20;
 const MOST_LISTED: usize = 1 << 23;
@@ -68,6 +70,10 @@ pub(crate) struct MeshField {
     lists: Vec<u32>,
     /// At most the distance of each listed triangle from its cell's centre; it rises along a list.
     nearer: Vec<f32>,
+    /// A ball around each triangle, about `center`, and its radius.
+    balls: Vec<[f32; 4]>,
+    /// The cell, and its depth, at or above each of the cubes that the outermost cell makes when it is divided [`TOP`] times.
+    top: Vec<(u32, u32)>,
     center: Vec3,
     half: f64,
     bounds: Aabb,
@@ -108,6 +114,8 @@ impl MeshField {
             cells: vec![Cell { distance: 0.0, children: 0, first: 0, count: 0 }],
             lists: Vec::new(),
             nearer: Vec::new(),
+            balls: Vec::new(),
+            top: Vec::new(),
             center: 0.5 * (bounds.min + bounds.max),
             half: 0.5 * (bounds.max - bounds.min).max() + RIM * diagonal,
             bounds,
@@ -124,17 +132,37 @@ impl MeshField {
         let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
         let mut builder = Builder { field: &mut field, deepest };
         builder.cell(0, center, half, &all, f64::INFINITY, 0);
+        field.balls = field.corners.iter().map(|c| ball_around(c, &center, diagonal)).collect();
+        field.top = (0..1 << (3 * TOP)).map(|n| field.cell_above(n)).collect();
         field
+    }
+
+    /// The cell at or above a cube of the top.
+    fn cell_above(&self, cube: usize) -> (u32, u32) {
+        let (mut cell, mut depth) = (0, 0);
+        while depth < TOP && self.cells[cell].children > 0 {
+            depth += 1;
+            let octant: usize = (0..3).map(|k| (cube >> (k * TOP + TOP - depth) & 1) << k).sum();
+            cell = self.cells[cell].children as usize + octant;
+        }
+        (cell as u32, depth as u32)
     }
 
     /// The smallest cell that holds `p`, and its centre; `None` outside all.
     fn locate(&self, p: &Vec3) -> Option<(&Cell, Vec3)> {
-        let (mut center, mut half, mut cell) = (self.center, self.half, &self.cells[0]);
         // written so that what is not a number is outside
-        let out = (p - center).amax();
-        if out.is_nan() || out > half {
+        let from_low = (p - self.center).add_scalar(self.half);
+        let within = from_low.iter().all(|x| *x >= 0.0 && *x <= 2.0 * self.half);
+        if !within {
             return None;
         }
+        const SIDE: usize = 1 << TOP;
+        let scale = SIDE as f64 / (2.0 * self.half);
+        let place: [usize; 3] = std::array::from_fn(|k| ((from_low[k] * scale) as usize).min(SIDE - 1));
+        let (index, depth) = self.top[place[0] | place[1] << TOP | place[2] << (2 * TOP)];
+        let mut cell = &self.cells[index as usize];
+        let mut half = self.half / f64::from(1_u32 << depth);
+        let mut center = Vec3::from_fn(|k, _| self.center[k] - self.half + ((place[k] >> (TOP - depth as usize)) as f64 * 2.0 + 1.0) * half);
         while cell.children > 0 {
             half *= 0.5;
             let mut octant = 0;
@@ -153,25 +181,29 @@ impl MeshField {
     /// The list is in the order of the distance from the centre `c`: `dist(p, t) ≥ dist(c, t) − |p − c|` ends the search.
     fn closest(&self, p: &Vec3, cell: &Cell, center: &Vec3) -> Option<Closest> {
         let mut best: Option<Closest> = None;
-        let mut limit = f64::INFINITY;
-        let mut furthest = f64::INFINITY;
-        let aside = (p - center).norm();
+        let (mut limit, mut reach, mut furthest) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+        let (aside, from_center) = ((p - center).norm(), p - self.center);
         for (&t, &nearer) in self.list(cell).iter().zip(&self.nearer[cell.first as usize..]) {
             if f64::from(nearer) > furthest {
                 break;
             }
             let t = t as usize;
-            let above = self.normals[t][0].dot(&(p - self.corners[t][0])).powi(2);
-            if above > limit {
+            let [x, y, z, radius] = self.balls[t].map(f64::from);
+            if (from_center - Vec3::new(x, y, z)).norm_squared() > (reach + radius).powi(2) {
                 continue;
             }
             let (point, feature) = closest_on_triangle(p, &self.corners[t]);
             let square = (p - point).norm_squared();
+            if square > limit {
+                continue;
+            }
+            let above = self.normals[t][0].dot(&(p - self.corners[t][0])).powi(2);
             let better = |b: &Closest| square < b.square * (1.0 - SAME) || (square <= b.square * (1.0 + SAME) && above > b.above);
             if best.as_ref().is_none_or(better) {
                 best = Some(Closest { square, above, point, triangle: t, feature });
                 limit = square * (1.0 + SAME);
-                furthest = limit.sqrt() + aside;
+                reach = limit.sqrt();
+                furthest = reach + aside;
             }
         }
         best
@@ -366,6 +398,18 @@ impl Builder<'_> {
             self.cell(children + octant, center + side * half, 0.5 * half, &near, 0.5 * reach, depth + 1);
         }
     }
+}
+
+/// A ball around a triangle, its centre told from `center`; rounding is on the safe side.
+fn ball_around(corners: &[Vec3; 3], center: &Vec3, diagonal: f64) -> [f32; 4] {
+    let longest = (0..3).map(|k| (corners[k], corners[(k + 1) % 3])).max_by(|a, b| (a.1 - a.0).norm().total_cmp(&(b.1 - b.0).norm()));
+    let (u, v) = longest.unwrap_or((corners[0], corners[1]));
+    // the middle of the longest side serves the obtuse, the mean of the corners others
+    let middles = [0.5 * (u + v), (corners[0] + corners[1] + corners[2]) / 3.0];
+    let radius = |m: &Vec3| corners.iter().map(|c| (c - m).norm()).fold(0.0, f64::max);
+    let middle = if radius(&middles[0]) < radius(&middles[1]) { middles[0] } else { middles[1] };
+    let c = middle - center;
+    [c.x as f32, c.y as f32, c.z as f32, (radius(&middle) + 1e-6 * diagonal) as f32]
 }
 
 fn valence(mesh: &TriMesh) -> Vec<u32> {

@@ -78,22 +78,30 @@ impl Pass<'_> {
             let ends = [0.0, length].map(|s| self.look(&line, s));
             self.search(&line, ends[0], ends[1], found);
         } else {
-            self.halve(&line, 0.0, length, found);
+            self.halve(&line, (0.0, None), (length, None), found);
         }
     }
 
-    /// A piece that may be in reach.
-    fn halve(&self, line: &Line, from: f64, to: f64, found: &mut Collector) {
+    /// A piece that may be in reach, between two places that may have been looked at. Returns what was seen at them.
+    fn halve(&self, line: &Line, low: (f64, Option<Look>), high: (f64, Option<Look>), found: &mut Collector) -> [Option<Look>; 2] {
+        let (from, to) = (low.0, high.0);
         if to - from > PIECE * self.size && to - from > 1e-3 * line.length {
             let middle = 0.5 * (from + to);
-            for (from, to) in [(from, middle), (middle, to)] {
-                if self.field.bound(&line.at(0.5 * (from + to))) - 0.5 * (to - from) - line.radius <= found.limit() {
-                    self.halve(line, from, to, found);
-                }
+            let reaches = |from: f64, to: f64, found: &Collector| {
+                self.field.bound(&line.at(0.5 * (from + to))) - 0.5 * (to - from) - line.radius <= found.limit()
+            };
+            let [mut first, mut between, mut last] = [low.1, None, high.1];
+            if reaches(from, middle, found) {
+                [first, between] = self.halve(line, low, (middle, None), found);
             }
-        } else {
-            self.search(line, self.look(line, from), self.look(line, to), found);
+            if reaches(middle, to, found) {
+                [_, last] = self.halve(line, (middle, between), high, found);
+            }
+            return [first, last];
         }
+        let looks = [low, high].map(|(s, look)| look.unwrap_or_else(|| self.look(line, s)));
+        self.search(line, looks[0], looks[1], found);
+        looks.map(Some)
     }
 
     fn look(&self, line: &Line, s: f64) -> Look {

@@ -53,21 +53,21 @@ impl<'a> Pass<'a> {
 
     fn node(&self, tree: &SphereTree, elements: &Elements, index: usize, found: &mut Collector) {
         let ball = &tree.nodes()[index];
-        if self.field.bound(&self.place(&ball.center)) - ball.radius > found.limit() {
+        let (fine, only_points) = (self.field.bent(), self.field.linear());
+        if self.field.bound(&self.place(&ball.center)) - elements.reach_of(index, fine) > found.limit() {
             return;
         }
         for point in elements.points_of(index) {
             let at = self.place(&point.at);
-            if self.field.bound(&at) <= found.limit() {
+            let bound = self.field.bound(&at);
+            if bound <= found.limit() {
                 let normals: Normals = elements.normals_of(point).iter().map(|n| self.rotation * n).collect();
                 self.vertex(&at, &normals, elements.ways_of(point), point.index, found);
             }
-        }
-        if !self.field.linear() {
-            for edge in elements.edges_of(index) {
-                self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
+            if only_points || bound - point.longest[usize::from(fine)] > found.limit() {
+                continue;
             }
-            for edge in if self.field.bent() { elements.fine_edges_of(index) } else { &[] } {
+            for edge in elements.edges_of(point, fine) {
                 self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
             }
         }
