@@ -17,6 +17,8 @@ use tumble_collide::{Contact, MeshDistance, Pose, Quat, Shape, TreeSettings, Tri
 /// What the mode states: 2e-4 of a diagonal per mesh (they are 1 m), and parry's own rounding.
 const ERROR: f64 = 4e-4 + 1e-5;
 const MARGIN: f64 = 0.02;
+/// What parry's prism is short of a cylinder by: `0.1 (1 − cos(π/720))`.
+const ROUNDING: f64 = 1e-6;
 /// Overlaps up to this deep have the depth of the deepest point; in deeper ones it may be that of another place.
 const SHALLOW: f64 = 0.02;
 
@@ -173,8 +175,10 @@ fn compare(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts
                 counts.invented += 1;
                 label();
             }
-            if let Some(contact) = deepest.filter(|_| distance > 1e-3 && (gap - distance).abs() < 1e-6) {
-                counts.turned += turned(contact, &qa, a, &qb, b);
+            if deepest.is_some() && distance > 1e-3 && (gap - distance).abs() < ROUNDING {
+                // of contacts that are all as deep, parry has one
+                let mut deep = found.iter().filter(|c| c.gap < gap + ROUNDING);
+                counts.turned += u32::from(deep.all(|contact| is_turned(contact, &qa, a, &qb, b)));
             }
         } else if (distance <= 0.0 || contained) && case % (cases / brute.min(cases)) == 0 {
             counts.overlapping += 1;
@@ -196,12 +200,12 @@ fn compare(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts
     }
 }
 
-/// 1 if the normal is more than 1° from the line between parry's closest points.
-fn turned(contact: &Contact, qa: &parry3d_f64::math::Pose, a: &Body, qb: &parry3d_f64::math::Pose, b: &Body) -> u32 {
-    let Ok(query::ClosestPoints::WithinMargin(x, y)) = query::closest_points(qa, &*a.theirs, qb, &*b.theirs, 1.0) else { return 0 };
+/// Whether the normal is more than 1° from the line between parry's closest points.
+fn is_turned(contact: &Contact, qa: &parry3d_f64::math::Pose, a: &Body, qb: &parry3d_f64::math::Pose, b: &Body) -> bool {
+    let Ok(query::ClosestPoints::WithinMargin(x, y)) = query::closest_points(qa, &*a.theirs, qb, &*b.theirs, 1.0) else { return false };
     let line: Vector = x - y;
     let line = Vec3::new(line.x, line.y, line.z).normalize();
-    u32::from(line.dot(&contact.normal) < 1.0_f64.to_radians().cos())
+    line.dot(&contact.normal) < 1.0_f64.to_radians().cos()
 }
 
 /// Meshes on the primitive of this name; about so many poses in all, of which so many of each pair are held against brute force.
