@@ -23,13 +23,13 @@ if ! cmp -s "$wanted" "$venv/requirements.txt"; then
 fi
 
 PATH="$venv/bin:$PATH"
-export PATH PIP_DISABLE_PIP_VERSION_CHECK=1 MPLBACKEND=Agg
+export PATH PIP_DISABLE_PIP_VERSION_CHECK=1 MPLBACKEND=Agg PYTHONSAFEPATH=1
 
 # maturin is in the environment: nothing is fetched, and the dependencies are those of the workspace's release build.
 "$python" -m pip install --quiet --no-build-isolation --no-deps --force-reinstall . || exit 1
 
 # Outside the sources, so that what is installed is what is imported.
-"$python" -P -m pytest --rootdir=. -p no:cacheprovider "$@" || exit 1
+"$python" -m pytest --rootdir=. -p no:cacheprovider "$@" || exit 1
 [ $# -eq 0 ] || exit 0
-"$python" -P -m mypy || exit 1
-"$python" -P -m mypy.stubtest tumble --mypy-config-file pyproject.toml
+"$python" -m mypy || exit 1
+"$python" -m mypy.stubtest tumble --mypy-config-file pyproject.toml

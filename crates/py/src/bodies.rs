@@ -1,7 +1,10 @@
 //! All bodies of a world, by number and by name.
 
+use crate::articulation::Articulation;
 use crate::body::{Place, RigidBody};
 use crate::errors::{Error, Result};
+use crate::world::place_of;
+use crate::robot::Robot;
 use crate::shared::{Inner, Shared};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
@@ -31,21 +34,21 @@ pub struct Found {
     /// The object.
     pub id: ObjectId,
     name: Arc<str>,
-    articulated: bool,
+    robot: Option<Arc<Robot>>,
 }
 
 /// An object as a handle will show it.
 pub fn found(inner: &Inner, id: ObjectId) -> Option<Found> {
     let name = inner.world.object(id)?.name().into();
-    Some(Found { id, name, articulated: inner.world.get::<ArticulatedBody>(id).is_some() })
+    Some(Found { id, name, robot: inner.robots.get(&id).cloned() })
 }
 
 /// The handle of an object.
 pub fn handle(py: Python<'_>, shared: &Arc<Shared>, found: Found) -> Result<Py<PyAny>> {
     let place = Place { shared: shared.clone(), id: found.id, name: found.name };
-    Ok(match found.articulated {
-        true => return Err(Error::value("not yet")),
-        false => Py::new(py, RigidBody { place })?.into_any(),
+    Ok(match found.robot {
+        Some(robot) => Py::new(py, Articulation::placed(place, robot))?.into_any(),
+        None => Py::new(py, RigidBody { place })?.into_any(),
     })
 }
 
@@ -100,8 +103,7 @@ impl Bodies {
         if let Ok(name) = key.extract::<String>() {
             return self.shared.read(|inner| Ok(by_name(inner, &name).is_ok()));
         }
-        let Ok(body) = key.cast::<RigidBody>() else { return Ok(false) };
-        let place = &body.get().place;
+        let Ok(place) = place_of(key) else { return Ok(false) };
         self.shared.read(|inner| Ok(Arc::ptr_eq(&place.shared, &self.shared) && inner.world.status(place.id).is_some()))
     }
 

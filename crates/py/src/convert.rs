@@ -93,6 +93,11 @@ pub fn pose_numbers(pose: &Pose) -> [f64; 7] {
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 }
 
+/// The rotation of four numbers `x, y, z, w`, made unit.
+pub fn unit(q: &[f64]) -> Quat {
+    UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2]))
+}
+
 /// A path: `str` or `os.PathLike`.
 pub fn path(value: &Bound<'_, PyAny>) -> Result<PathBuf> {
     Ok(value.extract().map_err(|_| PyTypeError::new_err("wanted a path: str or os.PathLike"))?)

@@ -1,11 +1,13 @@
 //! The Python module `tumble._native`: conversion between Python and the crates, and no physics.
 
+mod articulation;
 mod bodies;
 mod body;
 mod contacts;
 mod convert;
 mod errors;
 mod report;
+mod robot;
 mod shapes;
 mod shared;
 mod state;
@@ -18,6 +20,8 @@ use pyo3::prelude::*;
 mod _native {
     use super::*;
 
+    #[pymodule_export]
+    use super::articulation::Articulation;
     #[pymodule_export]
     use super::bodies::Bodies;
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! One world that many Python objects hold: behind a lock that is tried and never waited for, so that nothing can block or deadlock.
 
 use crate::errors::{Error, Result, caught};
+use crate::robot::Robot;
 use crate::state::Mirror;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
@@ -16,8 +17,8 @@ pub struct Inner {
     pub world: World,
     /// The scene that it was made of: its camera, lights and names.
     pub scene: Arc<SceneFile>,
-    /// Names of the joints of articulated bodies, in the order of their coordinates.
-    pub joints: BTreeMap<ObjectId, Arc<Vec<String>>>,
+    /// The trees of articulated bodies.
+    pub robots: BTreeMap<ObjectId, Arc<Robot>>,
     /// Generalized forces that act on articulated bodies in every frame.
     pub efforts: BTreeMap<ObjectId, Vec<f64>>,
     /// The arrays that Python sees the state by.
@@ -29,13 +30,13 @@ pub struct Inner {
 impl Inner {
     /// A world of a scene.
     pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
-        Inner { world, scene, joints: BTreeMap::new(), efforts: BTreeMap::new(), mirror: Mirror::default(), broken: false }
+        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), mirror: Mirror::default(), broken: false }
     }
 
     /// An independent copy, with no arrays yet.
     pub fn fork(&self) -> Inner {
         Inner {
-            world: self.world.fork(), scene: self.scene.clone(), joints: self.joints.clone(), efforts: self.efforts.clone(), mirror: Mirror::default(), broken: false,
+            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), mirror: Mirror::default(), broken: false,
         }
     }
 

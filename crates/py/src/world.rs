@@ -1,10 +1,12 @@
 //! The world: made or loaded, filled, stepped, asked.
 
+use crate::articulation::{Articulation, described};
 use crate::bodies::{Bodies, by_name, handle};
 use crate::body::{Place, RigidBody};
 use crate::convert::{Numbers, numbers, path, pose, shown, vec3, vec3_or, vector};
 use crate::errors::{Error, Result, caught};
 use crate::report::StepReport;
+use crate::robot::Robot;
 use crate::shapes::Shape;
 use crate::shared::{Inner, Shared};
 use crate::contacts;
@@ -14,7 +16,7 @@ use pyo3::types::PyBytes;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tumble::collide::Vec3;
-use tumble::core::{Mode, RigidBody as Rigid, Settings};
+use tumble::core::{ArticulatedBody, Joint, Mode, RigidBody as Rigid, Settings};
 use tumble::scene::{SceneFile, WorldSettings, resolve_scene};
 
 /// How long a call steps before it looks whether the user pressed Ctrl-C.
@@ -40,9 +42,10 @@ impl World {
         let mut inner = Inner::new(world, Arc::new(scene));
         let scene = inner.scene.clone();
         for spec in &scene.articulated {
-            let Some(id) = inner.world.find(&spec.name) else { continue };
-            let names = spec.links.iter().filter(|link| link.joint.kind != tumble::core::Joint::Fixed).map(|link| link.joint.name.clone());
-            inner.joints.insert(id, Arc::new(names.collect()));
+            let Some((id, body)) = inner.world.find(&spec.name).and_then(|id| Some((id, inner.world.get::<ArticulatedBody>(id)?))) else { continue };
+            let joints = spec.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.clone()).collect();
+            let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
+            inner.robots.insert(id, Arc::new(robot));
         }
         Ok(World { shared: Shared::new(inner), notes })
     }
@@ -328,6 +331,30 @@ impl World {
         self.add(py, body, Mode::Static, [true, collidable])
     }
 
+    /// Adds an articulated body, and gives the handle of it.
+    ///
+    /// articulation: a description, or the path of a URDF; base: where its base stands: a position (3,), or position and quaternion (7,), metres and
+    /// (x, y, z, w); name: by default the description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; where a floating root is, is
+    /// said from the base.
+    #[pyo3(signature = (articulation, base=None, *, name=None))]
+    fn add_articulation(
+        &self, py: Python<'_>, articulation: &Bound<'_, PyAny>, base: Option<&Bound<'_, PyAny>>, name: Option<&str>,
+    ) -> Result<Articulation> {
+        let description = described(articulation)?;
+        let description = description.get();
+        let (body, robot) = description.body(py, base.map_or(Ok(tumble::collide::Pose::identity()), base_pose)?, name)?;
+        let (robot, efforts) = (Arc::new(robot), description.efforts());
+        let place = self.shared.write(py, |inner| {
+            let id = inner.world.add(body)?;
+            inner.robots.insert(id, robot.clone());
+            efforts.map(|tau| inner.efforts.insert(id, tau));
+            inner.mirror.renew();
+            let name = inner.world.object(id).map_or("", |o| o.name()).into();
+            Ok(Place { shared: self.shared.clone(), id, name })
+        })?;
+        Ok(Articulation::placed(place, robot))
+    }
+
     /// Removes a body, given as a handle or by name. Handles of it raise ``RemovedError`` from then on.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         let place = match body.extract::<String>() {
@@ -355,8 +382,24 @@ impl World {
     }
 }
 
+/// A pose from 3 numbers or 7.
+fn base_pose(base: &Bound<'_, PyAny>) -> Result<tumble::collide::Pose> {
+    let Numbers { shape, data } = numbers(base, "base")?;
+    match shape.as_slice() {
+        [3] => Ok(Vec3::from_column_slice(&data).into()),
+        [7] if (data[3..].iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() <= 1e-6 => {
+            Ok(tumble::collide::Pose::from_parts(Vec3::from_column_slice(&data[..3]).into(), crate::convert::unit(&data[3..])))
+        }
+        [7] => Err(Error::value("base: the quaternion (x, y, z, w) in its last four numbers must have length 1")),
+        _ => Err(Error::value(format!("base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}", shown(&shape)))),
+    }
+}
+
 /// Where a handle of any kind points.
 pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
+    if let Some(place) = body.cast::<Articulation>().ok().and_then(|body| body.get().place().cloned()) {
+        return Ok(place);
+    }
     match body.cast::<RigidBody>() {
         Ok(body) => Ok(body.get().place.clone()),
         Err(_) => Err(pyo3::exceptions::PyTypeError::new_err("wanted a body: a handle or a name").into()),
@@ -366,7 +409,7 @@ pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
 impl Inner {
     /// What is kept about an object that is gone.
     fn forget(&mut self, id: tumble::core::ObjectId) {
-        self.joints.remove(&id);
+        self.robots.remove(&id);
         self.efforts.remove(&id);
         self.mirror.renew();
     }

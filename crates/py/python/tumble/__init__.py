@@ -17,6 +17,7 @@ from tumble._errors import (
     UnreadableFileError,
 )
 from tumble._native import (
+    Articulation,
     Bodies,
     Box,
     Capsule,
@@ -33,6 +34,7 @@ from tumble._native import (
 from tumble._values import Energy, Momentum
 
 __all__ = [
+    "Articulation",
     "Bodies",
     "Box",
     "BusyError",
