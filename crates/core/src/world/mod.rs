@@ -2,9 +2,11 @@
 
 mod bodies;
 mod core;
+mod mirror;
 mod snapshot;
 
 pub use self::core::{ContactPoint, Core, StepError};
+pub use mirror::MirrorError;
 pub use snapshot::SnapshotError;
 
 use crate::detect::{Owner, Scratch, WarmStarts};
