@@ -9,6 +9,7 @@ mod recover;
 mod roundtrip;
 mod support;
 mod shm;
+mod sync;
 mod udp;
 mod sync;
 mod udp_hostile;
