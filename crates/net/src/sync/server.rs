@@ -487,7 +487,10 @@ impl ServerSession {
         if place.standing != Standing::Absent && place.join == join {
             count(&mut place.counts.duplicate);
             place.heard = now;
-            return if place.synced { () } else { self.send_all_again(facet) };
+            if !place.synced {
+                self.send_all_again(facet);
+            }
+            return;
         }
         if self.ended {
             return self.send_to(facet, Kind::End, join, 0, |_| {});
