@@ -65,9 +65,11 @@ pub mod quantise;
 pub mod recording;
 mod scene_hash;
 pub mod server;
+pub mod shm;
 pub mod simulate;
 pub mod table;
 pub mod transport;
+pub mod udp;
 mod viewer;
 pub mod wire;
 
