@@ -62,7 +62,9 @@ impl ServerSession {
             return count(&mut place.counts.stale);
         }
         if place.standing != Standing::Absent && place.join == join {
-            count(&mut place.counts.duplicate);
+            if self.frame.is_some() {
+                count(&mut place.counts.duplicate); // before the first frame it asks again because nothing is answered
+            }
             place.heard = now;
             if !place.synced {
                 self.send_all_again(facet);
