@@ -205,6 +205,11 @@ impl Material {
         Material { roughness: 0.7, ..Material::plastic([0.55, 0.56, 0.58]) }.with_pattern(Pattern::Checker { other: [0.40, 0.41, 0.43], size_m })
     }
 
+    /// What its pipelines are made for: the pattern's number, and 100 more where light does not matter.
+    pub(crate) fn surface(&self) -> u32 {
+        self.pattern.packed().0 + if self.shader == Shader::Unlit { 100 } else { 0 }
+    }
+
     /// The same surface under another pattern.
     pub fn with_pattern(mut self, pattern: Pattern) -> Self {
         self.pattern = pattern;

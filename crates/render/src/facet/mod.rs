@@ -13,7 +13,6 @@ mod view;
 mod warp;
 
 pub use blend::Blend;
-pub(crate) use compose::cut;
 pub use calibration::{CalibrationPattern, calibration_picture};
 pub use perspective::FacetView;
 pub use unfold::{Tile, unfold};

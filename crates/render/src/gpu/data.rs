@@ -2,7 +2,7 @@
 
 use crate::list::debug::Stroke;
 use crate::material::linear3;
-use crate::{Instance, Material, Part, Shader, Sphere};
+use crate::{Instance, Material, Part, Sphere};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
 
 /// Numbers per mesh instance, sphere and stroke.
@@ -120,8 +120,7 @@ pub fn stroke(s: &Stroke, out: &mut Vec<f32>) {
 }
 
 fn material(m: &Material, out: &mut Vec<f32>) {
-    let (id, other, size) = m.pattern.packed();
-    let id = id + if m.shader == Shader::Unlit { 100 } else { 0 };
+    let (_, other, size) = m.pattern.packed();
     let ([r, g, b], [or, og, ob]) = (linear3(m.color), linear3(other));
-    out.extend([r, g, b, m.roughness, or, og, ob, m.metallic, m.clearcoat, id as f32, size[0], size[1]]);
+    out.extend([r, g, b, m.roughness, or, og, ob, m.metallic, m.clearcoat, 0.0, size[0], size[1]]);
 }

@@ -21,7 +21,7 @@ struct Scene {
     horizon: vec4f,  // w: ambient factor
     ground: vec4f,   // w: softbox
     backdrop: vec4f, // w: 1 for a flat backdrop
-    tone: vec4f,     // exposure, 1 for the filmic curve, 1 for occlusion, side of the shadow maps
+    tone: vec4f,     // exposure, 1 for the filmic curve, unused, side of the shadow maps
     floor: vec4f,    // middle x, y and reach of the ground
     bounce: vec4f,   // radiance that comes back from below
 };
@@ -30,6 +30,7 @@ struct Scene {
 @group(1) @binding(2) var shadow_sampler: sampler_comparison;
 @group(1) @binding(3) var occlusion: texture_2d<f32>;
 @group(1) @binding(4) var shadow_depths: texture_2d_array<f32>; // the same maps, to be read as numbers (OpenGL reads no depth texture)
+@group(1) @binding(5) var seen_depth: texture_2d<f32>; // of what is nearest, where that was drawn first
 
 struct Surface {
     position: vec3f,
@@ -109,6 +110,10 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     if (abs(plane.z) > 1e-9) { slope = -plane.xy / plane.z * vec2f(2.0, -2.0); }
     slope = select(clamp(slope, vec2f(-8.0), vec2f(8.0)), vec2f(0.0), ndc.z < 1e-6);
     let bias = 1e-5 + (abs(slope.x) + abs(slope.y)) * 0.75 / texels;
+    if (SHADOWS == 1u) {
+        let outside = any(uv <= vec2f(0.0)) || any(uv >= vec2f(1.0));
+        return select(textureSampleCompareLevel(shadow_maps, shadow_sampler, uv, index, clamp(depth + bias, 1e-6, 1.0)), 1.0, outside);
+    }
 
     let turn = 6.2831853 * fract(52.9829189 * fract(dot(floor(pixel) + view.grid.xy, vec2f(0.06711056, 0.00583715))));
     let s = select(shadow_depth_to_s(sh, ndc.z), clip.w, sh.scale.z > 0.5);
@@ -186,7 +191,7 @@ fn shade(s: Surface) -> vec3f {
         let n_l = dot(n, l);
         if (n_l <= 0.0) { continue; }
         var visible = 1.0;
-        if (light.shadow.x >= 0.0) { visible = light_visibility(i32(light.shadow.x), s.position, n, light.color.w, s.pixel); }
+        if (SHADOWS > 0u && light.shadow.x >= 0.0) { visible = light_visibility(i32(light.shadow.x), s.position, n, light.color.w, s.pixel); }
         if (visible <= 0.0) { continue; }
         let h = normalize(l + v);
         let v_h = max(dot(v, h), 0.0);
@@ -202,7 +207,7 @@ fn shade(s: Surface) -> vec3f {
     }
 
     var open = 1.0;
-    if (scene.tone.z > 0.5) { open = textureLoad(occlusion, vec2i(s.pixel), 0).x; }
+    if (OCCLUSION) { open = textureLoad(occlusion, vec2i(s.pixel), 0).x; }
     let env = environment_term(rough, n_v);
     let mirror = reflect(-v, n);
     let horizon_open = clamp(open * open + 0.15 * open, 0.0, 1.0);

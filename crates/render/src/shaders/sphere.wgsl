@@ -93,6 +93,19 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
     return sphere_pixel(vec4f(color, 1.0), depth, mask);
 }
 
+// The same where the depth of what is nearest is known and one sample is taken: whatever lies behind ends early.
+@fragment fn fs_sphere_seen(in: SphereOut) -> @location(0) vec4f {
+    let pixel = in.clip.xy;
+    let h = hit(in.ball, pixel);
+    let depth = depth_of(h.s);
+    let seen = textureLoad(seen_depth, vec2i(pixel), 0).x;
+    if (inside(in.ball, pixel) < 0.0 || h.s <= 0.0 || depth > 1.0 || depth < seen * 0.999999) { discard; }
+    let to_eye = -normalize(ray_at(pixel).dir);
+    let object_normal = unturn(in.turn, h.normal);
+    return vec4f(pixel_color(h.position, h.normal, to_eye, object_normal * in.ball.w, object_normal, h.s, pixel,
+        Look(in.color_rough, in.other_metal, in.pattern)), 1.0);
+}
+
 @fragment fn fs_sphere_depth(in: SphereOut) -> @builtin(frag_depth) f32 {
     if (inside(in.ball, in.clip.xy) < 0.0) { discard; }
     let h = hit(in.ball, in.clip.xy);
