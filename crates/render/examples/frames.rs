@@ -34,7 +34,7 @@ fn main() -> Result<(), Failure> {
     let mut renderer = Renderer::new()?;
     let adapter = renderer.adapter().to_owned();
     println!("adapter: {adapter}; {} threads", std::thread::available_parallelism().map_or(1, |n| n.get()));
-    println!("\n| world | facets | quality | frames per second | ms per frame |\n|---|---|---|---|---|");
+    println!("\n| world | facets | quality | frames per second | ms per frame | processor ms per frame |\n|---|---|---|---|---|---|");
     let qualities: Vec<Quality> = match &options.quality {
         Some(quality) => vec![*quality],
         None => ["fast", "fast,samples=4", "usual"].iter().map(|words| words.parse()).collect::<Result<_, _>>()?,
@@ -117,14 +117,15 @@ fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets
     };
     frame(renderer)?;
     frame(renderer)?;
-    let begin = Instant::now();
+    let (begin, spent) = (Instant::now(), processor_s());
     let mut frames = 0;
     while frames < 3 || begin.elapsed().as_secs_f64() < options.seconds {
         frame(renderer)?;
         frames += 1;
     }
     let each = begin.elapsed().as_secs_f64() / f64::from(frames);
-    println!("| {label} | {:.1} | {:.1} |", 1.0 / each, 1e3 * each);
+    let processor = 1e3 * (processor_s() - spent) / f64::from(frames);
+    println!("| {label} | {:.1} | {:.1} | {processor:.0} |", 1.0 / each, 1e3 * each);
     if options.stages {
         let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + 2);
         println!("  list {:.2} ms, picture {:.2} ms", ms(stages[0]), ms(stages[1]));
@@ -156,4 +157,12 @@ fn cave(scene: &SceneFile, facets: usize, size_px: [u32; 2], stereo: Stereo) -> 
     let eye: Vector3<f64> = cave.users[0].eye_m.coords;
     scene.cave = Some(tumble_scene::CavePlace { origin_m: [-eye.x, -eye.y, 1.2 - eye.z], heading_deg: 0.0, scale: 1.0 });
     Ok(CaveView::new(cave, &scene)?)
+}
+
+/// Processor time of this process so far, all threads, s; on a software driver it is what a frame costs however busy the machine is. 0 where
+/// the system does not tell.
+fn processor_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after_name = stat.rsplit(')').next().unwrap_or("");
+    after_name.split_whitespace().skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
 }

@@ -172,7 +172,8 @@ fn copy(encoder: &mut wgpu::CommandEncoder, from: &Texture, rim: u32, [w, h]: [u
     encoder.copy_texture_to_texture(source, target, size);
 }
 
-fn upload(gpu: &Gpu, [width, height]: [u32; 2], format: TextureFormat, bytes: &[u8]) -> TextureView {
+/// A texture with these bytes.
+pub(super) fn upload(gpu: &Gpu, [width, height]: [u32; 2], format: TextureFormat, bytes: &[u8]) -> TextureView {
     let descriptor = wgpu::TextureDescriptor {
         label: Some("finish"),
         size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },

@@ -28,15 +28,14 @@ impl<'a> Frame<'a> {
             let entries = [BindingResource::TextureView(&targets.view_depth), reach.as_entire_binding(), BindingResource::TextureView(raw)];
             bind(gpu, &pipelines.occlusion_layout, &entries)
         };
-        // with several samples the depth map belongs to occlusion alone
-        let seen = if stage.variant.depth_first() { &targets.view_depth } else { &targets.white };
         let scene_entries = [
             stage.scene.as_entire_binding(),
             BindingResource::TextureView(&maps.array),
             BindingResource::Sampler(&pipelines.shadow_sampler),
             BindingResource::TextureView(&targets.occlusion),
             BindingResource::TextureView(&maps.array),
-            BindingResource::TextureView(seen),
+            BindingResource::TextureView(&targets.ids),
+            BindingResource::TextureView(&stage.sphere_data),
         ];
         Ok(Frame {
             view: bind_view(gpu, pipelines, &eye)?,
@@ -53,9 +52,13 @@ impl<'a> Frame<'a> {
     pub fn draw(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines) {
         let occlusion = self.stage.reach > 0.0;
         if occlusion || self.stage.variant.depth_first() {
-            let mut pass = depth_pass(encoder, "view depth", &self.targets.view_depth);
+            let ids = self.stage.variant.depth_first().then_some(&self.targets.ids);
+            let mut pass = match ids {
+                Some(ids) => color_pass(encoder, "view depth", ids, None, Some(cleared(&self.targets.view_depth, wgpu::StoreOp::Store))),
+                None => depth_pass(encoder, "view depth", &self.targets.view_depth),
+            };
             pass.set_bind_group(0, &self.view, &[]);
-            self.stage.draw_view_depth(&mut pass, pipelines);
+            self.stage.draw_view_depth(&mut pass, if ids.is_some() { &pipelines.ids } else { &pipelines.depth });
         }
         if occlusion {
             self.draw_occlusion(encoder, pipelines);

@@ -66,7 +66,7 @@ pub fn uniform_buffer(gpu: &Gpu, floats: &[f32], what: &'static str) -> Result<B
 }
 
 /// A buffer with these bytes; refused beyond what the device can hold, never empty.
-fn buffer(gpu: &Gpu, bytes: &[u8], usage: BufferUsages, what: &'static str) -> Result<Buffer, RenderError> {
+pub fn buffer(gpu: &Gpu, bytes: &[u8], usage: BufferUsages, what: &'static str) -> Result<Buffer, RenderError> {
     let cap = gpu.device.limits().max_buffer_size;
     if bytes.len() as u64 > cap {
         return Err(RenderError::TooMany { what, count: bytes.len(), cap: cap as usize });

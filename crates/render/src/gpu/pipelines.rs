@@ -12,6 +12,8 @@ pub const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 /// Ambient occlusion.
 pub const OCCLUSION: TextureFormat = TextureFormat::R8Unorm;
+/// Number of the nearest sphere.
+pub const ID: TextureFormat = TextureFormat::R32Uint;
 
 /// Textures that are read, not sampled; depth textures too.
 const NUMBERS: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
@@ -51,11 +53,12 @@ pub struct Variant {
     pub samples: u32,
     shadows: u32,
     occlusion: bool,
+    softbox: bool,
 }
 
 impl Variant {
-    pub fn new(samples: u32, shadows: Shadows, occlusion: bool) -> Self {
-        Variant { samples, shadows: shadows.number(), occlusion }
+    pub fn new(samples: u32, shadows: Shadows, occlusion: bool, softbox: bool) -> Self {
+        Variant { samples, shadows: shadows.number(), occlusion, softbox }
     }
 
     /// With one sample the nearest depth is drawn first, and only what is nearest is lit.
@@ -64,7 +67,7 @@ impl Variant {
     }
 }
 
-/// A pipeline's name: pass, number of the surface's pattern, variant.
+/// A pipeline's name: pass, number of the surface ([`crate::Material`]'s), variant.
 pub type Key = (Pass, u32, Variant);
 
 /// Everything that does not change from picture to picture.
@@ -73,9 +76,10 @@ pub struct Pipelines {
     pub scene_layout: BindGroupLayout,
     pub occlusion_layout: BindGroupLayout,
     pub shadow_sampler: wgpu::Sampler,
-    pub ground_depth: RenderPipeline,
-    pub mesh_depth: RenderPipeline,
-    pub sphere_depth: RenderPipeline,
+    /// Floor, meshes and spheres: depth alone.
+    pub depth: [RenderPipeline; 3],
+    /// The same, and the number of the nearest sphere.
+    pub ids: [RenderPipeline; 3],
     pub occlusion: RenderPipeline,
     pub blur: RenderPipeline,
     /// For several samples per pixel, and for one.
@@ -96,7 +100,8 @@ impl Pipelines {
                 entry(2, BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
                 texture(3, NUMBERS, wgpu::TextureViewDimension::D2),
                 texture(4, NUMBERS, wgpu::TextureViewDimension::D2Array),
-                texture(5, NUMBERS, wgpu::TextureViewDimension::D2),
+                texture(5, wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
+                texture(6, NUMBERS, wgpu::TextureViewDimension::D2),
             ],
         );
         let occlusion_layout = layout(
@@ -113,18 +118,26 @@ impl Pipelines {
         let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
         let depth_only = [Some(&view_layout)];
         let screen = [Some(&view_layout), Some(&occlusion_layout)];
-        let depth = |vs, fs, input, depth| {
-            let plan = Plan { vs, fs, input, color: None, depth: Some(depth), blend: None, samples: 1, constants: &[] };
+        let depth = |vs, fs, input, color, depth| {
+            let plan = Plan { vs, fs, input, color, depth: Some(depth), blend: None, samples: 1, constants: &[] };
             plan.build(device, &pixels, &depth_only)
         };
+        let (mesh, no_id) = ("vs_mesh_depth", Some("fs_no_id"));
         let whole = |fs| {
             let plan = Plan { vs: "vs_whole", fs: Some(fs), input: Input::None, color: Some(OCCLUSION), depth: None, blend: None, samples: 1, constants: &[] };
             plan.build(device, &occlusion, &screen)
         };
         Pipelines {
-            ground_depth: depth("vs_mesh_depth", None, Input::Mesh, WRITE_BEHIND),
-            mesh_depth: depth("vs_mesh_depth", None, Input::Mesh, WRITE),
-            sphere_depth: depth("vs_sphere", Some("fs_sphere_depth"), Input::Sphere, WRITE),
+            depth: [
+                depth(mesh, None, Input::Mesh, None, WRITE),
+                depth(mesh, None, Input::Mesh, None, WRITE),
+                depth("vs_ball", Some("fs_ball_depth"), Input::Sphere, None, WRITE),
+            ],
+            ids: [
+                depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
+                depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
+                depth("vs_ball", Some("fs_ball_id"), Input::Sphere, Some(ID), WRITE),
+            ],
             occlusion: whole("fs_occlusion"),
             blur: whole("fs_blur"),
             shadow_sampler: device.create_sampler(&wgpu::SamplerDescriptor {
@@ -162,16 +175,24 @@ impl Pipelines {
         let first = variant.depth_first();
         let (solid, behind) = if first { (TEST, TEST_BEHIND) } else { (WRITE, WRITE_BEHIND) };
         let (vs, fs, input, depth, blend) = match pass {
-            Pass::Sky => ("vs_sky", "fs_sky", Input::None, ALWAYS, None),
+            // at the far plane: with depth known it is drawn only where nothing is
+            Pass::Sky => ("vs_sky", "fs_sky", Input::None, if first { TEST } else { ALWAYS }, None),
             Pass::Ground => ("vs_mesh", "fs_ground", Input::Mesh, behind, None),
             Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
-            Pass::Sphere if first => ("vs_sphere", "fs_sphere_seen", Input::Sphere, ALWAYS, None),
+            Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, ALWAYS, None),
             Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Sphere, WRITE, None),
             Pass::Shell => ("vs_sphere", "fs_shell", Input::Sphere, TEST, over),
             Pass::Line => ("vs_line", "fs_line", Input::Stroke, TEST, over),
             Pass::LineOnTop => ("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
         };
-        let constants = [("SURFACE", f64::from(surface)), ("SHADOWS", f64::from(variant.shadows)), ("OCCLUSION", f64::from(u8::from(variant.occlusion)))];
+        let flag = |on: bool| f64::from(u8::from(on));
+        let constants = [
+            ("SURFACE", f64::from(surface % 1000)),
+            ("COAT", flag(surface >= 1000)),
+            ("SHADOWS", f64::from(variant.shadows)),
+            ("OCCLUSION", flag(variant.occlusion)),
+            ("SOFTBOX", flag(variant.softbox)),
+        ];
         let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: variant.samples, constants: &constants };
         plan.build(device, &self.modules[usize::from(first)], &[Some(&self.view_layout), Some(&self.scene_layout)])
     }
@@ -198,6 +219,8 @@ enum Input {
     Mesh,
     Sphere,
     Stroke,
+    /// Two whole numbers.
+    Range,
 }
 
 struct Plan<'a> {
@@ -223,6 +246,7 @@ impl Plan<'_> {
             Input::None => vec![],
             Input::Mesh => vec![Some(per_vertex), Some(per_instance)],
             Input::Sphere | Input::Stroke => vec![Some(per_instance)],
+            Input::Range => vec![Some(wgpu::VertexBufferLayout { array_stride: 8, step_mode: wgpu::VertexStepMode::Instance, attributes: &RANGE })],
         };
         let strip = matches!(self.input, Input::Sphere | Input::Stroke);
         let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask: wgpu::ColorWrites::ALL })];
@@ -254,10 +278,12 @@ impl Plan<'_> {
     }
 }
 
+const RANGE: [wgpu::VertexAttribute; 1] = [wgpu::VertexAttribute { format: VertexFormat::Uint32x2, offset: 0, shader_location: 0 }];
+
 impl Input {
     fn floats(self) -> u64 {
         match self {
-            Input::None => 0,
+            Input::None | Input::Range => 0,
             Input::Mesh => INSTANCE_FLOATS,
             Input::Sphere => SPHERE_FLOATS,
             Input::Stroke => STROKE_FLOATS,

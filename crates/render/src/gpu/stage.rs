@@ -9,7 +9,7 @@ use crate::list::bounds::Bounds;
 use crate::list::debug::strokes;
 use crate::{DebugSphere, DrawList, Instance, MAX_SHADOWS, MeshData, MeshId, RenderError, Shadows, SphereStyle};
 use std::ops::Range;
-use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass};
+use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline, TextureView};
 
 /// A list that was sent to the device, to be drawn from as many points of view as there are eyes and screens ([`crate::Renderer::stage`]).
 /// Shadows are fitted to all that is there, wherever one looks from.
@@ -25,7 +25,11 @@ pub struct Stage {
     instances: Buffer,
     ground: Option<(MeshBuffers, Buffer, u32)>,
     spheres: Buffer,
+    /// The same numbers as a texture, for pictures that light each pixel once.
+    pub(super) sphere_data: TextureView,
     sphere_groups: Vec<Same>,
+    /// First and last number of the spheres of each group.
+    sphere_ranges: Buffer,
     strokes: [Batch; 2],
 }
 
@@ -56,10 +60,11 @@ impl Stage {
         let reach = scene::occlusion_reach(list, seen, part);
         let buffers = meshes.sync(gpu, &list.meshes)?;
         let (groups, instances) = group_instances(gpu, list, &buffers)?;
-        let (sphere_groups, spheres) = group_spheres(gpu, list)?;
+        let (sphere_groups, sphere_floats) = group_spheres(list);
+        let ranges: Vec<u32> = sphere_groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
         let stage = Stage {
             serial,
-            variant: Variant::new(s.samples, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0),
+            variant: Variant::new(s.samples, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0, list.sky.softbox > 0.0),
             shadow_map_size: s.shadow_map_size,
             reach,
             shadow_views: shadows.iter().map(|(_, eye)| bind_view(gpu, pipelines, eye)).collect::<Result<_, _>>()?,
@@ -68,8 +73,10 @@ impl Stage {
             groups,
             instances,
             ground: ground(gpu, list, seen)?,
-            spheres,
+            spheres: vertex_buffer(gpu, &sphere_floats, "spheres")?,
+            sphere_data: sphere_texture(gpu, if s.samples == 1 { &sphere_floats } else { &[] })?,
             sphere_groups,
+            sphere_ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), wgpu::BufferUsages::VERTEX, "sphere groups")?,
             strokes: [stroke_batch(gpu, list, false)?, stroke_batch(gpu, list, true)?],
         };
         pipelines.prepare(&gpu.device, stage.keys());
@@ -90,23 +97,23 @@ impl Stage {
         for (view, layer) in self.shadow_views.iter().zip(&maps.layers) {
             let mut pass = super::frame::depth_pass(encoder, "shadow", layer);
             pass.set_bind_group(0, view, &[]);
-            self.draw_depth(&mut pass, pipelines, |same| same.casters.clone());
+            self.draw_depth(&mut pass, &pipelines.depth, |same| same.casters.clone());
         }
     }
 
-    /// Depth of everything, the floor included.
-    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, pipelines: &Pipelines) {
+    /// Depth of everything, the floor included, by pipelines for floor, meshes and spheres.
+    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 3]) {
         if let Some((mesh, instance, _)) = &self.ground {
-            pass.set_pipeline(if self.variant.depth_first() { &pipelines.ground_depth } else { &pipelines.mesh_depth });
+            pass.set_pipeline(&by[0]);
             draw_mesh(pass, mesh, instance, 0..1);
         }
-        self.draw_depth(pass, pipelines, |same| same.all.clone());
+        self.draw_depth(pass, by, |same| same.all.clone());
     }
 
-    fn draw_depth(&self, pass: &mut RenderPass, pipelines: &Pipelines, which: impl Fn(&Same) -> Range<u32>) {
-        pass.set_pipeline(&pipelines.mesh_depth);
+    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 3], which: impl Fn(&Same) -> Range<u32>) {
+        pass.set_pipeline(&by[1]);
         self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, which(&g.same)));
-        pass.set_pipeline(&pipelines.sphere_depth);
+        pass.set_pipeline(&by[2]);
         pass.set_vertex_buffer(0, self.spheres.slice(..));
         for range in self.sphere_groups.iter().map(which).filter(|range| !range.is_empty()) {
             pass.draw(0..4, range);
@@ -124,8 +131,14 @@ impl Stage {
                 draw_mesh(pass, &g.mesh, &self.instances, g.same.all.clone());
             }
         }
-        for same in &self.sphere_groups {
-            if select(pass, Pass::Sphere, same.surface) {
+        for (i, same) in self.sphere_groups.iter().enumerate() {
+            if !select(pass, Pass::Sphere, same.surface) {
+                continue;
+            }
+            if self.variant.depth_first() {
+                pass.set_vertex_buffer(0, self.sphere_ranges.slice(..));
+                pass.draw(0..3, i as u32..i as u32 + 1);
+            } else {
                 pass.set_vertex_buffer(0, self.spheres.slice(..));
                 pass.draw(0..4, same.all.clone());
             }
@@ -188,7 +201,7 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
     Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
 }
 
-fn group_spheres(gpu: &Gpu, list: &DrawList) -> Result<(Vec<Same>, Buffer), RenderError> {
+fn group_spheres(list: &DrawList) -> (Vec<Same>, Vec<f32>) {
     let items = &list.spheres;
     let mut order: Vec<usize> = (0..items.len()).collect();
     let kind = |i: usize| items[i].material.surface();
@@ -196,7 +209,20 @@ fn group_spheres(gpu: &Gpu, list: &DrawList) -> Result<(Vec<Same>, Buffer), Rend
     let mut floats = Vec::with_capacity(data::SPHERE_FLOATS as usize * items.len());
     order.iter().for_each(|&i| data::sphere(&items[i], &mut floats));
     let groups = runs(&order, kind, |i| items[i].casts_shadow).map(|(same, first)| Same { surface: kind(first), ..same });
-    Ok((groups.collect(), vertex_buffer(gpu, &floats, "spheres")?))
+    (groups.collect(), floats)
+}
+
+/// Five texels per sphere, 256 spheres per row.
+fn sphere_texture(gpu: &Gpu, floats: &[f32]) -> Result<TextureView, RenderError> {
+    let row = 256 * data::SPHERE_FLOATS as usize;
+    let rows = floats.len().div_ceil(row).max(1);
+    let most = gpu.device.limits().max_texture_dimension_2d as usize;
+    if rows > most {
+        return Err(RenderError::TooMany { what: "spheres", count: floats.len() / data::SPHERE_FLOATS as usize, cap: 256 * most });
+    }
+    let mut padded = floats.to_vec();
+    padded.resize(rows * row, 0.0);
+    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Float, bytemuck::cast_slice(&padded)))
 }
 
 /// Runs of one kind in an order that has those that cast first in each; with the first item of each.

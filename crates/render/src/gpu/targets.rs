@@ -1,7 +1,7 @@
 //! The textures that are drawn into, and the way back to memory.
 
 use super::Gpu;
-use super::pipelines::{COLOR, DEPTH, OCCLUSION};
+use super::pipelines::{COLOR, DEPTH, ID, OCCLUSION};
 use crate::{Image, MAX_SHADOWS, RenderError};
 use wgpu::{Extent3d, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor};
 
@@ -19,6 +19,8 @@ pub struct Targets {
     pub samples: Option<(TextureView, TextureView)>,
     pub picture: TextureView,
     pub view_depth: TextureView,
+    /// Number of the nearest sphere; of one pixel where there are several samples.
+    pub ids: TextureView,
     pub occlusion_raw: TextureView,
     pub occlusion: TextureView,
     pub white: TextureView,
@@ -35,6 +37,7 @@ impl Targets {
             samples: (samples > 1).then(|| (whole(make("samples", samples, COLOR, DRAW)), whole(make("depth", samples, DEPTH, DRAW)))),
             picture: resolved.create_view(&TextureViewDescriptor::default()),
             view_depth: whole(make("view depth", 1, DEPTH, LOOK)),
+            ids: whole(texture(device, "ids", if samples > 1 { [1, 1, 1] } else { [width, height, 1] }, 1, ID, LOOK)),
             occlusion_raw: whole(make("occlusion raw", 1, OCCLUSION, LOOK)),
             occlusion: whole(make("occlusion", 1, OCCLUSION, LOOK)),
             white: whole(texture(device, "unused", [1, 1, 1], 1, OCCLUSION, LOOK)),

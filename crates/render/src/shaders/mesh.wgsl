@@ -49,6 +49,9 @@ fn world_of(in: MeshIn) -> vec3f {
     return view.clip_from_world * vec4f(world_of(in), 1.0);
 }
 
+// Where the number of the nearest sphere is asked for: it is none.
+@fragment fn fs_no_id() -> @location(0) u32 { return 0u; }
+
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     let facing = select(-1.0, 1.0, front) * in.side;
     let s = view_depth_at(in.world);

@@ -54,25 +54,30 @@ fn cover(ball: vec4f, index: u32) -> vec4f {
     return SphereOut(cover(in.ball, index), in.ball, in.turn, in.color_rough, in.other_metal, in.pattern);
 }
 
+// With D the ray's direction of view depth 1, c the way to the centre: s0 = c·D / D·D is the depth of the nearest point of the ray, m = c - s0 D the
+// way from there, and the ray enters at s0 - sqrt((r² - m²) / D·D).
+struct Crossing { room: f32, s: f32, ray: Ray };
+
+fn cross_sphere(ball: vec4f, pixel: vec2f) -> Crossing {
+    let ray = ray_at(pixel);
+    let to = ball.xyz - ray.origin;
+    let per = 1.0 / dot(ray.dir, ray.dir);
+    let nearest = dot(to, ray.dir) * per;
+    let miss = to - nearest * ray.dir;
+    let room = ball.w * ball.w - dot(miss, miss);
+    return Crossing(room, nearest - sqrt(max(room, 0.0) * per), ray);
+}
+
 // Square of the radius less the square of the ray's distance from the centre.
 fn inside(ball: vec4f, pixel: vec2f) -> f32 {
-    let ray = ray_at(pixel);
-    let d = normalize(ray.dir);
-    let to = ball.xyz - ray.origin;
-    let miss = to - dot(to, d) * d;
-    return ball.w * ball.w - dot(miss, miss);
+    return cross_sphere(ball, pixel).room;
 }
 
 fn hit(ball: vec4f, pixel: vec2f) -> Hit {
-    let ray = ray_at(pixel);
-    let len = length(ray.dir);
-    let d = ray.dir / len;
-    let to = ball.xyz - ray.origin;
-    let along = dot(to, d);
-    let miss = along * d - to;
-    let back = sqrt(max(ball.w * ball.w - dot(miss, miss), 0.0));
-    let n = normalize(miss - back * d);
-    return Hit((along - back) / len, ball.xyz + n * ball.w, n);
+    let c = cross_sphere(ball, pixel);
+    // at the rim the ray may just miss: the normal is that of the nearest point
+    let n = normalize(c.ray.origin + c.s * c.ray.dir - ball.xyz);
+    return Hit(c.s, ball.xyz + n * ball.w, n);
 }
 
 fn unturn(q: vec4f, v: vec3f) -> vec3f {
@@ -93,25 +98,54 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
     return sphere_pixel(vec4f(color, 1.0), depth, mask);
 }
 
-// The same where the depth of what is nearest is known and one sample is taken: whatever lies behind ends early.
-@fragment fn fs_sphere_seen(in: SphereOut) -> @location(0) vec4f {
-    let pixel = in.clip.xy;
-    let h = hit(in.ball, pixel);
-    let depth = depth_of(h.s);
-    let seen = textureLoad(seen_depth, vec2i(pixel), 0).x;
-    if (inside(in.ball, pixel) < 0.0 || h.s <= 0.0 || depth > 1.0 || depth < seen * 0.999999) { discard; }
-    let to_eye = -normalize(ray_at(pixel).dir);
-    let object_normal = unturn(in.turn, h.normal);
-    return vec4f(pixel_color(h.position, h.normal, to_eye, object_normal * in.ball.w, object_normal, h.s, pixel,
-        Look(in.color_rough, in.other_metal, in.pattern)), 1.0);
+// Depth alone needs less.
+struct BallOut {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) ball: vec4f,
+    @location(1) @interpolate(flat) id: u32,
+};
+
+@vertex fn vs_ball(in: SphereIn, @builtin(vertex_index) index: u32, @builtin(instance_index) id: u32) -> BallOut {
+    return BallOut(cover(in.ball, index), in.ball, id);
 }
 
-@fragment fn fs_sphere_depth(in: SphereOut) -> @builtin(frag_depth) f32 {
-    if (inside(in.ball, in.clip.xy) < 0.0) { discard; }
-    let h = hit(in.ball, in.clip.xy);
-    let depth = depth_of(h.s);
-    if ((view.lens.x > 0.5 && h.s <= 0.0) || depth > 1.0 || depth < 0.0) { discard; }
+fn ball_depth(ball: vec4f, pixel: vec2f) -> f32 {
+    let c = cross_sphere(ball, pixel);
+    let depth = depth_of(c.s);
+    if (c.room < 0.0 || (view.lens.x > 0.5 && c.s <= 0.0) || depth > 1.0 || depth < 0.0) { discard; }
     return depth;
+}
+
+@fragment fn fs_ball_depth(in: BallOut) -> @builtin(frag_depth) f32 {
+    return ball_depth(in.ball, in.clip.xy);
+}
+
+struct BallPixel { @location(0) id: u32, @builtin(frag_depth) depth: f32 };
+
+// Which sphere is nearest, from 1 on.
+@fragment fn fs_ball_id(in: BallOut) -> BallPixel {
+    return BallPixel(in.id + 1u, ball_depth(in.ball, in.clip.xy));
+}
+
+// All spheres of one surface at once, where the nearest is known: each pixel is lit once.
+@fragment fn fs_sphere_seen(@builtin(position) at: vec4f, @location(0) @interpolate(flat) range: vec2u) -> @location(0) vec4f {
+    let id = textureLoad(seen_id, vec2i(at.xy), 0).x - 1u;
+    if (id < range.x || id >= range.y) { discard; }
+    let place = vec2i(vec2u((id % 256u) * 5u, id / 256u));
+    let ball = textureLoad(sphere_data, place, 0);
+    let turn = textureLoad(sphere_data, place + vec2i(1, 0), 0);
+    let look = Look(textureLoad(sphere_data, place + vec2i(2, 0), 0), textureLoad(sphere_data, place + vec2i(3, 0), 0), textureLoad(sphere_data, place + vec2i(4, 0), 0));
+    let h = hit(ball, at.xy);
+    let to_eye = -normalize(ray_at(at.xy).dir);
+    let object_normal = unturn(turn, h.normal);
+    return vec4f(pixel_color(h.position, h.normal, to_eye, object_normal * ball.w, object_normal, h.s, at.xy, look), 1.0);
+}
+
+struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat) range: vec2u };
+
+// The whole picture, for the spheres from one number to another.
+@vertex fn vs_seen(@location(0) range: vec2u, @builtin(vertex_index) index: u32) -> SeenOut {
+    return SeenOut(vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0), range);
 }
 
 // A translucent shell: clear in the middle, denser at the rim.
