@@ -2,7 +2,8 @@
 //!
 //! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn to the end.
 //! The picture stays on the device, as it does in a window. Options: `--seconds S` per row (default 2), `--only WORDS` (rows that contain the words),
-//! `--quality WORDS` (instead of the two shown), `--readback` (with the way back to memory), `--stages` (where the time of each row goes).
+//! `--quality WORDS` (instead of the two shown), `--readback` (with the way back to memory), `--stages` (where the
+//! time of each row goes), `--pictures FOLDER` (the last picture of each row).
 
 use nalgebra::{Point3, Vector3};
 use std::time::{Duration, Instant};
@@ -19,6 +20,7 @@ struct Options {
     quality: Option<Quality>,
     readback: bool,
     stages: bool,
+    pictures: Option<std::path::PathBuf>,
 }
 
 /// What is drawn: a world, and the facets on which it is.
@@ -56,7 +58,7 @@ fn main() -> Result<(), Failure> {
 }
 
 fn options() -> Result<Options, Failure> {
-    let mut options = Options { seconds: 2.0, only: String::new(), quality: None, readback: false, stages: false };
+    let mut options = Options { seconds: 2.0, only: String::new(), quality: None, readback: false, stages: false, pictures: None };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} wants a value"));
@@ -65,8 +67,9 @@ fn options() -> Result<Options, Failure> {
             "--only" => options.only = value()?,
             "--quality" => options.quality = Some(value()?.parse()?),
             "--readback" => options.readback = true,
+            "--pictures" => options.pictures = Some(value()?.into()),
             "--stages" => options.stages = true,
-            _ => return Err(format!("no option {word}; wanted --seconds S, --only WORDS, --quality WORDS, --readback or --stages").into()),
+            _ => return Err(format!("no option {word}; wanted --seconds S, --only WORDS, --quality WORDS, --readback, --stages or --pictures FOLDER").into()),
         }
     }
     Ok(options)
@@ -117,6 +120,10 @@ fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets
     };
     frame(renderer)?;
     frame(renderer)?;
+    if let Some(folder) = &options.pictures {
+        let name = label.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
+        renderer.read()?.write_png(folder.join(format!("{name}.png")))?;
+    }
     let (begin, spent) = (Instant::now(), processor_s());
     let mut frames = 0;
     while frames < 3 || begin.elapsed().as_secs_f64() < options.seconds {

@@ -3,7 +3,7 @@
 use crate::list::debug::Stroke;
 use crate::material::linear3;
 use crate::{Instance, Material, Part, Sphere};
-use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3};
 
 /// Numbers per mesh instance, sphere and stroke.
 pub const INSTANCE_FLOATS: u64 = 24;
@@ -64,6 +64,18 @@ impl Eye {
         let number = |first: i32| f64::from((first - part.rim_px as i32 + 65_536).rem_euclid(131_072));
         self.grid = [number(part.first_pixel[0]), number(part.first_pixel[1]), f64::from(part.rim_px.saturating_sub(3))];
         self
+    }
+
+    /// Whether the eye is in, or near to, one of the balls, or one lies across the plane through the eye: there an outline is no ellipse before it.
+    pub fn near_any(&self, balls: &[(Point3<f32>, f32)]) -> bool {
+        let at: Vector3<f32> = self.origin[0].cast();
+        let ahead: Vector3<f32> = self.clip_from_world.row(3).transpose().xyz().cast();
+        self.perspective
+            && balls.iter().any(|(center, radius)| {
+                let to = center.coords - at;
+                // a little more than the shaders' own bounds
+                to.norm_squared() < 2.1 * radius * radius || (to.dot(&ahead).abs() < 3.0 * radius && to.norm() < 1e6 * radius)
+            })
     }
 
     /// How many picture widths and heights a metre across the view covers (at view depth 1, where perspective).

@@ -17,6 +17,7 @@ pub struct Frame<'a> {
     occlusion_raw: BindGroup,
     occlusion_blur: BindGroup,
     shells: Batch,
+    near: bool,
 }
 
 impl<'a> Frame<'a> {
@@ -43,6 +44,7 @@ impl<'a> Frame<'a> {
             occlusion_raw: bind_occlusion(&targets.white),
             occlusion_blur: bind_occlusion(&targets.occlusion_raw),
             shells: stage.shells_from(gpu, &lens.view.cast())?,
+            near: stage.near(&eye),
             stage,
             targets,
         })
@@ -58,7 +60,7 @@ impl<'a> Frame<'a> {
                 None => depth_pass(encoder, "view depth", &self.targets.view_depth),
             };
             pass.set_bind_group(0, &self.view, &[]);
-            self.stage.draw_view_depth(&mut pass, if ids.is_some() { &pipelines.ids } else { &pipelines.depth });
+            self.stage.draw_view_depth(&mut pass, if ids.is_some() { &pipelines.ids } else { &pipelines.depth }, self.near);
         }
         if occlusion {
             self.draw_occlusion(encoder, pipelines);

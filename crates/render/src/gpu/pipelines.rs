@@ -76,10 +76,10 @@ pub struct Pipelines {
     pub scene_layout: BindGroupLayout,
     pub occlusion_layout: BindGroupLayout,
     pub shadow_sampler: wgpu::Sampler,
-    /// Floor, meshes and spheres: depth alone.
-    pub depth: [RenderPipeline; 3],
+    /// Floor, meshes, spheres, and spheres that the eye is near to: depth alone.
+    pub depth: [RenderPipeline; 4],
     /// The same, and the number of the nearest sphere.
-    pub ids: [RenderPipeline; 3],
+    pub ids: [RenderPipeline; 4],
     pub occlusion: RenderPipeline,
     pub blur: RenderPipeline,
     /// For several samples per pixel, and for one.
@@ -132,11 +132,13 @@ impl Pipelines {
                 depth(mesh, None, Input::Mesh, None, WRITE),
                 depth(mesh, None, Input::Mesh, None, WRITE),
                 depth("vs_ball", Some("fs_ball_depth"), Input::Sphere, None, WRITE),
+                depth("vs_near", Some("fs_near_depth"), Input::Sphere, None, WRITE),
             ],
             ids: [
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
                 depth("vs_ball", Some("fs_ball_id"), Input::Sphere, Some(ID), WRITE),
+                depth("vs_near", Some("fs_near_id"), Input::Sphere, Some(ID), WRITE),
             ],
             occlusion: whole("fs_occlusion"),
             blur: whole("fs_blur"),

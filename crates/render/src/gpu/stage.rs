@@ -8,6 +8,7 @@ use super::{Gpu, scene};
 use crate::list::bounds::Bounds;
 use crate::list::debug::strokes;
 use crate::{DebugSphere, DrawList, Instance, MAX_SHADOWS, MeshData, MeshId, RenderError, Shadows, SphereStyle};
+use nalgebra::Point3;
 use std::ops::Range;
 use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline, TextureView};
 
@@ -18,13 +19,15 @@ pub struct Stage {
     pub(super) variant: Variant,
     pub(super) shadow_map_size: u32,
     pub(super) reach: f32,
-    pub(super) shadow_views: Vec<BindGroup>,
+    /// Each with whether it is near to a sphere.
+    pub(super) shadow_views: Vec<(BindGroup, bool)>,
     pub(super) scene: Buffer,
     shells: Vec<DebugSphere>,
     groups: Vec<Group>,
     instances: Buffer,
     ground: Option<(MeshBuffers, Buffer, u32)>,
     spheres: Buffer,
+    balls: Vec<(Point3<f32>, f32)>,
     /// The same numbers as a texture, for pictures that light each pixel once.
     pub(super) sphere_data: TextureView,
     sphere_groups: Vec<Same>,
@@ -62,12 +65,14 @@ impl Stage {
         let (groups, instances) = group_instances(gpu, list, &buffers)?;
         let (sphere_groups, sphere_floats) = group_spheres(list);
         let ranges: Vec<u32> = sphere_groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
+        let balls: Vec<_> = list.spheres.iter().map(|s| (s.center, s.radius)).collect();
         let stage = Stage {
             serial,
             variant: Variant::new(s.samples, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0, list.sky.softbox > 0.0),
             shadow_map_size: s.shadow_map_size,
             reach,
-            shadow_views: shadows.iter().map(|(_, eye)| bind_view(gpu, pipelines, eye)).collect::<Result<_, _>>()?,
+            shadow_views: shadows.iter().map(|(_, eye)| Ok((bind_view(gpu, pipelines, eye)?, eye.near_any(&balls)))).collect::<Result<_, RenderError>>()?,
+            balls,
             scene: uniform_buffer(gpu, &scene::floats(list, seen, &shadows), "scene")?,
             shells: list.debug_spheres.iter().filter(|s| s.look == SphereStyle::Shell && s.radius > 0.0).cloned().collect(),
             groups,
@@ -94,30 +99,37 @@ impl Stage {
 
     /// One depth map per shadow.
     pub(super) fn draw_shadows(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines, maps: &ShadowMaps) {
-        for (view, layer) in self.shadow_views.iter().zip(&maps.layers) {
+        for ((view, near), layer) in self.shadow_views.iter().zip(&maps.layers) {
             let mut pass = super::frame::depth_pass(encoder, "shadow", layer);
             pass.set_bind_group(0, view, &[]);
-            self.draw_depth(&mut pass, &pipelines.depth, |same| same.casters.clone());
+            self.draw_depth(&mut pass, &pipelines.depth, *near, |same| same.casters.clone());
         }
     }
 
-    /// Depth of everything, the floor included, by pipelines for floor, meshes and spheres.
-    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 3]) {
+    /// Depth of everything, the floor included, by pipelines for floor, meshes, spheres and near spheres.
+    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 4], near: bool) {
         if let Some((mesh, instance, _)) = &self.ground {
             pass.set_pipeline(&by[0]);
             draw_mesh(pass, mesh, instance, 0..1);
         }
-        self.draw_depth(pass, by, |same| same.all.clone());
+        self.draw_depth(pass, by, near, |same| same.all.clone());
     }
 
-    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 3], which: impl Fn(&Same) -> Range<u32>) {
+    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 4], near: bool, which: impl Fn(&Same) -> Range<u32>) {
         pass.set_pipeline(&by[1]);
         self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, which(&g.same)));
-        pass.set_pipeline(&by[2]);
         pass.set_vertex_buffer(0, self.spheres.slice(..));
-        for range in self.sphere_groups.iter().map(which).filter(|range| !range.is_empty()) {
-            pass.draw(0..4, range);
+        for pipeline in &by[2..if near { 4 } else { 3 }] {
+            pass.set_pipeline(pipeline);
+            for range in self.sphere_groups.iter().map(&which).filter(|range| !range.is_empty()) {
+                pass.draw(0..4, range);
+            }
         }
+    }
+
+    /// Whether some sphere is so near to the eye that its outline is no circle on a plane before it.
+    pub(super) fn near(&self, eye: &Eye) -> bool {
+        eye.near_any(&self.balls)
     }
 
     /// Everything in colour, with the view's own shells.
