@@ -37,6 +37,8 @@ pub struct Renderer {
     /// The finished picture.
     picture: Option<wgpu::Texture>,
     stages: u64,
+    /// Ends of frames that the device may still be at.
+    ends: std::collections::VecDeque<wgpu::SubmissionIndex>,
 }
 
 /// The device, its queue, and the last thing it complained about.
@@ -59,7 +61,7 @@ impl Renderer {
         let pipelines = Pipelines::new(&gpu.device, gpu.sample_masks);
         let finisher = Finisher::new(&gpu);
         gpu.complaint()?;
-        Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), finisher, shadows: None, targets: Vec::new(), picture: None, stages: 0 })
+        Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), finisher, shadows: None, targets: Vec::new(), picture: None, stages: 0, ends: Default::default() })
     }
 
     /// The adapter in use: its name, kind and interface.
@@ -141,6 +143,18 @@ impl Renderer {
     /// A device that fails, is lost, or hangs.
     pub fn wait(&self) -> Result<(), RenderError> {
         targets::wait(&self.gpu)
+    }
+
+    /// Ends a frame and waits until the device is at most `ahead` frames behind: with 1 the next list is made while the device draws this one.
+    ///
+    /// # Errors
+    /// As [`Renderer::wait`].
+    pub fn end_frame(&mut self, ahead: usize) -> Result<(), RenderError> {
+        self.ends.push_back(self.gpu.queue.submit([]));
+        while self.ends.len() > ahead {
+            targets::wait_for(&self.gpu, self.ends.pop_front())?;
+        }
+        self.gpu.complaint()
     }
 
     fn sent(&mut self, list: &DrawList, seen: Option<&Bounds>, part: bool) -> Result<Stage, RenderError> {

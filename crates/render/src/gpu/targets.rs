@@ -123,7 +123,12 @@ pub fn read(gpu: &Gpu, from: &Texture) -> Result<Image, RenderError> {
 
 /// Until all that was submitted is done.
 pub fn wait(gpu: &Gpu) -> Result<(), RenderError> {
-    let done = gpu.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) });
+    wait_for(gpu, None)
+}
+
+/// Until this submission is done, or all are.
+pub fn wait_for(gpu: &Gpu, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), RenderError> {
+    let done = gpu.device.poll(wgpu::PollType::Wait { submission_index, timeout: Some(PATIENCE) });
     gpu.complaint()?;
     done.map(drop).map_err(|e| gpu.failed(e.to_string()))
 }

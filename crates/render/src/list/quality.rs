@@ -30,7 +30,7 @@ impl Shadows {
     }
 }
 
-/// The part of [`Settings`] that trades looks for speed. As words: `usual`, `fast`, and behind it or alone `shadows=off|hard|soft`, `samples=1|4`,
+/// The part of [`Settings`] that trades looks for speed. As words: `usual`, `fast`, `fastest`, and behind it or alone `shadows=off|hard|soft`, `samples=1|4`,
 /// `occlusion=on|off`, `map=TEXELS`, with commas between them.
 ///
 /// ```
@@ -53,7 +53,7 @@ pub struct Quality {
 
 /// A word that names no quality.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no quality '{0}'; wanted usual, fast, shadows=off|hard|soft, samples=1|4, occlusion=on|off or map=TEXELS (256 to 8192), with commas between them")]
+#[error("no quality '{0}'; wanted usual, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off or map=TEXELS (256 to 8192), with commas between them")]
 pub struct UnknownQuality(String);
 
 impl Default for Quality {
@@ -67,6 +67,11 @@ impl Quality {
     /// For many bodies on a slow device: hard shadows, one sample, no occlusion.
     pub fn fast() -> Self {
         Quality { shadows: Shadows::Hard, samples: 1, occlusion: false, shadow_map_size: 1024 }
+    }
+
+    /// As [`Quality::fast`] without shadows.
+    pub fn fastest() -> Self {
+        Quality { shadows: Shadows::Off, ..Quality::fast() }
     }
 
     /// Writes it into the settings of a list. A reach of occlusion that is set stays, unless occlusion is off.
@@ -89,6 +94,7 @@ impl FromStr for Quality {
             let unknown = || UnknownQuality(word.to_string());
             match word.split_once('=') {
                 None if word == "usual" => quality = Quality::default(),
+                None if word == "fastest" => quality = Quality::fastest(),
                 None if word == "fast" => quality = Quality::fast(),
                 Some(("shadows", name)) => quality.shadows = SHADOWS.iter().find(|(known, _)| *known == name).ok_or_else(unknown)?.1,
                 Some(("samples", "1")) => quality.samples = 1,
