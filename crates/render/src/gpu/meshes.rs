@@ -3,7 +3,6 @@
 use super::Gpu;
 use crate::{MeshData, RenderError};
 use std::sync::Arc;
-use wgpu::util::DeviceExt;
 use wgpu::{Buffer, BufferUsages};
 
 /// Meshes on the device, known by their `Arc`: a mesh is uploaded once, and let go when a list no longer holds it.
@@ -72,5 +71,9 @@ pub fn buffer(gpu: &Gpu, bytes: &[u8], usage: BufferUsages, what: &'static str) 
         return Err(RenderError::TooMany { what, count: bytes.len(), cap: cap as usize });
     }
     let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
-    Ok(gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(what), contents, usage }))
+    // not mapped: on a lost device that would be a panic and no error
+    let size = contents.len() as u64;
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(what), size, usage: usage | BufferUsages::COPY_DST, mapped_at_creation: false });
+    gpu.queue.write_buffer(&buffer, 0, contents);
+    Ok(buffer)
 }

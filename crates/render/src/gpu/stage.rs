@@ -79,7 +79,7 @@ impl Stage {
             instances,
             ground: ground(gpu, list, seen)?,
             spheres: vertex_buffer(gpu, &sphere_floats, "spheres")?,
-            sphere_data: sphere_texture(gpu, if s.samples == 1 { &sphere_floats } else { &[] })?,
+            sphere_data: sphere_texture(gpu, if s.samples == 1 { sphere_floats } else { Vec::new() })?,
             sphere_groups,
             sphere_ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), wgpu::BufferUsages::VERTEX, "sphere groups")?,
             strokes: [stroke_batch(gpu, list, false)?, stroke_batch(gpu, list, true)?],
@@ -225,16 +225,15 @@ fn group_spheres(list: &DrawList) -> (Vec<Same>, Vec<f32>) {
 }
 
 /// Five texels per sphere, 256 spheres per row.
-fn sphere_texture(gpu: &Gpu, floats: &[f32]) -> Result<TextureView, RenderError> {
+fn sphere_texture(gpu: &Gpu, mut floats: Vec<f32>) -> Result<TextureView, RenderError> {
     let row = 256 * data::SPHERE_FLOATS as usize;
     let rows = floats.len().div_ceil(row).max(1);
     let most = gpu.device.limits().max_texture_dimension_2d as usize;
     if rows > most {
         return Err(RenderError::TooMany { what: "spheres", count: floats.len() / data::SPHERE_FLOATS as usize, cap: 256 * most });
     }
-    let mut padded = floats.to_vec();
-    padded.resize(rows * row, 0.0);
-    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Float, bytemuck::cast_slice(&padded)))
+    floats.resize(rows * row, 0.0);
+    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Float, bytemuck::cast_slice(&floats)))
 }
 
 /// Runs of one kind in an order that has those that cast first in each; with the first item of each.
