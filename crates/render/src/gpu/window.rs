@@ -33,6 +33,7 @@ pub struct Screen {
     copies: Copies,
     caption: Option<(Image, wgpu::Texture)>,
     losses: u32,
+    software: bool,
 }
 
 impl Screen {
@@ -68,6 +69,7 @@ impl Screen {
         let (width, height) = (size.width.max(1), size.height.max(1));
         let usual = surface.get_default_config(&adapter, width, height);
         let format = surface.get_capabilities(&adapter).formats.iter().copied().find(TextureFormat::is_srgb);
+        let software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
         let renderer = Renderer::on(adapter)?;
         let mut config = usual.ok_or_else(|| renderer.gpu.failed("it cannot show pictures in this window".into()))?;
         config.format = format.unwrap_or(config.format);
@@ -76,7 +78,7 @@ impl Screen {
         surface.configure(&renderer.gpu.device, &config);
         let copies = Copies::new(&renderer.gpu.device, config.format);
         renderer.gpu.complaint()?;
-        Ok(Screen { window, instance, surface, config, renderer, copies, caption: None, losses: 0 })
+        Ok(Screen { window, instance, surface, config, renderer, copies, caption: None, losses: 0, software })
     }
 
     /// The window.
@@ -87,6 +89,11 @@ impl Screen {
     /// The adapter in use: its name, kind and interface.
     pub fn adapter(&self) -> &str {
         self.renderer.adapter()
+    }
+
+    /// Whether the processor does the adapter's work: [`Quality::fast`](crate::Quality::fast) is made for that.
+    pub fn is_software(&self) -> bool {
+        self.software
     }
 
     /// What draws: [`Renderer::draw`] and its like leave a picture on the device, which [`show`](Self::show) shows.

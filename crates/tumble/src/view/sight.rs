@@ -2,10 +2,10 @@
 
 use super::user::Body;
 use tumble::collide::Vec3;
-use tumble::render::{CaveView, DrawList, Image, RIM_PX, RenderError, Screen, Viewpoint, unfold};
+use tumble::render::{CaveView, DrawList, Image, Quality, RIM_PX, RenderError, Screen, Viewpoint, unfold};
 use tumble::scene::cave::{Facet, Flip, Stereo};
 
-/// Side of the shadow maps of a cave, as for its pictures.
+/// Side of the shadow maps of a cave where it is the usual one elsewhere, as for its pictures.
 const CAVE_SHADOWS: u32 = 4096;
 
 /// What is shown.
@@ -44,7 +44,9 @@ impl Sight {
             (Sight::Camera, Body::Eye(camera)) => list.camera = *camera,
             (Sight::Facet(view, _) | Sight::Unfolded(view), Body::Cave { place, .. }) => {
                 view.stand(*place);
-                list.settings.shadow_map_size = CAVE_SHADOWS;
+                if list.settings.shadow_map_size == Quality::default().shadow_map_size {
+                    list.settings.shadow_map_size = CAVE_SHADOWS;
+                }
             }
             _ => {}
         }
