@@ -1,7 +1,7 @@
 #!/bin/sh
 # Installs what is missing, and only that: a C compiler (zstd and lz4 are C), make, a software Vulkan driver (for pictures), an X server without a
-# screen and hands for it (for tests of windows), the crates of Cargo.lock. Where all is there, it asks no network and no apt. What only pictures and
-# windows need may stay missing.
+# screen and hands for it (for tests of windows), Python's venv, the crates of Cargo.lock. Where all is there, it asks no network and no apt. What only
+# pictures and windows need may stay missing.
 . "$(dirname "$0")/env.sh"
 
 export DEBIAN_FRONTEND=noninteractive
@@ -30,6 +30,11 @@ has_window_libraries() {
     for library in libX11 libX11-xcb libXcursor libXi libxkbcommon-x11; do
         ls /usr/lib/*/$library.so.? /usr/lib/$library.so.? /usr/lib64/$library.so.? 2>/dev/null | grep -q . || return 1
     done
+}
+
+# Debian splits venv off; its absence shows as a missing ensurepip.
+has_venv() {
+    python3 -c 'import venv, ensurepip' >/dev/null 2>&1
 }
 
 as_root() {
@@ -66,6 +71,7 @@ has_compiler || missing="$missing gcc libc6-dev"
 command -v make >/dev/null 2>&1 || missing="$missing make"
 has_vulkan_loader || missing="$missing libvulkan1"
 has_vulkan_driver || missing="$missing mesa-vulkan-drivers"
+has_venv || missing="$missing python3 python3-venv"
 # shellcheck disable=SC2086  # one word per package
 [ -z "$missing" ] || install_packages $missing
 
