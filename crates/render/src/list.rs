@@ -2,8 +2,10 @@
 
 pub(crate) mod bounds;
 pub(crate) mod debug;
+mod quality;
 mod text;
 mod validate;
+pub use quality::{Quality, Shadows, UnknownQuality};
 pub use validate::{MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS};
 
 pub use debug::{DebugLine, DebugPoint, DebugSphere, DebugStyle, SphereStyle};
@@ -162,11 +164,15 @@ pub struct Settings {
     pub occlusion_m: Option<f32>,
     /// Filmic tone curve; without it light above 1 is cut off (tests and plots).
     pub tone_map: bool,
+    /// How shadows are drawn.
+    pub shadows: Shadows,
+    /// Samples per pixel: 1, or 4 for smooth edges.
+    pub samples: u32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { exposure: 1.0, shadow_map_size: 2048, occlusion_m: None, tone_map: true }
+        Settings { exposure: 1.0, shadow_map_size: 2048, occlusion_m: None, tone_map: true, shadows: Shadows::Soft, samples: 4 }
     }
 }
 

@@ -205,6 +205,12 @@ impl Material {
         Material { roughness: 0.7, ..Material::plastic([0.55, 0.56, 0.58]) }.with_pattern(Pattern::Checker { other: [0.40, 0.41, 0.43], size_m })
     }
 
+    /// What its pipelines are made for: the pattern's number, 100 more where light does not matter, 1000 more under lacquer.
+    pub(crate) fn surface(&self) -> u32 {
+        let unlit = self.shader == Shader::Unlit;
+        self.pattern.packed().0 + if unlit { 100 } else { 0 } + if self.clearcoat > 0.0 && !unlit { 1000 } else { 0 }
+    }
+
     /// The same surface under another pattern.
     pub fn with_pattern(mut self, pattern: Pattern) -> Self {
         self.pattern = pattern;

@@ -2,6 +2,8 @@
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names, Value};
+use std::path::PathBuf;
+use tumble_core::Detail;
 
 /// Red, green and blue from 0 to 1, sRGB (as on a screen, not linear light).
 pub type Color = [f64; 3];
@@ -69,6 +71,10 @@ pub struct Look {
     pub metallic: f64,
     /// Strength of a clear varnish on top, 0 to 1. Default 0.
     pub clearcoat: f64,
+    /// A picture (PNG) in the place of the main colour, which then only tints it; relative to the folder of the scene in the file, whole here.
+    pub texture: Option<PathBuf>,
+    /// How much of it is drawn. Default full.
+    pub detail: Detail,
 }
 
 impl Default for Look {
@@ -82,6 +88,8 @@ impl Default for Look {
             roughness: 0.5,
             metallic: 0.0,
             clearcoat: 0.0,
+            texture: None,
+            detail: Detail::Full,
         }
     }
 }
@@ -98,8 +106,18 @@ impl Look {
             roughness: f.number_or("roughness", Bound::UNIT, base.roughness),
             metallic: f.number_or("metallic", Bound::UNIT, base.metallic),
             clearcoat: f.number_or("clearcoat", Bound::UNIT, base.clearcoat),
+            texture: f.optional_text("texture").map(|(file, _)| f.log.folder().join(file)).or_else(|| base.texture.clone()),
+            detail: read_detail(f, base.detail),
         }
     }
+}
+
+fn read_detail(f: &mut Fields<'_>, default: Detail) -> Detail {
+    let Some((words, value)) = f.optional_text("quality") else { return default };
+    words.parse().unwrap_or_else(|wanted: String| {
+        f.wrong("quality", value, wanted);
+        default
+    })
 }
 
 /// A colour, or `default` where the key is not there.

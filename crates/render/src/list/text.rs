@@ -15,7 +15,8 @@ impl Display for DrawList {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         write_camera(f, &self.camera)?;
         let (s, k) = (&self.settings, &self.sky);
-        writeln!(f, "settings: exposure {} shadow map {} occlusion {} tone map {}", n(s.exposure), s.shadow_map_size, s.occlusion_m.map_or("auto".into(), n), s.tone_map)?;
+        write!(f, "settings: exposure {} shadow map {} occlusion {} tone map {}", n(s.exposure), s.shadow_map_size, s.occlusion_m.map_or("auto".into(), n), s.tone_map)?;
+        writeln!(f, " shadows {} samples {}", s.shadows.name(), s.samples)?;
         writeln!(f, "sky: zenith {} horizon {} ground {} ambient {} softbox {} backdrop {}", v(&k.zenith), v(&k.horizon), v(&k.ground), n(k.ambient), n(k.softbox), k.backdrop.map_or("none".into(), |c| v(&c)))?;
         if let Some(g) = &self.ground {
             writeln!(f, "ground: height {} reach {} {}", n(g.height_m), n(g.reach_m), material(&g.material))?;

@@ -91,6 +91,7 @@ impl DrawList {
         let at = Item("settings", 0);
         at.check(in_range(s.exposure, 0.0, 1e6), "exposure", &s.exposure, "0 or more")?;
         at.check((256..=8192).contains(&s.shadow_map_size), "shadow_map_size", &s.shadow_map_size, "256 to 8192 texels")?;
+        at.check([1, 4].contains(&s.samples), "samples", &s.samples, "1 or 4")?;
         at.check(s.occlusion_m.is_none_or(|r| in_range(r, 0.0, 1e6)), "occlusion_m", &s.occlusion_m, "0 or more")
     }
 }

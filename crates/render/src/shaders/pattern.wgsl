@@ -106,7 +106,7 @@ fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> v
 fn base_of(p: vec3f, n: vec3f, w: f32, color_rough: vec4f, other: vec3f, pattern: vec4f) -> Base {
     var base = Base(color_rough.xyz, color_rough.w, pattern.x, 0.0);
     let size = max(pattern.zw, vec2f(1e-6));
-    switch u32(pattern.y) % 100u {
+    switch SURFACE % 100u {
         case 1u: {
             // a face that lies in a plane of the lattice would flicker: sample slightly inside
             let q = (p - n * 1e-3 * size.x) / size.x;

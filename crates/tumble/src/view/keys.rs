@@ -19,6 +19,7 @@ pub enum Command {
     Statistics,
     Help,
     Picture,
+    Quality,
     Fullscreen,
     Quit,
 }
@@ -27,7 +28,7 @@ pub enum Command {
 pub const OVERLAYS: [&str; 5] = ["contacts", "normals", "velocities", "forces", "tree"];
 
 /// What is told of keys and mouse.
-pub const HELP: [&str; 18] = [
+pub const HELP: [&str; 19] = [
     "W A S D     walk; arrows too, left and right turn",
     "E Q         up and down; also page up, page down",
     "shift       four times as fast",
@@ -44,6 +45,7 @@ pub const HELP: [&str; 18] = [
     "1 2 3 4     contacts, normals, velocities, forces",
     "5           sphere trees, level by level",
     "T, H or F1  statistics, this help",
+    "G           looks: usual, fast, fastest",
     "P, F11      picture to a file, full screen",
     "escape      end",
 ];
@@ -71,6 +73,7 @@ pub fn command(key: &Key) -> Option<Command> {
         "t" | "T" => Command::Statistics,
         "h" | "H" | "?" => Command::Help,
         "p" | "P" => Command::Picture,
+        "g" | "G" => Command::Quality,
         digit => match digit.parse::<usize>() {
             Ok(n) if (1..=OVERLAYS.len()).contains(&n) => Command::Overlay(n - 1),
             _ => return None,

@@ -192,7 +192,7 @@ fn keys_and_mouse_do_what_they_say() {
     let Some(desktop) = Desktop::open() else { return };
     let folder = Folder::new("view-keys");
     let scene = folder.write("ball.toml", BALL.replace("mass_kg = 2.0", "mass_kg = 2.0\nvelocity_m_per_s = [0.01, 0, 0]"));
-    let Some(mut view) = Session::open(&desktop, "view-keys-status", &[&scene, "--size", "200x150"]) else { return };
+    let Some(mut view) = Session::open(&desktop, "view-keys-status", &[&scene, "--size", "200x150", "--quality", "fast"]) else { return };
     let title = String::from_utf8(desktop.run("xdotool", &["getwindowname", &view.window])).unwrap();
     assert!(title.starts_with(&format!("tumble: {scene}")), "{title}");
 
@@ -248,6 +248,9 @@ fn keys_and_mouse_do_what_they_say() {
         view.key(key);
     }
     view.until("overlays", |s| s["overlays"] == serde_json::json!(["normals", "tree=1"]));
+    view.key("g");
+    view.key("g");
+    view.until("the usual looks", |s| s["quality"] == "shadows=soft,samples=4,occlusion=on,map=2048");
     view.key("minus");
     view.key("minus");
     view.until("a quarter of the speed", |s| s["speed"] == 0.25);
@@ -262,7 +265,7 @@ fn keys_and_mouse_do_what_they_say() {
 #[test]
 fn a_window_shows_the_picture_that_run_takes() {
     let Some(desktop) = Desktop::open() else { return };
-    let Some(mut view) = Session::open(&desktop, "view-picture", &["bowling", "--size", "320x180", "--plain", "--paused"]) else { return };
+    let Some(mut view) = Session::open(&desktop, "view-picture", &["bowling", "--size", "160x90", "--quality", "usual", "--plain", "--paused"]) else { return };
     for n in 1..=12 {
         view.key("period");
         view.until("a step", |s| s["frame"] == n);
@@ -275,9 +278,9 @@ fn a_window_shows_the_picture_that_run_takes() {
     view.until("no text", |s| s["caption"] == false);
     let window = view.shot();
     let picture = view.folder.path("run.png");
-    succeed(&["run", "bowling", "--quiet", "--seconds", "0.05", "--size", "320x180", "--picture", &text(&picture)]);
+    succeed(&["run", "bowling", "--quiet", "--seconds", "0.05", "--size", "160x90", "--picture", &text(&picture)]);
     let image = tumble::render::Image::read_png(&picture).unwrap();
-    assert_eq!(window.len(), 3 * 320 * 180);
+    assert_eq!(window.len(), 3 * 160 * 90);
     let off = window.chunks_exact(3).zip(image.rgba.chunks_exact(4)).filter(|(a, b)| (0..3).any(|k| a[k].abs_diff(b[k]) > 1)).count();
     assert_eq!(off, 0, "pixels that differ by more than a level");
     let bright = image.rgba.chunks_exact(4).map(|p| u64::from(p[1])).collect::<Vec<_>>();
@@ -351,7 +354,7 @@ flip = \"FLIP\"
     let cases: [(&str, &[&str], usize); 3] = [(&anaglyph, &["--facet", "f"], 120 * 90), (&beside, &["--facet", "f"], 240 * 90), ("cube4", &["--size", "240x160"], 240 * 160)];
     for (cave, more, pixels) in cases {
         let args = [&["stack", "--cave", cave], more].concat();
-        let Some(view) = Session::open(&desktop, "view-cave-status", &[&args[..], &["--plain", "--paused"]].concat()) else { return };
+        let Some(view) = Session::open(&desktop, "view-cave-status", &[&args[..], &["--quality", "usual", "--plain", "--paused"]].concat()) else { return };
         let window = view.shot();
         let picture = view.folder.path("run.png");
         succeed(&[&["run"], &args[..], &["--quiet", "--seconds", "0", "--picture", &text(&picture)]].concat());
@@ -377,7 +380,7 @@ fn windows_that_end_end_well() {
     let Some(mut view) = Session::open(&desktop, "view-lost", &args) else { return };
     assert!(Command::new("kill").arg(desktop.server.0.id().to_string()).status().unwrap().success());
     let (code, said) = view.end();
-    assert!(code == Some(1) && said.contains("X server"), "{code:?}: {said}");
+    assert!(code == Some(1) && said.contains("X "), "{code:?}: {said}");
 }
 
 #[test]
