@@ -1,4 +1,4 @@
-//! Recordings, from outside.
+//! Recordings and sessions, from outside.
 
 mod damage;
 mod hostile;
@@ -8,10 +8,9 @@ mod links;
 mod outside;
 mod recover;
 mod roundtrip;
-mod support;
 mod shm;
+mod support;
 mod sync;
 mod udp;
-mod sync;
 mod udp_hostile;
 mod udp_socket;

@@ -7,12 +7,8 @@ use super::{Blend, Warp};
 use crate::gpu::{Finish, Placed};
 use crate::{DrawList, Image, RenderError, Renderer, Stage};
 use nalgebra::{Point3, Vector3};
-<<<<<<< HEAD
-use tumble_scene::cave::{Cave, Facet, User};
-=======
 use std::sync::Arc;
-use tumble_scene::cave::{Cave, Facet, Flip, Stereo};
->>>>>>> view5
+use tumble_scene::cave::{Cave, Facet, Flip, Stereo, User};
 use tumble_scene::{CavePlace, SceneFile};
 
 /// Pixels drawn beyond the edges of a facet and cut off again: what occlusion may reach across an edge.
@@ -64,19 +60,11 @@ impl CaveView {
         self.place = place;
     }
 
-<<<<<<< HEAD
     /// The users, to be moved as they move: what is drawn next is seen by their new eyes.
     pub fn users_mut(&mut self) -> &mut [User] {
         &mut self.cave.users
     }
 
-    /// Whether a facet's picture is bent or darkened for its projector.
-    pub fn is_bent(&self, facet: &Facet) -> bool {
-        facet.warp_file.is_some() || facet.blend_file.is_some()
-    }
-
-=======
->>>>>>> view5
     /// What the eye to the `side` (−1 left, 0 between, +1 right) sees through a facet's screen, in the scene.
     ///
     /// # Errors
