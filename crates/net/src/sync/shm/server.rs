@@ -212,10 +212,12 @@ impl ShmServer {
         !over.is_empty()
     }
 
-    /// What an ended connection still had to tell is gone.
+    /// What had arrived is told before, unless this side closes.
     fn end(&mut self, facet: FacetNumber, why: Closed) {
         if self.connections[usize::from(facet)].take().is_some() {
-            self.waiting.retain(|(of, what)| *of != facet || matches!(what, Waiting::Event(_)));
+            if why == Closed::ByUs {
+                self.waiting.retain(|(of, what)| *of != facet || matches!(what, Waiting::Event(_)));
+            }
             self.waiting.push_back((facet, Waiting::Event(LinkEvent::Closed(why))));
         }
     }

@@ -39,7 +39,7 @@ pub struct FacetMachine {
     handshake: Handshake,
     entropy: Entropy,
     stage: Stage,
-    events: VecDeque<LinkEvent>,
+    events: VecDeque<(LinkEvent, Vec<u8>)>,
     counters: LinkCounters,
 }
 
@@ -126,13 +126,12 @@ impl FacetMachine {
 
     /// The next event.
     pub fn poll(&mut self) -> Option<(LinkEvent, Vec<u8>)> {
-        if let Some(event) = self.events.pop_front() {
-            return Some((event, Vec::new()));
-        }
-        let Stage::Connected(session) = &mut self.stage else { return None };
-        let (_, message) = session.pop()?;
-        self.counters.messages_in += 1;
-        Some((LinkEvent::Message, message))
+        let event = self.events.pop_front().or_else(|| match &mut self.stage {
+            Stage::Connected(session) => session.pop().map(|(_, message)| (LinkEvent::Message, message)),
+            Stage::Looking { .. } => None,
+        });
+        self.counters.messages_in += u64::from(matches!(event, Some((LinkEvent::Message, _))));
+        event
     }
 
     /// Ends the connection and looks for a server anew.
@@ -193,7 +192,7 @@ impl FacetMachine {
         session.ping();
         self.stage = Stage::Connected(Box::new(session));
         self.counters.opened += 1;
-        self.events.push_back(LinkEvent::Opened);
+        self.events.push_back((LinkEvent::Opened, Vec::new()));
         Ok(())
     }
 
@@ -209,8 +208,12 @@ impl FacetMachine {
         Ok(())
     }
 
+    /// What had arrived is told before: it may say why the other side closes.
     fn end(&mut self, now: Duration, why: Closed) {
-        self.events.push_back(LinkEvent::Closed(why));
+        if let (Stage::Connected(session), true) = (&mut self.stage, why != Closed::ByUs) {
+            self.events.extend(std::iter::from_fn(|| session.pop()).map(|(_, message)| (LinkEvent::Message, message)));
+        }
+        self.events.push_back((LinkEvent::Closed(why), Vec::new()));
         self.look(now);
     }
 

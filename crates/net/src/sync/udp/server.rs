@@ -39,7 +39,7 @@ pub struct ServerMachine {
     live: Vec<Option<u64>>,
     prepared: VecDeque<u64>,
     replies: VecDeque<(SocketAddr, Vec<u8>)>,
-    events: VecDeque<(FacetNumber, LinkEvent)>,
+    events: VecDeque<(FacetNumber, LinkEvent, Vec<u8>)>,
     counters: Vec<LinkCounters>,
     strangers: LinkCounters,
     /// The facet that is asked first for a message.
@@ -137,8 +137,9 @@ impl ServerMachine {
 
     /// The next event, in order for each facet; facets take turns.
     pub fn poll(&mut self) -> Option<(FacetNumber, LinkEvent, Vec<u8>)> {
-        if let Some((facet, event)) = self.events.pop_front() {
-            return Some((facet, event, Vec::new()));
+        if let Some((facet, event, message)) = self.events.pop_front() {
+            self.counters[usize::from(facet)].messages_in += u64::from(event == LinkEvent::Message);
+            return Some((facet, event, message));
         }
         for _ in 0..self.live.len() {
             self.turn = (self.turn + 1) % self.live.len();
@@ -241,17 +242,21 @@ impl ServerMachine {
         }
         self.live[usize::from(facet)] = Some(id);
         self.counters[usize::from(facet)].opened += 1;
-        self.events.push_back((facet, LinkEvent::Opened));
+        self.events.push_back((facet, LinkEvent::Opened, Vec::new()));
     }
 
+    /// What had arrived is told before.
     fn end(&mut self, id: u64, why: Closed) {
-        let Some(session) = self.sessions.remove(&id) else { return };
+        let Some(mut session) = self.sessions.remove(&id) else { return };
         self.prepared.retain(|prepared| *prepared != id);
         let facet = session.agreed.facet;
         let live = &mut self.live[usize::from(facet)];
         if *live == Some(id) {
             *live = None;
-            self.events.push_back((facet, LinkEvent::Closed(why)));
+            if why != Closed::ByUs {
+                self.events.extend(std::iter::from_fn(|| session.pop()).map(|(_, message)| (facet, LinkEvent::Message, message)));
+            }
+            self.events.push_back((facet, LinkEvent::Closed(why), Vec::new()));
         }
     }
 
