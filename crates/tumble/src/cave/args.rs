@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use tumble::render::Quality;
 use tumble::scene::{Solver, Stepper};
 
 /// What is shown, and in which cave: the server and all facets must mean the same.
@@ -87,6 +88,9 @@ pub struct DrawOptions {
     /// Draw the number of the frame into the picture: in figures, and as squares for programs.
     #[arg(long)]
     pub stamp: bool,
+    /// usual, fast or fastest, or parts of it as for tumble view (default: usual; fast in windows where a software driver draws).
+    #[arg(long, value_name = "NAME")]
+    pub quality: Option<Quality>,
     /// Draw into memory even where there is a display.
     #[arg(long)]
     pub offscreen: bool,

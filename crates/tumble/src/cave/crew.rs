@@ -183,6 +183,7 @@ fn led(launcher: &CaveOptions, name: &str, address: &Address) -> Vec<String> {
     let folder = |option: &str, path: &Option<std::path::PathBuf>| path.iter().flat_map(|p| [option.to_owned(), p.display().to_string()]).collect::<Vec<_>>();
     args.extend(folder("--frames-dir", &draw.frames_dir));
     args.extend(folder("--log-dir", &draw.log_dir));
+    args.extend(draw.quality.iter().flat_map(|q| ["--quality".to_owned(), q.to_string()]));
     let switches = [("--stamp", draw.stamp), ("--offscreen", draw.offscreen), ("--no-pictures", draw.no_pictures)];
     args.extend(switches.iter().filter(|(_, on)| *on).map(|(name, _)| (*name).to_owned()));
     // the launcher gives up before its facets do

@@ -7,6 +7,7 @@ use super::log::FrameLog;
 use super::painter::{Painter, image_hash, seat_name};
 use super::signals::Signals;
 use super::stage::Setting;
+use super::window::{Parts, has_desktop};
 use crate::failure::Failure;
 use std::io::Read;
 use std::sync::Arc;
@@ -15,7 +16,7 @@ use std::time::{Duration, Instant};
 use tumble::net::sync::{Facet, FacetOptions as Told, Over, Pace, SessionError, Task, Waiting};
 use tumble::net::sync::{transport::FacetNumber, udp::Entropy};
 use tumble::render::Image;
-use tumble::scene::cave::Mode;
+use tumble::scene::cave::{Mode, Output};
 
 /// Between two looks at signals, pipe and picture.
 const TURN: Duration = Duration::from_millis(50);
@@ -30,18 +31,29 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let described = options.facet.as_deref().map(|name| setting.cave.facet(name).cloned()).transpose()?;
     let number = described.as_ref().map_or(0, |facet| setting.cave.facets.iter().position(|f| f.name == facet.name).unwrap_or(0)) as FacetNumber;
     let name = seat_name(described.as_ref()).to_owned();
-    let painter = if options.draw.no_pictures { None } else { Some(Painter::new(&setting, described.as_ref())?) };
+    let draw = &options.draw;
+    let offscreen = draw.offscreen || !has_desktop() || described.as_ref().is_some_and(|f| f.output == Output::Offscreen);
+    let (mut painter, mut parts) = (None, None);
+    match (draw.no_pictures, offscreen) {
+        (true, _) => {}
+        (false, true) => painter = Some(Painter::new(&setting, described.as_ref(), draw.quality)?),
+        (false, false) => parts = Some(Parts::new(&setting, described.as_ref(), draw.quality)?),
+    }
     let watch = Watch { name: name.clone(), signals, leader, patience: Duration::from_secs_f64(options.wait) };
     let address = address(options, &setting, &watch)?;
     let link = FacetEnd::open(&address, number, &setting.cave)?;
     let told = told(&setting, &name)?;
-    let log = match (&options.draw.frames_dir, &options.draw.log_dir) {
+    let log = match (&draw.frames_dir, &draw.log_dir) {
         (Some(folder), _) => Some(FrameLog::open(folder, &name, true, !options.led)?),
         (None, Some(folder)) => Some(FrameLog::open(folder, &name, false, !options.led)?),
         (None, None) => None,
     };
-    let mut running = Running { facet: Facet::new(link, told, setting.world), painter, log, stamp: options.draw.stamp, watch, drawing: None, picture: None };
-    let outcome = running.go();
+    let facet = Facet::new(link, told, setting.world);
+    let mut running = Running { facet, painter, log, stamp: draw.stamp, watch, alone: Alone::default(), drawing: None, picture: None };
+    let outcome = match parts {
+        Some(parts) => parts.show(&mut running, draw.stamp),
+        None => running.go(),
+    };
     // whatever happened, the server need not find out by silence
     let _ = running.facet.leave();
     outcome
@@ -125,7 +137,7 @@ fn watch_stdin() -> Result<Arc<AtomicBool>, Failure> {
 
 /// How long there has been no server, and what was said about it.
 #[derive(Default)]
-struct Alone {
+pub struct Alone {
     since: Option<(Waiting, Instant)>,
     said: bool,
 }
@@ -152,12 +164,14 @@ impl Alone {
     }
 }
 
-struct Running {
-    facet: Facet<FacetEnd>,
+/// A facet that is connected, or looks for its server.
+pub struct Running {
+    pub facet: Facet<FacetEnd>,
     painter: Option<Painter>,
-    log: Option<FrameLog>,
+    pub log: Option<FrameLog>,
     stamp: bool,
     watch: Watch,
+    alone: Alone,
     /// The frame that is being drawn, and its simulated time.
     drawing: Option<(u64, f64)>,
     /// The frame that is drawn, and not yet shown.
@@ -171,32 +185,46 @@ struct Drawn {
     image: Option<Image>,
 }
 
-fn failed(error: SessionError) -> Failure {
+/// The link's trouble.
+pub fn failed(error: SessionError) -> Failure {
     Failure::run("the connection to the server", error)
 }
 
 impl Running {
+    /// What to do next, after waiting for it for at most `timeout`; `None` when the facet is to end.
+    pub fn next(&mut self, timeout: Duration) -> Result<Option<Task>, Failure> {
+        if self.watch.orphaned() {
+            return Err(Failure::run(&self.watch.title(), "its launcher is gone"));
+        }
+        if self.watch.signals.end() {
+            return Ok(None);
+        }
+        let task = self.facet.next(timeout).map_err(failed)?;
+        self.alone.look(&task, &self.watch)?;
+        match task {
+            Task::Over(Over::Refused(why)) => Err(Failure::input(format!("facet {}: the server refuses it: {why}", self.watch.name))),
+            Task::Over(_) => Ok(None),
+            task => Ok(Some(task)),
+        }
+    }
+
+    /// For how many whole seconds there has been no server.
+    pub fn alone_s(&self) -> u64 {
+        self.alone.since.map_or(0, |(_, since)| since.elapsed().as_secs())
+    }
+
+    /// Draws into memory, or nothing, until the end.
     fn go(&mut self) -> Result<(), Failure> {
-        let mut alone = Alone::default();
-        loop {
-            if self.watch.orphaned() {
-                return Err(Failure::run(&self.watch.title(), "its launcher is gone"));
-            }
-            if self.watch.signals.end() {
-                return Ok(());
-            }
-            let task = self.facet.next(if self.drawing.is_some() { Duration::ZERO } else { TURN }).map_err(failed)?;
-            alone.look(&task, &self.watch)?;
+        while let Some(task) = self.next(if self.drawing.is_some() { Duration::ZERO } else { TURN })? {
             match task {
                 // what was begun is finished first, also where nobody waits for it any more
                 Task::Wait(_) | Task::Draw if self.drawing.is_some() => self.see_the_picture()?,
-                Task::Wait(_) => {}
+                Task::Wait(_) | Task::Over(_) => {}
                 Task::Draw => self.draw()?,
                 Task::Present(frame) => self.present(frame)?,
-                Task::Over(Over::Refused(why)) => return Err(Failure::input(format!("facet {}: the server refuses it: {why}", self.watch.name))),
-                Task::Over(_) => return Ok(()),
             }
         }
+        Ok(())
     }
 
     fn draw(&mut self) -> Result<(), Failure> {
@@ -220,14 +248,16 @@ impl Running {
         }
     }
 
-    fn drawn(&mut self, frame: u64, time_s: f64, image: Option<Image>) -> Result<(), Failure> {
+    /// A frame is drawn.
+    pub fn drawn(&mut self, frame: u64, time_s: f64, image: Option<Image>) -> Result<(), Failure> {
         self.drawing = None;
         let hash = image.as_ref().map_or([0; 16], image_hash);
         self.picture = Some(Drawn { frame, time_s, hash, image });
         self.facet.drawn(hash).map_err(failed)
     }
 
-    fn present(&mut self, frame: u64) -> Result<(), Failure> {
+    /// A frame is shown.
+    pub fn present(&mut self, frame: u64) -> Result<(), Failure> {
         self.facet.presented().map_err(failed)?;
         let shown = self.facet.session().shown();
         let Some(drawn) = self.picture.take().filter(|d| d.frame == frame) else { return Ok(()) };

@@ -23,6 +23,7 @@ mod stage;
 mod stamp;
 mod summary;
 mod users;
+mod window;
 
 use crate::failure::Failure;
 use args::{CaveOptions, FacetOptions, ServeOptions};

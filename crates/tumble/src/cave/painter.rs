@@ -7,11 +7,11 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 use tumble::core::World;
 use tumble::net::sync::Viewer;
-use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, RenderError, Renderer};
+use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer};
 use tumble::scene::cave::Facet;
 
-/// Side of the shadow maps, as for pictures of caves.
-pub const CAVE_SHADOWS: u32 = 4096;
+/// Side of the shadow maps where it is the usual one elsewhere, as for pictures of caves.
+const CAVE_SHADOWS: u32 = 4096;
 /// Largest picture of an unfolded cave, pixels.
 pub const PREVIEW_PX: [u32; 2] = [1280, 960];
 
@@ -25,13 +25,14 @@ struct Order {
 /// Makes draw lists here, and pictures on its thread.
 pub struct Painter {
     drawing: Drawing,
+    quality: Option<Quality>,
     orders: SyncSender<Order>,
     pictures: Receiver<Result<Image, RenderError>>,
 }
 
 impl Painter {
     /// For a facet; all of them unfolded where there is none.
-    pub fn new(setting: &Setting, facet: Option<&Facet>) -> Result<Painter, Failure> {
+    pub fn new(setting: &Setting, facet: Option<&Facet>, quality: Option<Quality>) -> Result<Painter, Failure> {
         let (view, facet) = (setting.view()?, facet.cloned());
         let (orders, wanted) = sync_channel::<Order>(1);
         let (done, pictures) = sync_channel(1);
@@ -51,12 +52,12 @@ impl Painter {
             })
             .map_err(|e| Failure::run("drawing", e))?;
         started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
-        Ok(Painter { drawing: Drawing::new(&setting.scene), orders, pictures })
+        Ok(Painter { drawing: Drawing::new(&setting.scene), quality, orders, pictures })
     }
 
     /// Begins a picture of the world; with the frame's number in it, if it is to be stamped.
     pub fn begin(&mut self, world: &World, viewer: &Viewer, stamp: Option<u64>) -> Result<(), Failure> {
-        let list = draw_list(&mut self.drawing, world)?;
+        let list = draw_list(&mut self.drawing, world, self.quality.as_ref())?;
         self.orders.send(Order { list, viewer: viewer.clone(), stamp }).map_err(|_| Failure::run("drawing", "the painter has gone"))
     }
 
@@ -71,9 +72,14 @@ impl Painter {
 }
 
 /// As all pictures of caves are drawn.
-pub fn draw_list(drawing: &mut Drawing, world: &World) -> Result<DrawList, Failure> {
+pub fn draw_list(drawing: &mut Drawing, world: &World, quality: Option<&Quality>) -> Result<DrawList, Failure> {
     let mut list = drawing.list(world, &DebugDraw::default()).map_err(|e| Failure::run("drawing", e))?;
-    list.settings.shadow_map_size = CAVE_SHADOWS;
+    if let Some(quality) = quality {
+        quality.apply(&mut list.settings);
+    }
+    if list.settings.shadow_map_size == Quality::default().shadow_map_size {
+        list.settings.shadow_map_size = CAVE_SHADOWS;
+    }
     Ok(list)
 }
 

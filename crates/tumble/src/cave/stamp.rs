@@ -15,22 +15,36 @@ pub fn side_px(width: u32) -> u32 {
 
 /// Draws it.
 pub fn stamp(image: &mut Image, frame: u64) {
-    let side = side_px(image.width);
-    for k in 0..64 {
-        let value = if frame >> (63 - k) & 1 == 1 { 255 } else { 0 };
-        let (x, y) = (k % COLUMNS * side, k / COLUMNS * side);
-        (0..side * side).for_each(|p| put(image, x + p % side, y + p / side, [value, value, value, 255]));
-    }
-    let text = caption(&[frame.to_string()], (image.width / 256).clamp(1, 8));
-    for y in 0..text.height {
-        for x in 0..text.width {
-            // solid: what is below shall not show
-            text.pixel(x, y).into_iter().for_each(|[r, g, b, _]| put(image, x, 2 * side + y, [r, g, b, 255]));
+    let strip = strip(image.width, frame);
+    for y in 0..strip.height {
+        for x in 0..strip.width {
+            strip.pixel(x, y).into_iter().filter(|pixel| pixel[3] > 0).for_each(|pixel| put(image, x, y, pixel));
         }
     }
 }
 
+/// By itself, for a picture of this width.
+pub fn strip(picture_width: u32, frame: u64) -> Image {
+    let side = side_px(picture_width);
+    let text = caption(&[frame.to_string()], (picture_width / 256).clamp(1, 8));
+    let (width, height) = ((COLUMNS * side).max(text.width), 2 * side + text.height);
+    let mut strip = Image { width, height, rgba: vec![0; 4 * (width * height) as usize] };
+    for k in 0..64 {
+        let value = if frame >> (63 - k) & 1 == 1 { 255 } else { 0 };
+        let (x, y) = (k % COLUMNS * side, k / COLUMNS * side);
+        (0..side * side).for_each(|p| put(&mut strip, x + p % side, y + p / side, [value, value, value, 255]));
+    }
+    for y in 0..text.height {
+        for x in 0..text.width {
+            text.pixel(x, y).into_iter().for_each(|pixel| put(&mut strip, x, 2 * side + y, pixel));
+        }
+    }
+    strip
+}
+
 fn put(image: &mut Image, x: u32, y: u32, pixel: [u8; 4]) {
+    // solid where there is anything: what is below shall not show
+    let pixel = [pixel[0], pixel[1], pixel[2], 255];
     if x < image.width && y < image.height {
         let at = 4 * (y as usize * image.width as usize + x as usize);
         image.rgba[at..at + 4].copy_from_slice(&pixel);

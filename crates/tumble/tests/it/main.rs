@@ -2,6 +2,7 @@
 
 mod articulated_scenes;
 mod bad_input;
+mod cave_processes;
 mod caves;
 mod common;
 mod determinism;
