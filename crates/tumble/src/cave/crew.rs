@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use tumble::net::sync::Seat;
 use tumble::scene::cave::Cave;
 
-/// How long facets may take to end by themselves after they were told.
-const GRACE: Duration = Duration::from_secs(3);
+/// How long facets may take to end by themselves after they were told, and again after their pipe was closed.
+const GRACE: Duration = Duration::from_secs(2);
 /// Restarts of a facet within a minute, at most.
 const MOST_RESTARTS: usize = 5;
 const MINUTE: Duration = Duration::from_secs(60);
@@ -123,10 +123,10 @@ impl Crew {
 
     /// After the facets were told that the run is over: waits for them, and ends who does not.
     pub fn end(&mut self) {
-        let until = Instant::now() + GRACE;
-        while Instant::now() < until && self.members.iter_mut().any(|m| m.child.as_mut().is_some_and(|c| matches!(c.try_wait(), Ok(None)))) {
-            std::thread::sleep(Duration::from_millis(10));
-        }
+        self.wait(GRACE);
+        // who has not heard it finds its pipe closed
+        self.members.iter_mut().filter_map(|m| m.child.as_mut()).for_each(|child| drop(child.stdin.take()));
+        self.wait(GRACE);
         for member in &mut self.members {
             let Some(mut child) = member.child.take() else { continue };
             if let Ok(None) = child.try_wait() {
@@ -134,6 +134,14 @@ impl Crew {
             }
             let _ = child.kill();
             let _ = child.wait();
+        }
+    }
+
+    /// Until all have ended, at most so long.
+    fn wait(&mut self, most: Duration) {
+        let until = Instant::now() + most;
+        while Instant::now() < until && self.members.iter_mut().any(|m| m.child.as_mut().is_some_and(|c| matches!(c.try_wait(), Ok(None)))) {
+            std::thread::sleep(Duration::from_millis(10));
         }
     }
 

@@ -52,7 +52,11 @@ impl Painter {
             })
             .map_err(|e| Failure::run("drawing", e))?;
         started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
-        Ok(Painter { drawing: Drawing::new(&setting.scene), quality, orders, pictures })
+        let mut painter = Painter { drawing: Drawing::new(&setting.scene), quality, orders, pictures };
+        // the first picture takes seconds where pipelines are compiled; nobody waits for it yet
+        painter.begin(&setting.world, &setting.viewer()?, None)?;
+        while painter.finished(Duration::from_secs(1))?.is_none() {}
+        Ok(painter)
     }
 
     /// Begins a picture of the world; with the frame's number in it, if it is to be stamped.

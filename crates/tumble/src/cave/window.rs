@@ -156,7 +156,10 @@ impl WindowApp for Window<'_> {
     fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let usual = if screen.is_software() { Quality::fast() } else { Quality::default() };
         self.parts.quality.get_or_insert(usual);
-        Ok(())
+        // the first picture takes seconds where pipelines are compiled; the server does not know of us yet
+        self.list = draw_list(&mut self.parts.drawing, self.running.facet.world(), self.parts.quality.as_ref())?;
+        self.parts.sight.draw(screen, &self.list)?;
+        Ok(screen.renderer().wait()?)
     }
 
     fn event(&mut self, _: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
