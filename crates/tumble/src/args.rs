@@ -1,6 +1,6 @@
 //! What can be typed.
 
-use crate::cave::args::{CaveOptions, FacetOptions, ServeOptions};
+use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use tumble::collide::Builder;
@@ -27,6 +27,10 @@ pub enum Command {
     Serve(Box<ServeOptions>),
     /// One facet of a run, for a server that is there or will be.
     Facet(Box<FacetOptions>),
+    /// Drive the facets of a cave from a recording, and compare what they show with what they showed.
+    Replay(Box<ReplayOptions>),
+    /// Save what can be saved of a recording that was cut or damaged.
+    Recover(RecoverOptions),
     /// Check scenes, caves, URDF robots and meshes; nothing is run.
     Check(CheckOptions),
     /// Build a sphere tree around a mesh, or replace a robot's collision geometry by spheres; say how good they are.

@@ -29,6 +29,8 @@ fn main() -> ExitCode {
         Command::Cave(options) => cave::cave(&options),
         Command::Serve(options) => cave::serve(&options),
         Command::Facet(options) => cave::facet(&options),
+        Command::Replay(options) => cave::replay(&options),
+        Command::Recover(options) => cave::recover(&options),
         Command::Check(options) => check::check(&options),
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),

@@ -114,6 +114,25 @@ pub struct CaveOptions {
     pub restart: bool,
 }
 
+/// `tumble replay`.
+#[derive(Args, Clone)]
+pub struct ReplayOptions {
+    /// A recording of a run in a cave (`tumble cave --record`), complete or cut.
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub cave: CaveOptions,
+}
+
+/// `tumble recover`.
+#[derive(Args, Clone)]
+pub struct RecoverOptions {
+    /// A recording (MCAP) that was cut or damaged.
+    pub file: PathBuf,
+    /// Where all of it goes that can be saved; must not exist.
+    #[arg(long, short, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
 /// `tumble facet`.
 #[derive(Args, Clone)]
 pub struct FacetOptions {

@@ -4,13 +4,14 @@ use super::args::{Carrier, CaveOptions, ServeOptions};
 use super::crew::{Crew, Crewed, carrier, seats};
 use super::ends::{Address, ServerEnd, key, timing};
 use super::lock::{Lock, Run};
+use super::replay::Tape;
 use super::signals::Signals;
 use super::stage::Setting;
 use super::summary::{Meter, Status, Summary, skew};
 use super::users::Users;
 use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tumble::core::World;
 use tumble::net::record::RecorderOptions;
@@ -24,8 +25,8 @@ const TURN: Duration = Duration::from_millis(20);
 /// The port where a cave of several machines is served.
 const PORT: u16 = 47_100;
 
-/// Runs a scene in a cave; with a launcher's options, also the facets of this machine.
-pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>) -> Result<(), Failure> {
+/// Runs a scene in a cave, or shows a recording of one; with a launcher's options, also the facets of this machine.
+pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let setting = Setting::load(&options.stage, |w| {
         w.dt_s = options.dt.unwrap_or(w.dt_s);
@@ -34,6 +35,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>) -> Result<(),
     })?;
     let say = |what: &str| (!options.quiet).then(|| eprintln!("{what}"));
     setting.notes.iter().for_each(|note| _ = say(note));
+    let tape = recording.map(|path| Tape::open(path, setting.hash)).transpose()?;
     let key = key(&setting.cave)?;
     let number = Entropy::system().map_err(|e| Failure::run("the run", e))?.next_u64();
     let name = format!("{number:016x}");
@@ -56,7 +58,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>) -> Result<(),
     let server = Server::new(end, told(options, &setting, number, &seats), &setting.world);
     let mut crew = Crew::start(options, &setting.cave, launcher, &run.address)?;
     let log_dir = launcher.and_then(|l| l.draw.frames_dir.clone().or(l.draw.log_dir.clone()));
-    let outcome = Host::new(options, setting, server, seats, &signals, log_dir).and_then(|mut host| {
+    let outcome = Host::new(options, setting, server, seats, &signals, (log_dir, tape)).and_then(|mut host| {
         let outcome = host.show(&mut crew);
         let ended = host.end(&mut crew);
         outcome.and(ended)
@@ -110,6 +112,9 @@ struct Host<'a> {
     meter: Meter,
     status: Status,
     log_dir: Option<PathBuf>,
+    /// What is shown, where nothing is simulated.
+    tape: Option<Tape>,
+    time_s: f64,
     began: Instant,
     behind_s: f64,
     frames: u64,
@@ -117,19 +122,20 @@ struct Host<'a> {
 
 impl<'a> Host<'a> {
     fn new(
-        options: &'a ServeOptions, setting: Setting, server: Server<ServerEnd>, seats: Vec<Seat>, signals: &'a Signals, log_dir: Option<PathBuf>,
+        options: &'a ServeOptions, setting: Setting, server: Server<ServerEnd>, seats: Vec<Seat>, signals: &'a Signals,
+        (log_dir, tape): (Option<PathBuf>, Option<Tape>),
     ) -> Result<Host<'a>, Failure> {
         let viewer = setting.viewer()?;
         let Setting { scene, cave, mut world, hash, .. } = setting;
         let users = Users::new(viewer, &mut world, options.push)?;
-        let described = cave.recording.as_ref().map(|r| (r.file.clone(), r.every_frames));
+        let described = cave.recording.as_ref().filter(|_| tape.is_none()).map(|r| (r.file.clone(), r.every_frames));
         let recorder = options.record.clone().map(|file| (file, 1)).or(described).map(|(file, every)| {
             let recorder = SessionRecorder::create(&file, &scene.file, hash, &world, every, RecorderOptions::default());
             recorder.map(|r| (r, file)).map_err(|e| Failure::run("recording", e))
         });
         Ok(Host {
             options, signals, server, world, users, recorder: recorder.transpose()?, recorded: false, cave, scene: scene.file, seconds: options.seconds,
-            meter: Meter::new(seats.len()), seats, status: Status::new(options.quiet), log_dir, began: Instant::now(), behind_s: 0.0, frames: 0,
+            meter: Meter::new(seats.len()), seats, status: Status::new(options.quiet), log_dir, tape, time_s: 0.0, began: Instant::now(), behind_s: 0.0, frames: 0,
         })
     }
 
@@ -144,10 +150,9 @@ impl<'a> Host<'a> {
         let mut due = self.server.now();
         for frame in 0.. {
             let begin = Instant::now();
-            if frame > 0 {
-                self.step(frame, dt)?;
+            if !self.publish(frame, dt)? {
+                return Ok(());
             }
-            self.publish(frame)?;
             if last == Some(frame) || self.signals.end() {
                 return Ok(());
             }
@@ -159,7 +164,7 @@ impl<'a> Host<'a> {
             if !self.options.fast {
                 due = self.keep_time(due, dt)?;
             }
-            self.meter.frame.add(begin.elapsed().as_secs_f64(), frame, self.world.time());
+            self.meter.frame.add(begin.elapsed().as_secs_f64(), frame, self.time_s);
         }
         Ok(())
     }
@@ -192,11 +197,25 @@ impl<'a> Host<'a> {
         Ok(())
     }
 
-    fn publish(&mut self, frame: u64) -> Result<(), Failure> {
+    /// The next frame, to its being shown: simulated, or from the recording. `false` where that is over.
+    fn publish(&mut self, frame: u64, dt: f64) -> Result<bool, Failure> {
+        let recorded = self.tape.as_mut().map(Tape::next).transpose()?;
+        if recorded.is_none() && frame > 0 {
+            self.step(frame, dt)?;
+        }
         let clock = Instant::now();
-        self.server.frame(&self.world, &self.users.viewer).map_err(failed)?;
-        let time_s = self.world.time();
-        self.meter.barrier.add(clock.elapsed().as_secs_f64(), frame, time_s);
+        match recorded {
+            Some(None) => return Ok(false),
+            Some(Some(recorded)) => {
+                self.server.replay(&recorded).map_err(failed)?;
+                self.time_s = recorded.time_s;
+            }
+            None => {
+                self.server.frame(&self.world, &self.users.viewer).map_err(failed)?;
+                self.time_s = self.world.time();
+            }
+        }
+        self.meter.barrier.add(clock.elapsed().as_secs_f64(), frame, self.time_s);
         self.frames += 1;
         if let Some((recorder, _)) = &mut self.recorder
             && let Some(recorded) = self.server.session().recorded(!self.recorded)
@@ -204,9 +223,9 @@ impl<'a> Host<'a> {
             recorder.frame(&self.world, recorded).map_err(|e| Failure::run("recording", e))?;
             self.recorded = true;
         }
-        self.take_events(time_s);
-        self.status.at(&self.server, &self.seats, &self.meter, frame, time_s);
-        Ok(())
+        self.take_events(self.time_s);
+        self.status.at(&self.server, &self.seats, &self.meter, frame, self.time_s);
+        Ok(true)
     }
 
     /// Waits until the next frame is due, and when that is. What is late by more than a frame is given up: time then goes slower, and no frame is left out.
@@ -228,6 +247,7 @@ impl<'a> Host<'a> {
         }
         for event in events {
             self.meter.take(&event, time_s);
+            self.tape.iter_mut().for_each(|tape| tape.take(&event));
             let seat = |k: &u16| self.seats.get(*k as usize).map_or("", |s| s.name.as_str());
             let said = match &event {
                 ServerEvent::Joined(k) => Some(format!("facet {} is there", seat(k))),
@@ -264,13 +284,14 @@ impl<'a> Host<'a> {
                 transport: if carrier(self.options, &self.cave) == Carrier::Udp { "udp" } else { "shared memory" },
                 mode: if self.cave.sync.mode == Mode::Lockstep { "lockstep" } else { "latest" },
                 frames: self.frames,
-                simulated_s: self.world.time(),
+                simulated_s: self.time_s,
                 wall_s,
                 behind_s: self.behind_s,
                 step: self.meter.step.figures(),
                 barrier: self.meter.barrier.figures(),
                 frame: self.meter.frame.figures(),
                 skew: self.log_dir.as_ref().and_then(|folder| skew(folder, &self.seats)),
+                replay: self.tape.as_ref().map(|tape| tape.counts),
                 facets: self.meter.facets(&self.server, &self.seats),
             };
             if !self.options.quiet {

@@ -3,6 +3,7 @@
 use super::ends::ServerEnd;
 use super::log::Line;
 use super::measure::{Figures, Spread};
+use super::replay::Counts;
 use super::stage::facet_folder;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -46,6 +47,8 @@ pub struct Summary {
     pub frame: Figures,
     /// Between the first and the last facet to show a frame, where facets of this machine wrote `frames.jsonl`.
     pub skew: Option<Figures>,
+    /// Of a replay: pictures, compared with those of the recording.
+    pub replay: Option<Counts>,
     pub facets: Vec<FacetSummary>,
 }
 
@@ -120,6 +123,9 @@ impl Summary {
         text += &figures("a frame took at most", &self.frame);
         if let Some(skew) = &self.skew {
             text += &figures("facets showed a frame within", skew);
+        }
+        if let Some(Counts { same, different, not_compared }) = self.replay {
+            text += &format!("pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n");
         }
         for f in &self.facets {
             text += &format!(
