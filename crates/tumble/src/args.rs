@@ -278,7 +278,7 @@ pub fn frame(text: &str) -> Result<f64, String> {
     number(text, 1e-6, 1.0)
 }
 
-fn pace(text: &str) -> Result<f64, String> {
+pub fn pace(text: &str) -> Result<f64, String> {
     number(text, 0.01, 1000.0)
 }
 

@@ -47,6 +47,9 @@ pub struct ServeOptions {
     /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
     #[arg(long, value_name = "NAME", value_parser = crate::args::solver)]
     pub solver: Option<Solver>,
+    /// Frames shown per simulated second, at most; a frame holds as many steps as fit, at least one.
+    #[arg(long, value_name = "N", default_value = "60", value_parser = crate::args::pace)]
+    pub fps: f64,
     /// Do not keep to the clock: the next frame begins when the last one is shown, and waits for its facets as long as the start does.
     #[arg(long)]
     pub fast: bool,

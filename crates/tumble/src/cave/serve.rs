@@ -144,13 +144,15 @@ impl<'a> Host<'a> {
         if !self.gather(crew)? {
             return Ok(());
         }
-        let dt = self.world.settings().dt;
+        let step_s = self.world.settings().dt;
+        let steps = ((1.0 / (self.options.fps * step_s) + 1e-9).floor() as u32).max(1);
+        let dt = self.frame_length(step_s * f64::from(steps));
         let last = self.seconds.map(|s| (s / dt).round() as u64);
         self.began = Instant::now();
         let mut due = self.server.now();
         for frame in 0.. {
             let begin = Instant::now();
-            if !self.publish(frame, dt)? {
+            if !self.publish(frame, steps)? {
                 return Ok(());
             }
             if last == Some(frame) || self.signals.end() {
@@ -189,19 +191,27 @@ impl<'a> Host<'a> {
         Ok(true)
     }
 
-    fn step(&mut self, frame: u64, dt: f64) -> Result<(), Failure> {
-        let clock = Instant::now();
-        self.users.act(&mut self.world, dt)?;
-        self.world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
+    /// The steps of one frame.
+    fn simulate(&mut self, frame: u64, steps: u32) -> Result<(), Failure> {
+        let (clock, dt) = (Instant::now(), self.world.settings().dt);
+        for _ in 0..steps {
+            self.users.act(&mut self.world, dt)?;
+            self.world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
+        }
         self.meter.step.add(clock.elapsed().as_secs_f64(), frame, self.world.time());
         Ok(())
     }
 
+    /// Of the simulation, s; a recording has its own.
+    fn frame_length(&self, simulated: f64) -> f64 {
+        self.tape.as_ref().and_then(Tape::frame_length).unwrap_or(simulated)
+    }
+
     /// The next frame, to its being shown: simulated, or from the recording. `false` where that is over.
-    fn publish(&mut self, frame: u64, dt: f64) -> Result<bool, Failure> {
+    fn publish(&mut self, frame: u64, steps: u32) -> Result<bool, Failure> {
         let recorded = self.tape.as_mut().map(Tape::next).transpose()?;
         if recorded.is_none() && frame > 0 {
-            self.step(frame, dt)?;
+            self.simulate(frame, steps)?;
         }
         let clock = Instant::now();
         match recorded {
@@ -287,7 +297,7 @@ impl<'a> Host<'a> {
                 simulated_s: self.time_s,
                 wall_s,
                 behind_s: self.behind_s,
-                step: self.meter.step.figures(),
+                simulation: self.meter.step.figures(),
                 barrier: self.meter.barrier.figures(),
                 frame: self.meter.frame.figures(),
                 skew: self.log_dir.as_ref().and_then(|folder| skew(folder, &self.seats)),

@@ -19,7 +19,7 @@ const EVERY: Duration = Duration::from_secs(5);
 /// Times of the run.
 #[derive(Default)]
 pub struct Meter {
-    /// A step of the simulation.
+    /// The steps of one frame.
     pub step: Spread,
     /// From publishing a frame to when all who are waited for have shown it.
     pub barrier: Spread,
@@ -42,7 +42,8 @@ pub struct Summary {
     pub wall_s: f64,
     /// Time that was given up because frames took longer than their length.
     pub behind_s: f64,
-    pub step: Figures,
+    /// Simulating one frame: all its steps.
+    pub simulation: Figures,
     pub barrier: Figures,
     pub frame: Figures,
     /// Between the first and the last facet to show a frame, where facets of this machine wrote `frames.jsonl`.
@@ -118,7 +119,7 @@ impl Summary {
         let figures = |what: &str, f: &Figures| {
             format!("{what} {:.2} ms (half), {:.2} ms (99 %), {:.2} ms (all; frame {} at {:.3} s)\n", f.p50_ms, f.p99_ms, f.max_ms, f.max_at_frame, f.max_at_s)
         };
-        text += &figures("a step took at most", &self.step);
+        text += &figures("simulating a frame took at most", &self.simulation);
         text += &figures("sent, drawn and shown within", &self.barrier);
         text += &figures("a frame took at most", &self.frame);
         if let Some(skew) = &self.skew {
@@ -184,7 +185,7 @@ impl Status {
         }
         let per_s = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed.as_secs_f64();
         let mut text = if self.terminal && self.lines > 0 { format!("\x1b[{}A", self.lines) } else { String::new() };
-        text += &format!("\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, a step {:.2} ms\n", per_s(frame, self.frame), 1e3 * meter.step.within(0.5));
+        text += &format!("\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms\n", per_s(frame, self.frame), 1e3 * meter.step.within(0.5));
         self.shown.resize(seats.len(), 0);
         for (k, seat) in seats.iter().enumerate() {
             let (counts, _, _) = server.counts(k as FacetNumber);

@@ -166,9 +166,10 @@ fn a_wand_pulls_what_it_points_at() {
     // it points along y at the ball, then goes aside with it by half a metre
     server.show_until(20, |input| (input.wand, input.buttons) = (Some(from(0.0)), 1));
     server.show_until(300, |input| (input.wand, input.buttons) = (Some(from(0.5)), 1));
-    // the point that is held is the one nearest to the user, and the ball hangs at it
+    // the point that is held is the one nearest to the user, on the ball's surface; nothing keeps the ball from turning about it
     let ball = server.ball();
-    assert!((ball - Vec3::new(0.5, 2.0, 1.0)).norm() < 0.25 && ball.x > 0.3, "{ball:?}");
+    let from_hand = (ball - Vec3::new(0.5, 1.8, 1.0)).norm();
+    assert!((from_hand - 0.2).abs() < 0.005 && ball.x > 0.25, "{ball:?}, {from_hand} m from the hand");
     // a wand that points past it pulls nothing
     let (folder, scene, cave) = place("cave-miss");
     let mut server = Server::start(&folder, &scene, &cave, &[]);
@@ -205,25 +206,25 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
     };
     let moving = folder.write("moving.toml", SCENE.replace("mass_kg = 2.0", "mass_kg = 2.0\nvelocity_m_per_s = [0.3, 0, 0.2]"));
     let path = |name: &str| text(&folder.path(name));
-    if !tumble::render::Renderer::new().is_ok() {
+    if tumble::render::Renderer::new().is_err() {
         let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter\n"));
         return;
     }
-    run(&["cave", &moving, "--seconds", "0.3", "--record", &file, "--log-dir", &path("a")]);
+    run(&["cave", &moving, "--seconds", "0.6", "--record", &file, "--log-dir", &path("a")]);
     let recorded = lines("a");
-    assert_eq!(recorded.len(), 31);
+    assert_eq!(recorded.len(), 61);
     run(&["replay", &file, &moving, "--log-dir", &path("b"), "--summary", &path("b.json")]);
     run(&["replay", &file, &moving, "--log-dir", &path("c")]);
     assert_eq!((lines("b"), lines("c")), (recorded.clone(), recorded.clone()));
-    assert_eq!(json(&folder.path("b.json"))["replay"], serde_json::json!({ "same": 31, "different": 0, "not_compared": 0 }));
-    // two thirds of it, mended
+    assert_eq!(json(&folder.path("b.json"))["replay"], serde_json::json!({ "same": 61, "different": 0, "not_compared": 0 }));
+    // half of it, mended
     let bytes = std::fs::read(&file).unwrap();
-    let cut = folder.write("cut.mcap", &bytes[..bytes.len() * 2 / 3]);
+    let cut = folder.write("cut.mcap", &bytes[..bytes.len() / 2]);
     let said = succeed(&["recover", &cut, "-o", &path("mended.mcap")]);
     assert!(said.contains("frames in") && said.contains("what was wrong: cut at byte"), "{said}");
     run(&["replay", &path("mended.mcap"), &moving, "--log-dir", &path("d")]);
     let saved = lines("d");
-    assert!(!saved.is_empty() && saved.len() < 31 && saved[..] == recorded[..saved.len()], "{} frames", saved.len());
+    assert!(!saved.is_empty() && saved.len() < 61 && saved[..] == recorded[..saved.len()], "{} frames", saved.len());
     // another scene is another matter
     let out = in_place(&folder, &["replay", &file, &scene, "--cave", &cave]).output().unwrap();
     let wrong = String::from_utf8_lossy(&out.stderr);
