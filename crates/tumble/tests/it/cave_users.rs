@@ -226,7 +226,8 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
     let saved = lines("d");
     assert!(!saved.is_empty() && saved.len() < 61 && saved[..] == recorded[..saved.len()], "{} frames", saved.len());
     // another scene is another matter
-    let out = in_place(&folder, &["replay", &file, &scene, "--cave", &cave]).output().unwrap();
+    let larger = folder.write("larger.toml", SCENE.replace("radius_m = 0.2", "radius_m = 0.21"));
+    let out = in_place(&folder, &["replay", &file, &larger, "--cave", &cave]).output().unwrap();
     let wrong = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.code() == Some(2) && wrong.contains("the recording is of a scene with the hash"), "{wrong}");
 }
