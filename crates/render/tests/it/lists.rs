@@ -200,11 +200,13 @@ fn islands_have_a_colour_each_and_joints_their_axes() {
     // two stacks of two boxes, apart, on the floor; a pendulum
     let text = "[[body]]\nname = \"floor\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n\
         [[grid]]\nname = \"b\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [0, 0, 0.5]\ncount = [2, 1, 2]\nspacing_m = [3, 0, 1]\n\
-        [[articulated]]\nname = \"arm\"\nposition_m = [-4, 0, 3]\n[[articulated.link]]\nname = \"rod\"\njoint = { type = \"revolute\", axis = [0, 1, 0] }\n\
+        [[articulated]]\nname = \"arm\"\nposition_m = [-4, 0, 3]\n[[articulated.link]]\nname = \"rod\"\njoint = \"revolute\"\naxis = [0, 1, 0]\n\
         shape = { type = \"capsule\", radius_m = 0.1, length_m = 1 }\nmass_kg = 1\n";
     let scene = SceneFile::parse(text, "s.toml").unwrap_or_else(|e| panic!("{e}"));
     let (mut world, _) = scene.build().unwrap();
-    (0..5).for_each(|_| drop(world.step().unwrap()));
+    for _ in 0..5 {
+        world.step().unwrap();
+    }
     let draw: DebugDraw = "islands,joints,frames".parse().unwrap();
     let list = Drawing::new(&scene).list(&world, &draw).unwrap();
     let colors: Vec<_> = (1..5).map(|i| list.instances[i].material.color).collect();
