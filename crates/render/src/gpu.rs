@@ -10,6 +10,9 @@ mod shadow;
 mod stage;
 mod targets;
 mod textures;
+mod window;
+
+pub use window::{Picture, Screen, Shown};
 
 use crate::list::bounds::Bounds;
 use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
@@ -61,7 +64,12 @@ impl Renderer {
     /// # Errors
     /// [`RenderError::NoAdapter`] where the machine has none: the caller goes on without pictures. [`RenderError::Device`] where it has one that fails.
     pub fn new() -> Result<Self, RenderError> {
-        let gpu = pollster::block_on(Gpu::open())?;
+        Renderer::on(pollster::block_on(first_adapter())?)
+    }
+
+    /// On an adapter that was chosen.
+    fn on(adapter: wgpu::Adapter) -> Result<Self, RenderError> {
+        let gpu = pollster::block_on(Gpu::open(adapter))?;
         let pipelines = Pipelines::new(&gpu.device, gpu.sample_masks);
         let finisher = Finisher::new(&gpu);
         let textures = TextureCache::new(&gpu, &pipelines.texture_layout);
@@ -250,8 +258,7 @@ impl Renderer {
 }
 
 impl Gpu {
-    async fn open() -> Result<Gpu, RenderError> {
-        let adapter = first_adapter().await?;
+    async fn open(adapter: wgpu::Adapter) -> Result<Gpu, RenderError> {
         let info = adapter.get_info();
         let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
         let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());

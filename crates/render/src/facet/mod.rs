@@ -6,7 +6,7 @@
 mod blend;
 mod calibration;
 mod compose;
-mod font;
+pub(crate) mod font;
 mod perspective;
 mod unfold;
 mod view;
@@ -14,6 +14,7 @@ mod warp;
 
 pub use blend::Blend;
 pub(crate) use blend::encoded;
+pub(crate) use compose::blank;
 pub use calibration::{CalibrationPattern, calibration_picture};
 pub use perspective::FacetView;
 pub use unfold::{Tile, unfold};
