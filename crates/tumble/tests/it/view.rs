@@ -244,10 +244,10 @@ fn keys_and_mouse_do_what_they_say() {
     view.key("Home");
     view.until("the scene's camera", |s| close(three(&s["eye_m"]), [0.0, -4.0, 1.0], 1e-6) && close(three(&s["forward"]), [0.0, 1.0, 0.0], 1e-6));
 
-    for key in ["2", "5", "5"] {
+    for key in ["2", "7", "8", "8"] {
         view.key(key);
     }
-    view.until("overlays", |s| s["overlays"] == serde_json::json!(["normals", "tree=1"]));
+    view.until("overlays", |s| s["overlays"] == serde_json::json!(["normals", "islands", "tree=1"]));
     view.key("g");
     view.key("g");
     view.until("the usual looks", |s| s["quality"] == "shadows=soft,samples=4,occlusion=on,map=2048");
