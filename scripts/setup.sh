@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs what is missing, and only that: a C compiler (zstd and lz4 are C), make, a software Vulkan driver (for pictures),
+# Installs what is missing, and only that: a C compiler (zstd and lz4 are C), make, a software Vulkan driver (for pictures), Python's venv,
 # the crates of Cargo.lock. Where all is there, it asks no network and no apt. What only pictures need may stay missing.
 . "$(dirname "$0")/env.sh"
 
@@ -17,6 +17,11 @@ has_vulkan_loader() {
 has_vulkan_driver() {
     [ -n "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && return 0
     ls /usr/share/vulkan/icd.d/lvp_icd*.json /etc/vulkan/icd.d/lvp_icd*.json /usr/local/share/vulkan/icd.d/lvp_icd*.json 2>/dev/null | grep -q .
+}
+
+# Debian splits venv off; its absence shows as a missing ensurepip.
+has_venv() {
+    python3 -c 'import venv, ensurepip' >/dev/null 2>&1
 }
 
 as_root() {
@@ -53,6 +58,7 @@ has_compiler || missing="$missing gcc libc6-dev"
 command -v make >/dev/null 2>&1 || missing="$missing make"
 has_vulkan_loader || missing="$missing libvulkan1"
 has_vulkan_driver || missing="$missing mesa-vulkan-drivers"
+has_venv || missing="$missing python3 python3-venv"
 # shellcheck disable=SC2086  # one word per package
 [ -z "$missing" ] || install_packages $missing
 

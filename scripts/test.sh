@@ -1,5 +1,5 @@
 #!/bin/sh
-# Everything that can fail, in the one profile that also runs: set-up, build, tests, doc tests, papers.
+# Everything that can fail, in the one profile that also runs: set-up, build, tests, doc tests, the Python module, papers.
 #   scripts/test.sh          all of them
 #   scripts/test.sh --slow   and again at their full length those that TUMBLE_SLOW=1 lengthens
 . "$(dirname "$0")/env.sh"
@@ -26,6 +26,7 @@ stage tests cargo test $tests --no-fail-fast
 # shellcheck disable=SC2086
 [ "${1:-}" != --slow ] || stage "slow tests" env TUMBLE_SLOW=1 cargo test $tests --no-fail-fast -- determinism full_length
 stage "doc tests" cargo test --no-fail-fast --release --workspace --locked --doc
+stage python scripts/test_python.sh
 stage papers python3 scripts/check_papers.py
 
 echo

@@ -1,11 +1,38 @@
 //! The Python module `tumble._native`: conversion between Python and the crates, and no physics.
 
+mod articulation;
+mod bodies;
+mod body;
+mod contacts;
+mod convert;
+mod errors;
+mod report;
+mod robot;
+mod rollout;
+mod shapes;
+mod shared;
+mod state;
+mod world;
+
 use pyo3::prelude::*;
 
 /// The compiled part of the package `tumble`.
 #[pymodule]
 mod _native {
     use super::*;
+
+    #[pymodule_export]
+    use super::articulation::Articulation;
+    #[pymodule_export]
+    use super::bodies::Bodies;
+    #[pymodule_export]
+    use super::body::RigidBody;
+    #[pymodule_export]
+    use super::report::StepReport;
+    #[pymodule_export]
+    use super::shapes::{Block, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere};
+    #[pymodule_export]
+    use super::world::World;
 
     /// Adds what is not a class or a function.
     #[pymodule_init]

@@ -199,6 +199,12 @@ impl ArticulatedBody {
         self
     }
 
+    /// The same under another name, so that one description can stand in a world more than once.
+    pub fn named(mut self, name: impl Into<String>) -> Self {
+        self.name = name.into();
+        self
+    }
+
     /// Sets all positions at time 0 (see [`Joint`](super::Joint) for what they mean).
     pub fn with_positions(mut self, q: &[f64]) -> Result<Self, ArticulatedError> {
         let wanted = self.model.positions();

@@ -1,5 +1,63 @@
-"""Real-time dynamics for interactive and immersive environments."""
+"""Real-time dynamics for interactive and immersive environments.
 
-from tumble._native import __version__
+SI units, radians, z up, right-handed axes; quaternions are (x, y, z, w); numpy arrays of float64 in and out.
+"""
 
-__all__ = ["__version__"]
+from tumble._errors import (
+    BusyError,
+    InternalError,
+    InvalidValueError,
+    MissingFileError,
+    RemovedError,
+    SceneError,
+    SnapshotError,
+    StepError,
+    TumbleError,
+    UnknownNameError,
+    UnreadableFileError,
+)
+from tumble._native import (
+    Articulation,
+    Bodies,
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    RigidBody,
+    Shape,
+    Sphere,
+    StepReport,
+    World,
+    __version__,
+)
+from tumble._values import Energy, Momentum
+
+__all__ = [
+    "Articulation",
+    "Bodies",
+    "Box",
+    "BusyError",
+    "Capsule",
+    "Cylinder",
+    "Energy",
+    "HalfSpace",
+    "InternalError",
+    "InvalidValueError",
+    "Mesh",
+    "MissingFileError",
+    "Momentum",
+    "RemovedError",
+    "RigidBody",
+    "SceneError",
+    "Shape",
+    "SnapshotError",
+    "Sphere",
+    "StepError",
+    "StepReport",
+    "TumbleError",
+    "UnknownNameError",
+    "UnreadableFileError",
+    "World",
+    "__version__",
+]

@@ -1,0 +1,547 @@
+//! Articulated bodies: a description from a file, or a handle of one in a world. Both answer the same questions.
+
+use crate::body::{Place, hash};
+use crate::convert::{Numbers, array, numbers, path, shown, vec3, vector};
+use crate::errors::{Error, Result, caught};
+use crate::robot::{Robot, Rows};
+use crate::shared::Inner;
+use numpy::{IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard};
+use tumble::collide::{Pose, Vec3};
+use tumble::core::{ArticulatedBody, Drive, Freedom};
+use tumble::scene::urdf::{self, CollisionMeshes, MissingMeshes, UrdfOptions};
+
+/// A tree of links: a robot, a chain, a skeleton.
+///
+/// ``Articulation.from_urdf`` gives a description, whose dynamics can be asked at once; ``World.add_articulation`` puts it into a world and gives a handle
+/// of the one there. ``q`` has ``nq`` numbers: one per hinge (rad) or slider (m), a quaternion (x, y, z, w) per ball joint, position and quaternion of
+/// a floating root. ``qd`` and ``tau`` have ``dof``: rad/s or m/s and N·m or N; of a floating root angular, then linear, world axes.
+///
+/// All functions of ``q``, ``qd``, ``tau`` take one state or a batch of states, a leading axis: what has none stands for all of the batch. They know the
+/// tree alone: no limits, damping, drives or contacts.
+#[pyclass(frozen, module = "tumble")]
+pub struct Articulation {
+    name: Arc<str>,
+    robot: Arc<Robot>,
+    spot: Spot,
+}
+
+/// A description by itself, or one in a world.
+enum Spot {
+    Free { source: Source, now: Mutex<Now> },
+    Placed(Place),
+}
+
+/// Where a description comes from; its shapes are read when it is put into a world.
+#[derive(Clone)]
+struct Source {
+    file: PathBuf,
+    options: UrdfOptions,
+}
+
+/// The numbers of a description.
+#[derive(Clone)]
+struct Now {
+    gravity: Vec3,
+    q: Vec<f64>,
+    qd: Vec<f64>,
+    tau: Vec<f64>,
+}
+
+/// Which of the numbers.
+#[derive(Clone, Copy)]
+enum Which {
+    Q,
+    Qd,
+    Tau,
+}
+
+impl Which {
+    fn name(self) -> &'static str {
+        match self {
+            Which::Q => "q",
+            Which::Qd => "qd",
+            Which::Tau => "tau",
+        }
+    }
+
+    fn of(self, now: &mut Now) -> &mut Vec<f64> {
+        match self {
+            Which::Q => &mut now.q,
+            Which::Qd => &mut now.qd,
+            Which::Tau => &mut now.tau,
+        }
+    }
+
+    fn width(self, robot: &Robot) -> usize {
+        if matches!(self, Which::Q) { robot.positions() } else { robot.dof() }
+    }
+}
+
+impl Source {
+    fn body(&self, options: &UrdfOptions) -> Result<ArticulatedBody> {
+        caught(|| Ok(urdf::load(&self.file, options)?.0))
+    }
+
+    /// The body for its joints alone: whatever meshes can be read.
+    fn joints(&self) -> Result<ArticulatedBody> {
+        self.body(&UrdfOptions { missing_meshes: MissingMeshes::Skip, ..self.options.clone() })
+    }
+}
+
+impl Articulation {
+    /// A handle of one in a world.
+    pub fn placed(place: Place, robot: Arc<Robot>) -> Articulation {
+        Articulation { name: place.name.clone(), robot, spot: Spot::Placed(place) }
+    }
+
+    /// Where it stands, if it is in a world.
+    pub fn place(&self) -> Option<&Place> {
+        match &self.spot {
+            Spot::Placed(place) => Some(place),
+            Spot::Free { .. } => None,
+        }
+    }
+
+    /// The body to be put into a world, in the state that the description has.
+    pub fn body(&self, py: Python<'_>, base: Pose, name: Option<&str>) -> Result<(ArticulatedBody, Robot)> {
+        let Spot::Free { source, now } = &self.spot else {
+            return Err(Error::value(format!("'{}' is in a world already; add the description that it was made of", self.name)));
+        };
+        let body = py.detach(|| source.body(&source.options))?.at(base).named(name.unwrap_or(&self.name));
+        let Now { mut q, qd, .. } = locked(now).clone();
+        // where a floating root is, is said from the base
+        let model = body.model();
+        for link in model.links().iter().filter(|link| link.joint == tumble::core::Joint::Floating) {
+            let own = Pose::from_parts(Vec3::from_column_slice(&q[link.q..link.q + 3]).into(), crate::convert::unit(&q[link.q + 3..link.q + 7]));
+            q[link.q..link.q + 7].copy_from_slice(&crate::convert::pose_numbers(&(base * own)));
+        }
+        let body = body.with_positions(&q)?.with_velocities(&qd)?;
+        let robot = Robot { model: body.model().clone(), base, joints: self.robot.joints.clone() };
+        Ok((body, robot))
+    }
+
+    /// Forces that act on it from the first frame on.
+    pub fn efforts(&self) -> Option<Vec<f64>> {
+        match &self.spot {
+            Spot::Free { now, .. } => Some(locked(now).tau.clone()).filter(|tau| tau.iter().any(|t| *t != 0.0)),
+            Spot::Placed(_) => None,
+        }
+    }
+
+    fn gravity_now(&self) -> Result<Vec3> {
+        match &self.spot {
+            Spot::Free { now, .. } => Ok(locked(now).gravity),
+            Spot::Placed(place) => place.read(|inner| inner.world.status(place.id).map(|_| inner.world.settings().gravity)),
+        }
+    }
+
+    fn get(&self, which: Which) -> Result<Vec<f64>> {
+        let (positions, dof) = (self.robot.positions(), self.robot.dof());
+        match &self.spot {
+            Spot::Free { now, .. } => Ok(which.of(&mut locked(now)).clone()),
+            Spot::Placed(place) => place.read(|inner| {
+                let x = inner.world.state_of(place.id)?;
+                Some(match which {
+                    Which::Q => x[..positions].to_vec(),
+                    Which::Qd => x[positions..].to_vec(),
+                    Which::Tau => inner.efforts.get(&place.id).cloned().unwrap_or_else(|| vec![0.0; dof]),
+                })
+            }),
+        }
+    }
+
+    fn set(&self, py: Python<'_>, which: Which, value: &Bound<'_, PyAny>) -> Result<()> {
+        let (name, width) = (which.name(), which.width(&self.robot));
+        let Numbers { shape, data } = numbers(value, name)?;
+        if shape != [width] {
+            return Err(Error::value(format!("{name}: wanted shape ({width},), and got {}", shown(&shape))));
+        }
+        let data = if matches!(which, Which::Q) { crate::robot::settled(&self.robot, data)? } else { data };
+        match &self.spot {
+            Spot::Free { now, .. } => {
+                *which.of(&mut locked(now)) = data;
+                Ok(())
+            }
+            Spot::Placed(place) => place.write(py, |inner| {
+                let mut x = inner.world.state_of(place.id).ok_or_else(|| place.removed())?.to_vec();
+                match which {
+                    Which::Q => x[..width].copy_from_slice(&data),
+                    Which::Qd => {
+                        let first = x.len() - width;
+                        x[first..].copy_from_slice(&data);
+                    }
+                    Which::Tau => {
+                        inner.efforts.insert(place.id, data);
+                        return Ok(());
+                    }
+                }
+                Ok(inner.world.write_state_of(place.id, &x)?)
+            }),
+        }
+    }
+
+    /// Arguments of an algorithm: what is not given is what it is now.
+    fn rows(&self, arguments: &[(Which, &'static str, Option<&Bound<'_, PyAny>>)]) -> Result<Rows> {
+        let read = |&(which, name, value): &(Which, &'static str, Option<&Bound<'_, PyAny>>)| {
+            let width = which.width(&self.robot);
+            let numbers = match value {
+                Some(value) => numbers(value, name)?,
+                None => Numbers { shape: vec![width], data: self.get(which)? },
+            };
+            Ok((name, numbers, width))
+        };
+        Rows::new(arguments.iter().map(read).collect::<Result<Vec<_>>>()?)
+    }
+
+    fn freedoms(&self, py: Python<'_>) -> Result<Vec<Freedom>> {
+        match &self.spot {
+            Spot::Free { source, .. } => Ok(py.detach(|| source.joints())?.freedoms().to_vec()),
+            Spot::Placed(place) => place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.freedoms().to_vec())),
+        }
+    }
+
+    fn in_world(&self) -> Result<&Place> {
+        self.place().ok_or_else(|| Error::value(format!("'{}' is in no world; World.add_articulation gives the handle of one that is", self.name)))
+    }
+
+    /// The freedom of a hinge or slider, by the name of its joint.
+    fn freedom(&self, joint: &str) -> Result<usize> {
+        let number = self.robot.joints.iter().position(|name| name == joint).ok_or_else(|| {
+            let names: Vec<&str> = self.robot.joints.iter().map(String::as_str).take(12).collect();
+            Error::Name(format!("there is no joint named '{joint}'; there are {}", names.join(", ")))
+        })?;
+        let link = &self.robot.model.links()[number];
+        if link.joint.dof() != 1 {
+            return Err(Error::value(format!("joint '{joint}' has {} freedoms; drives are of hinges and sliders", link.joint.dof())));
+        }
+        Ok(link.v)
+    }
+
+    /// The part that carries a frame.
+    fn part(&self, link: &str) -> Result<usize> {
+        let links = self.robot.model.links().len();
+        Ok(self.robot.frame(link)?.link.unwrap_or(links))
+    }
+
+    /// Something at a point of a link, by default the origin of its frame.
+    fn push(
+        &self, py: Python<'_>, link: &str, point: Option<&Bound<'_, PyAny>>, apply: impl FnOnce(&mut Inner, &Place, usize, Vec3) -> Result<()>,
+    ) -> Result<()> {
+        let (place, part) = (self.in_world()?, self.part(link)?);
+        let point = point.map(|p| vec3(p, "point")).transpose()?;
+        let frame = self.robot.frame(link)?.pose;
+        place.write(py, |inner| {
+            let site = inner.world.site(place.id, part).ok_or_else(|| place.removed())?;
+            let at = point.unwrap_or((site.pose * frame).translation.vector);
+            apply(inner, place, part, at)
+        })
+    }
+}
+
+fn locked(now: &Mutex<Now>) -> MutexGuard<'_, Now> {
+    now.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+/// Results in the shape that their arguments ask for.
+fn result<'py>(py: Python<'py>, rows: &Rows, data: Vec<f64>, shape: &[usize]) -> Result<Bound<'py, PyArrayDyn<f64>>> {
+    let shape: Vec<usize> = rows.batch.iter().chain(shape).copied().collect();
+    Ok(PyArray1::from_vec(py, data).reshape(IxDyn(&shape))?)
+}
+
+type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+
+#[pymethods]
+impl Articulation {
+    /// Reads a URDF: its tree at once, its shapes when it is added to a world.
+    ///
+    /// floating: whether the root floats, else it is fixed to the base; packages: folders by name, for ``package://NAME/…``; missing_meshes:
+    /// ``"error"`` or ``"skip"``, for collision meshes that are not there; collision_meshes: ``"exact"`` or ``"hull"``.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact"))]
+    fn from_urdf(
+        py: Python<'_>, path: &Bound<'_, PyAny>, floating: bool, packages: Option<BTreeMap<String, PathBuf>>, missing_meshes: &str, collision_meshes: &str,
+    ) -> Result<Articulation> {
+        let file = crate::convert::path(path)?;
+        let word = |what: &str, got: &str, wanted: &str| Error::value(format!("{what}: `{got}` is not known; wanted {wanted}"));
+        let options = UrdfOptions {
+            floating,
+            packages: packages.unwrap_or_default(),
+            missing_meshes: match missing_meshes {
+                "error" => MissingMeshes::Error,
+                "skip" => MissingMeshes::Skip,
+                other => return Err(word("missing_meshes", other, "error or skip")),
+            },
+            collision_meshes: match collision_meshes {
+                "exact" => CollisionMeshes::Exact,
+                "hull" => CollisionMeshes::Hull,
+                other => return Err(word("collision_meshes", other, "exact or hull")),
+            },
+            ..UrdfOptions::default()
+        };
+        let read = py.detach(|| caught(|| Ok(urdf::model(&file, &options)?)))?;
+        let start = start(&ArticulatedBody::new("", read.model.clone()));
+        let (q, qd) = start.split_at(read.model.positions());
+        let now = Now { gravity: Vec3::new(0.0, 0.0, -9.81), q: q.to_vec(), qd: qd.to_vec(), tau: vec![0.0; qd.len()] };
+        let robot = Robot { model: read.model, base: Pose::identity(), joints: read.joints };
+        Ok(Articulation { name: read.name.into(), robot: Arc::new(robot), spot: Spot::Free { source: Source { file, options }, now: Mutex::new(now) } })
+    }
+
+    /// The robot's name in its file, or the body's in its world.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Whether it is in a world.
+    #[getter]
+    fn placed_in_world(&self) -> bool {
+        self.place().is_some()
+    }
+
+    /// Whether its world still has it; a description always exists.
+    #[getter]
+    fn exists(&self) -> Result<bool> {
+        self.place().map_or(Ok(true), |place| place.shared.read(|inner| Ok(inner.world.status(place.id).is_some())))
+    }
+
+    /// Names of the moving joints, in the order of the coordinates.
+    #[getter]
+    fn joint_names(&self) -> Vec<String> {
+        self.robot.joints.clone()
+    }
+
+    /// Names of all links, the fixed ones too, in the order of ``link_poses``.
+    #[getter]
+    fn link_names(&self) -> Vec<String> {
+        self.robot.model.frames().iter().map(|frame| frame.name.clone()).collect()
+    }
+
+    /// Length of ``qd`` and ``tau``: degrees of freedom.
+    #[getter]
+    fn dof(&self) -> usize {
+        self.robot.dof()
+    }
+
+    /// Length of ``q``.
+    #[getter]
+    fn nq(&self) -> usize {
+        self.robot.positions()
+    }
+
+    /// Mass of all that moves, kg.
+    #[getter]
+    fn mass(&self) -> f64 {
+        self.robot.model.mass()
+    }
+
+    /// Positions, shape (nq,), rad and m.
+    #[getter]
+    fn q<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, &self.get(Which::Q)?))
+    }
+
+    #[setter]
+    fn set_q(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set(py, Which::Q, value)
+    }
+
+    /// Velocities, shape (dof,), rad/s and m/s.
+    #[getter]
+    fn qd<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, &self.get(Which::Qd)?))
+    }
+
+    #[setter]
+    fn set_qd(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set(py, Which::Qd, value)
+    }
+
+    /// Generalized forces, shape (dof,), N·m and N: they act in every step until they are set anew, beside drives and damping. An input and no state:
+    /// forks take it along, ``save`` does not.
+    #[getter]
+    fn tau<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, &self.get(Which::Tau)?))
+    }
+
+    #[setter]
+    fn set_tau(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set(py, Which::Tau, value)
+    }
+
+    /// Gravity that its functions count with, shape (3,), m/s². In a world it is the world's and set there.
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.gravity_now()?))
+    }
+
+    #[setter]
+    fn set_gravity(&self, value: &Bound<'_, PyAny>) -> Result<()> {
+        let gravity = vec3(value, "gravity")?;
+        match &self.spot {
+            Spot::Free { now, .. } => locked(now).gravity = gravity,
+            Spot::Placed(_) => return Err(Error::value("gravity is the world's; set it there")),
+        }
+        Ok(())
+    }
+
+    /// Least and greatest position of each freedom, shape (dof, 2), rad or m; infinite where there is no limit.
+    #[getter]
+    fn limits<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        let freedoms = self.freedoms(py)?;
+        let flat = freedoms.iter().flat_map(|f| f.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect();
+        Ok(PyArray1::from_vec(py, flat).reshape([freedoms.len(), 2])?)
+    }
+
+    /// Accelerations ``qdd`` that generalized forces ``tau`` cause. q: (nq,), qd, tau: (dof,), each also batched (batch, …); what is not given is
+    /// what it is now. Returns (dof,) or (batch, dof).
+    #[pyo3(signature = (q=None, qd=None, tau=None))]
+    fn forward_dynamics<'py>(&self, py: Python<'py>, q: Given<'_, 'py>, qd: Given<'_, 'py>, tau: Given<'_, 'py>) -> Result<Array<'py>> {
+        let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "tau", tau)])?;
+        let gravity = self.gravity_now()?;
+        let out = py.detach(|| self.robot.forward_dynamics(&gravity, &mut rows))?;
+        result(py, &rows, out, &[self.robot.dof()])
+    }
+
+    /// Generalized forces that accelerations ``qdd`` take, gravity included. q: (nq,), qd, qdd: (dof,), each also batched. Without ``qdd`` those that
+    /// hold the motion unaccelerated. Returns (dof,) or (batch, dof).
+    #[pyo3(signature = (q=None, qd=None, qdd=None))]
+    fn inverse_dynamics<'py>(&self, py: Python<'py>, q: Given<'_, 'py>, qd: Given<'_, 'py>, qdd: Given<'_, 'py>) -> Result<Array<'py>> {
+        let still = array(py, &vec![0.0; self.robot.dof()]).into_any();
+        let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "qdd", Some(qdd.unwrap_or(&still)))])?;
+        let gravity = self.gravity_now()?;
+        let out = py.detach(|| self.robot.inverse_dynamics(&gravity, &mut rows))?;
+        result(py, &rows, out, &[self.robot.dof()])
+    }
+
+    /// The mass matrix, shape (dof, dof) or (batch, dof, dof), symmetric.
+    #[pyo3(signature = (q=None))]
+    fn mass_matrix<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.mass_matrix(&mut rows))?;
+        result(py, &rows, out, &[self.robot.dof(); 2])
+    }
+
+    /// What velocities do to a link: shape (6, dof) or (batch, 6, dof). ``J @ qd`` is the angular velocity (first three rows) and the velocity of the
+    /// origin of the link's frame (last three), world axes.
+    #[pyo3(signature = (link, q=None))]
+    fn jacobian<'py>(&self, py: Python<'py>, link: &str, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        let frame = self.robot.frame(link)?;
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.jacobian(frame, &mut rows))?;
+        result(py, &rows, out, &[6, self.robot.dof()])
+    }
+
+    /// Poses of all links in the world: shape (links, 7) or (batch, links, 7), in the order of ``link_names``: position, m, and quaternion
+    /// (x, y, z, w).
+    #[pyo3(signature = (q=None))]
+    fn link_poses<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.link_poses(&mut rows))?;
+        result(py, &rows, out, &[self.robot.model.frames().len(), 7])
+    }
+
+    /// The pose of one link in the world: shape (7,) or (batch, 7), as in ``link_poses``.
+    #[pyo3(signature = (link, q=None))]
+    fn link_pose<'py>(&self, py: Python<'py>, link: &str, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        self.robot.frame(link)?;
+        let number = self.robot.model.frames().iter().position(|frame| frame.name == link).unwrap_or(0);
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.link_poses(&mut rows))?;
+        let all = 7 * self.robot.model.frames().len();
+        let own = out.chunks_exact(all).flat_map(|poses| &poses[7 * number..7 * number + 7]).copied().collect();
+        result(py, &rows, own, &[7])
+    }
+
+    /// The centre of mass in the world, shape (3,) or (batch, 3), metres.
+    #[pyo3(signature = (q=None))]
+    fn center_of_mass<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.center_of_mass(&mut rows))?;
+        result(py, &rows, out, &[3])
+    }
+
+    /// Puts a motor on a hinge or slider of one in a world, by the name of its joint.
+    ///
+    /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and ``velocity``; with neither it holds ``velocity``; with nothing
+    /// given there is no motor. limit: greatest torque or force, N·m or N. Part of the body and no state: ``save`` leaves it out.
+    #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, limit=f64::INFINITY))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn set_drive(
+        &self, py: Python<'_>, joint: &str, target: Option<f64>, velocity: Option<f64>, stiffness: f64, damping: f64, limit: f64,
+    ) -> Result<()> {
+        let (place, index) = (self.in_world()?, self.freedom(joint)?);
+        let stiff = stiffness != 0.0 || damping != 0.0;
+        let drive = match (target, velocity) {
+            (None, None) if !stiff => Drive::None,
+            (Some(_), _) if !stiff => return Err(Error::value("target: a drive to a position wants a stiffness or a damping above 0")),
+            (None, Some(target)) if !stiff => Drive::Velocity { target, limit },
+            _ => Drive::Position { stiffness, damping, target: target.unwrap_or(0.0), velocity: velocity.unwrap_or(0.0), limit },
+        };
+        place.write(py, |inner| {
+            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let freedom = Freedom { drive, ..body.freedoms()[index].clone() };
+            Ok(body.set_freedom(index, freedom)?)
+        })
+    }
+
+    /// A force on a link of one in a world, during the next step alone. force: shape (3,), N; point: where in the world it acts, metres (default: the
+    /// origin of the link's frame). World axes.
+    #[pyo3(signature = (link, force, point=None))]
+    fn apply_force(&self, py: Python<'_>, link: &str, force: &Bound<'_, PyAny>, point: Given<'_, '_>) -> Result<()> {
+        let force = vec3(force, "force")?;
+        self.push(py, link, point, |inner, place, part, at| Ok(inner.world.apply_force(place.id, part, force, &at)?))
+    }
+
+    /// A torque on a link, during the next step alone. torque: shape (3,), N·m, world axes.
+    fn apply_torque(&self, py: Python<'_>, link: &str, torque: &Bound<'_, PyAny>) -> Result<()> {
+        let torque = vec3(torque, "torque")?;
+        self.push(py, link, None, |inner, place, part, _| Ok(inner.world.apply_torque(place.id, part, torque)?))
+    }
+
+    /// An impulse on a link, at once. impulse: shape (3,), N·s; point: as in ``apply_force``.
+    #[pyo3(signature = (link, impulse, point=None))]
+    fn apply_impulse(&self, py: Python<'_>, link: &str, impulse: &Bound<'_, PyAny>, point: Given<'_, '_>) -> Result<()> {
+        let impulse = vec3(impulse, "impulse")?;
+        self.push(py, link, point, |inner, place, part, at| Ok(inner.world.apply_impulse(place.id, part, impulse, &at)?))
+    }
+
+    fn __repr__(&self) -> String {
+        let place = if !self.exists().unwrap_or(true) { ", removed" } else if self.place().is_some() { "" } else { ", a description" };
+        format!("<tumble.Articulation '{}', {} freedoms{place}>", self.name, self.robot.dof())
+    }
+
+    fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> bool {
+        let Ok(other) = other.cast::<Articulation>() else { return false };
+        match (slf.get().place(), other.get().place()) {
+            (Some(a), Some(b)) => a.same(b),
+            _ => slf.is(other),
+        }
+    }
+
+    fn __hash__(slf: &Bound<'_, Self>) -> u64 {
+        slf.get().place().map_or(slf.as_ptr() as u64 >> 4, hash)
+    }
+}
+
+/// The state that a body starts in.
+fn start(body: &ArticulatedBody) -> Vec<f64> {
+    use tumble::core::Object;
+    let Some(own) = body.integratable() else { return Vec::new() };
+    let mut x = vec![0.0; own.dims().x];
+    own.write_initial(&mut x);
+    x
+}
+
+/// A description of a URDF, from a path.
+pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulation>> {
+    if let Ok(own) = value.cast::<Articulation>() {
+        return Ok(own.clone());
+    }
+    path(value)?;
+    Ok(Bound::new(value.py(), Articulation::from_urdf(value.py(), value, false, None, "error", "exact")?)?)
+}

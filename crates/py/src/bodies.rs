@@ -1,0 +1,122 @@
+//! All bodies of a world, by number and by name.
+
+use crate::articulation::Articulation;
+use crate::body::{Place, RigidBody};
+use crate::errors::{Error, Result};
+use crate::world::place_of;
+use crate::robot::Robot;
+use crate::shared::{Inner, Shared};
+use pyo3::exceptions::{PyIndexError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::{PyInt, PyIterator, PyList};
+use std::sync::Arc;
+use tumble::core::{ArticulatedBody, ObjectId, RigidBody as Rigid, World as Core};
+
+/// The bodies of a world in the order in which they were added: a sequence that also takes names, ``world.bodies["ball"]``.
+///
+/// It follows the world. Constraints and forces are no bodies and not in it.
+#[pyclass(frozen, sequence, module = "tumble")]
+pub struct Bodies {
+    pub shared: Arc<Shared>,
+}
+
+/// Ids of what counts as a body, in the order of adding.
+pub fn body_ids(world: &Core) -> Vec<ObjectId> {
+    world.ids().iter().copied().filter(|&id| is_body(world, id)).collect()
+}
+
+fn is_body(world: &Core, id: ObjectId) -> bool {
+    world.get::<Rigid>(id).is_some() || world.get::<ArticulatedBody>(id).is_some()
+}
+
+/// What is needed to make a handle.
+pub struct Found {
+    /// The object.
+    pub id: ObjectId,
+    name: Arc<str>,
+    robot: Option<Arc<Robot>>,
+}
+
+/// An object as a handle will show it.
+pub fn found(inner: &Inner, id: ObjectId) -> Option<Found> {
+    let name = inner.world.object(id)?.name().into();
+    Some(Found { id, name, robot: inner.robots.get(&id).cloned() })
+}
+
+/// The handle of an object.
+pub fn handle(py: Python<'_>, shared: &Arc<Shared>, found: Found) -> Result<Py<PyAny>> {
+    let place = Place { shared: shared.clone(), id: found.id, name: found.name };
+    Ok(match found.robot {
+        Some(robot) => Py::new(py, Articulation::placed(place, robot))?.into_any(),
+        None => Py::new(py, RigidBody { place })?.into_any(),
+    })
+}
+
+impl Bodies {
+    fn all(&self) -> Result<Vec<Found>> {
+        self.shared.read(|inner| Ok(body_ids(&inner.world).into_iter().filter_map(|id| found(inner, id)).collect()))
+    }
+
+    fn list<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyList>> {
+        let handles = self.all()?.into_iter().map(|found| handle(py, &self.shared, found)).collect::<Result<Vec<_>>>()?;
+        Ok(PyList::new(py, handles)?)
+    }
+}
+
+/// The body of that name.
+pub fn by_name(inner: &Inner, name: &str) -> Result<Found> {
+    let id = inner.world.find(name).filter(|&id| is_body(&inner.world, id));
+    id.and_then(|id| found(inner, id)).ok_or_else(|| {
+        let names: Vec<&str> = body_ids(&inner.world).iter().filter_map(|&id| Some(inner.world.object(id)?.name())).take(8).collect();
+        let known = if names.is_empty() { "it has none".to_string() } else { format!("there are {}", names.join(", ")) };
+        Error::Name(format!("the world has no body named '{name}'; {known}"))
+    })
+}
+
+#[pymethods]
+impl Bodies {
+    fn __len__(&self) -> Result<usize> {
+        self.shared.read(|inner| Ok(body_ids(&inner.world).len()))
+    }
+
+    fn __getitem__(&self, py: Python<'_>, key: &Bound<'_, PyAny>) -> Result<Py<PyAny>> {
+        if let Ok(name) = key.extract::<String>() {
+            let found = self.shared.read(|inner| by_name(inner, &name))?;
+            return handle(py, &self.shared, found);
+        }
+        if !key.is_instance_of::<PyInt>() && !key.hasattr("__index__")? {
+            return Err(PyTypeError::new_err("bodies are asked for by name or by number").into());
+        }
+        let index: isize = key.extract()?;
+        let found = self.shared.read(|inner| {
+            let ids = body_ids(&inner.world);
+            let at = if index < 0 { index + ids.len() as isize } else { index };
+            Ok(usize::try_from(at).ok().and_then(|at| ids.get(at)).and_then(|&id| self::found(inner, id)))
+        })?;
+        match found {
+            Some(found) => handle(py, &self.shared, found),
+            None => Err(PyIndexError::new_err(format!("there is no body number {index}")).into()),
+        }
+    }
+
+    fn __contains__(&self, key: &Bound<'_, PyAny>) -> Result<bool> {
+        if let Ok(name) = key.extract::<String>() {
+            return self.shared.read(|inner| Ok(by_name(inner, &name).is_ok()));
+        }
+        let Ok(place) = place_of(key) else { return Ok(false) };
+        self.shared.read(|inner| Ok(Arc::ptr_eq(&place.shared, &self.shared) && inner.world.status(place.id).is_some()))
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyIterator>> {
+        Ok(self.list(py)?.try_iter()?)
+    }
+
+    /// Their names, in order.
+    fn names(&self) -> Result<Vec<String>> {
+        Ok(self.all()?.into_iter().map(|found| found.name.to_string()).collect())
+    }
+
+    fn __repr__(&self) -> Result<String> {
+        Ok(format!("<tumble.Bodies {:?}>", self.names()?))
+    }
+}

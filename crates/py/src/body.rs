@@ -1,0 +1,344 @@
+//! A rigid body of a world: a handle, which asks the world each time.
+
+use crate::convert::{pose, quaternion, rotation, symmetric, vec3, vec3_or, vector};
+use crate::errors::{Error, Result};
+use crate::shared::{Inner, Shared};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use std::sync::Arc;
+use tumble::collide::{Pose, Vec3};
+use tumble::core::{Mode, ObjectId, RigidBody as Rigid, Site, Status};
+
+/// Where a handle points: a world, an object of it, and the name it had.
+#[derive(Clone)]
+pub struct Place {
+    /// The world.
+    pub shared: Arc<Shared>,
+    /// The object.
+    pub id: ObjectId,
+    /// Its name, which never changes.
+    pub name: Arc<str>,
+}
+
+impl Place {
+    /// The error of a handle whose object is gone.
+    pub fn removed(&self) -> Error {
+        Error::Removed(format!("'{}' was removed from its world", self.name))
+    }
+
+    /// Reads something of the object; `None` is a removed one.
+    pub fn read<T>(&self, get: impl FnOnce(&Inner) -> Option<T>) -> Result<T> {
+        self.shared.read(|inner| get(inner).ok_or_else(|| self.removed()))
+    }
+
+    /// Changes something of the object.
+    pub fn write<T>(&self, py: Python<'_>, set: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
+        self.shared.write(py, |inner| {
+            inner.world.status(self.id).ok_or_else(|| self.removed())?;
+            set(inner)
+        })
+    }
+
+    /// The object's switches.
+    pub fn status(&self) -> Result<Status> {
+        self.read(|inner| inner.world.status(self.id))
+    }
+
+    /// The site of one part.
+    pub fn site(&self, part: usize) -> Result<Site> {
+        self.read(|inner| inner.world.site(self.id, part).copied())
+    }
+
+    /// Whether two handles point at the same.
+    pub fn same(&self, other: &Place) -> bool {
+        Arc::ptr_eq(&self.shared, &other.shared) && self.id == other.id
+    }
+}
+
+/// Python's words for how a body takes part.
+pub fn mode_name(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Static => "static",
+        Mode::Kinematic => "kinematic",
+        Mode::Dynamic => "dynamic",
+    }
+}
+
+/// The inverse of [`mode_name`].
+pub fn mode_of(name: &str) -> Result<Mode> {
+    match name {
+        "static" => Ok(Mode::Static),
+        "kinematic" => Ok(Mode::Kinematic),
+        "dynamic" => Ok(Mode::Dynamic),
+        _ => Err(Error::value(format!("mode: `{name}` is not known; wanted static, kinematic or dynamic"))),
+    }
+}
+
+/// A rigid body, or static geometry, of a world. Its frame has its origin at the centre of mass; all vectors are in world axes.
+///
+/// A handle: it holds no numbers of its own. After the body was removed every use raises ``RemovedError``.
+#[pyclass(frozen, module = "tumble")]
+pub struct RigidBody {
+    pub place: Place,
+}
+
+impl RigidBody {
+    fn constant<T>(&self, get: impl FnOnce(&Rigid) -> T) -> Result<T> {
+        self.place.read(|inner| inner.world.get::<Rigid>(self.place.id).map(get))
+    }
+
+    /// Changes a constant that may be changed; what it was stays where the new value cannot be.
+    fn change(&self, py: Python<'_>, set: impl FnOnce(&mut Rigid)) -> Result<()> {
+        self.place.write(py, |inner| {
+            let body = inner.world.get_mut::<Rigid>(self.place.id).ok_or_else(|| self.place.removed())?;
+            let mut changed = body.clone();
+            set(&mut changed);
+            changed.validate()?;
+            *body = changed;
+            Ok(())
+        })
+    }
+
+    fn set_motion(&self, py: Python<'_>, velocity: Option<Vec3>, angular: Option<Vec3>) -> Result<()> {
+        let place = &self.place;
+        place.write(py, |inner| {
+            let site = *inner.world.site(place.id, 0).ok_or_else(|| place.removed())?;
+            Ok(inner.world.set_velocity(place.id, velocity.unwrap_or(site.velocity), angular.unwrap_or(site.angular_velocity))?)
+        })
+    }
+
+    fn set_place(&self, py: Python<'_>, change: impl FnOnce(Pose) -> Pose) -> Result<()> {
+        let place = &self.place;
+        place.write(py, |inner| {
+            let now = inner.world.site(place.id, 0).ok_or_else(|| place.removed())?.pose;
+            Ok(inner.world.set_pose(place.id, change(now))?)
+        })
+    }
+}
+
+#[pymethods]
+impl RigidBody {
+    /// Unique in its world.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.place.name
+    }
+
+    /// Whether its world still has it.
+    #[getter]
+    fn exists(&self) -> Result<bool> {
+        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
+    }
+
+    /// Mass, kg. Of static geometry it means nothing.
+    #[getter]
+    fn mass(&self) -> Result<f64> {
+        self.constant(Rigid::mass)
+    }
+
+    /// Inertia about the centre of mass, body axes, shape (3, 3), kg·m².
+    #[getter]
+    fn inertia<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        symmetric(py, &self.constant(|body| *body.inertia())?)
+    }
+
+    /// Position of the centre of mass, shape (3,), metres. Setting it keeps the velocity.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.site(0)?.position()))
+    }
+
+    #[setter]
+    fn set_position(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let position = vec3(value, "position")?;
+        self.set_place(py, |now| Pose::from_parts(position.into(), now.rotation))
+    }
+
+    /// Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it keeps the velocity.
+    #[getter]
+    fn orientation<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(quaternion(py, &self.place.site(0)?.pose.rotation))
+    }
+
+    #[setter]
+    fn set_orientation(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let rotation = rotation(value, "orientation")?;
+        self.set_place(py, |now| Pose::from_parts(now.translation, rotation))
+    }
+
+    /// Velocity of the centre of mass, shape (3,), m/s.
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.site(0)?.velocity))
+    }
+
+    #[setter]
+    fn set_velocity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set_motion(py, Some(vec3(value, "velocity")?), None)
+    }
+
+    /// Angular velocity, world axes, shape (3,), rad/s.
+    #[getter]
+    fn angular_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.site(0)?.angular_velocity))
+    }
+
+    #[setter]
+    fn set_angular_velocity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set_motion(py, None, Some(vec3(value, "angular_velocity")?))
+    }
+
+    /// Acceleration of the centre of mass at the last force evaluation, shape (3,), m/s².
+    #[getter]
+    fn acceleration<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.site(0)?.acceleration))
+    }
+
+    /// ``"dynamic"``, ``"kinematic"`` (follows the velocity it is given and pushes others) or ``"static"``.
+    #[getter]
+    fn mode(&self) -> Result<&'static str> {
+        Ok(mode_name(self.place.status()?.mode))
+    }
+
+    #[setter]
+    fn set_mode(&self, py: Python<'_>, value: &str) -> Result<()> {
+        let mode = mode_of(value)?;
+        if mode == Mode::Dynamic && self.constant(Rigid::is_fixture)? {
+            return Err(Error::value(format!("'{}' has no mass: it was added as static, and cannot be dynamic", self.place.name)));
+        }
+        self.place.write(py, |inner| Ok(inner.world.set_mode(self.place.id, mode)?))
+    }
+
+    /// Whether it takes part in anything at all; its state stays while it does not.
+    #[getter]
+    fn alive(&self) -> Result<bool> {
+        Ok(self.place.status()?.alive)
+    }
+
+    #[setter]
+    fn set_alive(&self, py: Python<'_>, value: bool) -> Result<()> {
+        self.place.write(py, |inner| Ok(inner.world.set_alive(self.place.id, value)?))
+    }
+
+    /// Whether it meets others.
+    #[getter]
+    fn collidable(&self) -> Result<bool> {
+        Ok(self.place.status()?.collidable)
+    }
+
+    #[setter]
+    fn set_collidable(&self, py: Python<'_>, value: bool) -> Result<()> {
+        self.place.write(py, |inner| Ok(inner.world.set_collidable(self.place.id, value)?))
+    }
+
+    /// Coefficient of restitution, 0 to 1.
+    #[getter]
+    fn restitution(&self) -> Result<f64> {
+        self.constant(|body| body.material.restitution)
+    }
+
+    #[setter]
+    fn set_restitution(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.restitution = value)
+    }
+
+    /// Coefficient of Coulomb friction, at least 0.
+    #[getter]
+    fn friction(&self) -> Result<f64> {
+        self.constant(|body| body.material.friction)
+    }
+
+    #[setter]
+    fn set_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.friction = value)
+    }
+
+    /// Linear damping, 1/s: a force of ``-damping · momentum``.
+    #[getter]
+    fn linear_damping(&self) -> Result<f64> {
+        self.constant(|body| body.linear_damping)
+    }
+
+    #[setter]
+    fn set_linear_damping(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.linear_damping = value)
+    }
+
+    /// Angular damping, 1/s: a torque of ``-damping · angular momentum``.
+    #[getter]
+    fn angular_damping(&self) -> Result<f64> {
+        self.constant(|body| body.angular_damping)
+    }
+
+    #[setter]
+    fn set_angular_damping(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.angular_damping = value)
+    }
+
+    /// A force during the next frame alone. force: shape (3,), N, world axes; point: where in the world it acts, metres (default: the centre of mass).
+    #[pyo3(signature = (force, point=None))]
+    fn apply_force(&self, py: Python<'_>, force: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let (force, point) = (vec3(force, "force")?, point.map(|p| vec3(p, "point")).transpose()?);
+        self.place.write(py, |inner| {
+            let at = point.unwrap_or(inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+            Ok(inner.world.apply_force(self.place.id, 0, force, &at)?)
+        })
+    }
+
+    /// A torque during the next frame alone. torque: shape (3,), N·m, world axes.
+    fn apply_torque(&self, py: Python<'_>, torque: &Bound<'_, PyAny>) -> Result<()> {
+        let torque = vec3(torque, "torque")?;
+        self.place.write(py, |inner| Ok(inner.world.apply_torque(self.place.id, 0, torque)?))
+    }
+
+    /// An impulse, at once. impulse: shape (3,), N·s, world axes; point: where in the world it acts, metres (default: the centre of mass).
+    #[pyo3(signature = (impulse, point=None))]
+    fn apply_impulse(&self, py: Python<'_>, impulse: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let (impulse, point) = (vec3(impulse, "impulse")?, point.map(|p| vec3(p, "point")).transpose()?);
+        self.place.write(py, |inner| {
+            let at = point.unwrap_or(inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+            Ok(inner.world.apply_impulse(self.place.id, 0, impulse, &at)?)
+        })
+    }
+
+    /// Gives a kinematic body the velocity that brings it to a pose by the end of the next frame. What is not given stays as it is.
+    #[pyo3(signature = (position=None, orientation=None))]
+    fn move_to(&self, py: Python<'_>, position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let target = pose(position, orientation)?;
+        let (moves, turns) = (position.is_some(), orientation.is_some());
+        self.place.write(py, |inner| {
+            let now = inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.pose;
+            let translation = if moves { target.translation } else { now.translation };
+            let rotation = if turns { target.rotation } else { now.rotation };
+            Ok(inner.world.move_to(self.place.id, Pose::from_parts(translation, rotation))?)
+        })
+    }
+
+    /// Position of a point of the body in the world. point: shape (3,), body axes, metres.
+    #[pyo3(signature = (point=None))]
+    fn to_world<'py>(&self, py: Python<'py>, point: Option<&Bound<'_, PyAny>>) -> Result<Bound<'py, PyArray1<f64>>> {
+        let point = vec3_or(point, "point", Vec3::zeros())?;
+        Ok(vector(py, &self.place.site(0)?.pose.transform_point(&point.into()).coords))
+    }
+
+    fn __repr__(&self) -> String {
+        let gone = !self.exists().unwrap_or(true);
+        format!("<tumble.RigidBody '{}'{}>", self.place.name, if gone { ", removed" } else { "" })
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<RigidBody>().is_ok_and(|other| self.place.same(&other.get().place))
+    }
+
+    fn __hash__(&self) -> u64 {
+        hash(&self.place)
+    }
+}
+
+/// Equal handles have equal hashes.
+pub fn hash(place: &Place) -> u64 {
+    use std::hash::{DefaultHasher, Hash, Hasher};
+    let mut hasher = DefaultHasher::new();
+    (Arc::as_ptr(&place.shared) as usize, place.id).hash(&mut hasher);
+    hasher.finish()
+}

@@ -1,0 +1,50 @@
+//! The contacts of the last step as one structured numpy array.
+
+use crate::bodies::body_ids;
+use crate::errors::Result;
+use crate::shared::Inner;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyList;
+use tumble::core::ObjectId;
+
+/// Fields of a contact: name, format, how many. All have 8 bytes, so that there is no padding.
+const FIELDS: [(&str, &str, usize); 8] = [
+    ("bodies", "<i8", 2), ("parts", "<i8", 2), ("point", "<f8", 3), ("normal", "<f8", 3), ("depth", "<f8", 1), ("velocity", "<f8", 3), ("impulse", "<f8", 3),
+    ("force", "<f8", 3),
+];
+
+/// The contacts as the bytes of the array.
+pub fn bytes(inner: &Inner) -> Vec<u8> {
+    let ids = body_ids(&inner.world);
+    let number = |id: ObjectId| ids.iter().position(|&other| other == id).map_or(-1, |k| k as i64);
+    let contacts = inner.world.contacts();
+    let mut out = Vec::with_capacity(contacts.len() * 20 * 8);
+    for c in contacts {
+        let whole = [number(c.a), number(c.b), c.part_a as i64, c.part_b as i64];
+        whole.iter().for_each(|k| out.extend_from_slice(&k.to_le_bytes()));
+        let real = c.point.iter().chain(c.normal.iter()).copied().chain([-c.gap]).chain(c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()).copied());
+        real.for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
+    }
+    out
+}
+
+/// The array of such bytes.
+pub fn array<'py>(py: Python<'py>, bytes: Vec<u8>) -> Result<Bound<'py, PyAny>> {
+    Ok(PyArray1::from_vec(py, bytes).call_method1("view", (kind(py)?,))?)
+}
+
+/// The numpy type of one contact.
+pub fn kind<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    static KIND: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let kind = KIND.get_or_try_init(py, || {
+        let fields = FIELDS.map(|(name, format, count)| match count {
+            1 => (name, format).into_pyobject(py).map(|f| f.into_any()),
+            _ => (name, format, (count,)).into_pyobject(py).map(|f| f.into_any()),
+        });
+        let fields = fields.into_iter().collect::<PyResult<Vec<_>>>()?;
+        PyResult::Ok(py.import("numpy")?.call_method1("dtype", (PyList::new(py, fields)?,))?.unbind())
+    })?;
+    Ok(kind.bind(py).clone())
+}

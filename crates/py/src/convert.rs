@@ -1,0 +1,124 @@
+//! Python's numbers to Rust's and back. What comes in is checked here: its shape, and that all of it is finite.
+
+use crate::errors::{Error, Result};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use tumble::collide::{Mat3, Pose, Quat, Vec3};
+
+/// How far from 1 the length of a quaternion may be.
+const UNIT: f64 = 1e-6;
+
+/// Finite numbers and the shape they came in, in C order.
+pub struct Numbers {
+    /// The shape.
+    pub shape: Vec<usize>,
+    /// As many numbers as its product.
+    pub data: Vec<f64>,
+}
+
+/// Anything that numpy makes an array of; `what` stands in errors.
+pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
+    let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = value.extract().map_err(|_| not_numbers(value, what))?;
+    let shape = array.shape().to_vec();
+    let data: Vec<f64> = match array.as_slice() {
+        Ok(slice) => slice.to_vec(),
+        Err(_) => array.as_array().iter().copied().collect(),
+    };
+    match data.iter().position(|x| !x.is_finite()) {
+        Some(k) => Err(Error::value(format!("{what}: number {k} is {}; all must be finite", data[k]))),
+        None => Ok(Numbers { shape, data }),
+    }
+}
+
+fn not_numbers(value: &Bound<'_, PyAny>, what: &str) -> Error {
+    let shown = value.repr().map_or_else(|_| "something".into(), |r| r.to_string());
+    let shown: String = shown.chars().take(60).collect();
+    Error::value(format!("{what}: wanted numbers, and not {shown}"))
+}
+
+/// As many numbers as `N`, in one dimension.
+pub fn some<const N: usize>(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; N]> {
+    let Numbers { shape, data } = numbers(value, what)?;
+    if shape.as_slice() != [N] {
+        return Err(Error::value(format!("{what}: wanted {N} numbers, shape ({N},), and got shape {}", shown(&shape))));
+    }
+    data.try_into().map_err(|_| Error::value(what))
+}
+
+/// A shape as Python writes it.
+pub fn shown(shape: &[usize]) -> String {
+    let inner: Vec<String> = shape.iter().map(usize::to_string).collect();
+    if inner.len() == 1 { format!("({},)", inner[0]) } else { format!("({})", inner.join(", ")) }
+}
+
+/// One finite number.
+pub fn number(value: f64, what: &str) -> Result<f64> {
+    if value.is_finite() { Ok(value) } else { Err(Error::value(format!("{what} is {value}; it must be finite"))) }
+}
+
+/// Three numbers.
+pub fn vec3(value: &Bound<'_, PyAny>, what: &str) -> Result<Vec3> {
+    some::<3>(value, what).map(Vec3::from)
+}
+
+/// Three numbers, or what stands for none.
+pub fn vec3_or(value: Option<&Bound<'_, PyAny>>, what: &str, usual: Vec3) -> Result<Vec3> {
+    value.map_or(Ok(usual), |value| vec3(value, what))
+}
+
+/// A unit quaternion `x, y, z, w`; a length within 1e-6 of 1 is made 1.
+pub fn rotation(value: &Bound<'_, PyAny>, what: &str) -> Result<Quat> {
+    let [x, y, z, w] = some::<4>(value, what)?;
+    let q = Quaternion::new(w, x, y, z);
+    let norm = q.norm();
+    if (norm - 1.0).abs() > UNIT {
+        return Err(Error::value(format!("{what}: the quaternion (x, y, z, w) has length {norm}; it must be 1")));
+    }
+    Ok(UnitQuaternion::from_quaternion(q))
+}
+
+/// A pose from a position and an orientation, the identity where they are not given.
+pub fn pose(position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, PyAny>>) -> Result<Pose> {
+    let position = vec3_or(position, "position", Vec3::zeros())?;
+    let rotation = orientation.map_or(Ok(Quat::identity()), |q| self::rotation(q, "orientation"))?;
+    Ok(Pose::from_parts(Translation3::from(position), rotation))
+}
+
+/// A pose as 7 numbers: position, quaternion `x, y, z, w`.
+pub fn pose_numbers(pose: &Pose) -> [f64; 7] {
+    let (p, q) = (pose.translation.vector, pose.rotation.coords);
+    [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+}
+
+/// The rotation of four numbers `x, y, z, w`, made unit.
+pub fn unit(q: &[f64]) -> Quat {
+    UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2]))
+}
+
+/// A path: `str` or `os.PathLike`.
+pub fn path(value: &Bound<'_, PyAny>) -> Result<PathBuf> {
+    Ok(value.extract().map_err(|_| PyTypeError::new_err("wanted a path: str or os.PathLike"))?)
+}
+
+/// A numpy array of one dimension.
+pub fn array<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
+    PyArray1::from_slice(py, values)
+}
+
+/// The three numbers of a vector.
+pub fn vector<'py>(py: Python<'py>, v: &Vec3) -> Bound<'py, PyArray1<f64>> {
+    array(py, v.as_slice())
+}
+
+/// A quaternion as `x, y, z, w`.
+pub fn quaternion<'py>(py: Python<'py>, q: &Quat) -> Bound<'py, PyArray1<f64>> {
+    array(py, q.coords.as_slice())
+}
+
+/// A symmetric matrix.
+pub fn symmetric<'py>(py: Python<'py>, m: &Mat3) -> Result<Bound<'py, PyArray2<f64>>> {
+    Ok(array(py, m.as_slice()).reshape([3, 3])?)
+}

@@ -1,0 +1,137 @@
+//! Errors on their way to Python: the text is Rust's, the class is one of `tumble._errors`.
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use tumble::collide::{MeshError, ShapeError};
+use tumble::core::{ArticulatedError, BodyError, ModelError, SettingsError, SnapshotError, StepError, WorldError};
+use tumble::scene::urdf::UrdfError;
+use tumble::scene::{BuildError, SceneError, UnknownName};
+
+/// Whatever a call from Python can end with.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    #[error(transparent)]
+    World(#[from] WorldError),
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    #[error(transparent)]
+    Articulated(#[from] ArticulatedError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    #[error(transparent)]
+    Urdf(#[from] UrdfError),
+    #[error(transparent)]
+    Choice(#[from] UnknownName),
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// A step of one of many forks.
+    #[error("fork {fork}, frame {frame}: {source}")]
+    Fork { fork: usize, frame: usize, source: Box<Error> },
+    /// A file that the binding itself reads.
+    #[error("{file}: {source}")]
+    File { file: String, source: std::io::Error },
+    /// What is wrong with a value, and what would be right.
+    #[error("{0}")]
+    Value(String),
+    /// A name that nothing has, and what there is.
+    #[error("{0}")]
+    Name(String),
+    #[error("{0}")]
+    Removed(String),
+    #[error("the world is being stepped by another thread; wait until that step returns, or give each thread a fork of its own")]
+    Busy,
+    #[error("the world is being stepped, and this call comes from within that step; a force or behaviour reads the view it is given")]
+    Within,
+    /// A panic that was caught.
+    #[error("an error inside tumble: {0}; please report it")]
+    Internal(String),
+    #[error("an error inside tumble stopped this world in the middle of a call; make it anew, or go on from a fork or a snapshot in another world")]
+    Broken,
+    /// What Python itself raised.
+    #[error(transparent)]
+    Python(#[from] PyErr),
+}
+
+/// The result of every call.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+impl Error {
+    /// A value error.
+    pub fn value(text: impl Into<String>) -> Error {
+        Error::Value(text.into())
+    }
+
+    /// The name of its class in `tumble._errors`.
+    fn class(&self) -> &'static str {
+        match self {
+            Error::World(WorldError::Stale) | Error::Removed(_) => "RemovedError",
+            Error::Scene(SceneError::Unknown { .. }) => "MissingFileError",
+            Error::Scene(SceneError::Read { source, .. }) => of_file(source),
+            Error::Urdf(UrdfError::Read { source, .. }) => of_file(source),
+            Error::Build(BuildError::MeshFile { source, .. }) => of_file(source),
+            Error::File { source, .. } => of_file(source),
+            Error::Build(BuildError::World { .. }) => "InvalidValueError",
+            Error::Scene(_) | Error::Build(_) | Error::Urdf(_) => "SceneError",
+            Error::Snapshot(_) => "SnapshotError",
+            Error::Step(_) => "StepError",
+            Error::Fork { source, .. } => source.class(),
+            Error::Name(_) => "UnknownNameError",
+            Error::Busy | Error::Within => "BusyError",
+            Error::Internal(_) | Error::Broken => "InternalError",
+            _ => "InvalidValueError",
+        }
+    }
+}
+
+fn of_file(error: &std::io::Error) -> &'static str {
+    if error.kind() == ErrorKind::NotFound { "MissingFileError" } else { "UnreadableFileError" }
+}
+
+impl From<Error> for PyErr {
+    fn from(error: Error) -> PyErr {
+        if let Error::Python(error) = error {
+            return error;
+        }
+        Python::attach(|py| match class(py, error.class()) {
+            Ok(class) => PyErr::from_type(class, (error.to_string(),)),
+            Err(_) => PyRuntimeError::new_err(error.to_string()),
+        })
+    }
+}
+
+/// A class of `tumble._errors`, imported once.
+fn class<'py>(py: Python<'py>, name: &'static str) -> PyResult<Bound<'py, PyType>> {
+    static CLASSES: PyOnceLock<BTreeMap<String, Py<PyType>>> = PyOnceLock::new();
+    let classes = CLASSES.get_or_try_init(py, || {
+        let module = py.import("tumble._errors")?;
+        let classes = module.dict().iter().filter_map(|(name, class)| {
+            Some((name.extract().ok()?, class.cast_into::<PyType>().ok()?.unbind()))
+        });
+        PyResult::Ok(classes.collect())
+    })?;
+    classes.get(name).map(|class| class.bind(py).clone()).ok_or_else(|| PyRuntimeError::new_err(name))
+}
+
+/// Runs what must not panic; a panic becomes an [`Error::Internal`] with its text.
+pub fn caught<T>(call: impl FnOnce() -> Result<T>) -> Result<T> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<&str>().map(|s| s.to_string()).or_else(|| panic.downcast_ref::<String>().cloned());
+        Err(Error::Internal(text.unwrap_or_else(|| "a panic without words".into())))
+    })
+}

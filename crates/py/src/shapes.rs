@@ -1,0 +1,224 @@
+//! Shapes: what bodies are made of. Sizes are those that one measures: full edge lengths, lengths without caps.
+
+use crate::convert::{number, numbers, path, shown, some, vec3_or};
+use crate::errors::{Error, Result, caught};
+use nalgebra::Translation3;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::PyClass;
+use pyo3::prelude::*;
+use tumble::collide::{Pose, Quat, Shape as Solid, TreeCache, TreeSettings, TriMesh, Vec3};
+use tumble::scene::read_solid;
+
+/// A solid that bodies are made of. Made by ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` or ``Mesh``.
+#[pyclass(frozen, subclass, module = "tumble")]
+pub struct Shape {
+    /// In its own frame.
+    pub solid: Solid,
+    /// Where that frame stands in the body's frame that the user places.
+    pub placement: Pose,
+    /// As Python would write it.
+    words: String,
+}
+
+impl Shape {
+    fn new(solid: Solid, words: String) -> Shape {
+        Shape { solid, placement: Pose::identity(), words }
+    }
+
+    /// The shape as an object of one of its classes.
+    fn as_a<C: PyClass<BaseType = Shape>>(self, class: C) -> PyClassInitializer<C> {
+        PyClassInitializer::from(self).add_subclass(class)
+    }
+}
+
+#[pymethods]
+impl Shape {
+    /// Volume, m³; infinite for a half-space.
+    #[getter]
+    fn volume(&self) -> f64 {
+        self.solid.volume()
+    }
+
+    /// Radius of a ball about the shape's origin that holds it, metres; infinite for a half-space.
+    #[getter]
+    fn bounding_radius(&self) -> f64 {
+        self.solid.bounding_radius()
+    }
+
+    fn __repr__(&self) -> &str {
+        &self.words
+    }
+}
+
+/// A ball. radius: metres.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Sphere;
+
+#[pymethods]
+impl Sphere {
+    #[new]
+    fn new(radius: f64) -> Result<PyClassInitializer<Sphere>> {
+        Ok(Shape::new(Solid::sphere(radius)?, format!("Sphere(radius={radius})")).as_a(Sphere))
+    }
+}
+
+/// A block about its centre. size: full edge lengths along x, y and z, metres; one number is a cube.
+#[pyclass(frozen, extends = Shape, name = "Box", module = "tumble")]
+pub struct Block;
+
+#[pymethods]
+impl Block {
+    #[new]
+    fn new(size: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Block>> {
+        let size = match size.extract::<f64>() {
+            Ok(edge) => [number(edge, "size")?; 3],
+            Err(_) => some::<3>(size, "size")?,
+        };
+        let [x, y, z] = size;
+        if let Some(edge) = size.iter().find(|edge| **edge <= 0.0) {
+            return Err(Error::value(format!("size: an edge of {edge} m; edges must be above 0 m")));
+        }
+        Ok(Shape::new(Solid::cuboid(0.5 * Vec3::from(size))?, format!("Box(size=({x}, {y}, {z}))")).as_a(Block))
+    }
+}
+
+/// A capsule along z about its centre. radius: metres; length: of the straight part, without the caps, metres.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Capsule;
+
+#[pymethods]
+impl Capsule {
+    #[new]
+    fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Capsule>> {
+        let solid = Solid::capsule(radius, half(length)?)?;
+        Ok(Shape::new(solid, format!("Capsule(radius={radius}, length={length})")).as_a(Capsule))
+    }
+}
+
+/// A cylinder along z about its centre. radius, length: metres.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Cylinder;
+
+#[pymethods]
+impl Cylinder {
+    #[new]
+    fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Cylinder>> {
+        let length_half = half(length)?;
+        let solid = caught(|| Ok(Solid::cylinder(radius, length_half)?))?;
+        Ok(Shape::new(solid, format!("Cylinder(radius={radius}, length={length})")).as_a(Cylinder))
+    }
+}
+
+fn half(length: f64) -> Result<f64> {
+    if length.is_finite() && length > 0.0 { Ok(0.5 * length) } else { Err(Error::value(format!("length is {length}, but must be finite and above 0 m"))) }
+}
+
+/// All points x with ``normal · x <= offset``. normal: of any length above 0, points out of the solid; offset: metres along the unit normal.
+///
+/// Only static and kinematic bodies can have it. The frame of such a body has its z axis along the normal and its origin on the plane.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct HalfSpace;
+
+#[pymethods]
+impl HalfSpace {
+    #[new]
+    #[pyo3(signature = (normal=None, offset=0.0))]
+    fn new(normal: Option<&Bound<'_, PyAny>>, offset: f64) -> Result<PyClassInitializer<HalfSpace>> {
+        let given = vec3_or(normal, "normal", Vec3::z())?;
+        let offset = number(offset, "offset")?;
+        let largest = given.amax();
+        if largest == 0.0 {
+            return Err(Error::value("normal: (0, 0, 0) has no direction"));
+        }
+        let n = (given / largest).normalize();
+        // half a turn about x where the normal points straight down
+        let rotation = Quat::rotation_between(&Vec3::z(), &n).unwrap_or_else(|| Quat::from_quaternion(nalgebra::Quaternion::new(0.0, 1.0, 0.0, 0.0)));
+        let placement = Pose::from_parts(Translation3::from(n * offset), rotation);
+        let words = format!("HalfSpace(normal=({}, {}, {}), offset={offset})", given.x, given.y, given.z);
+        Ok(Shape { solid: Solid::half_space(), placement, words }.as_a(HalfSpace))
+    }
+}
+
+/// A closed mesh, moved so that its centre of mass is the origin of the body.
+///
+/// ``Mesh(vertices, faces)``: shapes (n, 3) in metres and (m, 3) of indices from 0, counter-clockwise seen from outside.
+/// ``Mesh(path)``: an OBJ, STL or COLLADA file in metres; ``scale`` multiplies its coordinates. An object with ``vertices`` and ``faces``
+/// (trimesh) is taken as such. What is open, or encloses nothing, is a ``ValueError`` that names the place.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Mesh {
+    center: Vec3,
+}
+
+#[pymethods]
+impl Mesh {
+    #[new]
+    #[pyo3(signature = (vertices, faces=None, *, scale=1.0))]
+    fn new(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>, scale: f64) -> Result<PyClassInitializer<Mesh>> {
+        if !(scale.is_finite() && scale > 0.0) {
+            return Err(Error::value(format!("scale is {scale}; it must be finite and above 0")));
+        }
+        let mesh = triangles(py, vertices, faces)?.scaled(scale);
+        let count = mesh.triangles.len();
+        let (solid, center, _) = py.detach(|| caught(|| Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?)))?;
+        Ok(Shape::new(solid, format!("Mesh({count} triangles)")).as_a(Mesh { center }))
+    }
+
+    /// The centre of mass in the axes that the vertices were given in, shape (3,), metres. A body of this mesh has its origin there.
+    #[getter]
+    fn center_of_mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        crate::convert::vector(py, &self.center)
+    }
+
+    /// The vertices about the centre of mass, shape (n, 3), metres.
+    #[getter]
+    fn vertices<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray2<f64>>> {
+        let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
+        let Solid::Mesh(mesh) = &base.solid else { return Err(Error::value("not a mesh")) };
+        let flat: Vec<f64> = mesh.mesh().vertices.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+        Ok(PyArray1::from_vec(slf.py(), flat).reshape([mesh.mesh().vertices.len(), 3])?)
+    }
+
+    /// The triangles, shape (m, 3), indices into ``vertices``.
+    #[getter]
+    fn faces<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray2<u32>>> {
+        let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
+        let Solid::Mesh(mesh) = &base.solid else { return Err(Error::value("not a mesh")) };
+        let flat: Vec<u32> = mesh.mesh().triangles.iter().flatten().copied().collect();
+        Ok(PyArray1::from_vec(slf.py(), flat).reshape([mesh.mesh().triangles.len(), 3])?)
+    }
+}
+
+/// Triangles from arrays, from an object that has them (trimesh), or from a file.
+pub fn triangles(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>) -> Result<TriMesh> {
+    if let Some(faces) = faces {
+        return of_arrays(vertices, faces);
+    }
+    if let (Ok(own), Ok(faces)) = (vertices.getattr("vertices"), vertices.getattr("faces")) {
+        return of_arrays(&own, &faces);
+    }
+    let file = path(vertices)?;
+    py.detach(|| {
+        let bytes = std::fs::read(&file).map_err(|source| Error::File { file: file.display().to_string(), source })?;
+        let (mesh, _) = caught(|| read_solid(&file, &bytes, None).map_err(|why| Error::value(format!("{}: {why}", file.display()))))?;
+        Ok(mesh)
+    })
+}
+
+fn of_arrays(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> Result<TriMesh> {
+    let (points, corners) = (numbers(vertices, "vertices")?, numbers(faces, "faces")?);
+    for (what, shape) in [("vertices", &points.shape), ("faces", &corners.shape)] {
+        if shape.len() != 2 || shape[1] != 3 {
+            return Err(Error::value(format!("{what}: wanted shape (n, 3), and got {}", shown(shape))));
+        }
+    }
+    let count = points.shape[0];
+    let index = |&k: &f64| {
+        let right = k >= 0.0 && k < count as f64 && k.fract() == 0.0;
+        if right { Ok(k as u32) } else { Err(Error::value(format!("faces: {k} is no index of {count} vertices"))) }
+    };
+    let flat = corners.data.iter().map(index).collect::<Result<Vec<u32>>>()?;
+    Ok(TriMesh {
+        vertices: points.data.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect(),
+        triangles: flat.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+    })
+}

@@ -1,0 +1,144 @@
+//! One world that many Python objects hold: behind a lock that is tried and never waited for, so that nothing can block or deadlock.
+
+use crate::errors::{Error, Result, caught};
+use crate::robot::Robot;
+use crate::state::Mirror;
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::ops::{Deref, DerefMut};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::thread::ThreadId;
+use tumble::core::{ObjectId, World};
+use tumble::scene::SceneFile;
+
+/// A world and what belongs to it on Python's side.
+pub struct Inner {
+    /// The world itself.
+    pub world: World,
+    /// The scene that it was made of: its camera, lights and names.
+    pub scene: Arc<SceneFile>,
+    /// The trees of articulated bodies.
+    pub robots: BTreeMap<ObjectId, Arc<Robot>>,
+    /// Generalized forces that act on articulated bodies in every frame.
+    pub efforts: BTreeMap<ObjectId, Vec<f64>>,
+    /// The arrays that Python sees the state by.
+    pub mirror: Mirror,
+    /// Whether a panic left it half-way.
+    broken: bool,
+}
+
+impl Inner {
+    /// A world of a scene.
+    pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
+        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), mirror: Mirror::default(), broken: false }
+    }
+
+    /// An independent copy, with no arrays yet.
+    pub fn fork(&self) -> Inner {
+        Inner {
+            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), mirror: Mirror::default(), broken: false,
+        }
+    }
+
+    /// One frame.
+    pub fn step(&mut self) -> Result<()> {
+        for (&id, effort) in &self.efforts {
+            self.world.apply_generalized(id, effort)?;
+        }
+        self.world.step()?;
+        Ok(())
+    }
+}
+
+/// A world behind its lock, and who is stepping it.
+pub struct Shared {
+    inner: Mutex<Inner>,
+    stepping: Mutex<Option<ThreadId>>,
+}
+
+/// The world while one call works on it.
+pub struct Held<'a> {
+    guard: MutexGuard<'a, Inner>,
+    shared: &'a Shared,
+}
+
+impl Shared {
+    /// A world to be held by handles.
+    pub fn new(inner: Inner) -> Arc<Shared> {
+        Arc::new(Shared { inner: Mutex::new(inner), stepping: Mutex::new(None) })
+    }
+
+    /// The world, if nobody works on it.
+    fn hold(&self) -> Result<Held<'_>> {
+        match self.inner.try_lock() {
+            Ok(guard) if guard.broken => Err(Error::Broken),
+            Ok(guard) => {
+                *self.stepper() = Some(std::thread::current().id());
+                Ok(Held { guard, shared: self })
+            }
+            Err(TryLockError::Poisoned(_)) => Err(Error::Broken),
+            Err(TryLockError::WouldBlock) if *self.stepper() == Some(std::thread::current().id()) => Err(Error::Within),
+            Err(TryLockError::WouldBlock) => Err(Error::Busy),
+        }
+    }
+
+    fn stepper(&self) -> MutexGuard<'_, Option<ThreadId>> {
+        self.stepping.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    /// Reads the world.
+    pub fn read<T>(&self, call: impl FnOnce(&Inner) -> Result<T>) -> Result<T> {
+        let held = self.hold()?;
+        caught(|| call(&held))
+    }
+
+    /// Changes the world, and shows the change to the arrays that Python holds. The call itself runs no Python.
+    pub fn write<T>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
+        let mut held = self.hold()?;
+        let outcome = guarded(&mut held, call);
+        held.publish(py);
+        outcome
+    }
+
+    /// The same with the interpreter let go, for what takes long: other threads run on meanwhile.
+    pub fn work<T: Send>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
+        let outcome = py.detach(|| guarded(&mut *self.hold()?, call));
+        if let Ok(mut held) = self.hold() {
+            held.publish(py);
+        }
+        outcome
+    }
+}
+
+/// A panic in a call that changes the world may leave it half-way: later calls say so.
+fn guarded<T>(held: &mut Inner, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
+    let outcome = caught(|| call(held));
+    held.broken = matches!(outcome, Err(Error::Internal(_)));
+    outcome
+}
+
+impl Deref for Held<'_> {
+    type Target = Inner;
+    fn deref(&self) -> &Inner {
+        &self.guard
+    }
+}
+
+impl DerefMut for Held<'_> {
+    fn deref_mut(&mut self) -> &mut Inner {
+        &mut self.guard
+    }
+}
+
+impl Held<'_> {
+    fn publish(&mut self, py: Python<'_>) {
+        let Inner { world, mirror, .. } = &mut **self;
+        mirror.follow(py, world.state());
+    }
+}
+
+impl Drop for Held<'_> {
+    fn drop(&mut self) {
+        *self.shared.stepper() = None;
+    }
+}

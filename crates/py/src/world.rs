@@ -1,0 +1,475 @@
+//! The world: made or loaded, filled, stepped, asked.
+
+use crate::articulation::{Articulation, described};
+use crate::bodies::{Bodies, by_name, handle};
+use crate::body::{Place, RigidBody};
+use crate::convert::{Numbers, numbers, path, pose, shown, vec3, vec3_or, vector};
+use crate::errors::{Error, Result, caught};
+use crate::report::StepReport;
+use crate::robot::Robot;
+use crate::shapes::Shape;
+use crate::shared::{Inner, Shared};
+use crate::rollout::Plan;
+use crate::{bodies, contacts};
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tumble::collide::Vec3;
+use tumble::core::{ArticulatedBody, Joint, Mode, ObjectId, RigidBody as Rigid, Settings};
+use tumble::scene::{SceneFile, WorldSettings, resolve_scene};
+
+/// How long a call steps before it looks whether the user pressed Ctrl-C.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions are (x, y, z, w).
+///
+/// gravity: shape (3,), m/s²; dt: length of a step, s; stepper: ``"time_stepping"`` or ``"backtracking"``; integrator: ``"verlet"``,
+/// ``"symplectic_euler"``, ``"explicit_euler"``, ``"rk4"`` or ``"dormand_prince"``; solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or
+/// ``"lcp_sliding"``: the words of scene files, with their defaults. substeps: parts of each step; iterations: sweeps of the solver at most;
+/// contact_tolerance: metres; integrator_tolerance: of ``dormand_prince``.
+///
+/// One thread at a time: while one steps a world, calls on it from another raise ``BusyError``. The interpreter is let go while a world steps.
+#[pyclass(frozen, weakref, module = "tumble")]
+pub struct World {
+    pub shared: Arc<Shared>,
+    notes: Vec<String>,
+}
+
+impl World {
+    fn build(scene: SceneFile) -> Result<World> {
+        let (world, notes) = caught(|| Ok(scene.build()?))?;
+        let mut inner = Inner::new(world, Arc::new(scene));
+        let scene = inner.scene.clone();
+        for spec in &scene.articulated {
+            let Some((id, body)) = inner.world.find(&spec.name).and_then(|id| Some((id, inner.world.get::<ArticulatedBody>(id)?))) else { continue };
+            let joints = spec.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.clone()).collect();
+            let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
+            inner.robots.insert(id, Arc::new(robot));
+        }
+        Ok(World { shared: Shared::new(inner), notes })
+    }
+
+    fn settings<T>(&self, get: impl FnOnce(&Settings) -> T) -> Result<T> {
+        self.shared.read(|inner| Ok(get(inner.world.settings())))
+    }
+
+    fn set(&self, py: Python<'_>, change: impl FnOnce(&mut Settings)) -> Result<()> {
+        self.shared.write(py, |inner| {
+            let mut settings = *inner.world.settings();
+            change(&mut settings);
+            Ok(inner.world.set_settings(settings)?)
+        })
+    }
+
+    /// Where a body of this world is, given as a handle or by name.
+    fn own_place(&self, body: &Bound<'_, PyAny>) -> Result<Place> {
+        let place = match body.extract::<String>() {
+            Ok(name) => {
+                let found = self.shared.read(|inner| by_name(inner, &name))?;
+                Place { shared: self.shared.clone(), id: found.id, name: name.into() }
+            }
+            Err(_) => place_of(body)?,
+        };
+        match Arc::ptr_eq(&place.shared, &self.shared) {
+            true => place.status().map(|_| place),
+            false => Err(Error::value(format!("'{}' is a body of another world", place.name))),
+        }
+    }
+
+    /// Adds a body and gives its handle.
+    fn add(&self, py: Python<'_>, body: Rigid, mode: Mode, switches: [bool; 2]) -> Result<RigidBody> {
+        let [alive, collidable] = switches;
+        let place = self.shared.write(py, |inner| {
+            let id = inner.world.add_boxed(Box::new(body), mode)?;
+            inner.world.set_alive(id, alive)?;
+            inner.world.set_collidable(id, collidable)?;
+            inner.mirror.renew();
+            let name = inner.world.object(id).map_or("", |o| o.name()).into();
+            Ok(Place { shared: self.shared.clone(), id, name })
+        })?;
+        Ok(RigidBody { place })
+    }
+}
+
+/// What the words and numbers of a constructor make of settings.
+struct Choices<'a> {
+    stepper: Option<&'a str>,
+    integrator: Option<&'a str>,
+    solver: Option<&'a str>,
+    dt: Option<f64>,
+}
+
+impl Choices<'_> {
+    fn apply(&self, world: &mut WorldSettings) -> Result<()> {
+        world.dt_s = self.dt.unwrap_or(world.dt_s);
+        let told = |what: &str| { let what = what.to_string(); move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}")) };
+        world.stepper = self.stepper.map_or(Ok(world.stepper), |s| s.parse().map_err(told("stepper")))?;
+        world.integrator = self.integrator.map_or(Ok(world.integrator), |s| s.parse().map_err(told("integrator")))?;
+        world.solver = self.solver.map_or(Ok(world.solver), |s| s.parse().map_err(told("solver")))?;
+        Ok(())
+    }
+}
+
+#[pymethods]
+impl World {
+    #[new]
+    #[pyo3(signature = (gravity=None, dt=1.0/240.0, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
+        contact_tolerance=1e-7, integrator_tolerance=1e-6))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn new(
+        gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, substeps: u32, iterations: u32, contact_tolerance: f64,
+        integrator_tolerance: f64,
+    ) -> Result<World> {
+        let mut scene = SceneFile::parse("", "World")?;
+        let world = &mut scene.world;
+        world.gravity_m_per_s2 = vec3_or(gravity, "gravity", Vec3::from(world.gravity_m_per_s2))?.into();
+        Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }.apply(world)?;
+        (world.substeps, world.iterations) = (substeps, iterations);
+        (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
+        World::build(scene)
+    }
+
+    /// The world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a shipped scene.
+    ///
+    /// What is given beside it stands instead of what the file says. A file that is not there, or an unknown name, is a ``MissingFileError``
+    /// (a ``FileNotFoundError``); a file with problems a ``SceneError`` (a ``ValueError``) that tells all of them with line and column.
+    #[staticmethod]
+    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None))]
+    fn load(
+        py: Python<'_>, path_or_name: &Bound<'_, PyAny>, dt: Option<f64>, stepper: Option<&str>, integrator: Option<&str>, solver: Option<&str>,
+    ) -> Result<World> {
+        let asked = path(path_or_name)?;
+        py.detach(|| {
+            let mut scene = caught(|| Ok(resolve_scene(&asked.to_string_lossy(), &[])?.load()?))?;
+            Choices { stepper, integrator, solver, dt }.apply(&mut scene.world)?;
+            World::build(scene)
+        })
+    }
+
+    /// The world of a scene that is given as the text of its file.
+    #[staticmethod]
+    fn parse(py: Python<'_>, text: &str) -> Result<World> {
+        py.detach(|| World::build(caught(|| Ok(SceneFile::parse(text, "scene.toml")?))?))
+    }
+
+    /// What is to be said of the files of a loaded scene, such as what was mended in a mesh: a list of sentences.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    /// Advances by ``n`` steps of ``dt``. The interpreter is let go meanwhile; Ctrl-C ends it between two steps.
+    ///
+    /// On a ``StepError`` the world is as it was before the step that failed; the steps before that stand.
+    #[pyo3(signature = (n=1))]
+    fn step(&self, py: Python<'_>, n: i64) -> Result<()> {
+        let Ok(mut left) = u64::try_from(n) else { return Err(Error::value(format!("n is {n}; it must be at least 0"))) };
+        while left > 0 {
+            left = self.shared.work(py, |inner| {
+                let begun = Instant::now();
+                while left > 0 {
+                    inner.step()?;
+                    left -= 1;
+                    if left > 0 && begun.elapsed() > PATIENCE {
+                        break;
+                    }
+                }
+                Ok(left)
+            })?;
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    /// Simulated time, s.
+    #[getter]
+    fn time(&self) -> Result<f64> {
+        self.shared.read(|inner| Ok(inner.world.time()))
+    }
+
+    /// Steps taken since the world was made.
+    #[getter]
+    fn frame(&self) -> Result<u64> {
+        self.shared.read(|inner| Ok(inner.world.frame()))
+    }
+
+    /// Length of a step, s.
+    #[getter]
+    fn dt(&self) -> Result<f64> {
+        self.settings(|s| s.dt)
+    }
+
+    #[setter]
+    fn set_dt(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.dt = value)
+    }
+
+    /// Gravity, shape (3,), m/s².
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.settings(|s| s.gravity)?))
+    }
+
+    #[setter]
+    fn set_gravity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let gravity = vec3(value, "gravity")?;
+        self.set(py, |s| s.gravity = gravity)
+    }
+
+    /// Name of the stepper.
+    #[getter]
+    fn stepper(&self) -> Result<&'static str> {
+        self.shared.read(|inner| Ok(inner.world.methods().0))
+    }
+
+    /// Name of the solver of contacts.
+    #[getter]
+    fn solver(&self) -> Result<&'static str> {
+        self.shared.read(|inner| Ok(inner.world.methods().1))
+    }
+
+    /// Name of the integrator.
+    #[getter]
+    fn integrator(&self) -> Result<String> {
+        self.shared.read(|inner| Ok(inner.scene.world.integrator.to_string()))
+    }
+
+    /// All bodies, in the order in which they were added; by number or by name.
+    #[getter]
+    fn bodies(&self) -> Bodies {
+        Bodies { shared: self.shared.clone() }
+    }
+
+    /// ``world[name]``: the body of that name.
+    fn __getitem__(&self, py: Python<'_>, name: &str) -> Result<Py<PyAny>> {
+        handle(py, &self.shared, self.shared.read(|inner| by_name(inner, name))?)
+    }
+
+    /// The contacts of the last step: a structured array with one row each.
+    ///
+    /// Fields: ``bodies`` (2,) numbers in ``world.bodies``, -1 for what is none; ``parts`` (2,) of articulated bodies; ``point`` (3,), m; ``normal`` (3,),
+    /// unit, from the second body to the first; ``depth``, m, negative while apart; ``velocity`` (3,) of the first against the second before the
+    /// contact was solved, m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without impacts. World axes.
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
+        contacts::array(py, self.shared.read(|inner| Ok(contacts::bytes(inner)))?)
+    }
+
+    /// Mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at the world's origin) and ``total``, J.
+    fn energy(&self, py: Python<'_>) -> Result<Py<PyAny>> {
+        let e = self.shared.read(|inner| Ok(inner.world.energy()))?;
+        Ok(py.import("tumble._values")?.call_method1("Energy", (e.kinetic, e.potential, e.total()))?.unbind())
+    }
+
+    /// Momentum of everything that moves: ``linear`` (3,), N·s, and ``angular`` (3,) about the world's origin, N·m·s. World axes.
+    fn momentum(&self, py: Python<'_>) -> Result<Py<PyAny>> {
+        let m = self.shared.read(|inner| Ok(inner.world.momentum()))?;
+        Ok(py.import("tumble._values")?.call_method1("Momentum", (vector(py, &m.linear), vector(py, &m.angular)))?.unbind())
+    }
+
+    /// What the last step took and how well it went.
+    #[getter]
+    fn report(&self) -> Result<StepReport> {
+        self.shared.read(|inner| Ok(StepReport::of(&inner.world)))
+    }
+
+    /// All that the next step reads, as bytes: for ``restore`` in a world of the same bodies.
+    fn save<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
+        let bytes = self.shared.read(|inner| Ok(inner.world.save()))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Goes back to what ``save`` gave. Bytes that are none, or of another world, are a ``SnapshotError`` and change nothing.
+    fn restore(&self, py: Python<'_>, snapshot: &[u8]) -> Result<()> {
+        self.shared.write(py, |inner| Ok(inner.world.restore(snapshot)?))
+    }
+
+    /// An independent copy: same state, same future.
+    fn fork(&self) -> Result<World> {
+        let inner = self.shared.read(|inner| Ok(inner.fork()))?;
+        Ok(World { shared: Shared::new(inner), notes: self.notes.clone() })
+    }
+
+    /// The futures of many forks, each under forces of its own, on all cores with the interpreter let go. This world stays as it is.
+    ///
+    /// controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all ``articulations`` one after the other (by default all of the
+    /// world, in order; with none of them n is 0); states: where the forks start, shape (len(state),) or (forks, len(state)), by default where the world
+    /// is; every: every how many steps the state is kept; threads: at most so many (default: all cores). Returns the states, shape
+    /// (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which.
+    #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
+    fn rollout<'py>(
+        &self, py: Python<'py>, controls: &Bound<'py, PyAny>, articulations: Option<Vec<Bound<'py, PyAny>>>, states: Option<&Bound<'py, PyAny>>, every: usize,
+        threads: Option<usize>,
+    ) -> Result<Bound<'py, PyArray3<f64>>> {
+        if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
+            return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
+        }
+        let asked = articulations.map(|all| all.iter().map(|one| self.own_place(one)).collect::<Result<Vec<_>>>()).transpose()?;
+        let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
+        let (plan, fork) = self.shared.read(|inner| {
+            let all = || bodies::body_ids(&inner.world).into_iter().filter(|id| inner.robots.contains_key(id)).collect();
+            let ids: Vec<ObjectId> = asked.map_or_else(all, |places| places.iter().map(|place| place.id).collect());
+            let freedoms = |id: ObjectId| inner.robots.get(&id).map(|robot| (id, robot.dof())).ok_or_else(|| Error::value("controls are of articulations"));
+            let driven = ids.into_iter().map(freedoms).collect::<Result<Vec<_>>>()?;
+            Ok((Plan::new(inner, driven, controls, states, every)?, inner.fork()))
+        })?;
+        let (shape, out) = py.detach(|| {
+            let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
+            plan.run(fork, threads).map(|out| (shape, out))
+        })?;
+        Ok(PyArray1::from_vec(py, out).reshape(shape)?)
+    }
+
+    /// The flat state, shape (n,): a read-only view that follows the world until bodies are added or removed, and then keeps what it showed last.
+    ///
+    /// A rigid body has 13 numbers: position, quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Making
+    /// a view copies nothing. Setting it writes every body's numbers.
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
+        self.shared.write(py, |inner| {
+            let Inner { world, mirror, .. } = inner;
+            Ok(mirror.view(py, world.state())?)
+        })
+    }
+
+    #[setter]
+    fn set_state(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let Numbers { shape, data } = numbers(value, "state")?;
+        self.shared.write(py, |inner| inner.write_state(&shape, &data))
+    }
+
+    /// Adds a body that moves.
+    ///
+    /// mass: kg, or density: kg/m³, one of the two; position: of the centre of mass, metres; orientation: unit quaternion (x, y, z, w); velocity,
+    /// m/s, and angular_velocity, rad/s, world axes; restitution: 0 to 1; friction: at least 0; kinematic: follows the velocity it is given.
+    #[pyo3(signature = (name, shape, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn add_rigid(
+        &self, py: Python<'_>, name: &str, shape: PyRef<'_, Shape>, mass: Option<f64>, density: Option<f64>, position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>, velocity: Option<&Bound<'_, PyAny>>, angular_velocity: Option<&Bound<'_, PyAny>>, restitution: f64,
+        friction: f64, linear_damping: f64, angular_damping: f64, kinematic: bool, collidable: bool,
+    ) -> Result<RigidBody> {
+        let solid = shape.solid.clone();
+        let body = match (mass, density) {
+            (Some(mass), None) => Rigid::with_mass(name, solid, mass)?,
+            (None, Some(density)) => Rigid::with_density(name, solid, density)?,
+            (None, None) if kinematic => Rigid::fixture(name, solid),
+            _ => return Err(Error::value(format!("body '{name}': wanted a mass or a density, and one of the two alone"))),
+        };
+        let (v, w) = (vec3_or(velocity, "velocity", Vec3::zeros())?, vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?);
+        let mut body = body.at(pose(position, orientation)? * shape.placement).moving(v, w).surface(restitution, friction);
+        (body.linear_damping, body.angular_damping) = (linear_damping, angular_damping);
+        self.add(py, body, if kinematic { Mode::Kinematic } else { Mode::Dynamic }, [true, collidable])
+    }
+
+    /// Adds geometry that never moves. position, orientation, restitution, friction: as in ``add_rigid``.
+    #[pyo3(signature = (name, shape, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn add_static(
+        &self, py: Python<'_>, name: &str, shape: PyRef<'_, Shape>, position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, PyAny>>,
+        restitution: f64, friction: f64, collidable: bool,
+    ) -> Result<RigidBody> {
+        let pose = pose(position, orientation)? * shape.placement;
+        let body = Rigid::fixture(name, shape.solid.clone()).at(pose).surface(restitution, friction);
+        self.add(py, body, Mode::Static, [true, collidable])
+    }
+
+    /// Adds an articulated body, and gives the handle of it.
+    ///
+    /// articulation: a description, or the path of a URDF; base: where its base stands: a position (3,), or position and quaternion (7,), metres and
+    /// (x, y, z, w); name: by default the description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; where a floating root is, is
+    /// said from the base.
+    #[pyo3(signature = (articulation, base=None, *, name=None))]
+    fn add_articulation(
+        &self, py: Python<'_>, articulation: &Bound<'_, PyAny>, base: Option<&Bound<'_, PyAny>>, name: Option<&str>,
+    ) -> Result<Articulation> {
+        let description = described(articulation)?;
+        let description = description.get();
+        let (body, robot) = description.body(py, base.map_or(Ok(tumble::collide::Pose::identity()), base_pose)?, name)?;
+        let (robot, efforts) = (Arc::new(robot), description.efforts());
+        let place = self.shared.write(py, |inner| {
+            let id = inner.world.add(body)?;
+            inner.robots.insert(id, robot.clone());
+            efforts.map(|tau| inner.efforts.insert(id, tau));
+            inner.mirror.renew();
+            let name = inner.world.object(id).map_or("", |o| o.name()).into();
+            Ok(Place { shared: self.shared.clone(), id, name })
+        })?;
+        Ok(Articulation::placed(place, robot))
+    }
+
+    /// Removes a body, given as a handle or by name. Handles of it raise ``RemovedError`` from then on.
+    fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
+        let place = self.own_place(body)?;
+        place.write(py, |inner| {
+            inner.world.remove(place.id)?;
+            inner.forget(place.id);
+            Ok(())
+        })
+    }
+
+    fn __repr__(&self) -> Result<String> {
+        self.shared.read(|inner| {
+            let (stepper, solver) = inner.world.methods();
+            Ok(format!("<tumble.World {} bodies, t = {} s, {stepper}, {solver}>", bodies::body_ids(&inner.world).len(), inner.world.time()))
+        })
+    }
+}
+
+/// A pose from 3 numbers or 7.
+fn base_pose(base: &Bound<'_, PyAny>) -> Result<tumble::collide::Pose> {
+    let Numbers { shape, data } = numbers(base, "base")?;
+    match shape.as_slice() {
+        [3] => Ok(Vec3::from_column_slice(&data).into()),
+        [7] if (data[3..].iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() <= 1e-6 => {
+            Ok(tumble::collide::Pose::from_parts(Vec3::from_column_slice(&data[..3]).into(), crate::convert::unit(&data[3..])))
+        }
+        [7] => Err(Error::value("base: the quaternion (x, y, z, w) in its last four numbers must have length 1")),
+        _ => Err(Error::value(format!("base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}", shown(&shape)))),
+    }
+}
+
+/// Where a handle of any kind points.
+pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
+    if let Some(place) = body.cast::<Articulation>().ok().and_then(|body| body.get().place().cloned()) {
+        return Ok(place);
+    }
+    match body.cast::<RigidBody>() {
+        Ok(body) => Ok(body.get().place.clone()),
+        Err(_) => Err(pyo3::exceptions::PyTypeError::new_err("wanted a body: a handle or a name").into()),
+    }
+}
+
+impl Inner {
+    /// What is kept about an object that is gone.
+    fn forget(&mut self, id: ObjectId) {
+        self.robots.remove(&id);
+        self.efforts.remove(&id);
+        self.mirror.renew();
+    }
+
+    /// Writes the whole state; all or nothing.
+    pub fn write_state(&mut self, shape: &[usize], x: &[f64]) -> Result<()> {
+        let wanted = self.world.state().len();
+        if shape != [wanted] {
+            return Err(Error::value(format!("state: wanted shape ({wanted},), and got {}", shown(shape))));
+        }
+        let before = self.world.state().to_vec();
+        let mut write = |from: &[f64]| -> Result<()> {
+            let ids = self.world.ids().to_vec();
+            for id in ids {
+                let Some(span) = self.world.view().span(id).map(|span| span.x.clone()).filter(|x| !x.is_empty()) else { continue };
+                self.world.write_state_of(id, &from[span])?;
+            }
+            Ok(())
+        };
+        let outcome = write(x);
+        if outcome.is_err() {
+            write(&before)?;
+        }
+        outcome
+    }
+}

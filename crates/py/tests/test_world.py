@@ -1,0 +1,124 @@
+"""Worlds: stepping against closed forms, state, saving, forking, errors."""
+
+import math
+
+import numpy as np
+import pytest
+
+import tumble
+
+
+def ball_world(**settings):
+    world = tumble.World(**settings)
+    world.add_static("ground", tumble.HalfSpace())
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=2.0, position=(0, 0, 10))
+    return world, ball
+
+
+def test_a_thrown_ball_follows_its_parabola():
+    world = tumble.World(gravity=(0.0, 0.0, -9.81), dt=1 / 240)
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0, position=(1, 2, 3), velocity=(2, 0, 5))
+    world.step(240)
+    assert world.time == pytest.approx(1.0, abs=1e-12)
+    assert ball.position == pytest.approx([3.0, 2.0, 3.0 + 5.0 - 0.5 * 9.81], abs=1e-9)
+    assert ball.velocity == pytest.approx([2.0, 0.0, 5.0 - 9.81], abs=1e-9)
+
+
+def test_energy_and_momentum_of_one_body_are_those_of_the_textbook():
+    world = tumble.World(gravity=(0, 0, -10))
+    world.add_rigid("box", tumble.Box((1, 2, 3)), mass=12.0, position=(0, 0, 4), velocity=(3, 0, 0), angular_velocity=(0, 0, 2))
+    energy, momentum = world.energy(), world.momentum()
+    spin = 12.0 * (1**2 + 2**2) / 12.0  # of a block about z: m (a² + b²) / 12
+    assert energy.kinetic == pytest.approx(0.5 * 12 * 9 + 0.5 * spin * 4)
+    assert energy.potential == pytest.approx(12 * 10 * 4)
+    assert energy.total == energy["total"] == energy.kinetic + energy.potential
+    assert momentum.linear == pytest.approx([36, 0, 0])
+    assert momentum["angular"] == pytest.approx([0, 4 * 36, spin * 2])  # r × p + I ω
+
+
+def test_a_ball_comes_to_rest_on_the_ground():
+    world, ball = ball_world()
+    world.step(3 * 240)
+    assert ball.position[2] == pytest.approx(0.1, abs=1e-6)
+    contacts = world.contacts
+    assert len(contacts) == 1
+    assert contacts["normal"][0] == pytest.approx(np.array([0, 0, 1.0]) * (1 if contacts["bodies"][0][0] == 1 else -1))
+    assert abs(contacts["force"][0][2]) == pytest.approx(2.0 * 9.81, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("shape", "volume"),
+    [
+        (tumble.Sphere(2.0), 4 / 3 * math.pi * 8),
+        (tumble.Box((1, 2, 3)), 6.0),
+        (tumble.Box(2.0), 8.0),
+        (tumble.Capsule(0.5, 2.0), math.pi * 0.25 * 2.0 + 4 / 3 * math.pi * 0.125),
+        (tumble.Cylinder(0.5, 2.0), math.pi * 0.25 * 2.0),
+    ],
+)
+def test_sizes_of_shapes_are_full_lengths(shape, volume):
+    assert shape.volume == pytest.approx(volume)
+
+
+def test_capsules_and_cylinders_lie_along_z():
+    world = tumble.World()
+    for name, shape in [("capsule", tumble.Capsule(0.1, 2.0)), ("cylinder", tumble.Cylinder(0.1, 2.0))]:
+        inertia = world.add_rigid(name, shape, mass=1.0).inertia
+        assert inertia[2, 2] < 0.1 * inertia[0, 0] and inertia[0, 0] == pytest.approx(inertia[1, 1])
+    assert world["cylinder"].inertia[2, 2] == pytest.approx(0.5 * 0.1**2)
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (3, -4, 12)])
+def test_a_ball_rests_where_its_half_space_ends(normal):
+    n = np.array(normal) / np.linalg.norm(normal)
+    world = tumble.World(gravity=-9.81 * n)
+    world.add_static("wall", tumble.HalfSpace(normal, 0.5))
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0, position=2 * n)
+    world.step(480)
+    assert ball.position == pytest.approx(0.6 * n, abs=1e-6)
+
+
+def test_state_is_a_view_that_follows_until_bodies_come_or_go():
+    world, ball = ball_world()
+    state = world.state
+    assert np.shares_memory(state, world.state)
+    assert not state.flags.writeable and state.shape == (26,)
+    world.step(10)
+    assert state[13 + 2] == ball.position[2] < 10
+    world.add_rigid("other", tumble.Sphere(1.0), mass=1.0, position=(5, 5, 5))
+    kept = state.copy()
+    world.step(10)
+    assert (state == kept).all() and world.state.shape == (39,)
+    assert not np.shares_memory(state, world.state)
+
+
+def test_setting_the_state_moves_the_bodies():
+    world, ball = ball_world()
+    x = world.state.copy()
+    x[13:16] = [1, 2, 3]
+    world.state = x
+    assert (ball.position == [1, 2, 3]).all()
+    x[13 + 3 : 13 + 7] = 0  # no quaternion
+    with pytest.raises(ValueError, match="ball"):
+        world.state = x
+    assert (ball.position == [1, 2, 3]).all()
+
+
+def test_saved_and_forked_worlds_have_the_same_future():
+    world, _ = ball_world()
+    world.step(100)
+    saved, fork = world.save(), world.fork()
+    world.step(200)
+    fork.step(200)
+    assert fork.save() == world.save()
+    world.restore(saved)
+    assert world.time == pytest.approx(100 / 240)
+    world.step(200)
+    assert fork.save() == world.save()
+
+
+def test_a_missing_scene_is_a_missing_file():
+    for path in ["nowhere/scene.toml", "no_such_scene"]:
+        with pytest.raises(FileNotFoundError, match="no") as caught:
+            tumble.World.load(path)
+        assert isinstance(caught.value, tumble.TumbleError)
