@@ -156,7 +156,7 @@ fn get_look(rest: &mut Bytes<'_>) -> Result<Look, Fault> {
     let shader = text(rest)?;
     let count = rest.u8()?;
     let properties = (0..count).map(|_| Ok((text(rest)?, rest.f64()?))).collect::<Result<_, Fault>>()?;
-    Ok(Look { color: [r, g, b], roughness, metallic, shader, properties })
+    Ok(Look { color: [r, g, b], roughness, metallic, shader, properties, ..Look::default() })
 }
 
 fn text(rest: &mut Bytes<'_>) -> Result<String, Fault> {
