@@ -102,10 +102,28 @@ impl Shared {
 
     /// The same with the interpreter let go, for what takes long: other threads run on meanwhile.
     pub fn work<T: Send>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
-        let outcome = py.detach(|| guarded(&mut *self.hold()?, call));
-        if let Ok(mut held) = self.hold() {
-            held.publish(py);
-        }
+        let mut held = self.hold()?;
+        let inner: &mut Inner = &mut held;
+        let outcome = py.detach(|| guarded(inner, call));
+        held.publish(py);
+        outcome
+    }
+
+    /// The same in parts, until one answers that it was the last: the world stays held over all of them, and Ctrl-C is heard between two.
+    pub fn work_in_parts(&self, py: Python<'_>, mut part: impl FnMut(&mut Inner) -> Result<bool> + Send) -> Result<()> {
+        let mut held = self.hold()?;
+        let outcome = loop {
+            let inner: &mut Inner = &mut held;
+            match py.detach(|| guarded(inner, &mut part)) {
+                Ok(false) => {}
+                Ok(true) => break Ok(()),
+                Err(error) => break Err(error),
+            }
+            if let Err(raised) = py.check_signals() {
+                break Err(raised.into());
+            }
+        };
+        held.publish(py);
         outcome
     }
 }
