@@ -9,6 +9,7 @@ mod errors;
 mod report;
 mod robot;
 mod shapes;
+mod spheretree;
 mod shared;
 mod state;
 mod world;
@@ -30,6 +31,8 @@ mod _native {
     use super::report::StepReport;
     #[pymodule_export]
     use super::shapes::{Block, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere};
+    #[pymodule_export]
+    use super::spheretree::SphereTree;
     #[pymodule_export]
     use super::world::World;
 

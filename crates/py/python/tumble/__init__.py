@@ -27,11 +27,12 @@ from tumble._native import (
     RigidBody,
     Shape,
     Sphere,
+    SphereTree,
     StepReport,
     World,
     __version__,
 )
-from tumble._values import Energy, Momentum
+from tumble._values import Energy, Momentum, SphereLevel
 
 __all__ = [
     "Articulation",
@@ -53,6 +54,8 @@ __all__ = [
     "Shape",
     "SnapshotError",
     "Sphere",
+    "SphereLevel",
+    "SphereTree",
     "StepError",
     "StepReport",
     "TumbleError",
