@@ -7,7 +7,7 @@ help:
 	@echo "make test       install what is missing, run all tests, check the papers"
 	@echo "make test-slow  the same, and determinism and energy over a minute"
 	@echo "make goldens    draws the kept pictures of crates/render/tests/goldens anew; look at them before committing"
-	@echo "make references installs Pinocchio and real robots from PyPI into target/python; tests that compare with them then run"
+	@echo "make references installs Pinocchio, MuJoCo and real robots from PyPI into target/python; tests that compare with them then run"
 	@echo "make lint       clippy; warnings are errors"
 	@echo "make bench      step times beside Rapier (benches/peers, a workspace of its own)"
 	@echo "make clean      remove everything built"
@@ -26,7 +26,7 @@ goldens:
 
 references:
 	python3 -m venv target/python
-	target/python/bin/pip install --quiet pin example-robot-data numpy scipy trimesh rtree
+	target/python/bin/pip install --quiet pin example-robot-data mujoco numpy scipy trimesh rtree
 
 lint:
 	@scripts/lint.sh

@@ -22,6 +22,13 @@ if ! cmp -s "$wanted" "$venv/requirements.txt"; then
     cp "$wanted" "$venv/requirements.txt"
 fi
 
+# What `make references` installed comes after what is installed here, if it is of the same Python.
+site="$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')"
+rm -f "$site/references.pth"
+for folder in target/python/lib/"$(basename "$(dirname "$site")")"/site-packages; do
+    [ ! -d "$folder" ] || echo "$PWD/$folder" >"$site/references.pth"
+done
+
 PATH="$venv/bin:$PATH"
 export PATH PIP_DISABLE_PIP_VERSION_CHECK=1 MPLBACKEND=Agg PYTHONSAFEPATH=1
 

@@ -8,6 +8,7 @@ mod convert;
 mod errors;
 mod report;
 mod robot;
+mod rollout;
 mod shapes;
 mod spheretree;
 mod shared;

@@ -9,14 +9,15 @@ use crate::report::StepReport;
 use crate::robot::Robot;
 use crate::shapes::Shape;
 use crate::shared::{Inner, Shared};
-use crate::contacts;
-use numpy::PyArray1;
+use crate::rollout::Plan;
+use crate::{bodies, contacts};
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tumble::collide::Vec3;
-use tumble::core::{ArticulatedBody, Joint, Mode, RigidBody as Rigid, Settings};
+use tumble::core::{ArticulatedBody, Joint, Mode, ObjectId, RigidBody as Rigid, Settings};
 use tumble::scene::{SceneFile, WorldSettings, resolve_scene};
 
 /// How long a call steps before it looks whether the user pressed Ctrl-C.
@@ -60,6 +61,21 @@ impl World {
             change(&mut settings);
             Ok(inner.world.set_settings(settings)?)
         })
+    }
+
+    /// Where a body of this world is, given as a handle or by name.
+    fn own_place(&self, body: &Bound<'_, PyAny>) -> Result<Place> {
+        let place = match body.extract::<String>() {
+            Ok(name) => {
+                let found = self.shared.read(|inner| by_name(inner, &name))?;
+                Place { shared: self.shared.clone(), id: found.id, name: name.into() }
+            }
+            Err(_) => place_of(body)?,
+        };
+        match Arc::ptr_eq(&place.shared, &self.shared) {
+            true => place.status().map(|_| place),
+            false => Err(Error::value(format!("'{}' is a body of another world", place.name))),
+        }
     }
 
     /// Adds a body and gives its handle.
@@ -276,6 +292,36 @@ impl World {
         Ok(World { shared: Shared::new(inner), notes: self.notes.clone() })
     }
 
+    /// The futures of many forks, each under forces of its own, on all cores with the interpreter let go. This world stays as it is.
+    ///
+    /// controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all ``articulations`` one after the other (by default all of the
+    /// world, in order; with none of them n is 0); states: where the forks start, shape (len(state),) or (forks, len(state)), by default where the world
+    /// is; every: every how many steps the state is kept; threads: at most so many (default: all cores). Returns the states, shape
+    /// (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which.
+    #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
+    fn rollout<'py>(
+        &self, py: Python<'py>, controls: &Bound<'py, PyAny>, articulations: Option<Vec<Bound<'py, PyAny>>>, states: Option<&Bound<'py, PyAny>>, every: usize,
+        threads: Option<usize>,
+    ) -> Result<Bound<'py, PyArray3<f64>>> {
+        if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
+            return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
+        }
+        let asked = articulations.map(|all| all.iter().map(|one| self.own_place(one)).collect::<Result<Vec<_>>>()).transpose()?;
+        let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
+        let (plan, fork) = self.shared.read(|inner| {
+            let all = || bodies::body_ids(&inner.world).into_iter().filter(|id| inner.robots.contains_key(id)).collect();
+            let ids: Vec<ObjectId> = asked.map_or_else(all, |places| places.iter().map(|place| place.id).collect());
+            let freedoms = |id: ObjectId| inner.robots.get(&id).map(|robot| (id, robot.dof())).ok_or_else(|| Error::value("controls are of articulations"));
+            let driven = ids.into_iter().map(freedoms).collect::<Result<Vec<_>>>()?;
+            Ok((Plan::new(inner, driven, controls, states, every)?, inner.fork()))
+        })?;
+        let (shape, out) = py.detach(|| {
+            let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
+            plan.run(fork, threads).map(|out| (shape, out))
+        })?;
+        Ok(PyArray1::from_vec(py, out).reshape(shape)?)
+    }
+
     /// The flat state, shape (n,): a read-only view that follows the world until bodies are added or removed, and then keeps what it showed last.
     ///
     /// A rigid body has 13 numbers: position, quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Making
@@ -357,16 +403,7 @@ impl World {
 
     /// Removes a body, given as a handle or by name. Handles of it raise ``RemovedError`` from then on.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
-        let place = match body.extract::<String>() {
-            Ok(name) => {
-                let found = self.shared.read(|inner| by_name(inner, &name))?;
-                Place { shared: self.shared.clone(), id: found.id, name: name.into() }
-            }
-            Err(_) => place_of(body)?,
-        };
-        if !Arc::ptr_eq(&place.shared, &self.shared) {
-            return Err(Error::value(format!("'{}' is a body of another world", place.name)));
-        }
+        let place = self.own_place(body)?;
         place.write(py, |inner| {
             inner.world.remove(place.id)?;
             inner.forget(place.id);
@@ -377,7 +414,7 @@ impl World {
     fn __repr__(&self) -> Result<String> {
         self.shared.read(|inner| {
             let (stepper, solver) = inner.world.methods();
-            Ok(format!("<tumble.World {} bodies, t = {} s, {stepper}, {solver}>", crate::bodies::body_ids(&inner.world).len(), inner.world.time()))
+            Ok(format!("<tumble.World {} bodies, t = {} s, {stepper}, {solver}>", bodies::body_ids(&inner.world).len(), inner.world.time()))
         })
     }
 }
@@ -408,7 +445,7 @@ pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
 
 impl Inner {
     /// What is kept about an object that is gone.
-    fn forget(&mut self, id: tumble::core::ObjectId) {
+    fn forget(&mut self, id: ObjectId) {
         self.robots.remove(&id);
         self.efforts.remove(&id);
         self.mirror.renew();

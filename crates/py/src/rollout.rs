@@ -1,0 +1,119 @@
+//! Many futures of one world at once: forks, each under controls of its own, on all cores.
+
+use crate::convert::{Numbers, shown};
+use crate::errors::{Error, Result, caught};
+use crate::shared::Inner;
+use rayon::prelude::*;
+use std::sync::Mutex;
+use tumble::core::ObjectId;
+
+/// Most numbers that one call returns: 4 GiB of them.
+const MOST: usize = 1 << 29;
+
+/// What is asked for.
+pub struct Plan {
+    /// Forks.
+    pub count: usize,
+    /// Frames of each.
+    pub frames: usize,
+    /// Every how many frames the state is kept.
+    pub every: usize,
+    /// Articulated bodies and their freedoms: a row of controls is one after the other.
+    pub driven: Vec<(ObjectId, usize)>,
+    /// `count · frames · width` generalized forces.
+    controls: Vec<f64>,
+    /// One state for all forks, one for each, or none: where the world is.
+    states: Option<Numbers>,
+}
+
+impl Plan {
+    /// Checks shapes against each other and the world.
+    pub fn new(inner: &Inner, driven: Vec<(ObjectId, usize)>, controls: Numbers, states: Option<Numbers>, every: usize) -> Result<Plan> {
+        let width: usize = driven.iter().map(|(_, dof)| dof).sum();
+        let [count, frames, got] = controls.shape[..] else {
+            return Err(Error::value(format!("controls: wanted shape (forks, steps, {width}), and got {}", shown(&controls.shape))));
+        };
+        if got != width {
+            let why = "as many as the articulations have freedoms";
+            return Err(Error::value(format!("controls: wanted {width} numbers a step, {why}, and got shape {}", shown(&controls.shape))));
+        }
+        if every == 0 || frames % every != 0 {
+            return Err(Error::value(format!("every is {every}; it must divide the {frames} steps")));
+        }
+        let x = inner.world.state().len();
+        if let Some(states) = &states
+            && states.shape != [x]
+            && states.shape != [count, x]
+        {
+            return Err(Error::value(format!("states: wanted shape ({x},) or ({count}, {x}), and got {}", shown(&states.shape))));
+        }
+        let numbers = count.checked_mul(frames / every).and_then(|n| n.checked_mul(x.max(1)));
+        if numbers.is_none_or(|n| n > MOST) {
+            return Err(Error::value(format!("{count} forks of {frames} steps have more than {MOST} numbers; keep fewer with `every`")));
+        }
+        Ok(Plan { count, frames, every, driven, controls: controls.data, states })
+    }
+
+    fn width(&self) -> usize {
+        self.driven.iter().map(|(_, dof)| dof).sum()
+    }
+
+    /// Where a fork starts, if not where the world is.
+    fn start(&self, fork: usize) -> Option<&[f64]> {
+        let Numbers { shape, data } = self.states.as_ref()?;
+        match shape[..] {
+            [_, x] => Some(&data[fork * x..(fork + 1) * x]),
+            _ => Some(data),
+        }
+    }
+
+    /// Runs all forks: the states after every `every` frames, fork by fork. `world` is forked again for each, so that only as many exist at
+    /// once as there are threads.
+    pub fn run(&self, world: Inner, threads: Option<usize>) -> Result<Vec<f64>> {
+        let kept = self.frames / self.every * world.world.state().len();
+        let mut out = vec![0.0; self.count * kept];
+        if out.is_empty() {
+            return Ok(out);
+        }
+        let template = Mutex::new(world);
+        let mut forks = || {
+            let each = |(fork, out): (usize, &mut [f64])| {
+                let own = template.lock().map_err(|_| Error::Broken)?.fork();
+                caught(|| self.fork(own, fork, out))
+            };
+            out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>()
+        };
+        let outcomes = match threads {
+            None => forks(),
+            Some(threads) => {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+                pool.map_err(|e| Error::Internal(e.to_string()))?.install(forks)
+            }
+        };
+        // the first fork that failed, whichever was first in time
+        outcomes.into_iter().collect::<Result<()>>()?;
+        Ok(out)
+    }
+
+    fn fork(&self, mut own: Inner, fork: usize, out: &mut [f64]) -> Result<()> {
+        if let Some(start) = self.start(fork) {
+            own.write_state(&[start.len()], start)?;
+        }
+        let (width, size) = (self.width(), own.world.state().len());
+        let controls = &self.controls[fork * self.frames * width..(fork + 1) * self.frames * width];
+        for frame in 0..self.frames {
+            let mut row = &controls[frame * width..(frame + 1) * width];
+            for &(id, dof) in &self.driven {
+                let (own_row, rest) = row.split_at(dof);
+                own.efforts.insert(id, own_row.to_vec());
+                row = rest;
+            }
+            own.step().map_err(|source| Error::Fork { fork, frame, source: Box::new(source) })?;
+            if (frame + 1) % self.every == 0 {
+                let at = ((frame + 1) / self.every - 1) * size;
+                out[at..at + size].copy_from_slice(own.world.state());
+            }
+        }
+        Ok(())
+    }
+}
