@@ -62,13 +62,11 @@ impl Shot {
 
     /// The picture as an array, shape (height, width, 4). The world is held only while what is to be drawn is written down.
     pub fn take<'py>(&self, py: Python<'py>, shared: &Shared) -> Result<Bound<'py, PyArray3<u8>>> {
+        ready(py)?;
         let image = py.detach(|| {
             let (list, scene) = shared.read(|inner| Ok((self.list(&inner.world, &inner.scene)?, inner.scene.clone())))?;
             let mut kept = RENDERER.lock().unwrap_or_else(PoisonError::into_inner);
-            let renderer = match &mut *kept {
-                Some(renderer) => renderer,
-                none => none.insert(caught(|| Ok(Renderer::new()?))?),
-            };
+            let renderer = kept.as_mut().ok_or_else(|| Error::Internal("the graphics device is gone".into()))?;
             caught(|| self.draw(renderer, list, &scene))
         })?;
         Ok(PyArray1::from_vec(py, image.rgba).reshape([image.height as usize, image.width as usize, 4])?)
@@ -98,6 +96,31 @@ impl Shot {
             }
         })
     }
+}
+
+/// Makes the device where there is none yet. Drivers complain on stderr where no runtime directory is named, as over ssh or in a container; any folder
+/// satisfies them, for as long as this takes.
+fn ready(py: Python<'_>) -> Result<()> {
+    let kept = || RENDERER.lock().unwrap_or_else(PoisonError::into_inner);
+    if py.detach(|| kept().is_some()) {
+        return Ok(());
+    }
+    let (environ, name) = (py.import("os")?.getattr("environ")?, "XDG_RUNTIME_DIR");
+    let named = environ.contains(name)?;
+    if !named {
+        environ.set_item(name, std::env::temp_dir().to_string_lossy())?;
+    }
+    let made = py.detach(|| {
+        let mut kept = kept();
+        if kept.is_none() {
+            *kept = Some(caught(|| Ok(Renderer::new()?))?);
+        }
+        Ok(())
+    });
+    if !named {
+        environ.call_method1("pop", (name, py.None()))?;
+    }
+    made
 }
 
 /// `(eye, target)`, and after them `up` and the opening angle in degrees.

@@ -8,6 +8,8 @@ from tumble._errors import (
     InternalError,
     InvalidValueError,
     MissingFileError,
+    PictureError,
+    RecordingError,
     RemovedError,
     SceneError,
     SnapshotError,
@@ -16,6 +18,7 @@ from tumble._errors import (
     UnknownNameError,
     UnreadableFileError,
 )
+from tumble._extension import Behaviour, Force
 from tumble._native import (
     Articulation,
     Bodies,
@@ -24,30 +27,41 @@ from tumble._native import (
     Cylinder,
     HalfSpace,
     Mesh,
+    Recorder,
     RigidBody,
     Shape,
     Sphere,
     SphereTree,
     StepReport,
+    View,
     World,
     __version__,
 )
+from tumble._pictures import Camera, save_png
+from tumble._recordings import Recording, read, replay
 from tumble._values import Energy, Momentum, SphereLevel
 
 __all__ = [
     "Articulation",
+    "Behaviour",
     "Bodies",
     "Box",
     "BusyError",
+    "Camera",
     "Capsule",
     "Cylinder",
     "Energy",
+    "Force",
     "HalfSpace",
     "InternalError",
     "InvalidValueError",
     "Mesh",
     "MissingFileError",
     "Momentum",
+    "PictureError",
+    "Recorder",
+    "Recording",
+    "RecordingError",
     "RemovedError",
     "RigidBody",
     "SceneError",
@@ -61,6 +75,10 @@ __all__ = [
     "TumbleError",
     "UnknownNameError",
     "UnreadableFileError",
+    "View",
     "World",
     "__version__",
+    "read",
+    "replay",
+    "save_png",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,8 +49,17 @@ class Behaviour:
         return copy.deepcopy(self)
 
 
-def check(kind: type[Any], value: object, where: str) -> None:
-    """Raises a ``TypeError`` for what is none of that kind."""
+def check_force(value: object) -> None:
+    """A ``TypeError`` for what is no force."""
+    _check(Force, value)
+
+
+def check_behaviour(value: object) -> None:
+    """A ``TypeError`` for what is no behaviour."""
+    _check(Behaviour, value)
+
+
+def _check(kind: type[Force] | type[Behaviour], value: object) -> None:
     if not isinstance(value, kind):
-        article = f"{kind.__module__.split('.')[0]}.{kind.__name__}"
-        raise TypeError(f"{where}: wanted an object of a subclass of {article}, and not {type(value).__name__}")
+        given = f"the class {value.__name__} itself" if isinstance(value, type) else type(value).__name__
+        raise TypeError(f"wanted an object of a subclass of tumble.{kind.__name__}, and not {given}")
