@@ -37,10 +37,7 @@ def test_what_is_read_is_what_was_recorded(tmp_path):
         run.position("bat")
 
 
-def test_the_file_is_the_command_s(root, tmp_path):
-    command = root / "target" / "release" / "tumble"
-    if not command.exists():
-        pytest.skip("SKIPPED: target/release/tumble is not built")
+def test_the_file_is_the_command_s(command, tmp_path):
     words = ["run", "billiards", "--seconds", "0.1", "--quiet", "--record", tmp_path / "theirs.mcap"]
     subprocess.run([command, *words], check=True, timeout=60)
     world = tumble.World.load("billiards")

@@ -60,10 +60,7 @@ def test_a_file_brings_the_same_tree_back(tree, tmp_path):
     assert all((a.centers == b.centers).all() and (a.radii == b.radii).all() for a, b in zip(again.levels, tree.levels))
 
 
-def test_the_report_is_the_command_s(root, tmp_path):
-    command = root / "target" / "release" / "tumble"
-    if not command.exists():
-        pytest.skip("SKIPPED: target/release/tumble is not built")
+def test_the_report_is_the_command_s(command, tmp_path):
     mesh = tmp_path / "cube.obj"
     lines = [f"v {x} {y} {z}" for x, y, z in CUBE] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in SIDES]
     mesh.write_text("\n".join(lines) + "\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path, PurePath
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,8 +75,16 @@ def replay(path: str | PathLike[str], world: World | None = None) -> Iterator[Wo
     if world is None:
         if recording.world == "World":
             raise InvalidValueError(f"{path}: the world was made in a program and not by a scene; give one of the same bodies as `world`")
-        world = World.load(recording.world)
+        world = World.load(_scene_of(recording))
     return _frames(world, recording)
+
+
+def _scene_of(recording: Recording) -> str:
+    """What `World.load` takes: a shipped scene is recorded by the path that it has in the sources."""
+    match PurePath(recording.world).parts:
+        case ("scenes", name, "scene.toml") if not Path(recording.world).exists():
+            return name
+    return recording.world
 
 
 def _frames(world: World, recording: Recording) -> Iterator[World]:

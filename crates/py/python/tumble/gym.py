@@ -22,6 +22,11 @@ _SCENE = """
 [world]
 dt_s = 0.005
 
+[materials.steel]
+color = "#77787c"
+metallic = 1.0
+roughness = 0.35
+
 [[articulated]]
 name = "cart_pole"
 collides = false
@@ -49,7 +54,8 @@ shape = { type = "capsule", radius_m = 0.03, length_m = 1.0, position_m = [0, -0
 name = "rail"
 mode = "static"
 position_m = [0, 0, -0.16]
-shape = { type = "box", size_m = [6, 0.06, 0.06], color = "#77787c" }
+material = "steel"
+shape = { type = "box", size_m = [6, 0.06, 0.06] }
 collides = false
 
 [ground]
