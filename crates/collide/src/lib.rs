@@ -26,6 +26,7 @@ mod mass;
 mod mesh;
 mod narrow;
 mod pose;
+mod ray;
 mod shape;
 mod solid;
 mod surface;

@@ -21,6 +21,15 @@ pub enum RenderError {
         /// What the graphics library said.
         reason: String,
     },
+    /// There is no desktop to open a window on, or it would not open one.
+    #[error(
+        "no window can be opened ({reason}). A window needs a desktop: X11, named by DISPLAY, or Wayland, named by WAYLAND_DISPLAY; \
+         `tumble run SCENE --picture out.png` needs none"
+    )]
+    NoWindow {
+        /// What the window system said.
+        reason: String,
+    },
     /// The picture is empty, or larger than the caps or the device allow.
     #[error("cannot render a picture of {width} x {height} pixels: each side must be 1 to {max_side} and their product at most {max_pixels}")]
     BadSize {

@@ -6,6 +6,9 @@ mod scene;
 mod shadow;
 mod targets;
 mod upload;
+mod window;
+
+pub use window::{Picture, Screen, Shown};
 
 use crate::facet::cut;
 use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
@@ -37,7 +40,12 @@ impl Renderer {
     /// # Errors
     /// [`RenderError::NoAdapter`] where the machine has none: the caller goes on without pictures. [`RenderError::Device`] where it has one that fails.
     pub fn new() -> Result<Self, RenderError> {
-        let gpu = pollster::block_on(Gpu::open())?;
+        Renderer::on(pollster::block_on(first_adapter())?)
+    }
+
+    /// On an adapter that was chosen.
+    fn on(adapter: wgpu::Adapter) -> Result<Self, RenderError> {
+        let gpu = pollster::block_on(Gpu::open(adapter))?;
         let pipelines = Pipelines::new(&gpu.device, gpu.sample_masks);
         gpu.complaint()?;
         Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), targets: None })
@@ -61,6 +69,13 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`], or a point of view that is none.
     pub fn render_from(&mut self, from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Result<Image, RenderError> {
+        let (lens, rim) = self.lens(from, list, width, height)?;
+        let image = self.draw(list, &lens, width + 2 * rim, height + 2 * rim)?;
+        Ok(if rim == 0 { image } else { cut(&image, rim) })
+    }
+
+    /// Checks everything; the view in numbers, and the pixels that it is drawn wider on each side.
+    fn lens(&self, from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Result<(Lens, u32), RenderError> {
         self.check_size(width, height)?;
         list.validate()?;
         let mut lens = from.lens(width as f32 / height as f32)?;
@@ -68,14 +83,22 @@ impl Renderer {
         let rim = lens.part.map_or(0, |part| if list.settings.occlusion_m == Some(0.0) { 0 } else { part.rim_px });
         lens.part = lens.part.map(|part| Part { rim_px: rim, ..part });
         if rim == 0 {
-            return self.draw(list, &lens, width, height);
+            return Ok((lens, 0));
         }
         self.check_size(width + 2 * rim, height + 2 * rim)?;
-        Ok(cut(&self.draw(list, &lens.widened(width, height, rim), width + 2 * rim, height + 2 * rim)?, rim))
+        Ok((lens.widened(width, height, rim), rim))
     }
 
-    /// Draws all pixels of a view.
+    /// Draws all pixels of a view into memory.
     fn draw(&mut self, list: &DrawList, lens: &Lens, width: u32, height: u32) -> Result<Image, RenderError> {
+        self.paint(list, lens, width, height, |encoder, targets| targets.copy_out(encoder))?;
+        let image = self.targets.as_ref().map(|targets| targets.read(&self.gpu));
+        self.gpu.complaint()?;
+        image.unwrap_or_else(|| Err(self.gpu.failed("no targets".into())))
+    }
+
+    /// Draws all pixels of a view and lets `after` make something of them, on the device.
+    fn paint(&mut self, list: &DrawList, lens: &Lens, width: u32, height: u32, after: impl FnOnce(&mut wgpu::CommandEncoder, &Targets)) -> Result<(), RenderError> {
         let fits = self.targets.as_ref().is_some_and(|t| t.fits(width, height, list.settings.shadow_map_size));
         if !fits {
             self.targets = None; // frees the old ones first
@@ -89,11 +112,9 @@ impl Renderer {
             frame.draw_occlusion(&mut encoder, &self.pipelines, targets);
         }
         frame.draw_picture(&mut encoder, &self.pipelines, targets);
-        targets.copy_out(&mut encoder);
+        after(&mut encoder, targets);
         self.gpu.queue.submit([encoder.finish()]);
-        let image = targets.read(&self.gpu);
-        self.gpu.complaint()?;
-        image
+        self.gpu.complaint()
     }
 
     fn check_size(&self, width: u32, height: u32) -> Result<(), RenderError> {
@@ -109,8 +130,7 @@ impl Renderer {
 }
 
 impl Gpu {
-    async fn open() -> Result<Gpu, RenderError> {
-        let adapter = first_adapter().await?;
+    async fn open(adapter: wgpu::Adapter) -> Result<Gpu, RenderError> {
         let info = adapter.get_info();
         let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
         let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());

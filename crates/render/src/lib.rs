@@ -22,6 +22,7 @@
 //! one pass with four samples per pixel: backdrop, floor, meshes, spheres, lines, translucent shells, lines on top.
 
 mod camera;
+mod caption;
 mod draw;
 mod error;
 mod facet;
@@ -31,12 +32,14 @@ mod list;
 mod material;
 mod mesh;
 mod viewpoint;
+mod window;
 
 pub use camera::Camera;
+pub use caption::caption;
 pub use draw::{DebugDraw, Drawing, UnknownOverlay, UpAxis, tree_over_mesh};
 pub use error::RenderError;
 pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Warp, calibration_picture, unfold};
-pub use gpu::Renderer;
+pub use gpu::{Picture, Renderer, Screen, Shown};
 pub use image::Image;
 pub use list::{
     DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MeshId, Settings, Sky, Sphere,
@@ -45,6 +48,8 @@ pub use list::{
 pub use material::{Material, Pattern, Shader};
 pub use mesh::{MAX_MESH_VERTICES, MeshData};
 pub use viewpoint::{Lens, Part, Viewpoint};
+pub use window::{Next, WindowApp, WindowOptions, run_window};
+pub use winit;
 
 /// The longest side of a picture, in pixels (the device may allow less).
 pub const MAX_SIDE: u32 = 16384;

@@ -18,6 +18,8 @@ pub struct Tumble {
 pub enum Command {
     /// Simulate a scene; record it, sum it up, take a picture of its end.
     Run(RunOptions),
+    /// Show a scene in a window: keys and mouse move the user, time stands and goes, bodies are pulled.
+    View(ViewOptions),
     /// Check scenes, caves, URDF robots and meshes; nothing is run.
     Check(CheckOptions),
     /// Build a sphere tree around a mesh, or replace a robot's collision geometry by spheres; say how good they are.
@@ -87,6 +89,67 @@ pub struct RunOptions {
     /// Say nothing but errors.
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+#[derive(Args)]
+#[command(after_help = "In the window, H shows what keys and mouse do.")]
+pub struct ViewOptions {
+    /// A scene file, a folder that holds a scene.toml, or the name of a shipped scene.
+    pub scene: String,
+    /// Length of a step, s (default: what the scene says).
+    #[arg(long, value_name = "S", value_parser = frame)]
+    pub dt: Option<f64>,
+    /// time_stepping or backtracking.
+    #[arg(long, value_name = "NAME")]
+    pub stepper: Option<Stepper>,
+    /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
+    #[arg(long, value_name = "NAME", value_parser = solver)]
+    pub solver: Option<Solver>,
+    /// verlet, symplectic_euler, explicit_euler, rk4 or dormand_prince; time_stepping is the midpoint rule whatever is chosen.
+    #[arg(long, value_name = "NAME")]
+    pub integrator: Option<Integrator>,
+    /// Size of the window, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
+    /// Look through the screens of a cave that moves with the user: a file or the name of a shipped cave.
+    #[arg(long, value_name = "CAVE")]
+    pub cave: Option<String>,
+    /// Show this facet of the cave alone, as its projector gets it, in a window without a frame.
+    #[arg(long, value_name = "NAME", requires = "cave", conflicts_with = "preview")]
+    pub facet: Option<String>,
+    /// Show all facets of the cave, unfolded; so does --cave without --facet.
+    #[arg(long, requires = "cave")]
+    pub preview: bool,
+    /// The camera to begin with: scene, front, left, back, right or top.
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Draw over the picture: contacts, normals, velocities, forces, tree=LEVEL, all; with commas between them.
+    #[arg(long, value_name = "WHAT", default_value = "")]
+    pub debug_draw: Overlays,
+    /// Begin with time standing.
+    #[arg(long)]
+    pub paused: bool,
+    /// Begin without text over the picture.
+    #[arg(long)]
+    pub plain: bool,
+    /// Pictures per second at most (default: what the desktop shows).
+    #[arg(long, value_name = "N", value_parser = pace)]
+    pub fps: Option<f64>,
+    /// End at this simulated time, s.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// End after so many pictures.
+    #[arg(long, value_name = "N")]
+    pub frames: Option<u64>,
+    /// Write what is shown at the end (PNG).
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Where the key P leaves pictures: SCENE_000123.png, by the number of the step.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub shots: PathBuf,
+    /// Write what is shown as JSON, a line whenever the user changes something and four a second; - for stdout.
+    #[arg(long, value_name = "FILE|-")]
+    pub status: Option<PathBuf>,
 }
 
 #[derive(Args)]

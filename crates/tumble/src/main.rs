@@ -1,4 +1,4 @@
-//! The `tumble` command: run scenes, check files, build sphere trees, list what is shipped.
+//! The `tumble` command: run scenes, show them in a window, check files, build sphere trees, list what is shipped.
 //!
 //! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
 
@@ -12,6 +12,7 @@ mod shots;
 mod spheretree;
 mod summary;
 mod video;
+mod view;
 
 use args::{Command, Tumble};
 use clap::Parser;
@@ -23,6 +24,7 @@ fn main() -> ExitCode {
     end_with_the_reader();
     let outcome = match Tumble::parse().command {
         Command::Run(options) => run::run(&options),
+        Command::View(options) => view::view(&options),
         Command::Check(options) => check::check(&options),
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),

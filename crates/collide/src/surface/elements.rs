@@ -1,13 +1,16 @@
-//! What of a mesh is held against the other's field: points, edges and rims, held by the balls of its sphere tree.
+//! What of a mesh is held against the other's field: points and edges, held by the balls of its sphere tree.
 //!
-//! A point is held by one leaf that covers it; an edge by the smallest ball found that holds both its ends, and so all of
-//! it. A ball that is further than the margin from the other body skips all that it and its children hold.
+//! A point is held by one leaf that covers it, an edge by one of its ends. Of each ball it is known how far what it and its children hold
+//! reaches from its centre, of each point how long its edges are: one look at the field passes over all that is further than the margin.
 //!
 //! **Which edges.** An edge of length `L` that turns by `θ` (the angle between its faces' normals) is left out where
 //! `θ·L/4 ≤ ε`. Where two edges cross at distance `g`, the ends of the first have at least one at distance
 //! `g + L₁·θ₂/4` or less from the other body (its slopes to the two sides differ by at most `θ₂`), and the other way round.
 //! If both edges were left out, the least of these is at most `√(θ₁L₁·θ₂L₂)/4 ≤ ε`: a finely triangulated smooth surface
 //! needs only its vertices, and the gap is overestimated by `ε` at most (to first order in θ).
+//!
+//! That supposes flat faces on both sides. A cylinder of radius `R` falls away from the middle of an edge by `L²/8R`, however little the edge
+//! turns: the edges left out ([`Edge::fine`]) are searched against cylinders alone, where a search is cheap.
 //!
 //! A short edge that turns little is [`Edge::spared`]: it makes no contact of its own where one of its ends is on a face and at most `ε`
 //! further from the other body. The least gap is then known to the same `ε`.
@@ -38,6 +41,11 @@ pub(crate) struct Point {
     /// Range of the directions of the searched edges that start here, in [`Elements::ways`].
     pub first_way: u32,
     pub ways: u32,
+    /// Where the edges that it holds begin in [`Elements::edges`], how many are searched always, how many are fine.
+    pub first_edge: u32,
+    pub edges: [u32; 2],
+    /// Lengths of the longest of those searched always and of all, metres.
+    pub longest: [f64; 2],
 }
 
 /// A straight edge.
@@ -48,6 +56,8 @@ pub(crate) struct Edge {
     pub points: [u32; 2],
     /// Its own contact may be left out if an end is no further by this, metres: `ε` on a smooth surface, else 0.
     pub spared: f64,
+    /// Whether it turns so little that only cylinders are held against it.
+    pub fine: bool,
     /// Outward normals of its faces.
     pub normals: [Vec3; 2],
     /// Names it.
@@ -61,8 +71,11 @@ pub(crate) struct Elements {
     pub edges: Vec<Edge>,
     pub normals: Vec<Vec3>,
     pub ways: Vec<Vec3>,
-    /// Per ball: where its points and edges begin and end.
-    held: Vec<[u32; 4]>,
+    /// Per ball: where its points begin and end.
+    held: Vec<[u32; 2]>,
+    /// Per ball: how far from its centre what it and its children hold reaches, without the fine edges and with them, metres;
+    /// −∞ where that is nothing.
+    reach: Vec<[f64; 2]>,
 }
 
 impl Elements {
@@ -70,33 +83,38 @@ impl Elements {
     pub fn new(mesh: &TriMesh, tree: &SphereTree) -> (Elements, Vec<[bool; 3]>) {
         let face: Vec<Vec3> = pseudonormals(mesh).iter().map(|n| n[0]).collect();
         let mut all = Elements::default();
-        let (mut edges, searched) = gather_edges(mesh, &face, tree);
+        let (mut edges, searched) = gather_edges(mesh, &face);
         let mut points = all.gather_points(mesh, &face, tree, &searched);
         points.sort_by_key(|p| (p.0, p.1.index));
-        edges.sort_by_key(|e| (e.0, e.1.index));
-        all.held = (0..tree.nodes().len() as u32)
-            .map(|node| {
-                let place = |list: &dyn Fn(u32) -> usize| [list(node) as u32, list(node + 1) as u32];
-                let [a, b] = place(&|n| points.partition_point(|p| p.0 < n));
-                let [c, d] = place(&|n| edges.partition_point(|e| e.0 < n));
-                [a, b, c, d]
-            })
-            .collect();
+        edges.sort_by_key(|e| (e.points[0], e.fine, e.index));
+        for (_, point) in &mut points {
+            let of = |fine: bool| (edges.partition_point(|e| (e.points[0], e.fine) < (point.index, fine)), edges.partition_point(|e| (e.points[0], e.fine) <= (point.index, fine)));
+            let ((a, b), (_, c)) = (of(false), of(true));
+            let longest = |end: usize| edges[a..end].iter().map(|e| (e.ends[1] - e.ends[0]).norm()).fold(0.0, f64::max);
+            (point.first_edge, point.edges, point.longest) = (a as u32, [(b - a) as u32, (c - b) as u32], [longest(b), longest(c)]);
+        }
+        all.held = (0..tree.nodes().len() as u32).map(|node| [node, node + 1].map(|n| points.partition_point(|p| p.0 < n) as u32)).collect();
         all.points = points.into_iter().map(|p| p.1).collect();
-        all.edges = edges.into_iter().map(|e| e.1).collect();
+        all.edges = edges;
+        all.reach = all.reaches(tree);
         (all, searched)
     }
 
     /// The points that ball `node` holds.
     pub fn points_of(&self, node: usize) -> &[Point] {
-        let [a, b, ..] = self.held[node];
+        let [a, b] = self.held[node];
         &self.points[a as usize..b as usize]
     }
 
-    /// The edges that ball `node` holds.
-    pub fn edges_of(&self, node: usize) -> &[Edge] {
-        let [_, _, c, d] = self.held[node];
-        &self.edges[c as usize..d as usize]
+    /// How far from the centre of ball `node` its elements reach, metres; with the fine edges or without.
+    pub fn reach_of(&self, node: usize, fine: bool) -> f64 {
+        self.reach[node][usize::from(fine)]
+    }
+
+    /// The edges that a point holds, with the fine ones or without.
+    pub fn edges_of(&self, point: &Point, fine: bool) -> &[Edge] {
+        let count = point.edges[0] + if fine { point.edges[1] } else { 0 };
+        &self.edges[point.first_edge as usize..(point.first_edge + count) as usize]
     }
 
     pub fn normals_of(&self, point: &Point) -> &[Vec3] {
@@ -105,6 +123,22 @@ impl Elements {
 
     pub fn ways_of(&self, point: &Point) -> &[Vec3] {
         &self.ways[point.first_way as usize..(point.first_way + point.ways) as usize]
+    }
+
+    fn reaches(&self, tree: &SphereTree) -> Vec<[f64; 2]> {
+        let nodes = tree.nodes();
+        // what a ball and its children hold; children come after their parents
+        let mut below: Vec<Vec<u32>> = (0..nodes.len()).map(|n| (self.held[n][0]..self.held[n][1]).collect()).collect();
+        for n in (0..nodes.len()).rev() {
+            let more: Vec<u32> = nodes[n].child_range().flat_map(|c| below[c].iter().copied()).collect();
+            below[n].extend(more);
+        }
+        let reach = |n: usize, fine: bool| {
+            let from = |p: &Vec3| (p - nodes[n].center).norm() * (1.0 + 1e-12);
+            let of = |p: &Point| self.edges_of(p, fine).iter().map(|e| from(&e.ends[1])).fold(from(&p.at), f64::max);
+            below[n].iter().map(|&p| of(&self.points[p as usize])).fold(f64::NEG_INFINITY, f64::max)
+        };
+        (0..nodes.len()).map(|n| [reach(n, false), reach(n, true)]).collect()
     }
 
     /// The vertices, each with the ball that holds it.
@@ -132,17 +166,17 @@ impl Elements {
                 continue;
             }
             let at = mesh.vertices[v];
-            let point = Point { at, index: v as u32, first: self.normals.len() as u32, count: normals.len() as u32, first_way: self.ways.len() as u32, ways: ways[v].len() as u32 };
+            let point = Point { at, index: v as u32, first: self.normals.len() as u32, count: normals.len() as u32, first_way: self.ways.len() as u32, ways: ways[v].len() as u32, first_edge: 0, edges: [0; 2], longest: [0.0; 2] };
             self.normals.extend(normals);
             self.ways.extend(&ways[v]);
-            points.push((holder(tree, &[at]), point));
+            points.push((holder(tree, &at), point));
         }
         points
     }
 }
 
-/// The edges that turn outwards by enough, each with the ball that holds it.
-fn gather_edges(mesh: &TriMesh, face: &[Vec3], tree: &SphereTree) -> (Vec<(u32, Edge)>, Vec<[bool; 3]>) {
+/// The edges that turn outwards.
+fn gather_edges(mesh: &TriMesh, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
     let mut searched = vec![[false; 3]; mesh.triangles.len()];
     let mut edges = Vec::new();
     let error = EDGE_ERROR * mesh.diagonal();
@@ -154,28 +188,29 @@ fn gather_edges(mesh: &TriMesh, face: &[Vec3], tree: &SphereTree) -> (Vec<(u32, 
         let reach = apart.iter().map(|c| normals[0].dot(&(c - ends[0]))).fold(0.0, f64::min);
         let turn = ComplexField::acos(normals[0].dot(&normals[1]).clamp(-1.0, 1.0));
         let length = (ends[1] - ends[0]).norm();
-        let wanted = group.len() > 2 || (reach < -1e-9 * length && 0.25 * turn * length > error);
-        if !wanted {
+        let convex = reach < -1e-9 * length;
+        if group.len() == 2 && !convex {
             continue;
         }
+        let fine = group.len() == 2 && 0.25 * turn * length <= error;
         let smooth = group.len() == 2 && turn < SMOOTH && length < SHORT * mesh.diagonal();
         let spared = if smooth { error } else { 0.0 };
-        for u in group {
+        for u in group.iter().filter(|_| !fine) {
             let t = mesh.triangles[u.face];
             let from = if u.forward { u.low } else { u.high };
             if let Some(k) = (0..3).find(|&k| t[k] == from && t[(k + 1) % 3] == u.low + u.high - from) {
                 searched[u.face][k] = true;
             }
         }
-        edges.push((holder(tree, &ends), Edge { ends, points: [group[0].low, group[0].high], spared, normals, index: index as u32 }));
+        edges.push(Edge { ends, points: [group[0].low, group[0].high], spared, fine, normals, index: index as u32 });
     }
     (edges, searched)
 }
 
-/// The smallest ball found, going down, that holds all `points`; the root where rounding leaves none.
-fn holder(tree: &SphereTree, points: &[Vec3]) -> u32 {
+/// The smallest ball found, going down, that holds `p`; the root where rounding leaves none.
+fn holder(tree: &SphereTree, p: &Vec3) -> u32 {
     let nodes = tree.nodes();
-    let holds = |n: usize| points.iter().all(|p| (p - nodes[n].center).norm() <= nodes[n].radius * (1.0 + 1e-9));
+    let holds = |n: usize| (p - nodes[n].center).norm() <= nodes[n].radius * (1.0 + 1e-9);
     let (mut best, mut stack) = (0, vec![0]);
     while let Some(n) = stack.pop() {
         if n > 0 && !holds(n) {

@@ -38,19 +38,37 @@ const SAME: f64 = 1e-11;
 const ABOVE: f64 = 1.0 - 1e-6;
 /// Keeps a distance rounded to single precision below it.
 const BELOW: f64 = 1.0 - 2e-7;
+/// Of single precision, and more.
+const ROUNDING: f64 = 1e-7;
+/// Divisions that are passed at once on the way down.
+const TOP: usize = 4;
 /// Cells and listed triangles at most; beyond, the tree of boxes answers.
 const MOST_CELLS: usize = 1 << 20;
 const MOST_LISTED: usize = 1 << 23;
 
+/// Twelve bytes, since most of the time of a query goes by waiting for cells.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
-    /// Signed distance at the centre.
-    distance: f64,
-    /// The first of eight children; 0 if there are none.
-    children: u32,
-    first: u32,
+    /// Signed distance at the centre, or a little less.
+    distance: f32,
+    /// Where its list begins if it has one; else the first of eight children, 0 if there are none.
+    link: u32,
     /// Length of the list; 0 where there is none.
     count: u32,
+}
+
+impl Cell {
+    fn children(&self) -> usize {
+        if self.count == 0 { self.link as usize } else { 0 }
+    }
+}
+
+/// A triangle in the list of a cell.
+#[derive(Clone, Copy, Debug)]
+struct Listed {
+    triangle: u32,
+    /// At most its distance from the cell's centre; it rises along a list.
+    nearer: f32,
 }
 
 /// The field of a mesh.
@@ -65,9 +83,11 @@ pub(crate) struct MeshField {
     /// Whether the edges of each triangle (k to k+1) are elements.
     searched: Vec<[bool; 3]>,
     cells: Vec<Cell>,
-    lists: Vec<u32>,
-    /// At most the distance of each listed triangle from its cell's centre; it rises along a list.
-    nearer: Vec<f32>,
+    lists: Vec<Listed>,
+    /// A ball around each triangle, about `center`, and its radius.
+    balls: Vec<[f32; 4]>,
+    /// The cell, and its depth, at or above each of the cubes that the outermost cell makes when it is divided [`TOP`] times.
+    top: Vec<(u32, u32)>,
     center: Vec3,
     half: f64,
     bounds: Aabb,
@@ -105,9 +125,10 @@ impl MeshField {
             corners: (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect(),
             normals: pseudonormals(mesh).into_iter().map(|n| n.map(|v| v.try_normalize(0.0).unwrap_or_default())).collect(),
             searched,
-            cells: vec![Cell { distance: 0.0, children: 0, first: 0, count: 0 }],
+            cells: vec![Cell { distance: 0.0, link: 0, count: 0 }],
             lists: Vec::new(),
-            nearer: Vec::new(),
+            balls: Vec::new(),
+            top: Vec::new(),
             center: 0.5 * (bounds.min + bounds.max),
             half: 0.5 * (bounds.max - bounds.min).max() + RIM * diagonal,
             bounds,
@@ -124,18 +145,38 @@ impl MeshField {
         let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
         let mut builder = Builder { field: &mut field, deepest };
         builder.cell(0, center, half, &all, f64::INFINITY, 0);
+        field.balls = field.corners.iter().map(|c| ball_around(c, &center, diagonal)).collect();
+        field.top = (0..1 << (3 * TOP)).map(|n| field.cell_above(n)).collect();
         field
+    }
+
+    /// The cell at or above a cube of the top.
+    fn cell_above(&self, cube: usize) -> (u32, u32) {
+        let (mut cell, mut depth) = (0, 0);
+        while depth < TOP && self.cells[cell].children() > 0 {
+            depth += 1;
+            let octant: usize = (0..3).map(|k| (cube >> (k * TOP + TOP - depth) & 1) << k).sum();
+            cell = self.cells[cell].children() + octant;
+        }
+        (cell as u32, depth as u32)
     }
 
     /// The smallest cell that holds `p`, and its centre; `None` outside all.
     fn locate(&self, p: &Vec3) -> Option<(&Cell, Vec3)> {
-        let (mut center, mut half, mut cell) = (self.center, self.half, &self.cells[0]);
         // written so that what is not a number is outside
-        let out = (p - center).amax();
-        if out.is_nan() || out > half {
+        let from_low = (p - self.center).add_scalar(self.half);
+        let within = from_low.iter().all(|x| *x >= 0.0 && *x <= 2.0 * self.half);
+        if !within {
             return None;
         }
-        while cell.children > 0 {
+        const SIDE: usize = 1 << TOP;
+        let scale = SIDE as f64 / (2.0 * self.half);
+        let place: [usize; 3] = std::array::from_fn(|k| ((from_low[k] * scale) as usize).min(SIDE - 1));
+        let (index, depth) = self.top[place[0] | place[1] << TOP | place[2] << (2 * TOP)];
+        let mut cell = &self.cells[index as usize];
+        let mut half = self.half / f64::from(1_u32 << depth);
+        let mut center = Vec3::from_fn(|k, _| self.center[k] - self.half + ((place[k] >> (TOP - depth as usize)) as f64 * 2.0 + 1.0) * half);
+        while cell.children() > 0 {
             half *= 0.5;
             let mut octant = 0;
             for k in 0..3 {
@@ -143,7 +184,7 @@ impl MeshField {
                 octant |= usize::from(above) << k;
                 center[k] += if above { half } else { -half };
             }
-            cell = &self.cells[cell.children as usize + octant];
+            cell = &self.cells[cell.children() + octant];
         }
         Some((cell, center))
     }
@@ -153,32 +194,36 @@ impl MeshField {
     /// The list is in the order of the distance from the centre `c`: `dist(p, t) ≥ dist(c, t) − |p − c|` ends the search.
     fn closest(&self, p: &Vec3, cell: &Cell, center: &Vec3) -> Option<Closest> {
         let mut best: Option<Closest> = None;
-        let mut limit = f64::INFINITY;
-        let mut furthest = f64::INFINITY;
-        let aside = (p - center).norm();
-        for (&t, &nearer) in self.list(cell).iter().zip(&self.nearer[cell.first as usize..]) {
-            if f64::from(nearer) > furthest {
+        let (mut limit, mut reach, mut furthest) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+        let (aside, from_center) = ((p - center).norm(), p - self.center);
+        for listed in self.list(cell) {
+            if f64::from(listed.nearer) > furthest {
                 break;
             }
-            let t = t as usize;
-            let above = self.normals[t][0].dot(&(p - self.corners[t][0])).powi(2);
-            if above > limit {
+            let t = listed.triangle as usize;
+            let [x, y, z, radius] = self.balls[t].map(f64::from);
+            if (from_center - Vec3::new(x, y, z)).norm_squared() > (reach + radius).powi(2) {
                 continue;
             }
             let (point, feature) = closest_on_triangle(p, &self.corners[t]);
             let square = (p - point).norm_squared();
+            if square > limit {
+                continue;
+            }
+            let above = self.normals[t][0].dot(&(p - self.corners[t][0])).powi(2);
             let better = |b: &Closest| square < b.square * (1.0 - SAME) || (square <= b.square * (1.0 + SAME) && above > b.above);
             if best.as_ref().is_none_or(better) {
                 best = Some(Closest { square, above, point, triangle: t, feature });
                 limit = square * (1.0 + SAME);
-                furthest = limit.sqrt() + aside;
+                reach = limit.sqrt();
+                furthest = reach + aside;
             }
         }
         best
     }
 
-    fn list(&self, cell: &Cell) -> &[u32] {
-        &self.lists[cell.first as usize..][..cell.count as usize]
+    fn list(&self, cell: &Cell) -> &[Listed] {
+        if cell.count == 0 { &[] } else { &self.lists[cell.link as usize..][..cell.count as usize] }
     }
 
     /// The closest part of the surface, whatever an element faces.
@@ -230,10 +275,10 @@ impl MeshField {
 
     /// The closest face among those listed that faces the element, has `p` behind it (or on it), and is not much further
     /// than `nearest`: the far side of the solid is not meant.
-    fn behind(&self, p: &Vec3, normals: &[Vec3], list: &[u32], nearest: f64, aside: f64) -> Option<Hit> {
+    fn behind(&self, p: &Vec3, normals: &[Vec3], list: &[Listed], nearest: f64, aside: f64) -> Option<Hit> {
         let mut best: Option<(f64, f64, Hit)> = None;
-        for &t in list {
-            let t = t as usize;
+        for listed in list {
+            let t = listed.triangle as usize;
             let normal = self.normals[t][0];
             let above = normal.dot(&(p - self.corners[t][0]));
             if above > aside || !facing(normals, &normal) {
@@ -317,7 +362,7 @@ const MOST_NEAR: usize = 512;
 impl Field for MeshField {
     fn bound(&self, p: &Vec3) -> f64 {
         match self.locate(p) {
-            Some((cell, center)) => cell.distance - (p - center).norm(),
+            Some((cell, center)) => f64::from(cell.distance) - (p - center).norm(),
             None => (p - p.zip_zip_map(&self.bounds.min, &self.bounds.max, |x, low, high| x.clamp(low, high))).norm(),
         }
     }
@@ -342,7 +387,8 @@ impl Builder<'_> {
         let most = from_center(guess.1) + 2.0 * reach + self.field.around;
         let mut near: Vec<(f64, u32)> = list.iter().filter(|n| n.0 - moved <= most).map(|n| (from_center(n.1), n.1)).collect();
         let Some(&(least, first)) = near.iter().min_by(order) else { return };
-        self.field.cells[index].distance = self.field.describe(&center, &self.field.closest_of(&center, first as usize)).distance;
+        let distance = self.field.describe(&center, &self.field.closest_of(&center, first as usize)).distance;
+        self.field.cells[index].distance = (distance - ROUNDING * (distance.abs() + self.field.diagonal)) as f32;
         let facing_first = self.field.normals[first as usize][0];
         let turned = |t: u32| self.field.normals[t as usize][0].dot(&facing_first) < OTHER_WAY;
         near.retain(|&(d, t)| d <= least + 2.0 * reach || (d <= least + 2.0 * reach + self.field.around && turned(t)));
@@ -351,21 +397,32 @@ impl Builder<'_> {
         if near.len() <= SHORT || depth == self.deepest || far || full {
             if near.len() <= LONG && !full {
                 near.sort_unstable_by(|a, b| order(&a, &b));
-                self.field.cells[index].first = self.field.lists.len() as u32;
+                self.field.cells[index].link = self.field.lists.len() as u32;
                 self.field.cells[index].count = near.len() as u32;
-                self.field.lists.extend(near.iter().map(|n| n.1));
-                self.field.nearer.extend(near.iter().map(|n| (n.0 * BELOW) as f32));
+                self.field.lists.extend(near.iter().map(|n| Listed { triangle: n.1, nearer: (n.0 * BELOW) as f32 }));
             }
             return;
         }
         let children = self.field.cells.len();
-        self.field.cells[index].children = children as u32;
-        self.field.cells.extend([Cell { distance: 0.0, children: 0, first: 0, count: 0 }; 8]);
+        self.field.cells[index].link = children as u32;
+        self.field.cells.extend([Cell { distance: 0.0, link: 0, count: 0 }; 8]);
         for octant in 0..8 {
             let side = Vec3::from_fn(|k, _| if octant >> k & 1 == 1 { 0.5 } else { -0.5 });
             self.cell(children + octant, center + side * half, 0.5 * half, &near, 0.5 * reach, depth + 1);
         }
     }
+}
+
+/// A ball around a triangle, its centre told from `center`; rounding is on the safe side.
+fn ball_around(corners: &[Vec3; 3], center: &Vec3, diagonal: f64) -> [f32; 4] {
+    let longest = (0..3).map(|k| (corners[k], corners[(k + 1) % 3])).max_by(|a, b| (a.1 - a.0).norm().total_cmp(&(b.1 - b.0).norm()));
+    let (u, v) = longest.unwrap_or((corners[0], corners[1]));
+    // the middle of the longest side serves the obtuse, the mean of the corners others
+    let middles = [0.5 * (u + v), (corners[0] + corners[1] + corners[2]) / 3.0];
+    let radius = |m: &Vec3| corners.iter().map(|c| (c - m).norm()).fold(0.0, f64::max);
+    let middle = if radius(&middles[0]) < radius(&middles[1]) { middles[0] } else { middles[1] };
+    let c = middle - center;
+    [c.x as f32, c.y as f32, c.z as f32, (radius(&middle) + 1e-6 * diagonal) as f32]
 }
 
 fn valence(mesh: &TriMesh) -> Vec<u32> {

@@ -97,6 +97,10 @@ pub(crate) trait Field {
     fn round(&self) -> bool {
         false
     }
+    /// Whether the surface is bent and its own elements do not find every edge that comes near it.
+    fn bent(&self) -> bool {
+        false
+    }
     /// Whether the signed distance is linear: only points count.
     fn linear(&self) -> bool {
         false

@@ -151,6 +151,10 @@ impl Field for CylinderField {
         true
     }
 
+    fn bent(&self) -> bool {
+        true
+    }
+
     fn convex(&self) -> bool {
         true
     }

@@ -10,6 +10,7 @@ mod mesh_contacts;
 mod meshes;
 mod primitives;
 mod quality;
+mod rays;
 mod rng;
 mod shared_meshes;
 mod surface;

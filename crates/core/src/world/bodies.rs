@@ -149,7 +149,7 @@ impl World {
         Ok(())
     }
 
-    fn part(&self, id: ObjectId, part: usize, numbers: &[Vec3]) -> Result<usize, WorldError> {
+    pub(super) fn part(&self, id: ObjectId, part: usize, numbers: &[Vec3]) -> Result<usize, WorldError> {
         let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
         if part >= entry.span.site.len() {
             return Err(WorldError::NoPart { name: entry.object.name().to_string(), part });

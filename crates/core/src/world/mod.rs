@@ -2,9 +2,13 @@
 
 mod bodies;
 mod core;
+mod mirror;
+mod pull;
 mod snapshot;
 
 pub use self::core::{ContactPoint, Core, StepError};
+pub use mirror::MirrorError;
+pub use pull::Pull;
 pub use snapshot::SnapshotError;
 
 use crate::detect::{Owner, Scratch, WarmStarts};

@@ -29,6 +29,7 @@ mod mesh_boxes;
 mod meshes;
 mod out_of_reach;
 mod paradox;
+mod pull;
 mod regressions;
 mod regressions_rows;
 mod soft_rows;

@@ -8,3 +8,8 @@ mod outside;
 mod recover;
 mod roundtrip;
 mod support;
+mod shm;
+mod sync;
+mod udp;
+mod udp_hostile;
+mod udp_socket;

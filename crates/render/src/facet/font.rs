@@ -1,4 +1,4 @@
-//! Capital letters and digits of 5 x 7 dots, for calibration pictures.
+//! Capital letters and digits of 5 x 7 dots, for calibration pictures and captions.
 
 use super::calibration::rect;
 use crate::Image;
@@ -7,7 +7,7 @@ use crate::Image;
 const ADVANCE: i64 = 6;
 
 /// Rows from the top, five bits each, the left dot highest.
-const LETTERS: [(char, [u8; 7]); 40] = [
+const LETTERS: [(char, [u8; 7]); 50] = [
     ('A', [0b01110, 0b10001, 0b10001, 0b11111, 0b10001, 0b10001, 0b10001]),
     ('B', [0b11110, 0b10001, 0b10001, 0b11110, 0b10001, 0b10001, 0b11110]),
     ('C', [0b01110, 0b10001, 0b10000, 0b10000, 0b10000, 0b10001, 0b01110]),
@@ -47,16 +47,26 @@ const LETTERS: [(char, [u8; 7]); 40] = [
     ('.', [0b00000, 0b00000, 0b00000, 0b00000, 0b00000, 0b01100, 0b01100]),
     ('-', [0b00000, 0b00000, 0b00000, 0b11111, 0b00000, 0b00000, 0b00000]),
     ('_', [0b00000, 0b00000, 0b00000, 0b00000, 0b00000, 0b00000, 0b11111]),
+    (':', [0b00000, 0b01100, 0b01100, 0b00000, 0b01100, 0b01100, 0b00000]),
+    ('/', [0b00001, 0b00010, 0b00010, 0b00100, 0b01000, 0b01000, 0b10000]),
+    ('%', [0b11001, 0b11001, 0b00010, 0b00100, 0b01000, 0b10011, 0b10011]),
+    (',', [0b00000, 0b00000, 0b00000, 0b00000, 0b01100, 0b00100, 0b01000]),
+    ('(', [0b00010, 0b00100, 0b01000, 0b01000, 0b01000, 0b00100, 0b00010]),
+    (')', [0b01000, 0b00100, 0b00010, 0b00010, 0b00010, 0b00100, 0b01000]),
+    ('+', [0b00000, 0b00100, 0b00100, 0b11111, 0b00100, 0b00100, 0b00000]),
+    ('=', [0b00000, 0b00000, 0b11111, 0b00000, 0b11111, 0b00000, 0b00000]),
+    (';', [0b00000, 0b01100, 0b01100, 0b00000, 0b01100, 0b00100, 0b01000]),
+    ('\'', [0b00100, 0b00100, 0b00100, 0b00000, 0b00000, 0b00000, 0b00000]),
     ('?', [0b01110, 0b10001, 0b00001, 0b00110, 0b00100, 0b00000, 0b00100]),
 ];
 
 /// The width of a text at `scale` pixels to a dot.
-pub(super) fn text_width(text: &str, scale: i64) -> i64 {
+pub(crate) fn text_width(text: &str, scale: i64) -> i64 {
     (ADVANCE * text.chars().count() as i64 - 1).max(0) * scale
 }
 
 /// Writes with the top left corner at `x`, `y`. Letters that are not known are question marks; blanks are blank.
-pub(super) fn write(image: &mut Image, text: &str, x: i64, y: i64, scale: i64, color: [u8; 4]) {
+pub(crate) fn write(image: &mut Image, text: &str, x: i64, y: i64, scale: i64, color: [u8; 4]) {
     for (i, letter) in text.chars().enumerate().filter(|(_, c)| *c != ' ') {
         let find = |wanted: char| LETTERS.iter().find(|(c, _)| *c == wanted);
         let Some((_, rows)) = find(letter).or_else(|| find('?')) else { continue };

@@ -6,14 +6,14 @@
 mod blend;
 mod calibration;
 mod compose;
-mod font;
+pub(crate) mod font;
 mod perspective;
 mod unfold;
 mod view;
 mod warp;
 
 pub use blend::Blend;
-pub(crate) use compose::cut;
+pub(crate) use compose::{blank, cut};
 pub use calibration::{CalibrationPattern, calibration_picture};
 pub use perspective::FacetView;
 pub use unfold::{Tile, unfold};

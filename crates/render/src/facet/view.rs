@@ -49,6 +49,16 @@ impl CaveView {
         &self.place
     }
 
+    /// Puts it elsewhere in the scene.
+    pub fn stand(&mut self, place: CavePlace) {
+        self.place = place;
+    }
+
+    /// Whether a facet's picture is bent or darkened for its projector.
+    pub fn is_bent(&self, facet: &Facet) -> bool {
+        facet.warp_file.is_some() || facet.blend_file.is_some()
+    }
+
     /// What the eye to the `side` (−1 left, 0 between, +1 right) sees through a facet's screen, in the scene.
     ///
     /// # Errors

@@ -32,7 +32,7 @@ impl Targets {
         let full = (width, height, 1);
         let shadows = make("shadow maps", (shadow_size, shadow_size, MAX_SHADOWS as u32), 1, DEPTH, look);
         let layer = |i| TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2), base_array_layer: i, array_layer_count: Some(1), ..Default::default() };
-        let resolved = make("picture", full, 1, COLOR, draw | TextureUsages::COPY_SRC);
+        let resolved = make("picture", full, 1, COLOR, look | TextureUsages::COPY_SRC);
         Targets {
             width,
             height,

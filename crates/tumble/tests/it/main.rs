@@ -11,3 +11,4 @@ mod picture;
 mod repair;
 mod scenes;
 mod spheretree;
+mod view;

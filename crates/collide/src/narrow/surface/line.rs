@@ -1,0 +1,281 @@
+//! A straight element (an edge, an axis) against a field: the least distance along it, and where it leaves a face that it lies on.
+//!
+//! **Search along an edge.** Against a convex body `d_B` is convex along a line, so two tangents meet below the minimum
+//! (Kelley 1960, *The cutting-plane method*): where that is above the margin, the search ends; else their meeting point
+//! is the next place to look. On flat faces a few looks are exact. Other bodies: the edge is first halved into short pieces, and those
+//! that are too far to reach the margin are dropped (`d_B` changes by at most 1 m per metre). Within a piece that is kept the function
+//! is treated as convex.
+//! What comes out:
+//!
+//! - a kink, two slopes: an edge of B (or the ridge between two faces, inside) is crossed. The normal is the combination of the two that is
+//!   perpendicular to the edge;
+//! - a face that the edge lies on, or slopes gently over. Its two ends are contacts, the corners of the area of contact, unless they are the
+//!   edge's own ends, which are points and speak for themselves.
+
+use super::super::reduce::Collector;
+use super::pass::{ASIDE, Normals, Pass};
+use crate::surface::elements::Edge;
+use crate::surface::{Feature, Hit, TOUCHING, facing};
+use crate::{NormalFrom, Vec3};
+
+/// Pieces that an edge is halved into against a body that is not convex, in radii of the smaller body.
+pub(super) const PIECE: f64 = 0.03;
+/// Slopes that differ by this are the same.
+pub(super) const LEVEL: f64 = 1e-7;
+/// An edge that slopes less than this over a face lies on it.
+const LYING_EDGE: f64 = 0.15;
+/// Looks for the end of a flat bottom at most.
+const LOOKS: usize = 20;
+/// Looks for the minimum at most: a third of them halve what is left.
+const MOST_LOOKS: usize = 90;
+
+/// A straight element in the frame of the field.
+struct Line<'a> {
+    start: Vec3,
+    along: Vec3,
+    length: f64,
+    radius: f64,
+    normals: &'a [Vec3],
+    index: u32,
+    /// The edge of a mesh that it is.
+    edge: Option<&'a Edge>,
+}
+
+/// A look at a place on a line.
+#[derive(Clone, Copy)]
+struct Look {
+    s: f64,
+    slope: f64,
+    hit: Hit,
+}
+
+impl Look {
+    /// Whether the line lies here on a face, or along a straight round side.
+    fn lies(&self) -> bool {
+        match self.hit.feature {
+            Feature::Face => self.hit.facing && self.slope.abs() < LYING_EDGE,
+            _ => self.slope.abs() <= LEVEL,
+        }
+    }
+
+    /// The tangent at another place.
+    fn height(&self, s: f64) -> f64 {
+        self.hit.distance + self.slope * (s - self.s)
+    }
+}
+
+impl Pass<'_> {
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn edge(&self, ends: &[Vec3; 2], radius: f64, normals: &[Vec3], index: u32, edge: Option<&Edge>, found: &mut Collector) {
+        let [start, end] = ends.map(|p| self.place(&p));
+        let (middle, length) = (0.5 * (start + end), (end - start).norm());
+        if length <= 0.0 || self.field.bound(&middle) - 0.5 * length - radius > found.limit() {
+            return;
+        }
+        let normals: Normals = normals.iter().map(|n| self.rotation * n).collect();
+        let line = Line { start, along: (end - start) / length, length, radius, normals: &normals, index, edge };
+        if self.field.convex() {
+            let ends = [0.0, length].map(|s| self.look(&line, s));
+            self.search(&line, ends[0], ends[1], found);
+        } else {
+            self.halve(&line, (0.0, None), (length, None), found);
+        }
+    }
+
+    /// A piece that may be in reach, between two places that may have been looked at. Returns what was seen at them.
+    fn halve(&self, line: &Line, low: (f64, Option<Look>), high: (f64, Option<Look>), found: &mut Collector) -> [Option<Look>; 2] {
+        let (from, to) = (low.0, high.0);
+        if to - from > PIECE * self.size && to - from > 1e-3 * line.length {
+            let middle = 0.5 * (from + to);
+            let reaches = |from: f64, to: f64, found: &Collector| {
+                self.field.bound(&line.at(0.5 * (from + to))) - 0.5 * (to - from) - line.radius <= found.limit()
+            };
+            let [mut first, mut between, mut last] = [low.1, None, high.1];
+            if reaches(from, middle, found) {
+                [first, between] = self.halve(line, low, (middle, None), found);
+            }
+            if reaches(middle, to, found) {
+                [_, last] = self.halve(line, (middle, between), high, found);
+            }
+            return [first, last];
+        }
+        let looks = [low, high].map(|(s, look)| look.unwrap_or_else(|| self.look(line, s)));
+        self.search(line, looks[0], looks[1], found);
+        looks.map(Some)
+    }
+
+    fn look(&self, line: &Line, s: f64) -> Look {
+        let end = if s == 0.0 { Some(0) } else if s == line.length { Some(1) } else { None };
+        let name = end.and_then(|end: usize| line.edge.map(|edge| edge.points[end]));
+        let hit = self.hit_of(&line.at(s), name, line.normals, TOUCHING);
+        Look { s, slope: hit.normal.dot(&line.along), hit }
+    }
+
+    /// The minimum between two looks, if it is not at one of them, and where the line leaves a face that it lies on.
+    fn search(&self, line: &Line, mut low: Look, mut high: Look, found: &mut Collector) {
+        if high.slope - low.slope <= LEVEL || ends_will_do(line, &low, &high) {
+            return;
+        }
+        let mut on_face = low.lies() != high.lies();
+        match (low.lies(), high.lies()) {
+            (true, false) => self.end_of_face(line, &low, high, found),
+            (false, true) => self.end_of_face(line, &high, low, found),
+            _ => {}
+        }
+        if low.slope > -LEVEL || high.slope < LEVEL {
+            return;
+        }
+        let tolerance = 1e-9 * self.size;
+        let limit = found.limit() + line.radius;
+        for n in 0..MOST_LOOKS {
+            let (s, level) = meeting(&low, &high);
+            let least = low.hit.distance.min(high.hit.distance);
+            // tangents that meet above what was seen are no bound: not convex here
+            let convex = level <= least + tolerance;
+            if convex && level > limit {
+                return;
+            }
+            if (convex && least - level < tolerance) || high.s - low.s < tolerance {
+                break;
+            }
+            let s = match n % 3 {
+                0 if convex => s.clamp(low.s, high.s),
+                1 => low.s - low.slope * (high.s - low.s) / (high.slope - low.slope),
+                _ => 0.5 * (low.s + high.s),
+            };
+            let look = self.look(line, s);
+            if look.lies() && !on_face {
+                on_face = true;
+                self.face(line, &look, low, high, found);
+                if look.slope.abs() <= LEVEL {
+                    return;
+                }
+            }
+            if look.slope.abs() <= LEVEL {
+                return self.bottom(line, look.s, look.hit, found);
+            }
+            if look.slope < 0.0 {
+                low = look;
+            } else {
+                high = look;
+            }
+        }
+        self.kink(line, &low, &high, found);
+    }
+
+    /// A minimum between two slopes.
+    fn kink(&self, line: &Line, low: &Look, high: &Look, found: &mut Collector) {
+        let (s, level) = meeting(low, high);
+        let (a, b) = (high.slope, -low.slope);
+        let sum = low.hit.normal * a + high.hit.normal * b;
+        let length = sum.norm();
+        if length.is_nan() || length <= 1e-9 * (a + b) {
+            return;
+        }
+        let nearest = if low.hit.distance < high.hit.distance { low } else { high };
+        if self.second.is_some() && matches!(nearest.hit.feature, Feature::Edge(_)) {
+            return; // that edge has found it
+        }
+        // two faces at depth `level` meet in an edge further up
+        let distance = level * (a + b) / length;
+        self.bottom(line, s, Hit { distance, normal: sum / length, ..nearest.hit }, found);
+    }
+
+    fn bottom(&self, line: &Line, s: f64, hit: Hit, found: &mut Collector) {
+        let fits = facing(line.normals, &hit.normal) && line.is_closest(&hit.normal);
+        self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);
+    }
+
+    /// A part that lies on a face: its two ends.
+    fn face(&self, line: &Line, look: &Look, low: Look, high: Look, found: &mut Collector) {
+        let from = self.leaves(line, look, low);
+        let to = self.leaves(line, look, high);
+        if to - from < 1e-3 * self.size {
+            self.push_on_face(line, look, look.s, 1, found);
+        } else {
+            self.push_on_face(line, look, from, 1, found);
+            self.push_on_face(line, look, to, 2, found);
+        }
+    }
+
+    /// The end of a part that lies on a face and begins at `look`, on the side of `outer`.
+    fn end_of_face(&self, line: &Line, look: &Look, outer: Look, found: &mut Collector) {
+        let s = self.leaves(line, look, outer);
+        // at the very start it is the element's own end, or another piece's
+        if (s - look.s).abs() > 1e-6 * self.size {
+            self.push_on_face(line, look, s, if outer.s > look.s { 2 } else { 1 }, found);
+        }
+    }
+
+    /// Where the line leaves the face that is under `look`, towards `outer`: where the tangents of the two meet.
+    fn leaves(&self, line: &Line, look: &Look, mut outer: Look) -> f64 {
+        let tolerance = 1e-9 * self.size;
+        for _ in 0..LOOKS {
+            let turn = outer.slope - look.slope;
+            let rise = outer.hit.distance - look.height(outer.s);
+            if rise < tolerance || turn.abs() <= LEVEL {
+                return outer.s;
+            }
+            let s = outer.s - rise / turn;
+            if (s - look.s) * (outer.s - look.s) <= 0.0 || (s - outer.s) * (look.s - outer.s) <= 0.0 {
+                return look.s;
+            }
+            outer = self.look(line, s);
+        }
+        outer.s
+    }
+
+    fn push_on_face(&self, line: &Line, look: &Look, s: f64, part: u64, found: &mut Collector) {
+        let hit = Hit { distance: look.height(s), ..look.hit };
+        if line.radius > 0.0 && look.slope.abs() > ASIDE {
+            return; // the surface of a cylinder is its radius away across the axis alone
+        }
+        if hit.facing && (hit.feature == Feature::Face || line.is_closest(&hit.normal)) {
+            self.push(&line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(part), found);
+        }
+    }
+}
+
+impl Line<'_> {
+    fn at(&self, s: f64) -> Vec3 {
+        self.start + self.along * s
+    }
+
+    /// Whether going from the edge into either of its faces leads no closer.
+    fn is_closest(&self, normal: &Vec3) -> bool {
+        let [n1, n2] = self.normals else { return true };
+        let cos = n1.dot(n2);
+        // into the first face is −(n₂ − n₁ cos)
+        [n2 - n1 * cos, n1 - n2 * cos].iter().all(|out| normal.dot(out) <= ASIDE)
+    }
+
+    fn feature(&self, part: u64) -> u64 {
+        1 << 58 | u64::from(self.index) << 2 | part
+    }
+}
+
+/// Where the tangents of two looks meet: place and height.
+fn meeting(low: &Look, high: &Look) -> (f64, f64) {
+    let fall = high.hit.distance - low.hit.distance + low.slope * low.s - high.slope * high.s;
+    let s = fall / (low.slope - high.slope);
+    (s, low.hit.distance + low.slope * (s - low.s))
+}
+
+/// Whether an edge of a smooth surface is no deeper than one of its ends, which counts, by more than the stated error.
+fn ends_will_do(line: &Line, low: &Look, high: &Look) -> bool {
+    let Some(edge) = line.edge else { return false };
+    let end = if low.hit.distance < high.hit.distance { low } else { high };
+    let whole = low.s == 0.0 && high.s == line.length;
+    let turns = low.slope < 0.0 && high.slope > 0.0;
+    let least = if turns { meeting(low, high).1 } else { end.hit.distance };
+    whole && end.hit.feature == Feature::Face && end.hit.facing && end.hit.distance - least < edge.spared
+}
+
+/// What the normal of a line's contact turns with.
+fn line_normal(line: &Line, hit: &Hit) -> NormalFrom {
+    match hit.feature {
+        Feature::Face => NormalFrom::FaceOfB,
+        Feature::Line(_) | Feature::Edge(_) => NormalFrom::Edges,
+        Feature::Point => NormalFrom::LineOfA(line.along),
+    }
+}

@@ -1,0 +1,55 @@
+//! The `surface` mode: elements of each body against the signed distance of the other.
+//!
+//! ```text
+//! point x        d_B(x) where it is
+//! edge x(s)      min over s of d_B(x(s))      slope g(s) = n(x(s))·u,  u the edge's direction, n the field's normal
+//! core           the same for the points and axes of rounded bodies, less their radius
+//! ```
+//!
+//! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
+//! search of a face we do not need, since edges and vertices of both bodies are exact.
+
+mod line;
+mod pass;
+mod rim;
+
+use super::reduce::Collector;
+use crate::surface::Field;
+use crate::surface::elements::Elements;
+use crate::surface::field::MeshField;
+use crate::{Contact, Pose, SphereTree, Vec3};
+use pass::Pass;
+
+/// A body as the pass sees it that takes its elements.
+pub(in crate::narrow) enum Source<'a> {
+    /// A mesh, culled by its tree.
+    Mesh(&'a SphereTree, &'a Elements),
+    /// A block's corners and edges.
+    Box(Vec3),
+    /// All within a radius of the segment `±half_length` on z; a ball if that is 0.
+    Round { radius: f64, half_length: f64 },
+    /// Rims and axis.
+    Cylinder { radius: f64, half_length: f64 },
+    /// A half-space has no elements.
+    Nothing,
+}
+
+/// A body in the `surface` mode.
+pub(in crate::narrow) struct Body<'a> {
+    pub source: Source<'a>,
+    pub field: &'a dyn Field,
+    /// The field again, where it is a mesh's.
+    pub mesh: Option<&'a MeshField>,
+    pub radius: f64,
+}
+
+/// All contacts of `a` and `b`.
+pub(in crate::narrow) fn surface(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    let a_in_b = pose_b.inv_mul(pose_a);
+    let size = a.radius.min(b.radius);
+    let mut found = Collector::new(margin, size, out);
+    Pass::new(&a_in_b, b, size, None).run(&a.source, &mut found);
+    Pass::new(&a_in_b.inverse(), a, size, Some(&a_in_b)).run(&b.source, &mut found);
+    found.finish(pose_b);
+}
+

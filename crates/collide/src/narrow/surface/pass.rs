@@ -1,0 +1,206 @@
+//! The elements of one body against the field of the other: which are in reach, and what becomes of those that are.
+
+use super::super::reduce::Collector;
+use super::{Body, Source};
+use crate::surface::elements::Elements;
+use crate::surface::field::MeshField;
+use crate::surface::{Feature, Field, Hit, OVERHANG};
+use crate::{Contact, Mat3, NormalFrom, Pose, SphereTree, Vec3};
+use arrayvec::ArrayVec;
+use std::cell::Cell;
+
+/// Normals of an element, in the frame of the field.
+pub(super) type Normals = ArrayVec<Vec3, 12>;
+
+/// Slopes across an edge down to this are rounding's.
+pub(super) const ASIDE: f64 = 1e-6;
+
+/// The elements of one body against the field of the other.
+pub(super) struct Pass<'a> {
+    pub(super) pose: &'a Pose,
+    pub(super) rotation: Mat3,
+    pub(super) field: &'a dyn Field,
+    pub(super) mesh: Option<&'a MeshField>,
+    pub(super) size: f64,
+    /// In the second pass, where the field is A's: the pose of A in B.
+    pub(super) second: Option<&'a Pose>,
+    /// What a mesh's field says of points of a mesh, by their names: each is the end of several edges.
+    seen: [Cell<Option<(u32, Hit)>>; SEEN],
+}
+
+/// Points that are remembered.
+const SEEN: usize = 128;
+
+impl<'a> Pass<'a> {
+    pub(super) fn new(pose: &'a Pose, other: &Body<'a>, size: f64, second: Option<&'a Pose>) -> Pass<'a> {
+        let rotation = *pose.rotation.to_rotation_matrix().matrix();
+        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, seen: [const { Cell::new(None) }; SEEN] }
+    }
+
+    pub(super) fn run(&self, source: &Source, found: &mut Collector) {
+        match source {
+            Source::Mesh(tree, elements) => self.node(tree, elements, 0, found),
+            Source::Box(half) => self.block(half, found),
+            Source::Round { radius, half_length } => self.round(*radius, *half_length, found),
+            Source::Cylinder { radius, half_length } => self.cylinder(*radius, *half_length, found),
+            Source::Nothing => {}
+        }
+    }
+
+    pub(super) fn place(&self, local: &Vec3) -> Vec3 {
+        self.rotation * local + self.pose.translation.vector
+    }
+
+    fn node(&self, tree: &SphereTree, elements: &Elements, index: usize, found: &mut Collector) {
+        let ball = &tree.nodes()[index];
+        let (fine, only_points) = (self.field.bent(), self.field.linear());
+        if self.field.bound(&self.place(&ball.center)) - elements.reach_of(index, fine) > found.limit() {
+            return;
+        }
+        for point in elements.points_of(index) {
+            let at = self.place(&point.at);
+            let bound = self.field.bound(&at);
+            if bound <= found.limit() {
+                let normals: Normals = elements.normals_of(point).iter().map(|n| self.rotation * n).collect();
+                self.vertex(&at, &normals, elements.ways_of(point), point.index, found);
+            }
+            if only_points || bound - point.longest[usize::from(fine)] > found.limit() {
+                continue;
+            }
+            for edge in elements.edges_of(point, fine) {
+                self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
+            }
+        }
+        for child in ball.child_range() {
+            self.node(tree, elements, child, found);
+        }
+    }
+
+    fn block(&self, half: &Vec3, found: &mut Collector) {
+        let signs = |corner: u32| Vec3::from_fn(|k, _| if corner >> k & 1 == 1 { 1.0 } else { -1.0 });
+        for corner in 0..8 {
+            let normals: Normals = (0..3).map(|k| self.rotation.column(k) * signs(corner)[k]).collect();
+            let ways: [Vec3; 3] = std::array::from_fn(|k| Vec3::ith(k, -signs(corner)[k]));
+            self.point(&self.place(&signs(corner).component_mul(half)), 0.0, &normals, &ways, corner, found);
+        }
+        if self.field.linear() {
+            return;
+        }
+        for corner in 0..8 {
+            for k in (0..3).filter(|&k| corner >> k & 1 == 0) {
+                let ends = [corner, corner | 1 << k].map(|c| signs(c).component_mul(half));
+                let normals = [1, 2].map(|n| Vec3::ith((k + n) % 3, signs(corner)[(k + n) % 3]));
+                self.edge(&ends, 0.0, &normals, 3 * corner + k as u32, None, found);
+            }
+        }
+    }
+
+    fn round(&self, radius: f64, half_length: f64, found: &mut Collector) {
+        let ends = [-half_length, half_length].map(|z| Vec3::z() * z);
+        for (n, end) in ends.iter().enumerate().take(if half_length > 0.0 { 2 } else { 1 }) {
+            self.core_point(&self.place(end), radius, n as u32, found);
+        }
+        if half_length > 0.0 && !self.field.linear() {
+            self.edge(&ends, radius, &[], 0, None, found);
+        }
+    }
+
+    /// The end of a rounded body: every place of a mesh that it touches, the closest of others.
+    fn core_point(&self, at: &Vec3, radius: f64, index: u32, found: &mut Collector) {
+        let Some(mesh) = self.mesh else { return self.point(at, radius, &[], &[], index, found) };
+        if self.field.bound(at) - radius > found.limit() {
+            return;
+        }
+        let reach = (radius + found.limit()).max(0.0);
+        mesh.minima(at, reach, &mut |name, hit| {
+            let feature = (3 << 60 | u64::from(index) << 59) ^ (name & ((1 << 59) - 1)) ^ (name >> 62 << 57);
+            self.push(at, radius, &hit, point_normal(&hit), feature, found);
+        });
+    }
+
+    /// A point with its normals in the field's frame; `ways` are the directions of its edges in the element's own.
+    ///
+    /// Straight above or below a face it counts wherever it is. Near an edge or corner of the other body it counts only if it is
+    /// closest there: where one of its edges leads closer, that edge or its face makes the contact.
+    fn point(&self, at: &Vec3, radius: f64, normals: &[Vec3], ways: &[Vec3], index: u32, found: &mut Collector) {
+        if self.field.bound(at) - radius > found.limit() {
+            return;
+        }
+        self.point_at(at, radius, self.field.hit(at, normals, OVERHANG), ways, index, found);
+    }
+
+    /// A point of a mesh, known to be in reach.
+    fn vertex(&self, at: &Vec3, normals: &[Vec3], ways: &[Vec3], index: u32, found: &mut Collector) {
+        self.point_at(at, 0.0, self.hit_of(at, Some(index), normals, OVERHANG), ways, index, found);
+    }
+
+    /// What the field says of a place that may have a name.
+    pub(super) fn hit_of(&self, at: &Vec3, name: Option<u32>, normals: &[Vec3], beside: f64) -> Hit {
+        let (Some(mesh), Some(name)) = (self.mesh, name) else { return self.field.hit(at, normals, beside) };
+        let seen = &self.seen[name as usize % SEEN];
+        let nearest = match seen.get() {
+            Some((n, hit)) if n == name => hit,
+            _ => mesh.nearest(at),
+        };
+        seen.set(Some((name, nearest)));
+        mesh.hit_by(at, nearest, normals, beside)
+    }
+
+    fn point_at(&self, at: &Vec3, radius: f64, hit: Hit, ways: &[Vec3], index: u32, found: &mut Collector) {
+        let down = self.rotation.tr_mul(&hit.normal);
+        let closest = hit.feature == Feature::Face || ways.iter().all(|way| down.dot(way) >= -ASIDE);
+        self.push_if(hit.facing && closest, at, radius, &hit, point_normal(&hit), u64::from(index), found);
+    }
+
+    pub(super) fn push(&self, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64, found: &mut Collector) {
+        self.push_if(true, at, radius, hit, normal_from, feature, found);
+    }
+
+    /// One contact: a core point of the element and what the field says there. One that does not `fit` is kept in
+    /// reserve.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn push_if(&self, fits: bool, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64, found: &mut Collector) {
+        let gap = hit.distance - radius;
+        if gap.is_nan() || gap > found.limit() {
+            return;
+        }
+        let contact = Contact {
+            point: at - hit.normal * (radius + 0.5 * gap),
+            normal: hit.normal,
+            gap,
+            feature: feature << 1 | u64::from(self.second.is_some()),
+            core_a: radius,
+            core_b: hit.core,
+            normal_from,
+        };
+        let contact = match self.second {
+            None => contact,
+            Some(pose) => turned(contact, pose).flipped(),
+        };
+        if fits {
+            found.push(contact);
+        } else {
+            found.push_spare(contact);
+        }
+    }
+}
+
+/// What the normal of a point's contact turns with.
+pub(super) fn point_normal(hit: &Hit) -> NormalFrom {
+    match hit.feature {
+        Feature::Face => NormalFrom::FaceOfB,
+        Feature::Line(along) | Feature::Edge(along) => NormalFrom::LineOfB(along),
+        Feature::Point => NormalFrom::CorePoints,
+    }
+}
+
+/// The same contact in another frame.
+fn turned(contact: Contact, pose: &Pose) -> Contact {
+    let normal_from = match contact.normal_from {
+        NormalFrom::LineOfA(along) => NormalFrom::LineOfA(pose.rotation * along),
+        NormalFrom::LineOfB(along) => NormalFrom::LineOfB(pose.rotation * along),
+        other => other,
+    };
+    let point = (pose * nalgebra::Point3::from(contact.point)).coords;
+    Contact { point, normal: pose.rotation * contact.normal, normal_from, ..contact }
+}

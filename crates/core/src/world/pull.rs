@@ -1,0 +1,97 @@
+//! A hand that pulls at a point of a body: a damped spring to a point of the world.
+//!
+//! ```text
+//! K = Y Yᵀ                        inverse mass of the point, 3 x 3, from test impulses: the same for rigid bodies and links
+//! v⁺ = (v + h ω² d) / (1 + h ω)²   one implicit step of the critically damped spring d̈ = −ω² d − 2 ω ḋ
+//! F = K⁺ (v⁺ − v) / h             the force that gives the point this velocity, were it alone
+//! C = Z Zᵀ                        inverse inertia of the part, from test couples
+//! τ = C⁺ (w⁺ − w) / h             w⁺ = w / (1 + h ω/2): the grip takes the turning away, which no force at one point can
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | d | from the point to where it is wanted, m |
+//! | v, w | velocity of the point, angular velocity of the part |
+//! | ω | the spring's frequency, rad/s |
+//! | h | length of a frame, s |
+//! | Y, Z | whitened responses to unit impulses at the point, and to unit couples |
+//! | ⁺ of a matrix | pseudo-inverse: nothing is asked of directions in which the part cannot move |
+//!
+//! Stiffness and damping are in proportion to the mass that the point shows, so that a feather and a wrecking ball come to the hand alike, and each of the
+//! implicit steps is stable for any ω h. Under gravity g a body comes to rest g/ω² below the hand.
+
+use super::{World, WorldError};
+use crate::collidable::Collidable;
+use crate::site::{Site, Wrench};
+use crate::view::ObjectId;
+use nalgebra::Matrix3;
+use tumble_collide::Vec3;
+
+/// Directions in which the part is this many times harder to move than in the easiest count as closed to it.
+const CLOSED: f64 = 1e9;
+
+/// What is pulled, where at, where to, how hard.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pull {
+    /// The object.
+    pub id: ObjectId,
+    /// Its part.
+    pub part: usize,
+    /// The point that is held, in the part's frame, m.
+    pub point: Vec3,
+    /// Where it is wanted, world axes, m.
+    pub target: Vec3,
+    /// Frequency of the spring, rad/s, above 0; from rest a distance shrinks to 5 % in 4.7/ω.
+    pub frequency: f64,
+}
+
+impl World {
+    /// Pulls during the next frame. Returns the force, N, and the torque about the point that is held, N·m, world axes; zero on what does not move or has
+    /// no parts that impulses reach.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`], [`WorldError::NoPart`], [`WorldError::NotFinite`].
+    pub fn pull(&mut self, pull: &Pull) -> Result<Wrench, WorldError> {
+        let index = self.part(pull.id, pull.part, &[pull.point, pull.target, Vec3::repeat(pull.frequency)])?;
+        let entry = &self.core.table.slots[pull.id];
+        let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pull.part)) else { return Ok(Wrench::default()) };
+        let (site, dof, h) = (self.core.sites[index], entry.span.v.len(), self.core.settings.dt);
+        let held = site.pose.rotation * pull.point + site.position();
+        let (v, omega) = (site.velocity_at(&held), pull.frequency.max(0.0));
+        let wanted = (v + (pull.target - held) * (h * omega * omega)) / (1.0 + h * omega).powi(2);
+        let impulses = responses(collidable, pull.part, &site, dof, &held, [Vec3::x(), Vec3::y(), Vec3::z()]);
+        let force = mass(&impulses, dof) * (wanted - v) / h;
+        let slowed = site.angular_velocity * (1.0 / (1.0 + 0.5 * h * omega) - 1.0);
+        let torque = mass(&couples(collidable, pull.part, &site, dof), dof) * slowed / h;
+        self.apply_force(pull.id, pull.part, force, &held)?;
+        self.apply_torque(pull.id, pull.part, torque)?;
+        Ok(Wrench { torque, force })
+    }
+}
+
+/// Whitened responses to unit impulses at a point, a row of `dof` numbers each.
+fn responses(collidable: &dyn Collidable, part: usize, site: &Site, dof: usize, point: &Vec3, axes: [Vec3; 3]) -> Vec<f64> {
+    let mut y = vec![0.0; 3 * dof];
+    collidable.test_impulse(part, site, point, &axes, 1.0, &mut y);
+    y
+}
+
+/// The same of unit couples about x, y and z: a force along the next axis but one, an arm of 1 m along the next, and the force's opposite without it.
+fn couples(collidable: &dyn Collidable, part: usize, site: &Site, dof: usize) -> Vec<f64> {
+    let mut z = vec![0.0; 3 * dof];
+    for (k, row) in z.chunks_exact_mut(dof.max(1)).enumerate() {
+        let (arm, axis) = (Vec3::ith((k + 1) % 3, 1.0), Vec3::ith((k + 2) % 3, 1.0));
+        collidable.test_impulse(part, site, &(site.position() + arm), &[axis], 1.0, row);
+        collidable.test_impulse(part, site, &site.position(), &[axis], -1.0, row);
+    }
+    z
+}
+
+/// The pseudo-inverse of `Y Yᵀ`.
+fn mass(y: &[f64], dof: usize) -> Matrix3<f64> {
+    let k = Matrix3::from_fn(|r, c| (0..dof).map(|i| y[r * dof + i] * y[c * dof + i]).sum());
+    let mut eigen = k.symmetric_eigen();
+    let easiest = eigen.eigenvalues.max();
+    eigen.eigenvalues.apply(|x| *x = if *x * CLOSED > easiest && easiest > 0.0 { 1.0 / *x } else { 0.0 });
+    eigen.recompose()
+}

@@ -1,0 +1,447 @@
+//! A facet's side of a session: a state machine. It has no clock and no link; `now` and messages go in, messages and tasks come out.
+//!
+//! ```text
+//!  joining ──SNAPSHOT, STATE──► live: draw ──► READY ──PRESENT──► show ──► PRESENTED, and again
+//!     ▲                          │
+//!     └── silent for drop_after, REJOIN, link closed          REFUSED, END: over
+//! ```
+//!
+//! A state of a later frame stands for the PRESENT of the one that is drawn: the server would not have sent it before.
+
+use super::input::Input;
+use super::messages::{Done, FacetCounts, Join, Refusal, count};
+use super::mirror::Mirror;
+use super::server::Pace;
+use super::table::Snapshot;
+use super::transport::{Delivery, LinkEvent};
+use super::viewer::Viewer;
+use super::wire::{Fault, HEADER_BYTES, Hash, Header, Kind, VERSION, later, message, open};
+use std::time::Duration;
+use tumble_core::World;
+
+/// What a facet is told at the start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FacetOptions {
+    /// Its name in the cave file.
+    pub name: String,
+    /// BLAKE3 of the scene.
+    pub scene: [u8; 32],
+    /// Whether it wants exact messages (a replica) and not poses.
+    pub exact: bool,
+    /// When frames are shown; as the server's.
+    pub pace: Pace,
+    /// `drop_timeout_ms`: the server is lost when nothing was heard for so long.
+    pub drop_after: Duration,
+    /// How often it asks to be let in.
+    pub join_every: Duration,
+    /// Where the numbers of its joinings begin: another one at each start of the process.
+    pub seed: u64,
+}
+
+impl FacetOptions {
+    /// The defaults of a cave file.
+    pub fn new(name: &str, scene: [u8; 32], seed: u64) -> FacetOptions {
+        let ms = Duration::from_millis;
+        FacetOptions { name: name.to_owned(), scene, exact: false, pace: Pace::Lockstep, drop_after: ms(2000), join_every: ms(250), seed }
+    }
+}
+
+/// What a facet does next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Task {
+    /// Wait for a message.
+    Wait(Waiting),
+    /// [`begin`](FacetSession::begin), draw [`world`](FacetSession::world), and say [`drawn`](FacetSession::drawn).
+    Draw,
+    /// Show what was drawn, and say [`presented`](FacetSession::presented).
+    Present(u64),
+    /// Nothing any more.
+    Over(Over),
+}
+
+/// What a facet waits for: what its screen should say where it has no picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Waiting {
+    /// A server, for the first time.
+    Server,
+    /// A server: the one it had is lost. The last picture is old.
+    Lost,
+    /// A frame.
+    Frame,
+    /// The others: it has drawn the frame.
+    Others(u64),
+}
+
+/// Why it is over.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Over {
+    /// The server said that the run is over.
+    Ended,
+    /// The server does not let it in.
+    Refused(String),
+    /// It left.
+    Left,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Phase {
+    Joining,
+    Live,
+    Over(Over),
+}
+
+/// A state that waits to be drawn.
+struct Pending {
+    header: Header,
+    message: Vec<u8>,
+    arrived: Duration,
+}
+
+/// A facet's session.
+pub struct FacetSession {
+    options: FacetOptions,
+    mirror: Mirror,
+    phase: Phase,
+    lost: bool,
+    run: u64,
+    join: u64,
+    asked: Option<Duration>,
+    heard: Duration,
+    beaten: Duration,
+    resynced: Option<Duration>,
+    /// Frame of the newest snapshot.
+    listed: Option<u64>,
+    /// The newest frame that came.
+    newest: Option<u64>,
+    pending: Option<Pending>,
+    /// Came before its list of objects, or before the answer to JOIN.
+    early: Option<Pending>,
+    /// A list of objects that came while a frame is being drawn: it waits, since that frame is of the old one.
+    list: Option<Pending>,
+    /// Applied, and being drawn: frame and when it came.
+    drawing: Option<(u64, Duration)>,
+    /// Drawn: frame, what READY said, when it was drawn.
+    held: Option<(u64, Done, Duration)>,
+    show: bool,
+    shown: Option<(u64, Done)>,
+    counts: FacetCounts,
+    out: Vec<(Delivery, Vec<u8>)>,
+    close: bool,
+}
+
+impl FacetSession {
+    /// `base`: the world as the scene file makes it.
+    pub fn new(options: FacetOptions, base: World) -> FacetSession {
+        let mut session = FacetSession {
+            options, mirror: Mirror::new(base), phase: Phase::Joining, lost: false, run: 0, join: 0, asked: None, heard: Duration::ZERO,
+            beaten: Duration::ZERO, resynced: None, listed: None, newest: None, pending: None, early: None, list: None, drawing: None, held: None, show: false,
+            shown: None, counts: FacetCounts::default(), out: Vec::new(), close: false,
+        };
+        session.join_anew();
+        session
+    }
+
+    /// What to draw after [`begin`](Self::begin).
+    pub fn world(&self) -> &World {
+        self.mirror.world()
+    }
+
+    /// Who looks, and where the cave stands.
+    pub fn viewer(&self) -> &Viewer {
+        self.mirror.viewer()
+    }
+
+    /// What was counted.
+    pub fn counts(&self) -> FacetCounts {
+        self.counts
+    }
+
+    /// The frame shown last since the last joining, and what PRESENTED said of it.
+    pub fn shown(&self) -> Option<(u64, Done)> {
+        self.shown
+    }
+
+    /// What is to be sent.
+    pub fn outgoing(&mut self) -> Vec<(Delivery, Vec<u8>)> {
+        std::mem::take(&mut self.out)
+    }
+
+    /// Whether the link is to be closed, so that it looks for a server anew.
+    pub fn closing(&mut self) -> bool {
+        std::mem::take(&mut self.close)
+    }
+
+    /// What to do next.
+    pub fn task(&self) -> Task {
+        match (&self.phase, &self.held, &self.pending) {
+            (Phase::Over(why), ..) => Task::Over(why.clone()),
+            (_, Some((frame, ..)), _) if self.show => Task::Present(*frame),
+            (Phase::Joining, ..) => Task::Wait(if self.lost { Waiting::Lost } else { Waiting::Server }),
+            (_, Some((frame, ..)), _) => Task::Wait(Waiting::Others(*frame)),
+            (_, None, Some(_)) => Task::Draw,
+            (_, None, None) => Task::Wait(Waiting::Frame),
+        }
+    }
+
+    /// Applies the frame that waits to be drawn; its number. `None`: there is none, or it does not fit and was refused.
+    pub fn begin(&mut self) -> Option<u64> {
+        let Pending { header, message, arrived } = self.pending.take()?;
+        let applied = self.mirror.apply_state(header.frame, header.time_s, message.get(HEADER_BYTES..).unwrap_or(&[]));
+        if applied.is_err() {
+            count(&mut self.counts.refused);
+            return None;
+        }
+        self.drawing = Some((header.frame, arrived));
+        Some(header.frame)
+    }
+
+    /// The frame of [`begin`](Self::begin) is drawn. `image`: first 16 bytes of the BLAKE3 of its pixels, zeros where there are none.
+    pub fn drawn(&mut self, now: Duration, image: Hash) {
+        let Some((frame, arrived)) = self.drawing.take() else { return };
+        let done = Done { hash: self.mirror.hash(), image, took_us: micros(now.saturating_sub(arrived)) };
+        self.held = Some((frame, done, now));
+        self.show = self.options.pace == Pace::Latest || self.pending.is_some();
+        if self.options.pace == Pace::Lockstep {
+            self.answer(Kind::Ready, frame, &done);
+        }
+        if let Some(Pending { header, message, .. }) = self.list.take()
+            && self.on_snapshot(now, &header, &message).is_err()
+        {
+            count(&mut self.counts.refused);
+        }
+    }
+
+    /// The frame that was held is on the screen.
+    pub fn presented(&mut self, now: Duration) {
+        let Some((frame, done, since)) = self.held.take() else { return };
+        let done = Done { took_us: micros(now.saturating_sub(since)), ..done };
+        (self.show, self.shown) = (false, Some((frame, done)));
+        count(&mut self.counts.shown);
+        self.answer(Kind::Presented, frame, &done);
+    }
+
+    /// Sends what a user does; `false` while there is no server.
+    pub fn send_input(&mut self, input: &Input) -> bool {
+        let live = self.phase == Phase::Live;
+        if live {
+            self.send(Kind::Input, 0, |out| input.write(out));
+        }
+        live
+    }
+
+    /// Says good-bye.
+    pub fn leave(&mut self) {
+        if self.phase == Phase::Live {
+            self.send(Kind::Leave, 0, |_| {});
+        }
+        self.phase = Phase::Over(Over::Left);
+    }
+
+    /// Takes what the link reports; `bytes` is the message, if it is one.
+    pub fn on_event(&mut self, now: Duration, event: LinkEvent, bytes: &[u8]) {
+        match event {
+            LinkEvent::Opened => self.asked = None,
+            LinkEvent::Message => self.on_message(now, bytes),
+            LinkEvent::Closed(_) if self.phase == Phase::Live => self.lose(),
+            LinkEvent::Closed(_) => {}
+        }
+        self.advance(now);
+    }
+
+    /// Does what is due by now: call it whenever `recv` returns.
+    pub fn advance(&mut self, now: Duration) {
+        match self.phase {
+            Phase::Over(_) => {}
+            Phase::Joining => {
+                if self.asked.is_none_or(|asked| now >= asked.saturating_add(self.options.join_every)) {
+                    self.asked = Some(now);
+                    let join = Join { scene: self.options.scene, name: self.options.name.clone(), exact: self.options.exact };
+                    self.send(Kind::Join, 0, |out| join.write(out));
+                }
+            }
+            Phase::Live => {
+                if now >= self.heard.saturating_add(self.options.drop_after) {
+                    self.lose();
+                    self.close = true;
+                } else if now >= self.beaten.saturating_add(self.options.drop_after / 4) {
+                    self.beaten = now;
+                    let counts = self.counts;
+                    self.send(Kind::Beat, 0, |out| counts.write(out));
+                }
+            }
+        }
+    }
+
+    fn lose(&mut self) {
+        count(&mut self.counts.lost);
+        self.lost = true;
+        self.join_anew();
+    }
+
+    fn join_anew(&mut self) {
+        self.options.seed = self.options.seed.wrapping_add(1);
+        (self.phase, self.run, self.join, self.asked) = (Phase::Joining, 0, mixed(self.options.seed), None);
+        (self.listed, self.newest, self.resynced) = (None, None, None);
+        (self.pending, self.early, self.list, self.drawing, self.held, self.show, self.shown) = (None, None, None, None, None, false, None);
+    }
+
+    fn on_message(&mut self, now: Duration, bytes: &[u8]) {
+        if let Phase::Over(_) = self.phase {
+            return;
+        }
+        let taken = match open(bytes) {
+            Ok((header, payload)) => self.on_header(now, header, payload, bytes),
+            Err(Fault::Version(theirs)) if self.phase == Phase::Joining => {
+                let why = format!("the server speaks NetSync version {theirs}, this facet version {VERSION}: use the same build of tumble on both");
+                self.phase = Phase::Over(Over::Refused(why));
+                Ok(())
+            }
+            Err(fault) => Err(fault),
+        };
+        if let Err(fault) = taken {
+            count(if fault == Fault::Torn { &mut self.counts.torn } else { &mut self.counts.refused });
+        }
+    }
+
+    fn on_header(&mut self, now: Duration, header: Header, payload: &[u8], bytes: &[u8]) -> Result<(), Fault> {
+        let about_us = header.join == self.join;
+        let live = self.phase == Phase::Live && header.run == self.run;
+        match header.kind {
+            Kind::Snapshot if about_us && (live || self.phase == Phase::Joining) => {
+                if self.drawing.is_some() {
+                    self.list = Some(Pending { header, message: payload.to_vec(), arrived: now });
+                } else {
+                    self.on_snapshot(now, &header, payload)?;
+                }
+            }
+            Kind::Refused if about_us => self.phase = Phase::Over(Over::Refused(Refusal::read(payload)?.0)),
+            Kind::Rejoin if about_us && self.phase == Phase::Live => self.lose(),
+            Kind::Rejoin if about_us => {}
+            Kind::End if live || about_us => self.phase = Phase::Over(Over::Ended),
+            Kind::State if self.phase == Phase::Joining => self.keep_early(now, header, bytes),
+            Kind::State if live => return self.on_state(now, header, payload, bytes),
+            Kind::Present if live => self.on_present(header.frame),
+            Kind::Beat if live => {}
+            Kind::Snapshot | Kind::Refused | Kind::Rejoin | Kind::End | Kind::State | Kind::Present | Kind::Beat => {
+                count(&mut self.counts.stale);
+                return Ok(());
+            }
+            _ => return Err(Fault::Malformed("a kind that only facets send")),
+        }
+        self.heard = now;
+        Ok(())
+    }
+
+    fn on_snapshot(&mut self, now: Duration, header: &Header, payload: &[u8]) -> Result<(), Fault> {
+        self.heard = now;
+        if let Some(listed) = self.listed.filter(|listed| !later(header.frame, *listed)) {
+            count(if listed == header.frame { &mut self.counts.duplicate } else { &mut self.counts.stale });
+            return Ok(());
+        }
+        if self.phase == Phase::Live && Some(Snapshot::revision_of(payload)?) == self.mirror.revision() {
+            count(&mut self.counts.duplicate);
+            return Ok(());
+        }
+        self.mirror.apply_snapshot(payload)?;
+        (self.phase, self.run, self.listed, self.lost, self.resynced) = (Phase::Live, header.run, Some(header.frame), false, None);
+        if self.pending.take().is_some() {
+            count(&mut self.counts.missing); // it belonged to the old list
+        }
+        let early = self.early.take().filter(|early| early.header.run == self.run);
+        let fits = early.filter(|early| Mirror::revision_of(&early.message[HEADER_BYTES..]).ok() == self.mirror.revision());
+        fits.into_iter().for_each(|early| self.take_state(early));
+        Ok(())
+    }
+
+    fn on_state(&mut self, now: Duration, header: Header, payload: &[u8], bytes: &[u8]) -> Result<(), Fault> {
+        self.heard = now;
+        if Some(Mirror::revision_of(payload)?) == self.mirror.revision() {
+            self.take_state(Pending { header, message: bytes.to_vec(), arrived: now });
+            return Ok(());
+        }
+        if self.newest.is_some_and(|newest| !later(header.frame, newest)) {
+            count(&mut self.counts.stale);
+            return Ok(());
+        }
+        self.keep_early(now, header, bytes);
+        if self.resynced.is_none_or(|asked| now >= asked.saturating_add(self.options.join_every)) {
+            self.resynced = Some(now);
+            self.send(Kind::Resync, 0, |_| {});
+        }
+        Ok(())
+    }
+
+    fn keep_early(&mut self, now: Duration, header: Header, bytes: &[u8]) {
+        count(&mut self.counts.early);
+        self.early = Some(Pending { header, message: bytes.to_vec(), arrived: now });
+    }
+
+    fn take_state(&mut self, state: Pending) {
+        let frame = state.header.frame;
+        if let Some(newest) = self.newest {
+            if frame == newest {
+                count(&mut self.counts.duplicate);
+                return self.answer_again(frame);
+            }
+            if !later(frame, newest) {
+                return count(&mut self.counts.stale);
+            }
+            self.counts.missing = self.counts.missing.wrapping_add(frame.wrapping_sub(newest) - 1);
+        }
+        self.newest = Some(frame);
+        if self.pending.replace(state).is_some() {
+            count(&mut self.counts.missing);
+        }
+        self.show |= self.held.is_some();
+    }
+
+    fn on_present(&mut self, frame: u64) {
+        let held = self.held.as_ref().map(|(held, ..)| *held);
+        let shown = self.shown.map(|(shown, _)| shown);
+        if held == Some(frame) {
+            self.show = true;
+        } else if shown == Some(frame) {
+            count(&mut self.counts.duplicate);
+            self.answer_again(frame);
+        } else if self.newest.is_none_or(|newest| later(frame, newest) || frame == newest) {
+            count(&mut self.counts.early);
+        } else {
+            count(&mut self.counts.stale);
+        }
+    }
+
+    /// The server asks again: the answer was lost.
+    fn answer_again(&mut self, frame: u64) {
+        if let Some((held, done, _)) = self.held.filter(|(held, ..)| *held == frame) {
+            self.answer(Kind::Ready, held, &done);
+        } else if let Some((shown, done)) = self.shown.filter(|(shown, _)| *shown == frame) {
+            if self.options.pace == Pace::Lockstep {
+                self.answer(Kind::Ready, shown, &done);
+            }
+            self.answer(Kind::Presented, shown, &done);
+        }
+    }
+
+    fn answer(&mut self, kind: Kind, frame: u64, done: &Done) {
+        if self.phase == Phase::Live {
+            self.send(kind, frame, |out| done.write(out));
+        }
+    }
+
+    fn send(&mut self, kind: Kind, frame: u64, write: impl FnOnce(&mut Vec<u8>)) {
+        let header = Header { kind, run: self.run, join: self.join, frame, time_s: 0.0 };
+        self.out.push((Delivery::Reliable, message(&header, write)));
+    }
+}
+
+fn micros(duration: Duration) -> u32 {
+    u32::try_from(duration.as_micros()).unwrap_or(u32::MAX)
+}
+
+/// A number that looks nothing like its neighbours: splitmix64.
+pub(crate) fn mixed(seed: u64) -> u64 {
+    let mut z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}

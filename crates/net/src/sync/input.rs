@@ -1,0 +1,54 @@
+//! What the user does, on its way to the server (thesis §III.C): where the head is, what the wand points at, which keys are held.
+
+use super::viewer::{MAX_USERS, exact_pose, put_exact_pose};
+use super::wire::{Bytes, Fault};
+use tumble_collide::Pose;
+
+/// Most keys held at a time.
+pub const MAX_KEYS: usize = 32;
+
+/// The state of one user's devices; each message holds all of it, so that a lost one is mended by the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Input {
+    /// Number of the message, rising by one per message and user; wraps. The frame that shows it carries it ([`User::input`](super::User::input)).
+    pub sequence: u64,
+    /// Which user of the cave.
+    pub user: u16,
+    /// Head in the cave's frame, if it is tracked: the origin between the eyes (m), x to the right, y ahead, z up.
+    pub head: Option<Pose>,
+    /// Wand in the cave's frame, if there is one: it points along its y axis.
+    pub wand: Option<Pose>,
+    /// Held buttons of the wand, bit by bit; bit 0 picks and pulls.
+    pub buttons: u32,
+    /// Keys held, by their USB HID usage (page 7); at most [`MAX_KEYS`], the rest is left out.
+    pub keys: Vec<u16>,
+}
+
+impl Input {
+    /// Appends it.
+    pub fn write(&self, out: &mut Vec<u8>) {
+        out.extend(self.sequence.to_le_bytes());
+        out.extend(self.user.to_le_bytes());
+        out.extend([self.head.is_some() as u8 | (self.wand.is_some() as u8) << 1, self.keys.len().min(MAX_KEYS) as u8]);
+        out.extend(self.buttons.to_le_bytes());
+        [self.head, self.wand].iter().flatten().for_each(|pose| put_exact_pose(out, pose));
+        self.keys.iter().take(MAX_KEYS).for_each(|key| out.extend(key.to_le_bytes()));
+    }
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// [`Fault::Malformed`].
+    pub fn read(payload: &[u8]) -> Result<Input, Fault> {
+        let mut rest = Bytes(payload);
+        let (sequence, user, flags, keys, buttons) = (rest.u64()?, rest.u16()?, rest.u8()?, rest.u8()?, rest.u32()?);
+        if flags > 3 || keys as usize > MAX_KEYS || user as usize >= MAX_USERS {
+            return Err(Fault::Malformed("a flag that there is not, too many keys, or no such user"));
+        }
+        let mut pose = |bit: u8| if flags & bit != 0 { exact_pose(&mut rest).map(Some) } else { Ok(None) };
+        let (head, wand) = (pose(1)?, pose(2)?);
+        let keys = (0..keys).map(|_| rest.u16()).collect::<Result<_, _>>()?;
+        rest.end()?;
+        Ok(Input { sequence, user, head, wand, buttons, keys })
+    }
+}

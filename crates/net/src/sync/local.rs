@@ -1,0 +1,261 @@
+//! The transport within one process: queues behind a lock. Nothing is lost, so it is the reference for the others.
+
+use super::transport::{Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES, ServerLink};
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+struct Item {
+    facet: FacetNumber,
+    event: LinkEvent,
+    delivery: Delivery,
+    bytes: Vec<u8>,
+}
+
+/// One direction to one listener.
+#[derive(Default)]
+struct Queue {
+    items: VecDeque<Item>,
+    counters: Vec<LinkCounters>,
+}
+
+#[derive(Default)]
+struct Wires {
+    /// How many times a server and each facet were made; an end of an earlier making is deaf and dumb.
+    server: u64,
+    facets: Vec<u64>,
+    open: Vec<bool>,
+    up: Queue,
+    down: Vec<Queue>,
+}
+
+#[derive(Default)]
+struct Shared {
+    wires: Mutex<Wires>,
+    bell: Condvar,
+}
+
+/// Where ends of links are plugged in. An end that is dropped closes its connections; one that is made again opens new ones.
+#[derive(Clone)]
+pub struct Hub(Arc<Shared>);
+
+/// The server's end.
+pub struct LocalServer {
+    shared: Arc<Shared>,
+    made: u64,
+}
+
+/// A facet's end.
+pub struct LocalFacet {
+    shared: Arc<Shared>,
+    facet: FacetNumber,
+    made: u64,
+}
+
+impl Hub {
+    /// For so many facets, at most [`MAX_FACETS`].
+    pub fn new(facets: usize) -> Hub {
+        let n = facets.min(MAX_FACETS);
+        let counters = || vec![LinkCounters::default(); n];
+        let wires = Wires {
+            facets: vec![0; n], open: vec![false; n], up: Queue { items: VecDeque::new(), counters: counters() },
+            down: (0..n).map(|_| Queue { items: VecDeque::new(), counters: counters() }).collect(), server: 0,
+        };
+        Hub(Arc::new(Shared { wires: Mutex::new(wires), bell: Condvar::new() }))
+    }
+
+    /// A server's end; it takes the place of an earlier one.
+    pub fn server(&self) -> LocalServer {
+        let mut wires = lock(&self.0);
+        (0..wires.open.len()).for_each(|k| wires.close(k, Closed::Replaced, Closed::ByPeer));
+        wires.up.items.clear();
+        wires.server += 1;
+        (0..wires.open.len()).for_each(|k| wires.try_open(k));
+        self.0.bell.notify_all();
+        LocalServer { made: wires.server, shared: self.0.clone() }
+    }
+
+    /// A facet's end; it takes the place of an earlier one. `None`: the hub has no such facet.
+    pub fn facet(&self, facet: FacetNumber) -> Option<LocalFacet> {
+        let (mut wires, k) = (lock(&self.0), facet as usize);
+        let made = *wires.facets.get(k)? + 1;
+        wires.close(k, Closed::Replaced, Closed::ByPeer);
+        wires.down[k].items.clear();
+        wires.facets[k] = made;
+        wires.try_open(k);
+        self.0.bell.notify_all();
+        Some(LocalFacet { shared: self.0.clone(), facet, made })
+    }
+}
+
+fn lock(shared: &Shared) -> MutexGuard<'_, Wires> {
+    shared.wires.lock().unwrap_or_else(PoisonError::into_inner) // queues are whole between any two statements
+}
+
+impl Wires {
+    /// Opens a connection where both ends are there and none is open.
+    fn try_open(&mut self, k: usize) {
+        if !self.open[k] && self.server > 0 && self.facets[k] > 0 {
+            self.open[k] = true;
+            self.tell(k, LinkEvent::Opened, LinkEvent::Opened);
+            self.up.counters[k].opened += 1;
+            self.down[k].counters[k].opened += 1;
+        }
+    }
+
+    /// Closes a connection; what was under way is gone.
+    fn close(&mut self, k: usize, to_server: Closed, to_facet: Closed) {
+        if std::mem::take(&mut self.open[k]) {
+            self.up.items.retain(|item| item.facet as usize != k || item.event != LinkEvent::Message);
+            self.down[k].items.retain(|item| item.event != LinkEvent::Message);
+            self.tell(k, LinkEvent::Closed(to_server), LinkEvent::Closed(to_facet));
+        }
+    }
+
+    fn tell(&mut self, k: usize, server: LinkEvent, facet: LinkEvent) {
+        let item = |event| Item { facet: k as FacetNumber, event, delivery: Delivery::Reliable, bytes: Vec::new() };
+        self.up.items.push_back(item(server));
+        self.down[k].items.push_back(item(facet));
+    }
+
+    /// Puts a message into a queue.
+    fn post(&mut self, k: usize, up: bool, delivery: Delivery, bytes: &[u8]) -> bool {
+        let (sender, queue) = if up { (&mut self.down[k].counters[k], &mut self.up) } else { (&mut self.up.counters[k], &mut self.down[k]) };
+        if !self.open[k] || bytes.is_empty() || bytes.len() > MAX_MESSAGE_BYTES {
+            sender.unsent += 1;
+            return false;
+        }
+        sender.messages_out += 1;
+        sender.bytes_out += bytes.len() as u64;
+        if delivery == Delivery::Newest {
+            let before = queue.items.len();
+            queue.items.retain(|item| item.facet as usize != k || item.delivery != Delivery::Newest);
+            sender.superseded += (before - queue.items.len()) as u64;
+        }
+        let waiting: usize = queue.items.iter().filter(|item| item.facet as usize == k).map(|item| item.bytes.len()).sum();
+        if waiting + bytes.len() > MAX_QUEUED_BYTES {
+            let (server, facet) = if up { (Closed::ByPeer, Closed::Overrun) } else { (Closed::Overrun, Closed::ByPeer) };
+            self.close(k, server, facet);
+            self.try_open(k);
+            return false;
+        }
+        queue.items.push_back(Item { facet: k as FacetNumber, event: LinkEvent::Message, delivery, bytes: bytes.to_vec() });
+        true
+    }
+}
+
+/// Takes the next item, waiting until `timeout` is over.
+fn wait(shared: &Shared, timeout: Duration, mut next: impl FnMut(&mut Wires) -> Option<Item>) -> Option<Item> {
+    let until = Instant::now().checked_add(timeout);
+    let mut wires = lock(shared);
+    loop {
+        if let Some(item) = next(&mut wires) {
+            return Some(item);
+        }
+        let left = until.map_or(Duration::from_secs(1), |until| until.saturating_duration_since(Instant::now()));
+        if left.is_zero() {
+            return None;
+        }
+        wires = shared.bell.wait_timeout(wires, left).unwrap_or_else(PoisonError::into_inner).0;
+    }
+}
+
+fn received(counters: &mut LinkCounters, item: &Item) {
+    counters.messages_in += u64::from(item.event == LinkEvent::Message);
+    counters.bytes_in += item.bytes.len() as u64;
+}
+
+impl ServerLink for LocalServer {
+    fn send(&mut self, to: FacetNumber, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
+        let mut wires = lock(&self.shared);
+        let sent = wires.server == self.made && (to as usize) < wires.open.len() && wires.post(to as usize, false, delivery, message);
+        self.shared.bell.notify_all();
+        Ok(sent)
+    }
+
+    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
+        message.clear();
+        let item = wait(&self.shared, timeout, |wires| {
+            let item = if wires.server == self.made { wires.up.items.pop_front()? } else { return None };
+            received(&mut wires.up.counters[item.facet as usize], &item);
+            Some(item)
+        });
+        Ok(item.map(|item| {
+            *message = item.bytes;
+            (item.facet, item.event)
+        }))
+    }
+
+    fn close(&mut self, facet: FacetNumber) {
+        let mut wires = lock(&self.shared);
+        if wires.server == self.made && (facet as usize) < wires.open.len() {
+            wires.close(facet as usize, Closed::ByUs, Closed::ByPeer);
+            wires.try_open(facet as usize);
+            self.shared.bell.notify_all();
+        }
+    }
+
+    fn counters(&self, facet: FacetNumber) -> LinkCounters {
+        lock(&self.shared).up.counters.get(facet as usize).copied().unwrap_or_default()
+    }
+}
+
+impl Drop for LocalServer {
+    fn drop(&mut self) {
+        let mut wires = lock(&self.shared);
+        if wires.server == self.made {
+            (0..wires.open.len()).for_each(|k| wires.close(k, Closed::ByUs, Closed::ByPeer));
+            wires.up.items.clear();
+            wires.server = 0;
+            self.shared.bell.notify_all();
+        }
+    }
+}
+
+impl FacetLink for LocalFacet {
+    fn send(&mut self, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
+        let (mut wires, k) = (lock(&self.shared), self.facet as usize);
+        let sent = wires.facets[k] == self.made && wires.post(k, true, delivery, message);
+        self.shared.bell.notify_all();
+        Ok(sent)
+    }
+
+    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<LinkEvent>, LinkError> {
+        message.clear();
+        let k = self.facet as usize;
+        let item = wait(&self.shared, timeout, |wires| {
+            let item = if wires.facets[k] == self.made { wires.down[k].items.pop_front()? } else { return None };
+            received(&mut wires.down[k].counters[k], &item);
+            Some(item)
+        });
+        Ok(item.map(|item| {
+            *message = item.bytes;
+            item.event
+        }))
+    }
+
+    fn close(&mut self) {
+        let (mut wires, k) = (lock(&self.shared), self.facet as usize);
+        if wires.facets[k] == self.made {
+            wires.close(k, Closed::ByPeer, Closed::ByUs);
+            wires.try_open(k);
+            self.shared.bell.notify_all();
+        }
+    }
+
+    fn counters(&self) -> LinkCounters {
+        lock(&self.shared).down[self.facet as usize].counters[self.facet as usize]
+    }
+}
+
+impl Drop for LocalFacet {
+    fn drop(&mut self) {
+        let (mut wires, k) = (lock(&self.shared), self.facet as usize);
+        if wires.facets[k] == self.made {
+            wires.close(k, Closed::ByPeer, Closed::ByUs);
+            wires.down[k].items.clear();
+            wires.facets[k] = 0;
+            self.shared.bell.notify_all();
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! How an object looks that the scene file does not have: shapes, colours and poses, as bytes.
+//!
+//! A mesh that is drawn anywhere in the scene of the file travels as a reference (object and number of the visual); another one travels whole, once per
+//! snapshot and object.
+
+use super::viewer::{exact_pose, put_exact_pose};
+use super::wire::{Bytes, Fault, put_f64, put_name};
+use std::sync::Arc;
+use tumble_collide::{Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::{Look, Visual, World};
+
+/// Most pictures of one object.
+pub const MAX_VISUALS: usize = 4096;
+/// Most properties of a look.
+const MAX_PROPERTIES: usize = 64;
+/// Most bytes of a shader's or property's name.
+const MAX_TEXT: usize = 255;
+
+/// Appends the pictures. `base` is the world as the scene file makes it.
+pub(crate) fn put_looks(out: &mut Vec<u8>, visuals: &[Visual], base: &World) {
+    let visuals = &visuals[..visuals.len().min(MAX_VISUALS)];
+    out.extend((visuals.len() as u32).to_le_bytes());
+    for visual in visuals {
+        out.extend((visual.part as u32).to_le_bytes());
+        put_exact_pose(out, &visual.pose);
+        put_shape(out, &visual.shape, base);
+        put_look(out, &visual.look);
+    }
+}
+
+fn put_shape(out: &mut Vec<u8>, shape: &Shape, base: &World) {
+    let mut tagged = |tag: u8, numbers: &[f64]| {
+        out.push(tag);
+        put_f64(out, numbers);
+    };
+    match shape {
+        Shape::HalfSpace => tagged(0, &[]),
+        Shape::Sphere { radius } => tagged(1, &[*radius]),
+        Shape::Box { half_extents: h } => tagged(2, &[h.x, h.y, h.z]),
+        Shape::Capsule { radius, half_length } => tagged(3, &[*radius, *half_length]),
+        Shape::Cylinder(c) => tagged(4, &[c.radius(), c.half_length()]),
+        Shape::Mesh(mesh) => {
+            let same = |v: &Visual| matches!(&v.shape, Shape::Mesh(other) if Arc::ptr_eq(mesh, other));
+            let found = base.ids().iter().find_map(|&id| {
+                let object = base.object(id)?;
+                Some((object.name(), object.renderable()?.visuals().iter().position(same)?))
+            });
+            match found {
+                Some((name, index)) => {
+                    tagged(5, &[]);
+                    put_name(out, name);
+                    out.extend((index as u32).to_le_bytes());
+                }
+                None => {
+                    tagged(6, &[]);
+                    put_mesh(out, mesh.mesh());
+                }
+            }
+        }
+    }
+}
+
+fn put_mesh(out: &mut Vec<u8>, mesh: &TriMesh) {
+    out.extend((mesh.vertices.len() as u32).to_le_bytes());
+    out.extend((mesh.triangles.len() as u32).to_le_bytes());
+    mesh.vertices.iter().for_each(|v| put_f64(out, v.as_slice()));
+    out.extend(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()));
+}
+
+fn put_look(out: &mut Vec<u8>, look: &Look) {
+    let [r, g, b] = look.color;
+    out.extend([r, g, b, look.roughness, look.metallic].iter().flat_map(|x| x.to_le_bytes()));
+    put_text(out, &look.shader);
+    let properties = &look.properties[..look.properties.len().min(MAX_PROPERTIES)];
+    out.push(properties.len() as u8);
+    for (name, value) in properties {
+        put_text(out, name);
+        put_f64(out, &[*value]);
+    }
+}
+
+fn put_text(out: &mut Vec<u8>, text: &str) {
+    let end = (0..=text.len().min(MAX_TEXT)).rev().find(|&n| text.is_char_boundary(n)).unwrap_or(0);
+    out.push(end as u8);
+    out.extend(&text.as_bytes()[..end]);
+}
+
+/// Reads pictures of an object of `parts` parts; `base` as before.
+pub(crate) fn get_looks(bytes: &[u8], parts: usize, base: &World) -> Result<Vec<Visual>, Fault> {
+    let mut rest = Bytes(bytes);
+    let count = rest.u32()? as usize;
+    if count > MAX_VISUALS {
+        return Err(Fault::Malformed("more than 4096 pictures of an object"));
+    }
+    let mut visuals = Vec::new();
+    for _ in 0..count {
+        let part = rest.u32()? as usize;
+        if part >= parts {
+            return Err(Fault::Malformed("a picture of a part that there is not"));
+        }
+        let pose = exact_pose(&mut rest)?;
+        visuals.push(Visual { part, pose, shape: get_shape(&mut rest, base)?, look: get_look(&mut rest)? });
+    }
+    rest.end()?;
+    Ok(visuals)
+}
+
+fn get_shape(rest: &mut Bytes<'_>, base: &World) -> Result<Shape, Fault> {
+    let shape = match rest.u8()? {
+        0 => Ok(Shape::half_space()),
+        1 => Shape::sphere(rest.f64()?),
+        2 => Shape::cuboid(Vec3::from(rest.f64s::<3>()?)),
+        3 => rest.f64s().map(|[radius, half]| Shape::capsule(radius, half))?,
+        4 => rest.f64s().map(|[radius, half]| Shape::cylinder(radius, half))?,
+        5 => return mesh_of(base, rest.name()?, rest.u32()? as usize),
+        6 => {
+            let mesh = get_mesh(rest)?;
+            let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
+            let shape = Shape::mesh(mesh, &TreeSettings::default()).map(|(shape, _)| shape);
+            return shape.map_err(|why| Fault::Unfit(format!("a mesh of {vertices} vertices and {triangles} triangles: {why}")));
+        }
+        _ => return Err(Fault::Malformed("a shape that there is not")),
+    };
+    shape.map_err(|_| Fault::Malformed("a shape with a size that is not above 0"))
+}
+
+fn mesh_of(base: &World, name: &str, index: usize) -> Result<Shape, Fault> {
+    let object = base.find(name).and_then(|id| base.object(id));
+    let visual = object.and_then(|o| o.renderable()).and_then(|r| r.visuals().get(index));
+    visual.map(|v| v.shape.clone()).ok_or_else(|| Fault::Unfit(format!("picture {index} of '{name}', which the scene has not")))
+}
+
+fn get_mesh(rest: &mut Bytes<'_>) -> Result<TriMesh, Fault> {
+    let (vertices, triangles) = (rest.u32()? as u64, rest.u32()? as u64);
+    let mut corners = Bytes(rest.take(24 * vertices)?); // checked against what is there before anything is kept
+    let mut indices = Bytes(rest.take(12 * triangles)?);
+    let vertices: Vec<Vec3> = (0..vertices).map(|_| corners.f64s::<3>().map(Vec3::from)).collect::<Result<_, _>>()?;
+    let triangle = |_| Ok([indices.u32()?, indices.u32()?, indices.u32()?]);
+    let triangles: Vec<[u32; 3]> = (0..triangles).map(triangle).collect::<Result<_, Fault>>()?;
+    if triangles.iter().flatten().any(|&i| i as usize >= vertices.len()) {
+        return Err(Fault::Malformed("a triangle with a corner that there is not"));
+    }
+    Ok(TriMesh { vertices, triangles })
+}
+
+fn get_look(rest: &mut Bytes<'_>) -> Result<Look, Fault> {
+    let mut shares = [0.0f32; 5];
+    for x in &mut shares {
+        *x = f32::from_le_bytes(rest.array()?);
+        if !(0.0..=1.0).contains(x) {
+            return Err(Fault::Malformed("a colour or surface that is not within 0 to 1"));
+        }
+    }
+    let [r, g, b, roughness, metallic] = shares;
+    let shader = text(rest)?;
+    let count = rest.u8()?;
+    let properties = (0..count).map(|_| Ok((text(rest)?, rest.f64()?))).collect::<Result<_, Fault>>()?;
+    Ok(Look { color: [r, g, b], roughness, metallic, shader, properties })
+}
+
+fn text(rest: &mut Bytes<'_>) -> Result<String, Fault> {
+    let length = rest.u8()?;
+    let bytes = rest.take(length as u64)?;
+    std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| Fault::Malformed("a text that is not UTF-8"))
+}

@@ -1,0 +1,249 @@
+//! The client's side of the frame: payloads to a world that is drawn and never stepped.
+
+use super::drawn::Drawn;
+use super::looks::get_looks;
+use super::puppet::Puppet;
+use super::quantise::get_pose;
+use super::table::{Entry, EntryKind, Snapshot, parse_state, poses_bytes};
+use super::viewer::{VIEWER_NAME, Viewer};
+use super::wire::{Bytes, Fault, Hash};
+use std::collections::BTreeSet;
+use tumble_collide::Pose;
+use tumble_core::{Mode, ObjectId, World};
+
+/// What a slot of the list is here.
+struct Slot {
+    /// `None`: the viewer.
+    id: Option<ObjectId>,
+    kind: EntryKind,
+    still: bool,
+    parts: u16,
+}
+
+/// A copy of the server's world. Built from the same scene file; after that it follows messages.
+///
+/// A message is applied whole or not at all.
+pub struct Mirror {
+    base: World,
+    world: World,
+    slots: Vec<Slot>,
+    revision: Option<u32>,
+    viewer: Viewer,
+    frame: u64,
+    table: Hash,
+    scratch: Drawn,
+}
+
+impl Mirror {
+    /// `base`: the world as the scene file makes it.
+    pub fn new(base: World) -> Mirror {
+        let world = base.fork();
+        Mirror { base, world, slots: Vec::new(), revision: None, viewer: Viewer::default(), frame: 0, table: [0; 16], scratch: Drawn::default() }
+    }
+
+    /// What is to be drawn.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Who looks, and where the cave stands.
+    pub fn viewer(&self) -> &Viewer {
+        &self.viewer
+    }
+
+    /// The frame applied last.
+    pub fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    /// Number of the list of objects; `None` before the first snapshot.
+    pub fn revision(&self) -> Option<u32> {
+        self.revision
+    }
+
+    /// Takes the list of objects from a snapshot's payload.
+    ///
+    /// # Errors
+    /// [`Fault::Malformed`], [`Fault::Unfit`]; nothing has changed then.
+    pub fn apply_snapshot(&mut self, payload: &[u8]) -> Result<(), Fault> {
+        let snapshot = Snapshot::parse(payload)?;
+        let (mut world, mut names, mut slots) = (self.base.fork(), BTreeSet::new(), Vec::with_capacity(snapshot.entries.len()));
+        let mut viewers = 0;
+        for entry in &snapshot.entries {
+            if !names.insert(entry.name) {
+                return Err(Fault::Malformed("a name twice"));
+            }
+            viewers += usize::from(entry.kind == EntryKind::Viewer);
+        }
+        if viewers != 1 || snapshot.entries.last().is_none_or(|e| e.kind != EntryKind::Viewer || e.name != VIEWER_NAME) {
+            return Err(Fault::Malformed("a list that does not end with its one viewer"));
+        }
+        for &id in self.base.ids() {
+            let absent = self.base.object(id).is_some_and(|o| !names.contains(o.name()) && (has_parts(&self.base, id) || o.net_sync().is_some()));
+            if absent {
+                let _ = world.remove(id);
+            }
+        }
+        for entry in &snapshot.entries {
+            slots.push(self.slot(&mut world, entry)?);
+        }
+        (self.world, self.slots, self.revision) = (world, slots, Some(snapshot.revision));
+        self.hash_table();
+        Ok(())
+    }
+
+    /// Makes sure of one object of a list, and puts a still one where it stands.
+    fn slot(&self, world: &mut World, entry: &Entry<'_>) -> Result<Slot, Fault> {
+        let unfit = |why: &str| Fault::Unfit(format!("'{}' {why}", entry.name));
+        let (still, parts) = (entry.still, entry.parts);
+        if entry.kind == EntryKind::Viewer {
+            return Ok(Slot { id: None, kind: entry.kind, still, parts });
+        }
+        let still_bytes = if still { poses_bytes(parts) } else { 0 };
+        let (poses, looks) = entry.body.split_at_checked(still_bytes).ok_or(Fault::Malformed("it ends too early"))?;
+        let id = match (entry.described, world.find(entry.name)) {
+            (false, Some(id)) => id,
+            (false, None) => return Err(unfit("is not in this scene")),
+            (true, old) => {
+                let visuals = get_looks(looks, parts as usize, &self.base)?;
+                let _ = old.map(|id| world.remove(id));
+                let puppet = Puppet { name: entry.name.to_owned(), parts: parts as usize, visuals };
+                world.add_boxed(Box::new(puppet), Mode::Static).map_err(|why| unfit(&why.to_string()))?
+            }
+        };
+        if !entry.described && !looks.is_empty() {
+            return Err(Fault::Malformed("it goes on after its end"));
+        }
+        if entry.kind == EntryKind::Exact && world.object(id).is_none_or(|o| o.net_sync().is_none()) {
+            return Err(unfit("takes no messages"));
+        }
+        let here = world.view().span(id).map_or(0, |span| span.site.len());
+        if here != parts as usize {
+            return Err(unfit(&format!("has {here} parts here and {parts} on the server")));
+        }
+        let _ = world.set_alive(id, entry.alive);
+        if still {
+            let poses = read_poses(poses, parts)?;
+            world.show_at(id, &poses).map_err(|why| unfit(&why.to_string()))?;
+        }
+        Ok(Slot { id: Some(id), kind: entry.kind, still, parts })
+    }
+
+    /// The revision that a state's payload is for.
+    ///
+    /// # Errors
+    /// [`Fault::Malformed`].
+    pub fn revision_of(payload: &[u8]) -> Result<u32, Fault> {
+        parse_state(payload).map(|(revision, ..)| revision)
+    }
+
+    /// Applies a frame's payload.
+    ///
+    /// # Errors
+    /// [`Fault::Malformed`], [`Fault::Unfit`]; nothing has changed then.
+    pub fn apply_state(&mut self, frame: u64, time_s: f64, payload: &[u8]) -> Result<(), Fault> {
+        parse_state(payload)?.2.try_for_each(|record| record.map(drop))?;
+        let (revision, count, records) = parse_state(payload)?;
+        if Some(revision) != self.revision {
+            return Err(Fault::Unfit(format!("list of objects {revision}; here is {:?}", self.revision)));
+        }
+        let moving: Vec<usize> = (0..self.slots.len()).filter(|&i| !self.slots[i].still).collect();
+        if count as usize != moving.len() {
+            return Err(Fault::Malformed("not as many objects as move"));
+        }
+        let (mut viewer, mut shown, mut told) = (None, Vec::with_capacity(moving.len()), Vec::new());
+        for (record, &wanted) in records.zip(&moving) {
+            let (index, body) = record?;
+            let slot = &self.slots[wanted];
+            match (slot.id, slot.kind) {
+                _ if index != wanted => return Err(Fault::Malformed("objects out of order")),
+                (None, _) => viewer = Some(Viewer::read(body)?),
+                (Some(id), _) if body.is_empty() => shown.push((id, None)),
+                (Some(id), EntryKind::Exact) => told.push((id, body)),
+                (Some(id), _) => shown.push((id, Some(read_poses(body, slot.parts)?))),
+            }
+        }
+        let viewer = viewer.ok_or(Fault::Malformed("no viewer"))?;
+        self.tell(&told)?;
+        for (id, poses) in shown {
+            let _ = self.world.set_alive(id, poses.is_some()); // ids of our own list are there
+            let _ = poses.map(|poses| self.world.show_at(id, &poses)); // as many as there are parts, and finite
+        }
+        self.world.show_time(time_s);
+        (self.viewer, self.frame) = (viewer, frame);
+        Ok(())
+    }
+
+    /// Hands the objects their messages: all of them, or none.
+    fn tell(&mut self, told: &[(ObjectId, &[u8])]) -> Result<(), Fault> {
+        let before: Vec<Vec<f64>> = told.iter().map(|(id, _)| self.world.state_of(*id).unwrap_or_default().to_vec()).collect();
+        for (done, (id, data)) in told.iter().enumerate() {
+            if let Err(why) = self.world.read_data(*id, data) {
+                for ((id, _), x) in told[..done].iter().zip(&before) {
+                    let _ = self.world.write_state_of(*id, x); // it held these numbers before
+                }
+                return Err(Fault::Unfit(why.to_string()));
+            }
+        }
+        for (id, _) in told {
+            let _ = self.world.set_alive(*id, true);
+        }
+        Ok(())
+    }
+
+    /// The hash of what [`world`](Self::world) shows now, read from the world itself.
+    pub fn hash(&mut self) -> Hash {
+        let mut drawn = std::mem::take(&mut self.scratch).frame(self.frame, self.world.time(), self.table);
+        for slot in self.slots.iter().filter(|slot| !slot.still) {
+            let Some(id) = slot.id else {
+                drawn.bytes(|out| self.viewer.write(out));
+                continue;
+            };
+            let alive = self.world.status(id).is_some_and(|s| s.alive);
+            drawn.alive(alive);
+            if alive {
+                self.see(id, slot, &mut drawn);
+            }
+        }
+        let (hash, scratch) = drawn.hash();
+        self.scratch = scratch;
+        hash
+    }
+
+    fn see(&self, id: ObjectId, slot: &Slot, drawn: &mut Drawn) {
+        if slot.kind == EntryKind::Exact {
+            drawn.bytes(|out| {
+                self.world.get_data(id, out);
+            });
+            return;
+        }
+        for part in 0..slot.parts as usize {
+            self.world.site(id, part).iter().for_each(|site| drawn.pose(&site.pose));
+        }
+    }
+
+    fn hash_table(&mut self) {
+        let mut drawn = std::mem::take(&mut self.scratch).table();
+        for slot in &self.slots {
+            let Some(id) = slot.id else { continue };
+            drawn.name(self.world.object(id).map_or("", |o| o.name()));
+            drawn.alive(slot.still && self.world.status(id).is_some_and(|s| s.alive));
+            if slot.still {
+                self.see(id, slot, &mut drawn);
+            }
+        }
+        (self.table, self.scratch) = drawn.hash();
+    }
+}
+
+fn has_parts(world: &World, id: ObjectId) -> bool {
+    world.view().span(id).is_some_and(|span| !span.site.is_empty())
+}
+
+fn read_poses(body: &[u8], parts: u16) -> Result<Vec<Pose>, Fault> {
+    if body.len() != poses_bytes(parts) {
+        return Err(Fault::Malformed("not as many poses as parts"));
+    }
+    let mut rest = Bytes(body);
+    (0..parts).map(|_| get_pose(&mut rest)).collect()
+}

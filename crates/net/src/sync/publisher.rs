@@ -1,0 +1,219 @@
+//! The server's side of the frame: a world to payloads, and the hash that a client which drew them must answer.
+
+use super::drawn::Drawn;
+use super::looks::put_looks;
+use super::quantise::{get_pose, put_pose};
+use super::table::{Entry, EntryKind, MAX_OBJECTS, put_record, put_snapshot_head, put_state_head};
+use super::transport::MAX_MESSAGE_BYTES;
+use super::viewer::{VIEWER_NAME, Viewer};
+use super::wire::{Bytes, HEADER_BYTES, Hash};
+use std::sync::Arc;
+use tumble_collide::Pose;
+use tumble_core::{Mode, ObjectId, World};
+
+/// Why a world cannot be sent.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PublishError {
+    /// A pose that is no number.
+    #[error("part {part} of '{name}' stands at a pose that is not finite")]
+    NotFinite {
+        /// Object.
+        name: String,
+        /// Its part.
+        part: usize,
+    },
+    /// Too many objects, or one with too many parts.
+    #[error("{what}: {is}, at most {most} can be sent")]
+    TooMuch {
+        /// Of what.
+        what: String,
+        /// How many.
+        is: usize,
+        /// Allowed.
+        most: usize,
+    },
+    /// A name that the protocol needs.
+    #[error("an object is named '{VIEWER_NAME}', which is the viewer's name; rename it")]
+    Name,
+}
+
+/// A frame as it travels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Published {
+    /// Payload of STATE.
+    pub state: Vec<u8>,
+    /// What a client that drew it must answer.
+    pub hash: Hash,
+    /// Whether the list of objects is new: the snapshot goes first.
+    pub fresh: bool,
+    /// Poses beyond ±32768 m, which stand at the edge in the message.
+    pub saturated: u32,
+}
+
+struct Row {
+    id: ObjectId,
+    kind: EntryKind,
+    still: bool,
+    /// Whether it is alive, of a still one.
+    alive: bool,
+    parts: usize,
+    /// Poses of a still one, as the world has them.
+    poses: Vec<Pose>,
+}
+
+/// Makes the payloads of one kind of client: those that draw, or replicas that want exact messages.
+pub struct Publisher {
+    exact: bool,
+    base: World,
+    rows: Vec<Row>,
+    revision: u32,
+    snapshot: Arc<Vec<u8>>,
+    table: Hash,
+    scratch: Drawn,
+}
+
+impl Publisher {
+    /// `base`: the world as the scene file makes it, before the first step. `revision`: number before the first list's (it wraps).
+    pub fn new(base: &World, exact: bool, revision: u32) -> Publisher {
+        Publisher { exact, base: base.fork(), rows: Vec::new(), revision, snapshot: Arc::default(), table: [0; 16], scratch: Drawn::default() }
+    }
+
+    /// Payload of SNAPSHOT, of the last [`publish`](Self::publish); empty before the first.
+    pub fn snapshot(&self) -> Arc<Vec<u8>> {
+        self.snapshot.clone()
+    }
+
+    /// Makes the payloads of a frame.
+    ///
+    /// # Errors
+    /// [`PublishError`]; the list of objects is then made anew by the next call.
+    pub fn publish(&mut self, world: &World, viewer: &Viewer, frame: u64) -> Result<Published, PublishError> {
+        let fresh = self.snapshot.is_empty() || !self.still_fits(world);
+        if fresh {
+            self.snapshot = Arc::default();
+            self.relist(world)?;
+        }
+        let mut drawn = std::mem::take(&mut self.scratch).frame(frame, world.time(), self.table);
+        let moving = self.rows.iter().filter(|row| !row.still).count() + 1;
+        let mut state = Vec::with_capacity(8 + 28 * moving);
+        put_state_head(&mut state, self.revision, moving);
+        let mut saturated = 0;
+        for (index, row) in self.rows.iter().enumerate().filter(|(_, row)| !row.still) {
+            let alive = world.status(row.id).is_some_and(|s| s.alive);
+            drawn.alive(alive);
+            let mut fine = Ok(());
+            put_record(&mut state, index, |out| {
+                if alive {
+                    fine = put_row(out, row, world, &mut drawn, &mut saturated);
+                }
+            });
+            fine?;
+        }
+        drawn.bytes(|out| viewer.write(out));
+        put_record(&mut state, self.rows.len(), |out| viewer.write(out));
+        let (hash, scratch) = drawn.hash();
+        self.scratch = scratch;
+        fits("bytes of a frame", state.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
+        Ok(Published { state, hash, fresh, saturated })
+    }
+
+    fn still_fits(&self, world: &World) -> bool {
+        let mut listed = self.rows.iter();
+        for &id in world.ids() {
+            let Some((kind, still, alive, parts)) = self.class(world, id) else { continue };
+            let same = |row: &Row| {
+                let poses = || poses(world, id).eq(row.poses.iter().copied());
+                (row.id, row.kind, row.still, row.parts) == (id, kind, still, parts) && (!still || row.alive == alive && poses())
+            };
+            if !listed.next().is_some_and(same) {
+                return false;
+            }
+        }
+        listed.next().is_none()
+    }
+
+    /// What of an object travels: kind, whether it is still, whether it is alive, parts. `None`: nothing.
+    fn class(&self, world: &World, id: ObjectId) -> Option<(EntryKind, bool, bool, usize)> {
+        let (object, status) = (world.object(id)?, world.status(id)?);
+        let parts = world.view().span(id)?.site.len();
+        let known = self.base.object(id).is_some();
+        let exact = known && object.net_sync().is_some() && (self.exact || parts == 0);
+        match (exact, parts) {
+            (true, _) => Some((EntryKind::Exact, false, status.alive, parts)),
+            (false, 0) => None,
+            _ => Some((EntryKind::Poses, status.mode == Mode::Static, status.alive, parts)),
+        }
+    }
+
+    /// Lists the objects anew and writes the snapshot.
+    fn relist(&mut self, world: &World) -> Result<(), PublishError> {
+        self.revision = self.revision.wrapping_add(1);
+        self.rows.clear();
+        for &id in world.ids() {
+            if let Some((kind, still, alive, parts)) = self.class(world, id) {
+                let poses = if still { poses(world, id).collect() } else { Vec::new() };
+                self.rows.push(Row { id, kind, still, alive, parts, poses });
+            }
+        }
+        fits("objects", self.rows.len() + 1, MAX_OBJECTS)?;
+        let mut out = Vec::new();
+        put_snapshot_head(&mut out, self.revision, self.exact, self.rows.len() + 1);
+        let (mut drawn, mut body) = (std::mem::take(&mut self.scratch).table(), Vec::new());
+        for row in &self.rows {
+            let Some(object) = world.object(row.id) else { continue };
+            let (name, described) = (object.name(), self.base.object(row.id).is_none());
+            if name == VIEWER_NAME {
+                return Err(PublishError::Name);
+            }
+            fits(&format!("parts of '{name}'"), row.parts, u16::MAX as usize)?;
+            drawn.name(name);
+            drawn.alive(row.still && row.alive);
+            body.clear();
+            if row.still {
+                put_row(&mut body, row, world, &mut drawn, &mut 0)?;
+            }
+            if described {
+                put_looks(&mut body, object.renderable().map_or(&[], |r| r.visuals()), &self.base);
+            }
+            let entry = Entry { name, kind: row.kind, alive: row.alive, still: row.still, described, parts: row.parts as u16, body: &body };
+            entry.write(&mut out);
+        }
+        let viewer = Entry { name: VIEWER_NAME, kind: EntryKind::Viewer, alive: true, still: false, described: false, parts: 0, body: &[] };
+        viewer.write(&mut out);
+        fits("bytes of a snapshot", out.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
+        (self.table, self.scratch) = drawn.hash();
+        self.snapshot = Arc::new(out);
+        Ok(())
+    }
+}
+
+/// One object's body, and what of it will be seen.
+fn put_row(out: &mut Vec<u8>, row: &Row, world: &World, drawn: &mut Drawn, saturated: &mut u32) -> Result<(), PublishError> {
+    let start = out.len();
+    if row.kind == EntryKind::Exact {
+        world.get_data(row.id, out);
+        drawn.bytes(|seen| seen.extend(&out[start..]));
+        return Ok(());
+    }
+    for (part, pose) in poses(world, row.id).enumerate() {
+        if !pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite()) {
+            let name = world.object(row.id).map_or(String::new(), |o| o.name().to_string());
+            return Err(PublishError::NotFinite { name, part });
+        }
+        let start = out.len();
+        *saturated += u32::from(!put_pose(out, &pose));
+        if let Ok(sent) = get_pose(&mut Bytes(&out[start..])) {
+            drawn.pose(&sent);
+        }
+    }
+    Ok(())
+}
+
+fn poses(world: &World, id: ObjectId) -> impl Iterator<Item = Pose> + '_ {
+    let parts = world.view().span(id).map_or(0, |span| span.site.len());
+    (0..parts).filter_map(move |part| Some(world.site(id, part)?.pose))
+}
+
+fn fits(what: &str, is: usize, most: usize) -> Result<(), PublishError> {
+    if is <= most { Ok(()) } else { Err(PublishError::TooMuch { what: what.to_owned(), is, most }) }
+}

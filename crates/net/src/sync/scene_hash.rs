@@ -1,0 +1,42 @@
+//! By what a server and a facet know that they mean the same scene.
+
+use super::viewer::put_exact_pose;
+use super::wire::{put_f64, put_name};
+use tumble_collide::{Shape, TriMesh};
+use tumble_core::World;
+
+/// The BLAKE3 of a scene: the text of its file (lights, camera, sky), and everything in the world as it makes it that can be seen: names, modes, poses,
+/// shapes with every corner of every mesh, looks. So a mesh file that differs is found even where the scene file is the same.
+pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&(text.len() as u64).to_le_bytes());
+    hasher.update(text.as_bytes());
+    let mut out = Vec::new();
+    for &id in world.ids() {
+        out.clear();
+        let Some(object) = world.object(id) else { continue };
+        put_name(&mut out, object.name());
+        out.extend(format!("{:?}", world.status(id)).bytes());
+        let parts = world.view().span(id).map_or(0, |span| span.site.len());
+        (0..parts).filter_map(|part| world.site(id, part)).for_each(|site| put_exact_pose(&mut out, &site.pose));
+        for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
+            out.extend((visual.part as u64).to_le_bytes());
+            put_exact_pose(&mut out, &visual.pose);
+            match &visual.shape {
+                Shape::Mesh(mesh) => put_mesh(&mut out, mesh.mesh()),
+                Shape::Cylinder(c) => put_f64(&mut out, &[4.0, c.radius(), c.half_length()]),
+                other => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
+            }
+            out.extend(format!("{:?}", visual.look).bytes());
+        }
+        hasher.update(&(out.len() as u64).to_le_bytes());
+        hasher.update(&out);
+    }
+    *hasher.finalize().as_bytes()
+}
+
+fn put_mesh(out: &mut Vec<u8>, mesh: &TriMesh) {
+    out.extend((mesh.vertices.len() as u64).to_le_bytes());
+    mesh.vertices.iter().for_each(|v| put_f64(out, v.as_slice()));
+    out.extend(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()));
+}

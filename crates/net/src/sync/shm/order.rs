@@ -1,0 +1,230 @@
+//! Reliable order over a buffer that overflows: numbers, a memory of what was sent, and asking again.
+//!
+//! A reader that is slower than its buffer loses the *oldest* samples, so the newest always arrives and shows by its number what is missing. The reader
+//! asks for the first few of those again, at most as many as its buffer holds, and for the next when they came: it sets the pace itself.
+
+use super::wire::Head;
+use crate::sync::transport::{Delivery, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES};
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+/// Pieces asked for at once: below what a reader's buffer holds.
+const AT_ONCE: u64 = 6;
+/// When what was asked for has not come, it is asked for again.
+const PATIENCE: Duration = Duration::from_millis(5);
+/// Pieces held out of order.
+const MAX_PENDING: usize = 65_536;
+
+/// A piece that was sent.
+pub struct Kept {
+    /// For whom.
+    pub mask: u64,
+    /// Of a newest message.
+    pub newest: bool,
+    /// More of this message follows.
+    pub more: bool,
+    /// The bytes.
+    pub data: Vec<u8>,
+}
+
+/// What was sent and may be asked for again.
+#[derive(Default)]
+pub struct Memory {
+    first: u64,
+    kept: VecDeque<Kept>,
+    bytes: usize,
+    /// A buffer to use again: fresh memory costs more than the copy.
+    spare: Vec<u8>,
+}
+
+impl Memory {
+    /// The number of the next piece.
+    pub fn next(&self) -> u64 {
+        self.first + self.kept.len() as u64
+    }
+
+    /// Remembers the piece that was sent as [`next`](Self::next).
+    pub fn keep(&mut self, mask: u64, newest: bool, more: bool, bytes: &[u8]) {
+        let mut data = std::mem::take(&mut self.spare);
+        data.clear();
+        data.extend_from_slice(bytes);
+        self.bytes += data.len();
+        self.kept.push_back(Kept { mask, newest, more, data });
+    }
+
+    fn forget_first(&mut self) -> bool {
+        let Some(kept) = self.kept.pop_front() else { return false };
+        self.bytes -= kept.data.len();
+        self.first += 1;
+        if self.spare.capacity() < kept.data.capacity() {
+            self.spare = kept.data;
+        }
+        true
+    }
+
+    /// Forgets all before `number`.
+    pub fn forget_before(&mut self, number: u64) {
+        while self.first < number && self.forget_first() {}
+    }
+
+    /// Forgets beyond the cap; what is first then. Everyone who lacks an earlier piece cannot be served any more.
+    pub fn trim(&mut self, pieces: usize) -> u64 {
+        while (self.bytes > MAX_QUEUED_BYTES || self.kept.len() > pieces) && self.forget_first() {}
+        self.first
+    }
+
+    /// The pieces asked for, capped; `None` where one is forgotten.
+    pub fn again(&self, head: &Head) -> Option<impl Iterator<Item = (u64, &Kept)>> {
+        let until = head.until.min(head.number.saturating_add(AT_ONCE)).min(self.next());
+        let range = head.number..until;
+        (head.number >= self.first).then(|| range.filter_map(|number| Some((number, self.kept.get((number - self.first) as usize)?))))
+    }
+}
+
+/// A piece held out of order.
+struct Pending {
+    newest: bool,
+    more: bool,
+    mine: bool,
+    data: Vec<u8>,
+}
+
+/// A gap that will not close: more is held than may be.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Overrun;
+
+/// Puts pieces in order and joins them.
+pub struct Order {
+    next: u64,
+    pending: BTreeMap<u64, Pending>,
+    pending_bytes: usize,
+    partial: Vec<u8>,
+    asked: Option<(u64, Duration)>,
+}
+
+impl Order {
+    /// The first piece expected is `next`.
+    pub fn new(next: u64) -> Order {
+        Order { next, pending: BTreeMap::new(), pending_bytes: 0, partial: Vec::new(), asked: None }
+    }
+
+    /// The first number that was not taken.
+    pub fn next(&self) -> u64 {
+        self.next
+    }
+
+    /// Takes a piece; whole messages go to `deliver`.
+    pub fn take(&mut self, head: &Head, mine: bool, data: &[u8], mut deliver: impl FnMut(Delivery, Vec<u8>)) -> Result<(), Overrun> {
+        let mine = mine && !head.skip;
+        if head.number < self.next || self.pending.contains_key(&head.number) {
+            return Ok(());
+        }
+        if head.number > self.next {
+            if self.pending.len() >= MAX_PENDING || self.pending_bytes + data.len() > MAX_QUEUED_BYTES {
+                return Err(Overrun);
+            }
+            let data = if mine { data.to_vec() } else { Vec::new() };
+            self.pending_bytes += data.len();
+            self.pending.insert(head.number, Pending { newest: head.newest, more: head.more, mine, data });
+            return Ok(());
+        }
+        self.join(mine, head.newest, head.more, data, &mut deliver)?;
+        while let Some(piece) = self.pending.remove(&self.next) {
+            self.pending_bytes -= piece.data.len();
+            self.join(piece.mine, piece.newest, piece.more, &piece.data, &mut deliver)?;
+        }
+        Ok(())
+    }
+
+    /// What to ask for now, if anything: first and the one after the last.
+    pub fn ask(&mut self, now: Duration) -> Option<(u64, u64)> {
+        let known = *self.pending.keys().next()?;
+        if self.asked.is_some_and(|(until, at)| self.next < until && now < at + PATIENCE) {
+            return None;
+        }
+        let until = known.min(self.next + AT_ONCE);
+        self.asked = Some((until, now));
+        Some((self.next, until))
+    }
+
+    /// A buffer to build the next message in, where there is none.
+    pub fn lend(&mut self, buffer: Vec<u8>) {
+        if self.partial.is_empty() && self.partial.capacity() < buffer.capacity() {
+            self.partial = buffer;
+            self.partial.clear();
+        }
+    }
+
+    /// Whether something is missing.
+    pub fn has_gap(&self) -> bool {
+        !self.pending.is_empty()
+    }
+
+    fn join(&mut self, mine: bool, newest: bool, more: bool, data: &[u8], deliver: &mut impl FnMut(Delivery, Vec<u8>)) -> Result<(), Overrun> {
+        self.next += 1;
+        if !mine {
+            return Ok(());
+        }
+        if self.partial.len() + data.len() > MAX_MESSAGE_BYTES {
+            return Err(Overrun);
+        }
+        self.partial.extend_from_slice(data);
+        if !more {
+            let delivery = if newest { Delivery::Newest } else { Delivery::Reliable };
+            deliver(delivery, std::mem::take(&mut self.partial));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wire::Kind;
+    use super::*;
+
+    /// A buffer of 8 that drops the oldest, as safe overflow does, between a writer and a reader that looks rarely.
+    #[test]
+    fn a_slow_reader_gets_all_in_order() {
+        let (mut memory, mut order, mut buffer) = (Memory::default(), Order::new(0), VecDeque::new());
+        let mut got = Vec::new();
+        let head = |number, kept: &Kept| Head { number, mask: kept.mask, newest: kept.newest, more: kept.more, ..Head::new(Kind::Piece, 1) };
+        for round in 0..400u64 {
+            if round < 100 {
+                for _ in 0..round % 23 {
+                    let number = memory.next();
+                    let kept = Kept { mask: 1 << (number % 3 / 2), newest: false, more: number % 3 == 0, data: vec![number as u8; 3] };
+                    memory.keep(kept.mask, false, kept.more, &kept.data);
+                    buffer.push_back((head(number, &kept), kept.data));
+                }
+            }
+            while buffer.len() > 8 {
+                buffer.pop_front();
+            }
+            for (head, data) in buffer.drain(..) {
+                order.take(&head, head.mask == 1, &data, |_, message| got.push(message)).unwrap();
+            }
+            if let Some((number, until)) = order.ask(Duration::from_millis(round)) {
+                let asked = Head { number, until, ..Head::new(Kind::Again, 1) };
+                buffer.extend(memory.again(&asked).unwrap().map(|(number, kept)| (head(number, kept), kept.data.clone())));
+            }
+        }
+        // Numbers 3k and 3k + 1 are the two pieces of a message for this reader; 3k + 2 is for another.
+        let want: Vec<Vec<u8>> = (0..memory.next()).step_by(3).map(|k| [[k as u8; 3], [(k + 1) as u8; 3]].concat()).collect();
+        let whole = memory.next() as usize / 3 + usize::from(memory.next() % 3 == 2);
+        assert_eq!(order.next(), memory.next());
+        assert!(got.len() > 300 && got == want[..whole]);
+    }
+
+    #[test]
+    fn what_is_forgotten_cannot_be_asked_for() {
+        let mut memory = Memory::default();
+        for _ in 0..10 {
+            memory.keep(1, false, false, &[0]);
+        }
+        memory.forget_before(4);
+        let asked = |number| Head { number, until: u64::MAX, ..Head::new(Kind::Again, 1) };
+        assert!(memory.again(&asked(3)).is_none());
+        assert_eq!(memory.again(&asked(7)).unwrap().map(|(number, _)| number).collect::<Vec<_>>(), [7, 8, 9]);
+        assert_eq!(memory.trim(3), 7);
+    }
+}

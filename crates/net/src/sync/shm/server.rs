@@ -1,0 +1,304 @@
+//! The server's end of shared memory.
+
+use super::order::{Memory, Order};
+use super::ports::Ports;
+use super::wire::{HEAD, Head, Kind};
+use super::{PING, SILENCE, draw};
+use crate::sync::transport::{
+    Closed, Delivery, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused, ServerLink,
+};
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// Pieces remembered for those who missed them.
+const MEMORY: usize = 16_384;
+
+/// A facet that is connected.
+struct Connection {
+    number: u64,
+    order: Order,
+    /// The first piece it has not taken.
+    taken: u64,
+    heard: Duration,
+}
+
+/// What waits for the user.
+enum Waiting {
+    Event(LinkEvent),
+    Message(Delivery, Vec<u8>),
+}
+
+/// The server's end of shared memory.
+pub struct ShmServer {
+    ports: Ports,
+    reign: u64,
+    start: Instant,
+    connections: Vec<Option<Connection>>,
+    memory: Memory,
+    waiting: VecDeque<(FacetNumber, Waiting)>,
+    counters: Vec<LinkCounters>,
+    strangers: LinkCounters,
+    sent: Duration,
+}
+
+impl ShmServer {
+    /// Begins run `run` for facets with numbers below `facets`.
+    ///
+    /// Errors: iceoryx2 or the system refuses; the message names the service or the folder.
+    pub fn new(run: &str, facets: FacetNumber) -> Result<ShmServer, LinkError> {
+        let facets = facets.min(MAX_FACETS as FacetNumber);
+        let count = usize::from(facets);
+        Ok(ShmServer {
+            ports: Ports::serve(run, facets)?,
+            reign: draw()?,
+            start: Instant::now(),
+            connections: (0..count).map(|_| None).collect(),
+            memory: Memory::default(),
+            waiting: VecDeque::new(),
+            counters: vec![LinkCounters::default(); count],
+            strangers: LinkCounters::default(),
+            sent: Duration::ZERO,
+        })
+    }
+
+    fn mask_of(&self, to: &[FacetNumber]) -> u64 {
+        let connected = |facet: &&FacetNumber| self.connections.get(usize::from(**facet)).is_some_and(Option::is_some);
+        to.iter().filter(connected).fold(0, |mask, facet| mask | 1 << facet)
+    }
+
+    /// Writes once for all; wakes everyone; then remembers, which is not what anyone waits for.
+    fn publish(&mut self, mask: u64, delivery: Delivery, message: &[u8]) -> Result<(), LinkError> {
+        let mut chunks = message.chunks(self.ports.piece_bytes()).peekable();
+        let newest = delivery == Delivery::Newest;
+        while let Some(chunk) = chunks.next() {
+            let more = chunks.peek().is_some();
+            let head = Head { newest, more, mask, number: self.memory.next(), ..Head::new(Kind::Piece, self.reign) };
+            self.ports.publish(&head.bytes(), chunk)?;
+            if !more {
+                self.ports.wake()?;
+            }
+            for counters in of_mask(&mut self.counters, mask) {
+                counters.bytes_out += (HEAD + chunk.len()) as u64;
+            }
+            self.memory.keep(mask, newest, more, chunk);
+        }
+        self.sent = self.start.elapsed();
+        let first = self.memory.trim(MEMORY);
+        self.end_all(Closed::Overrun, |connection| connection.taken < first);
+        Ok(())
+    }
+
+    fn tell(&mut self, head: Head) -> Result<(), LinkError> {
+        self.sent = self.start.elapsed();
+        self.ports.publish(&head.bytes(), &[])?;
+        self.ports.wake()
+    }
+
+    fn take_all(&mut self) -> Result<(), LinkError> {
+        loop {
+            let mut sample = Vec::new();
+            if !self.ports.receive(|bytes| sample.extend_from_slice(&bytes[..bytes.len().min(HEAD + super::ports::UP_BYTES)]))? {
+                return Ok(());
+            }
+            self.take(&sample)?;
+        }
+    }
+
+    fn take(&mut self, sample: &[u8]) -> Result<(), LinkError> {
+        let (head, data) = match Head::parse(sample) {
+            Ok(parts) => parts,
+            Err(why) => {
+                self.strangers.refuse(why);
+                return Ok(());
+            }
+        };
+        let facet = usize::from(head.facet);
+        if facet >= self.connections.len() {
+            self.strangers.refuse(Refused::Stranger);
+            return Ok(());
+        }
+        self.counters[facet].bytes_in += sample.len() as u64;
+        if head.kind == Kind::Hello {
+            return self.welcome(&head);
+        }
+        let now = self.start.elapsed();
+        let known = |connection: &&mut Connection| connection.number == head.connection && head.reign == self.reign;
+        let Some(connection) = self.connections[facet].as_mut().filter(known) else {
+            self.counters[facet].refuse(Refused::Stale);
+            return Ok(());
+        };
+        connection.heard = now;
+        if head.until > self.memory.next() {
+            self.counters[facet].refuse(Refused::Torn);
+            return Ok(());
+        }
+        match head.kind {
+            Kind::Piece => {
+                connection.taken = connection.taken.max(head.until);
+                let waiting = &mut self.waiting;
+                let taken = connection.order.take(&head, true, data, |delivery, message| queue(waiting, head.facet, delivery, message));
+                if taken.is_err() {
+                    self.end(head.facet, Closed::Overrun);
+                }
+            }
+            Kind::Ping => connection.taken = connection.taken.max(head.until),
+            Kind::Again => self.send_again(&head)?,
+            Kind::Close => self.end(head.facet, Closed::ByPeer),
+            Kind::Hello | Kind::Welcome => self.counters[facet].refuse(Refused::Foreign),
+        }
+        Ok(())
+    }
+
+    fn welcome(&mut self, hello: &Head) -> Result<(), LinkError> {
+        let facet = usize::from(hello.facet);
+        let next = self.memory.next();
+        let same = self.connections[facet].as_ref().is_some_and(|connection| connection.number == hello.connection);
+        if !same {
+            self.end(hello.facet, Closed::Replaced);
+            let connection = Connection { number: hello.connection, order: Order::new(0), taken: next, heard: self.start.elapsed() };
+            self.connections[facet] = Some(connection);
+            self.counters[facet].opened += 1;
+            self.waiting.push_back((hello.facet, Waiting::Event(LinkEvent::Opened)));
+        }
+        let number = self.connections[facet].as_ref().map_or(next, |connection| connection.taken);
+        self.tell(Head { facet: hello.facet, connection: hello.connection, number, ..Head::new(Kind::Welcome, self.reign) })
+    }
+
+    /// Sends again what a slow facet missed; of the rest, that there is nothing.
+    fn send_again(&mut self, asked: &Head) -> Result<(), LinkError> {
+        let Some(pieces) = self.memory.again(asked) else {
+            self.end(asked.facet, Closed::Overrun);
+            return Ok(());
+        };
+        let bit = 1 << asked.facet;
+        for (number, kept) in pieces {
+            let skip = kept.mask & bit == 0;
+            let base = Head { facet: asked.facet, connection: asked.connection, ..Head::new(Kind::Piece, self.reign) };
+            let head = Head { newest: kept.newest, more: kept.more, skip, mask: bit, number, ..base };
+            let data = if skip { &[][..] } else { &kept.data };
+            self.ports.publish(&head.bytes(), data)?;
+            let counters = &mut self.counters[usize::from(asked.facet)];
+            counters.repeated += 1;
+            counters.bytes_out += (HEAD + data.len()) as u64;
+        }
+        self.ports.wake()
+    }
+
+    /// Pings, asks again, forgets what all have, and finds who is silent.
+    fn keep_house(&mut self) -> Result<(), LinkError> {
+        let now = self.start.elapsed();
+        for facet in 0..self.connections.len() {
+            let Some(connection) = &mut self.connections[facet] else { continue };
+            if let Some((number, until)) = connection.order.ask(now) {
+                let head = Head { facet: facet as u16, connection: connection.number, number, until, ..Head::new(Kind::Again, self.reign) };
+                self.tell(head)?;
+            }
+        }
+        if now >= self.sent + PING {
+            self.tell(Head::new(Kind::Ping, self.reign))?;
+        }
+        let next = self.memory.next();
+        let taken = self.connections.iter().flatten().map(|connection| connection.taken).min().unwrap_or(next);
+        self.memory.forget_before(taken);
+        if self.end_all(Closed::Silent, |connection| now >= connection.heard + SILENCE) {
+            self.ports.clean_up();
+        }
+        Ok(())
+    }
+
+    fn end_all(&mut self, why: Closed, is_over: impl Fn(&Connection) -> bool) -> bool {
+        let over: Vec<u16> = (0..self.connections.len() as u16).filter(|k| self.connections[usize::from(*k)].as_ref().is_some_and(&is_over)).collect();
+        over.iter().for_each(|facet| self.end(*facet, why));
+        !over.is_empty()
+    }
+
+    /// What an ended connection still had to tell is gone.
+    fn end(&mut self, facet: FacetNumber, why: Closed) {
+        if self.connections[usize::from(facet)].take().is_some() {
+            self.waiting.retain(|(of, what)| *of != facet || matches!(what, Waiting::Event(_)));
+            self.waiting.push_back((facet, Waiting::Event(LinkEvent::Closed(why))));
+        }
+    }
+}
+
+fn of_mask(counters: &mut [LinkCounters], mask: u64) -> impl Iterator<Item = &mut LinkCounters> {
+    counters.iter_mut().enumerate().filter(move |(facet, _)| mask >> facet & 1 == 1).map(|(_, counters)| counters)
+}
+
+/// A newest message that still waits is replaced.
+fn queue(waiting: &mut VecDeque<(FacetNumber, Waiting)>, facet: FacetNumber, delivery: Delivery, message: Vec<u8>) {
+    if delivery == Delivery::Newest {
+        waiting.retain(|(of, what)| *of != facet || !matches!(what, Waiting::Message(Delivery::Newest, _)));
+    }
+    waiting.push_back((facet, Waiting::Message(delivery, message)));
+}
+
+impl ServerLink for ShmServer {
+    fn send(&mut self, to: FacetNumber, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
+        Ok(self.send_all(&[to], delivery, message)? == 1)
+    }
+
+    fn send_all(&mut self, to: &[FacetNumber], delivery: Delivery, message: &[u8]) -> Result<usize, LinkError> {
+        let fits = (1..=MAX_MESSAGE_BYTES).contains(&message.len());
+        let mask = if fits { self.mask_of(to) } else { 0 };
+        for facet in to {
+            if let Some(counters) = self.counters.get_mut(usize::from(*facet)) {
+                let sent = mask >> facet & 1;
+                counters.messages_out += sent;
+                counters.unsent += 1 - sent;
+            }
+        }
+        if mask != 0 {
+            self.publish(mask, delivery, message)?;
+        }
+        Ok(mask.count_ones() as usize)
+    }
+
+    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
+        message.clear();
+        let end = self.start.elapsed() + timeout;
+        loop {
+            if self.waiting.is_empty() {
+                self.take_all()?;
+                self.keep_house()?;
+            }
+            match self.waiting.pop_front() {
+                Some((facet, Waiting::Event(event))) => return Ok(Some((facet, event))),
+                Some((facet, Waiting::Message(_, bytes))) => {
+                    *message = bytes;
+                    self.counters[usize::from(facet)].messages_in += 1;
+                    return Ok(Some((facet, LinkEvent::Message)));
+                }
+                None => {}
+            }
+            let left = end.saturating_sub(self.start.elapsed());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            let gap = self.connections.iter().flatten().any(|connection| connection.order.has_gap());
+            self.ports.wait(left.min(if gap { Duration::from_millis(2) } else { PING / 4 }))?;
+        }
+    }
+
+    fn close(&mut self, facet: FacetNumber) {
+        let Some(connection) = self.connections.get(usize::from(facet)).and_then(Option::as_ref) else { return };
+        // A facet that does not hear it finds the silence.
+        let _ = self.tell(Head { facet, connection: connection.number, ..Head::new(Kind::Close, self.reign) });
+        self.end(facet, Closed::ByUs);
+    }
+
+    fn counters(&self, facet: FacetNumber) -> LinkCounters {
+        self.counters.get(usize::from(facet)).copied().unwrap_or_default()
+    }
+
+    fn strangers(&self) -> LinkCounters {
+        self.strangers
+    }
+}
+
+impl Drop for ShmServer {
+    fn drop(&mut self) {
+        (0..self.connections.len() as u16).for_each(|facet| self.close(facet));
+        self.ports.clean_up();
+    }
+}

@@ -1,0 +1,129 @@
+//! How a session begins: four packets, and a cookie, so that the server keeps nothing for an address that cannot receive.
+//!
+//! ```text
+//! facet                                             server
+//!   Hello(nonce, facet), padded to 256 bytes    →            nothing kept
+//!                                               ←   Challenge(nonce, cookie), 106 bytes
+//!   Answer(nonce, facet, cookie), padded        →            cookie fits: the session is prepared
+//!                                               ←   Welcome(nonce, server's nonce, session), 106 bytes
+//!   Data: the first sealed packet               →            the session is live, and replaces an older one of this facet
+//! ```
+//!
+//! `cookie = BLAKE3-keyed(secret of this server's process, address ‖ nonce ‖ facet ‖ ten-second interval)`; that of the interval before is taken too.
+//! All four carry a tag by the handshake key: without the key file a machine gets no answer at all. A recorded Answer that is sent again gets the same
+//! Welcome again, or prepares a session that nobody can bring to life; it never touches a live one.
+
+use super::keys::Handshake;
+use super::packet::{self, HEADER, Header, Kind, TAG};
+use crate::sync::transport::{FacetNumber, Refused};
+use std::net::{IpAddr, SocketAddr};
+use std::time::Duration;
+
+/// Length of what asks: larger than every answer.
+pub const REQUEST_BYTES: usize = 256;
+const INTERVAL_S: u64 = 10;
+
+/// Facet: I am here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hello {
+    /// Fresh for each try to connect.
+    pub nonce: [u8; 32],
+    /// Who.
+    pub facet: FacetNumber,
+    /// The proof; zeros in a Hello.
+    pub cookie: [u8; 32],
+}
+
+/// Server: a nonce of the facet given back, and a cookie or the server's nonce.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// The facet's nonce.
+    pub nonce: [u8; 32],
+    /// The cookie (Challenge) or the server's nonce (Welcome).
+    pub value: [u8; 32],
+}
+
+impl Hello {
+    /// Writes a Hello or an Answer.
+    pub fn write(&self, kind: Kind, handshake: &Handshake, datagram: &mut Vec<u8>) {
+        packet::begin(datagram, Header { kind, session: 0, sequence: 0 });
+        datagram.extend_from_slice(&self.nonce);
+        datagram.extend_from_slice(&self.facet.to_le_bytes());
+        datagram.extend_from_slice(&self.cookie);
+        datagram.resize(REQUEST_BYTES - TAG, 0);
+        handshake.tag(datagram);
+    }
+
+    /// Reads one.
+    pub fn read(datagram: &[u8], handshake: &Handshake) -> Result<Hello, Refused> {
+        if datagram.len() != REQUEST_BYTES {
+            return Err(if datagram.len() < REQUEST_BYTES { Refused::Truncated } else { Refused::Oversize });
+        }
+        let body = handshake.open(datagram)?;
+        let (nonce, rest) = body.split_first_chunk().ok_or(Refused::Truncated)?;
+        let (facet, rest) = rest.split_first_chunk().ok_or(Refused::Truncated)?;
+        let (cookie, _) = rest.split_first_chunk().ok_or(Refused::Truncated)?;
+        Ok(Hello { nonce: *nonce, facet: FacetNumber::from_le_bytes(*facet), cookie: *cookie })
+    }
+}
+
+impl Reply {
+    /// Writes a Challenge or a Welcome.
+    pub fn write(&self, kind: Kind, session: u64, handshake: &Handshake, datagram: &mut Vec<u8>) {
+        packet::begin(datagram, Header { kind, session, sequence: 0 });
+        datagram.extend_from_slice(&self.nonce);
+        datagram.extend_from_slice(&self.value);
+        handshake.tag(datagram);
+    }
+
+    /// Reads one.
+    pub fn read(datagram: &[u8], handshake: &Handshake) -> Result<Reply, Refused> {
+        match datagram.len().cmp(&(HEADER + 64 + TAG)) {
+            std::cmp::Ordering::Less => return Err(Refused::Truncated),
+            std::cmp::Ordering::Greater => return Err(Refused::Oversize),
+            std::cmp::Ordering::Equal => {}
+        }
+        let body = handshake.open(datagram)?;
+        let (nonce, rest) = body.split_first_chunk().ok_or(Refused::Truncated)?;
+        let (value, _) = rest.split_first_chunk().ok_or(Refused::Truncated)?;
+        Ok(Reply { nonce: *nonce, value: *value })
+    }
+}
+
+/// Writes the server's word that it does not know a session: 42 bytes, less than any sealed packet has.
+pub fn write_unknown(session: u64, handshake: &Handshake, datagram: &mut Vec<u8>) {
+    packet::begin(datagram, Header { kind: Kind::Unknown, session, sequence: 0 });
+    handshake.tag(datagram);
+}
+
+/// Makes cookies and knows its own.
+pub struct Cookies([u8; 32]);
+
+impl Cookies {
+    /// With a secret of this process.
+    pub fn new(secret: [u8; 32]) -> Cookies {
+        Cookies(secret)
+    }
+
+    /// For this Hello from this address, now.
+    pub fn bake(&self, now: Duration, from: SocketAddr, hello: &Hello) -> [u8; 32] {
+        *self.of(now.as_secs() / INTERVAL_S, from, hello).as_bytes()
+    }
+
+    /// Whether the Answer carries a cookie for this address that is at most 20 s old.
+    pub fn fits(&self, now: Duration, from: SocketAddr, answer: &Hello) -> bool {
+        let interval = now.as_secs() / INTERVAL_S;
+        let given = blake3::Hash::from(answer.cookie);
+        [Some(interval), interval.checked_sub(1)].into_iter().flatten().any(|interval| self.of(interval, from, answer) == given)
+    }
+
+    fn of(&self, interval: u64, from: SocketAddr, hello: &Hello) -> blake3::Hash {
+        let address = match from.ip() {
+            IpAddr::V4(ip) => ip.to_ipv6_mapped().octets(),
+            IpAddr::V6(ip) => ip.octets(),
+        };
+        let mut hasher = blake3::Hasher::new_keyed(&self.0);
+        hasher.update(&address).update(&from.port().to_le_bytes()).update(&hello.nonce).update(&hello.facet.to_le_bytes());
+        hasher.update(&interval.to_le_bytes()).finalize()
+    }
+}

@@ -1,0 +1,219 @@
+//! Fragments in, whole messages out: reassembly under caps.
+//!
+//! A message is complete when each fragment is there or follows from the parity of its group. Reliable messages leave in the order of their numbers;
+//! of newest messages one leaves when it is complete, and all before it are forgotten.
+//!
+//! Memory is taken for bytes that have arrived, never for bytes that were announced.
+
+use super::frames::{Channel, FRAGMENT, Part, before};
+use crate::sync::transport::{Delivery, MAX_QUEUED_BYTES};
+use std::collections::{BTreeMap, VecDeque};
+
+/// Reliable messages under way at once; the other side starts no more.
+pub const RELIABLE_AHEAD: u32 = 256;
+/// Newest messages under way at once; the other side starts no more.
+pub const NEWEST_AHEAD: u32 = 4;
+/// Bytes of messages under way at once; the other side starts no more, or one message alone.
+pub const BYTES_AHEAD: usize = 32 << 20;
+
+/// A message in pieces.
+struct Assembly {
+    part: Part,
+    fragments: BTreeMap<u16, Box<[u8]>>,
+    parity: BTreeMap<u16, Box<[u8]>>,
+    groups: u16,
+}
+
+/// A fragment or a parity frame contradicts what was agreed, or what came before.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Contradiction;
+
+/// What has arrived of one connection.
+pub struct Inbox {
+    /// The first message that is not complete (reliable), and the one after the last that was delivered (newest).
+    next: [u32; 2],
+    assemblies: [BTreeMap<u32, Assembly>; 2],
+    held: usize,
+    ready: VecDeque<(Delivery, Vec<u8>)>,
+    ready_bytes: usize,
+    superseded: u64,
+}
+
+impl Inbox {
+    /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
+    pub fn new(first: u32) -> Inbox {
+        Inbox {
+            next: [first; 2],
+            assemblies: Default::default(),
+            held: 0,
+            ready: VecDeque::new(),
+            ready_bytes: 0,
+            superseded: 0,
+        }
+    }
+
+    /// What an acknowledgement says: messages before these are complete.
+    pub fn complete(&self) -> [u32; 2] {
+        self.next
+    }
+
+    /// Newest messages that a later one replaced; counted since this was asked last.
+    pub fn take_superseded(&mut self) -> u64 {
+        std::mem::take(&mut self.superseded)
+    }
+
+    /// The next message for the user.
+    pub fn pop(&mut self) -> Option<(Delivery, Vec<u8>)> {
+        let (delivery, message) = self.ready.pop_front()?;
+        self.ready_bytes -= message.len();
+        self.release();
+        Some((delivery, message))
+    }
+
+    /// Takes a fragment. One of a message that is complete is no fault: it was sent again.
+    pub fn fragment(&mut self, part: Part, index: u16, data: &[u8]) -> Result<(), Contradiction> {
+        let Some(assembly) = self.assembly(part)? else { return Ok(()) };
+        if assembly.fragments.contains_key(&index) {
+            return Ok(());
+        }
+        assembly.fragments.insert(index, data.into());
+        let recovered = if assembly.groups > 0 { assembly.recover(index % assembly.groups) } else { 0 };
+        self.held += data.len() + recovered;
+        self.release_if_whole(part);
+        Ok(())
+    }
+
+    /// Takes the parity of a group of fragments.
+    pub fn parity(&mut self, part: Part, group: u16, groups: u16, data: &[u8]) -> Result<(), Contradiction> {
+        let Some(assembly) = self.assembly(part)? else { return Ok(()) };
+        if assembly.groups != 0 && assembly.groups != groups {
+            return Err(Contradiction);
+        }
+        assembly.groups = groups;
+        if assembly.parity.insert(group, data.into()).is_some() {
+            return Ok(());
+        }
+        let recovered = assembly.recover(group);
+        self.held += data.len() + recovered;
+        self.release_if_whole(part);
+        Ok(())
+    }
+
+    /// The assembly of a message, begun if need be; `None` if the message is already complete.
+    fn assembly(&mut self, part: Part) -> Result<Option<&mut Assembly>, Contradiction> {
+        let channel = part.channel as usize;
+        let ahead = if part.channel == Channel::Reliable { RELIABLE_AHEAD } else { 1 << 24 };
+        if before(part.message, self.next[channel]) {
+            return Ok(None);
+        }
+        // Twice what the other side keeps to, because what it counts as done may still be held here.
+        if part.message.wrapping_sub(self.next[channel]) >= ahead || self.held > 2 * BYTES_AHEAD {
+            return Err(Contradiction);
+        }
+        if part.channel == Channel::Newest {
+            self.make_room(part.message);
+        }
+        let begun = || Assembly { part, fragments: BTreeMap::new(), parity: BTreeMap::new(), groups: 0 };
+        let assembly = self.assemblies[channel].entry(part.message).or_insert_with(begun);
+        if assembly.part == part { Ok(Some(assembly)) } else { Err(Contradiction) }
+    }
+
+    /// Of newest messages under way, forgets the oldest beyond twice what the other side keeps to.
+    fn make_room(&mut self, message: u32) {
+        let assemblies = &mut self.assemblies[Channel::Newest as usize];
+        while assemblies.len() >= 2 * NEWEST_AHEAD as usize && !assemblies.contains_key(&message) {
+            let next = self.next[Channel::Newest as usize];
+            let Some(oldest) = assemblies.keys().copied().min_by_key(|k| k.wrapping_sub(next)) else { return };
+            if let Some(gone) = assemblies.remove(&oldest) {
+                self.held -= gone.held();
+            }
+        }
+    }
+
+    fn release_if_whole(&mut self, part: Part) {
+        let channel = part.channel as usize;
+        if !self.assemblies[channel].get(&part.message).is_some_and(Assembly::whole) {
+            return;
+        }
+        if part.channel == Channel::Newest && let Some(assembly) = self.assemblies[channel].remove(&part.message) {
+            self.held -= assembly.held();
+            let gone: Vec<u32> = self.assemblies[channel].keys().copied().filter(|k| before(*k, part.message)).collect();
+            for gone in gone.iter().filter_map(|k| self.assemblies[channel].remove(k)) {
+                self.held -= gone.held();
+            }
+            self.superseded += u64::from(part.message.wrapping_sub(self.next[channel]));
+            self.next[channel] = part.message.wrapping_add(1);
+            self.deliver_newest(assembly.join());
+        }
+        self.release();
+    }
+
+    /// A newest message that still waits for the user is replaced.
+    fn deliver_newest(&mut self, message: Vec<u8>) {
+        if let Some(waiting) = self.ready.iter().position(|(delivery, _)| *delivery == Delivery::Newest)
+            && let Some((_, old)) = self.ready.remove(waiting)
+        {
+            self.ready_bytes -= old.len();
+            self.superseded += 1;
+        }
+        self.ready_bytes += message.len();
+        self.ready.push_back((Delivery::Newest, message));
+    }
+
+    /// Moves what is whole and in order to the user, as long as the user takes it.
+    fn release(&mut self) {
+        let next = &mut self.next[Channel::Reliable as usize];
+        let assemblies = &mut self.assemblies[Channel::Reliable as usize];
+        while self.ready_bytes < MAX_QUEUED_BYTES && assemblies.get(next).is_some_and(Assembly::whole) {
+            let Some(assembly) = assemblies.remove(next) else { return };
+            self.held -= assembly.held();
+            let message = assembly.join();
+            self.ready_bytes += message.len();
+            self.ready.push_back((Delivery::Reliable, message));
+            *next = next.wrapping_add(1);
+        }
+    }
+}
+
+impl Assembly {
+    fn whole(&self) -> bool {
+        self.fragments.len() == usize::from(self.part.fragments())
+    }
+
+    fn held(&self) -> usize {
+        self.fragments.values().chain(self.parity.values()).map(|piece| piece.len()).sum()
+    }
+
+    fn join(self) -> Vec<u8> {
+        let mut message = Vec::with_capacity(self.part.total as usize);
+        self.fragments.values().for_each(|piece| message.extend_from_slice(piece));
+        message
+    }
+
+    /// `missing = parity ⊕ the others`, where one of the group is missing. How many bytes that gave.
+    fn recover(&mut self, group: u16) -> usize {
+        let Some(parity) = self.parity.get(&group) else { return 0 };
+        let members = (group..self.part.fragments()).step_by(usize::from(self.groups));
+        let mut missing = members.clone().filter(|index| !self.fragments.contains_key(index));
+        let (Some(lost), None) = (missing.next(), missing.next()) else { return 0 };
+        let mut piece = parity.clone();
+        for other in members.filter_map(|index| self.fragments.get(&index)) {
+            xor(&mut piece, other);
+        }
+        let length = self.part.length(lost);
+        self.fragments.insert(lost, piece[..length].into());
+        length
+    }
+}
+
+/// `into ^= other`, where the shorter `other` counts as padded with zeros.
+pub fn xor(into: &mut [u8], other: &[u8]) {
+    into.iter_mut().zip(other).for_each(|(a, b)| *a ^= b);
+}
+
+/// The parity of a group of a message's fragments.
+pub fn parity(message: &[u8], group: u16, groups: u16) -> [u8; FRAGMENT] {
+    let mut parity = [0; FRAGMENT];
+    message.chunks(FRAGMENT).skip(usize::from(group)).step_by(usize::from(groups)).for_each(|fragment| xor(&mut parity, fragment));
+    parity
+}

@@ -1,0 +1,241 @@
+//! Keys: from the file that all machines of a cave share, to the two keys of each session.
+//!
+//! | name | what |
+//! |---|---|
+//! | pre-shared key | 32 bytes that only the machines of this cave know |
+//! | handshake key | `BLAKE3-derive("… handshake", pre-shared key)`: tags what is sent before there is a session |
+//! | session keys | `BLAKE3-derive("… facet to server", pre-shared key ‖ facet's nonce ‖ server's nonce ‖ session ‖ facet)`, and the same the other way |
+//!
+//! Both sides give a fresh nonce of 32 bytes, so no session ever uses the keys of another one, and a packet of one direction, facet or session is a
+//! forgery in every other. Losing the key file opens the sessions recorded before: there is no forward secrecy, because there is no other secret.
+
+use super::packet::{self, HEADER, Header, MAX_DATAGRAM, TAG};
+use crate::sync::transport::{FacetNumber, LinkError, Refused};
+use chacha20poly1305::aead::{AeadInOut, Generate, Key, KeyInit};
+use chacha20poly1305::{ChaCha20Poly1305, Nonce, Tag};
+use std::path::Path;
+
+const HANDSHAKE: &str = "tumble-net udp v1 handshake";
+const TO_SERVER: &str = "tumble-net udp v1 facet to server";
+const TO_FACET: &str = "tumble-net udp v1 server to facet";
+const ENTROPY: &str = "tumble-net udp v1 random numbers of one process";
+
+/// The key that all machines of a cave share.
+#[derive(Clone)]
+pub struct SharedKey {
+    bytes: [u8; 32],
+    secret: bool,
+}
+
+impl std::fmt::Debug for SharedKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(if self.secret { "SharedKey(secret)" } else { "SharedKey(none)" })
+    }
+}
+
+impl SharedKey {
+    /// No secret: damage is still found, a forger is not. Only loopback is bound with it.
+    pub fn none() -> SharedKey {
+        SharedKey { bytes: [0; 32], secret: false }
+    }
+
+    /// A key from its bytes.
+    pub fn new(bytes: [u8; 32]) -> SharedKey {
+        SharedKey { bytes, secret: true }
+    }
+
+    /// Whether this is a secret.
+    pub fn is_secret(&self) -> bool {
+        self.secret
+    }
+
+    /// Reads a key file: 64 hexadecimal digits (32 bytes), white space around them.
+    ///
+    /// Errors, each naming the file and what would be right: it cannot be read, others than its owner may read it, or it holds something else.
+    pub fn read(path: &Path) -> Result<SharedKey, LinkError> {
+        let refuse = |why: String| LinkError::Other(format!("key file {}: {why}", path.display()));
+        let file = std::fs::File::open(path).map_err(|why| LinkError::Io { what: format!("key file {}", path.display()), why })?;
+        let about = file.metadata().map_err(|why| LinkError::Io { what: format!("key file {}", path.display()), why })?;
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = about.permissions().mode() & 0o777;
+            if mode & 0o077 != 0 {
+                return Err(refuse(format!("mode {mode:03o} lets others read it; run: chmod 600 {}", path.display())));
+            }
+        }
+        let wanted = "wanted are 64 hexadecimal digits (32 bytes); make one with: head -c 32 /dev/urandom | od -An -tx1 | tr -d ' \\n'";
+        if about.len() > 256 {
+            return Err(refuse(format!("{} bytes long; {wanted}", about.len())));
+        }
+        let mut text = Vec::new();
+        std::io::Read::read_to_end(&mut std::io::Read::take(file, 256), &mut text)
+            .map_err(|why| LinkError::Io { what: format!("key file {}", path.display()), why })?;
+        let text = String::from_utf8(text).map_err(|_| refuse(format!("not text; {wanted}")))?;
+        let digits = text.trim().as_bytes();
+        if digits.len() != 64 {
+            return Err(refuse(format!("{} digits; {wanted}", digits.len())));
+        }
+        let mut bytes = [0; 32];
+        for (k, pair) in digits.chunks_exact(2).enumerate() {
+            let digit = |at: usize| (pair[at] as char).to_digit(16).ok_or_else(|| refuse(format!("character {} is no hexadecimal digit; {wanted}", 2 * k + at + 1)));
+            bytes[k] = (digit(0)? * 16 + digit(1)?) as u8;
+        }
+        if bytes == [0; 32] {
+            return Err(refuse(format!("all zeros; {wanted}")));
+        }
+        Ok(SharedKey::new(bytes))
+    }
+}
+
+/// Random bytes: in a process from the operating system, in a test from a seed.
+pub struct Entropy {
+    key: [u8; 32],
+    counter: u64,
+}
+
+impl Entropy {
+    /// From the operating system.
+    pub fn system() -> Result<Entropy, LinkError> {
+        let key = Key::<ChaCha20Poly1305>::try_generate().map_err(|why| LinkError::Other(format!("the system gives no random numbers: {why}")))?;
+        Ok(Entropy { key: key.into(), counter: 0 })
+    }
+
+    /// From a seed: the same numbers each time. For tests alone.
+    pub fn seeded(seed: u64) -> Entropy {
+        Entropy { key: blake3::derive_key(ENTROPY, &seed.to_le_bytes()), counter: 0 }
+    }
+
+    /// The next 32 bytes.
+    pub fn next(&mut self) -> [u8; 32] {
+        self.counter += 1;
+        *blake3::keyed_hash(&self.key, &self.counter.to_le_bytes()).as_bytes()
+    }
+
+    /// The next number; never 0.
+    pub fn next_u64(&mut self) -> u64 {
+        let [a, b, c, d, e, f, g, h, ..] = self.next();
+        u64::from_le_bytes([a, b, c, d, e, f, g, h]).max(1)
+    }
+}
+
+/// Tags what is sent before there is a session.
+#[derive(Clone)]
+pub struct Handshake([u8; 32]);
+
+impl Handshake {
+    /// Of this cave.
+    pub fn new(shared: &SharedKey) -> Handshake {
+        Handshake(blake3::derive_key(HANDSHAKE, &shared.bytes))
+    }
+
+    /// Ends a datagram begun by [`packet::begin`]: length, tag, checksum.
+    pub fn tag(&self, datagram: &mut Vec<u8>) {
+        packet::set_length(datagram);
+        let tag = self.of(datagram);
+        packet::finish(datagram, &tag);
+    }
+
+    /// The body, if the tag fits.
+    pub fn open<'a>(&self, datagram: &'a [u8]) -> Result<&'a [u8], Refused> {
+        let (covered, tag) = datagram.split_at(datagram.len() - TAG);
+        // Compared in constant time, as one hash with another.
+        let (mut have, mut want) = ([0; 32], [0; 32]);
+        have[..TAG].copy_from_slice(tag);
+        want[..TAG].copy_from_slice(&self.of(covered));
+        if blake3::Hash::from(have) == blake3::Hash::from(want) { Ok(&covered[HEADER..]) } else { Err(Refused::Forged) }
+    }
+
+    fn of(&self, covered: &[u8]) -> [u8; TAG] {
+        let mut hasher = blake3::Hasher::new_keyed(&self.0);
+        hasher.update(&packet::associated(covered));
+        hasher.update(&covered[HEADER..]);
+        let mut tag = [0; TAG];
+        tag.copy_from_slice(&hasher.finalize().as_bytes()[..TAG]);
+        tag
+    }
+}
+
+/// Which end of a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The server's.
+    Server,
+    /// A facet's.
+    Facet,
+}
+
+/// What both sides agreed on.
+#[derive(Clone, Copy)]
+pub struct Agreement {
+    /// The session's number, drawn by the server.
+    pub session: u64,
+    /// Whose it is.
+    pub facet: FacetNumber,
+    /// Drawn by the facet.
+    pub facet_nonce: [u8; 32],
+    /// Drawn by the server.
+    pub server_nonce: [u8; 32],
+}
+
+/// Seals what one side sends and opens what it receives.
+pub struct Seal {
+    session: u64,
+    outgoing: ChaCha20Poly1305,
+    incoming: ChaCha20Poly1305,
+    next: u64,
+}
+
+impl Seal {
+    /// The keys of `side`. `first` is the first sequence number: 0 but in tests of the wrap.
+    pub fn new(shared: &SharedKey, agreed: &Agreement, side: Side, first: u64) -> Seal {
+        let material =
+            [&shared.bytes[..], &agreed.facet_nonce, &agreed.server_nonce, &agreed.session.to_le_bytes(), &agreed.facet.to_le_bytes()].concat();
+        let cipher = |context| ChaCha20Poly1305::new(&blake3::derive_key(context, &material).into());
+        let (outgoing, incoming) = match side {
+            Side::Server => (cipher(TO_FACET), cipher(TO_SERVER)),
+            Side::Facet => (cipher(TO_SERVER), cipher(TO_FACET)),
+        };
+        Seal { session: agreed.session, outgoing, incoming, next: first }
+    }
+
+    /// The sequence number of the next packet; `None` when they are used up: a number is never used twice under one key.
+    pub fn next_sequence(&self) -> Option<u64> {
+        (self.next < u64::MAX).then_some(self.next)
+    }
+
+    /// Writes the next packet with this body. `false`: the sequence numbers are used up, or the body is too long; nothing was written.
+    pub fn close(&mut self, body: &[u8], datagram: &mut Vec<u8>) -> bool {
+        let Some(sequence) = self.next_sequence().filter(|_| HEADER + body.len() + TAG <= MAX_DATAGRAM) else {
+            return false;
+        };
+        packet::begin(datagram, Header { kind: packet::Kind::Data, session: self.session, sequence });
+        datagram.extend_from_slice(body);
+        packet::set_length(datagram);
+        let covered = packet::associated(datagram);
+        let Ok(tag) = self.outgoing.encrypt_inout_detached(&nonce(sequence), &covered, (&mut datagram[HEADER..]).into()) else {
+            return false; // only for bodies of gigabytes
+        };
+        packet::finish(datagram, &tag.into());
+        self.next += 1;
+        true
+    }
+
+    /// The body of a packet, opened into `body`.
+    pub fn open(&self, header: &Header, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
+        let (covered, tag) = datagram.split_at(datagram.len() - TAG);
+        body.clear();
+        body.extend_from_slice(&covered[HEADER..]);
+        let tag = Tag::try_from(tag).map_err(|_| Refused::Forged)?;
+        self.incoming
+            .decrypt_inout_detached(&nonce(header.sequence), &packet::associated(datagram), body.as_mut_slice().into(), &tag)
+            .map_err(|_| Refused::Forged)
+    }
+}
+
+/// 32 zero bits and the sequence number.
+fn nonce(sequence: u64) -> Nonce {
+    let mut nonce = [0; 12];
+    nonce[4..].copy_from_slice(&sequence.to_le_bytes());
+    nonce.into()
+}

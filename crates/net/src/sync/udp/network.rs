@@ -1,0 +1,121 @@
+//! A network with faults, by a seed and without a clock: the same seed gives the same faults.
+//!
+//! As Linux's `netem` does it: a datagram is delayed by `delay_s` plus up to `jitter_s`; with probability `reorder` it overtakes, that is, it is not delayed at
+//! all; then it may be lost, sent twice, or damaged.
+
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+/// How bad the network is; shares are 0 to 1, per datagram and direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Faults {
+    /// Share lost.
+    pub loss: f64,
+    /// Share that overtakes.
+    pub reorder: f64,
+    /// Share that arrives twice.
+    pub duplicate: f64,
+    /// Share of which a random bit is flipped.
+    pub flip: f64,
+    /// Share that is cut at a random place.
+    pub cut: f64,
+    /// Delay one way, seconds.
+    pub delay_s: f64,
+    /// Most that is added to the delay, seconds.
+    pub jitter_s: f64,
+}
+
+/// A stream of random numbers (splitmix64).
+#[derive(Clone, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// From a seed.
+    pub fn new(seed: u64) -> Random {
+        Random(seed)
+    }
+
+    /// The next number.
+    pub fn next_u64(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// In [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Below `n`; 0 for 0.
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.unit() * n as f64) as usize
+    }
+
+    fn happens(&mut self, share: f64) -> bool {
+        self.unit() < share
+    }
+}
+
+/// A datagram under way: from, to, bytes.
+pub type UnderWay = (SocketAddr, SocketAddr, Vec<u8>);
+
+/// Datagrams under way.
+pub struct Network {
+    faults: Faults,
+    random: Random,
+    under_way: BTreeMap<(Duration, u64), UnderWay>,
+    count: u64,
+    /// While set, everything is lost.
+    pub parted: bool,
+    /// Bytes that were sent, lost ones included.
+    pub bytes: u64,
+}
+
+impl Network {
+    /// A quiet network.
+    pub fn new(seed: u64, faults: Faults) -> Network {
+        Network { faults, random: Random::new(seed), under_way: BTreeMap::new(), count: 0, parted: false, bytes: 0 }
+    }
+
+    /// Sends a datagram into it.
+    pub fn send(&mut self, now: Duration, from: SocketAddr, to: SocketAddr, datagram: &[u8]) {
+        self.bytes += datagram.len() as u64;
+        let copies = 1 + usize::from(self.random.happens(self.faults.duplicate));
+        for _ in 0..copies {
+            let lost = self.random.happens(self.faults.loss) || self.parted;
+            let overtakes = self.random.happens(self.faults.reorder);
+            let delay = if overtakes { 0.0 } else { self.faults.delay_s + self.random.unit() * self.faults.jitter_s };
+            let mut datagram = datagram.to_vec();
+            self.damage(&mut datagram);
+            if !lost {
+                self.count += 1;
+                self.under_way.insert((now + Duration::from_secs_f64(delay), self.count), (from, to, datagram));
+            }
+        }
+    }
+
+    /// The next datagram that has arrived by now.
+    pub fn receive(&mut self, now: Duration) -> Option<UnderWay> {
+        let first = self.under_way.first_entry().filter(|first| first.key().0 <= now)?;
+        Some(first.remove())
+    }
+
+    /// When the next datagram arrives.
+    pub fn next(&self) -> Option<Duration> {
+        self.under_way.keys().next().map(|(at, _)| *at)
+    }
+
+    fn damage(&mut self, datagram: &mut Vec<u8>) {
+        if self.random.happens(self.faults.flip) && !datagram.is_empty() {
+            let bit = self.random.below(8 * datagram.len());
+            datagram[bit / 8] ^= 1 << (bit % 8);
+        }
+        if self.random.happens(self.faults.cut) {
+            datagram.truncate(self.random.below(datagram.len()));
+        }
+    }
+}

@@ -1,0 +1,479 @@
+//! Messages in, pieces of packets out; acknowledgements in, repairs out.
+//!
+//! A packet is lost when it is not acknowledged `loss_delay` after it was sent although a later one was, or `timeout` after it was sent at all:
+//!
+//! ```text
+//! srtt   ← 7/8 srtt + 1/8 sample          var ← 3/4 var + 1/4 |srtt − sample|          (RFC 6298; smoothed round trip and its deviation)
+//! loss_delay = srtt + max(2 var, 0.5 ms)
+//! timeout    = srtt + min(4 var, 4 ms) + 1 ms              for the first two time-outs in a row
+//!            = (srtt + 4 var + 1 ms) · 2^(k − 2)           for those after k, at most 250 ms
+//! ```
+//!
+//! What is lost is sent again, twice where the budget allows: at a loss of 5 % a repair then fails 0.25 % of the time, for 5 % more bytes, and it is the repair
+//! of a repair that makes the longest delays. While more than 0.5 % is lost, a message of several fragments gets a parity fragment for each four, and a message
+//! of one is sent twice, again where the budget allows. The budget is what keeps the bytes in bounds:
+//!
+//! ```text
+//! balance += 1.45 · length of a message        balance −= length of each packet sent, and of each acknowledgement received
+//! ```
+//!
+//! Something redundant is sent only while the balance covers it. Ordering over a fixed time rather than over a count of later packets keeps reordering
+//! from looking like loss.
+
+use super::frames::{Ack, Channel, FRAGMENT, FRAGMENT_HEAD, Frame, PARITY_HEAD, Part, before};
+use super::inbox::{BYTES_AHEAD, NEWEST_AHEAD, RELIABLE_AHEAD, parity};
+use crate::sync::transport::MAX_QUEUED_BYTES;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Packets under way at once; half of what a socket's default buffer holds.
+const PACKETS_AHEAD: usize = 64;
+/// Packets remembered after they were given up, so that a late acknowledgement still tells the round trip.
+const REMEMBERED: usize = 512;
+const RESOLUTION: Duration = Duration::from_millis(1);
+const LONGEST_TIMEOUT: Duration = Duration::from_millis(250);
+/// Share of lost packets above which redundancy pays.
+const LOSSY: f64 = 0.005;
+/// Bytes by which the balance may run ahead or behind.
+const BALANCE: i64 = 32 << 10;
+
+/// A fragment under way.
+#[derive(Clone, Copy, Default)]
+struct Progress {
+    /// Packets under way that hold it.
+    copies: u8,
+    arrived: bool,
+}
+
+/// A message under way.
+struct Outgoing {
+    part: Part,
+    data: Arc<[u8]>,
+    progress: Vec<Progress>,
+    missing: u16,
+    /// Fragments from here on were never sent.
+    unsent: u16,
+    /// Parity groups, 0 until the last fragment was sent; and those from here on were never sent.
+    groups: u16,
+    unsent_parity: u16,
+}
+
+/// What a packet holds.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Piece {
+    Fragment(Channel, u32, u16),
+    Parity(Channel, u32, u16),
+    Ping,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    UnderWay,
+    Lost,
+    Arrived,
+}
+
+struct Sent {
+    sequence: u64,
+    at: Duration,
+    pieces: Vec<Piece>,
+    fate: Fate,
+}
+
+/// More waits than may.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Full;
+
+/// An acknowledgement of something that was never sent.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Impossible;
+
+/// One stream of messages.
+struct Stream {
+    /// Messages that were not begun; at most one of the newest.
+    waiting: VecDeque<Arc<[u8]>>,
+    begun: VecDeque<Outgoing>,
+    begun_bytes: usize,
+    waiting_bytes: usize,
+    next: u32,
+    /// The other side has all before this one.
+    done: u32,
+}
+
+/// What is to be sent of one connection.
+pub struct Outbox {
+    streams: [Stream; 2],
+    sent: VecDeque<Sent>,
+    under_way: usize,
+    repairs: VecDeque<Piece>,
+    /// Second copies, sent in a packet of their own.
+    again: VecDeque<Piece>,
+    ping: bool,
+    srtt: Duration,
+    var: Duration,
+    measured: bool,
+    timeouts: u32,
+    largest: Option<u64>,
+    loss: f64,
+    balance: i64,
+    repeated: u64,
+    superseded: u64,
+}
+
+impl Outbox {
+    /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
+    pub fn new(first: u32) -> Outbox {
+        let stream = || Stream { waiting: VecDeque::new(), begun: VecDeque::new(), begun_bytes: 0, waiting_bytes: 0, next: first, done: first };
+        Outbox {
+            streams: [stream(), stream()],
+            sent: VecDeque::new(),
+            under_way: 0,
+            repairs: VecDeque::new(),
+            again: VecDeque::new(),
+            ping: false,
+            srtt: Duration::from_millis(5),
+            var: Duration::from_millis(5),
+            measured: false,
+            timeouts: 0,
+            largest: None,
+            loss: 0.0,
+            balance: 0,
+            repeated: 0,
+            superseded: 0,
+        }
+    }
+
+    /// Takes a message of 1 to [`MAX_MESSAGE_BYTES`](crate::sync::transport::MAX_MESSAGE_BYTES) bytes.
+    pub fn push(&mut self, channel: Channel, message: Arc<[u8]>) -> Result<(), Full> {
+        self.earn(message.len() * 29 / 20);
+        let stream = &mut self.streams[channel as usize];
+        if channel == Channel::Newest {
+            self.superseded += stream.waiting.len() as u64;
+            stream.waiting.clear();
+            stream.waiting_bytes = 0;
+        } else if stream.waiting_bytes + stream.begun_bytes + message.len() > MAX_QUEUED_BYTES {
+            return Err(Full);
+        }
+        stream.waiting_bytes += message.len();
+        stream.waiting.push_back(message);
+        self.begin_messages();
+        Ok(())
+    }
+
+    /// Asks for an acknowledgement although there is nothing to send.
+    pub fn ping(&mut self) {
+        self.ping = true;
+    }
+
+    /// Smoothed round trip.
+    pub fn round_trip(&self) -> Duration {
+        self.srtt
+    }
+
+    /// Estimated share of lost packets.
+    pub fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    /// Pieces sent again or for redundancy; counted since this was asked last.
+    pub fn take_repeated(&mut self) -> u64 {
+        std::mem::take(&mut self.repeated)
+    }
+
+    /// Newest messages replaced before they were begun; counted since this was asked last.
+    pub fn take_superseded(&mut self) -> u64 {
+        std::mem::take(&mut self.superseded)
+    }
+
+    /// Fills a packet with up to `room` bytes of frames. `false`: there is nothing to send now.
+    pub fn fill(&mut self, now: Duration, sequence: u64, room: usize, body: &mut Vec<u8>) -> bool {
+        let end = body.len() + room;
+        let mut pieces = Vec::new();
+        while let Some(piece) = self.choose(end - body.len(), pieces.is_empty()) {
+            self.write(piece, body);
+            pieces.push(piece);
+        }
+        if pieces.is_empty() {
+            return false;
+        }
+        self.sent.push_back(Sent { sequence, at: now, pieces, fate: Fate::UnderWay });
+        self.under_way += 1;
+        self.forget();
+        true
+    }
+
+    /// A packet of so many bytes was sent (or one with nothing but an acknowledgement received): it is paid for.
+    pub fn pay(&mut self, bytes: usize) {
+        self.balance = (self.balance - bytes as i64).max(-BALANCE);
+    }
+
+    fn earn(&mut self, bytes: usize) {
+        // A long message earns and pays within the same burst, so only what stands idle is cut.
+        self.balance = self.balance.min(BALANCE) + bytes as i64;
+    }
+
+    /// Takes an acknowledgement.
+    pub fn acknowledged(&mut self, now: Duration, ack: &Ack, next_sequence: u64) -> Result<(), Impossible> {
+        let possible = |stream: &Stream, done: u32| !before(stream.next, done);
+        if ack.largest >= next_sequence || !self.streams.iter().zip(ack.complete).all(|(stream, done)| possible(stream, done)) {
+            return Err(Impossible);
+        }
+        self.largest = self.largest.max(Some(ack.largest));
+        self.mark(now, ack);
+        for (stream, done) in self.streams.iter_mut().zip(ack.complete) {
+            stream.finish(done);
+        }
+        self.forget();
+        self.begin_messages();
+        Ok(())
+    }
+
+    /// When something is due without any packet arriving.
+    pub fn wake(&self) -> Option<Duration> {
+        self.sent.iter().filter(|sent| sent.fate == Fate::UnderWay).map(|sent| self.due(sent)).min()
+    }
+
+    /// Gives up the packets whose time is over.
+    pub fn tick(&mut self, now: Duration) {
+        let mut timed_out = false;
+        for k in 0..self.sent.len() {
+            if self.sent[k].fate != Fate::UnderWay || now < self.due(&self.sent[k]) {
+                continue;
+            }
+            timed_out |= self.largest.is_none_or(|largest| self.sent[k].sequence > largest);
+            self.sent[k].fate = Fate::Lost;
+            self.under_way -= 1;
+            self.loss += (1.0 - self.loss) / 128.0;
+            for p in 0..self.sent[k].pieces.len() {
+                self.lose(self.sent[k].pieces[p]);
+            }
+        }
+        self.timeouts = self.timeouts.saturating_add(u32::from(timed_out)).min(16);
+    }
+
+    fn due(&self, sent: &Sent) -> Duration {
+        if self.largest.is_some_and(|largest| sent.sequence < largest) {
+            return sent.at + self.srtt + (2 * self.var).max(RESOLUTION / 2);
+        }
+        let timeout = match self.timeouts.checked_sub(2) {
+            None => self.srtt + (4 * self.var).min(4 * RESOLUTION) + RESOLUTION,
+            Some(more) => (self.srtt + 4 * self.var + RESOLUTION) * (1 << more.min(8)),
+        };
+        sent.at + timeout.min(LONGEST_TIMEOUT)
+    }
+
+    fn mark(&mut self, now: Duration, ack: &Ack) {
+        let mut newest = None;
+        for k in 0..self.sent.len() {
+            let sent = &mut self.sent[k];
+            let taken = ack.largest.checked_sub(sent.sequence).is_some_and(|age| age < 128 && ack.mask >> age & 1 == 1);
+            if !taken || sent.fate == Fate::Arrived {
+                continue;
+            }
+            self.under_way -= usize::from(sent.fate == Fate::UnderWay);
+            sent.fate = Fate::Arrived;
+            newest = Some(sent.at);
+            self.loss -= self.loss / 128.0;
+            for p in 0..self.sent[k].pieces.len() {
+                self.arrive(self.sent[k].pieces[p]);
+            }
+        }
+        if let Some(at) = newest {
+            self.timeouts = 0;
+            self.measure(now.saturating_sub(at));
+        }
+    }
+
+    fn measure(&mut self, sample: Duration) {
+        if !std::mem::replace(&mut self.measured, true) {
+            (self.srtt, self.var) = (sample, sample / 2);
+            return;
+        }
+        self.var = (3 * self.var + self.srtt.abs_diff(sample)) / 4;
+        self.srtt = (7 * self.srtt + sample) / 8;
+    }
+
+    fn arrive(&mut self, piece: Piece) {
+        let Piece::Fragment(channel, message, index) = piece else { return };
+        let stream = &mut self.streams[channel as usize];
+        if let Some(outgoing) = stream.find(message) {
+            let progress = &mut outgoing.progress[usize::from(index)];
+            progress.copies = progress.copies.saturating_sub(1);
+            if !std::mem::replace(&mut progress.arrived, true) {
+                outgoing.missing -= 1;
+            }
+        }
+    }
+
+    fn lose(&mut self, piece: Piece) {
+        match piece {
+            Piece::Fragment(channel, message, index) => {
+                if let Some(outgoing) = self.streams[channel as usize].find(message) {
+                    let progress = &mut outgoing.progress[usize::from(index)];
+                    progress.copies = progress.copies.saturating_sub(1);
+                    if !progress.arrived && progress.copies == 0 {
+                        self.repairs.push_back(piece);
+                    }
+                }
+            }
+            Piece::Parity(..) => {}
+            Piece::Ping => self.ping = true,
+        }
+    }
+
+    /// What to send next: repairs, then what was never sent, then redundancy.
+    fn choose(&mut self, room: usize, first: bool) -> Option<Piece> {
+        while let Some(&piece) = self.repairs.front() {
+            match self.size(piece) {
+                Some(size) if size > room => return None,
+                Some(size) => {
+                    self.repairs.pop_front();
+                    self.repeated += 1;
+                    self.repeat(piece, size);
+                    return Some(piece);
+                }
+                None => _ = self.repairs.pop_front(),
+            }
+        }
+        if self.under_way < PACKETS_AHEAD {
+            if let Some(piece) = self.unsent(room) {
+                return Some(piece);
+            }
+            while let (true, Some(piece)) = (first, self.again.pop_front()) {
+                if self.size(piece).is_some() {
+                    self.repeated += 1;
+                    return Some(piece);
+                }
+            }
+        }
+        (first && std::mem::take(&mut self.ping)).then_some(Piece::Ping)
+    }
+
+    /// The next piece that was never sent, if it has room.
+    fn unsent(&mut self, room: usize) -> Option<Piece> {
+        let (loss, balance) = (self.loss, self.balance);
+        let outgoing = self.streams.iter_mut().flat_map(|stream| stream.begun.iter_mut()).find(|outgoing| outgoing.has_unsent())?;
+        let Part { channel, message, .. } = outgoing.part;
+        if outgoing.unsent == outgoing.part.fragments() {
+            if FRAGMENT + PARITY_HEAD > room {
+                return None;
+            }
+            outgoing.unsent_parity += 1;
+            self.repeated += 1;
+            return Some(Piece::Parity(channel, message, outgoing.unsent_parity - 1));
+        }
+        let (index, length) = (outgoing.unsent, outgoing.part.length(outgoing.unsent));
+        if length + FRAGMENT_HEAD > room {
+            return None;
+        }
+        outgoing.unsent += 1;
+        let piece = Piece::Fragment(channel, message, index);
+        if outgoing.unsent == outgoing.part.fragments() && loss > LOSSY {
+            outgoing.groups = parity_groups(&outgoing.part, balance - length as i64);
+            if outgoing.part.fragments() == 1 {
+                self.repeat(piece, length + FRAGMENT_HEAD);
+            }
+        }
+        Some(piece)
+    }
+
+    /// A second copy in a packet of its own, if the budget covers it.
+    fn repeat(&mut self, piece: Piece, size: usize) {
+        if self.balance >= 2 * (size + 64) as i64 && self.again.len() < PACKETS_AHEAD {
+            self.again.push_back(piece);
+        }
+    }
+
+    /// Bytes of a piece; `None` if it is not needed any more.
+    fn size(&mut self, piece: Piece) -> Option<usize> {
+        let Piece::Fragment(channel, message, index) = piece else { return Some(1) };
+        let outgoing = self.streams[channel as usize].find(message)?;
+        (!outgoing.progress[usize::from(index)].arrived).then(|| outgoing.part.length(index) + FRAGMENT_HEAD)
+    }
+
+    fn write(&mut self, piece: Piece, body: &mut Vec<u8>) {
+        match piece {
+            Piece::Fragment(channel, message, index) => {
+                if let Some(outgoing) = self.streams[channel as usize].find(message) {
+                    let at = usize::from(index) * FRAGMENT;
+                    let progress = &mut outgoing.progress[usize::from(index)];
+                    progress.copies = progress.copies.saturating_add(1);
+                    Frame::Fragment(outgoing.part, index, &outgoing.data[at..at + outgoing.part.length(index)]).write(body);
+                }
+            }
+            Piece::Parity(channel, message, group) => {
+                if let Some(outgoing) = self.streams[channel as usize].find(message) {
+                    Frame::Parity(outgoing.part, group, outgoing.groups, &parity(&outgoing.data, group, outgoing.groups)).write(body);
+                }
+            }
+            Piece::Ping => Frame::Ping.write(body),
+        }
+    }
+
+    /// Forgets packets from the front that nothing is expected of any more.
+    fn forget(&mut self) {
+        while self.sent.front().is_some_and(|sent| sent.fate == Fate::Arrived || (sent.fate == Fate::Lost && self.sent.len() > REMEMBERED)) {
+            self.sent.pop_front();
+        }
+    }
+
+    fn begin_messages(&mut self) {
+        for (stream, channel) in self.streams.iter_mut().zip([Channel::Reliable, Channel::Newest]) {
+            while stream.may_begin(channel)
+                && let Some(data) = stream.waiting.pop_front()
+            {
+                stream.begin(channel, data);
+            }
+        }
+    }
+}
+
+/// A parity fragment for each four, as far as the balance covers it.
+fn parity_groups(part: &Part, balance: i64) -> u16 {
+    let affordable = balance.max(0) / (FRAGMENT + 100) as i64;
+    let fragments = i64::from(part.fragments());
+    ((fragments + 3) / 4).min(affordable).min(fragments - 1) as u16
+}
+
+impl Outgoing {
+    /// Whether a fragment, or a parity that may still help, was never sent.
+    fn has_unsent(&self) -> bool {
+        self.unsent < self.part.fragments() || (self.unsent_parity < self.groups && self.missing > 0)
+    }
+}
+
+impl Stream {
+    fn may_begin(&self, channel: Channel) -> bool {
+        let ahead = if channel == Channel::Reliable { RELIABLE_AHEAD } else { NEWEST_AHEAD };
+        let Some(first) = self.waiting.front() else { return false };
+        self.begun.is_empty() || (self.next.wrapping_sub(self.done) < ahead && self.begun_bytes + first.len() <= BYTES_AHEAD)
+    }
+
+    fn begin(&mut self, channel: Channel, data: Arc<[u8]>) {
+        let part = Part { channel, message: self.next, total: data.len() as u32 };
+        let fragments = part.fragments();
+        self.next = self.next.wrapping_add(1);
+        self.waiting_bytes -= data.len();
+        self.begun_bytes += data.len();
+        let progress = vec![Progress::default(); usize::from(fragments)];
+        self.begun.push_back(Outgoing { part, data, progress, missing: fragments, unsent: 0, groups: 0, unsent_parity: 0 });
+    }
+
+    /// The message, if it is still under way.
+    fn find(&mut self, message: u32) -> Option<&mut Outgoing> {
+        let first = self.begun.front()?.part.message;
+        self.begun.get_mut(message.wrapping_sub(first) as usize)
+    }
+
+    /// The other side has all messages before `done`.
+    fn finish(&mut self, done: u32) {
+        if before(self.done, done) {
+            self.done = done;
+        }
+        while let Some(front) = self.begun.front().filter(|outgoing| before(outgoing.part.message, self.done)) {
+            self.begun_bytes -= front.data.len();
+            self.begun.pop_front();
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! The outside of every datagram: a header that can be checked before any key is used, and the seal.
+//!
+//! All numbers are little-endian.
+//!
+//! | byte | size | what |
+//! |---|---|---|
+//! | 0 | 2 | magic `74 db` |
+//! | 2 | 1 | version, [`VERSION`] |
+//! | 3 | 1 | [`Kind`] |
+//! | 4 | 2 | length of the whole datagram |
+//! | 6 | 4 | CRC-32 of all bytes but these four: tells a packet damaged on its way from a forged one |
+//! | 10 | 8 | session (0 before there is one) |
+//! | 18 | 8 | sequence: the number of this packet within its session and direction, and the nonce of its seal |
+//! | 26 | n | body: sealed in [`Kind::Data`], plain in the others |
+//! | 26 + n | 16 | tag: Poly1305 in [`Kind::Data`], keyed BLAKE3 in the others |
+//!
+//! Everything of the header but the checksum is associated data of the tag, so none of it can be changed.
+
+use crate::sync::transport::Refused;
+
+/// The protocol's version; a datagram of another one is refused.
+pub const VERSION: u8 = 1;
+/// Most bytes of a datagram (payload of UDP): passes every path of 1280 bytes, which IPv6 demands.
+pub const MAX_DATAGRAM: usize = 1200;
+/// Bytes before the body.
+pub const HEADER: usize = 26;
+/// Bytes after the body.
+pub const TAG: usize = 16;
+
+const MAGIC: [u8; 2] = [0x74, 0xdb];
+const CHECKSUM: std::ops::Range<usize> = 6..10;
+
+/// What a datagram is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Facet: I am here. Padded, so that no answer is larger than what asked for it.
+    Hello = 1,
+    /// Server: prove that you receive at this address. It keeps nothing.
+    Challenge = 2,
+    /// Facet: the proof.
+    Answer = 3,
+    /// Server: your session.
+    Welcome = 4,
+    /// Server: I know no such session (it was started again, or gave you up).
+    Unknown = 5,
+    /// Either: sealed frames.
+    Data = 6,
+}
+
+const KINDS: [Kind; 6] = [Kind::Hello, Kind::Challenge, Kind::Answer, Kind::Welcome, Kind::Unknown, Kind::Data];
+
+/// What the header says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// What the datagram is for.
+    pub kind: Kind,
+    /// Whose it is.
+    pub session: u64,
+    /// Its number.
+    pub sequence: u64,
+}
+
+/// Reads the header; looks at nothing else. Cheap: no key, no allocation.
+pub fn parse(datagram: &[u8]) -> Result<Header, Refused> {
+    if datagram.len() < HEADER + TAG {
+        return Err(Refused::Truncated);
+    }
+    if datagram.len() > MAX_DATAGRAM {
+        return Err(Refused::Oversize);
+    }
+    if datagram[..2] != MAGIC || datagram[2] != VERSION {
+        return Err(Refused::Foreign);
+    }
+    let claimed = usize::from(u16::from_le_bytes([datagram[4], datagram[5]]));
+    if claimed > datagram.len() {
+        return Err(Refused::Truncated);
+    }
+    if claimed < datagram.len() {
+        return Err(Refused::Oversize);
+    }
+    if u32_at(datagram, CHECKSUM.start) != checksum(datagram) {
+        return Err(Refused::Torn);
+    }
+    let kind = KINDS.into_iter().find(|kind| *kind as u8 == datagram[3]).ok_or(Refused::Foreign)?;
+    Ok(Header { kind, session: u64_at(datagram, 10), sequence: u64_at(datagram, 18) })
+}
+
+/// Clears `datagram` and writes the header into it; `seal_off` or [`finish`] set length and checksum.
+pub fn begin(datagram: &mut Vec<u8>, header: Header) {
+    datagram.clear();
+    datagram.extend_from_slice(&MAGIC);
+    datagram.extend_from_slice(&[VERSION, header.kind as u8]);
+    datagram.extend_from_slice(&[0; 6]);
+    datagram.extend_from_slice(&header.session.to_le_bytes());
+    datagram.extend_from_slice(&header.sequence.to_le_bytes());
+}
+
+/// Sets the length that the datagram will have with its tag. Before the tag is made, because the tag covers it.
+pub fn set_length(datagram: &mut [u8]) {
+    let length = (datagram.len() + TAG) as u16;
+    datagram[4..6].copy_from_slice(&length.to_le_bytes());
+}
+
+/// Appends the tag, then sets the checksum.
+pub fn finish(datagram: &mut Vec<u8>, tag: &[u8; TAG]) {
+    datagram.extend_from_slice(tag);
+    let sum = checksum(datagram);
+    datagram[CHECKSUM].copy_from_slice(&sum.to_le_bytes());
+}
+
+/// What of the header the tag covers: all but the checksum.
+pub fn associated(datagram: &[u8]) -> [u8; HEADER - 4] {
+    let mut covered = [0; HEADER - 4];
+    covered[..CHECKSUM.start].copy_from_slice(&datagram[..CHECKSUM.start]);
+    covered[CHECKSUM.start..].copy_from_slice(&datagram[CHECKSUM.end..HEADER]);
+    covered
+}
+
+fn checksum(datagram: &[u8]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&datagram[..CHECKSUM.start]);
+    hasher.update(&datagram[CHECKSUM.end..]);
+    hasher.finalize()
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
+}

@@ -1,0 +1,283 @@
+//! The server's side, without socket or clock.
+
+use super::handshake::{Cookies, Hello, Reply, write_unknown};
+use super::keys::{Agreement, Entropy, Handshake, SharedKey, Side};
+use super::packet::{self, Header, Kind};
+use super::session::{Numbering, Session};
+use super::Timing;
+use crate::sync::transport::{Closed, Delivery, FacetNumber, LinkCounters, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused};
+use std::collections::{BTreeMap, VecDeque};
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Sessions prepared and not yet live; beyond, the oldest goes.
+const MAX_PREPARED: usize = 2 * MAX_FACETS;
+/// Answers that wait to be sent; beyond, they are dropped and the facet asks again.
+const MAX_REPLIES: usize = 256;
+
+/// What is set when a server begins.
+#[derive(Clone, Copy, Debug)]
+pub struct ServerSettings {
+    /// Facets have numbers below this, at most [`MAX_FACETS`].
+    pub facets: FacetNumber,
+    /// How often, and how long at most.
+    pub timing: Timing,
+    /// Where counting begins.
+    pub numbering: Numbering,
+}
+
+/// The server's side: datagrams and time in, datagrams and events out.
+pub struct ServerMachine {
+    settings: ServerSettings,
+    shared: SharedKey,
+    handshake: Handshake,
+    entropy: Entropy,
+    cookies: Cookies,
+    sessions: BTreeMap<u64, Session>,
+    /// The live session of each facet.
+    live: Vec<Option<u64>>,
+    prepared: VecDeque<u64>,
+    replies: VecDeque<(SocketAddr, Vec<u8>)>,
+    events: VecDeque<(FacetNumber, LinkEvent)>,
+    counters: Vec<LinkCounters>,
+    strangers: LinkCounters,
+    /// The facet that is asked first for a message.
+    turn: usize,
+}
+
+impl ServerMachine {
+    /// A server that nobody has joined.
+    pub fn new(settings: ServerSettings, shared: SharedKey, mut entropy: Entropy) -> ServerMachine {
+        let facets = usize::from(settings.facets).min(MAX_FACETS);
+        ServerMachine {
+            settings,
+            handshake: Handshake::new(&shared),
+            shared,
+            cookies: Cookies::new(entropy.next()),
+            entropy,
+            sessions: BTreeMap::new(),
+            live: vec![None; facets],
+            prepared: VecDeque::new(),
+            replies: VecDeque::new(),
+            events: VecDeque::new(),
+            counters: vec![LinkCounters::default(); facets],
+            strangers: LinkCounters::default(),
+            turn: 0,
+        }
+    }
+
+    /// Takes a datagram.
+    pub fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) {
+        let header = packet::parse(datagram);
+        let facet = match &header {
+            Ok(header) if header.kind == Kind::Data => self.sessions.get(&header.session).map(|session| session.agreed.facet),
+            _ => self.facet_at(from),
+        };
+        self.counters_of(facet).bytes_in += datagram.len() as u64;
+        let taken = header.and_then(|header| match header.kind {
+            Kind::Data => self.take_data(now, from, &header, datagram),
+            Kind::Hello => self.take_hello(now, from, datagram),
+            Kind::Answer => self.take_answer(now, from, datagram),
+            _ => Err(Refused::Foreign),
+        });
+        if let Err(why) = taken {
+            self.counters_of(facet).refuse(why);
+        }
+    }
+
+    /// Sends what is due by `emit`, and finds what is over.
+    pub fn transmit(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        for (to, datagram) in self.replies.drain(..) {
+            self.strangers.bytes_out += datagram.len() as u64;
+            emit(to, &datagram);
+        }
+        let mut over = Vec::new();
+        for (id, session) in &mut self.sessions {
+            let counters = &mut self.counters[usize::from(session.agreed.facet)];
+            if session.live {
+                session.transmit(now, counters, emit);
+            }
+            if session.is_closed_by_peer() {
+                over.push((*id, Closed::ByPeer));
+            } else if session.is_silent(now) {
+                over.push((*id, Closed::Silent));
+            } else if session.is_exhausted() {
+                over.push((*id, Closed::ByUs));
+            }
+        }
+        for (id, why) in over {
+            self.end(id, why);
+        }
+    }
+
+    /// When [`transmit`](Self::transmit) has something to do, if nothing arrives before.
+    pub fn wake(&self) -> Option<Duration> {
+        self.sessions.values().map(Session::wake).min()
+    }
+
+    /// Takes a message for a facet. `false`: there is no connection, or the message is empty or too long.
+    pub fn send(&mut self, to: FacetNumber, delivery: Delivery, message: &Arc<[u8]>) -> bool {
+        let session = self.live_session(to);
+        let fits = (1..=MAX_MESSAGE_BYTES).contains(&message.len());
+        let Some(session) = session.filter(|_| fits) else {
+            if let Some(counters) = self.counters.get_mut(usize::from(to)) {
+                counters.unsent += 1;
+            }
+            return false;
+        };
+        if session.send(delivery, message.clone()).is_err() {
+            let id = session.agreed.session;
+            self.end(id, Closed::Overrun);
+            return false;
+        }
+        self.counters[usize::from(to)].messages_out += 1;
+        true
+    }
+
+    /// The next event, in order for each facet; facets take turns.
+    pub fn poll(&mut self) -> Option<(FacetNumber, LinkEvent, Vec<u8>)> {
+        if let Some((facet, event)) = self.events.pop_front() {
+            return Some((facet, event, Vec::new()));
+        }
+        for _ in 0..self.live.len() {
+            self.turn = (self.turn + 1) % self.live.len();
+            let facet = self.turn as FacetNumber;
+            if let Some((_, message)) = self.live_session(facet).and_then(Session::pop) {
+                self.counters[usize::from(facet)].messages_in += 1;
+                return Some((facet, LinkEvent::Message, message));
+            }
+        }
+        None
+    }
+
+    /// Ends a facet's connection.
+    pub fn close(&mut self, now: Duration, facet: FacetNumber, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        let Some(id) = self.live.get(usize::from(facet)).copied().flatten() else { return };
+        if let Some(session) = self.sessions.get_mut(&id) {
+            session.say_close(now, &mut self.counters[usize::from(facet)], emit);
+        }
+        self.end(id, Closed::ByUs);
+    }
+
+    /// What happened on a facet's connections so far.
+    pub fn counters(&self, facet: FacetNumber) -> LinkCounters {
+        self.counters.get(usize::from(facet)).copied().unwrap_or_default()
+    }
+
+    /// What could not be laid to any facet.
+    pub fn strangers(&self) -> LinkCounters {
+        self.strangers
+    }
+
+    fn take_data(&mut self, now: Duration, from: SocketAddr, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
+        let Some(session) = self.sessions.get_mut(&header.session) else {
+            let mut reply = Vec::new();
+            write_unknown(header.session, &self.handshake, &mut reply);
+            // Less than it answers, so that nobody can make this server send more than he sends himself.
+            if reply.len() < datagram.len() {
+                self.reply(from, reply);
+            }
+            return Err(Refused::Stale);
+        };
+        if session.address != from {
+            return Err(Refused::Stranger);
+        }
+        let facet = session.agreed.facet;
+        let was_live = session.live;
+        let taken = session.receive(now, header, datagram, &mut self.counters[usize::from(facet)]);
+        if session.live && !was_live {
+            self.bring_to_life(header.session, facet);
+        }
+        taken
+    }
+
+    fn take_hello(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) -> Result<(), Refused> {
+        let hello = self.known(Hello::read(datagram, &self.handshake)?)?;
+        let mut reply = Vec::new();
+        Reply { nonce: hello.nonce, value: self.cookies.bake(now, from, &hello) }.write(Kind::Challenge, 0, &self.handshake, &mut reply);
+        self.reply(from, reply);
+        Ok(())
+    }
+
+    fn take_answer(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) -> Result<(), Refused> {
+        let answer = self.known(Hello::read(datagram, &self.handshake)?)?;
+        if !self.cookies.fits(now, from, &answer) {
+            return Err(Refused::Stale);
+        }
+        let same = |session: &&Session| session.agreed.facet_nonce == answer.nonce && session.agreed.facet == answer.facet && session.address == from;
+        let agreed = match self.sessions.values().find(same) {
+            Some(session) => session.agreed,
+            None => self.prepare(now, from, &answer),
+        };
+        let mut reply = Vec::new();
+        Reply { nonce: agreed.facet_nonce, value: agreed.server_nonce }.write(Kind::Welcome, agreed.session, &self.handshake, &mut reply);
+        self.reply(from, reply);
+        Ok(())
+    }
+
+    /// A session that the first sealed packet will bring to life.
+    fn prepare(&mut self, now: Duration, from: SocketAddr, answer: &Hello) -> Agreement {
+        while self.prepared.len() >= MAX_PREPARED {
+            if let Some(oldest) = self.prepared.pop_front() {
+                self.sessions.remove(&oldest);
+            }
+        }
+        let mut session = self.entropy.next_u64();
+        while self.sessions.contains_key(&session) {
+            session = self.entropy.next_u64();
+        }
+        let agreed = Agreement { session, facet: answer.facet, facet_nonce: answer.nonce, server_nonce: self.entropy.next() };
+        let prepared = Session::new(now, &self.shared, agreed, Side::Server, from, self.settings.timing, self.settings.numbering);
+        self.sessions.insert(session, prepared);
+        self.prepared.push_back(session);
+        agreed
+    }
+
+    fn bring_to_life(&mut self, id: u64, facet: FacetNumber) {
+        self.prepared.retain(|prepared| *prepared != id);
+        if let Some(old) = self.live[usize::from(facet)] {
+            self.end(old, Closed::Replaced);
+        }
+        self.live[usize::from(facet)] = Some(id);
+        self.counters[usize::from(facet)].opened += 1;
+        self.events.push_back((facet, LinkEvent::Opened));
+    }
+
+    fn end(&mut self, id: u64, why: Closed) {
+        let Some(session) = self.sessions.remove(&id) else { return };
+        self.prepared.retain(|prepared| *prepared != id);
+        let facet = session.agreed.facet;
+        let live = &mut self.live[usize::from(facet)];
+        if *live == Some(id) {
+            *live = None;
+            self.events.push_back((facet, LinkEvent::Closed(why)));
+        }
+    }
+
+    fn known(&self, hello: Hello) -> Result<Hello, Refused> {
+        if usize::from(hello.facet) < self.live.len() { Ok(hello) } else { Err(Refused::Stranger) }
+    }
+
+    fn live_session(&mut self, facet: FacetNumber) -> Option<&mut Session> {
+        let id = self.live.get(usize::from(facet)).copied().flatten()?;
+        self.sessions.get_mut(&id)
+    }
+
+    fn facet_at(&self, from: SocketAddr) -> Option<FacetNumber> {
+        self.sessions.values().find(|session| session.live && session.address == from).map(|session| session.agreed.facet)
+    }
+
+    fn counters_of(&mut self, facet: Option<FacetNumber>) -> &mut LinkCounters {
+        match facet {
+            Some(facet) => &mut self.counters[usize::from(facet)],
+            None => &mut self.strangers,
+        }
+    }
+
+    fn reply(&mut self, to: SocketAddr, datagram: Vec<u8>) {
+        if self.replies.len() < MAX_REPLIES {
+            self.replies.push_back((to, datagram));
+        }
+    }
+}

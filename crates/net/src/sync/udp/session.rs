@@ -1,0 +1,207 @@
+//! One session, one side of it: packets and messages through seal, window, inbox and outbox.
+
+use super::frames::{self, ACK_BYTES, Ack, Channel, Frame};
+use super::inbox::Inbox;
+use super::keys::{Agreement, Seal, SharedKey, Side};
+use super::outbox::{Full, Outbox};
+use super::packet::{HEADER, Header, MAX_DATAGRAM, TAG};
+use super::window::ReplayWindow;
+use super::Timing;
+use crate::sync::transport::{Delivery, LinkCounters, Refused};
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Packets that may arrive before they are acknowledged at once.
+const PACKETS_PER_ACK: u32 = 8;
+/// How long an acknowledgement may wait for a message that it can travel with: what is answered at once costs no packet of its own.
+const ACK_DELAY: Duration = Duration::from_micros(500);
+const BODY: usize = MAX_DATAGRAM - HEADER - TAG;
+
+/// Where the counting begins; other than 0 in tests of the wrap.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Numbering {
+    /// First packet.
+    pub sequence: u64,
+    /// First message of each stream.
+    pub message: u32,
+}
+
+/// One side of a session.
+pub struct Session {
+    /// Where the other side is.
+    pub address: SocketAddr,
+    /// What both sides agreed on.
+    pub agreed: Agreement,
+    /// Whether the other side has shown that it has the keys.
+    pub live: bool,
+    seal: Seal,
+    window: ReplayWindow,
+    inbox: Inbox,
+    outbox: Outbox,
+    timing: Timing,
+    heard: Duration,
+    sent: Duration,
+    /// Packets that want an acknowledgement, and when it is due.
+    unacknowledged: u32,
+    ack_due: Option<Duration>,
+    closed_by_peer: bool,
+    exhausted: bool,
+    body: Vec<u8>,
+    datagram: Vec<u8>,
+}
+
+impl Session {
+    /// Begins a session.
+    pub fn new(now: Duration, shared: &SharedKey, agreed: Agreement, side: Side, address: SocketAddr, timing: Timing, from: Numbering) -> Session {
+        Session {
+            address,
+            agreed,
+            live: false,
+            seal: Seal::new(shared, &agreed, side, from.sequence),
+            window: ReplayWindow::default(),
+            inbox: Inbox::new(from.message),
+            outbox: Outbox::new(from.message),
+            timing,
+            heard: now,
+            sent: now,
+            unacknowledged: 0,
+            ack_due: None,
+            closed_by_peer: false,
+            exhausted: false,
+            body: Vec::new(),
+            datagram: Vec::new(),
+        }
+    }
+
+    /// Takes a packet. Nothing of it is believed before its seal was checked, and nothing of it is taken where one frame contradicts.
+    pub fn receive(&mut self, now: Duration, header: &Header, datagram: &[u8], counters: &mut LinkCounters) -> Result<(), Refused> {
+        self.window.check(header.sequence)?;
+        let mut body = std::mem::take(&mut self.body);
+        let result = self.seal.open(header, datagram, &mut body).and_then(|()| {
+            self.window.take(header.sequence);
+            self.heard = now;
+            self.live = true;
+            let frames = frames::parse(&body).ok_or(Refused::Torn)?;
+            self.take_frames(now, &frames, datagram.len())
+        });
+        self.body = body;
+        counters.superseded += self.inbox.take_superseded();
+        result
+    }
+
+    fn take_frames(&mut self, now: Duration, frames: &[Frame], bytes: usize) -> Result<(), Refused> {
+        if let [Frame::Ack(_)] = frames {
+            self.outbox.pay(bytes);
+        }
+        let mut wants_ack = false;
+        for frame in frames {
+            match frame {
+                Frame::Ack(ack) => {
+                    let next = self.seal.next_sequence().unwrap_or(u64::MAX);
+                    self.outbox.acknowledged(now, ack, next).map_err(|_| Refused::Torn)?;
+                }
+                Frame::Fragment(part, index, data) => self.inbox.fragment(*part, *index, data).map_err(|_| Refused::Torn)?,
+                Frame::Parity(part, group, groups, data) => self.inbox.parity(*part, *group, *groups, data).map_err(|_| Refused::Torn)?,
+                Frame::Ping => {}
+                Frame::Close => self.closed_by_peer = true,
+            }
+            wants_ack |= !matches!(frame, Frame::Ack(_) | Frame::Close);
+        }
+        if wants_ack {
+            self.unacknowledged += 1;
+            let due = if self.unacknowledged >= PACKETS_PER_ACK { now } else { now + ACK_DELAY };
+            self.ack_due = Some(self.ack_due.map_or(due, |old| old.min(due)));
+        }
+        Ok(())
+    }
+
+    /// Takes a message to be sent.
+    pub fn send(&mut self, delivery: Delivery, message: Arc<[u8]>) -> Result<(), Full> {
+        self.outbox.push(Channel::from(delivery), message)
+    }
+
+    /// The next message that arrived.
+    pub fn pop(&mut self) -> Option<(Delivery, Vec<u8>)> {
+        self.inbox.pop()
+    }
+
+    /// Asks the other side for a sign of life with the next packet.
+    pub fn ping(&mut self) {
+        self.outbox.ping();
+    }
+
+    /// Sends what is due by `emit`.
+    pub fn transmit(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        self.outbox.tick(now);
+        if now >= self.sent + self.timing.ping {
+            self.outbox.ping();
+        }
+        while let Some(sequence) = self.seal.next_sequence() {
+            self.body.clear();
+            let ack_is_due = self.ack_due.is_some_and(|due| now >= due);
+            if self.unacknowledged > 0 {
+                self.write_ack();
+            }
+            let room = BODY - ACK_BYTES.max(self.body.len());
+            if !self.outbox.fill(now, sequence, room, &mut self.body) && !ack_is_due {
+                break;
+            }
+            self.unacknowledged = 0;
+            self.ack_due = None;
+            self.seal_and_emit(now, counters, emit);
+        }
+        self.exhausted = self.seal.next_sequence().is_none();
+        counters.repeated += self.outbox.take_repeated();
+        counters.superseded += self.outbox.take_superseded();
+    }
+
+    /// Tells the other side that the session is over; three times, because nobody will repeat it.
+    pub fn say_close(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        for _ in 0..3 {
+            self.body.clear();
+            Frame::Close.write(&mut self.body);
+            self.seal_and_emit(now, counters, emit);
+        }
+    }
+
+    /// When [`transmit`](Self::transmit) has something to do, if nothing arrives before.
+    pub fn wake(&self) -> Duration {
+        let over = self.heard + self.timing.silence;
+        if !self.live {
+            return over;
+        }
+        let idle = over.min(self.sent + self.timing.ping);
+        [self.ack_due, self.outbox.wake()].into_iter().flatten().fold(idle, Duration::min)
+    }
+
+    /// Whether nothing was heard for too long.
+    pub fn is_silent(&self, now: Duration) -> bool {
+        now >= self.heard + self.timing.silence
+    }
+
+    /// Whether the other side closed it.
+    pub fn is_closed_by_peer(&self) -> bool {
+        self.closed_by_peer
+    }
+
+    /// Whether the sequence numbers are used up.
+    pub fn is_exhausted(&self) -> bool {
+        self.exhausted
+    }
+
+    fn write_ack(&mut self) {
+        if let Some((largest, mask)) = self.window.taken() {
+            Frame::Ack(Ack { complete: self.inbox.complete(), largest, mask }).write(&mut self.body);
+        }
+    }
+
+    fn seal_and_emit(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        if self.seal.close(&self.body, &mut self.datagram) {
+            self.sent = now;
+            self.outbox.pay(self.datagram.len());
+            counters.bytes_out += self.datagram.len() as u64;
+            emit(self.address, &self.datagram);
+        }
+    }
+}

@@ -1,0 +1,358 @@
+//! A socket and two threads around each machine: the only place here that knows sockets and the clock.
+//!
+//! One thread receives; the other waits for the next thing that is due. Both, and whoever holds the link, work on the machine under one lock, and
+//! whoever changed it sends what is due before it lets go. A datagram that the system will not send counts as lost on its way.
+
+use super::facet::FacetSettings;
+use super::keys::{Entropy, SharedKey};
+use super::server::ServerSettings;
+use super::{FacetMachine, Numbering, ServerMachine, Timing};
+use crate::sync::transport::{Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, ServerLink};
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// How often the receiving thread looks whether it is to stop.
+const PATIENCE: Duration = Duration::from_millis(50);
+/// Longer than any datagram that is taken, so that a longer one is seen to be longer.
+const BUFFER: usize = 2048;
+
+/// What both machines can do.
+trait Machine: Send + 'static {
+    type Event;
+    fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]);
+    fn transmit(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8]));
+    fn wake(&self) -> Option<Duration>;
+    fn poll(&mut self) -> Option<Self::Event>;
+    fn close_all(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8]));
+}
+
+struct State<M> {
+    machine: M,
+    /// Until when the waiting thread sleeps.
+    asleep_until: Duration,
+    stop: bool,
+    failed: Option<std::io::Error>,
+}
+
+struct Core<M> {
+    state: Mutex<State<M>>,
+    /// Something may be there for the user.
+    arrived: Condvar,
+    /// Something is due earlier than the waiting thread knows.
+    earlier: Condvar,
+    socket: UdpSocket,
+    start: Instant,
+}
+
+impl<M: Machine> Core<M> {
+    fn now(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<M>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sends what is due, and wakes the waiting thread if it would sleep too long.
+    fn settle(&self, state: &mut State<M>) {
+        state.machine.transmit(self.now(), &mut |to, datagram| self.emit(to, datagram));
+        if state.machine.wake().is_some_and(|wake| wake < state.asleep_until) {
+            self.earlier.notify_one();
+        }
+    }
+
+    fn emit(&self, to: SocketAddr, datagram: &[u8]) {
+        let _ = self.socket.send_to(datagram, to);
+    }
+
+    fn receive_until_stopped(&self) {
+        let mut buffer = [0; BUFFER];
+        loop {
+            let result = self.socket.recv_from(&mut buffer);
+            let mut state = self.lock();
+            if state.stop {
+                return;
+            }
+            match result {
+                Ok((length, from)) => {
+                    state.machine.receive(self.now(), from, &buffer[..length]);
+                    self.settle(&mut state);
+                    self.arrived.notify_one();
+                }
+                Err(error) if is_passing(&error) => {}
+                Err(error) => {
+                    state.failed = Some(error);
+                    self.arrived.notify_one();
+                    return;
+                }
+            }
+        }
+    }
+
+    fn wait_until_stopped(&self) {
+        let mut state = self.lock();
+        while !state.stop {
+            let now = self.now();
+            let wake = state.machine.wake().unwrap_or(now + PATIENCE).min(now + PATIENCE);
+            if wake <= now {
+                self.settle(&mut state);
+                self.arrived.notify_one();
+            }
+            // At least a little, so that a fault in a machine cannot make this thread spin.
+            let wake = state.machine.wake().unwrap_or(now + PATIENCE).clamp(now + Duration::from_micros(50), now + PATIENCE);
+            state.asleep_until = wake;
+            state = self.earlier.wait_timeout(state, wake - now).unwrap_or_else(PoisonError::into_inner).0;
+            state.asleep_until = Duration::ZERO;
+        }
+    }
+
+    fn next_event(&self, timeout: Duration) -> Result<Option<M::Event>, LinkError> {
+        let end = Instant::now() + timeout;
+        let mut state = self.lock();
+        loop {
+            if let Some(event) = state.machine.poll() {
+                return Ok(Some(event));
+            }
+            if let Some(why) = state.failed.take() {
+                return Err(LinkError::Io { what: format!("udp socket {}: cannot receive", name(&self.socket)), why });
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            state = self.arrived.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+}
+
+/// A system's answer that is over with the next call.
+fn is_passing(error: &std::io::Error) -> bool {
+    use std::io::ErrorKind::*;
+    matches!(error.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused | ConnectionReset | HostUnreachable | NetworkUnreachable)
+}
+
+fn name(socket: &UdpSocket) -> String {
+    socket.local_addr().map_or_else(|_| "?".into(), |address| address.to_string())
+}
+
+/// A core and its threads; all end when this goes.
+struct Running<M: Machine> {
+    core: Arc<Core<M>>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl<M: Machine> Running<M> {
+    fn start(socket: UdpSocket, machine: M) -> Result<Running<M>, LinkError> {
+        let what = || format!("udp socket {}", name(&socket));
+        socket.set_read_timeout(Some(PATIENCE)).map_err(|why| LinkError::Io { what: what(), why })?;
+        let state = State { machine, asleep_until: Duration::ZERO, stop: false, failed: None };
+        let core =
+            Arc::new(Core { state: Mutex::new(state), arrived: Condvar::new(), earlier: Condvar::new(), socket, start: Instant::now() });
+        let mut running = Running { core: core.clone(), threads: Vec::new() };
+        let works: [(&str, fn(&Core<M>)); 2] = [("udp receive", Core::receive_until_stopped), ("udp wait", Core::wait_until_stopped)];
+        for (name, work) in works {
+            let core = core.clone();
+            let thread = std::thread::Builder::new().name(name.into()).spawn(move || work(&core));
+            running.threads.push(thread.map_err(|why| LinkError::Io { what: format!("thread {name}"), why })?);
+        }
+        Ok(running)
+    }
+}
+
+impl<M: Machine> Drop for Running<M> {
+    fn drop(&mut self) {
+        let mut state = self.core.lock();
+        state.machine.close_all(self.core.now(), &mut |to, datagram| self.core.emit(to, datagram));
+        state.stop = true;
+        drop(state);
+        self.core.earlier.notify_all();
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Refuses to be open to the network without a key.
+fn check_address(address: SocketAddr, key: &Option<SharedKey>, what: &str) -> Result<(), LinkError> {
+    if key.is_some() || address.ip().is_loopback() {
+        return Ok(());
+    }
+    Err(LinkError::Other(format!(
+        "{what} {address}: without a key only this machine's own addresses (127.0.0.1, ::1) are used; give a key file, the same on every machine"
+    )))
+}
+
+fn bind(address: SocketAddr) -> Result<UdpSocket, LinkError> {
+    UdpSocket::bind(address).map_err(|why| LinkError::Io { what: format!("cannot bind udp {address}"), why })
+}
+
+/// What a user should know about an address: whether it is sealed.
+fn describe(socket: &UdpSocket, sealed: bool) -> String {
+    let state = if sealed { "sealed by the key file" } else { "no key: only this machine is served, and nobody is authenticated" };
+    format!("udp {}, {state}", name(socket))
+}
+
+/// The server's end of UDP.
+pub struct UdpServer {
+    running: Running<ServerMachine>,
+    sealed: bool,
+}
+
+impl UdpServer {
+    /// Binds `address` for facets with numbers below `facets`. Without a key only a loopback address is bound.
+    ///
+    /// Errors: the address is not loopback and there is no key; the system refuses.
+    pub fn bind(address: SocketAddr, facets: FacetNumber, key: Option<SharedKey>, timing: Timing) -> Result<UdpServer, LinkError> {
+        check_address(address, &key, "udp")?;
+        let sealed = key.is_some();
+        let settings = ServerSettings { facets, timing, numbering: Numbering::default() };
+        let machine = ServerMachine::new(settings, key.unwrap_or_else(SharedKey::none), Entropy::system()?);
+        Ok(UdpServer { running: Running::start(bind(address)?, machine)?, sealed })
+    }
+
+    /// The address that was bound: with its port, if port 0 was asked for.
+    ///
+    /// Errors: the system refuses.
+    pub fn address(&self) -> Result<SocketAddr, LinkError> {
+        self.running.core.socket.local_addr().map_err(|why| LinkError::Io { what: "udp socket".into(), why })
+    }
+
+    /// One line for the user: the address, and whether it is sealed.
+    pub fn describe(&self) -> String {
+        describe(&self.running.core.socket, self.sealed)
+    }
+}
+
+impl ServerLink for UdpServer {
+    fn send(&mut self, to: FacetNumber, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
+        Ok(self.send_all(&[to], delivery, message)? == 1)
+    }
+
+    fn send_all(&mut self, to: &[FacetNumber], delivery: Delivery, message: &[u8]) -> Result<usize, LinkError> {
+        let message: Arc<[u8]> = message.into();
+        let mut state = self.running.core.lock();
+        let sent = to.iter().filter(|facet| state.machine.send(**facet, delivery, &message)).count();
+        self.running.core.settle(&mut state);
+        Ok(sent)
+    }
+
+    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
+        message.clear();
+        Ok(self.running.core.next_event(timeout)?.map(|(facet, event, bytes)| {
+            *message = bytes;
+            (facet, event)
+        }))
+    }
+
+    fn close(&mut self, facet: FacetNumber) {
+        let core = &self.running.core;
+        core.lock().machine.close(core.now(), facet, &mut |to, datagram| core.emit(to, datagram));
+    }
+
+    fn counters(&self, facet: FacetNumber) -> LinkCounters {
+        self.running.core.lock().machine.counters(facet)
+    }
+
+    fn strangers(&self) -> LinkCounters {
+        self.running.core.lock().machine.strangers()
+    }
+}
+
+/// A facet's end of UDP.
+pub struct UdpFacet {
+    running: Running<FacetMachine>,
+    sealed: bool,
+}
+
+impl UdpFacet {
+    /// Begins to look for the server. Without a key only a loopback address is asked.
+    ///
+    /// Errors: the address is not loopback and there is no key; the system refuses.
+    pub fn connect(server: SocketAddr, facet: FacetNumber, key: Option<SharedKey>, timing: Timing) -> Result<UdpFacet, LinkError> {
+        check_address(server, &key, "udp server")?;
+        let local: SocketAddr = match (server, server.ip().is_loopback()) {
+            (SocketAddr::V4(_), true) => ([127, 0, 0, 1], 0).into(),
+            (SocketAddr::V4(_), false) => ([0, 0, 0, 0], 0).into(),
+            (SocketAddr::V6(_), true) => (std::net::Ipv6Addr::LOCALHOST, 0).into(),
+            (SocketAddr::V6(_), false) => (std::net::Ipv6Addr::UNSPECIFIED, 0).into(),
+        };
+        let sealed = key.is_some();
+        let settings = FacetSettings { facet, server, timing, numbering: Numbering::default() };
+        let machine = FacetMachine::new(Duration::ZERO, settings, key.unwrap_or_else(SharedKey::none), Entropy::system()?);
+        Ok(UdpFacet { running: Running::start(bind(local)?, machine)?, sealed })
+    }
+
+    /// One line for the user: the address, and whether it is sealed.
+    pub fn describe(&self) -> String {
+        describe(&self.running.core.socket, self.sealed)
+    }
+}
+
+impl FacetLink for UdpFacet {
+    fn send(&mut self, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
+        let core = &self.running.core;
+        let mut state = core.lock();
+        let sent = state.machine.send(core.now(), delivery, message);
+        core.settle(&mut state);
+        Ok(sent)
+    }
+
+    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<LinkEvent>, LinkError> {
+        message.clear();
+        Ok(self.running.core.next_event(timeout)?.map(|(event, bytes)| {
+            *message = bytes;
+            event
+        }))
+    }
+
+    fn close(&mut self) {
+        let core = &self.running.core;
+        core.lock().machine.close(core.now(), &mut |to, datagram| core.emit(to, datagram));
+    }
+
+    fn counters(&self) -> LinkCounters {
+        self.running.core.lock().machine.counters()
+    }
+}
+
+impl Machine for ServerMachine {
+    type Event = (FacetNumber, LinkEvent, Vec<u8>);
+    fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) {
+        self.receive(now, from, datagram);
+    }
+    fn transmit(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        self.transmit(now, emit);
+    }
+    fn wake(&self) -> Option<Duration> {
+        self.wake()
+    }
+    fn poll(&mut self) -> Option<Self::Event> {
+        self.poll()
+    }
+    fn close_all(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        for facet in 0..crate::sync::transport::MAX_FACETS as FacetNumber {
+            self.close(now, facet, emit);
+        }
+    }
+}
+
+impl Machine for FacetMachine {
+    type Event = (LinkEvent, Vec<u8>);
+    fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) {
+        self.receive(now, from, datagram);
+    }
+    fn transmit(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        self.transmit(now, emit);
+    }
+    fn wake(&self) -> Option<Duration> {
+        Some(self.wake())
+    }
+    fn poll(&mut self) -> Option<Self::Event> {
+        self.poll()
+    }
+    fn close_all(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        self.close(now, emit);
+    }
+}

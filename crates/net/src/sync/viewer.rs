@@ -1,0 +1,85 @@
+//! Who looks, and where the cave stands: the thesis's `SidData` (§IV.C), an object among the others.
+
+use super::wire::{Bytes, Fault, put_f64};
+use tumble_collide::{Pose, Quat, Vec3};
+
+/// The name it is addressed by.
+pub const VIEWER_NAME: &str = "SidData";
+/// Most users of a cave.
+pub const MAX_USERS: usize = 256;
+
+/// One user, in the cave's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct User {
+    /// Head: the origin between the eyes (m), x to the right, y ahead, z up.
+    pub head: Pose,
+    /// Between the eyes, m.
+    pub interpupillary_m: f64,
+    /// Sequence number of the newest [`Input`](super::Input) of this user that the frame shows; 0 for none.
+    pub input: u64,
+}
+
+/// Users and camera, exact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Viewer {
+    /// In the order of the cave file.
+    pub users: Vec<User>,
+    /// The cave's frame in the scene.
+    pub cave: Pose,
+    /// Metres of the scene to a metre of the cave.
+    pub scale: f64,
+}
+
+impl Default for Viewer {
+    fn default() -> Viewer {
+        Viewer { users: Vec::new(), cave: Pose::identity(), scale: 1.0 }
+    }
+}
+
+impl Viewer {
+    /// Appends it: place (7 numbers), scale, count (u16), and 80 bytes per user. Users beyond [`MAX_USERS`] are left out.
+    pub fn write(&self, out: &mut Vec<u8>) {
+        let users = &self.users[..self.users.len().min(MAX_USERS)];
+        put_exact_pose(out, &self.cave);
+        put_f64(out, &[self.scale]);
+        out.extend((users.len() as u16).to_le_bytes());
+        for user in users {
+            put_exact_pose(out, &user.head);
+            put_f64(out, &[user.interpupillary_m]);
+            out.extend(user.input.to_le_bytes());
+        }
+    }
+
+    /// Reads what [`write`](Self::write) wrote.
+    ///
+    /// # Errors
+    /// [`Fault::Malformed`].
+    pub fn read(bytes: &[u8]) -> Result<Viewer, Fault> {
+        let mut rest = Bytes(bytes);
+        let (cave, scale) = (exact_pose(&mut rest)?, rest.f64()?);
+        let count = rest.u16()?;
+        if count as usize > MAX_USERS || scale <= 0.0 {
+            return Err(Fault::Malformed("more than 256 users, or a scale that is not above 0"));
+        }
+        let user = |_| Ok(User { head: exact_pose(&mut rest)?, interpupillary_m: rest.f64()?, input: rest.u64()? });
+        let users = (0..count).map(user).collect::<Result<_, Fault>>()?;
+        rest.end()?;
+        Ok(Viewer { users, cave, scale })
+    }
+}
+
+/// Position and `x, y, z, w`.
+pub(crate) fn put_exact_pose(out: &mut Vec<u8>, pose: &Pose) {
+    put_f64(out, pose.translation.vector.as_slice());
+    put_f64(out, pose.rotation.coords.as_slice());
+}
+
+pub(crate) fn exact_pose(bytes: &mut Bytes<'_>) -> Result<Pose, Fault> {
+    let [x, y, z] = bytes.f64s()?;
+    let [i, j, k, w] = bytes.f64s()?;
+    let rotation = nalgebra::Quaternion::new(w, i, j, k);
+    if (rotation.norm_squared() - 1.0).abs() > 1e-6 {
+        return Err(Fault::Malformed("an orientation that is not of unit length"));
+    }
+    Ok(Pose::from_parts(Vec3::new(x, y, z).into(), Quat::new_unchecked(rotation)))
+}

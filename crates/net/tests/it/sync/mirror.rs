@@ -1,0 +1,246 @@
+//! A world and its copy: what is seen is the same, whatever is added, removed, switched off or moved.
+
+use super::stage::{scene, viewer};
+use tumble_core::collide::{Pose, Quat, Shape, Vec3};
+use tumble_core::{Look, Mode, Object, RigidBody, Visual, World};
+use tumble_net::sync::quantise::{POSITION_ERROR_M, ROTATION_ERROR_RAD};
+use tumble_net::sync::wire::Fault;
+use tumble_net::sync::{Mirror, Publisher, VIEWER_NAME};
+
+/// A server's world and a client's, and what goes between.
+struct Pair {
+    world: World,
+    publisher: Publisher,
+    mirror: Mirror,
+    frame: u64,
+}
+
+impl Pair {
+    fn new(exact: bool) -> Pair {
+        let world = scene();
+        Pair { publisher: Publisher::new(&world, exact, u32::MAX - 2), world, mirror: Mirror::new(scene()), frame: 0 }
+    }
+
+    /// Sends a frame; whether the list of objects was new.
+    fn send(&mut self) -> bool {
+        self.frame += 1;
+        let published = self.publisher.publish(&self.world, &viewer(self.frame), self.frame).unwrap();
+        if published.fresh {
+            self.mirror.apply_snapshot(&self.publisher.snapshot()).unwrap();
+        }
+        self.mirror.apply_state(self.frame, self.world.time(), &published.state).unwrap();
+        assert_eq!(self.mirror.hash(), published.hash);
+        assert_eq!((self.mirror.world().time(), self.mirror.frame()), (self.world.time(), self.frame));
+        assert_eq!(self.mirror.viewer(), &viewer(self.frame));
+        self.compare();
+        published.fresh
+    }
+
+    /// Object by object, by name: the same are there, alive, and stand where they should.
+    fn compare(&self) {
+        let names = |w: &World| {
+            let mut names: Vec<String> = w.ids().iter().map(|&id| w.object(id).unwrap().name().to_string()).collect();
+            names.sort();
+            names
+        };
+        assert_eq!(names(&self.world), names(self.mirror.world()));
+        for name in names(&self.world) {
+            let (here, there) = (self.mirror.world(), &self.world);
+            let (a, b) = (here.find(&name).unwrap(), there.find(&name).unwrap());
+            assert_eq!(here.status(a).unwrap().alive, there.status(b).unwrap().alive, "{name}");
+            if there.status(b).unwrap().alive {
+                let (a, b) = (here.site(a, 0).unwrap().pose, there.site(b, 0).unwrap().pose);
+                assert!((a.translation.vector - b.translation.vector).amax() <= POSITION_ERROR_M, "{name}");
+                assert!(a.rotation.angle_to(&b.rotation) <= ROTATION_ERROR_RAD + 3e-8, "{name}"); // an arc cosine loses 2e-8 near 0
+            }
+        }
+    }
+}
+
+#[test]
+fn a_copy_follows_frame_by_frame() {
+    for exact in [false, true] {
+        let mut pair = Pair::new(exact);
+        assert!(pair.send(), "the first frame brings the list");
+        for _ in 0..100 {
+            pair.world.step().unwrap();
+            assert!(!pair.send());
+        }
+    }
+}
+
+/// A replica has the very bits of the state.
+#[test]
+fn a_replica_is_exact() {
+    let mut pair = Pair::new(true);
+    for _ in 0..100 {
+        pair.world.step().unwrap();
+        pair.send();
+    }
+    assert_eq!(pair.mirror.world().state(), pair.world.state());
+    // and goes on by itself as the server does, but for the contacts' memory: free flight
+    let ball = pair.world.find("ball 4").unwrap();
+    pair.world.set_pose(ball, Pose::translation(0.0, 0.0, 50.0)).unwrap();
+    pair.send();
+    let mut copy = pair.mirror.world().fork();
+    copy.step().unwrap();
+    pair.world.step().unwrap();
+    let (a, b) = (copy.find("ball 4").unwrap(), ball);
+    assert_eq!(copy.state_of(a), pair.world.state_of(b));
+}
+
+#[test]
+fn objects_come_and_go() {
+    let mut pair = Pair::new(false);
+    pair.send();
+    let look = Look { color: [0.1, 0.2, 0.3], shader: "checker".into(), properties: vec![("squares".into(), 8.0)], ..Look::default() };
+    let spun = Pose::from_parts(Vec3::new(1.0, 2.0, 3.0).into(), Quat::from_scaled_axis(Vec3::new(0.3, -0.2, 0.9)));
+    for (k, shape) in [Shape::sphere(0.2), Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)), Shape::capsule(0.1, 0.2), Shape::cylinder(0.1, 0.3)].into_iter().enumerate() {
+        let visual = Visual { part: 0, pose: spun, shape: shape.clone().unwrap(), look: look.clone() };
+        let body = RigidBody::with_mass(format!("new {k}"), shape.unwrap(), 1.0).unwrap();
+        pair.world.add(body.at(spun).drawn_as(vec![visual])).unwrap();
+        assert!(pair.send(), "an object more");
+        pair.world.step().unwrap();
+        assert!(!pair.send());
+        let here = pair.mirror.world();
+        let (a, b) = (here.find(&format!("new {k}")).unwrap(), pair.world.find(&format!("new {k}")).unwrap());
+        let visuals = |w: &World, id| format!("{:?}", w.object(id).unwrap().renderable().unwrap().visuals());
+        assert_eq!(visuals(here, a), visuals(&pair.world, b), "it looks the same");
+    }
+    for name in ["new 1", "ball 2", "post"] {
+        let id = pair.world.find(name).unwrap();
+        pair.world.remove(id).unwrap();
+        assert!(pair.send(), "{name} is gone");
+    }
+    // somebody else of an old name
+    pair.world.add(RigidBody::with_mass("ball 2", Shape::sphere(0.5).unwrap(), 1.0).unwrap()).unwrap();
+    assert!(pair.send());
+    let ball = pair.mirror.world().find("ball 2").unwrap();
+    let radius = |o: &dyn Object| if let Shape::Sphere { radius } = o.renderable().unwrap().visuals()[0].shape { radius } else { 0.0 };
+    assert_eq!(radius(pair.mirror.world().object(ball).unwrap()), 0.5);
+}
+
+#[test]
+fn what_is_switched_off_or_moved_by_hand_is_seen_so() {
+    let mut pair = Pair::new(false);
+    pair.send();
+    let [ball, post] = ["ball 1", "post"].map(|name| pair.world.find(name).unwrap());
+    pair.world.set_alive(ball, false).unwrap();
+    assert!(!pair.send(), "what moves may die without a new list");
+    pair.world.set_alive(ball, true).unwrap();
+    pair.send();
+    pair.world.set_pose(post, Pose::translation(-3.0, 0.0, 1.0)).unwrap();
+    assert!(pair.send(), "what is still has moved");
+    pair.world.set_alive(post, false).unwrap();
+    assert!(pair.send());
+    pair.world.set_mode(ball, Mode::Static).unwrap();
+    assert!(pair.send());
+}
+
+#[test]
+fn a_mesh_of_the_scene_is_not_sent_again() {
+    use tumble_core::collide::{TreeSettings, TriMesh};
+    let tetrahedron = TriMesh {
+        vertices: [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3::from).to_vec(),
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    };
+    let (shape, _) = Shape::mesh(tetrahedron, &TreeSettings::default()).unwrap();
+    let body = |name: &str, shape: &Shape| RigidBody::with_mass(name, shape.clone(), 1.0).unwrap();
+    let build = || {
+        let mut world = scene();
+        world.add(body("rock", &shape)).unwrap();
+        world
+    };
+    let mut world = build();
+    let (mut publisher, mut mirror) = (Publisher::new(&world, false, 0), Mirror::new(build()));
+    publisher.publish(&world, &viewer(0), 0).unwrap();
+    let before = publisher.snapshot().len();
+    world.add(body("second rock", &shape)).unwrap();
+    let published = publisher.publish(&world, &viewer(0), 1).unwrap();
+    assert!(publisher.snapshot().len() - before < 300, "{} bytes more", publisher.snapshot().len() - before);
+    mirror.apply_snapshot(&publisher.snapshot()).unwrap();
+    mirror.apply_state(1, 0.0, &published.state).unwrap();
+    assert_eq!(mirror.hash(), published.hash);
+    // one that the scene has not travels whole
+    let mut other = tumble_core::collide::TriMesh { vertices: vec![], triangles: vec![] };
+    if let Shape::Mesh(mesh) = &shape {
+        other = mesh.mesh().clone();
+        other.vertices.iter_mut().for_each(|v| *v *= 2.0);
+    }
+    let (other, _) = Shape::mesh(other, &TreeSettings::default()).unwrap();
+    world.add(body("boulder", &other)).unwrap();
+    publisher.publish(&world, &viewer(0), 2).unwrap();
+    mirror.apply_snapshot(&publisher.snapshot()).unwrap();
+    let boulder = mirror.world().object(mirror.world().find("boulder").unwrap()).unwrap();
+    let Shape::Mesh(mesh) = &boulder.renderable().unwrap().visuals()[0].shape else { panic!("a mesh") };
+    assert_eq!(mesh.mesh().triangles.len(), 4);
+    assert!((mesh.volume() - 8.0 / 6.0).abs() < 1e-12, "{}", mesh.volume());
+}
+
+#[test]
+fn what_cannot_be_sent_is_said() {
+    let mut pair = Pair::new(false);
+    pair.world.add(RigidBody::with_mass(VIEWER_NAME, Shape::sphere(1.0).unwrap(), 1.0).unwrap()).unwrap();
+    let error = pair.publisher.publish(&pair.world, &viewer(0), 0).unwrap_err();
+    assert!(error.to_string().contains("SidData"), "{error}");
+    let id = pair.world.find(VIEWER_NAME).unwrap();
+    pair.world.remove(id).unwrap();
+    assert!(pair.send(), "and all is well again");
+}
+
+/// Another scene than the server's is noticed by what it lacks, and the copy stays as it was.
+#[test]
+fn a_list_that_does_not_fit_changes_nothing() {
+    let mut pair = Pair::new(false);
+    pair.send();
+    let mut smaller = scene();
+    let ball = smaller.find("ball 3").unwrap();
+    smaller.remove(ball).unwrap();
+    let mut mirror = Mirror::new(smaller);
+    let fault = mirror.apply_snapshot(&pair.publisher.snapshot()).unwrap_err();
+    assert!(matches!(&fault, Fault::Unfit(why) if why.contains("'ball 3'")), "{fault}");
+    assert_eq!(mirror.revision(), None);
+}
+
+/// The hash is of the world that is shown, not of the message: whoever moves something in between is found out.
+#[test]
+fn the_hash_is_read_from_the_world() {
+    let mut pair = Pair::new(false);
+    pair.send();
+    let hash = pair.mirror.hash();
+    pair.world.step().unwrap();
+    pair.frame -= 1; // the same number and another world
+    let published = pair.publisher.publish(&pair.world, &viewer(1), 1).unwrap();
+    pair.mirror.apply_state(1, 0.0, &published.state).unwrap();
+    assert_ne!(pair.mirror.hash(), hash);
+    assert_ne!(pair.mirror.hash(), published.hash, "the time differs: 0 here, a step there");
+}
+
+/// One bit of anything that can be seen makes another scene; what cannot be seen does not.
+#[test]
+fn the_hash_of_a_scene_sees_what_can_be_seen() {
+    use tumble_net::sync::scene_hash;
+    let hash = |change: &dyn Fn(&mut World)| {
+        let mut world = scene();
+        change(&mut world);
+        scene_hash("text", &world)
+    };
+    let same = hash(&|_| {});
+    assert_eq!(same, scene_hash("text", &scene()));
+    assert_ne!(same, scene_hash("text ", &scene()));
+    let find = |w: &World, name: &str| w.find(name).unwrap();
+    let up = |w: &mut World| w.set_pose(find(w, "ball 0"), Pose::translation(0.0, 0.0, 1.0 + f64::EPSILON)).unwrap();
+    let gone = |w: &mut World| drop(w.remove(find(w, "post")).unwrap());
+    let dead = |w: &mut World| w.set_alive(find(w, "post"), false).unwrap();
+    let wider = |w: &mut World| {
+        let id = find(w, "ball 4");
+        w.remove(id).unwrap();
+        let pose = Pose::translation(1.2, 0.0, 1.8);
+        w.add(RigidBody::with_mass("ball 4", Shape::sphere(0.1000001).unwrap(), 1.0).unwrap().at(pose)).unwrap();
+    };
+    let changes: [&dyn Fn(&mut World); 4] = [&up, &gone, &dead, &wider];
+    let hashes: Vec<_> = changes.iter().map(|change| hash(*change)).collect();
+    assert!(hashes.iter().all(|h| *h != same) && (0..4).all(|k| !hashes[..k].contains(&hashes[k])));
+    let faster = |w: &mut World| w.set_velocity(find(w, "ball 0"), Vec3::x(), Vec3::zeros()).unwrap();
+    assert_eq!(hash(&faster), same);
+}

@@ -1,0 +1,9 @@
+//! NetSync from outside.
+
+mod faults;
+mod hostile;
+mod lockstep;
+mod mirror;
+mod quantise;
+mod threads;
+pub mod stage;

@@ -1,0 +1,94 @@
+//! What keys do.
+
+use super::user::Way;
+use tumble::render::winit::keyboard::{Key, KeyCode, NamedKey};
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    Pause,
+    Step,
+    Reset,
+    Faster,
+    Slower,
+    NextCamera,
+    LastCamera,
+    Home,
+    Fly,
+    Overlay(usize),
+    Statistics,
+    Help,
+    Picture,
+    Fullscreen,
+    Quit,
+}
+
+/// Overlays by number key from 1 on, as `--debug-draw` names them.
+pub const OVERLAYS: [&str; 5] = ["contacts", "normals", "velocities", "forces", "tree"];
+
+/// What is told of keys and mouse.
+pub const HELP: [&str; 18] = [
+    "W A S D     walk; arrows too, left and right turn",
+    "E Q         up and down; also page up, page down",
+    "shift       four times as fast",
+    "F           fly where you look, or walk level",
+    "right drag  look around; left drag off a body too",
+    "left drag   pull a body; the wheel brings it nearer",
+    "wheel       faster or slower on foot",
+    "C, shift C  next camera, the one before",
+    "home        the scene's camera",
+    "space       pause, go on",
+    ". or N      one step",
+    "R           back to time 0",
+    "+ -         time twice as fast, half as fast",
+    "1 2 3 4     contacts, normals, velocities, forces",
+    "5           sphere trees, level by level",
+    "T, H or F1  statistics, this help",
+    "P, F11      picture to a file, full screen",
+    "escape      end",
+];
+
+/// What a key that goes down asks for, if anything.
+pub fn command(key: &Key) -> Option<Command> {
+    let letter = match key {
+        Key::Named(NamedKey::Space) => return Some(Command::Pause),
+        Key::Named(NamedKey::Escape) => return Some(Command::Quit),
+        Key::Named(NamedKey::Home) => return Some(Command::Home),
+        Key::Named(NamedKey::F1) => return Some(Command::Help),
+        Key::Named(NamedKey::F11) => return Some(Command::Fullscreen),
+        Key::Character(text) => text.as_str(),
+        _ => return None,
+    };
+    Some(match letter {
+        " " => Command::Pause,
+        "." | "n" | "N" => Command::Step,
+        "r" | "R" => Command::Reset,
+        "+" | "=" => Command::Faster,
+        "-" | "_" => Command::Slower,
+        "c" => Command::NextCamera,
+        "C" => Command::LastCamera,
+        "f" | "F" => Command::Fly,
+        "t" | "T" => Command::Statistics,
+        "h" | "H" | "?" => Command::Help,
+        "p" | "P" => Command::Picture,
+        digit => match digit.parse::<usize>() {
+            Ok(n) if (1..=OVERLAYS.len()).contains(&n) => Command::Overlay(n - 1),
+            _ => return None,
+        },
+    })
+}
+
+/// Which way a key moves the user, by its place on the keyboard, whatever is printed on it.
+pub fn way(code: KeyCode) -> Option<Way> {
+    Some(match code {
+        KeyCode::KeyW | KeyCode::ArrowUp => Way::Ahead,
+        KeyCode::KeyS | KeyCode::ArrowDown => Way::Back,
+        KeyCode::KeyA => Way::Left,
+        KeyCode::KeyD => Way::Right,
+        KeyCode::KeyE | KeyCode::PageUp => Way::Up,
+        KeyCode::KeyQ | KeyCode::PageDown => Way::Down,
+        KeyCode::ArrowLeft => Way::TurnLeft,
+        KeyCode::ArrowRight => Way::TurnRight,
+        _ => return None,
+    })
+}

@@ -1,0 +1,95 @@
+//! `tumble view`: a scene in a window. Keys and mouse move the user, time stands and goes, bodies are pulled.
+//!
+//! Time goes by the clock, in whole steps: which steps are taken depends on the clock, what a step does does not. When nobody pulls, the state after n steps is
+//! that of `tumble run`.
+
+mod hand;
+mod keys;
+mod overlays;
+mod pace;
+mod presets;
+mod sight;
+mod statistics;
+mod status;
+mod user;
+mod viewer;
+
+use crate::args::ViewOptions;
+use crate::failure::Failure;
+use crate::shots::write_png;
+use sight::Sight;
+use tumble::render::{CaveView, RenderError, WindowOptions, run_window};
+use tumble::scene::cave::{Output, resolve_cave};
+use tumble::scene::{SceneFile, resolve_scene};
+use viewer::Viewer;
+
+/// Size of the window where nothing is said, pixels.
+const USUAL: [u32; 2] = [1280, 720];
+
+/// Shows a scene until the window is closed.
+pub fn view(options: &ViewOptions) -> Result<(), Failure> {
+    let scene = described(options)?;
+    let (world, notes) = scene.build().map_err(Failure::input)?;
+    notes.iter().for_each(|note| eprintln!("{note}"));
+    let sight = sight(&scene, options)?;
+    let window = window(&sight, options);
+    let mut viewer = Viewer::new(&scene, world, sight, options)?;
+    run_window(&window, &mut viewer)?;
+    let image = viewer.finish()?;
+    match (&options.picture, image) {
+        (Some(path), Some(image)) => write_png(&image, path),
+        _ => Ok(()),
+    }
+}
+
+/// The scene with what the command line says instead.
+fn described(options: &ViewOptions) -> Result<SceneFile, Failure> {
+    let mut scene = resolve_scene(&options.scene, &[])?.load()?;
+    let w = &mut scene.world;
+    w.dt_s = options.dt.unwrap_or(w.dt_s);
+    w.stepper = options.stepper.unwrap_or(w.stepper);
+    w.solver = options.solver.unwrap_or(w.solver);
+    w.integrator = options.integrator.unwrap_or(w.integrator);
+    Ok(scene)
+}
+
+fn sight(scene: &SceneFile, options: &ViewOptions) -> Result<Sight, Failure> {
+    let Some(name) = &options.cave else {
+        // clap lets neither --facet nor --preview through without it
+        return Ok(Sight::Camera);
+    };
+    let cave = resolve_cave(name)?.load()?;
+    let facet = options.facet.as_ref().map(|facet| cave.facet(facet).cloned()).transpose()?;
+    let view = Box::new(CaveView::new(cave, scene).map_err(Failure::input)?);
+    match facet {
+        Some(_) if options.size.is_some() => Err(Failure::input("the cave says how large a facet is (size_px); --size goes with --preview or without a cave")),
+        Some(facet) => Ok(Sight::Facet(view, Box::new(facet))),
+        None => Ok(Sight::Unfolded(view)),
+    }
+}
+
+fn window(sight: &Sight, options: &ViewOptions) -> WindowOptions {
+    let most = options.size.map_or(USUAL, |(w, h)| [w, h]);
+    let name = &options.scene;
+    match sight {
+        Sight::Camera => WindowOptions::new(format!("tumble: {name}"), most),
+        Sight::Unfolded(view) => WindowOptions::new(format!("tumble: {name} in {}", view.cave().file), view.size_px(None, most)),
+        Sight::Facet(view, facet) => {
+            let title = format!("tumble: {name} on {}", facet.name);
+            let position_px = match facet.output {
+                Output::Window { position_px } => Some(position_px),
+                Output::Offscreen => None,
+            };
+            WindowOptions { position_px, decorated: false, resizable: false, ..WindowOptions::new(title, view.size_px(Some(facet), most)) }
+        }
+    }
+}
+
+impl From<RenderError> for Failure {
+    fn from(error: RenderError) -> Failure {
+        match error {
+            RenderError::BadSize { .. } => Failure::input(error),
+            error => Failure::run("the window", error),
+        }
+    }
+}

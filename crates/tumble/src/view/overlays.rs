@@ -1,0 +1,35 @@
+//! Which overlays are on, by name.
+
+use super::keys::OVERLAYS;
+use tumble::render::DebugDraw;
+
+/// The deepest level of sphere trees that keys go through.
+const DEEPEST: u32 = 5;
+
+/// Debug drawing that keys switch.
+pub struct Overlays {
+    /// As it is drawn.
+    pub draw: DebugDraw,
+}
+
+impl Overlays {
+    /// Switches the overlay of a number; trees go on to the next level, and off after the last.
+    pub fn switch(&mut self, index: usize) {
+        let draw = &mut self.draw;
+        match OVERLAYS[index] {
+            "contacts" => draw.contacts = !draw.contacts,
+            "normals" => draw.normals = !draw.normals,
+            "velocities" => draw.velocities = !draw.velocities,
+            "forces" => draw.forces = !draw.forces,
+            _ => draw.tree_level = Some(draw.tree_level.map_or(0, |level| level + 1)).filter(|level| *level <= DEEPEST),
+        }
+    }
+
+    /// Names of those that are on, as `--debug-draw` takes them.
+    pub fn names(&self) -> Vec<String> {
+        let d = &self.draw;
+        let flags = [d.contacts, d.normals, d.velocities, d.forces];
+        let on = OVERLAYS.iter().zip(flags).filter(|(_, on)| *on).map(|(name, _)| name.to_string());
+        on.chain(d.tree_level.map(|level| format!("tree={level}"))).collect()
+    }
+}

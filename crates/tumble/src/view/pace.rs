@@ -1,0 +1,121 @@
+//! Simulated time against the clock: how many steps are due, and what is given up when they take too long.
+
+/// What of a pause between two turns counts at most, s: a window that was hidden or a machine that slept is not caught up with.
+const MOST_LATE_S: f64 = 1.0;
+/// Speeds, as powers of 2.
+const SPEEDS: std::ops::RangeInclusive<i32> = -6..=4;
+
+/// Keeps simulated time in step with the clock.
+pub struct Pace {
+    /// Whether time stands.
+    pub paused: bool,
+    /// Simulated seconds that are due and not yet stepped.
+    owed_s: f64,
+    /// Simulated seconds that were given up since the start.
+    pub behind_s: f64,
+    /// Speed as a power of 2.
+    power: i32,
+    /// Steps asked for one by one.
+    single: u32,
+}
+
+impl Pace {
+    /// At real time.
+    pub fn new(paused: bool) -> Pace {
+        Pace { paused, owed_s: 0.0, behind_s: 0.0, power: 0, single: 0 }
+    }
+
+    /// Simulated seconds per second of the clock.
+    pub fn speed(&self) -> f64 {
+        2f64.powi(self.power)
+    }
+
+    /// Twice as fast (1), half as fast (-1).
+    pub fn change_speed(&mut self, by: i32) {
+        self.power = (self.power + by).clamp(*SPEEDS.start(), *SPEEDS.end());
+    }
+
+    /// Stands, or goes on. What was owed is forgotten.
+    pub fn toggle(&mut self) {
+        self.paused = !self.paused;
+        (self.owed_s, self.single) = (0.0, 0);
+    }
+
+    /// One step, and then time stands.
+    pub fn step_once(&mut self) {
+        self.paused = true;
+        self.owed_s = 0.0;
+        self.single = (self.single + 1).min(100);
+    }
+
+    /// The clock went on by so many seconds.
+    pub fn pass(&mut self, clock_s: f64) {
+        if !self.paused {
+            let counted = clock_s.clamp(0.0, MOST_LATE_S);
+            self.behind_s += (clock_s - counted).max(0.0) * self.speed();
+            self.owed_s += counted * self.speed();
+        }
+    }
+
+    /// Whether a step of `dt` seconds is due; it then counts as taken.
+    pub fn take(&mut self, dt: f64) -> bool {
+        if self.single > 0 {
+            self.single -= 1;
+            return true;
+        }
+        let due = !self.paused && self.owed_s >= dt;
+        if due {
+            self.owed_s -= dt;
+        }
+        due
+    }
+
+    /// Steps took too long: what is still owed is given up, so that the next picture does not come later still.
+    pub fn give_up(&mut self) {
+        self.behind_s += self.owed_s;
+        self.owed_s = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn steps(pace: &mut Pace, dt: f64) -> u32 {
+        std::iter::from_fn(|| pace.take(dt).then_some(())).count() as u32
+    }
+
+    #[test]
+    fn a_second_in_uneven_turns_gives_as_many_steps_as_fit_in_it() {
+        let mut pace = Pace::new(false);
+        let turns = [0.25, 0.125, 0.5, 0.0625, 0.0625];
+        assert_eq!(turns.map(|t| { pace.pass(t); steps(&mut pace, 1.0 / 64.0) }), [16, 8, 32, 4, 4]);
+        pace.change_speed(-1);
+        pace.pass(1.0);
+        assert_eq!(steps(&mut pace, 1.0 / 64.0), 32);
+    }
+
+    #[test]
+    fn time_stands_when_paused_and_single_steps_are_exact() {
+        let mut pace = Pace::new(true);
+        pace.pass(0.5);
+        assert_eq!(steps(&mut pace, 0.01), 0);
+        pace.step_once();
+        pace.step_once();
+        pace.pass(0.5);
+        assert_eq!(steps(&mut pace, 0.01), 2);
+        pace.toggle();
+        assert!(!pace.paused);
+        assert_eq!(steps(&mut pace, 0.01), 0, "what passed while it stood is not owed");
+    }
+
+    #[test]
+    fn what_is_late_is_given_up_and_counted() {
+        let mut pace = Pace::new(false);
+        pace.pass(10.0);
+        assert_eq!((pace.owed_s, pace.behind_s), (1.0, 9.0));
+        assert!(pace.take(0.25));
+        pace.give_up();
+        assert_eq!((steps(&mut pace, 0.25), pace.behind_s), (0, 9.75));
+    }
+}

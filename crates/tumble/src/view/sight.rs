@@ -1,0 +1,135 @@
+//! What the window shows: the scene's camera, one facet of a cave, or the whole cave unfolded.
+
+use super::user::Body;
+use tumble::collide::Vec3;
+use tumble::render::{CaveView, DrawList, Image, Picture, RIM_PX, RenderError, Screen, Viewpoint, unfold};
+use tumble::scene::cave::{Facet, Flip, Stereo};
+
+/// Side of the shadow maps of a cave, as for its pictures.
+const CAVE_SHADOWS: u32 = 4096;
+/// Around the facets of an unfolded cave, sRGB.
+const BACKGROUND: [u8; 3] = [24, 24, 26];
+
+/// What is shown.
+pub enum Sight {
+    /// Through the user's one eye.
+    Camera,
+    /// A facet, as its projector gets it.
+    Facet(Box<CaveView>, Box<Facet>),
+    /// All facets, from the point between the eyes.
+    Unfolded(Box<CaveView>),
+}
+
+/// A line of sight, world axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// The eye, m.
+    pub origin: Vec3,
+    /// Unit vector.
+    pub direction: Vec3,
+    /// The middle of the view, a unit vector.
+    pub axis: Vec3,
+}
+
+/// A view in a rectangle, with the channels and mirrors that it is shown by.
+struct Tile {
+    from: Box<dyn Viewpoint>,
+    position_px: [u32; 2],
+    size_px: [u32; 2],
+    flip: [bool; 2],
+    channels: [bool; 3],
+}
+
+impl Tile {
+    fn picture(&self) -> Picture<'_> {
+        Picture { from: self.from.as_ref(), position_px: self.position_px, size_px: self.size_px, flip: self.flip, channels: self.channels }
+    }
+}
+
+impl Sight {
+    /// Takes the cave to where the user is, or the list's camera to his eye.
+    pub fn stand(&mut self, body: &Body, list: &mut DrawList) {
+        match (self, body) {
+            (Sight::Camera, Body::Eye(camera)) => list.camera = *camera,
+            (Sight::Facet(view, _) | Sight::Unfolded(view), Body::Cave { place, .. }) => {
+                view.stand(*place);
+                list.settings.shadow_map_size = CAVE_SHADOWS;
+            }
+            _ => {}
+        }
+    }
+
+    /// Draws into the window's canvas.
+    pub fn draw(&self, screen: &mut Screen, list: &DrawList) -> Result<(), RenderError> {
+        if let Sight::Facet(view, facet) = self
+            && view.is_bent(facet)
+        {
+            let image = view.draw(screen.renderer(), list, facet)?;
+            return screen.draw_image(&image);
+        }
+        let tiles = self.tiles(list, screen.size_px())?;
+        screen.draw(list, &tiles.iter().map(Tile::picture).collect::<Vec<_>>(), BACKGROUND)
+    }
+
+    /// The same into memory.
+    pub fn picture(&self, screen: &mut Screen, list: &DrawList) -> Result<Image, RenderError> {
+        let [w, h] = screen.size_px();
+        match self {
+            Sight::Camera => screen.renderer().render(list, w, h),
+            Sight::Facet(view, facet) => view.draw(screen.renderer(), list, facet),
+            Sight::Unfolded(view) => view.draw_unfolded(screen.renderer(), list, [w, h]),
+        }
+    }
+
+    /// The line of sight through a pixel; `None` where nothing is shown there. Of an anaglyph the left eye's.
+    pub fn ray(&self, list: &DrawList, size_px: [u32; 2], at_px: [f64; 2]) -> Option<Ray> {
+        let tiles = self.tiles(list, size_px).ok()?;
+        let within = |t: &&Tile| (0..2).all(|k| (0.0..f64::from(t.size_px[k])).contains(&(at_px[k] - f64::from(t.position_px[k]))));
+        let tile = tiles.iter().find(within)?;
+        let share: [f64; 2] = std::array::from_fn(|k| (at_px[k] - f64::from(tile.position_px[k])) / f64::from(tile.size_px[k]));
+        let share: [f64; 2] = std::array::from_fn(|k| if tile.flip[k] { 1.0 - share[k] } else { share[k] });
+        let lens = tile.from.lens(tile.size_px[0] as f32 / tile.size_px[1] as f32).ok()?;
+        let back = (lens.projection * lens.view).try_inverse()?;
+        let at = |depth: f64| back.transform_point(&nalgebra::Point3::new(2.0 * share[0] - 1.0, 1.0 - 2.0 * share[1], depth)).coords;
+        let (near, far) = (at(0.0), at(0.5));
+        let rotation = lens.view.fixed_view::<3, 3>(0, 0).transpose();
+        let origin = -(rotation * lens.view.fixed_view::<3, 1>(0, 3));
+        Some(Ray { origin, direction: (far - near).try_normalize(1e-12)?, axis: -rotation.column(2).into_owned() })
+    }
+
+    fn tiles(&self, list: &DrawList, size_px: [u32; 2]) -> Result<Vec<Tile>, RenderError> {
+        let whole = |from: Box<dyn Viewpoint>, position_px, size_px| Tile { from, position_px, size_px, flip: [false; 2], channels: [true; 3] };
+        Ok(match self {
+            Sight::Camera => vec![whole(Box::new(list.camera), [0; 2], size_px)],
+            Sight::Facet(view, facet) => eyes(view, facet)?,
+            Sight::Unfolded(view) => {
+                let facets = &view.cave().facets;
+                let tile = |t: tumble::render::Tile| -> Result<Tile, RenderError> {
+                    let [w, h] = t.size_px;
+                    Ok(whole(Box::new(view.eye(&facets[t.facet], 0.0)?.part(w, h, RIM_PX)), t.position_px, t.size_px))
+                };
+                unfold(view.cave(), size_px).1.into_iter().map(tile).collect::<Result<_, _>>()?
+            }
+        })
+    }
+}
+
+/// Both eyes' views of a facet, or the one between them, in their places.
+fn eyes(view: &CaveView, facet: &Facet) -> Result<Vec<Tile>, RenderError> {
+    let [w, h] = facet.size_px;
+    let flip = [matches!(facet.flip, Flip::Horizontal | Flip::Both), matches!(facet.flip, Flip::Vertical | Flip::Both)];
+    let eye = |side: &f64| -> Result<Tile, RenderError> {
+        let right = *side > 0.0;
+        let position_px = match facet.stereo {
+            Stereo::SideBySide if right => [w, 0],
+            Stereo::TopBottom if right => [0, h],
+            _ => [0, 0],
+        };
+        let channels = match facet.stereo {
+            Stereo::Anaglyph => [!right, right, right],
+            _ => [true; 3],
+        };
+        Ok(Tile { from: Box::new(view.eye(facet, *side)?.part(w, h, RIM_PX)), position_px, size_px: [w, h], flip, channels })
+    };
+    facet.stereo.sides().iter().map(eye).collect()
+}

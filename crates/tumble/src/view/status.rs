@@ -1,0 +1,81 @@
+//! `--status`: what the window shows, line by line, for programs.
+
+use crate::failure::Failure;
+use serde::Serialize;
+use std::fs::File;
+use std::io::{Write, stdout};
+use std::path::Path;
+
+/// One line. Units stand in the names; world axes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Status {
+    /// Steps since time 0.
+    pub frame: u64,
+    pub time_s: f64,
+    pub paused: bool,
+    /// Simulated seconds wanted per second.
+    pub speed: f64,
+    /// Simulated seconds that were given up because steps took too long.
+    pub behind_s: f64,
+    /// Pictures shown.
+    pub shown: u64,
+    pub size_px: [u32; 2],
+    pub eye_m: [f64; 3],
+    /// Unit vector.
+    pub forward: [f64; 3],
+    pub camera: String,
+    pub flies: bool,
+    /// How far a tap on a key moves the eye.
+    pub step_m: f64,
+    /// The body that is pulled, where it is held, and where the hand is.
+    pub held: Option<String>,
+    pub held_at_m: Option<[f64; 3]>,
+    pub hand_at_m: Option<[f64; 3]>,
+    pub overlays: Vec<String>,
+    pub caption: bool,
+    /// BLAKE3 of what `tumble run --save` writes of the same state, in hexadecimal.
+    pub state_blake3: String,
+}
+
+impl Status {
+    /// Whether anything differs but what changes by itself.
+    pub fn differs(&self, other: &Status) -> bool {
+        let still = |s: &Status| Status { frame: 0, time_s: 0.0, behind_s: 0.0, shown: 0, held_at_m: None, state_blake3: String::new(), ..s.clone() };
+        still(self) != still(other)
+    }
+}
+
+/// Where lines go.
+pub struct Log {
+    to: Option<Box<dyn Write>>,
+    last: Option<Status>,
+}
+
+impl Log {
+    /// Into a file, to stdout (`-`), or nowhere.
+    pub fn create(path: Option<&Path>) -> Result<Log, Failure> {
+        let to: Option<Box<dyn Write>> = match path {
+            None => None,
+            Some(path) if path.as_os_str() == "-" => Some(Box::new(stdout())),
+            Some(path) => Some(Box::new(File::create(path).map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))?)),
+        };
+        Ok(Log { to, last: None })
+    }
+
+    /// Whether there is anyone to tell.
+    pub fn wanted(&self) -> bool {
+        self.to.is_some()
+    }
+
+    /// A line, if something differs from the last one or `anyway`.
+    pub fn tell(&mut self, status: Status, anyway: bool) -> Result<(), Failure> {
+        let Some(to) = &mut self.to else { return Ok(()) };
+        if anyway || self.last.as_ref().is_none_or(|last| status.differs(last)) {
+            let failed = |e: &dyn std::fmt::Display| Failure::run("the status", e.to_string());
+            let line = serde_json::to_string(&status).map_err(|e| failed(&e))?;
+            writeln!(to, "{line}").and_then(|()| to.flush()).map_err(|e| failed(&e))?;
+            self.last = Some(status);
+        }
+        Ok(())
+    }
+}

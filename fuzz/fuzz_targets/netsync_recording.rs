@@ -1,0 +1,11 @@
+//! A frame of a recorded session, taken apart.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tumble_net::sync::recording::take_apart;
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok((frame, _)) = take_apart(bytes) {
+        assert!(frame.recorded.state.len() < bytes.len());
+    }
+});
