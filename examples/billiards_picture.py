@@ -17,9 +17,9 @@ try:
     start = world.energy().kinetic
     world.step(round(2.0 / world.dt))
     tumble.save_png(folder / "break.png", world.render(640, 360))
-    # straight down on the table: the top of the picture is +y, the head of the table
-    above = tumble.Camera(eye=(0, 0, 5), target=(0, 0, 0.8), up=(0, 1, 0))
-    tumble.save_png(folder / "from_above.png", world.render(360, 640, camera=above))
+    # straight down on the table, which lies along x: the top of the picture is +y
+    above = tumble.Camera(eye=(0, 0, 3.2), target=(0, 0, 0.8), up=(0, 1, 0))
+    tumble.save_png(folder / "from_above.png", world.render(640, 360, camera=above))
     print(f"the break: {start:.1f} J before, {world.energy().kinetic:.1f} J after {world.time:.1f} s; pictures in {folder}")
 except tumble.PictureError as error:
     print(f"no picture: {error}")

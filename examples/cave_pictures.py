@@ -13,8 +13,9 @@ import tumble
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 folder.mkdir(parents=True, exist_ok=True)
 
-world = tumble.World.load("falling")
-world.step(round(1.0 / world.dt))
+world = tumble.World.load("stack")
+world["crate_10"].apply_impulse((0, 150.0, 0))  # N·s: the top crate is knocked off
+world.step(round(0.7 / world.dt))
 
 # a facet's frustum leans from the user's eye to the corners of its screen (Kooima, Generalized Perspective Projection, 2009)
 try:

@@ -386,3 +386,17 @@ def test_ten_thousand_calls_leak_nothing():
     gc.collect()
     assert sys.getallocatedblocks() - before < 200 and sys.getrefcount(spring) == references
     assert copy.copy(spring).stiffness == 1.0
+
+
+def test_a_typed_program_that_extends_the_library_runs(root, tmp_path):
+    import runpy
+
+    program = runpy.run_path(str(root / "crates" / "py" / "tests" / "typed" / "extending.py"))
+    heights = program["record"](tmp_path / "run.mcap")[:, 2]
+    # 2 g up against g down, less a little drag: z' = g t − c z'/m
+    t = np.arange(25) / 240
+    assert heights == pytest.approx(9.81 * (t / 0.1 - (1 - np.exp(-0.1 * t)) / 0.01), abs=1e-4)
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    sides = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    centers, radii = program["balls"](corners, np.array(sides))
+    assert centers.shape == (len(radii), 3) and len(radii) == 8

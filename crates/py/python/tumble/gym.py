@@ -113,7 +113,7 @@ class CartPole(gymnasium.Env[NDArray[np.float32], np.int64]):
         fallen = bool(abs(observation[0]) > self.FARTHEST_M or abs(observation[2]) > self.TILT_RAD)
         return observation, 1.0, fallen, False, {}
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """A picture, shape (400, 600, 3), where ``render_mode`` is ``"rgb_array"``."""
         return None if self.render_mode is None else self.world.render(600, 400)[..., :3]
 
@@ -123,4 +123,4 @@ class CartPole(gymnasium.Env[NDArray[np.float32], np.int64]):
 
 
 if "tumble/CartPole-v0" not in gymnasium.registry:
-    gymnasium.register("tumble/CartPole-v0", entry_point=CartPole, max_episode_steps=500)
+    gymnasium.register("tumble/CartPole-v0", entry_point="tumble.gym:CartPole", max_episode_steps=500)
