@@ -65,7 +65,7 @@ def test_the_notebook_runs(tmp_path):
     spec.mkdir(parents=True)
     start = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
     (spec / "kernel.json").write_text(json.dumps({"argv": start, "display_name": "Python 3", "language": "python"}))
-    nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}, **client(tmp_path)).execute()
+    nbclient.NotebookClient(notebook, timeout=120, startup_timeout=180, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}, **client(tmp_path)).execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     assert not [output for output in outputs if output.output_type == "error"]
     shown = [output for output in outputs if "image/png" in output.get("data", {})]

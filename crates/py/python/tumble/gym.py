@@ -15,8 +15,8 @@ import tumble
 
 try:
     import gymnasium
-except ImportError as error:
-    raise ImportError("tumble.gym needs the package gymnasium: pip install gymnasium, or tumble[gym]", name="gymnasium") from error
+except ImportError as _missing:
+    raise ImportError("tumble.gym needs the package gymnasium: pip install gymnasium, or tumble[gym]", name="gymnasium") from _missing
 
 _SCENE = """
 [world]
