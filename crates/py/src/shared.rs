@@ -111,10 +111,10 @@ impl Shared {
 
     /// The same with the interpreter let go, for what takes long: other threads run on meanwhile.
     pub fn work<T: Send>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
-        let outcome = py.detach(|| guarded(&mut *self.hold()?, call));
-        if let Ok(mut held) = self.hold() {
-            held.publish(py);
-        }
+        let mut held = self.hold()?;
+        let inner: &mut Inner = &mut held;
+        let outcome = py.detach(|| guarded(inner, call));
+        held.publish(py);
         outcome
     }
 }

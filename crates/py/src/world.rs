@@ -171,13 +171,12 @@ impl World {
         let Ok(mut left) = u64::try_from(n) else { return Err(Error::value(format!("n is {n}; it must be at least 0"))) };
         while left > 0 {
             left = self.shared.work(py, |inner| {
-                let begun = Instant::now();
-                while left > 0 {
+                inner.step()?;
+                left -= 1;
+                let begun = if left > 0 { Some(Instant::now()) } else { None };
+                while left > 0 && begun.is_none_or(|begun| begun.elapsed() < PATIENCE) {
                     inner.step()?;
                     left -= 1;
-                    if left > 0 && begun.elapsed() > PATIENCE {
-                        break;
-                    }
                 }
                 Ok(left)
             })?;
