@@ -140,15 +140,19 @@ impl Inner {
 
     /// One frame with behaviours before it and forces in it. Where one raises, the world is as it was before.
     pub fn extended_frame(&mut self) -> Result<()> {
+        // what could not be forked
+        self.take_raised()?;
         let before = self.world.save();
-        let outcome = self.behave().and_then(|()| self.frame());
-        match self.take_raised() {
-            Ok(()) => outcome,
-            Err(error) => {
-                self.world.restore(&before)?;
-                Err(error)
-            }
+        if let Err(error) = self.behave() {
+            self.world.restore(&before)?;
+            return Err(error);
         }
+        let outcome = self.frame();
+        if let Err(error) = self.take_raised() {
+            self.world.restore(&before)?;
+            return Err(error);
+        }
+        outcome
     }
 
     fn behave(&mut self) -> Result<()> {
@@ -160,13 +164,7 @@ impl Inner {
                 continue;
             }
             let array = |py: Python<'_>, _: &Layout| Ok(Some(numpy::PyArray1::from_slice(py, &rows).into_any().unbind()));
-            let wrenches = match code.call(&view, "act", array) {
-                Ok(wrenches) => wrenches,
-                Err(error) => {
-                    *lock(&code.raised) = Some(error.into());
-                    return Ok(());
-                }
-            };
+            let wrenches = code.call(&view, "act", array)?;
             for (row, wrench) in wrenches.iter().enumerate().filter(|(_, wrench)| **wrench != Wrench::default()) {
                 let Some((id, part, _)) = layout.owner(row) else { continue };
                 let Some(point) = self.world.site(id, part).map(|site| site.position()) else { continue };

@@ -1,7 +1,7 @@
 //! What a force or a behaviour written in Python sees of the world, and where it puts what it does.
 //!
 //! The site table is copied into one numpy array for each call: the world's own memory changes while it is stepped, and an array that a callback
-//! kept would look into it. 19 numbers per row are copied, some 0.1 µs for ten bodies, which is less than the call itself. After the call the view
+//! kept would look into it. 19 numbers per row are copied, which takes less than the call itself. After the call the view
 //! refuses to be asked, and what was added to its arrays is read once and then no more.
 
 use crate::convert::{numbers, some, vec3};

@@ -79,3 +79,27 @@ def client(folder):
 
     manager = AsyncKernelManager(kernel_name="python3", kernel_spec_manager=KernelSpecManager(kernel_dirs=[str(folder / "kernels")]))
     return {"km": manager}
+
+
+def test_the_snippets_of_the_book_run_one_after_the_other(tmp_path, monkeypatch):
+    import tumble
+
+    pytest.importorskip("gymnasium", reason="SKIPPED: gymnasium is not installed")
+    monkeypatch.chdir(tmp_path)
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    sides = "013 032 467 475 045 051 237 276 026 064 157 173".split()
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f " + " ".join(str(int(k) + 1) for k in side) for side in sides]
+    Path("bunny.obj").write_text("\n".join(lines) + "\n")
+    text = (ROOT / "docs" / "python_extending.md").read_text()
+    blocks = [part.split("```")[0] for part in text.split("```python\n")[1:]]
+    assert len(blocks) == 6
+    names = {}
+    for block in blocks:
+        try:
+            exec(compile(block, "python_extending.md", "exec"), names)
+        except tumble.PictureError as error:
+            print(f"SKIPPED: {error}")
+    world, run = names["world"], names["run"]
+    assert names["tree"].levels[0].radii[0] >= 3**0.5 / 2 and list(world.behaviours) == ["cruise"]
+    assert run.position("bird").shape == (61, 3) and run.times[-1] - run.times[0] == pytest.approx(1.0)
+    assert len(names["run"].states) == 61 and world.time == pytest.approx(2.0)
