@@ -1,6 +1,7 @@
 //! One world that many Python objects hold: behind a lock that is tried and never waited for, so that nothing can block or deadlock.
 
 use crate::errors::{Error, Result, caught};
+use crate::extension::Extension;
 use crate::robot::Robot;
 use crate::state::Mirror;
 use pyo3::prelude::*;
@@ -21,6 +22,8 @@ pub struct Inner {
     pub robots: BTreeMap<ObjectId, Arc<Robot>>,
     /// Generalized forces that act on articulated bodies in every frame.
     pub efforts: BTreeMap<ObjectId, Vec<f64>>,
+    /// Forces and behaviours written in Python.
+    pub extension: Extension,
     /// The arrays that Python sees the state by.
     pub mirror: Mirror,
     /// Whether a panic left it half-way.
@@ -30,18 +33,24 @@ pub struct Inner {
 impl Inner {
     /// A world of a scene.
     pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
-        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), mirror: Mirror::default(), broken: false }
+        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), extension: Extension::default(), mirror: Mirror::default(), broken: false }
     }
 
     /// An independent copy, with no arrays yet.
     pub fn fork(&self) -> Inner {
         Inner {
-            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), mirror: Mirror::default(), broken: false,
+            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), extension: self.extension.fork(),
+            mirror: Mirror::default(), broken: false,
         }
     }
 
     /// One frame.
     pub fn step(&mut self) -> Result<()> {
+        if self.extension.is_empty() { self.frame() } else { self.extended_frame() }
+    }
+
+    /// One frame of the world alone.
+    pub fn frame(&mut self) -> Result<()> {
         for (&id, effort) in &self.efforts {
             self.world.apply_generalized(id, effort)?;
         }
