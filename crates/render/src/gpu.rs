@@ -12,8 +12,6 @@ mod targets;
 mod textures;
 mod window;
 
-pub use window::{Picture, Screen, Shown};
-
 use crate::list::bounds::Bounds;
 use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
 pub(crate) use finish::{Finish, Placed};
@@ -27,6 +25,7 @@ use stage::Textures;
 use std::sync::{Arc, Mutex, PoisonError};
 use targets::{ShadowMaps, Targets};
 use textures::TextureCache;
+pub use window::{Screen, Shown};
 
 /// Targets of several sizes are kept while they have no more pixels than this together.
 const KEPT_PIXELS: u64 = 8 << 20;

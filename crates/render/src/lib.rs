@@ -39,7 +39,7 @@ pub use caption::caption;
 pub use draw::{DebugDraw, Drawing, NamedView, UnknownOverlay, UnknownView, UpAxis, tree_over_mesh};
 pub use error::RenderError;
 pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Warp, calibration_picture, unfold};
-pub use gpu::{Picture, Renderer, Screen, Shown, Stage};
+pub use gpu::{Renderer, Screen, Shown, Stage};
 pub use image::Image;
 pub use list::{
     DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere,

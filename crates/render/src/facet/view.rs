@@ -60,11 +60,6 @@ impl CaveView {
         self.place = place;
     }
 
-    /// Whether a facet's picture is bent or darkened for its projector.
-    pub fn is_bent(&self, facet: &Facet) -> bool {
-        facet.warp_file.is_some() || facet.blend_file.is_some()
-    }
-
     /// What the eye to the `side` (−1 left, 0 between, +1 right) sees through a facet's screen, in the scene.
     ///
     /// # Errors
