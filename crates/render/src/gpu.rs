@@ -283,6 +283,8 @@ impl Gpu {
 
     /// What went wrong on the device since the last call.
     fn complaint(&self) -> Result<(), RenderError> {
+        // a loss is told at the next poll
+        let _ = self.device.poll(wgpu::PollType::Poll);
         if let Some(reason) = self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone() {
             return Err(self.failed(reason));
         }
