@@ -1,6 +1,7 @@
 #!/bin/sh
-# Installs what is missing, and only that: a C compiler (zstd and lz4 are C), make, a software Vulkan driver (for pictures), Python's venv,
-# the crates of Cargo.lock. Where all is there, it asks no network and no apt. What only pictures need may stay missing.
+# Installs what is missing, and only that: a C compiler (zstd and lz4 are C), make, a software Vulkan driver (for pictures), an X server without a
+# screen and hands for it (for tests of windows), Python's venv, the crates of Cargo.lock. Where all is there, it asks no network and no apt. What only
+# pictures and windows need may stay missing.
 . "$(dirname "$0")/env.sh"
 
 export DEBIAN_FRONTEND=noninteractive
@@ -17,6 +18,18 @@ has_vulkan_loader() {
 has_vulkan_driver() {
     [ -n "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && return 0
     ls /usr/share/vulkan/icd.d/lvp_icd*.json /etc/vulkan/icd.d/lvp_icd*.json /usr/local/share/vulkan/icd.d/lvp_icd*.json 2>/dev/null | grep -q .
+}
+
+# What tests of windows run.
+has_window_tools() {
+    command -v Xvfb >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1 && command -v import >/dev/null 2>&1
+}
+
+# What a window loads when it opens.
+has_window_libraries() {
+    for library in libX11 libX11-xcb libXcursor libXi libxkbcommon-x11; do
+        ls /usr/lib/*/$library.so.? /usr/lib/$library.so.? /usr/lib64/$library.so.? 2>/dev/null | grep -q . || return 1
+    done
 }
 
 # Debian splits venv off; its absence shows as a missing ensurepip.
@@ -62,12 +75,21 @@ has_venv || missing="$missing python3 python3-venv"
 # shellcheck disable=SC2086  # one word per package
 [ -z "$missing" ] || install_packages $missing
 
+missing=""
+has_window_tools || missing="$missing xvfb xdotool imagemagick"
+has_window_libraries || missing="$missing libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0"
+# shellcheck disable=SC2086
+[ -z "$missing" ] || install_packages $missing
+
 if ! has_compiler; then
     echo "Error: no C compiler (cc) that links; on Debian: apt-get install gcc libc6-dev" >&2
     exit 1
 fi
 if ! { has_vulkan_loader && has_vulkan_driver; }; then
     echo "No Vulkan software driver: where no graphics card helps out, pictures and their tests are left out; everything else works." >&2
+fi
+if ! { has_window_tools && has_window_libraries; }; then
+    echo "No Xvfb, xdotool or import, or no X libraries: tests of windows are left out." >&2
 fi
 if ! command -v cargo >/dev/null 2>&1; then
     echo "Error: no cargo; a Rust toolchain comes from https://rustup.rs" >&2

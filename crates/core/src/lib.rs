@@ -22,6 +22,7 @@ mod collidable;
 mod detect;
 mod integrators;
 mod motion;
+mod mounts;
 mod object;
 mod rigid;
 mod rotation;
@@ -39,6 +40,7 @@ mod world;
 pub use articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Drive, Freedom, Joint, LinkMass, Model, ModelBuilder, ModelError, Playback, Spring};
 pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
+pub use mounts::{CameraCarrier, CameraMount, Detail, LightCarrier, LightMount, Spread};
 pub use object::{
     Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget, SyncError, Visual,
 };

@@ -5,11 +5,14 @@
 //! copies of a slice.
 
 use crate::collidable::Collidable;
+use crate::mounts::{CameraCarrier, Detail, LightCarrier};
 use crate::rows::RowSet;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::view::WorldView;
 use crate::row_builder::RowBuilder;
 use std::any::Any;
+use std::path::Path;
+use std::sync::Arc;
 use tumble_collide::{Pose, Vec3};
 
 /// Everything the world holds. One accessor per interface; the default answer is "not I" (the thesis's
@@ -42,6 +45,14 @@ pub trait Object: Any + Send + Sync {
     }
     /// Whether it can be drawn.
     fn renderable(&self) -> Option<&dyn Renderable> {
+        None
+    }
+    /// Whether it carries points of view.
+    fn camera(&self) -> Option<&dyn CameraCarrier> {
+        None
+    }
+    /// Whether it carries lights.
+    fn light(&self) -> Option<&dyn LightCarrier> {
         None
     }
     /// Whether it can be kept in step with copies of itself in other processes.
@@ -288,10 +299,14 @@ pub struct Look {
     pub shader: String,
     /// Named properties of the shader, in the order given.
     pub properties: Vec<(String, f64)>,
+    /// A picture (PNG) over the base colour; opened by who draws.
+    pub texture: Option<Arc<Path>>,
+    /// How much of it is drawn.
+    pub detail: Detail,
 }
 
 impl Default for Look {
     fn default() -> Look {
-        Look { color: [0.7, 0.7, 0.72], roughness: 0.5, metallic: 0.0, shader: "plain".into(), properties: Vec::new() }
+        Look { color: [0.7, 0.7, 0.72], roughness: 0.5, metallic: 0.0, shader: "plain".into(), properties: Vec::new(), texture: None, detail: Detail::Full }
     }
 }

@@ -11,6 +11,7 @@
 //! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`. Body origin = centre of mass (thesis §III.A.1).
 
 use crate::collidable::{Collidable, CollisionKind, Material};
+use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
 use crate::rotation;
 use crate::sync;
@@ -89,6 +90,8 @@ pub struct RigidBody {
     pub initial_angular_velocity: Vec3,
     fixture: bool,
     visuals: Vec<Visual>,
+    cameras: Vec<CameraMount>,
+    lights: Vec<LightMount>,
     cache: Cache,
 }
 
@@ -125,7 +128,7 @@ impl RigidBody {
         Ok(RigidBody {
             name, shape, mass, root_mass: mass.sqrt(), inertia, material: Material::default(), contact_mode: ContactMode::default(), linear_damping: 0.0, angular_damping: 0.0,
             kind: CollisionKind::default(), meets: u64::MAX, initial_pose: Pose::identity(), initial_velocity: Vec3::zeros(),
-            initial_angular_velocity: Vec3::zeros(), fixture: false, visuals, cache,
+            initial_angular_velocity: Vec3::zeros(), fixture: false, visuals, cameras: Vec::new(), lights: Vec::new(), cache,
         })
     }
 
@@ -190,6 +193,18 @@ impl RigidBody {
     /// Sets what it looks like; by default its shape in grey.
     pub fn drawn_as(mut self, visuals: Vec<Visual>) -> Self {
         self.visuals = visuals;
+        self
+    }
+
+    /// Adds a camera; its pose is in the body's frame.
+    pub fn with_camera(mut self, camera: CameraMount) -> Self {
+        self.cameras.push(camera);
+        self
+    }
+
+    /// Adds a light; its pose is in the body's frame.
+    pub fn with_light(mut self, light: LightMount) -> Self {
+        self.lights.push(light);
         self
     }
 
@@ -318,6 +333,14 @@ impl Object for RigidBody {
 
     fn renderable(&self) -> Option<&dyn Renderable> {
         Some(self)
+    }
+
+    fn camera(&self) -> Option<&dyn CameraCarrier> {
+        (!self.cameras.is_empty()).then_some(self)
+    }
+
+    fn light(&self) -> Option<&dyn LightCarrier> {
+        (!self.lights.is_empty()).then_some(self)
     }
 
     fn net_sync(&self) -> Option<&dyn NetSync> {
@@ -489,6 +512,18 @@ impl Collidable for RigidBody {
                 y[k + 3] += linear * axis[k];
             }
         }
+    }
+}
+
+impl CameraCarrier for RigidBody {
+    fn cameras(&self) -> &[CameraMount] {
+        &self.cameras
+    }
+}
+
+impl LightCarrier for RigidBody {
+    fn lights(&self) -> &[LightMount] {
+        &self.lights
     }
 }
 

@@ -117,6 +117,24 @@ impl Shared {
         held.publish(py);
         outcome
     }
+
+    /// The same in parts, until one answers that it was the last: the world stays held over all of them, and Ctrl-C is heard between two.
+    pub fn work_in_parts(&self, py: Python<'_>, mut part: impl FnMut(&mut Inner) -> Result<bool> + Send) -> Result<()> {
+        let mut held = self.hold()?;
+        let outcome = loop {
+            let inner: &mut Inner = &mut held;
+            match py.detach(|| guarded(inner, &mut part)) {
+                Ok(false) => {}
+                Ok(true) => break Ok(()),
+                Err(error) => break Err(error),
+            }
+            if let Err(raised) = py.check_signals() {
+                break Err(raised.into());
+            }
+        };
+        held.publish(py);
+        outcome
+    }
 }
 
 /// A panic in a call that changes the world may leave it half-way: later calls say so.

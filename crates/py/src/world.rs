@@ -169,20 +169,17 @@ impl World {
     #[pyo3(signature = (n=1))]
     fn step(&self, py: Python<'_>, n: i64) -> Result<()> {
         let Ok(mut left) = u64::try_from(n) else { return Err(Error::value(format!("n is {n}; it must be at least 0"))) };
-        while left > 0 {
-            left = self.shared.work(py, |inner| {
+        self.shared.work_in_parts(py, |inner| {
+            let begun = (left > 1).then(Instant::now);
+            while left > 0 {
                 inner.step()?;
                 left -= 1;
-                let begun = if left > 0 { Some(Instant::now()) } else { None };
-                while left > 0 && begun.is_none_or(|begun| begun.elapsed() < PATIENCE) {
-                    inner.step()?;
-                    left -= 1;
+                if begun.is_some_and(|begun| begun.elapsed() > PATIENCE) {
+                    break;
                 }
-                Ok(left)
-            })?;
-            py.check_signals()?;
-        }
-        Ok(())
+            }
+            Ok(left == 0)
+        })
     }
 
     /// Simulated time, s.

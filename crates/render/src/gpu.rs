@@ -1,28 +1,50 @@
 //! The renderer: a device without a window, and the order of its passes.
 
 mod data;
+mod finish;
+mod frame;
+mod meshes;
 mod pipelines;
 mod scene;
 mod shadow;
+mod stage;
 mod targets;
-mod upload;
+mod textures;
 mod window;
 
-pub use window::{Picture, Screen, Shown};
-
-use crate::facet::cut;
+use crate::list::bounds::Bounds;
 use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
+pub(crate) use finish::{Finish, Placed};
+use finish::Finisher;
+use frame::Frame;
+use meshes::MeshCache;
+use nalgebra::Matrix4;
 use pipelines::Pipelines;
+pub use stage::Stage;
+use stage::Textures;
 use std::sync::{Arc, Mutex, PoisonError};
-use targets::Targets;
-use upload::{Frame, MeshCache};
+use targets::{ShadowMaps, Targets};
+use textures::TextureCache;
+pub use window::{Screen, Shown};
+
+/// Targets of several sizes are kept while they have no more pixels than this together.
+const KEPT_PIXELS: u64 = 8 << 20;
 
 /// A graphics device that draws into memory. Making one takes a moment; keep it for all pictures of a run.
 pub struct Renderer {
     gpu: Gpu,
     pipelines: Pipelines,
     meshes: MeshCache,
-    targets: Option<Targets>,
+    textures: TextureCache,
+    finisher: Finisher,
+    shadows: Option<ShadowMaps>,
+    /// The one used last is the last.
+    targets: Vec<Targets>,
+    /// The finished picture.
+    picture: Option<wgpu::Texture>,
+    stages: u64,
+    /// Ends of frames that the device may still be at.
+    ends: std::collections::VecDeque<wgpu::SubmissionIndex>,
 }
 
 /// The device, its queue, and the last thing it complained about.
@@ -32,6 +54,7 @@ pub(crate) struct Gpu {
     adapter: String,
     sample_masks: bool,
     complaint: Arc<Mutex<Option<String>>>,
+    lost: Arc<Mutex<Option<String>>>,
 }
 
 impl Renderer {
@@ -47,8 +70,10 @@ impl Renderer {
     fn on(adapter: wgpu::Adapter) -> Result<Self, RenderError> {
         let gpu = pollster::block_on(Gpu::open(adapter))?;
         let pipelines = Pipelines::new(&gpu.device, gpu.sample_masks);
+        let finisher = Finisher::new(&gpu);
+        let textures = TextureCache::new(&gpu, &pipelines.texture_layout);
         gpu.complaint()?;
-        Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), targets: None })
+        Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), textures, finisher, shadows: None, targets: Vec::new(), picture: None, stages: 0, ends: Default::default() })
     }
 
     /// The adapter in use: its name, kind and interface.
@@ -59,7 +84,7 @@ impl Renderer {
     /// Draws the list into a picture of `width` x `height` pixels.
     ///
     /// # Errors
-    /// A size or a list that cannot be drawn, or a device that fails. The renderer stays usable.
+    /// A size or a list that cannot be drawn, or a device that fails. The renderer stays usable unless the device is lost.
     pub fn render(&mut self, list: &DrawList, width: u32, height: u32) -> Result<Image, RenderError> {
         self.render_from(&list.camera, list, width, height)
     }
@@ -69,52 +94,154 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`], or a point of view that is none.
     pub fn render_from(&mut self, from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Result<Image, RenderError> {
-        let (lens, rim) = self.lens(from, list, width, height)?;
-        let image = self.draw(list, &lens, width + 2 * rim, height + 2 * rim)?;
-        Ok(if rim == 0 { image } else { cut(&image, rim) })
+        self.draw(from, list, width, height)?;
+        self.read()
     }
 
-    /// Checks everything; the view in numbers, and the pixels that it is drawn wider on each side.
-    fn lens(&self, from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Result<(Lens, u32), RenderError> {
+    /// The same, but the picture stays on the device: [`Renderer::picture`] for a window to show, [`Renderer::read`] to have it in memory. Does not
+    /// wait for the device.
+    ///
+    /// # Errors
+    /// As [`Renderer::render_from`].
+    pub fn draw(&mut self, from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Result<(), RenderError> {
         self.check_size(width, height)?;
         list.validate()?;
-        let mut lens = from.lens(width as f32 / height as f32)?;
-        // only occlusion looks beyond the edge
-        let rim = lens.part.map_or(0, |part| if list.settings.occlusion_m == Some(0.0) { 0 } else { part.rim_px });
-        lens.part = lens.part.map(|part| Part { rim_px: rim, ..part });
-        if rim == 0 {
-            return Ok((lens, 0));
-        }
-        self.check_size(width + 2 * rim, height + 2 * rim)?;
-        Ok((lens.widened(width, height, rim), rim))
+        let lens = from.lens(width as f32 / height as f32)?;
+        let projection: Matrix4<f32> = (lens.projection * lens.view).cast();
+        // views that are parts of one whole fit everything to what is the same for all of them
+        let seen = if lens.part.is_some() { list.whole_box() } else { list.visible_box(&projection) };
+        let stage = self.sent(list, seen.as_ref(), lens.part.is_some())?;
+        self.draw_lens(&stage, lens, width, height)
     }
 
-    /// Draws all pixels of a view into memory.
-    fn draw(&mut self, list: &DrawList, lens: &Lens, width: u32, height: u32) -> Result<Image, RenderError> {
-        self.paint(list, lens, width, height, |encoder, targets| targets.copy_out(encoder))?;
-        let image = self.targets.as_ref().map(|targets| targets.read(&self.gpu));
-        self.gpu.complaint()?;
-        image.unwrap_or_else(|| Err(self.gpu.failed("no targets".into())))
+    /// Sends a list to the device, to be drawn from several points of view with [`Renderer::draw_stage`].
+    ///
+    /// # Errors
+    /// A list that cannot be drawn, or a device that fails.
+    pub fn stage(&mut self, list: &DrawList) -> Result<Stage, RenderError> {
+        list.validate()?;
+        self.sent(list, list.whole_box().as_ref(), true)
     }
 
-    /// Draws all pixels of a view and lets `after` make something of them, on the device.
-    fn paint(&mut self, list: &DrawList, lens: &Lens, width: u32, height: u32, after: impl FnOnce(&mut wgpu::CommandEncoder, &Targets)) -> Result<(), RenderError> {
-        let fits = self.targets.as_ref().is_some_and(|t| t.fits(width, height, list.settings.shadow_map_size));
-        if !fits {
-            self.targets = None; // frees the old ones first
-        }
-        let targets = self.targets.get_or_insert_with(|| Targets::new(&self.gpu.device, width, height, list.settings.shadow_map_size));
-        let frame = Frame::new(&self.gpu, &self.pipelines, &mut self.meshes, targets, list, lens)?;
+    /// As [`Renderer::draw`], of a list that was sent before.
+    ///
+    /// # Errors
+    /// A size that cannot be drawn, a point of view that is none, or a device that fails.
+    pub fn draw_stage(&mut self, stage: &Stage, from: &dyn Viewpoint, width: u32, height: u32) -> Result<(), RenderError> {
+        self.check_size(width, height)?;
+        let lens = from.lens(width as f32 / height as f32)?;
+        self.draw_lens(stage, lens, width, height)
+    }
+
+    /// The picture drawn last, on the device: 8-bit sRGB with alpha, rows from the top.
+    pub fn picture(&self) -> Option<&wgpu::Texture> {
+        self.picture.as_ref()
+    }
+
+    /// The picture drawn last, in memory. Waits for the device.
+    ///
+    /// # Errors
+    /// A device that fails or hangs; nothing was drawn yet.
+    pub fn read(&self) -> Result<Image, RenderError> {
+        let picture = self.picture.as_ref().ok_or_else(|| self.gpu.failed("no picture was drawn yet".into()))?;
+        let image = targets::read(&self.gpu, picture);
         self.gpu.complaint()?;
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
-        frame.draw_shadows(&mut encoder, &self.pipelines, targets);
-        if frame.occlusion {
-            frame.draw_occlusion(&mut encoder, &self.pipelines, targets);
+        image
+    }
+
+    /// Waits until the device has drawn what it was given.
+    ///
+    /// # Errors
+    /// A device that fails, is lost, or hangs.
+    pub fn wait(&self) -> Result<(), RenderError> {
+        targets::wait(&self.gpu)
+    }
+
+    /// Ends a frame and waits until the device is at most `ahead` frames behind: with 1 the next list is made while the device draws this one.
+    ///
+    /// # Errors
+    /// As [`Renderer::wait`].
+    pub fn end_frame(&mut self, ahead: usize) -> Result<(), RenderError> {
+        self.ends.push_back(self.gpu.queue.submit([]));
+        while self.ends.len() > ahead {
+            targets::wait_for(&self.gpu, self.ends.pop_front())?;
         }
-        frame.draw_picture(&mut encoder, &self.pipelines, targets);
-        after(&mut encoder, targets);
-        self.gpu.queue.submit([encoder.finish()]);
         self.gpu.complaint()
+    }
+
+    fn sent(&mut self, list: &DrawList, seen: Option<&Bounds>, part: bool) -> Result<Stage, RenderError> {
+        self.stages += 1;
+        let textures = self.textures.sync(&self.gpu, &self.pipelines.texture_layout, &list.textures)?;
+        let bound = Textures { white: self.textures.white.clone(), list: textures };
+        let stage = Stage::new(&self.gpu, &mut self.pipelines, &mut self.meshes, bound, list, seen, part, self.stages)?;
+        self.gpu.complaint()?;
+        Ok(stage)
+    }
+
+    /// Draws all pixels of a view, the rim that its lens asks for included, and leaves the middle.
+    fn draw_lens(&mut self, stage: &Stage, lens: Lens, width: u32, height: u32) -> Result<(), RenderError> {
+        let rim = self.draw_with_rim(stage, lens, width, height)?;
+        self.picture = match self.targets.last() {
+            Some(t) if rim == 0 => Some(t.resolved.clone()),
+            Some(t) => Some(self.finisher.cut(&self.gpu, &t.resolved, rim)),
+            None => None,
+        };
+        self.gpu.complaint()
+    }
+
+    /// Draws a view into the last targets, and says how many pixels wider they are on each side.
+    fn draw_with_rim(&mut self, stage: &Stage, mut lens: Lens, width: u32, height: u32) -> Result<u32, RenderError> {
+        // only occlusion looks beyond the edge
+        let rim = lens.part.map_or(0, |part| if stage.reach > 0.0 { part.rim_px } else { 0 });
+        lens.part = lens.part.map(|part| Part { rim_px: rim, ..part });
+        if rim > 0 {
+            self.check_size(width + 2 * rim, height + 2 * rim)?;
+            lens = lens.widened(width, height, rim);
+        }
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+        self.want_targets(width + 2 * rim, height + 2 * rim, stage.variant.samples);
+        let targets = &self.targets[self.targets.len() - 1]; // put there by the line above
+        let (size, count) = (stage.shadow_map_size, stage.shadow_views.len());
+        let maps = match self.shadows.take().filter(|maps| maps.fits(size, count)) {
+            Some(maps) => self.shadows.insert(maps),
+            None => self.shadows.insert(ShadowMaps::new(&self.gpu.device, size, count)),
+        };
+        if maps.drawn != stage.serial {
+            stage.draw_shadows(&mut encoder, &self.pipelines, maps);
+            maps.drawn = stage.serial;
+        }
+        let frame = Frame::new(&self.gpu, &self.pipelines, stage, maps, targets, &lens)?;
+        self.gpu.complaint()?;
+        frame.draw(&mut encoder, &self.pipelines);
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.complaint()?;
+        Ok(rim)
+    }
+
+    /// Draws what one eye sees, and puts it, finished for its projector, into its place in the whole picture of this size.
+    pub(crate) fn draw_placed(&mut self, stage: &Stage, from: &dyn Viewpoint, [width, height]: [u32; 2], placed: &Placed) -> Result<(), RenderError> {
+        self.check_size(width, height)?;
+        self.check_size(placed.whole_px[0], placed.whole_px[1])?;
+        let lens = from.lens(width as f32 / height as f32)?;
+        let rim = self.draw_with_rim(stage, lens, width, height)?;
+        let targets = &self.targets[self.targets.len() - 1]; // put there by drawing
+        self.picture = Some(self.finisher.place(&self.gpu, targets, rim, [width, height], placed)?);
+        self.gpu.complaint()
+    }
+
+    /// Makes the targets of this size the last ones.
+    fn want_targets(&mut self, width: u32, height: u32, samples: u32) {
+        match self.targets.iter().position(|t| t.fits(width, height, samples)) {
+            Some(i) => self.targets[i..].rotate_left(1),
+            None => {
+                // old ones go before new ones come
+                let new = u64::from(width) * u64::from(height);
+                while !self.targets.is_empty() && new + self.targets.iter().map(Targets::pixels).sum::<u64>() > KEPT_PIXELS {
+                    self.targets.remove(0);
+                }
+                self.targets.push(Targets::new(&self.gpu.device, width, height, samples));
+            }
+        }
     }
 
     fn check_size(&self, width: u32, height: u32) -> Result<(), RenderError> {
@@ -145,11 +272,20 @@ impl Gpu {
         asked.0.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
         }));
-        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, sample_masks, complaint })
+        let lost = Arc::new(Mutex::new(None));
+        let note = lost.clone();
+        asked.0.set_device_lost_callback(move |_, message| {
+            let why = if message.is_empty() { String::new() } else { format!(" ({message})") };
+            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("the device was lost{why}; a new renderer can be made"));
+        });
+        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, sample_masks, complaint, lost })
     }
 
     /// What went wrong on the device since the last call.
     fn complaint(&self) -> Result<(), RenderError> {
+        if let Some(reason) = self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone() {
+            return Err(self.failed(reason));
+        }
         match self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(reason) => Err(self.failed(reason)),
             None => Ok(()),
@@ -174,4 +310,21 @@ async fn first_adapter() -> Result<wgpu::Adapter, RenderError> {
         }
     }
     Err(RenderError::NoAdapter { reason: reasons.join(", ") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lost_device_is_an_error_and_no_hang() {
+        let Ok(mut renderer) = Renderer::new() else { return };
+        let list = DrawList::default();
+        assert!(renderer.render(&list, 8, 8).is_ok());
+        renderer.gpu.device.destroy();
+        for _ in 0..2 {
+            let error = renderer.render(&list, 8, 8).expect_err("the device is gone").to_string();
+            assert!(error.contains("lost") && error.contains(renderer.adapter()), "{error}");
+        }
+    }
 }

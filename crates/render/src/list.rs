@@ -2,13 +2,15 @@
 
 pub(crate) mod bounds;
 pub(crate) mod debug;
+mod quality;
 mod text;
 mod validate;
-pub use validate::{MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS};
+pub use quality::{Quality, Shadows, UnknownQuality};
+pub use validate::{MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES};
 
 pub use debug::{DebugLine, DebugPoint, DebugSphere, DebugStyle, SphereStyle};
 
-use crate::{Camera, Material, MeshData, Pattern};
+use crate::{Camera, Image, Material, MeshData, Pattern};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -162,11 +164,15 @@ pub struct Settings {
     pub occlusion_m: Option<f32>,
     /// Filmic tone curve; without it light above 1 is cut off (tests and plots).
     pub tone_map: bool,
+    /// How shadows are drawn.
+    pub shadows: Shadows,
+    /// Samples per pixel: 1, or 4 for smooth edges.
+    pub samples: u32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { exposure: 1.0, shadow_map_size: 2048, occlusion_m: None, tone_map: true }
+        Settings { exposure: 1.0, shadow_map_size: 2048, occlusion_m: None, tone_map: true, shadows: Shadows::Soft, samples: 4 }
     }
 }
 
@@ -185,6 +191,8 @@ impl Default for Settings {
 pub struct DrawList {
     /// Meshes by [`MeshId`]. Shared, so that a list per frame copies nothing and the renderer uploads each once.
     pub meshes: Vec<Arc<MeshData>>,
+    /// Pictures on surfaces, by the number in [`crate::Texture`]; shared like meshes.
+    pub textures: Vec<Arc<Image>>,
     /// Placed meshes.
     pub instances: Vec<Instance>,
     /// Spheres.

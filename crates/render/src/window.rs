@@ -59,7 +59,7 @@ pub trait WindowApp {
         Ok(())
     }
 
-    /// Something happened. The canvas already has a new size; what closes the window is told too, and then it closes.
+    /// Something happened. The screen already has a new size; what closes the window is told too, and then it closes.
     ///
     /// # Errors
     /// Whatever ends the program.

@@ -2,7 +2,7 @@
 
 use tumble_core::articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Kinematics, LinkMass, Model, ModelBuilder, ModelError};
 use tumble_core::collide::{Pose, Shape, contacts};
-use tumble_core::{Joint, Look, Material, Object, Visual};
+use tumble_core::{CameraMount, Joint, Look, Material, Object, Visual};
 
 use crate::articulated::ArticulatedSpec;
 use crate::build::look;
@@ -54,6 +54,12 @@ fn furnished(spec: &ArticulatedSpec, model: Model, shapes: &[Vec<Placed<'_>>], m
     for (link, placed) in spec.links.iter().zip(shapes) {
         for placed in placed {
             furnish(&mut body, &link.name, placed)?;
+        }
+        if let Some(camera) = &link.mounts.camera {
+            body.add_camera(&link.name, CameraMount { name: link.name.clone(), ..camera.clone() })?;
+        }
+        if let Some(light) = &link.mounts.light {
+            body.add_light(&link.name, light.clone())?;
         }
     }
     for (number, link) in moving.iter().enumerate() {

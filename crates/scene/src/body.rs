@@ -9,6 +9,7 @@ use crate::bound::Bound;
 use crate::fields::{Fields, Names};
 use crate::look::Look;
 use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, MaterialSpec, RESTITUTION};
+use crate::mount::Mounts;
 use crate::rotation;
 use crate::shape::ShapeSpec;
 use crate::world::CONTACTS;
@@ -67,6 +68,8 @@ pub struct BodySpec {
     pub visible: bool,
     /// The body's own look, on top of its material's.
     pub look: Look,
+    /// The camera and the light that it carries, in axes of the shape.
+    pub mounts: Mounts,
 }
 
 /// Names a body can refer to. A name without an index stands for something that is itself wrong.
@@ -110,6 +113,7 @@ impl BodySpec {
             alive: f.flag_or("alive", true),
             visible: f.flag_or("visible", true),
             look: Look::read(f, &look),
+            mounts: Mounts::read(f),
         };
         let shape = shape?;
         check_half_space(f, &shape, mode);

@@ -6,7 +6,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
 use tumble_collide::{Pose, RepairSettings, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble_core::solver::{self, Accuracy};
-use tumble_core::{ArticulatedBody, Closure, Look as CoreLook, ObjectId, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
+use tumble_core::{ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
 
 use crate::body::{BodySpec, MassSpec};
 use crate::articulated::ArticulatedSpec;
@@ -240,6 +240,14 @@ impl SceneFile {
             .surface(spec.restitution, spec.friction)
             .colliding_by(spec.contacts)
             .drawn_as(visuals(spec, shape, &center));
+        // the body's own origin is the centre of mass
+        let from_center = Translation3::from(-center);
+        if let Some(camera) = &spec.mounts.camera {
+            body = body.with_camera(CameraMount { pose: from_center * camera.pose, ..camera.clone() });
+        }
+        if let Some(light) = &spec.mounts.light {
+            body = body.with_light(LightMount { pose: from_center * light.pose, ..light.clone() });
+        }
         body.linear_damping = spec.linear_damping_per_s;
         body.angular_damping = spec.angular_damping_per_s;
         Ok(body)
@@ -314,5 +322,7 @@ pub(crate) fn look(look: &Look, center: &Vec3) -> CoreLook {
         metallic: look.metallic as f32,
         shader: look.pattern.name().into(),
         properties: named.map(|(name, value)| (name.to_string(), value)).to_vec(),
+        texture: look.texture.as_deref().map(Into::into),
+        detail: look.detail,
     }
 }

@@ -98,7 +98,7 @@ impl SceneFile {
         if text.len() as u64 > MOST_BYTES {
             return Err(SceneError::TooLarge { file: file_name.into(), limit: MOST_BYTES });
         }
-        let log = Log::new(text);
+        let log = Log::new(text).in_folder(Path::new(file_name).parent().unwrap_or(Path::new("")));
         // What follows a slip of syntax is guesswork: it is told alone.
         let scene = parse_toml(&log, text).map(|root| SceneFile::read(&log, &root, file_name, files));
         match scene {

@@ -13,6 +13,7 @@ use crate::fields::{Fields, Value};
 use crate::joint::JointSpec;
 use crate::look::{Color, Look, as_color};
 use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, RESTITUTION};
+use crate::mount::Mounts;
 use crate::rotation;
 use crate::shape::ShapeSpec;
 use crate::world::CONTACTS;
@@ -35,6 +36,8 @@ pub struct LinkSpec {
     pub mass: LinkMassSpec,
     /// What it collides with and what is drawn.
     pub shapes: Vec<LinkShape>,
+    /// The camera and the light that it carries, in axes of the link.
+    pub mounts: Mounts,
 }
 
 impl LinkSpec {
@@ -176,11 +179,12 @@ impl<'a> LinkRow<'a> {
             collides: f.flag_or("collides", from.collides), visible: f.flag_or("visible", from.visible),
         };
         let shapes = read_shapes(f, &from);
+        let mounts = Mounts::read(f);
         let mass = read_mass(f, &shapes, joint.as_ref().is_some_and(|j| j.kind == Joint::Fixed));
         let (count, next, colors) = read_repeat(f, &name, from.room);
         let mut joint = joint?;
         let mimic = joint.read_mimic(f);
-        Some(LinkRow { link: LinkSpec { name, parent, placement, joint, mass, shapes }, count, next, colors, mimic })
+        Some(LinkRow { link: LinkSpec { name, parent, placement, joint, mass, shapes, mounts }, count, next, colors, mimic })
     }
 
     /// Adds its links to a list: `name`, or `name_1` to `name_n`.

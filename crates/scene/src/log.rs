@@ -13,12 +13,24 @@ const QUOTED_CHARS: usize = 48;
 /// The problems found so far in one text.
 pub(crate) struct Log<'a> {
     text: &'a str,
+    folder: std::path::PathBuf,
     found: RefCell<Vec<(Range<usize>, String, String)>>,
 }
 
 impl<'a> Log<'a> {
     pub(crate) fn new(text: &'a str) -> Self {
-        Log { text, found: RefCell::new(Vec::new()) }
+        Log { text, folder: Default::default(), found: RefCell::new(Vec::new()) }
+    }
+
+    /// The same for a text whose file names are meant from this folder.
+    pub(crate) fn in_folder(mut self, folder: &std::path::Path) -> Self {
+        self.folder = folder.to_path_buf();
+        self
+    }
+
+    /// The folder that file names of the text are meant from.
+    pub(crate) fn folder(&self) -> &std::path::Path {
+        &self.folder
     }
 
     /// Records that what stands at `span` is wrong as `message` says, and what is `wanted` there.

@@ -2,6 +2,8 @@
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names, Value};
+use std::path::PathBuf;
+use tumble_core::Detail;
 
 /// Red, green and blue from 0 to 1, sRGB (as on a screen, not linear light).
 pub type Color = [f64; 3];
@@ -69,6 +71,11 @@ pub struct Look {
     pub metallic: f64,
     /// Strength of a clear varnish on top, 0 to 1. Default 0.
     pub clearcoat: f64,
+    /// A picture (PNG) over the main colour, which then only tints it, once every `pattern_scale_m`, and once around a sphere. In the file from the
+    /// folder of the scene; here as it is opened.
+    pub texture: Option<PathBuf>,
+    /// How much of it is drawn. Default full.
+    pub detail: Detail,
 }
 
 impl Default for Look {
@@ -82,6 +89,8 @@ impl Default for Look {
             roughness: 0.5,
             metallic: 0.0,
             clearcoat: 0.0,
+            texture: None,
+            detail: Detail::Full,
         }
     }
 }
@@ -98,8 +107,28 @@ impl Look {
             roughness: f.number_or("roughness", Bound::UNIT, base.roughness),
             metallic: f.number_or("metallic", Bound::UNIT, base.metallic),
             clearcoat: f.number_or("clearcoat", Bound::UNIT, base.clearcoat),
+            texture: read_texture(f).or_else(|| base.texture.clone()),
+            detail: read_detail(f, base.detail),
         }
     }
+}
+
+/// The file of a texture, which must be there.
+fn read_texture(f: &mut Fields<'_>) -> Option<PathBuf> {
+    let (file, value) = f.optional_text("texture")?;
+    let path = f.log.folder().join(file);
+    if !path.is_file() {
+        f.wrong("texture", value, format!("a PNG file; there is none at {}", path.display()));
+    }
+    Some(path)
+}
+
+fn read_detail(f: &mut Fields<'_>, default: Detail) -> Detail {
+    let Some((words, value)) = f.optional_text("quality") else { return default };
+    words.parse().unwrap_or_else(|wanted: String| {
+        f.wrong("quality", value, wanted);
+        default
+    })
 }
 
 /// A colour, or `default` where the key is not there.

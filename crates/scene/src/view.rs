@@ -21,7 +21,8 @@ pub struct CameraSpec {
     pub far_m: f64,
 }
 
-const FOV: Bound = Bound::new(1.0, 170.0, "an angle from 1 to 170 degrees");
+/// An opening angle of a picture.
+pub(crate) const FOV: Bound = Bound::new(1.0, 170.0, "an angle from 1 to 170 degrees");
 
 impl CameraSpec {
     pub(crate) fn read(mut f: Fields<'_>) -> Self {

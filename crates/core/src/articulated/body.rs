@@ -10,6 +10,7 @@ use super::freedom::{Coupling, Freedom};
 use super::kinematics::Kinematics;
 use super::model::Model;
 use crate::collidable::{CollisionKind, Material};
+use crate::mounts::{CameraMount, LightMount};
 use crate::object::Visual;
 use nalgebra::Quaternion;
 use std::sync::{Mutex, MutexGuard};
@@ -118,6 +119,8 @@ pub struct ArticulatedBody {
     base: Pose,
     pub(super) colliders: Vec<Part>,
     pub(super) visuals: Vec<Visual>,
+    pub(super) cameras: Vec<CameraMount>,
+    pub(super) lights: Vec<LightMount>,
     /// What acts on each degree of freedom, in the order of `v`. May be changed between steps.
     freedoms: Vec<Freedom>,
     pub(super) couplings: Vec<Coupling>,
@@ -156,6 +159,7 @@ impl Clone for ArticulatedBody {
     fn clone(&self) -> ArticulatedBody {
         ArticulatedBody {
             name: self.name.clone(), model: self.model.clone(), base: self.base, colliders: self.colliders.clone(), visuals: self.visuals.clone(),
+            cameras: self.cameras.clone(), lights: self.lights.clone(),
             freedoms: self.freedoms.clone(), couplings: self.couplings.clone(), self_collision: self.self_collision, apart: self.apart.clone(),
             start: self.start.clone(), dynamics: self.dynamics.clone(), working: Mutex::new(self.working().clone()),
         }
@@ -177,7 +181,7 @@ impl ArticulatedBody {
         };
         let freedoms = vec![Freedom::default(); model.dof()];
         let mut body = ArticulatedBody {
-            name: name.into(), model, base: Pose::identity(), colliders: Vec::new(), visuals: Vec::new(), freedoms, couplings: Vec::new(),
+            name: name.into(), model, base: Pose::identity(), colliders: Vec::new(), visuals: Vec::new(), cameras: Vec::new(), lights: Vec::new(), freedoms, couplings: Vec::new(),
             self_collision: true, apart: Vec::new(), start, dynamics, working: Mutex::new(working),
         };
         body.refresh_dynamics(&body.start.clone());
@@ -241,11 +245,29 @@ impl ArticulatedBody {
 
     /// Adds a picture to a link; its `part` is set here and its pose is in the link's frame.
     pub fn add_visual(&mut self, link: &str, mut visual: Visual) -> Result<(), ArticulatedError> {
-        let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
-        visual.pose = frame.pose * visual.pose;
-        visual.part = frame.link.unwrap_or(self.model.links().len());
+        (visual.part, visual.pose) = self.part_of(link, &visual.pose)?;
         self.visuals.push(visual);
         Ok(())
+    }
+
+    /// Adds a camera to a link; its `part` is set here and its pose is in the link's frame.
+    pub fn add_camera(&mut self, link: &str, mut camera: CameraMount) -> Result<(), ArticulatedError> {
+        (camera.part, camera.pose) = self.part_of(link, &camera.pose)?;
+        self.cameras.push(camera);
+        Ok(())
+    }
+
+    /// Adds a light to a link; its `part` is set here and its pose is in the link's frame.
+    pub fn add_light(&mut self, link: &str, mut light: LightMount) -> Result<(), ArticulatedError> {
+        (light.part, light.pose) = self.part_of(link, &light.pose)?;
+        self.lights.push(light);
+        Ok(())
+    }
+
+    /// The part that a link is, or is folded into, and a pose of the link's frame in the part's.
+    fn part_of(&self, link: &str, pose: &Pose) -> Result<(usize, Pose), ArticulatedError> {
+        let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
+        Ok((frame.link.unwrap_or(self.model.links().len()), frame.pose * pose))
     }
 
     /// Keeps two links from meeting; what is folded into another link, or into the base, stands for all of that.

@@ -6,6 +6,7 @@ use super::coordinates::integrate;
 use super::energy::{energy, momentum};
 use super::joint::Joint;
 use crate::collidable::{Collidable, CollisionKind, Material};
+use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
 use crate::site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
 use crate::rigid::vec3;
@@ -60,6 +61,14 @@ impl Object for ArticulatedBody {
 
     fn renderable(&self) -> Option<&dyn Renderable> {
         Some(self)
+    }
+
+    fn camera(&self) -> Option<&dyn CameraCarrier> {
+        (!self.cameras.is_empty()).then_some(self)
+    }
+
+    fn light(&self) -> Option<&dyn LightCarrier> {
+        (!self.lights.is_empty()).then_some(self)
     }
 
     fn net_sync(&self) -> Option<&dyn NetSync> {
@@ -251,6 +260,18 @@ impl Collidable for ArticulatedBody {
         let carried = self.collider(part).map_or(Vec3::zeros(), |p| p.collider.pose.translation.vector);
         let arm = point - site.position() + self.dynamics.link_pose(link).rotation * carried;
         self.dynamics.point_response(link, &arm, axes, sign, y);
+    }
+}
+
+impl CameraCarrier for ArticulatedBody {
+    fn cameras(&self) -> &[CameraMount] {
+        &self.cameras
+    }
+}
+
+impl LightCarrier for ArticulatedBody {
+    fn lights(&self) -> &[LightMount] {
+        &self.lights
     }
 }
 

@@ -1,5 +1,6 @@
 //! The hash of what a facet has drawn. The server makes it of what it sent, a facet of the world it drew, read back after drawing: so it can differ.
 
+use super::quantise::{PER_M, nearest};
 use super::wire::{Hash, put_name, short};
 use tumble_collide::Pose;
 
@@ -31,9 +32,18 @@ impl Drawn {
         self.0.push(alive as u8);
     }
 
+    /// A pose as it is drawn: positions in the units in which they travel, rotations in the renderer's precision. Poses that differ as they
+    /// travel differ here.
     pub fn pose(&mut self, pose: &Pose) {
-        let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
-        self.0.extend(numbers.flat_map(|x| x.to_bits().to_le_bytes()));
+        let (p, q) = (pose.translation.vector, pose.rotation.coords);
+        let mut out = [0; 28];
+        for k in 0..3 {
+            out[4 * k..4 * k + 4].copy_from_slice(&nearest(p[k] * PER_M).to_le_bytes());
+        }
+        for k in 0..4 {
+            out[12 + 4 * k..16 + 4 * k].copy_from_slice(&(q[k] as f32).to_le_bytes());
+        }
+        self.0.extend_from_slice(&out);
     }
 
     pub fn bytes(&mut self, write: impl FnOnce(&mut Vec<u8>)) {

@@ -189,6 +189,8 @@ impl FacetSession {
         let applied = self.mirror.apply_state(header.frame, header.time_s, message.get(HEADER_BYTES..).unwrap_or(&[]));
         if applied.is_err() {
             count(&mut self.counts.refused);
+            self.newest = None; // so that it is taken when it comes again
+            self.resync(arrived);
             return None;
         }
         self.drawing = Some((header.frame, arrived));
@@ -364,11 +366,16 @@ impl FacetSession {
             return Ok(());
         }
         self.keep_early(now, header, bytes);
+        self.resync(now);
+        Ok(())
+    }
+
+    /// Asks for the list and the frame again, unless it did so a moment ago.
+    fn resync(&mut self, now: Duration) {
         if self.resynced.is_none_or(|asked| now >= asked.saturating_add(self.options.join_every)) {
             self.resynced = Some(now);
             self.send(Kind::Resync, 0, |_| {});
         }
-        Ok(())
     }
 
     fn keep_early(&mut self, now: Duration, header: Header, bytes: &[u8]) {

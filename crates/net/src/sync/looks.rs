@@ -116,7 +116,8 @@ fn get_shape(rest: &mut Bytes<'_>, base: &World) -> Result<Shape, Fault> {
         6 => {
             let mesh = get_mesh(rest)?;
             let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
-            let shape = Shape::mesh(mesh, &TreeSettings::default()).map(|(shape, _)| shape);
+            // it is drawn and meets nothing: the coarsest tree will do
+            let shape = Shape::mesh(mesh, &TreeSettings { depth: 1, ..TreeSettings::octree() }).map(|(shape, _)| shape);
             return shape.map_err(|why| Fault::Unfit(format!("a mesh of {vertices} vertices and {triangles} triangles: {why}")));
         }
         _ => return Err(Fault::Malformed("a shape that there is not")),
@@ -155,7 +156,7 @@ fn get_look(rest: &mut Bytes<'_>) -> Result<Look, Fault> {
     let shader = text(rest)?;
     let count = rest.u8()?;
     let properties = (0..count).map(|_| Ok((text(rest)?, rest.f64()?))).collect::<Result<_, Fault>>()?;
-    Ok(Look { color: [r, g, b], roughness, metallic, shader, properties })
+    Ok(Look { color: [r, g, b], roughness, metallic, shader, properties, ..Look::default() })
 }
 
 fn text(rest: &mut Bytes<'_>) -> Result<String, Fault> {

@@ -6,7 +6,7 @@ use super::puppet::Puppet;
 use super::quantise::get_pose;
 use super::table::{Entry, EntryKind, Snapshot, parse_state, poses_bytes};
 use super::viewer::{VIEWER_NAME, Viewer};
-use super::wire::{Bytes, Fault, Hash};
+use super::wire::{Fault, Hash};
 use std::collections::BTreeSet;
 use tumble_collide::Pose;
 use tumble_core::{Mode, ObjectId, World};
@@ -123,8 +123,9 @@ impl Mirror {
         }
         let _ = world.set_alive(id, entry.alive);
         if still {
-            let poses = read_poses(poses, parts)?;
-            world.show_at(id, &poses).map_err(|why| unfit(&why.to_string()))?;
+            let mut stand = Vec::new();
+            read_poses(poses, parts, &mut stand)?;
+            world.show_at(id, &stand).map_err(|why| unfit(&why.to_string()))?;
         }
         Ok(Slot { id: Some(id), kind: entry.kind, still, parts })
     }
@@ -151,23 +152,34 @@ impl Mirror {
         if count as usize != moving.len() {
             return Err(Fault::Malformed("not as many objects as move"));
         }
-        let (mut viewer, mut shown, mut told) = (None, Vec::with_capacity(moving.len()), Vec::new());
+        let (mut viewer, mut told) = (None, Vec::new());
+        let mut poses = Vec::with_capacity(self.slots.iter().map(|slot| slot.parts as usize).sum()); // of our own list
+        let mut shown = Vec::with_capacity(moving.len());
         for (record, &wanted) in records.zip(&moving) {
             let (index, body) = record?;
             let slot = &self.slots[wanted];
             match (slot.id, slot.kind) {
                 _ if index != wanted => return Err(Fault::Malformed("objects out of order")),
                 (None, _) => viewer = Some(Viewer::read(body)?),
-                (Some(id), _) if body.is_empty() => shown.push((id, None)),
+                (Some(id), _) if body.is_empty() => shown.push((id, 0..0)),
                 (Some(id), EntryKind::Exact) => told.push((id, body)),
-                (Some(id), _) => shown.push((id, Some(read_poses(body, slot.parts)?))),
+                (Some(id), _) => {
+                    let start = poses.len();
+                    read_poses(body, slot.parts, &mut poses)?;
+                    shown.push((id, start..poses.len()));
+                }
             }
         }
         let viewer = viewer.ok_or(Fault::Malformed("no viewer"))?;
         self.tell(&told)?;
-        for (id, poses) in shown {
-            let _ = self.world.set_alive(id, poses.is_some()); // ids of our own list are there
-            let _ = poses.map(|poses| self.world.show_at(id, &poses)); // as many as there are parts, and finite
+        for (id, range) in shown {
+            let alive = !range.is_empty();
+            if self.world.status(id).is_some_and(|s| s.alive != alive) {
+                let _ = self.world.set_alive(id, alive); // ids of our own list are there
+            }
+            if alive {
+                let _ = self.world.show_at(id, &poses[range]); // as many as there are parts, and finite
+            }
         }
         self.world.show_time(time_s);
         (self.viewer, self.frame) = (viewer, frame);
@@ -217,9 +229,8 @@ impl Mirror {
             });
             return;
         }
-        for part in 0..slot.parts as usize {
-            self.world.site(id, part).iter().for_each(|site| drawn.pose(&site.pose));
-        }
+        let sites = self.world.view().span(id).and_then(|span| self.world.sites().get(span.site.clone())).unwrap_or_default();
+        sites.iter().for_each(|site| drawn.pose(&site.pose));
     }
 
     fn hash_table(&mut self) {
@@ -240,10 +251,14 @@ fn has_parts(world: &World, id: ObjectId) -> bool {
     world.view().span(id).is_some_and(|span| !span.site.is_empty())
 }
 
-fn read_poses(body: &[u8], parts: u16) -> Result<Vec<Pose>, Fault> {
-    if body.len() != poses_bytes(parts) {
+/// Appends as many poses as there are parts.
+fn read_poses(body: &[u8], parts: u16, out: &mut Vec<Pose>) -> Result<(), Fault> {
+    let (poses, rest) = body.as_chunks();
+    if poses.len() != parts as usize || !rest.is_empty() {
         return Err(Fault::Malformed("not as many poses as parts"));
     }
-    let mut rest = Bytes(body);
-    (0..parts).map(|_| get_pose(&mut rest)).collect()
+    for pose in poses {
+        out.push(get_pose(pose)?);
+    }
+    Ok(())
 }

@@ -6,7 +6,7 @@ use super::quantise::{get_pose, put_pose};
 use super::table::{Entry, EntryKind, MAX_OBJECTS, put_record, put_snapshot_head, put_state_head};
 use super::transport::MAX_MESSAGE_BYTES;
 use super::viewer::{VIEWER_NAME, Viewer};
-use super::wire::{Bytes, HEADER_BYTES, Hash};
+use super::wire::{HEADER_BYTES, Hash};
 use std::sync::Arc;
 use tumble_collide::Pose;
 use tumble_core::{Mode, ObjectId, World};
@@ -53,6 +53,9 @@ pub struct Published {
 struct Row {
     id: ObjectId,
     kind: EntryKind,
+    /// Whether its mode is static.
+    fixed: bool,
+    /// Fixed, and sent as poses: in the list and in no state.
     still: bool,
     /// Whether it is alive, of a still one.
     alive: bool,
@@ -65,6 +68,8 @@ struct Row {
 pub struct Publisher {
     exact: bool,
     base: World,
+    /// Objects of the world that was listed.
+    ids: Vec<ObjectId>,
     rows: Vec<Row>,
     revision: u32,
     snapshot: Arc<Vec<u8>>,
@@ -75,7 +80,7 @@ pub struct Publisher {
 impl Publisher {
     /// `base`: the world as the scene file makes it, before the first step. `revision`: number before the first list's (it wraps).
     pub fn new(base: &World, exact: bool, revision: u32) -> Publisher {
-        Publisher { exact, base: base.fork(), rows: Vec::new(), revision, snapshot: Arc::default(), table: [0; 16], scratch: Drawn::default() }
+        Publisher { exact, base: base.fork(), ids: Vec::new(), rows: Vec::new(), revision, snapshot: Arc::default(), table: [0; 16], scratch: Drawn::default() }
     }
 
     /// Payload of SNAPSHOT, of the last [`publish`](Self::publish); empty before the first.
@@ -117,19 +122,14 @@ impl Publisher {
         Ok(Published { state, hash, fresh, saturated })
     }
 
+    /// Whether the list is still that of the world: the same objects, and what stood still stands where it stood.
     fn still_fits(&self, world: &World) -> bool {
-        let mut listed = self.rows.iter();
-        for &id in world.ids() {
-            let Some((kind, still, alive, parts)) = self.class(world, id) else { continue };
-            let same = |row: &Row| {
-                let poses = || poses(world, id).eq(row.poses.iter().copied());
-                (row.id, row.kind, row.still, row.parts) == (id, kind, still, parts) && (!still || row.alive == alive && poses())
-            };
-            if !listed.next().is_some_and(same) {
-                return false;
-            }
-        }
-        listed.next().is_none()
+        let same = |row: &Row| {
+            let Some(status) = world.status(row.id) else { return false };
+            let fixed = status.mode == Mode::Static;
+            fixed == row.fixed && (!row.still || status.alive == row.alive && poses(world, row.id).eq(row.poses.iter().copied()))
+        };
+        world.ids() == self.ids && self.rows.iter().all(same)
     }
 
     /// What of an object travels: kind, whether it is still, whether it is alive, parts. `None`: nothing.
@@ -152,9 +152,11 @@ impl Publisher {
         for &id in world.ids() {
             if let Some((kind, still, alive, parts)) = self.class(world, id) {
                 let poses = if still { poses(world, id).collect() } else { Vec::new() };
-                self.rows.push(Row { id, kind, still, alive, parts, poses });
+                let fixed = world.status(id).is_some_and(|s| s.mode == Mode::Static);
+                self.rows.push(Row { id, kind, fixed, still, alive, parts, poses });
             }
         }
+        self.ids = world.ids().to_vec();
         fits("objects", self.rows.len() + 1, MAX_OBJECTS)?;
         let mut out = Vec::new();
         put_snapshot_head(&mut out, self.revision, self.exact, self.rows.len() + 1);
@@ -196,13 +198,13 @@ fn put_row(out: &mut Vec<u8>, row: &Row, world: &World, drawn: &mut Drawn, satur
         return Ok(());
     }
     for (part, pose) in poses(world, row.id).enumerate() {
-        if !pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite()) {
+        let sum = pose.translation.vector.sum() + pose.rotation.coords.sum(); // finite numbers of a world sum to a finite one
+        if !sum.is_finite() {
             let name = world.object(row.id).map_or(String::new(), |o| o.name().to_string());
             return Err(PublishError::NotFinite { name, part });
         }
-        let start = out.len();
         *saturated += u32::from(!put_pose(out, &pose));
-        if let Ok(sent) = get_pose(&mut Bytes(&out[start..])) {
+        if let Some(Ok(sent)) = out.last_chunk().map(get_pose) {
             drawn.pose(&sent);
         }
     }
@@ -210,8 +212,8 @@ fn put_row(out: &mut Vec<u8>, row: &Row, world: &World, drawn: &mut Drawn, satur
 }
 
 fn poses(world: &World, id: ObjectId) -> impl Iterator<Item = Pose> + '_ {
-    let parts = world.view().span(id).map_or(0, |span| span.site.len());
-    (0..parts).filter_map(move |part| Some(world.site(id, part)?.pose))
+    let sites = world.view().span(id).and_then(|span| world.sites().get(span.site.clone())).unwrap_or_default();
+    sites.iter().map(|site| site.pose)
 }
 
 fn fits(what: &str, is: usize, most: usize) -> Result<(), PublishError> {

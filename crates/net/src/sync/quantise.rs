@@ -10,7 +10,7 @@
 //!
 //! The two bits above the three times 20 say which component was left out, the two above those are zero.
 
-use super::wire::{Bytes, Fault};
+use super::wire::Fault;
 use tumble_collide::{Pose, Quat, Vec3};
 
 /// Bytes of a pose.
@@ -22,58 +22,65 @@ pub const ROTATION_ERROR_RAD: f64 = 5e-6;
 /// Positions beyond saturate, m.
 pub const MOST_M: f64 = 32_767.999;
 
-const PER_M: f64 = 65_536.0;
+pub(crate) const PER_M: f64 = 65_536.0;
 const N: i32 = (1 << 19) - 1;
+/// Places of the components that travel, by the place of the one that does not.
+const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+/// `√2·N`.
+const SCALE: f64 = std::f64::consts::SQRT_2 * N as f64;
 const MASK: u64 = (1 << 20) - 1;
 
 /// Appends a finite pose; whether its position fitted.
 pub fn put_pose(out: &mut Vec<u8>, pose: &Pose) -> bool {
     let position = pose.translation.vector;
-    for &x in position.iter() {
-        out.extend(((x * PER_M).round() as i32).to_le_bytes()); // saturates
+    let mut bytes = [0; POSE_BYTES];
+    for k in 0..3 {
+        let units = nearest(position[k] * PER_M);
+        bytes[4 * k..4 * k + 4].copy_from_slice(&units.to_le_bytes());
     }
-    out.extend(pack(&pose.rotation).to_le_bytes());
+    bytes[12..].copy_from_slice(&pack(&pose.rotation).to_le_bytes());
+    out.extend_from_slice(&bytes);
     position.amax() <= MOST_M
 }
 
 /// Reads a pose.
-pub(crate) fn get_pose(bytes: &mut Bytes<'_>) -> Result<Pose, Fault> {
-    let mut position = [0.0; 3];
-    for x in &mut position {
-        *x = i32::from_le_bytes(bytes.array()?) as f64 / PER_M;
-    }
-    let rotation = unpack(bytes.u64()?).ok_or(Fault::Malformed("a rotation that is none"))?;
-    Ok(Pose::from_parts(Vec3::from(position).into(), rotation))
+pub(crate) fn get_pose(bytes: &[u8; POSE_BYTES]) -> Result<Pose, Fault> {
+    let units = |k: usize| i32::from_le_bytes([bytes[k], bytes[k + 1], bytes[k + 2], bytes[k + 3]]) as f64 * (1.0 / PER_M);
+    let mut packed = [0; 8];
+    packed.copy_from_slice(&bytes[12..]);
+    let rotation = unpack(u64::from_le_bytes(packed)).ok_or(Fault::Malformed("a rotation that is none"))?;
+    Ok(Pose::from_parts(Vec3::new(units(0), units(4), units(8)).into(), rotation))
+}
+
+/// The nearest whole number (of two the even one), saturating: adding 1.5·2⁵² leaves no room for a fraction.
+pub(crate) fn nearest(x: f64) -> i32 {
+    const ROOM: f64 = 6_755_399_441_055_744.0;
+    (x.clamp(i32::MIN as f64, i32::MAX as f64) + ROOM - ROOM) as i32
 }
 
 fn pack(rotation: &Quat) -> u64 {
     let c = rotation.coords;
     let left_out = c.iamax();
-    let sign = if c[left_out] < 0.0 { -1.0 } else { 1.0 };
-    let others = (0..4).filter(|&k| k != left_out).map(|k| {
-        let n = (sign * c[k] * std::f64::consts::SQRT_2 * N as f64).round() as i32;
-        (n.clamp(-N, N) + N) as u64
-    });
-    others.fold(left_out as u64, |packed, n| packed << 20 | n)
+    let scale = if c[left_out] < 0.0 { -SCALE } else { SCALE };
+    let packed = |packed: u64, &k: &usize| packed << 20 | (nearest(scale * c[k]).clamp(-N, N) + N) as u64;
+    OTHERS[left_out].iter().fold(left_out as u64, packed)
 }
 
 fn unpack(packed: u64) -> Option<Quat> {
-    let left_out = (packed >> 60) as usize;
-    let (mut c, mut sum, mut shift) = ([0.0; 4], 0.0, 60);
-    if left_out > 3 {
+    let left_out = packed >> 60;
+    let [a, b, d] = [40, 20, 0].map(|shift| ((packed >> shift & MASK) as i32 - N) as f64 * (1.0 / SCALE));
+    let rest = 1.0 - (a * a + b * b + d * d);
+    // the one left out is the largest, so its square is 1/4 at least, but for a little rounding
+    if rest < 0.249 {
         return None;
     }
-    for (_, c) in c.iter_mut().enumerate().filter(|(k, _)| *k != left_out) {
-        shift -= 20;
-        let n = (packed >> shift & MASK) as i32 - N;
-        *c = n as f64 / (std::f64::consts::SQRT_2 * N as f64);
-        sum += *c * *c;
-    }
-    // the one left out is the largest, so the others' squares sum to 3/4 at most, and a little for rounding
-    if sum > 0.751 {
-        return None;
-    }
-    c[left_out] = (1.0 - sum).sqrt();
-    let [x, y, z, w] = c;
+    let largest = rest.sqrt();
+    let (x, y, z, w) = match left_out {
+        0 => (largest, a, b, d),
+        1 => (a, largest, b, d),
+        2 => (a, b, largest, d),
+        3 => (a, b, d, largest),
+        _ => return None,
+    };
     Some(Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)))
 }

@@ -4,6 +4,7 @@ mod damage;
 mod hostile;
 mod inputs;
 mod kill;
+mod links;
 mod outside;
 mod recover;
 mod roundtrip;

@@ -37,6 +37,11 @@ impl Blend {
         Ok(Blend { width, shares })
     }
 
+    /// The shares as bytes, 255 for all of the light.
+    pub(crate) fn bytes(&self) -> Vec<[u8; 3]> {
+        self.shares.iter().map(|shares| shares.map(|s| (255.0 * s).round() as u8)).collect()
+    }
+
     /// Darkens a picture of the mask's size.
     pub fn apply(&self, image: &mut Image) {
         if image.width != self.width {

@@ -19,17 +19,6 @@ pub(crate) fn paste(into: &mut Image, from: &Image, x: u32, y: u32) {
     }
 }
 
-/// The middle of a picture without `rim` pixels on each side.
-pub(crate) fn cut(image: &Image, rim: u32) -> Image {
-    let (width, height) = (image.width - 2 * rim, image.height - 2 * rim);
-    let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
-    for y in rim..rim + height {
-        let start = 4 * (y as usize * image.width as usize + rim as usize);
-        rgba.extend_from_slice(&image.rgba[start..start + 4 * width as usize]);
-    }
-    Image { width, height, rgba }
-}
-
 /// The pictures of the eyes (one, or left and right of one size) as the stereo mode shows them.
 pub(crate) fn combined(mut eyes: Vec<Image>, stereo: Stereo) -> Image {
     if eyes.len() < 2 || stereo == Stereo::Mono {

@@ -13,7 +13,8 @@ mod view;
 mod warp;
 
 pub use blend::Blend;
-pub(crate) use compose::{blank, cut};
+pub(crate) use blend::encoded;
+pub(crate) use compose::blank;
 pub use calibration::{CalibrationPattern, calibration_picture};
 pub use perspective::FacetView;
 pub use unfold::{Tile, unfold};

@@ -1,12 +1,14 @@
 //! A cave that stands in a scene.
 
-use super::compose::{blank, combined, flipped, paste};
+use super::compose::{combined, flipped};
 use super::perspective::FacetView;
 use super::unfold::{Tile, unfold};
 use super::{Blend, Warp};
-use crate::{DrawList, Image, RenderError, Renderer};
+use crate::gpu::{Finish, Placed};
+use crate::{DrawList, Image, RenderError, Renderer, Stage};
 use nalgebra::{Point3, Vector3};
-use tumble_scene::cave::{Cave, Facet};
+use std::sync::Arc;
+use tumble_scene::cave::{Cave, Facet, Flip, Stereo};
 use tumble_scene::{CavePlace, SceneFile};
 
 /// Pixels drawn beyond the edges of a facet and cut off again: what occlusion may reach across an edge.
@@ -23,6 +25,8 @@ pub struct CaveView {
     warps: Vec<Option<Warp>>,
     /// By facet.
     blends: Vec<Option<Blend>>,
+    /// The two of them for the device, by facet.
+    finishes: Vec<Option<Arc<Finish>>>,
 }
 
 impl CaveView {
@@ -36,7 +40,9 @@ impl CaveView {
         let warps = cave.facets.iter().map(|f| f.warp_file.as_deref().map(Warp::load).transpose()).collect::<Result<_, _>>()?;
         let blend = |f: &Facet| f.blend_file.as_deref().map(|path| Blend::load(path, f.size_px)).transpose();
         let blends = cave.facets.iter().map(blend).collect::<Result<_, _>>()?;
-        Ok(CaveView { cave, place, warps, blends })
+        let mut view = CaveView { cave, place, warps, blends, finishes: Vec::new() };
+        view.finishes = (0..view.cave.facets.len()).map(|i| view.finish(i)).collect();
+        Ok(view)
     }
 
     /// The cave.
@@ -52,11 +58,6 @@ impl CaveView {
     /// Puts it elsewhere in the scene.
     pub fn stand(&mut self, place: CavePlace) {
         self.place = place;
-    }
-
-    /// Whether a facet's picture is bent or darkened for its projector.
-    pub fn is_bent(&self, facet: &Facet) -> bool {
-        facet.warp_file.is_some() || facet.blend_file.is_some()
     }
 
     /// What the eye to the `side` (−1 left, 0 between, +1 right) sees through a facet's screen, in the scene.
@@ -83,7 +84,40 @@ impl CaveView {
     /// # Errors
     /// As [`Renderer::render_from`].
     pub fn draw(&self, renderer: &mut Renderer, list: &DrawList, facet: &Facet) -> Result<Image, RenderError> {
-        let index = self.cave.facets.iter().position(|f| f.name == facet.name);
+        let stage = renderer.stage(list)?;
+        self.draw_on_device(renderer, &stage, facet)?;
+        renderer.read()
+    }
+
+    /// The same, but the picture stays on the device ([`Renderer::picture`]). One stage serves all facets of a frame.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw_stage`].
+    pub fn draw_on_device(&self, renderer: &mut Renderer, stage: &Stage, facet: &Facet) -> Result<(), RenderError> {
+        let finish = self.index(facet).and_then(|i| self.finishes[i].clone());
+        let [w, h] = facet.size_px;
+        for (i, side) in facet.stereo.sides().iter().enumerate() {
+            let (at_px, channels) = match (facet.stereo, i) {
+                (Stereo::Anaglyph, 0) => ([0, 0], [true, false, false]),
+                (Stereo::Anaglyph, _) => ([0, 0], [false, true, true]),
+                (Stereo::SideBySide, 1) => ([w, 0], [true; 3]),
+                (Stereo::TopBottom, 1) => ([0, h], [true; 3]),
+                _ => ([0, 0], [true; 3]),
+            };
+            let begin = (i == 0).then_some([0, 0, 0, 255]);
+            // each eye by itself: mirroring the whole would give each the other's half
+            let placed = Placed { whole_px: facet.whole_px(), at_px, begin, flip: facet.flip, channels, finish: finish.clone() };
+            renderer.draw_placed(stage, &self.eye(facet, *side)?.part(w, h, RIM_PX), [w, h], &placed)?;
+        }
+        Ok(())
+    }
+
+    /// What [`CaveView::draw`] gives, with all that is done to finished pictures done in memory: the reference for the device.
+    ///
+    /// # Errors
+    /// As [`Renderer::render_from`].
+    pub fn draw_in_memory(&self, renderer: &mut Renderer, list: &DrawList, facet: &Facet) -> Result<Image, RenderError> {
+        let index = self.index(facet);
         let [w, h] = facet.size_px;
         let one = |side: &f64| -> Result<Image, RenderError> { renderer.render_from(&self.eye(facet, *side)?.part(w, h, RIM_PX), list, w, h) };
         let mut eyes = facet.stereo.sides().iter().map(one).collect::<Result<Vec<_>, _>>()?;
@@ -93,7 +127,6 @@ impl CaveView {
         if let Some(blend) = index.and_then(|i| self.blends[i].as_ref()) {
             eyes.iter_mut().for_each(|eye| blend.apply(eye));
         }
-        // each eye by itself: mirroring the whole would give each the other's half
         Ok(combined(eyes.into_iter().map(|eye| flipped(eye, facet.flip)).collect(), facet.stereo))
     }
 
@@ -102,13 +135,36 @@ impl CaveView {
     /// # Errors
     /// As [`Renderer::render_from`].
     pub fn draw_unfolded(&self, renderer: &mut Renderer, list: &DrawList, most: [u32; 2]) -> Result<Image, RenderError> {
-        let ([width, height], tiles) = unfold(&self.cave, most);
-        let mut whole = blank(width, height, BACKGROUND);
-        for Tile { facet, position_px, size_px: [w, h] } in tiles {
-            let view = self.eye(&self.cave.facets[facet], 0.0)?.part(w, h, RIM_PX);
-            paste(&mut whole, &renderer.render_from(&view, list, w, h)?, position_px[0], position_px[1]);
+        let stage = renderer.stage(list)?;
+        self.draw_unfolded_on_device(renderer, &stage, most)?;
+        renderer.read()
+    }
+
+    /// The same, but the picture stays on the device ([`Renderer::picture`]).
+    ///
+    /// # Errors
+    /// As [`Renderer::draw_stage`].
+    pub fn draw_unfolded_on_device(&self, renderer: &mut Renderer, stage: &Stage, most: [u32; 2]) -> Result<(), RenderError> {
+        let (whole_px, tiles) = unfold(&self.cave, most);
+        for (i, Tile { facet, position_px, size_px: [w, h] }) in tiles.into_iter().enumerate() {
+            let begin = (i == 0).then_some(BACKGROUND);
+            let placed = Placed { whole_px, at_px: position_px, begin, flip: Flip::None, channels: [true; 3], finish: None };
+            renderer.draw_placed(stage, &self.eye(&self.cave.facets[facet], 0.0)?.part(w, h, RIM_PX), [w, h], &placed)?;
         }
-        Ok(whole)
+        Ok(())
+    }
+
+    fn index(&self, facet: &Facet) -> Option<usize> {
+        self.cave.facets.iter().position(|f| f.name == facet.name)
+    }
+
+    /// Warp and blend of a facet in numbers for the device.
+    fn finish(&self, index: usize) -> Option<Arc<Finish>> {
+        let size = self.cave.facets[index].size_px;
+        let small = |place: [f64; 2]| place.map(|p| p as f32);
+        let warp = self.warps[index].as_ref().map(|warp| warp.sources(size).into_iter().map(|from| from.map(small)).collect());
+        let shares = self.blends[index].as_ref().map(Blend::bytes);
+        (warp.is_some() || shares.is_some()).then(|| Arc::new(Finish { size, warp, shares }))
     }
 }
 

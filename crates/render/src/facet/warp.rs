@@ -107,8 +107,19 @@ impl Warp {
 
     /// The bent picture, of the same size.
     pub fn apply(&self, image: &Image) -> Image {
-        let (w, h) = (image.width as usize, image.height as usize);
         let mut out = super::compose::blank(image.width, image.height, [0, 0, 0, 255]);
+        for (pixel, from) in out.rgba.chunks_exact_mut(4).zip(self.sources([image.width, image.height])) {
+            if let Some([x, y]) = from {
+                pixel.copy_from_slice(&sample(image, x, y));
+            }
+        }
+        out
+    }
+
+    /// For each pixel of a picture of this size, by rows from the top, the place that appears there: pixels, middles at whole numbers.
+    pub(crate) fn sources(&self, [width, height]: [u32; 2]) -> Vec<Option<[f64; 2]>> {
+        let (w, h) = (width as usize, height as usize);
+        let mut out = vec![None; w * h];
         for triangle in &self.triangles {
             // corners in pixels of the target, y down
             let p = triangle.map(|(place, _)| [place[0] * w as f64, (1.0 - place[1]) * h as f64]);
@@ -127,8 +138,7 @@ impl Warp {
                     let share = [cross(middle, p[1], p[2]) / area, cross(p[0], middle, p[2]) / area, cross(p[0], p[1], middle) / area];
                     if share.iter().all(|s| *s >= -1e-9) {
                         let source: [f64; 2] = std::array::from_fn(|k| (0..3).map(|i| share[i] * triangle[i].1[k]).sum());
-                        let pixel = sample(image, source[0] * w as f64 - 0.5, (1.0 - source[1]) * h as f64 - 0.5);
-                        out.rgba[4 * (y * w + x)..][..4].copy_from_slice(&pixel);
+                        out[y * w + x] = Some([source[0] * w as f64 - 0.5, (1.0 - source[1]) * h as f64 - 0.5]);
                     }
                 }
             }

@@ -2,8 +2,8 @@
 
 use crate::list::debug::Stroke;
 use crate::material::linear3;
-use crate::{Instance, Material, Part, Shader, Sphere};
-use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
+use crate::{Instance, Material, Part, Sphere};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3};
 
 /// Numbers per mesh instance, sphere and stroke.
 pub const INSTANCE_FLOATS: u64 = 24;
@@ -66,6 +66,18 @@ impl Eye {
         self
     }
 
+    /// Whether the eye is in, or near to, one of the balls, or one lies across the plane through the eye: there an outline is no ellipse before it.
+    pub fn near_any(&self, balls: &[(Point3<f32>, f32)]) -> bool {
+        let at: Vector3<f32> = self.origin[0].cast();
+        let ahead: Vector3<f32> = self.clip_from_world.row(3).transpose().xyz().cast();
+        self.perspective
+            && balls.iter().any(|(center, radius)| {
+                let to = center.coords - at;
+                // a little more than the shaders' own bounds
+                to.norm_squared() < 2.1 * radius * radius || (to.dot(&ahead).abs() < 3.0 * radius && to.norm() < 1e6 * radius)
+            })
+    }
+
     /// How many picture widths and heights a metre across the view covers (at view depth 1, where perspective).
     pub fn map_widths_per_metre(&self) -> [f64; 2] {
         self.per_ndc.map(|metres| 0.5 / metres)
@@ -94,14 +106,15 @@ pub fn instance(x: &Instance, out: &mut Vec<f32>) {
     for i in 0..3 {
         out.extend([r[(i, 0)], r[(i, 1)], r[(i, 2)], x.pose.translation.vector[i]]);
     }
-    material(&x.material, out);
+    material(&x.material, x.material.texture.map_or(0.0, |t| t.repeat_m), out);
 }
 
 /// A sphere: centre and radius, turn, material.
 pub fn sphere(s: &Sphere, out: &mut Vec<f32>) {
     let (c, q) = (s.center, s.orientation.coords);
     out.extend([c.x, c.y, c.z, s.radius, q.x, q.y, q.z, q.w]);
-    material(&s.material, out);
+    // a sphere wears its texture once around
+    material(&s.material, 0.0, out);
 }
 
 /// A translucent sphere: its opacity takes the place of the roughness.
@@ -119,9 +132,8 @@ pub fn stroke(s: &Stroke, out: &mut Vec<f32>) {
     out.extend([r, g, b, s.style.opacity, f32::from(u8::from(s.round)), 0.0, 0.0, 0.0]);
 }
 
-fn material(m: &Material, out: &mut Vec<f32>) {
-    let (id, other, size) = m.pattern.packed();
-    let id = id + if m.shader == Shader::Unlit { 100 } else { 0 };
+fn material(m: &Material, repeat_m: f32, out: &mut Vec<f32>) {
+    let (_, other, size) = m.pattern.packed();
     let ([r, g, b], [or, og, ob]) = (linear3(m.color), linear3(other));
-    out.extend([r, g, b, m.roughness, or, og, ob, m.metallic, m.clearcoat, id as f32, size[0], size[1]]);
+    out.extend([r, g, b, m.roughness, or, og, ob, m.metallic, m.clearcoat, repeat_m, size[0], size[1]]);
 }

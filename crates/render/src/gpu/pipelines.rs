@@ -1,22 +1,26 @@
-//! Shaders, binding layouts and pipelines: made once per device.
+//! Shaders, binding layouts and pipelines. Layouts and shaders are made once per device, pipelines when a picture first needs them: one for each
+//! pass, pattern and quality, so that none computes what it does not show.
 
 use super::data::{INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
+use crate::Shadows;
+use std::collections::BTreeMap;
 use wgpu::{BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline, ShaderModule, ShaderStages, TextureFormat, VertexFormat};
 
-/// Samples per pixel.
-pub const SAMPLES: u32 = 4;
 /// The picture: linear in the shader, sRGB in memory, averaged in linear light.
 pub const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 /// Reversed depth wants floating point.
 pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 /// Ambient occlusion.
 pub const OCCLUSION: TextureFormat = TextureFormat::R8Unorm;
+/// Number of the nearest sphere.
+pub const ID: TextureFormat = TextureFormat::R32Uint;
 
 /// Textures that are read, not sampled; depth textures too.
 const NUMBERS: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
 
 /// All but the edges of spheres.
 const PICTURE_WGSL: &str = concat!(
+    include_str!("../shaders/variant.wgsl"),
     include_str!("../shaders/view.wgsl"),
     include_str!("../shaders/noise.wgsl"),
     include_str!("../shaders/pattern.wgsl"),
@@ -31,23 +35,57 @@ const EDGE_SAMPLES_WGSL: &str = include_str!("../shaders/edge_samples.wgsl");
 const EDGE_PIXELS_WGSL: &str = include_str!("../shaders/edge_pixels.wgsl");
 const OCCLUSION_WGSL: &str = concat!(include_str!("../shaders/view.wgsl"), include_str!("../shaders/occlusion.wgsl"));
 
+/// What is drawn by a pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Pass {
+    Sky,
+    Ground,
+    Mesh,
+    Sphere,
+    Shell,
+    Line,
+    LineOnTop,
+}
+
+/// What all pipelines of a picture have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Variant {
+    pub samples: u32,
+    shadows: u32,
+    occlusion: bool,
+    softbox: bool,
+}
+
+impl Variant {
+    pub fn new(samples: u32, shadows: Shadows, occlusion: bool, softbox: bool) -> Self {
+        Variant { samples, shadows: shadows.number(), occlusion, softbox }
+    }
+
+    /// With one sample the nearest depth is drawn first, and only what is nearest is lit.
+    pub fn depth_first(&self) -> bool {
+        self.samples == 1
+    }
+}
+
+/// A pipeline's name: pass, number of the surface ([`crate::Material`]'s), variant.
+pub type Key = (Pass, u32, Variant);
+
 /// Everything that does not change from picture to picture.
 pub struct Pipelines {
     pub view_layout: BindGroupLayout,
     pub scene_layout: BindGroupLayout,
     pub occlusion_layout: BindGroupLayout,
+    pub texture_layout: BindGroupLayout,
     pub shadow_sampler: wgpu::Sampler,
-    pub sky: RenderPipeline,
-    pub ground: RenderPipeline,
-    pub mesh: RenderPipeline,
-    pub sphere: RenderPipeline,
-    pub shell: RenderPipeline,
-    pub line: RenderPipeline,
-    pub line_on_top: RenderPipeline,
-    pub mesh_depth: RenderPipeline,
-    pub sphere_depth: RenderPipeline,
+    /// Floor, meshes, spheres, and spheres that the eye is near to: depth alone.
+    pub depth: [RenderPipeline; 4],
+    /// The same, and the number of the nearest sphere.
+    pub ids: [RenderPipeline; 4],
     pub occlusion: RenderPipeline,
     pub blur: RenderPipeline,
+    /// For several samples per pixel, and for one.
+    modules: [ShaderModule; 2],
+    known: BTreeMap<Key, RenderPipeline>,
 }
 
 impl Pipelines {
@@ -63,6 +101,8 @@ impl Pipelines {
                 entry(2, BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
                 texture(3, NUMBERS, wgpu::TextureViewDimension::D2),
                 texture(4, NUMBERS, wgpu::TextureViewDimension::D2Array),
+                texture(5, wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
+                texture(6, NUMBERS, wgpu::TextureViewDimension::D2),
             ],
         );
         let occlusion_layout = layout(
@@ -74,34 +114,36 @@ impl Pipelines {
                 texture(2, NUMBERS, wgpu::TextureViewDimension::D2),
             ],
         );
-        let picture = shader(device, "picture", &[PICTURE_WGSL, if sample_masks { EDGE_SAMPLES_WGSL } else { EDGE_PIXELS_WGSL }].concat());
+        let filtered = wgpu::TextureSampleType::Float { filterable: true };
+        let albedo = [texture(0, filtered, wgpu::TextureViewDimension::D2), entry(1, BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
+        let texture_layout = layout(device, "texture", &albedo);
+        let pixels = shader(device, "picture", &[PICTURE_WGSL, EDGE_PIXELS_WGSL].concat());
+        let samples = if sample_masks { shader(device, "picture", &[PICTURE_WGSL, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
         let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
-        let lit = [Some(&view_layout), Some(&scene_layout)];
         let depth_only = [Some(&view_layout)];
         let screen = [Some(&view_layout), Some(&occlusion_layout)];
-        let draw = |vs, fs, input, depth, blend| {
-            let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: SAMPLES };
-            plan.build(device, &picture, &lit)
+        let depth = |vs, fs, input, color, depth| {
+            let plan = Plan { vs, fs, input, color, depth: Some(depth), blend: None, samples: 1, constants: &[] };
+            plan.build(device, &pixels, &depth_only)
         };
-        let depth = |vs, fs, input| {
-            let plan = Plan { vs, fs, input, color: None, depth: Some(WRITE), blend: None, samples: 1 };
-            plan.build(device, &picture, &depth_only)
-        };
+        let (mesh, no_id) = ("vs_mesh_depth", Some("fs_no_id"));
         let whole = |fs| {
-            let plan = Plan { vs: "vs_whole", fs: Some(fs), input: Input::None, color: Some(OCCLUSION), depth: None, blend: None, samples: 1 };
+            let plan = Plan { vs: "vs_whole", fs: Some(fs), input: Input::None, color: Some(OCCLUSION), depth: None, blend: None, samples: 1, constants: &[] };
             plan.build(device, &occlusion, &screen)
         };
-        let over = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         Pipelines {
-            sky: draw("vs_sky", "fs_sky", Input::None, ALWAYS, None),
-            ground: draw("vs_mesh", "fs_ground", Input::Mesh, WRITE_BEHIND, None),
-            mesh: draw("vs_mesh", "fs_mesh", Input::Mesh, WRITE, None),
-            sphere: draw("vs_sphere", "fs_sphere", Input::Sphere, WRITE, None),
-            shell: draw("vs_sphere", "fs_shell", Input::Sphere, TEST, over),
-            line: draw("vs_line", "fs_line", Input::Stroke, TEST, over),
-            line_on_top: draw("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
-            mesh_depth: depth("vs_mesh_depth", None, Input::Mesh),
-            sphere_depth: depth("vs_sphere", Some("fs_sphere_depth"), Input::Sphere),
+            depth: [
+                depth(mesh, None, Input::Mesh, None, WRITE),
+                depth(mesh, None, Input::Mesh, None, WRITE),
+                depth("vs_ball", Some("fs_ball_depth"), Input::Sphere, None, WRITE),
+                depth("vs_near", Some("fs_near_depth"), Input::Sphere, None, WRITE),
+            ],
+            ids: [
+                depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
+                depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
+                depth("vs_ball", Some("fs_ball_id"), Input::Sphere, Some(ID), WRITE),
+                depth("vs_near", Some("fs_near_id"), Input::Sphere, Some(ID), WRITE),
+            ],
             occlusion: whole("fs_occlusion"),
             blur: whole("fs_blur"),
             shadow_sampler: device.create_sampler(&wgpu::SamplerDescriptor {
@@ -114,7 +156,53 @@ impl Pipelines {
             view_layout,
             scene_layout,
             occlusion_layout,
+            texture_layout,
+            modules: [samples, pixels],
+            known: BTreeMap::new(),
         }
+    }
+
+    /// Makes the pipelines that are not there yet.
+    pub fn prepare(&mut self, device: &Device, keys: impl Iterator<Item = Key>) {
+        for key in keys {
+            if !self.known.contains_key(&key) {
+                let made = self.make(device, key);
+                self.known.insert(key, made);
+            }
+        }
+    }
+
+    /// A pipeline that was prepared.
+    pub fn of(&self, key: Key) -> Option<&RenderPipeline> {
+        self.known.get(&key)
+    }
+
+    fn make(&self, device: &Device, (pass, surface, variant): Key) -> RenderPipeline {
+        let over = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+        let first = variant.depth_first();
+        let (solid, behind) = if first { (TEST, TEST_BEHIND) } else { (WRITE, WRITE_BEHIND) };
+        let (vs, fs, input, depth, blend) = match pass {
+            // at the far plane: with depth known it is drawn only where nothing is
+            Pass::Sky => ("vs_sky", "fs_sky", Input::None, if first { TEST } else { ALWAYS }, None),
+            Pass::Ground => ("vs_mesh", "fs_ground", Input::Mesh, behind, None),
+            Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
+            Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, ALWAYS, None),
+            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Sphere, WRITE, None),
+            Pass::Shell => ("vs_sphere", "fs_shell", Input::Sphere, TEST, over),
+            Pass::Line => ("vs_line", "fs_line", Input::Stroke, TEST, over),
+            Pass::LineOnTop => ("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
+        };
+        let flag = |on: bool| f64::from(u8::from(on));
+        let constants = [
+            ("SURFACE", f64::from(surface % 1000)),
+            ("COAT", flag(surface / 1000 % 10 == 1)),
+            ("TEXTURED", flag(surface >= 10_000)),
+            ("SHADOWS", f64::from(variant.shadows)),
+            ("OCCLUSION", flag(variant.occlusion)),
+            ("SOFTBOX", flag(variant.softbox)),
+        ];
+        let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: variant.samples, constants: &constants };
+        plan.build(device, &self.modules[usize::from(first)], &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)])
     }
 }
 
@@ -129,6 +217,7 @@ const WRITE: DepthUse = DepthUse { compare: CompareFunction::GreaterEqual, write
 /// A hair farther than it is: what lies on the floor in its plane is seen.
 const WRITE_BEHIND: DepthUse = DepthUse { bias: -1, ..WRITE };
 const TEST: DepthUse = DepthUse { write: false, ..WRITE };
+const TEST_BEHIND: DepthUse = DepthUse { write: false, ..WRITE_BEHIND };
 const ALWAYS: DepthUse = DepthUse { compare: CompareFunction::Always, write: false, bias: 0 };
 
 /// What the vertex stage reads.
@@ -138,6 +227,8 @@ enum Input {
     Mesh,
     Sphere,
     Stroke,
+    /// Two whole numbers.
+    Range,
 }
 
 struct Plan<'a> {
@@ -148,6 +239,7 @@ struct Plan<'a> {
     depth: Option<DepthUse>,
     blend: Option<BlendState>,
     samples: u32,
+    constants: &'a [(&'a str, f64)],
 }
 
 impl Plan<'_> {
@@ -162,6 +254,7 @@ impl Plan<'_> {
             Input::None => vec![],
             Input::Mesh => vec![Some(per_vertex), Some(per_instance)],
             Input::Sphere | Input::Stroke => vec![Some(per_instance)],
+            Input::Range => vec![Some(wgpu::VertexBufferLayout { array_stride: 8, step_mode: wgpu::VertexStepMode::Instance, attributes: &RANGE })],
         };
         let strip = matches!(self.input, Input::Sphere | Input::Stroke);
         let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask: wgpu::ColorWrites::ALL })];
@@ -184,7 +277,7 @@ impl Plan<'_> {
             fragment: self.fs.map(|fs| wgpu::FragmentState {
                 module,
                 entry_point: Some(fs),
-                compilation_options: Default::default(),
+                compilation_options: wgpu::PipelineCompilationOptions { constants: self.constants, ..Default::default() },
                 targets: if self.color.is_some() { &targets } else { &[] },
             }),
             multiview_mask: None,
@@ -193,10 +286,12 @@ impl Plan<'_> {
     }
 }
 
+const RANGE: [wgpu::VertexAttribute; 1] = [wgpu::VertexAttribute { format: VertexFormat::Uint32x2, offset: 0, shader_location: 0 }];
+
 impl Input {
     fn floats(self) -> u64 {
         match self {
-            Input::None => 0,
+            Input::None | Input::Range => 0,
             Input::Mesh => INSTANCE_FLOATS,
             Input::Sphere => SPHERE_FLOATS,
             Input::Stroke => STROKE_FLOATS,

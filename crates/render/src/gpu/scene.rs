@@ -49,7 +49,7 @@ fn bounce(list: &DrawList) -> [f32; 3] {
 }
 
 /// `struct Scene`.
-pub fn floats(list: &DrawList, seen: Option<&Bounds>, shadows: &[(usize, Eye)], occlusion: bool) -> Vec<f32> {
+pub fn floats(list: &DrawList, seen: Option<&Bounds>, shadows: &[(usize, Eye)]) -> Vec<f32> {
     let mut out = Vec::new();
     for (i, light) in list.lights.iter().enumerate() {
         let layer = shadows.iter().position(|(of, _)| *of == i).map_or(-1.0, |layer| layer as f32);
@@ -69,7 +69,7 @@ pub fn floats(list: &DrawList, seen: Option<&Bounds>, shadows: &[(usize, Eye)], 
     color(sky.horizon, sky.ambient);
     color(sky.ground, sky.softbox);
     color(sky.backdrop.unwrap_or_default(), flag(sky.backdrop.is_some()));
-    out.extend([s.exposure, flag(s.tone_map), flag(occlusion), s.shadow_map_size as f32]);
+    out.extend([s.exposure, flag(s.tone_map), 0.0, s.shadow_map_size as f32]);
     out.extend(floor(list, seen));
     let [r, g, b] = bounce(list);
     out.extend([r, g, b, 0.0]);

@@ -1,93 +1,136 @@
 //! The textures that are drawn into, and the way back to memory.
 
 use super::Gpu;
-use super::pipelines::{COLOR, DEPTH, OCCLUSION, SAMPLES};
+use super::pipelines::{COLOR, DEPTH, ID, OCCLUSION};
 use crate::{Image, MAX_SHADOWS, RenderError};
 use wgpu::{Extent3d, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor};
 
-/// All targets for one picture size and one size of shadow maps.
+/// How long a picture may take before the device counts as hung.
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(600);
+
+const DRAW: TextureUsages = TextureUsages::RENDER_ATTACHMENT;
+const LOOK: TextureUsages = DRAW.union(TextureUsages::TEXTURE_BINDING);
+
+/// All targets for one picture size and number of samples.
 pub struct Targets {
     pub width: u32,
     pub height: u32,
-    pub shadow_size: u32,
-    pub color: TextureView,
-    pub depth: TextureView,
+    /// Colour and depth of several samples per pixel; `None` where there is one.
+    pub samples: Option<(TextureView, TextureView)>,
     pub picture: TextureView,
-    pub shadow_layers: Vec<TextureView>,
-    pub shadow_array: TextureView,
     pub view_depth: TextureView,
+    /// Number of the nearest sphere; of one pixel where there are several samples.
+    pub ids: TextureView,
     pub occlusion_raw: TextureView,
     pub occlusion: TextureView,
     pub white: TextureView,
-    resolved: Texture,
-    readback: wgpu::Buffer,
+    pub resolved: Texture,
 }
 
 impl Targets {
-    pub fn new(device: &wgpu::Device, width: u32, height: u32, shadow_size: u32) -> Self {
-        let draw = TextureUsages::RENDER_ATTACHMENT;
-        let look = draw | TextureUsages::TEXTURE_BINDING;
-        let make = |label, (width, height, layers), samples, format, usage| texture(device, label, Extent3d { width, height, depth_or_array_layers: layers }, samples, format, usage);
-        let whole = |t: Texture| t.create_view(&TextureViewDescriptor::default());
-        let full = (width, height, 1);
-        let shadows = make("shadow maps", (shadow_size, shadow_size, MAX_SHADOWS as u32), 1, DEPTH, look);
-        let layer = |i| TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2), base_array_layer: i, array_layer_count: Some(1), ..Default::default() };
-        let resolved = make("picture", full, 1, COLOR, look | TextureUsages::COPY_SRC);
+    pub fn new(device: &wgpu::Device, width: u32, height: u32, samples: u32) -> Self {
+        let make = |label, samples, format, usage| texture(device, label, [width, height, 1], samples, format, usage);
+        let resolved = finished_texture(device, "picture", width, height);
         Targets {
             width,
             height,
-            shadow_size,
-            color: whole(make("samples", full, SAMPLES, COLOR, draw)),
-            depth: whole(make("depth", full, SAMPLES, DEPTH, draw)),
+            samples: (samples > 1).then(|| (whole(make("samples", samples, COLOR, DRAW)), whole(make("depth", samples, DEPTH, DRAW)))),
             picture: resolved.create_view(&TextureViewDescriptor::default()),
-            shadow_layers: (0..MAX_SHADOWS as u32).map(|i| shadows.create_view(&layer(i))).collect(),
-            shadow_array: shadows.create_view(&TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2Array), ..Default::default() }),
-            view_depth: whole(make("view depth", full, 1, DEPTH, look)),
-            occlusion_raw: whole(make("occlusion raw", full, 1, OCCLUSION, look)),
-            occlusion: whole(make("occlusion", full, 1, OCCLUSION, look)),
-            white: whole(make("unused", (1, 1, 1), 1, OCCLUSION, look)),
+            view_depth: whole(make("view depth", 1, DEPTH, LOOK)),
+            ids: whole(texture(device, "ids", if samples > 1 { [1, 1, 1] } else { [width, height, 1] }, 1, ID, LOOK)),
+            occlusion_raw: whole(make("occlusion raw", 1, OCCLUSION, LOOK)),
+            occlusion: whole(make("occlusion", 1, OCCLUSION, LOOK)),
+            white: whole(texture(device, "unused", [1, 1, 1], 1, OCCLUSION, LOOK)),
             resolved,
-            readback: device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("readback"),
-                size: u64::from(pitch(width)) * u64::from(height),
-                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-                mapped_at_creation: false,
-            }),
         }
     }
 
-    pub fn fits(&self, width: u32, height: u32, shadow_size: u32) -> bool {
-        (self.width, self.height, self.shadow_size) == (width, height, shadow_size)
+    pub fn fits(&self, width: u32, height: u32, samples: u32) -> bool {
+        (self.width, self.height, self.samples.is_some()) == (width, height, samples > 1)
     }
 
-    /// Picture to buffer.
-    pub fn copy_out(&self, encoder: &mut wgpu::CommandEncoder) {
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch(self.width)), rows_per_image: Some(self.height) };
-        encoder.copy_texture_to_buffer(
-            self.resolved.as_image_copy(),
-            wgpu::TexelCopyBufferInfo { buffer: &self.readback, layout },
-            Extent3d { width: self.width, height: self.height, depth_or_array_layers: 1 },
-        );
+    /// Pixels of a picture.
+    pub fn pixels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
     }
+}
 
-    /// Buffer to memory; waits for the device.
-    pub fn read(&self, gpu: &Gpu) -> Result<Image, RenderError> {
-        let (tell, told) = std::sync::mpsc::channel();
-        self.readback.map_async(wgpu::MapMode::Read, .., move |r| {
-            let _ = tell.send(r); // the receiver waits below
-        });
-        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| gpu.failed(e.to_string()))?;
-        told.recv().map_err(|e| gpu.failed(e.to_string()))?.map_err(|e| gpu.failed(e.to_string()))?;
-        let mut rgba = Vec::with_capacity(4 * self.width as usize * self.height as usize);
-        {
-            let bytes = self.readback.get_mapped_range(..).map_err(|e| gpu.failed(e.to_string()))?;
-            for row in bytes.chunks_exact(pitch(self.width) as usize) {
-                rgba.extend_from_slice(&row[..4 * self.width as usize]);
-            }
+/// The maps of the lights that throw shadows.
+pub struct ShadowMaps {
+    pub size: u32,
+    pub layers: Vec<TextureView>,
+    pub array: TextureView,
+    /// The stage whose shadows they hold.
+    pub drawn: u64,
+}
+
+impl ShadowMaps {
+    pub fn new(device: &wgpu::Device, size: u32, count: usize) -> Self {
+        let count = count.clamp(1, MAX_SHADOWS) as u32;
+        let maps = texture(device, "shadow maps", [size, size, count], 1, DEPTH, LOOK);
+        let layer = |i| TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2), base_array_layer: i, array_layer_count: Some(1), ..Default::default() };
+        ShadowMaps {
+            size,
+            layers: (0..count).map(|i| maps.create_view(&layer(i))).collect(),
+            array: maps.create_view(&TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2Array), ..Default::default() }),
+            drawn: 0,
         }
-        self.readback.unmap();
-        Ok(Image { width: self.width, height: self.height, rgba })
     }
+
+    pub fn fits(&self, size: u32, count: usize) -> bool {
+        self.size == size && self.layers.len() >= count
+    }
+}
+
+/// A texture for finished pictures: drawn into, copied from and to, shown by a window.
+pub fn finished_texture(device: &wgpu::Device, label: &str, width: u32, height: u32) -> Texture {
+    texture(device, label, [width, height, 1], 1, COLOR, LOOK | TextureUsages::COPY_SRC | TextureUsages::COPY_DST)
+}
+
+/// A finished picture to memory; waits for the device.
+pub fn read(gpu: &Gpu, from: &Texture) -> Result<Image, RenderError> {
+    let (width, height) = (from.width(), from.height());
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("readback"),
+        size: u64::from(pitch(width)) * u64::from(height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("readback") });
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch(width)), rows_per_image: Some(height) };
+    encoder.copy_texture_to_buffer(
+        from.as_image_copy(),
+        wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+        Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+    gpu.queue.submit([encoder.finish()]);
+    let (tell, told) = std::sync::mpsc::channel();
+    buffer.map_async(wgpu::MapMode::Read, .., move |r| {
+        let _ = tell.send(r); // the receiver waits below
+    });
+    wait(gpu)?;
+    told.recv().map_err(|e| gpu.failed(e.to_string()))?.map_err(|e| gpu.failed(e.to_string()))?;
+    let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
+    {
+        let bytes = buffer.get_mapped_range(..).map_err(|e| gpu.failed(e.to_string()))?;
+        for row in bytes.chunks_exact(pitch(width) as usize) {
+            rgba.extend_from_slice(&row[..4 * width as usize]);
+        }
+    }
+    buffer.unmap();
+    Ok(Image { width, height, rgba })
+}
+
+/// Until all that was submitted is done.
+pub fn wait(gpu: &Gpu) -> Result<(), RenderError> {
+    wait_for(gpu, None)
+}
+
+/// Until this submission is done, or all are.
+pub fn wait_for(gpu: &Gpu, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), RenderError> {
+    let done = gpu.device.poll(wgpu::PollType::Wait { submission_index, timeout: Some(PATIENCE) });
+    gpu.complaint()?;
+    done.map(drop).map_err(|e| gpu.failed(e.to_string()))
 }
 
 /// Bytes per row in the buffer: wgpu wants a multiple of 256.
@@ -95,10 +138,14 @@ fn pitch(width: u32) -> u32 {
     (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }
 
-fn texture(device: &wgpu::Device, label: &str, size: Extent3d, sample_count: u32, format: TextureFormat, usage: TextureUsages) -> Texture {
+fn whole(t: Texture) -> TextureView {
+    t.create_view(&TextureViewDescriptor::default())
+}
+
+fn texture(device: &wgpu::Device, label: &str, [width, height, layers]: [u32; 3], sample_count: u32, format: TextureFormat, usage: TextureUsages) -> Texture {
     device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
-        size,
+        size: Extent3d { width, height, depth_or_array_layers: layers },
         mip_level_count: 1,
         sample_count,
         dimension: wgpu::TextureDimension::D2,

@@ -64,8 +64,9 @@ impl DrawList {
         median(self.items(true).map(|item| ball_of(&item.1).1))
     }
 
-    /// What throws shadows near the `seen` box: each one's corners in the world, as points to be transformed, with a radius around them.
-    pub(crate) fn casters_near(&self, seen: &Bounds) -> impl Iterator<Item = (Vec<Point3<f32>>, f32, Bounds)> {
+    /// What throws shadows near the `seen` box: each one's corners in the world (eight; a sphere's centre alone), as points to be
+    /// transformed, with a radius around them.
+    pub(crate) fn casters_near(&self, seen: &Bounds) -> impl Iterator<Item = (Corners, f32, Bounds)> {
         let (middle, radius) = ball_of(seen);
         self.items(true).filter_map(move |(points, bounds, around)| {
             let (center, own) = ball_of(&bounds);
@@ -74,32 +75,41 @@ impl DrawList {
     }
 
     /// Points and a radius around them that hold each item, and its box.
-    fn items(&self, casters: bool) -> impl Iterator<Item = (Vec<Point3<f32>>, Bounds, f32)> {
+    fn items(&self, casters: bool) -> impl Iterator<Item = (Corners, Bounds, f32)> {
         let meshes: Vec<_> = self.meshes.iter().map(|m| m.bounds()).collect();
         let instances = self.instances.iter().filter(move |i| i.casts_shadow || !casters).filter_map(move |i| {
             let corners = world_corners(i, *meshes.get(i.mesh.0)?)?;
             let bounds = union(corners.iter().map(|&p| (p, p)))?;
-            Some((corners, bounds, 0.0))
+            Some((Corners(corners, 8), bounds, 0.0))
         });
         let spheres = self.spheres.iter().filter(move |s| s.casts_shadow || !casters).map(|s| {
             let r = Vector3::repeat(s.radius);
-            (vec![s.center], (s.center - r, s.center + r), s.radius)
+            (Corners([s.center; 8], 1), (s.center - r, s.center + r), s.radius)
         });
         instances.chain(spheres)
     }
 }
 
+/// Up to eight points.
+pub(crate) struct Corners([Point3<f32>; 8], usize);
+
+impl Corners {
+    pub fn iter(&self) -> impl Iterator<Item = &Point3<f32>> {
+        self.0[..self.1].iter()
+    }
+}
+
 /// The eight world corners of an instance's box; none for an empty mesh.
-fn world_corners(instance: &Instance, local: Option<([f32; 3], [f32; 3])>) -> Option<Vec<Point3<f32>>> {
+fn world_corners(instance: &Instance, local: Option<([f32; 3], [f32; 3])>) -> Option<[Point3<f32>; 8]> {
     let (lo, hi) = local?;
-    Some(corners_of(&(lo.into(), hi.into())).map(|p| instance.pose * Point3::from(p.coords.component_mul(&instance.scale))).to_vec())
+    Some(corners_of(&(lo.into(), hi.into())).map(|p| instance.pose * Point3::from(p.coords.component_mul(&instance.scale))))
 }
 
 /// The upper median; 0 of nothing.
 fn median(numbers: impl Iterator<Item = f32>) -> f32 {
-    let mut sorted: Vec<f32> = numbers.collect();
-    sorted.sort_by(f32::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    let mut all: Vec<f32> = numbers.collect();
+    let middle = all.len() / 2;
+    if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 /// The smallest box around boxes.

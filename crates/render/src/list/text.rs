@@ -15,7 +15,8 @@ impl Display for DrawList {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         write_camera(f, &self.camera)?;
         let (s, k) = (&self.settings, &self.sky);
-        writeln!(f, "settings: exposure {} shadow map {} occlusion {} tone map {}", n(s.exposure), s.shadow_map_size, s.occlusion_m.map_or("auto".into(), n), s.tone_map)?;
+        write!(f, "settings: exposure {} shadow map {} occlusion {} tone map {}", n(s.exposure), s.shadow_map_size, s.occlusion_m.map_or("auto".into(), n), s.tone_map)?;
+        writeln!(f, " shadows {} samples {}", s.shadows.name(), s.samples)?;
         writeln!(f, "sky: zenith {} horizon {} ground {} ambient {} softbox {} backdrop {}", v(&k.zenith), v(&k.horizon), v(&k.ground), n(k.ambient), n(k.softbox), k.backdrop.map_or("none".into(), |c| v(&c)))?;
         if let Some(g) = &self.ground {
             writeln!(f, "ground: height {} reach {} {}", n(g.height_m), n(g.reach_m), material(&g.material))?;
@@ -26,6 +27,9 @@ impl Display for DrawList {
         for (i, mesh) in self.meshes.iter().enumerate() {
             let (lo, hi) = mesh.bounds().unwrap_or_default();
             writeln!(f, "mesh {i}: {} vertices {} triangles from {} to {}", mesh.positions.len(), mesh.indices.len() / 3, v(&lo), v(&hi))?;
+        }
+        for (i, image) in self.textures.iter().enumerate() {
+            writeln!(f, "texture {i}: {} x {}", image.width, image.height)?;
         }
         for (i, x) in self.instances.iter().enumerate() {
             let (t, q) = (x.pose.translation.vector, x.pose.rotation.coords);
@@ -84,7 +88,8 @@ fn material(m: &Material) -> String {
         _ => format!(" pattern {} {} {}", m.pattern.name(), v(&other), v(&size)),
     };
     let shader = if m.shader == Shader::Unlit { " unlit" } else { "" };
-    format!("color {} rough {} metal {} coat {}{pattern}{shader}", v(&m.color), n(m.roughness), n(m.metallic), n(m.clearcoat))
+    let texture = m.texture.map_or(String::new(), |t| format!(" texture {} every {}", t.id, n(t.repeat_m)));
+    format!("color {} rough {} metal {} coat {}{pattern}{shader}{texture}", v(&m.color), n(m.roughness), n(m.metallic), n(m.clearcoat))
 }
 
 fn style(s: &DebugStyle) -> String {

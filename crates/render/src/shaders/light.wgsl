@@ -21,7 +21,7 @@ struct Scene {
     horizon: vec4f,  // w: ambient factor
     ground: vec4f,   // w: softbox
     backdrop: vec4f, // w: 1 for a flat backdrop
-    tone: vec4f,     // exposure, 1 for the filmic curve, 1 for occlusion, side of the shadow maps
+    tone: vec4f,     // exposure, 1 for the filmic curve, unused, side of the shadow maps
     floor: vec4f,    // middle x, y and reach of the ground
     bounce: vec4f,   // radiance that comes back from below
 };
@@ -30,6 +30,8 @@ struct Scene {
 @group(1) @binding(2) var shadow_sampler: sampler_comparison;
 @group(1) @binding(3) var occlusion: texture_2d<f32>;
 @group(1) @binding(4) var shadow_depths: texture_2d_array<f32>; // the same maps, to be read as numbers (OpenGL reads no depth texture)
+@group(1) @binding(5) var seen_id: texture_2d<u32>;     // number of the nearest sphere from 1 on, where that was drawn first
+@group(1) @binding(6) var sphere_data: texture_2d<f32>; // five texels per sphere, 256 spheres per row
 
 struct Surface {
     position: vec3f,
@@ -44,14 +46,18 @@ const PI = 3.14159265;
 // Widest penumbra, as a share of the shadow map.
 const WIDEST = 0.08;
 
+// x to the power of 2.5; of 5.
+fn fall(x: f32) -> f32 { return x * x * sqrt(x); }
+fn fifth(x: f32) -> f32 { let x2 = x * x; return x2 * x2 * x; }
+
 // Radiance of the surroundings, blurred for rough reflections.
 fn sky_radiance(dir: vec3f, blur: f32) -> vec3f {
     let rise = clamp(dir.z, 0.0, 1.0);
-    let above = mix(scene.horizon.xyz, scene.zenith.xyz, mix(1.0 - pow(1.0 - rise, 2.5), 0.5, 0.6 * blur));
+    let above = mix(scene.horizon.xyz, scene.zenith.xyz, mix(1.0 - fall(1.0 - rise), 0.5, 0.6 * blur));
     let below = mix(mix(scene.bounce.xyz, scene.horizon.xyz, 0.4), scene.bounce.xyz, smoothstep(0.0, 0.35, -dir.z));
     let width = 0.015 + 0.6 * blur;
     var c = mix(below, above, smoothstep(-width, width, dir.z));
-    if (scene.ground.w > 0.0 && dir.z > 0.02) {
+    if (SOFTBOX && dir.z > 0.02) {
         let p = abs(dir.xy / dir.z - vec2f(0.25, 0.1));
         let soft = 0.06 + 2.2 * blur;
         let inside = (1.0 - smoothstep(0.75 - 0.5 * soft, 0.75 + soft, p.x)) * (1.0 - smoothstep(0.4 - 0.5 * soft, 0.4 + soft, p.y));
@@ -74,7 +80,7 @@ fn sky_irradiance(n: vec3f) -> vec3f {
 fn backdrop_at(dir: vec3f) -> vec3f {
     if (scene.backdrop.w > 0.5) { return scene.backdrop.xyz; }
     let rise = clamp(dir.z, 0.0, 1.0);
-    let above = mix(scene.horizon.xyz, scene.zenith.xyz, 1.0 - pow(1.0 - rise, 2.5));
+    let above = mix(scene.horizon.xyz, scene.zenith.xyz, 1.0 - fall(1.0 - rise));
     return mix(scene.ground.xyz, above, smoothstep(-0.7, 0.0, dir.z));
 }
 
@@ -95,7 +101,7 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     let texels = scene.tone.w;
     let clip0 = sh.clip_from_world * vec4f(p, 1.0);
     let s0 = mix(1.0, clip0.w, sh.scale.z);
-    let clip = sh.clip_from_world * vec4f(p + n * (1.2 * sh.scale.w * s0), 1.0);
+    let clip = sh.clip_from_world * vec4f(p + n * (select(1.2, 2.0, SHADOWS == 1u) * sh.scale.w * s0), 1.0);
     if (clip.w <= 0.0) { return 1.0; }
     let ndc = clip.xyz / clip.w;
     let uv = ndc.xy * vec2f(0.5, -0.5) + 0.5;
@@ -103,6 +109,10 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     if (any(uv <= vec2f(-WIDEST)) || any(uv >= vec2f(1.0 + WIDEST))) { return 1.0; }
     // behind the map's far plane everything that throws shadows is in front
     let depth = clamp(ndc.z, 1e-6, 1.0);
+    if (SHADOWS == 1u) {
+        let outside = any(uv <= vec2f(0.0)) || any(uv >= vec2f(1.0));
+        return select(textureSampleCompareLevel(shadow_maps, shadow_sampler, uv, index, depth + 1e-5), 1.0, outside);
+    }
     // depth along the surface's plane is affine in the map: its slope keeps wide filters free of acne
     let plane = transpose(sh.world_from_clip) * vec4f(n, -dot(n, p));
     var slope = vec2f(0.0);
@@ -149,7 +159,7 @@ fn ggx(n_h: f32, n_v: f32, n_l: f32, alpha: f32) -> f32 {
 }
 
 fn schlick(f0: vec3f, v_h: f32) -> vec3f {
-    return f0 + (1.0 - f0) * pow(1.0 - v_h, 5.0);
+    return f0 + (1.0 - f0) * fifth(1.0 - v_h);
 }
 
 // Reflectance of a rough surface under an even surrounding: scale and offset of f0.
@@ -163,6 +173,7 @@ fn shade(s: Surface) -> vec3f {
     let n = s.normal;
     let v = s.to_eye;
     let n_v = max(dot(n, v), 1e-3);
+    let grazing = 1.0 - n_v;
     let rough = clamp(s.base.roughness, 0.04, 1.0);
     let alpha = rough * rough;
     let diffuse = s.base.color * (1.0 - s.metallic);
@@ -186,7 +197,7 @@ fn shade(s: Surface) -> vec3f {
         let n_l = dot(n, l);
         if (n_l <= 0.0) { continue; }
         var visible = 1.0;
-        if (light.shadow.x >= 0.0) { visible = light_visibility(i32(light.shadow.x), s.position, n, light.color.w, s.pixel); }
+        if (SHADOWS > 0u && light.shadow.x >= 0.0) { visible = light_visibility(i32(light.shadow.x), s.position, n, light.color.w, s.pixel); }
         if (visible <= 0.0) { continue; }
         let h = normalize(l + v);
         let v_h = max(dot(v, h), 0.0);
@@ -194,25 +205,31 @@ fn shade(s: Surface) -> vec3f {
         // a source of some size widens the lobe and keeps its energy
         let wide = clamp(alpha + 0.5 * angle, 0.0, 1.0);
         let specular = schlick(f0, v_h) * (ggx(n_h, n_v, n_l, wide) * alpha * alpha / (wide * wide) * PI);
-        let coat_wide = coat_alpha + 0.5 * angle;
-        let coat_f = coat * schlick(vec3f(0.04), v_h).x;
-        let coat_lobe = coat_f * min(ggx(n_h, n_v, n_l, coat_wide), 60.0) * PI * 0.5;
-        let sheen = s.base.sheen * s.base.color * pow(1.0 - n_v, 3.0);
+        var coat_f = 0.0;
+        var coat_lobe = 0.0;
+        if (COAT) {
+            let coat_wide = coat_alpha + 0.5 * angle;
+            coat_f = coat * schlick(vec3f(0.04), v_h).x;
+            coat_lobe = coat_f * min(ggx(n_h, n_v, n_l, coat_wide), 60.0) * PI * 0.5;
+        }
+        let sheen = s.base.sheen * s.base.color * grazing * grazing * grazing;
         out += ((diffuse * (1.0 - schlick(f0, v_h)) + specular + sheen) * (1.0 - coat_f) + coat_lobe) * radiance * (n_l * visible);
     }
 
     var open = 1.0;
-    if (scene.tone.z > 0.5) { open = textureLoad(occlusion, vec2i(s.pixel), 0).x; }
+    if (OCCLUSION) { open = textureLoad(occlusion, vec2i(s.pixel), 0).x; }
     let env = environment_term(rough, n_v);
     let mirror = reflect(-v, n);
     let horizon_open = clamp(open * open + 0.15 * open, 0.0, 1.0);
     // light bounced between bright surfaces keeps their creases from going grey
     let bounced = vec3f(open) + (1.0 - open) * open * s.base.color;
-    let coat_env = coat * (0.04 + 0.96 * pow(1.0 - n_v, 5.0));
-    let ambient = diffuse * sky_irradiance(n) * bounced * (1.0 + s.base.sheen * pow(1.0 - n_v, 3.0))
+    var ambient = diffuse * sky_irradiance(n) * bounced * (1.0 + s.base.sheen * grazing * grazing * grazing)
         + (f0 * env.x + env.y) * sky_radiance(mirror, rough) * horizon_open;
-    out += (ambient * (1.0 - coat_env) + coat_env * sky_radiance(mirror, 0.02) * horizon_open) * scene.horizon.w;
-    return out;
+    if (COAT) {
+        let coat_env = coat * (0.04 + 0.96 * fifth(grazing));
+        ambient = ambient * (1.0 - coat_env) + coat_env * sky_radiance(mirror, 0.02) * horizon_open;
+    }
+    return out + ambient * scene.horizon.w;
 }
 
 // Scene light to display light.

@@ -10,7 +10,7 @@ struct MeshIn {
 };
 // Taken at a point inside the triangle (centroid): at the middle of a pixel that a thin triangle only grazes they would run beyond it.
 struct MeshOut {
-    @builtin(position) clip: vec4f,
+    @invariant @builtin(position) clip: vec4f,
     @location(0) @interpolate(perspective, centroid) world: vec3f,
     @location(1) @interpolate(perspective, centroid) normal: vec3f,
     @location(2) @interpolate(perspective, centroid) object: vec3f,
@@ -45,9 +45,12 @@ fn world_of(in: MeshIn) -> vec3f {
     return out;
 }
 
-@vertex fn vs_mesh_depth(in: MeshIn) -> @builtin(position) vec4f {
+@vertex fn vs_mesh_depth(in: MeshIn) -> @invariant @builtin(position) vec4f {
     return view.clip_from_world * vec4f(world_of(in), 1.0);
 }
+
+// Where the number of the nearest sphere is asked for: it is none.
+@fragment fn fs_no_id() -> @location(0) u32 { return 0u; }
 
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     let facing = select(-1.0, 1.0, front) * in.side;

@@ -21,19 +21,28 @@ fn corner_of(index: u32) -> vec2f {
     return vec2f(select(-1.0, 1.0, (index & 1u) != 0u), select(-1.0, 1.0, (index & 2u) != 0u));
 }
 
-// A square around the sphere's outline; the whole picture where the eye is too near for one.
-fn cover(ball: vec4f, index: u32) -> vec4f {
+// A square around the sphere's outline, in the plane through its centre c across the way from the eye. The outline is a circle there: of radius
+// h² = r² d² / (d² - r²) at the distance d in perspective, of h = r in a parallel view. Where the eye is too near for that: the whole picture.
+struct Cover {
+    clip: vec4f,
+    plane: vec2f,    // place in the plane, m from the centre
+    numbers: vec3f,  // d², d² - r², h²
+    near: bool,
+};
+
+fn cover(ball: vec4f, index: u32) -> Cover {
     let corner = corner_of(index);
-    let whole = vec4f(corner, 0.5, 1.0);
+    let whole = Cover(vec4f(corner, 0.5, 1.0), vec2f(0.0), vec3f(0.0), true);
     var axis = view.dir_0.xyz;
-    var half = ball.w;
+    let r2 = ball.w * ball.w;
+    var numbers = vec3f(1.0, 1.0, r2);
     if (view.lens.x > 0.5) {
         axis = ball.xyz - view.origin_0.xyz;
         let d2 = dot(axis, axis);
-        let r2 = ball.w * ball.w;
         if (d2 < 2.0 * r2) { return whole; }
-        half = ball.w * sqrt(d2 / (d2 - r2));
+        numbers = vec3f(d2, d2 - r2, r2 * d2 / (d2 - r2));
     }
+    let half = sqrt(numbers.z);
     axis = normalize(axis);
     let side = normalize(cross(axis, select(vec3f(0.0, 0.0, 1.0), vec3f(1.0, 0.0, 0.0), abs(axis.z) > 0.9)));
     let up = cross(side, axis);
@@ -42,37 +51,46 @@ fn cover(ball: vec4f, index: u32) -> vec4f {
     let middle = view.clip_from_world * vec4f(ball.xyz, 1.0);
     let least = middle.w - half * (abs(dot(row, side)) + abs(dot(row, up)));
     if (view.lens.x > 0.5 && least < 1e-3 * half) {
-        if (middle.w < -1.5 * half) { return vec4f(0.0, 0.0, 2.0, 1.0); }
+        if (middle.w < -1.5 * half) { return Cover(NOWHERE, vec2f(0.0), numbers, false); }
         return whole;
     }
-    let reach = half * 1.002;
-    let clip = view.clip_from_world * vec4f(ball.xyz + (side * corner.x + up * corner.y) * reach, 1.0);
-    return vec4f(clip.xy / clip.w, 0.5, 1.0);
+    let reach = half * 1.002 * corner;
+    let clip = view.clip_from_world * vec4f(ball.xyz + side * reach.x + up * reach.y, 1.0);
+    return Cover(vec4f(clip.xy, 0.5 * clip.w, clip.w), reach, numbers, false);
 }
 
+// Outside the picture.
+const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
+
 @vertex fn vs_sphere(in: SphereIn, @builtin(vertex_index) index: u32) -> SphereOut {
-    return SphereOut(cover(in.ball, index), in.ball, in.turn, in.color_rough, in.other_metal, in.pattern);
+    let c = cover(in.ball, index);
+    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, in.turn, in.color_rough, in.other_metal, in.pattern);
+}
+
+// With D the ray's direction of view depth 1, c the way to the centre: s0 = c·D / D·D is the depth of the nearest point of the ray, m = c - s0 D the
+// way from there, and the ray enters at s0 - sqrt((r² - m²) / D·D).
+struct Crossing { room: f32, s: f32, ray: Ray };
+
+fn cross_sphere(ball: vec4f, pixel: vec2f) -> Crossing {
+    let ray = ray_at(pixel);
+    let to = ball.xyz - ray.origin;
+    let per = 1.0 / dot(ray.dir, ray.dir);
+    let nearest = dot(to, ray.dir) * per;
+    let miss = to - nearest * ray.dir;
+    let room = ball.w * ball.w - dot(miss, miss);
+    return Crossing(room, nearest - sqrt(max(room, 0.0) * per), ray);
 }
 
 // Square of the radius less the square of the ray's distance from the centre.
 fn inside(ball: vec4f, pixel: vec2f) -> f32 {
-    let ray = ray_at(pixel);
-    let d = normalize(ray.dir);
-    let to = ball.xyz - ray.origin;
-    let miss = to - dot(to, d) * d;
-    return ball.w * ball.w - dot(miss, miss);
+    return cross_sphere(ball, pixel).room;
 }
 
 fn hit(ball: vec4f, pixel: vec2f) -> Hit {
-    let ray = ray_at(pixel);
-    let len = length(ray.dir);
-    let d = ray.dir / len;
-    let to = ball.xyz - ray.origin;
-    let along = dot(to, d);
-    let miss = along * d - to;
-    let back = sqrt(max(ball.w * ball.w - dot(miss, miss), 0.0));
-    let n = normalize(miss - back * d);
-    return Hit((along - back) / len, ball.xyz + n * ball.w, n);
+    let c = cross_sphere(ball, pixel);
+    // at the rim the ray may just miss: the normal is that of the nearest point
+    let n = normalize(c.ray.origin + c.s * c.ray.dir - ball.xyz);
+    return Hit(c.s, ball.xyz + n * ball.w, n);
 }
 
 fn unturn(q: vec4f, v: vec3f) -> vec3f {
@@ -93,12 +111,89 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
     return sphere_pixel(vec4f(color, 1.0), depth, mask);
 }
 
-@fragment fn fs_sphere_depth(in: SphereOut) -> @builtin(frag_depth) f32 {
-    if (inside(in.ball, in.clip.xy) < 0.0) { discard; }
-    let h = hit(in.ball, in.clip.xy);
-    let depth = depth_of(h.s);
-    if ((view.lens.x > 0.5 && h.s <= 0.0) || depth > 1.0 || depth < 0.0) { discard; }
+// Depth alone needs less: with u the place in the plane of the cover, the ray through it enters at the share
+// t = (d² - sqrt((d² - r²) (h² - u²))) / (d² + u²) of the way to the plane; in a parallel view sqrt(h² - u²) before it.
+struct BallOut {
+    @builtin(position) clip: vec4f,
+    @location(0) plane: vec2f,
+    @location(1) @interpolate(flat) numbers: vec3f,
+    @location(2) @interpolate(flat) middle: f32, // view depth of the centre
+    @location(3) @interpolate(flat) id: u32,
+};
+
+@vertex fn vs_ball(in: SphereIn, @builtin(vertex_index) index: u32, @builtin(instance_index) id: u32) -> BallOut {
+    let c = cover(in.ball, index);
+    return BallOut(select(c.clip, NOWHERE, c.near), c.plane, c.numbers, dot(in.ball.xyz - view.origin_0.xyz, view.dir_0.xyz) / dot(view.dir_0.xyz, view.dir_0.xyz), id);
+}
+
+fn ball_depth(in: BallOut) -> f32 {
+    let u2 = dot(in.plane, in.plane);
+    let room = in.numbers.z - u2;
+    let root = sqrt(max(room * in.numbers.y, 0.0));
+    let share = (in.numbers.x - root) / (in.numbers.x + u2);
+    let s = select(in.middle - root, share / in.clip.w, view.lens.x > 0.5);
+    let depth = depth_of(s);
+    if (room < 0.0 || depth > 1.0 || depth < 0.0) { discard; }
     return depth;
+}
+
+@fragment fn fs_ball_depth(in: BallOut) -> @builtin(frag_depth) f32 {
+    return ball_depth(in);
+}
+
+struct BallPixel { @location(0) id: u32, @builtin(frag_depth) depth: f32 };
+
+// Which sphere is nearest, from 1 on.
+@fragment fn fs_ball_id(in: BallOut) -> BallPixel {
+    return BallPixel(in.id + 1u, ball_depth(in));
+}
+
+// The few that the eye is too near to, by whole pictures.
+struct NearOut {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) ball: vec4f,
+    @location(1) @interpolate(flat) id: u32,
+};
+
+@vertex fn vs_near(in: SphereIn, @builtin(vertex_index) index: u32, @builtin(instance_index) id: u32) -> NearOut {
+    let c = cover(in.ball, index);
+    return NearOut(select(NOWHERE, c.clip, c.near), in.ball, id);
+}
+
+fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
+    let c = cross_sphere(ball, pixel);
+    let depth = depth_of(c.s);
+    if (c.room < 0.0 || c.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
+    return depth;
+}
+
+@fragment fn fs_near_depth(in: NearOut) -> @builtin(frag_depth) f32 {
+    return near_depth(in.ball, in.clip.xy);
+}
+
+@fragment fn fs_near_id(in: NearOut) -> BallPixel {
+    return BallPixel(in.id + 1u, near_depth(in.ball, in.clip.xy));
+}
+
+// All spheres of one surface at once, where the nearest is known: each pixel is lit once.
+@fragment fn fs_sphere_seen(@builtin(position) at: vec4f, @location(0) @interpolate(flat) range: vec2u) -> @location(0) vec4f {
+    let id = textureLoad(seen_id, vec2i(at.xy), 0).x - 1u;
+    if (id < range.x || id >= range.y) { discard; }
+    let place = vec2i(vec2u((id % 256u) * 5u, id / 256u));
+    let ball = textureLoad(sphere_data, place, 0);
+    let turn = textureLoad(sphere_data, place + vec2i(1, 0), 0);
+    let look = Look(textureLoad(sphere_data, place + vec2i(2, 0), 0), textureLoad(sphere_data, place + vec2i(3, 0), 0), textureLoad(sphere_data, place + vec2i(4, 0), 0));
+    let h = hit(ball, at.xy);
+    let to_eye = -normalize(ray_at(at.xy).dir);
+    let object_normal = unturn(turn, h.normal);
+    return vec4f(pixel_color(h.position, h.normal, to_eye, object_normal * ball.w, object_normal, h.s, at.xy, look), 1.0);
+}
+
+struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat) range: vec2u };
+
+// The whole picture, for the spheres from one number to another.
+@vertex fn vs_seen(@location(0) range: vec2u, @builtin(vertex_index) index: u32) -> SeenOut {
+    return SeenOut(vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0), range);
 }
 
 // A translucent shell: clear in the middle, denser at the rim.

@@ -1,8 +1,6 @@
-// A rectangle of one picture into a rectangle of another, pixel by pixel.
+// A picture into the corner of a window, pixel by pixel.
 struct Place {
-    rect: vec4f, // upper left corner and size, pixels of the target
-    source: vec4f, // upper left corner in the source; z, w: 1 where mirrored
-    how: vec4f,  // x: 1 where the target keeps numbers as they are and wants sRGB
+    how: vec4f, // x: 1 where the target keeps numbers as they are and wants sRGB
 };
 @group(0) @binding(0) var<uniform> place: Place;
 @group(0) @binding(1) var picture: texture_2d<f32>;
@@ -18,9 +16,6 @@ fn srgb(c: vec3f) -> vec3f {
 
 @fragment
 fn fs_place(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    let p = floor(at.xy - place.rect.xy);
-    let mirrored = place.rect.zw - vec2f(1.0) - p;
-    let q = select(p, mirrored, place.source.zw > vec2f(0.5));
-    let c = textureLoad(picture, vec2i(q + place.source.xy), 0);
+    let c = textureLoad(picture, vec2i(at.xy), 0);
     return vec4f(select(c.rgb, srgb(c.rgb), place.how.x > 0.5), c.a);
 }

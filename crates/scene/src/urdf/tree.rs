@@ -131,7 +131,7 @@ impl<'t> TreeBuilder<'t> {
         let name = format!("{}/{axis}", joint.name);
         let spec = joint.with_effects(JointSpec::new(&name, kind));
         let mass = LinkMassSpec::Given(LinkMass::none());
-        self.links.push(LinkSpec { name, parent: Some(parent), placement, joint: spec, mass, shapes: Vec::new() });
+        self.links.push(LinkSpec { name, parent: Some(parent), placement, joint: spec, mass, shapes: Vec::new(), mounts: Default::default() });
         self.spans.push(joint.span.clone());
         self.links.len() - 1
     }
@@ -139,7 +139,7 @@ impl<'t> TreeBuilder<'t> {
     fn hang(&mut self, element: usize, parent: Option<usize>, placement: Pose, joint: JointSpec, span: std::ops::Range<usize>) -> usize {
         let element = &mut self.elements[element];
         let shapes = std::mem::take(&mut element.shapes);
-        self.links.push(LinkSpec { name: element.name.clone(), parent, placement, joint, mass: LinkMassSpec::Given(element.mass), shapes });
+        self.links.push(LinkSpec { name: element.name.clone(), parent, placement, joint, mass: LinkMassSpec::Given(element.mass), shapes, mounts: Default::default() });
         self.spans.push(span);
         self.links.len() - 1
     }

@@ -2,13 +2,11 @@
 
 use super::user::Body;
 use tumble::collide::Vec3;
-use tumble::render::{CaveView, DrawList, Image, Picture, RIM_PX, RenderError, Screen, Viewpoint, unfold};
+use tumble::render::{CaveView, DrawList, Image, RIM_PX, RenderError, Screen, Viewpoint, unfold};
 use tumble::scene::cave::{Facet, Flip, Stereo};
 
-/// Side of the shadow maps of a cave, as for its pictures.
-const CAVE_SHADOWS: u32 = 4096;
-/// Around the facets of an unfolded cave, sRGB.
-const BACKGROUND: [u8; 3] = [24, 24, 26];
+/// Shadow maps of a cave are this much wider, as for its pictures.
+const CAVE_SHADOWS: u32 = 2;
 
 /// What is shown.
 pub enum Sight {
@@ -31,19 +29,12 @@ pub struct Ray {
     pub axis: Vec3,
 }
 
-/// A view in a rectangle, with the channels and mirrors that it is shown by.
+/// A view in a rectangle.
 struct Tile {
     from: Box<dyn Viewpoint>,
     position_px: [u32; 2],
     size_px: [u32; 2],
     flip: [bool; 2],
-    channels: [bool; 3],
-}
-
-impl Tile {
-    fn picture(&self) -> Picture<'_> {
-        Picture { from: self.from.as_ref(), position_px: self.position_px, size_px: self.size_px, flip: self.flip, channels: self.channels }
-    }
 }
 
 impl Sight {
@@ -51,34 +42,39 @@ impl Sight {
     pub fn stand(&mut self, body: &Body, list: &mut DrawList) {
         match (self, body) {
             (Sight::Camera, Body::Eye(camera)) => list.camera = *camera,
-            (Sight::Facet(view, _) | Sight::Unfolded(view), Body::Cave { place, .. }) => {
-                view.stand(*place);
-                list.settings.shadow_map_size = CAVE_SHADOWS;
-            }
+            (Sight::Facet(view, _) | Sight::Unfolded(view), Body::Cave { place, .. }) => view.stand(*place),
             _ => {}
         }
     }
 
-    /// Draws into the window's canvas.
-    pub fn draw(&self, screen: &mut Screen, list: &DrawList) -> Result<(), RenderError> {
-        if let Sight::Facet(view, facet) = self
-            && view.is_bent(facet)
-        {
-            let image = view.draw(screen.renderer(), list, facet)?;
-            return screen.draw_image(&image);
+    /// The shadow maps of a cave hold all that its screens show together.
+    pub fn widen_shadows(&self, list: &mut DrawList) {
+        if !matches!(self, Sight::Camera) {
+            list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
         }
-        let tiles = self.tiles(list, screen.size_px())?;
-        screen.draw(list, &tiles.iter().map(Tile::picture).collect::<Vec<_>>(), BACKGROUND)
     }
 
-    /// The same into memory.
-    pub fn picture(&self, screen: &mut Screen, list: &DrawList) -> Result<Image, RenderError> {
+    /// Draws on the window's device: what it shows next.
+    pub fn draw(&self, screen: &mut Screen, list: &DrawList) -> Result<(), RenderError> {
         let [w, h] = screen.size_px();
+        let renderer = screen.renderer();
         match self {
-            Sight::Camera => screen.renderer().render(list, w, h),
-            Sight::Facet(view, facet) => view.draw(screen.renderer(), list, facet),
-            Sight::Unfolded(view) => view.draw_unfolded(screen.renderer(), list, [w, h]),
+            Sight::Camera => renderer.draw(&list.camera, list, w, h),
+            Sight::Facet(view, facet) => {
+                let stage = renderer.stage(list)?;
+                view.draw_on_device(renderer, &stage, facet)
+            }
+            Sight::Unfolded(view) => {
+                let stage = renderer.stage(list)?;
+                view.draw_unfolded_on_device(renderer, &stage, [w, h])
+            }
         }
+    }
+
+    /// The same, in memory.
+    pub fn picture(&self, screen: &mut Screen, list: &DrawList) -> Result<Image, RenderError> {
+        self.draw(screen, list)?;
+        screen.renderer().read()
     }
 
     /// The line of sight through a pixel; `None` where nothing is shown there. Of an anaglyph the left eye's.
@@ -98,7 +94,7 @@ impl Sight {
     }
 
     fn tiles(&self, list: &DrawList, size_px: [u32; 2]) -> Result<Vec<Tile>, RenderError> {
-        let whole = |from: Box<dyn Viewpoint>, position_px, size_px| Tile { from, position_px, size_px, flip: [false; 2], channels: [true; 3] };
+        let whole = |from: Box<dyn Viewpoint>, position_px, size_px| Tile { from, position_px, size_px, flip: [false; 2] };
         Ok(match self {
             Sight::Camera => vec![whole(Box::new(list.camera), [0; 2], size_px)],
             Sight::Facet(view, facet) => eyes(view, facet)?,
@@ -125,11 +121,7 @@ fn eyes(view: &CaveView, facet: &Facet) -> Result<Vec<Tile>, RenderError> {
             Stereo::TopBottom if right => [0, h],
             _ => [0, 0],
         };
-        let channels = match facet.stereo {
-            Stereo::Anaglyph => [!right, right, right],
-            _ => [true; 3],
-        };
-        Ok(Tile { from: Box::new(view.eye(facet, *side)?.part(w, h, RIM_PX)), position_px, size_px: [w, h], flip, channels })
+        Ok(Tile { from: Box::new(view.eye(facet, *side)?.part(w, h, RIM_PX)), position_px, size_px: [w, h], flip })
     };
     facet.stereo.sides().iter().map(eye).collect()
 }

@@ -31,6 +31,8 @@ pub struct Status {
     pub held: Option<String>,
     pub held_at_m: Option<[f64; 3]>,
     pub hand_at_m: Option<[f64; 3]>,
+    /// As `--quality` takes it.
+    pub quality: Option<String>,
     pub overlays: Vec<String>,
     pub caption: bool,
     /// BLAKE3 of what `tumble run --save` writes of the same state, in hexadecimal.

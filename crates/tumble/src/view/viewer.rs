@@ -18,7 +18,7 @@ use tumble::core::World;
 use tumble::render::winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
 use tumble::render::winit::keyboard::PhysicalKey;
 use tumble::render::winit::window::Fullscreen;
-use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Screen, Shown, WindowApp, caption};
+use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, Shown, WindowApp, caption};
 use tumble::scene::SceneFile;
 
 /// Steps between two pictures take at most this long, and then one more.
@@ -49,6 +49,8 @@ pub struct Viewer {
     log: Log,
     show: Captions,
     limits: Limits,
+    /// `None` until it is known what draws.
+    quality: Option<Quality>,
     shots: PathBuf,
     picture_wanted: bool,
     last_picture: Option<Image>,
@@ -97,8 +99,8 @@ impl Viewer {
     /// Of a world at time 0.
     pub fn new(scene: &SceneFile, world: World, sight: Sight, options: &ViewOptions) -> Result<Viewer, Failure> {
         let mut drawing = Drawing::new(scene);
-        let list = drawing.list(&world, &DebugDraw::default()).map_err(|e| Failure::run("the picture", e))?;
-        let mut presets = Presets::new(list.camera);
+        let list = drawing.list(&world, &DebugDraw::default()).map_err(Failure::input)?;
+        let mut presets = Presets::new(&world, &list);
         let body = match &sight {
             Sight::Camera => Body::Eye(list.camera),
             Sight::Facet(view, _) | Sight::Unfolded(view) => {
@@ -114,7 +116,7 @@ impl Viewer {
             if !presets.find(name) {
                 return Err(Failure::input(format!("no camera `{name}`; wanted one of {}", presets.names().join(", "))));
             }
-            user.look_from(&presets.camera(&world, &list));
+            presets.camera(&world, &list).iter().for_each(|camera| user.look_from(camera));
         }
         let now = Instant::now();
         let dt = world.settings().dt;
@@ -134,6 +136,7 @@ impl Viewer {
             log: Log::create(options.status.as_deref())?,
             show: Captions { any: !options.plain, statistics: true, help: false },
             limits: Limits { steps: options.seconds.map(|s| (s / dt).round() as u64), pictures: options.frames, per_second: options.fps },
+            quality: options.quality,
             shots: options.shots.clone(),
             picture_wanted: options.picture.is_some(),
             last_picture: None,
@@ -177,6 +180,11 @@ impl Viewer {
             Command::Statistics => (self.show.any, self.show.statistics) = (true, !(self.show.any && self.show.statistics)),
             Command::Help => (self.show.any, self.show.help) = (true, !self.show.help),
             Command::Picture => self.save_picture(screen)?,
+            Command::Quality => {
+                let all = [Quality::default(), Quality::fast(), Quality::fastest()];
+                let next = all.iter().position(|q| Some(*q) == self.quality).map_or(0, |i| (i + 1) % all.len());
+                self.quality = Some(all[next]);
+            }
             Command::Fullscreen => {
                 let full = screen.window().fullscreen().is_some();
                 screen.window().set_fullscreen((!full).then_some(Fullscreen::Borderless(None)));
@@ -189,8 +197,9 @@ impl Viewer {
 
     fn go_to(&mut self, by: isize) {
         self.presets.go(by);
-        let camera = self.presets.camera(&self.world, &self.list);
-        self.user.look_from(&camera);
+        if let Some(camera) = self.presets.camera(&self.world, &self.list) {
+            self.user.look_from(&camera);
+        }
     }
 
     fn reset(&mut self) -> Result<(), Failure> {
@@ -203,6 +212,7 @@ impl Viewer {
         let [dx, dy] = std::array::from_fn(|k| at_px[k] - self.pointer.at_px[k]);
         self.pointer.at_px = at_px;
         if self.pointer.turning {
+            self.presets.let_go();
             self.user.turn(-TURN_RAD_PER_PX * dx, -TURN_RAD_PER_PX * dy);
             self.stale = true;
         }
@@ -278,6 +288,13 @@ impl Viewer {
     /// The draw list of this moment.
     fn update_list(&mut self) -> Result<(), Failure> {
         self.list = self.drawing.list(&self.world, &self.overlays.draw).map_err(|e| Failure::run("the picture", e))?;
+        if let Some(camera) = self.presets.followed(&self.world, &self.list) {
+            self.user.look_from(&camera);
+        }
+        if let Some(quality) = &self.quality {
+            quality.apply(&mut self.list.settings);
+        }
+        self.sight.widen_shadows(&mut self.list);
         self.sight.stand(self.user.body(), &mut self.list);
         if let Some(hand) = &self.hand {
             hand.draw(&self.world, &mut self.list);
@@ -342,6 +359,7 @@ impl Viewer {
             held: held.as_ref().map(|h| h.0.clone()),
             held_at_m: held.as_ref().map(|h| h.1.into()),
             hand_at_m: held.as_ref().map(|h| h.2.into()),
+            quality: self.quality.map(|q| q.to_string()),
             overlays: self.overlays.names(),
             caption: self.show.any && (self.show.statistics || self.show.help),
             state_blake3: blake3::hash(&self.world.save()).to_hex().to_string(),
@@ -376,7 +394,9 @@ impl Viewer {
 impl WindowApp for Viewer {
     type Error = Failure;
 
-    fn opened(&mut self, _screen: &mut Screen) -> Result<(), Failure> {
+    fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let usual = if screen.is_software() { Quality::fast() } else { Quality::default() };
+        self.quality.get_or_insert(usual);
         // opening took its time; the simulation starts now
         self.times.turn = Instant::now();
         Ok(())
@@ -424,6 +444,7 @@ impl WindowApp for Viewer {
         let passed = (now - self.times.turn).as_secs_f64();
         self.times.turn = now;
         if self.user.moves() {
+            self.presets.let_go();
             self.user.pass(passed);
             self.sight.stand(self.user.body(), &mut self.list);
             self.move_hand(screen);

@@ -19,6 +19,12 @@ enum Stage {
     Connected { reign: u64, order: Order, heard: Duration, sent: Duration },
 }
 
+/// What waits for the user.
+enum Waiting {
+    Event(LinkEvent),
+    Message(Delivery, Vec<u8>),
+}
+
 /// A facet's end of shared memory.
 pub struct ShmFacet {
     run: String,
@@ -28,8 +34,7 @@ pub struct ShmFacet {
     connection: u64,
     stage: Stage,
     memory: Memory,
-    events: VecDeque<LinkEvent>,
-    messages: VecDeque<(Delivery, Vec<u8>)>,
+    waiting: VecDeque<Waiting>,
     counters: LinkCounters,
 }
 
@@ -49,8 +54,7 @@ impl ShmFacet {
             connection: draw()?,
             stage: Stage::Looking { next: Duration::ZERO },
             memory: Memory::default(),
-            events: VecDeque::new(),
-            messages: VecDeque::new(),
+            waiting: VecDeque::new(),
             counters: LinkCounters::default(),
         })
     }
@@ -104,7 +108,7 @@ impl ShmFacet {
             if head.kind == Kind::Welcome && for_me {
                 self.stage = Stage::Connected { reign: head.reign, order: Order::new(head.number), heard: now, sent: now };
                 self.counters.opened += 1;
-                self.events.push_back(LinkEvent::Opened);
+                self.waiting.push_back(Waiting::Event(LinkEvent::Opened));
             }
             return None;
         }
@@ -121,8 +125,8 @@ impl ShmFacet {
                 self.counters.bytes_in += if mine { sample.len() as u64 } else { 0 };
                 // What is repeated for another facet says nothing to this one, even where it misses the same number.
                 let repeated_for_another = head.connection != 0 && !for_me;
-                let (messages, superseded) = (&mut self.messages, &mut self.counters.superseded);
-                let deliver = |delivery, message| *superseded += queue(messages, delivery, message);
+                let (waiting, superseded) = (&mut self.waiting, &mut self.counters.superseded);
+                let deliver = |delivery, message| *superseded += queue(waiting, delivery, message);
                 if !repeated_for_another && order.take(&head, mine, data, deliver).is_err() {
                     self.end(Closed::Overrun);
                 }
@@ -184,30 +188,33 @@ impl ShmFacet {
             self.stage = Stage::Looking { next: self.start.elapsed() };
             self.connection = self.connection.wrapping_add(1);
             self.memory = Memory::default();
-            self.messages.clear();
-            self.events.push_back(LinkEvent::Closed(why));
+            if why == Closed::ByUs {
+                self.waiting.retain(|what| matches!(what, Waiting::Event(_)));
+            }
+            self.waiting.push_back(Waiting::Event(LinkEvent::Closed(why)));
         }
     }
 
     fn next_event(&mut self, message: &mut Vec<u8>) -> Option<LinkEvent> {
-        if let Some(event) = self.events.pop_front() {
-            return Some(event);
+        match self.waiting.pop_front()? {
+            Waiting::Event(event) => Some(event),
+            Waiting::Message(_, bytes) => {
+                *message = bytes;
+                self.counters.messages_in += 1;
+                Some(LinkEvent::Message)
+            }
         }
-        let (_, bytes) = self.messages.pop_front()?;
-        *message = bytes;
-        self.counters.messages_in += 1;
-        Some(LinkEvent::Message)
     }
 }
 
 /// A newest message that still waits is replaced; how many were.
-fn queue(messages: &mut VecDeque<(Delivery, Vec<u8>)>, delivery: Delivery, message: Vec<u8>) -> u64 {
-    let before = messages.len();
+fn queue(waiting: &mut VecDeque<Waiting>, delivery: Delivery, message: Vec<u8>) -> u64 {
+    let before = waiting.len();
     if delivery == Delivery::Newest {
-        messages.retain(|(delivery, _)| *delivery != Delivery::Newest);
+        waiting.retain(|what| !matches!(what, Waiting::Message(Delivery::Newest, _)));
     }
-    let replaced = before - messages.len();
-    messages.push_back((delivery, message));
+    let replaced = before - waiting.len();
+    waiting.push_back(Waiting::Message(delivery, message));
     replaced as u64
 }
 

@@ -1,10 +1,10 @@
 //! A facet's side, without socket or clock.
 
+use super::Timing;
 use super::handshake::{Hello, Reply};
 use super::keys::{Agreement, Entropy, Handshake, SharedKey, Side};
-use super::packet::{self, Header, Kind, TAG};
+use super::packet::{self, Header, Kind};
 use super::session::{Numbering, Session};
-use super::Timing;
 use crate::sync::transport::{Closed, Delivery, FacetNumber, LinkCounters, LinkEvent, MAX_MESSAGE_BYTES, Refused};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -39,7 +39,7 @@ pub struct FacetMachine {
     handshake: Handshake,
     entropy: Entropy,
     stage: Stage,
-    events: VecDeque<LinkEvent>,
+    events: VecDeque<(LinkEvent, Vec<u8>)>,
     counters: LinkCounters,
 }
 
@@ -126,13 +126,12 @@ impl FacetMachine {
 
     /// The next event.
     pub fn poll(&mut self) -> Option<(LinkEvent, Vec<u8>)> {
-        if let Some(event) = self.events.pop_front() {
-            return Some((event, Vec::new()));
-        }
-        let Stage::Connected(session) = &mut self.stage else { return None };
-        let (_, message) = session.pop()?;
-        self.counters.messages_in += 1;
-        Some((LinkEvent::Message, message))
+        let event = self.events.pop_front().or_else(|| match &mut self.stage {
+            Stage::Connected(session) => session.pop().map(|(_, message)| (LinkEvent::Message, message)),
+            Stage::Looking { .. } => None,
+        });
+        self.counters.messages_in += u64::from(matches!(event, Some((LinkEvent::Message, _))));
+        event
     }
 
     /// Ends the connection and looks for a server anew.
@@ -158,7 +157,9 @@ impl FacetMachine {
             Kind::Welcome => self.take_welcome(now, &header, datagram),
             Kind::Unknown => self.take_unknown(now, &header, datagram),
             Kind::Data => match &mut self.stage {
-                Stage::Connected(session) if session.agreed.session == header.session => session.receive(now, &header, datagram, &mut self.counters),
+                Stage::Connected(session) if session.agreed.session == header.session => {
+                    session.receive(now, &header, datagram, &mut self.counters)
+                }
                 _ => Err(Refused::Stale),
             },
             Kind::Hello | Kind::Answer => Err(Refused::Foreign),
@@ -193,15 +194,14 @@ impl FacetMachine {
         session.ping();
         self.stage = Stage::Connected(Box::new(session));
         self.counters.opened += 1;
-        self.events.push_back(LinkEvent::Opened);
+        self.events.push_back((LinkEvent::Opened, Vec::new()));
         Ok(())
     }
 
     fn take_unknown(&mut self, now: Duration, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
-        if !self.handshake.open(&datagram[..])?.is_empty() {
+        if !self.handshake.open(datagram)?.is_empty() {
             return Err(Refused::Oversize);
         }
-        debug_assert!(datagram.len() >= TAG);
         match &self.stage {
             Stage::Connected(session) if session.agreed.session == header.session => self.end(now, Closed::ByPeer),
             _ => return Err(Refused::Stale),
@@ -209,14 +209,18 @@ impl FacetMachine {
         Ok(())
     }
 
+    /// What had arrived is told before: it may say why the other side closes.
     fn end(&mut self, now: Duration, why: Closed) {
-        self.events.push_back(LinkEvent::Closed(why));
+        if let (Stage::Connected(session), true) = (&mut self.stage, why != Closed::ByUs) {
+            self.events.extend(std::iter::from_fn(|| session.pop()).map(|(_, message)| (LinkEvent::Message, message)));
+        }
+        self.events.push_back((LinkEvent::Closed(why), Vec::new()));
         self.look(now);
     }
 
     /// Begins anew, with a fresh nonce. An answer that leads nowhere for a second is given up too: the server may have been started again meanwhile.
     fn look(&mut self, now: Duration) {
-        let hello = Hello { nonce: self.entropy.next(), facet: self.settings.facet, cookie: [0; 32] };
+        let hello = Hello { nonce: self.entropy.next_bytes(), facet: self.settings.facet, cookie: [0; 32] };
         self.stage = Stage::Looking { hello, answering: false, next: now, give_up: now + 10 * self.settings.timing.ask };
     }
 }

@@ -1,10 +1,10 @@
 //! The server's side, without socket or clock.
 
+use super::Timing;
 use super::handshake::{Cookies, Hello, Reply, write_unknown};
 use super::keys::{Agreement, Entropy, Handshake, SharedKey, Side};
 use super::packet::{self, Header, Kind};
 use super::session::{Numbering, Session};
-use super::Timing;
 use crate::sync::transport::{Closed, Delivery, FacetNumber, LinkCounters, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused};
 use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;
@@ -39,7 +39,7 @@ pub struct ServerMachine {
     live: Vec<Option<u64>>,
     prepared: VecDeque<u64>,
     replies: VecDeque<(SocketAddr, Vec<u8>)>,
-    events: VecDeque<(FacetNumber, LinkEvent)>,
+    events: VecDeque<(FacetNumber, LinkEvent, Vec<u8>)>,
     counters: Vec<LinkCounters>,
     strangers: LinkCounters,
     /// The facet that is asked first for a message.
@@ -54,7 +54,7 @@ impl ServerMachine {
             settings,
             handshake: Handshake::new(&shared),
             shared,
-            cookies: Cookies::new(entropy.next()),
+            cookies: Cookies::new(entropy.next_bytes()),
             entropy,
             sessions: BTreeMap::new(),
             live: vec![None; facets],
@@ -137,8 +137,9 @@ impl ServerMachine {
 
     /// The next event, in order for each facet; facets take turns.
     pub fn poll(&mut self) -> Option<(FacetNumber, LinkEvent, Vec<u8>)> {
-        if let Some((facet, event)) = self.events.pop_front() {
-            return Some((facet, event, Vec::new()));
+        if let Some((facet, event, message)) = self.events.pop_front() {
+            self.counters[usize::from(facet)].messages_in += u64::from(event == LinkEvent::Message);
+            return Some((facet, event, message));
         }
         for _ in 0..self.live.len() {
             self.turn = (self.turn + 1) % self.live.len();
@@ -205,7 +206,9 @@ impl ServerMachine {
         if !self.cookies.fits(now, from, &answer) {
             return Err(Refused::Stale);
         }
-        let same = |session: &&Session| session.agreed.facet_nonce == answer.nonce && session.agreed.facet == answer.facet && session.address == from;
+        let same = |session: &&Session| {
+            session.agreed.facet_nonce == answer.nonce && session.agreed.facet == answer.facet && session.address == from
+        };
         let agreed = match self.sessions.values().find(same) {
             Some(session) => session.agreed,
             None => self.prepare(now, from, &answer),
@@ -227,7 +230,7 @@ impl ServerMachine {
         while self.sessions.contains_key(&session) {
             session = self.entropy.next_u64();
         }
-        let agreed = Agreement { session, facet: answer.facet, facet_nonce: answer.nonce, server_nonce: self.entropy.next() };
+        let agreed = Agreement { session, facet: answer.facet, facet_nonce: answer.nonce, server_nonce: self.entropy.next_bytes() };
         let prepared = Session::new(now, &self.shared, agreed, Side::Server, from, self.settings.timing, self.settings.numbering);
         self.sessions.insert(session, prepared);
         self.prepared.push_back(session);
@@ -241,17 +244,21 @@ impl ServerMachine {
         }
         self.live[usize::from(facet)] = Some(id);
         self.counters[usize::from(facet)].opened += 1;
-        self.events.push_back((facet, LinkEvent::Opened));
+        self.events.push_back((facet, LinkEvent::Opened, Vec::new()));
     }
 
+    /// What had arrived is told before.
     fn end(&mut self, id: u64, why: Closed) {
-        let Some(session) = self.sessions.remove(&id) else { return };
+        let Some(mut session) = self.sessions.remove(&id) else { return };
         self.prepared.retain(|prepared| *prepared != id);
         let facet = session.agreed.facet;
         let live = &mut self.live[usize::from(facet)];
         if *live == Some(id) {
             *live = None;
-            self.events.push_back((facet, LinkEvent::Closed(why)));
+            if why != Closed::ByUs {
+                self.events.extend(std::iter::from_fn(|| session.pop()).map(|(_, message)| (facet, LinkEvent::Message, message)));
+            }
+            self.events.push_back((facet, LinkEvent::Closed(why), Vec::new()));
         }
     }
 

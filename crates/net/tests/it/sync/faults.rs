@@ -7,7 +7,7 @@ use tumble_net::sync::messages::Done;
 use tumble_net::sync::simulate::{To, Weather};
 use tumble_net::sync::transport::LinkEvent;
 use tumble_net::sync::wire;
-use tumble_net::sync::{FacetOptions, FacetSession, Over, Pace, ServerEvent, ServerSession, Standing, Task, Waiting};
+use tumble_net::sync::{FacetOptions, FacetSession, Over, Pace, ServerEvent, ServerOptions, ServerSession, Standing, Task, Waiting};
 
 /// States of a session, as the facet that fails is in them.
 const MOMENTS: [fn(&Stage) -> bool; 5] = [
@@ -213,4 +213,37 @@ fn good_byes_are_told_from_deaths() {
     for k in [0, 2] {
         assert_eq!(stage.facets[k].session.as_ref().unwrap().task(), Task::Over(Over::Ended));
     }
+}
+
+/// A frame that does not fit is refused, asked for again, and shown when it comes right.
+#[test]
+fn a_frame_that_does_not_fit_is_asked_for_again() {
+    let base = scene();
+    let mut server = ServerSession::new(ServerOptions { resend_after: None, ..Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options }, &base);
+    let mut facet = FacetSession::new(FacetOptions::new("facet 0", SCENE, 1), scene());
+    let mut spoilt = 0;
+    for k in 1..100u32 {
+        let now = k * MS;
+        facet.advance(now);
+        if facet.task() == Task::Draw && facet.begin().is_some() {
+            facet.drawn(now, [0; 16]);
+        }
+        if let Task::Present(_) = facet.task() {
+            facet.presented(now);
+        }
+        facet.outgoing().iter().for_each(|(_, bytes)| server.on_event(now, 0, LinkEvent::Message, bytes));
+        if server.idle() && server.complete() {
+            server.publish(now, &base, &viewer(0)).unwrap();
+        }
+        for out in server.outgoing() {
+            let (header, payload) = wire::open(&out.message).unwrap();
+            let spoil = header.kind == wire::Kind::State && header.frame == 5 && spoilt == 0;
+            let bytes = if spoil { wire::message(&header, |out| out.extend(&payload[..payload.len() - 1])) } else { out.message.to_vec() };
+            spoilt += u32::from(spoil);
+            facet.on_event(now, LinkEvent::Message, &bytes);
+        }
+    }
+    let counts = facet.counts();
+    assert_eq!((spoilt, counts.refused, counts.missing, server.counts(0).0.late), (1, 1, 0, 0));
+    assert!(counts.shown > 20, "{counts:?}");
 }

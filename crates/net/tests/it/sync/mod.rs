@@ -2,6 +2,7 @@
 
 mod faults;
 mod hostile;
+mod links;
 mod lockstep;
 mod mirror;
 mod quantise;

@@ -14,7 +14,7 @@ use tumble_net::sync::transport::{Closed, Delivery, FacetLink, LinkEvent, Server
 use tumble_net::sync::*;
 
 const SECOND: Duration = Duration::from_secs(1);
-type Shown = Vec<(u64, Done)>;
+pub type Shown = Vec<(u64, Done)>;
 
 /// A stand-in for a picture: a hash of what its renderer would read.
 fn picture(world: &World, viewer: &Viewer) -> [u8; 16] {
@@ -28,8 +28,8 @@ fn picture(world: &World, viewer: &Viewer) -> [u8; 16] {
 }
 
 /// A facet that draws what it gets until the run is over, and what it has shown.
-fn facet(hub: &Hub, k: u16, stop: &Arc<AtomicBool>) -> JoinHandle<(Shown, FacetCounts)> {
-    let (link, stop) = (hub.facet(k).unwrap(), stop.clone());
+pub fn facet(link: impl FacetLink + Send + 'static, k: u16, stop: &Arc<AtomicBool>) -> JoinHandle<(Shown, FacetCounts)> {
+    let stop = stop.clone();
     std::thread::spawn(move || {
         let mut facet = Facet::new(link, FacetOptions::new(&format!("facet {k}"), SCENE, k as u64), scene());
         let mut shown = Vec::new();
@@ -57,13 +57,13 @@ fn facet(hub: &Hub, k: u16, stop: &Arc<AtomicBool>) -> JoinHandle<(Shown, FacetC
     })
 }
 
-fn options() -> ServerOptions {
+pub fn options() -> ServerOptions {
     let seats = (0..3).map(|k| Seat { name: format!("facet {k}"), critical: true }).collect();
     ServerOptions { ready_after: 10 * SECOND, drop_after: 60 * SECOND, ..ServerOptions::new(5, SCENE, seats) }
 }
 
 /// Hashes of the states and of the pictures, frame by frame.
-fn hashes(shown: &Shown) -> Vec<(u64, [u8; 16], [u8; 16])> {
+pub fn hashes(shown: &Shown) -> Vec<(u64, [u8; 16], [u8; 16])> {
     shown.iter().map(|(frame, done)| (*frame, done.hash, done.image)).collect()
 }
 
@@ -73,7 +73,7 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
     let path = scratch.file("run.mcap");
     let stop = Arc::new(AtomicBool::new(false));
     let hub = Hub::new(3);
-    let facets: Vec<_> = (0..3).map(|k| facet(&hub, k, &stop)).collect();
+    let facets: Vec<_> = (0..3).map(|k| facet(hub.facet(k).unwrap(), k, &stop)).collect();
     let mut world = scene();
     let mut server = Server::new(hub.server(), options(), &world);
     let mut recorder = SessionRecorder::create(&path, "test", SCENE, &world, 1, RecorderOptions::default()).unwrap();
@@ -98,7 +98,7 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
 
     for run in 0..2 {
         let hub = Hub::new(3);
-        let facets: Vec<_> = (0..3).map(|k| facet(&hub, k, &stop)).collect();
+        let facets: Vec<_> = (0..3).map(|k| facet(hub.facet(k).unwrap(), k, &stop)).collect();
         let mut server = Server::new(hub.server(), options(), &scene());
         let mut replay = Replay::open(&path).unwrap();
         replay.check_scene(SCENE).unwrap();
@@ -182,7 +182,7 @@ fn who_does_not_read_is_closed() {
 #[test]
 fn facets_find_the_next_server_over_a_link() {
     let (hub, stop) = (Hub::new(3), Arc::new(AtomicBool::new(false)));
-    let facets: Vec<_> = (0..3).map(|k| facet(&hub, k, &stop)).collect();
+    let facets: Vec<_> = (0..3).map(|k| facet(hub.facet(k).unwrap(), k, &stop)).collect();
     let world = Mutex::new(scene());
     for run in 0..2 {
         let mut world = world.lock().unwrap();

@@ -1,0 +1,180 @@
+//! Frames per second on this machine, as the table of docs/caves.md: `cargo run --release -p tumble-render --example frames`.
+//!
+//! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn.
+//! The picture stays on the device, as it does in a window, and the next list is made while the device draws. Options: `--seconds S` per row (default 2), `--only WORDS` (rows that contain the words),
+//! `--quality WORDS` (instead of the two shown), `--readback` (with the way back to memory), `--stages` (where the
+//! time of each row goes), `--pictures FOLDER` (the last picture of each row).
+
+use nalgebra::{Point3, Vector3};
+use std::time::{Duration, Instant};
+use tumble_core::World;
+use tumble_render::{Camera, CaveView, DebugDraw, DrawList, Drawing, Quality, RenderError, Renderer};
+use tumble_scene::SceneFile;
+use tumble_scene::cave::{Stereo, resolve_cave};
+
+type Failure = Box<dyn std::error::Error>;
+
+struct Options {
+    seconds: f64,
+    only: String,
+    quality: Option<Quality>,
+    readback: bool,
+    stages: bool,
+    pictures: Option<std::path::PathBuf>,
+}
+
+/// What is drawn: a world, and the facets on which it is.
+struct Subject {
+    name: &'static str,
+    world: World,
+    scene: SceneFile,
+    camera: Option<Camera>,
+}
+
+fn main() -> Result<(), Failure> {
+    let options = options()?;
+    let mut renderer = Renderer::new()?;
+    let adapter = renderer.adapter().to_owned();
+    println!("adapter: {adapter}; {} threads", std::thread::available_parallelism().map_or(1, |n| n.get()));
+    println!("\n| world | facets | quality | frames per second | ms per frame | processor ms per frame |\n|---|---|---|---|---|---|");
+    let qualities: Vec<Quality> = match &options.quality {
+        Some(quality) => vec![*quality],
+        None => ["fastest", "fastest,samples=4", "fast", "fast,samples=4", "usual"].iter().map(|words| words.parse()).collect::<Result<_, _>>()?,
+    };
+    let mut subjects = [billiards()?, bodies("1,000 bodies", [25, 20, 2])?, bodies("10,000 bodies", [50, 50, 4])?];
+    for subject in &mut subjects {
+        for facets in [1, 4, 6] {
+            for quality in &qualities {
+                row(&options, &mut renderer, subject, facets, [1024, 768], Stereo::Mono, quality)?;
+            }
+        }
+    }
+    if !["Cpu", "Other"].iter().any(|kind| adapter.contains(kind)) {
+        for quality in &qualities {
+            row(&options, &mut renderer, &mut subjects[2], 6, [1920, 1080], Stereo::SideBySide, quality)?;
+        }
+    }
+    Ok(())
+}
+
+fn options() -> Result<Options, Failure> {
+    let mut options = Options { seconds: 2.0, only: String::new(), quality: None, readback: false, stages: false, pictures: None };
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        let mut value = || words.next().ok_or(format!("{word} wants a value"));
+        match word.as_str() {
+            "--seconds" => options.seconds = value()?.parse()?,
+            "--only" => options.only = value()?,
+            "--quality" => options.quality = Some(value()?.parse()?),
+            "--readback" => options.readback = true,
+            "--pictures" => options.pictures = Some(value()?.into()),
+            "--stages" => options.stages = true,
+            _ => return Err(format!("no option {word}; wanted --seconds S, --only WORDS, --quality WORDS, --readback, --stages or --pictures FOLDER").into()),
+        }
+    }
+    Ok(options)
+}
+
+/// The table before the break, from the scene's own camera.
+fn billiards() -> Result<Subject, Failure> {
+    let shipped = tumble_scene::shipped().iter().find(|s| s.name == "billiards").ok_or("billiards is not shipped")?;
+    let scene = shipped.read()?;
+    Ok(Subject { name: "`billiards`", world: scene.build()?.0, scene, camera: None })
+}
+
+/// A bed of balls of 0.1 m, `nx · ny · nz` of them, which fills the picture.
+fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failure> {
+    let scene = SceneFile::parse(
+        &format!(
+            "[ground]\n[[light]]\ntype = \"directional\"\ndirection = [0.36, 0.48, -0.8]\n[[grid]]\nname = \"ball\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\n\
+             density_kg_per_m3 = 1000\ncount = [{nx}, {ny}, {nz}]\nspacing_m = [0.21, 0.23, 0.22]\nposition_m = [0, 0, {}]\ncentered = true\n\
+             colors = [\"#c0392b\", \"#2980b9\", \"#f1c40f\", \"#27ae60\", \"#8e44ad\", \"#ecf0f1\", \"#d35400\"]\nroughness = 0.3\n",
+            0.1 + 0.11 * (nz - 1) as f64,
+        ),
+        "balls.toml",
+    )?;
+    let wide = 0.21 * nx as f32;
+    // all of it is in the picture
+    let camera = Camera::look_at(Point3::new(0.0, -1.35 * wide, 0.8 * wide), Point3::new(0.0, -0.08 * wide, 0.2));
+    Ok(Subject { name, world: scene.build()?.0, scene, camera: Some(camera) })
+}
+
+fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets: usize, size: [u32; 2], stereo: Stereo, quality: &Quality) -> Result<(), Failure> {
+    let shown = if stereo == Stereo::Mono { format!("{facets}") } else { format!("{facets} of {} x {} in stereo", size[0], size[1]) };
+    let label = format!("{} | {shown} | {quality}", subject.name);
+    if !label.contains(&options.only) {
+        return Ok(());
+    }
+    let mut drawing = Drawing::new(&subject.scene);
+    let cave = (facets > 1).then(|| cave(&subject.scene, facets, size, stereo)).transpose()?;
+    let mut stages = [Duration::ZERO; 2];
+    let mut frame = |renderer: &mut Renderer| -> Result<(), RenderError> {
+        let begin = Instant::now();
+        let mut list = drawing.list(&subject.world, &DebugDraw::default())?;
+        quality.apply(&mut list.settings);
+        list.camera = subject.camera.unwrap_or(list.camera);
+        let listed = Instant::now();
+        draw(renderer, &list, cave.as_ref(), size, options.readback)?;
+        stages[0] += listed - begin;
+        stages[1] += listed.elapsed();
+        Ok(())
+    };
+    frame(renderer)?;
+    frame(renderer)?;
+    if let Some(folder) = &options.pictures {
+        let name = label.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
+        renderer.read()?.write_png(folder.join(format!("{name}.png")))?;
+    }
+    let (begin, spent) = (Instant::now(), processor_s());
+    let mut frames = 0;
+    while frames < 3 || begin.elapsed().as_secs_f64() < options.seconds {
+        frame(renderer)?;
+        frames += 1;
+    }
+    renderer.wait()?;
+    let each = begin.elapsed().as_secs_f64() / f64::from(frames);
+    let processor = 1e3 * (processor_s() - spent) / f64::from(frames);
+    println!("| {label} | {:.1} | {:.1} | {processor:.0} |", 1.0 / each, 1e3 * each);
+    if options.stages {
+        let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + 2);
+        println!("  list {:.2} ms, picture {:.2} ms", ms(stages[0]), ms(stages[1]));
+    }
+    Ok(())
+}
+
+fn draw(renderer: &mut Renderer, list: &DrawList, cave: Option<&CaveView>, [w, h]: [u32; 2], readback: bool) -> Result<(), RenderError> {
+    match cave {
+        None => renderer.draw(&list.camera, list, w, h)?,
+        Some(cave) => {
+            let stage = renderer.stage(list)?;
+            for facet in &cave.cave().facets {
+                cave.draw_on_device(renderer, &stage, facet)?;
+                if readback {
+                    renderer.read()?;
+                }
+            }
+        }
+    }
+    if readback && cave.is_none() {
+        renderer.read()?;
+    }
+    renderer.end_frame(1)
+}
+
+/// A cube around the middle of the scene.
+fn cave(scene: &SceneFile, facets: usize, size_px: [u32; 2], stereo: Stereo) -> Result<CaveView, Failure> {
+    let mut cave = resolve_cave(if facets == 4 { "cube4" } else { "cube6" })?.load()?;
+    cave.facets.iter_mut().for_each(|facet| (facet.size_px, facet.stereo) = (size_px, stereo));
+    let mut scene = scene.clone();
+    let eye: Vector3<f64> = cave.users[0].eye_m.coords;
+    scene.cave = Some(tumble_scene::CavePlace { origin_m: [-eye.x, -eye.y, 1.2 - eye.z], heading_deg: 0.0, scale: 1.0 });
+    Ok(CaveView::new(cave, &scene)?)
+}
+
+/// Processor time of this process so far, all threads, s; on a software driver it is what a frame costs however busy the machine is. 0 where
+/// the system does not tell.
+fn processor_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after_name = stat.rsplit(')').next().unwrap_or("");
+    after_name.split_whitespace().skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
+}

@@ -1,0 +1,213 @@
+//! Finished pictures on the device: the rim cut off; both eyes in one picture, bent, darkened and mirrored for projectors.
+//!
+//! Where a picture only changes its place its bytes are copied. All else is one pass per eye, which gives what [`crate::Warp::apply`] and
+//! [`crate::Blend::apply`] give to within a level: they round to bytes in between, and the pass does not.
+
+use super::Gpu;
+use super::frame::bind;
+use super::meshes::uniform_buffer;
+use super::pipelines::COLOR;
+use super::targets::{Targets, finished_texture};
+use crate::RenderError;
+use std::sync::Arc;
+use tumble_scene::cave::Flip;
+use wgpu::util::{DeviceExt, TextureDataOrder};
+use wgpu::{BindGroupLayout, BindingResource, ColorWrites, RenderPipeline, Texture, TextureFormat, TextureView, TextureViewDescriptor};
+
+const FINISH_WGSL: &str = include_str!("../shaders/finish.wgsl");
+/// Most finishes whose textures are kept.
+const MOST_KEPT: usize = 64;
+/// Stands for no source in the texture of a warp.
+const NOWHERE: f32 = -1e9;
+
+/// What a projector needs done to every picture of one size, in numbers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Finish {
+    pub size: [u32; 2],
+    /// For each pixel the place of the picture that appears there, in pixels, middles at whole numbers; `None` stays black.
+    pub warp: Option<Vec<Option<[f32; 2]>>>,
+    /// For each pixel the share of light that it keeps, per colour, 255 for all of it.
+    pub shares: Option<Vec<[u8; 3]>>,
+}
+
+/// Where and how an eye's picture goes into the whole.
+pub(crate) struct Placed {
+    /// Size of the whole, pixels.
+    pub whole_px: [u32; 2],
+    /// Top left corner in the whole.
+    pub at_px: [u32; 2],
+    /// Whether the whole begins anew, with this colour behind it.
+    pub begin: Option<[u8; 4]>,
+    pub flip: Flip,
+    /// Which of red, green and blue are written.
+    pub channels: [bool; 3],
+    pub finish: Option<Arc<Finish>>,
+}
+
+/// The pass, the pictures that it makes, and the textures that it reads.
+pub(crate) struct Finisher {
+    layout: BindGroupLayout,
+    /// All colours; red; green and blue.
+    pipelines: [RenderPipeline; 3],
+    nothing: [TextureView; 2],
+    known: Vec<(Arc<Finish>, [TextureView; 2])>,
+    whole: Option<Texture>,
+}
+
+const CHANNELS: [[bool; 3]; 3] = [[true; 3], [true, false, false], [false, true, true]];
+
+impl Finisher {
+    pub fn new(gpu: &Gpu) -> Self {
+        let device = &gpu.device;
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
+        let numbers = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: false },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let place = wgpu::BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: None };
+        let entries = [entry(0, place), entry(1, numbers), entry(2, numbers), entry(3, numbers)];
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("finish"), entries: &entries });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("finish"), source: wgpu::ShaderSource::Wgsl(FINISH_WGSL.into()) });
+        let pipelines = CHANNELS.map(|channels| pipeline(device, &layout, &module, channels));
+        // no warp, and a mask that keeps all light
+        let nothing = [upload(gpu, [1, 1], TextureFormat::Rg32Float, &[0; 8]), upload(gpu, [1, 1], TextureFormat::Rgba8Unorm, &[255; 4])];
+        Finisher { layout, pipelines, nothing, known: Vec::new(), whole: None }
+    }
+
+    /// The middle of a picture without `rim` pixels on each side.
+    pub fn cut(&mut self, gpu: &Gpu, from: &Texture, rim: u32) -> Texture {
+        let size = [from.width() - 2 * rim, from.height() - 2 * rim];
+        let whole = self.whole(gpu, size);
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("cut") });
+        copy(&mut encoder, from, rim, size, &whole, [0, 0]);
+        gpu.queue.submit([encoder.finish()]);
+        whole
+    }
+
+    /// Puts the picture of the targets into its place; the whole.
+    pub fn place(&mut self, gpu: &Gpu, from: &Targets, rim: u32, size: [u32; 2], placed: &Placed) -> Result<Texture, RenderError> {
+        let whole = self.whole(gpu, placed.whole_px);
+        let target = whole.create_view(&TextureViewDescriptor::default());
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
+        let plain = placed.finish.is_none() && placed.flip == Flip::None && placed.channels == [true; 3];
+        if placed.begin.is_some() || !plain {
+            let load = placed.begin.map_or(wgpu::LoadOp::Load, |color| wgpu::LoadOp::Clear(linear_color(color)));
+            let uniform = uniform_buffer(gpu, &place_floats(rim, size, placed), "place")?;
+            let views = self.views(gpu, placed.finish.as_ref());
+            let entries = [
+                uniform.as_entire_binding(),
+                BindingResource::TextureView(&from.picture),
+                BindingResource::TextureView(&views[0]),
+                BindingResource::TextureView(&views[1]),
+            ];
+            let inputs = bind(gpu, &self.layout, &entries);
+            let attachment = wgpu::RenderPassColorAttachment { view: &target, depth_slice: None, resolve_target: None, ops: wgpu::Operations { load, store: wgpu::StoreOp::Store } };
+            let mut pass =
+                encoder.begin_render_pass(&wgpu::RenderPassDescriptor { label: Some("finish"), color_attachments: &[Some(attachment)], ..Default::default() });
+            if !plain {
+                let which = CHANNELS.iter().position(|c| *c == placed.channels).unwrap_or(0);
+                pass.set_pipeline(&self.pipelines[which]);
+                pass.set_bind_group(0, &inputs, &[]);
+                pass.set_scissor_rect(placed.at_px[0], placed.at_px[1], size[0], size[1]);
+                pass.draw(0..3, 0..1);
+            }
+        }
+        if plain {
+            copy(&mut encoder, &from.resolved, rim, size, &whole, placed.at_px);
+        }
+        gpu.queue.submit([encoder.finish()]);
+        Ok(whole)
+    }
+
+    /// The texture of finished pictures of this size; its content stays from call to call.
+    fn whole(&mut self, gpu: &Gpu, [width, height]: [u32; 2]) -> Texture {
+        match &self.whole {
+            Some(whole) if (whole.width(), whole.height()) == (width, height) => whole.clone(),
+            _ => self.whole.insert(finished_texture(&gpu.device, "finished", width, height)).clone(),
+        }
+    }
+
+    fn views(&mut self, gpu: &Gpu, finish: Option<&Arc<Finish>>) -> [TextureView; 2] {
+        let Some(finish) = finish else { return self.nothing.clone() };
+        if let Some((_, views)) = self.known.iter().find(|(known, _)| Arc::ptr_eq(known, finish)) {
+            return views.clone();
+        }
+        let warp = finish.warp.as_ref().map(|warp| {
+            let floats: Vec<f32> = warp.iter().flat_map(|from| from.unwrap_or([NOWHERE; 2])).collect();
+            upload(gpu, finish.size, TextureFormat::Rg32Float, bytemuck::cast_slice(&floats))
+        });
+        let shares = finish.shares.as_ref().map(|shares| {
+            let bytes: Vec<u8> = shares.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
+            upload(gpu, finish.size, TextureFormat::Rgba8Unorm, &bytes)
+        });
+        let views = [warp.unwrap_or_else(|| self.nothing[0].clone()), shares.unwrap_or_else(|| self.nothing[1].clone())];
+        if self.known.len() >= MOST_KEPT {
+            self.known.remove(0);
+        }
+        self.known.push((finish.clone(), views.clone()));
+        views
+    }
+}
+
+fn place_floats(rim: u32, [w, h]: [u32; 2], placed: &Placed) -> [f32; 8] {
+    let flag = |on: bool| f32::from(u8::from(on));
+    let across = flag(matches!(placed.flip, Flip::Horizontal | Flip::Both));
+    let upward = flag(matches!(placed.flip, Flip::Vertical | Flip::Both));
+    let warped = flag(placed.finish.as_ref().is_some_and(|f| f.warp.is_some()));
+    [placed.at_px[0] as f32, placed.at_px[1] as f32, across, upward, w as f32, h as f32, rim as f32, warped]
+}
+
+/// A byte colour as what the clear of an sRGB texture takes.
+fn linear_color([r, g, b, a]: [u8; 4]) -> wgpu::Color {
+    let linear = |c: u8| f64::from(crate::material::linear(f32::from(c) / 255.0));
+    wgpu::Color { r: linear(r), g: linear(g), b: linear(b), a: f64::from(a) / 255.0 }
+}
+
+/// The middle of a picture into a place of another; what would stick out is cut off.
+fn copy(encoder: &mut wgpu::CommandEncoder, from: &Texture, rim: u32, [w, h]: [u32; 2], into: &Texture, [x, y]: [u32; 2]) {
+    let size = wgpu::Extent3d { width: w.min(into.width().saturating_sub(x)), height: h.min(into.height().saturating_sub(y)), depth_or_array_layers: 1 };
+    let source = wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x: rim, y: rim, z: 0 }, ..from.as_image_copy() };
+    let target = wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z: 0 }, ..into.as_image_copy() };
+    encoder.copy_texture_to_texture(source, target, size);
+}
+
+/// A texture with these bytes.
+pub(super) fn upload(gpu: &Gpu, [width, height]: [u32; 2], format: TextureFormat, bytes: &[u8]) -> TextureView {
+    let descriptor = wgpu::TextureDescriptor {
+        label: Some("finish"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    };
+    gpu.device.create_texture_with_data(&gpu.queue, &descriptor, TextureDataOrder::LayerMajor, bytes).create_view(&TextureViewDescriptor::default())
+}
+
+fn pipeline(device: &wgpu::Device, layout: &BindGroupLayout, module: &wgpu::ShaderModule, [red, green, blue]: [bool; 3]) -> RenderPipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some("finish"), bind_group_layouts: &[Some(layout)], immediate_size: 0 });
+    let mut write_mask = ColorWrites::empty();
+    write_mask.set(ColorWrites::RED, red);
+    write_mask.set(ColorWrites::GREEN, green);
+    write_mask.set(ColorWrites::BLUE, blue);
+    write_mask.set(ColorWrites::ALPHA, red && green && blue);
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("finish"),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState { module, entry_point: Some("vs_place"), compilation_options: Default::default(), buffers: &[] },
+        primitive: Default::default(),
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some("fs_place"),
+            compilation_options: Default::default(),
+            targets: &[Some(wgpu::ColorTargetState { format: COLOR, blend: None, write_mask })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

@@ -1,0 +1,79 @@
+//! Meshes on the device, and how numbers get there.
+
+use super::Gpu;
+use crate::{MeshData, RenderError};
+use std::sync::Arc;
+use wgpu::{Buffer, BufferUsages};
+
+/// Meshes on the device, known by their `Arc`: a mesh is uploaded once, and let go when a list no longer holds it.
+#[derive(Default)]
+pub struct MeshCache {
+    known: Vec<(Arc<MeshData>, MeshBuffers)>,
+}
+
+/// Vertices and indices.
+#[derive(Clone)]
+pub struct MeshBuffers {
+    pub vertices: Buffer,
+    pub indices: Buffer,
+    pub count: u32,
+}
+
+impl MeshCache {
+    /// Buffers for the meshes of a list, in its order.
+    pub(crate) fn sync(&mut self, gpu: &Gpu, meshes: &[Arc<MeshData>]) -> Result<Vec<MeshBuffers>, RenderError> {
+        let mut kept = Vec::with_capacity(meshes.len());
+        for mesh in meshes {
+            let place = self.known.binary_search_by_key(&Arc::as_ptr(mesh), |(m, _)| Arc::as_ptr(m));
+            let buffers = match place {
+                Ok(i) => self.known[i].1.clone(),
+                Err(_) => {
+                    mesh.validate()?;
+                    MeshBuffers::new(gpu, mesh)?
+                }
+            };
+            kept.push((mesh.clone(), buffers));
+        }
+        let buffers = kept.iter().map(|(_, b)| b.clone()).collect();
+        // addresses order the cache only; nothing drawn depends on them
+        kept.sort_by_key(|(m, _)| Arc::as_ptr(m));
+        kept.dedup_by_key(|(m, _)| Arc::as_ptr(m));
+        self.known = kept;
+        Ok(buffers)
+    }
+}
+
+impl MeshBuffers {
+    pub(crate) fn new(gpu: &Gpu, mesh: &MeshData) -> Result<Self, RenderError> {
+        let vertices: Vec<f32> = mesh.positions.iter().zip(&mesh.normals).flat_map(|(p, n)| [p[0], p[1], p[2], n[0], n[1], n[2]]).collect();
+        Ok(MeshBuffers {
+            vertices: vertex_buffer(gpu, &vertices, "mesh vertices")?,
+            indices: buffer(gpu, bytemuck::cast_slice(&mesh.indices), BufferUsages::INDEX, "mesh indices")?,
+            count: mesh.indices.len() as u32,
+        })
+    }
+}
+
+/// Numbers that vertices are made of.
+pub fn vertex_buffer(gpu: &Gpu, floats: &[f32], what: &'static str) -> Result<Buffer, RenderError> {
+    buffer(gpu, bytemuck::cast_slice(floats), BufferUsages::VERTEX, what)
+}
+
+/// Numbers that are the same for a whole pass.
+pub fn uniform_buffer(gpu: &Gpu, floats: &[f32], what: &'static str) -> Result<Buffer, RenderError> {
+    buffer(gpu, bytemuck::cast_slice(floats), BufferUsages::UNIFORM, what)
+}
+
+/// A buffer with these bytes; refused beyond what the device can hold, never empty.
+pub fn buffer(gpu: &Gpu, bytes: &[u8], usage: BufferUsages, what: &'static str) -> Result<Buffer, RenderError> {
+    let cap = gpu.device.limits().max_buffer_size;
+    if bytes.len() as u64 > cap {
+        return Err(RenderError::TooMany { what, count: bytes.len(), cap: cap as usize });
+    }
+    let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
+    // not mapped: on a lost device that would be a panic and no error
+    let size = contents.len() as u64;
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(what), size, usage: usage | BufferUsages::COPY_DST, mapped_at_creation: false });
+    gpu.queue.write_buffer(&buffer, 0, contents);
+    Ok(buffer)
+}

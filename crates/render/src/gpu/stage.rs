@@ -1,0 +1,290 @@
+//! A draw list on the device: what is the same for all points of view from which it is drawn.
+
+use super::data::{self, Eye};
+use super::meshes::{MeshBuffers, MeshCache, uniform_buffer, vertex_buffer};
+use super::pipelines::{Key, Pass, Pipelines, Variant};
+use super::targets::ShadowMaps;
+use super::{Gpu, scene};
+use crate::list::bounds::Bounds;
+use crate::list::debug::strokes;
+use crate::{DebugSphere, DrawList, Instance, MAX_SHADOWS, MeshData, MeshId, RenderError, Shadows, SphereStyle};
+use nalgebra::Point3;
+use std::ops::Range;
+use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline, TextureView};
+
+/// A list that was sent to the device, to be drawn from as many points of view as there are eyes and screens ([`crate::Renderer::stage`]).
+/// Shadows are fitted to all that is there, wherever one looks from.
+pub struct Stage {
+    pub(super) serial: u64,
+    pub(super) variant: Variant,
+    pub(super) shadow_map_size: u32,
+    pub(super) reach: f32,
+    /// Each with whether it is near to a sphere.
+    pub(super) shadow_views: Vec<(BindGroup, bool)>,
+    pub(super) scene: Buffer,
+    shells: Vec<DebugSphere>,
+    groups: Vec<Group>,
+    instances: Buffer,
+    /// With its surface and texture.
+    ground: Option<(MeshBuffers, Buffer, (u32, Option<usize>))>,
+    spheres: Buffer,
+    balls: Vec<(Point3<f32>, f32)>,
+    /// The same numbers as a texture, for pictures that light each pixel once.
+    pub(super) sphere_data: TextureView,
+    sphere_groups: Vec<Same>,
+    /// First and last number of the spheres of each group.
+    sphere_ranges: Buffer,
+    strokes: [Batch; 2],
+    textures: Textures,
+}
+
+/// Textures of a list, bound.
+pub(super) struct Textures {
+    pub white: BindGroup,
+    pub list: Vec<BindGroup>,
+}
+
+impl Textures {
+    fn of(&self, number: Option<usize>) -> &BindGroup {
+        number.and_then(|i| self.list.get(i)).unwrap_or(&self.white)
+    }
+}
+
+/// Items with one surface, side by side in a buffer; those that throw shadows first.
+struct Same {
+    surface: u32,
+    texture: Option<usize>,
+    all: Range<u32>,
+    casters: Range<u32>,
+}
+
+/// Instances of one mesh.
+struct Group {
+    mesh: MeshBuffers,
+    same: Same,
+}
+
+/// Instances of a square.
+pub struct Batch {
+    pub buffer: Buffer,
+    pub count: u32,
+}
+
+impl Stage {
+    /// `seen`: what shadows, floor and occlusion are fitted to; `part`: whether that is all there is.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn new(gpu: &Gpu, pipelines: &mut Pipelines, meshes: &mut MeshCache, textures: Textures, list: &DrawList, seen: Option<&Bounds>, part: bool, serial: u64) -> Result<Self, RenderError> {
+        let s = &list.settings;
+        let shadows = if s.shadows == Shadows::Off { Vec::new() } else { scene::shadow_eyes(list, seen) };
+        let reach = scene::occlusion_reach(list, seen, part);
+        let buffers = meshes.sync(gpu, &list.meshes)?;
+        let (groups, instances) = group_instances(gpu, list, &buffers)?;
+        let (sphere_groups, sphere_floats) = group_spheres(list);
+        let ranges: Vec<u32> = sphere_groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
+        let balls: Vec<_> = list.spheres.iter().map(|s| (s.center, s.radius)).collect();
+        let stage = Stage {
+            serial,
+            variant: Variant::new(s.samples, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0, list.sky.softbox > 0.0),
+            shadow_map_size: s.shadow_map_size,
+            reach,
+            shadow_views: shadows.iter().map(|(_, eye)| Ok((bind_view(gpu, pipelines, eye)?, eye.near_any(&balls)))).collect::<Result<_, RenderError>>()?,
+            balls,
+            scene: uniform_buffer(gpu, &scene::floats(list, seen, &shadows), "scene")?,
+            shells: list.debug_spheres.iter().filter(|s| s.look == SphereStyle::Shell && s.radius > 0.0).cloned().collect(),
+            groups,
+            instances,
+            ground: ground(gpu, list, seen)?,
+            spheres: vertex_buffer(gpu, &sphere_floats, "spheres")?,
+            sphere_data: sphere_texture(gpu, if s.samples == 1 { sphere_floats } else { Vec::new() })?,
+            sphere_groups,
+            sphere_ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), wgpu::BufferUsages::VERTEX, "sphere groups")?,
+            textures,
+            strokes: [stroke_batch(gpu, list, false)?, stroke_batch(gpu, list, true)?],
+        };
+        pipelines.prepare(&gpu.device, stage.keys());
+        Ok(stage)
+    }
+
+    /// All pipelines that a picture of it may need.
+    fn keys(&self) -> impl Iterator<Item = Key> {
+        let fixed = [(Pass::Sky, 0), (Pass::Shell, 0), (Pass::Line, 0), (Pass::LineOnTop, 0)];
+        let ground = self.ground.iter().map(|(_, _, (surface, _))| (Pass::Ground, *surface));
+        let meshes = self.groups.iter().map(|g| (Pass::Mesh, g.same.surface));
+        let spheres = self.sphere_groups.iter().map(|g| (Pass::Sphere, g.surface));
+        fixed.into_iter().chain(ground).chain(meshes).chain(spheres).map(|(pass, surface)| (pass, surface, self.variant))
+    }
+
+    /// One depth map per shadow.
+    pub(super) fn draw_shadows(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines, maps: &ShadowMaps) {
+        for ((view, near), layer) in self.shadow_views.iter().zip(&maps.layers) {
+            let mut pass = super::frame::depth_pass(encoder, "shadow", layer);
+            pass.set_bind_group(0, view, &[]);
+            self.draw_depth(&mut pass, &pipelines.depth, *near, |same| same.casters.clone());
+        }
+    }
+
+    /// Depth of everything, the floor included, by pipelines for floor, meshes, spheres and near spheres.
+    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 4], near: bool) {
+        if let Some((mesh, instance, _)) = &self.ground {
+            pass.set_pipeline(&by[0]);
+            draw_mesh(pass, mesh, instance, 0..1);
+        }
+        self.draw_depth(pass, by, near, |same| same.all.clone());
+    }
+
+    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 4], near: bool, which: impl Fn(&Same) -> Range<u32>) {
+        pass.set_pipeline(&by[1]);
+        self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, which(&g.same)));
+        pass.set_vertex_buffer(0, self.spheres.slice(..));
+        for pipeline in &by[2..if near { 4 } else { 3 }] {
+            pass.set_pipeline(pipeline);
+            for range in self.sphere_groups.iter().map(&which).filter(|range| !range.is_empty()) {
+                pass.draw(0..4, range);
+            }
+        }
+    }
+
+    /// Whether some sphere is so near to the eye that its outline is no circle on a plane before it.
+    pub(super) fn near(&self, eye: &Eye) -> bool {
+        eye.near_any(&self.balls)
+    }
+
+    /// Everything in colour, with the view's own shells.
+    pub(super) fn draw_picture(&self, pass: &mut RenderPass, pipelines: &Pipelines, shells: &Batch) {
+        let select = |pass: &mut RenderPass, which, surface| pipelines.of((which, surface, self.variant)).map(|p| pass.set_pipeline(p)).is_some();
+        pass.set_bind_group(2, &self.textures.white, &[]);
+        if select(pass, Pass::Sky, 0) {
+            pass.draw(0..3, 0..1);
+        }
+        for g in &self.groups {
+            pass.set_bind_group(2, self.textures.of(g.same.texture), &[]);
+            if select(pass, Pass::Mesh, g.same.surface) {
+                draw_mesh(pass, &g.mesh, &self.instances, g.same.all.clone());
+            }
+        }
+        for (i, same) in self.sphere_groups.iter().enumerate() {
+            pass.set_bind_group(2, self.textures.of(same.texture), &[]);
+            if !select(pass, Pass::Sphere, same.surface) {
+                continue;
+            }
+            if self.variant.depth_first() {
+                pass.set_vertex_buffer(0, self.sphere_ranges.slice(..));
+                pass.draw(0..3, i as u32..i as u32 + 1);
+            } else {
+                pass.set_vertex_buffer(0, self.spheres.slice(..));
+                pass.draw(0..4, same.all.clone());
+            }
+        }
+        if let Some((mesh, instance, (surface, texture))) = &self.ground
+            && select(pass, Pass::Ground, *surface)
+        {
+            pass.set_bind_group(2, self.textures.of(*texture), &[]);
+            draw_mesh(pass, mesh, instance, 0..1);
+        }
+        for (which, batch) in [(Pass::Line, &self.strokes[0]), (Pass::Shell, shells), (Pass::LineOnTop, &self.strokes[1])] {
+            if batch.count > 0 && select(pass, which, 0) {
+                pass.set_vertex_buffer(0, batch.buffer.slice(..));
+                pass.draw(0..4, 0..batch.count);
+            }
+        }
+    }
+
+    /// Shells from back to front, so that they blend the right way.
+    pub(super) fn shells_from(&self, gpu: &Gpu, view: &nalgebra::Matrix4<f32>) -> Result<Batch, RenderError> {
+        let mut shells: Vec<(f32, &DebugSphere)> = self.shells.iter().map(|s| (view.transform_point(&s.center).z, s)).collect();
+        shells.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut floats = Vec::new();
+        shells.iter().for_each(|(_, s)| data::shell(s, &mut floats));
+        Batch::new(gpu, &floats, shells.len(), "shells")
+    }
+}
+
+impl Batch {
+    fn new(gpu: &Gpu, floats: &[f32], count: usize, what: &'static str) -> Result<Self, RenderError> {
+        Ok(Batch { buffer: vertex_buffer(gpu, floats, what)?, count: count as u32 })
+    }
+}
+
+/// A point of view, bound.
+pub fn bind_view(gpu: &Gpu, pipelines: &Pipelines, eye: &Eye) -> Result<BindGroup, RenderError> {
+    let uniform = uniform_buffer(gpu, &eye.floats(), "view")?;
+    Ok(super::frame::bind(gpu, &pipelines.view_layout, &[uniform.as_entire_binding()]))
+}
+
+fn draw_mesh(pass: &mut RenderPass, mesh: &MeshBuffers, instances: &Buffer, range: Range<u32>) {
+    if !range.is_empty() {
+        pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+        pass.set_vertex_buffer(1, instances.slice(..));
+        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..mesh.count, 0, range);
+    }
+}
+
+fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result<(Vec<Group>, Buffer), RenderError> {
+    let items = &list.instances;
+    let mut order: Vec<usize> = (0..items.len()).collect();
+    let kind = |i: usize| (items[i].mesh, items[i].material.surface(), items[i].material.texture.map(|t| t.id));
+    order.sort_by_key(|&i| (kind(i), !items[i].casts_shadow, i));
+    let mut floats = Vec::with_capacity(data::INSTANCE_FLOATS as usize * items.len());
+    order.iter().for_each(|&i| data::instance(&items[i], &mut floats));
+    let mut groups = Vec::new();
+    for (same, first) in runs(&order, kind, |i| items[i].casts_shadow) {
+        groups.push(Group { mesh: meshes[items[first].mesh.0].clone(), same: Same { surface: kind(first).1, texture: kind(first).2, ..same } });
+    }
+    Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
+}
+
+fn group_spheres(list: &DrawList) -> (Vec<Same>, Vec<f32>) {
+    let items = &list.spheres;
+    let mut order: Vec<usize> = (0..items.len()).collect();
+    let kind = |i: usize| (items[i].material.surface(), items[i].material.texture.map(|t| t.id));
+    order.sort_by_key(|&i| (kind(i), !items[i].casts_shadow, i));
+    let mut floats = Vec::with_capacity(data::SPHERE_FLOATS as usize * items.len());
+    order.iter().for_each(|&i| data::sphere(&items[i], &mut floats));
+    let groups = runs(&order, kind, |i| items[i].casts_shadow).map(|(same, first)| Same { surface: kind(first).0, texture: kind(first).1, ..same });
+    (groups.collect(), floats)
+}
+
+/// Five texels per sphere, 256 spheres per row.
+fn sphere_texture(gpu: &Gpu, mut floats: Vec<f32>) -> Result<TextureView, RenderError> {
+    let row = 256 * data::SPHERE_FLOATS as usize;
+    let rows = floats.len().div_ceil(row).max(1);
+    let most = gpu.device.limits().max_texture_dimension_2d as usize;
+    if rows > most {
+        return Err(RenderError::TooMany { what: "spheres", count: floats.len() / data::SPHERE_FLOATS as usize, cap: 256 * most });
+    }
+    floats.resize(rows * row, 0.0);
+    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Float, bytemuck::cast_slice(&floats)))
+}
+
+/// Runs of one kind in an order that has those that cast first in each; with the first item of each.
+fn runs<K: PartialEq>(order: &[usize], kind: impl Fn(usize) -> K, casts: impl Fn(usize) -> bool) -> impl Iterator<Item = (Same, usize)> {
+    let mut start = 0;
+    order.chunk_by(move |&a, &b| kind(a) == kind(b)).map(move |run| {
+        let casting = run.iter().filter(|&&i| casts(i)).count() as u32;
+        let all = start..start + run.len() as u32;
+        start = all.end;
+        (Same { surface: 0, texture: None, casters: all.start..all.start + casting, all }, run[0])
+    })
+}
+
+fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<(MeshBuffers, Buffer, (u32, Option<usize>))>, RenderError> {
+    let Some(ground) = &list.ground else { return Ok(None) };
+    let [x, y, reach, _] = scene::floor(list, seen);
+    let mut quad = MeshData::ground_quad(reach);
+    quad.positions.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, ground.height_m]);
+    let mut floats = Vec::new();
+    let placed =
+        Instance { mesh: MeshId(0), pose: nalgebra::Isometry3::identity(), scale: nalgebra::Vector3::repeat(1.0), material: ground.material, casts_shadow: false };
+    data::instance(&placed, &mut floats);
+    Ok(Some((MeshBuffers::new(gpu, &quad)?, vertex_buffer(gpu, &floats, "ground")?, (ground.material.surface(), ground.material.texture.map(|t| t.id)))))
+}
+
+fn stroke_batch(gpu: &Gpu, list: &DrawList, on_top: bool) -> Result<Batch, RenderError> {
+    let mut floats = Vec::new();
+    let wanted: Vec<_> = strokes(list).into_iter().filter(|s| s.style.on_top == on_top).collect();
+    wanted.iter().for_each(|s| data::stroke(s, &mut floats));
+    Batch::new(gpu, &floats, wanted.len(), "strokes")
+}
+
+const _: () = assert!(MAX_SHADOWS == 4, "the shaders' array of shadows has this length");

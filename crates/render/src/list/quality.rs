@@ -1,0 +1,117 @@
+//! Looks against speed: shadows, edges and occlusion by name.
+
+use super::Settings;
+use std::fmt;
+use std::str::FromStr;
+
+/// How the shadows of lights that throw any are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Shadows {
+    /// None.
+    Off,
+    /// Sharp, smoothed over one texel of the map.
+    Hard,
+    /// With penumbrae as wide as the light's size gives.
+    #[default]
+    Soft,
+}
+
+const SHADOWS: [(&str, Shadows); 3] = [("off", Shadows::Off), ("hard", Shadows::Hard), ("soft", Shadows::Soft)];
+
+impl Shadows {
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        SHADOWS.iter().find(|(_, shadows)| *shadows == self).map_or("", |(name, _)| name)
+    }
+
+    /// Its number in the shaders.
+    pub(crate) fn number(self) -> u32 {
+        SHADOWS.iter().position(|(_, shadows)| *shadows == self).unwrap_or(0) as u32
+    }
+}
+
+/// The part of [`Settings`] that trades looks for speed. As words: `usual`, `fast`, `fastest`, and behind it or alone `shadows=off|hard|soft`, `samples=1|4`,
+/// `occlusion=on|off`, `map=TEXELS`, with commas between them.
+///
+/// ```
+/// use tumble_render::{Quality, Shadows};
+/// let quality: Quality = "fast,samples=4".parse()?;
+/// assert_eq!((quality.shadows, quality.samples), (Shadows::Hard, 4));
+/// # Ok::<(), tumble_render::UnknownQuality>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quality {
+    /// Shadows of lights.
+    pub shadows: Shadows,
+    /// Samples per pixel: 1 or 4.
+    pub samples: u32,
+    /// Whether corners and creases get less of the sky's light.
+    pub occlusion: bool,
+    /// Side of a shadow map in texels, 256 to 8192.
+    pub shadow_map_size: u32,
+}
+
+/// A word that names no quality.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no quality '{0}'; wanted usual, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off or map=TEXELS (256 to 8192), with commas between them")]
+pub struct UnknownQuality(String);
+
+impl Default for Quality {
+    /// What pictures have: soft shadows, four samples, occlusion.
+    fn default() -> Self {
+        Quality { shadows: Shadows::Soft, samples: 4, occlusion: true, shadow_map_size: 2048 }
+    }
+}
+
+impl Quality {
+    /// For many bodies on a slow device: hard shadows, one sample, no occlusion.
+    pub fn fast() -> Self {
+        Quality { shadows: Shadows::Hard, samples: 1, occlusion: false, shadow_map_size: 1024 }
+    }
+
+    /// As [`Quality::fast`] without shadows.
+    pub fn fastest() -> Self {
+        Quality { shadows: Shadows::Off, ..Quality::fast() }
+    }
+
+    /// Writes it into the settings of a list. A reach of occlusion that is set stays, unless occlusion is off.
+    pub fn apply(&self, settings: &mut Settings) {
+        settings.shadows = self.shadows;
+        settings.samples = self.samples;
+        settings.shadow_map_size = self.shadow_map_size;
+        if !self.occlusion {
+            settings.occlusion_m = Some(0.0);
+        }
+    }
+}
+
+impl FromStr for Quality {
+    type Err = UnknownQuality;
+
+    fn from_str(words: &str) -> Result<Quality, UnknownQuality> {
+        let mut quality = Quality::default();
+        for word in words.split(',').map(str::trim) {
+            let unknown = || UnknownQuality(word.to_string());
+            match word.split_once('=') {
+                None if word == "usual" => quality = Quality::default(),
+                None if word == "fastest" => quality = Quality::fastest(),
+                None if word == "fast" => quality = Quality::fast(),
+                Some(("shadows", name)) => quality.shadows = SHADOWS.iter().find(|(known, _)| *known == name).ok_or_else(unknown)?.1,
+                Some(("samples", "1")) => quality.samples = 1,
+                Some(("samples", "4")) => quality.samples = 4,
+                Some(("occlusion", "on")) => quality.occlusion = true,
+                Some(("occlusion", "off")) => quality.occlusion = false,
+                Some(("map", side)) => quality.shadow_map_size = side.parse().ok().filter(|n| (256..=8192).contains(n)).ok_or_else(unknown)?,
+                _ => return Err(unknown()),
+            }
+        }
+        Ok(quality)
+    }
+}
+
+impl fmt::Display for Quality {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let occlusion = if self.occlusion { "on" } else { "off" };
+        write!(f, "shadows={},samples={},occlusion={occlusion},map={}", self.shadows.name(), self.samples, self.shadow_map_size)
+    }
+}
