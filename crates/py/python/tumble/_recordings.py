@@ -32,7 +32,7 @@ class Recording:
     """Unit quaternions (x, y, z, w), shape (n, m, 4); NaN while a body was not there."""
     states: list[bytes]
     """What ``World.restore`` takes, of each frame."""
-    note: str | None = None
+    note: str | None
     """Where the file was cut, if it was; None of a complete one."""
 
     def __len__(self) -> int:
