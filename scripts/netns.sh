@@ -60,7 +60,9 @@ join() { # namespace, its address, the middle's address, a letter
 join "$server" 10.77.1.1 10.77.1.2 a
 join "$facet" 10.77.2.1 10.77.2.2 b
 
-within() { ip netns exec "$1" "$trial" --transport udp --key "$key" --bytes "$bytes" --address 10.77.1.1:7700 --role "$2" $3; }
+# Replaces the shell it runs in, so that its number is the program's and `finish` ends it.
+# shellcheck disable=SC2086  # words
+within() { exec ip netns exec "$1" "$trial" --transport udp --key "$key" --bytes "$bytes" --address 10.77.1.1:7700 --role "$2" $3; }
 if [ -n "$netem" ]; then
     ip netns exec "$middle" sysctl -q -w net.ipv4.ip_forward=1
     ip -n "$server" route add default via 10.77.1.2
@@ -83,4 +85,4 @@ while [ "$k" -lt "$facets" ]; do
     k=$((k + 1))
 done
 echo "loss $loss, reorder $reorder, duplicate $duplicate each way, delay $delay ms, by $([ -n "$netem" ] && echo netem || echo a relay in its own namespace)"
-within "$server" server "--facets $facets --frames $frames --rate $rate"
+(within "$server" server "--facets $facets --frames $frames --rate $rate")

@@ -30,6 +30,7 @@ pub struct Articulation {
 }
 
 /// A description by itself, or one in a world.
+#[allow(clippy::large_enum_variant, reason = "each is the inside of one Python object")]
 enum Spot {
     Free { source: Source, now: Mutex<Now> },
     Placed(Place),

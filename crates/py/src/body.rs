@@ -1,7 +1,8 @@
 //! A rigid body of a world: a handle, which asks the world each time.
 
-use crate::convert::{pose, quaternion, rotation, symmetric, vec3, vec3_or, vector};
+use crate::convert::{array, pose, quaternion, rotation, some, symmetric, vec3, vec3_or, vector};
 use crate::errors::{Error, Result};
+use crate::looks;
 use crate::shared::{Inner, Shared};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -251,6 +252,21 @@ impl RigidBody {
     #[setter]
     fn set_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
         self.change(py, |body| body.material.friction = value)
+    }
+
+    /// Colour that it is drawn in, sRGB, shape (3,), each 0 to 1. Setting it takes a pattern off.
+    #[getter]
+    fn color<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, &self.constant(looks::color)?))
+    }
+
+    #[setter]
+    fn set_color(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let color = some::<3>(value, "color")?;
+        if let Some(wrong) = color.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+            return Err(Error::value(format!("color: {wrong} is not within 0 to 1")));
+        }
+        self.change(py, |body| *body = looks::colored(body.clone(), color))
     }
 
     /// Linear damping, 1/s: a force of ``-damping · momentum``.

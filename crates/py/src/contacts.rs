@@ -24,7 +24,8 @@ pub fn bytes(inner: &Inner) -> Vec<u8> {
     for c in contacts {
         let whole = [number(c.a), number(c.b), c.part_a as i64, c.part_b as i64];
         whole.iter().for_each(|k| out.extend_from_slice(&k.to_le_bytes()));
-        let real = c.point.iter().chain(c.normal.iter()).copied().chain([-c.gap]).chain(c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()).copied());
+        let (first, last) = (c.point.iter().chain(c.normal.iter()), c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()));
+        let real = first.copied().chain([-c.gap]).chain(last.copied());
         real.for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
     }
     out

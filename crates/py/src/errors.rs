@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use tumble::collide::{MeshError, ShapeError};
 use tumble::core::{ArticulatedError, BodyError, ModelError, SettingsError, SnapshotError, StepError, WorldError};
+use tumble::net::record::RecordError;
+use tumble::render::RenderError;
+use tumble::scene::cave::CaveError;
 use tumble::scene::urdf::UrdfError;
 use tumble::scene::{BuildError, SceneError, UnknownName};
 
@@ -34,6 +37,12 @@ pub enum Error {
     Build(#[from] BuildError),
     #[error(transparent)]
     Urdf(#[from] UrdfError),
+    #[error(transparent)]
+    Cave(#[from] CaveError),
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Record(#[from] RecordError),
     #[error(transparent)]
     Choice(#[from] UnknownName),
     #[error(transparent)]
@@ -86,6 +95,14 @@ impl Error {
             Error::Urdf(UrdfError::Read { source, .. }) => of_file(source),
             Error::Build(BuildError::MeshFile { source, .. }) => of_file(source),
             Error::File { source, .. } => of_file(source),
+            Error::Record(RecordError::Io { source, .. }) => of_file(source),
+            Error::Cave(CaveError::Read { source, .. }) => of_file(source),
+            Error::Cave(CaveError::Unknown { .. }) => "MissingFileError",
+            Error::Cave(CaveError::NoFacet { .. }) => "UnknownNameError",
+            Error::Cave(_) => "SceneError",
+            Error::Render(RenderError::NoAdapter { .. } | RenderError::Device { .. }) => "PictureError",
+            Error::Record(RecordError::Input { .. }) => "InvalidValueError",
+            Error::Record(_) => "RecordingError",
             Error::Build(BuildError::World { .. }) => "InvalidValueError",
             Error::Scene(_) | Error::Build(_) | Error::Urdf(_) => "SceneError",
             Error::Snapshot(_) => "SnapshotError",
@@ -105,14 +122,22 @@ fn of_file(error: &std::io::Error) -> &'static str {
 
 impl From<Error> for PyErr {
     fn from(error: Error) -> PyErr {
-        if let Error::Python(error) = error {
-            return error;
-        }
+        let error = match error {
+            Error::Python(error) => return error,
+            Error::Fork { fork, frame, source } if matches!(*source, Error::Python(_)) => return noted(PyErr::from(*source), fork, frame),
+            error => error,
+        };
         Python::attach(|py| match class(py, error.class()) {
             Ok(class) => PyErr::from_type(class, (error.to_string(),)),
             Err(_) => PyRuntimeError::new_err(error.to_string()),
         })
     }
+}
+
+/// What Python raised in a fork, with a note of where (from Python 3.11 on).
+fn noted(error: PyErr, fork: usize, frame: usize) -> PyErr {
+    Python::attach(|py| _ = error.value(py).call_method1("add_note", (format!("in fork {fork}, frame {frame}"),)));
+    error
 }
 
 /// A class of `tumble._errors`, imported once.

@@ -6,12 +6,18 @@ mod body;
 mod contacts;
 mod convert;
 mod errors;
+mod extension;
+mod looks;
+mod picture;
+mod recording;
 mod report;
 mod robot;
 mod rollout;
 mod shapes;
 mod shared;
+mod spheretree;
 mod state;
+mod view;
 mod world;
 
 use pyo3::prelude::*;
@@ -28,9 +34,15 @@ mod _native {
     #[pymodule_export]
     use super::body::RigidBody;
     #[pymodule_export]
+    use super::recording::{Recorder, read_recording};
+    #[pymodule_export]
     use super::report::StepReport;
     #[pymodule_export]
     use super::shapes::{Block, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere};
+    #[pymodule_export]
+    use super::spheretree::SphereTree;
+    #[pymodule_export]
+    use super::view::View;
     #[pymodule_export]
     use super::world::World;
 

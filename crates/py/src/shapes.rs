@@ -26,7 +26,7 @@ impl Shape {
     }
 
     /// The shape as an object of one of its classes.
-    fn as_a<C: PyClass<BaseType = Shape>>(self, class: C) -> PyClassInitializer<C> {
+    fn into_a<C: PyClass<BaseType = Shape>>(self, class: C) -> PyClassInitializer<C> {
         PyClassInitializer::from(self).add_subclass(class)
     }
 }
@@ -58,7 +58,7 @@ pub struct Sphere;
 impl Sphere {
     #[new]
     fn new(radius: f64) -> Result<PyClassInitializer<Sphere>> {
-        Ok(Shape::new(Solid::sphere(radius)?, format!("Sphere(radius={radius})")).as_a(Sphere))
+        Ok(Shape::new(Solid::sphere(radius)?, format!("Sphere(radius={radius})")).into_a(Sphere))
     }
 }
 
@@ -78,7 +78,7 @@ impl Block {
         if let Some(edge) = size.iter().find(|edge| **edge <= 0.0) {
             return Err(Error::value(format!("size: an edge of {edge} m; edges must be above 0 m")));
         }
-        Ok(Shape::new(Solid::cuboid(0.5 * Vec3::from(size))?, format!("Box(size=({x}, {y}, {z}))")).as_a(Block))
+        Ok(Shape::new(Solid::cuboid(0.5 * Vec3::from(size))?, format!("Box(size=({x}, {y}, {z}))")).into_a(Block))
     }
 }
 
@@ -91,7 +91,7 @@ impl Capsule {
     #[new]
     fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Capsule>> {
         let solid = Solid::capsule(radius, half(length)?)?;
-        Ok(Shape::new(solid, format!("Capsule(radius={radius}, length={length})")).as_a(Capsule))
+        Ok(Shape::new(solid, format!("Capsule(radius={radius}, length={length})")).into_a(Capsule))
     }
 }
 
@@ -105,7 +105,7 @@ impl Cylinder {
     fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Cylinder>> {
         let length_half = half(length)?;
         let solid = caught(|| Ok(Solid::cylinder(radius, length_half)?))?;
-        Ok(Shape::new(solid, format!("Cylinder(radius={radius}, length={length})")).as_a(Cylinder))
+        Ok(Shape::new(solid, format!("Cylinder(radius={radius}, length={length})")).into_a(Cylinder))
     }
 }
 
@@ -135,7 +135,7 @@ impl HalfSpace {
         let rotation = Quat::rotation_between(&Vec3::z(), &n).unwrap_or_else(|| Quat::from_quaternion(nalgebra::Quaternion::new(0.0, 1.0, 0.0, 0.0)));
         let placement = Pose::from_parts(Translation3::from(n * offset), rotation);
         let words = format!("HalfSpace(normal=({}, {}, {}), offset={offset})", given.x, given.y, given.z);
-        Ok(Shape { solid: Solid::half_space(), placement, words }.as_a(HalfSpace))
+        Ok(Shape { solid: Solid::half_space(), placement, words }.into_a(HalfSpace))
     }
 }
 
@@ -160,7 +160,7 @@ impl Mesh {
         let mesh = triangles(py, vertices, faces)?.scaled(scale);
         let count = mesh.triangles.len();
         let (solid, center, _) = py.detach(|| caught(|| Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?)))?;
-        Ok(Shape::new(solid, format!("Mesh({count} triangles)")).as_a(Mesh { center }))
+        Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh { center }))
     }
 
     /// The centre of mass in the axes that the vertices were given in, shape (3,), metres. A body of this mesh has its origin there.

@@ -1,6 +1,7 @@
 //! One world that many Python objects hold: behind a lock that is tried and never waited for, so that nothing can block or deadlock.
 
 use crate::errors::{Error, Result, caught};
+use crate::extension::Extension;
 use crate::robot::Robot;
 use crate::state::Mirror;
 use pyo3::prelude::*;
@@ -21,6 +22,8 @@ pub struct Inner {
     pub robots: BTreeMap<ObjectId, Arc<Robot>>,
     /// Generalized forces that act on articulated bodies in every frame.
     pub efforts: BTreeMap<ObjectId, Vec<f64>>,
+    /// Forces and behaviours written in Python.
+    pub extension: Extension,
     /// The arrays that Python sees the state by.
     pub mirror: Mirror,
     /// Whether a panic left it half-way.
@@ -30,18 +33,24 @@ pub struct Inner {
 impl Inner {
     /// A world of a scene.
     pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
-        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), mirror: Mirror::default(), broken: false }
+        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), extension: Extension::default(), mirror: Mirror::default(), broken: false }
     }
 
     /// An independent copy, with no arrays yet.
     pub fn fork(&self) -> Inner {
         Inner {
-            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), mirror: Mirror::default(), broken: false,
+            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), extension: self.extension.fork(),
+            mirror: Mirror::default(), broken: false,
         }
     }
 
     /// One frame.
     pub fn step(&mut self) -> Result<()> {
+        if self.extension.is_empty() { self.frame() } else { self.extended_frame() }
+    }
+
+    /// One frame of the world alone.
+    pub fn frame(&mut self) -> Result<()> {
         for (&id, effort) in &self.efforts {
             self.world.apply_generalized(id, effort)?;
         }
@@ -102,10 +111,28 @@ impl Shared {
 
     /// The same with the interpreter let go, for what takes long: other threads run on meanwhile.
     pub fn work<T: Send>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
-        let outcome = py.detach(|| guarded(&mut *self.hold()?, call));
-        if let Ok(mut held) = self.hold() {
-            held.publish(py);
-        }
+        let mut held = self.hold()?;
+        let inner: &mut Inner = &mut held;
+        let outcome = py.detach(|| guarded(inner, call));
+        held.publish(py);
+        outcome
+    }
+
+    /// The same in parts, until one answers that it was the last: the world stays held over all of them, and Ctrl-C is heard between two.
+    pub fn work_in_parts(&self, py: Python<'_>, mut part: impl FnMut(&mut Inner) -> Result<bool> + Send) -> Result<()> {
+        let mut held = self.hold()?;
+        let outcome = loop {
+            let inner: &mut Inner = &mut held;
+            match py.detach(|| guarded(inner, &mut part)) {
+                Ok(false) => {}
+                Ok(true) => break Ok(()),
+                Err(error) => break Err(error),
+            }
+            if let Err(raised) = py.check_signals() {
+                break Err(raised.into());
+            }
+        };
+        held.publish(py);
         outcome
     }
 }

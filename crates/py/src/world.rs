@@ -9,11 +9,13 @@ use crate::report::StepReport;
 use crate::robot::Robot;
 use crate::shapes::Shape;
 use crate::shared::{Inner, Shared};
+use crate::picture::Shot;
 use crate::rollout::Plan;
-use crate::{bodies, contacts};
+use crate::{bodies, contacts, looks};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tumble::collide::Vec3;
@@ -82,6 +84,7 @@ impl World {
     fn add(&self, py: Python<'_>, body: Rigid, mode: Mode, switches: [bool; 2]) -> Result<RigidBody> {
         let [alive, collidable] = switches;
         let place = self.shared.write(py, |inner| {
+            let body = looks::usual(body, inner.world.ids().len());
             let id = inner.world.add_boxed(Box::new(body), mode)?;
             inner.world.set_alive(id, alive)?;
             inner.world.set_collidable(id, collidable)?;
@@ -166,21 +169,17 @@ impl World {
     #[pyo3(signature = (n=1))]
     fn step(&self, py: Python<'_>, n: i64) -> Result<()> {
         let Ok(mut left) = u64::try_from(n) else { return Err(Error::value(format!("n is {n}; it must be at least 0"))) };
-        while left > 0 {
-            left = self.shared.work(py, |inner| {
-                let begun = Instant::now();
-                while left > 0 {
-                    inner.step()?;
-                    left -= 1;
-                    if left > 0 && begun.elapsed() > PATIENCE {
-                        break;
-                    }
+        self.shared.work_in_parts(py, |inner| {
+            let begun = (left > 1).then(Instant::now);
+            while left > 0 {
+                inner.step()?;
+                left -= 1;
+                if begun.is_some_and(|begun| begun.elapsed() > PATIENCE) {
+                    break;
                 }
-                Ok(left)
-            })?;
-            py.check_signals()?;
-        }
-        Ok(())
+            }
+            Ok(left == 0)
+        })
     }
 
     /// Simulated time, s.
@@ -287,8 +286,11 @@ impl World {
     }
 
     /// An independent copy: same state, same future.
+    ///
+    /// Forces and behaviours are copied by their own ``fork``.
     fn fork(&self) -> Result<World> {
         let inner = self.shared.read(|inner| Ok(inner.fork()))?;
+        inner.take_raised()?;
         Ok(World { shared: Shared::new(inner), notes: self.notes.clone() })
     }
 
@@ -401,14 +403,86 @@ impl World {
         Ok(Articulation::placed(place, robot))
     }
 
-    /// Removes a body, given as a handle or by name. Handles of it raise ``RemovedError`` from then on.
+    /// Removes a body, given as a handle or by name, or a force or behaviour by name. Handles of a body raise ``RemovedError`` from then on.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
+        if let Ok(name) = body.extract::<String>()
+            && self.shared.write(py, |inner| inner.remove_extension(&name))?
+        {
+            return Ok(());
+        }
         let place = self.own_place(body)?;
         place.write(py, |inner| {
             inner.world.remove(place.id)?;
             inner.forget(place.id);
             Ok(())
         })
+    }
+
+    /// Adds a force of your own: an object of a subclass of ``tumble.Force``. Its name is unique among bodies, forces and behaviours.
+    fn add_force(&self, py: Python<'_>, name: &str, force: &Bound<'_, PyAny>) -> Result<()> {
+        py.import("tumble._extension")?.call_method1("check_force", (force,))?;
+        self.shared.write(py, |inner| inner.add_force(name, force))
+    }
+
+    /// Adds a behaviour of your own, an object of a subclass of ``tumble.Behaviour``, to bodies given by name or as handles.
+    fn add_behaviour(&self, py: Python<'_>, name: &str, behaviour: &Bound<'_, PyAny>, bodies: &Bound<'_, PyAny>) -> Result<()> {
+        py.import("tumble._extension")?.call_method1("check_behaviour", (behaviour,))?;
+        let given: Vec<Bound<'_, PyAny>> = match bodies.is_instance_of::<pyo3::types::PyString>() || place_of(bodies).is_ok() {
+            true => vec![bodies.clone()],
+            false => bodies.try_iter()?.collect::<PyResult<_>>()?,
+        };
+        let places = given.iter().map(|body| self.own_place(body)).collect::<Result<Vec<_>>>()?;
+        self.shared.write(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
+    }
+
+    /// Forces of your own by name: a new dict.
+    #[getter]
+    fn forces(&self, py: Python<'_>) -> Result<BTreeMap<String, Py<PyAny>>> {
+        self.shared.read(|inner| Ok(inner.extensions(py)[0].drain(..).collect()))
+    }
+
+    /// Behaviours of your own by name: a new dict.
+    #[getter]
+    fn behaviours(&self, py: Python<'_>) -> Result<BTreeMap<String, Py<PyAny>>> {
+        self.shared.read(|inner| Ok(inner.extensions(py)[1].drain(..).collect()))
+    }
+
+    /// A picture of the world as it is: sRGB and alpha, shape (height, width, 4), uint8, rows from the top. Needs no window.
+    ///
+    /// width, height: pixels, 640 x 480 unless told otherwise. From one of: camera, ``tumble.Camera`` or ``(eye, target)`` in metres; facet,
+    /// ``"cube4:front"``: a facet of a cave, given by path or name, at the size that the cave says; cave: all its facets unfolded into at most
+    /// width x height; else the scene's camera, or one that shows everything. overlays: words of ``tumble run --debug-draw``, such as
+    /// ``"contacts,forces"``. Without a graphics adapter ``PictureError``.
+    #[pyo3(signature = (width=None, height=None, *, camera=None, facet=None, cave=None, overlays=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn render<'py>(
+        &self, py: Python<'py>, width: Option<u32>, height: Option<u32>, camera: Option<&Bound<'py, PyAny>>, facet: Option<&str>, cave: Option<&str>,
+        overlays: Option<&str>,
+    ) -> Result<Bound<'py, PyArray3<u8>>> {
+        Shot::new([width, height], camera, facet, cave, overlays)?.take(py, &self.shared)
+    }
+
+    /// How a notebook shows the world: a PNG, or nothing where there is no graphics adapter.
+    fn _repr_png_(slf: &Bound<'_, Self>) -> Result<Py<PyAny>> {
+        Ok(slf.py().import("tumble._pictures")?.call_method1("repr_png", (slf,))?.unbind())
+    }
+
+    /// Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib (``pip install tumble[plot]``).
+    ///
+    /// ax: the axes to plot on, by default new ones. Returns the axes.
+    #[pyo3(signature = (seconds=5.0, *, ax=None))]
+    fn plot_energy(slf: &Bound<'_, Self>, seconds: f64, ax: Option<&Bound<'_, PyAny>>) -> Result<Py<PyAny>> {
+        Ok(slf.py().import("tumble._plots")?.call_method1("energy", (slf, seconds, ax))?.unbind())
+    }
+
+    /// Steps a fork for ``seconds`` and plots the paths of bodies (default: all that move) as seen along an axis, ``"x"``, ``"y"`` or ``"z"``.
+    ///
+    /// As ``plot_energy`` otherwise.
+    #[pyo3(signature = (seconds=5.0, *, bodies=None, along="y", ax=None))]
+    fn plot_paths(
+        slf: &Bound<'_, Self>, seconds: f64, bodies: Option<&Bound<'_, PyAny>>, along: &str, ax: Option<&Bound<'_, PyAny>>,
+    ) -> Result<Py<PyAny>> {
+        Ok(slf.py().import("tumble._plots")?.call_method1("paths", (slf, seconds, bodies, along, ax))?.unbind())
     }
 
     fn __repr__(&self) -> Result<String> {

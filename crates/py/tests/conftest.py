@@ -1,5 +1,6 @@
 """What the tests share."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -9,3 +10,12 @@ import pytest
 def root():
     """The checkout."""
     return Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture
+def command(root):
+    """The program `tumble`."""
+    program = Path(os.environ.get("TUMBLE_COMMAND", root / "target" / "release" / "tumble"))
+    if not program.is_file():
+        pytest.skip(f"SKIPPED: {program} is not built; `cargo build --release -p tumble` builds it")
+    return program

@@ -1,21 +1,11 @@
 """The same run gives the same bytes as the command line."""
 
 import json
-import os
 import subprocess
-from pathlib import Path
 
 import pytest
 
 import tumble
-
-
-@pytest.fixture
-def command(root):
-    program = Path(os.environ.get("TUMBLE_COMMAND", root / "target" / "release" / "tumble"))
-    if not program.is_file():
-        pytest.skip(f"SKIPPED: {program} is not built; `cargo build --release -p tumble` builds it")
-    return program
 
 
 @pytest.mark.parametrize("scene", ["stack", "billiards", "chain", "robot"])

@@ -1,6 +1,7 @@
 """What goes wrong is a Python exception with the library's words: never an abort, never a deadlock."""
 
 import gc
+import signal
 import threading
 
 import numpy as np
@@ -143,6 +144,19 @@ def test_two_threads_on_one_world_get_an_error_and_no_deadlock():
     assert busy and all("being stepped by another thread" in text for text in busy)
     assert world.frame >= 400
     world.step()
+
+
+def test_ctrl_c_ends_a_long_step_between_two_frames():
+    world = tumble.World.load("stack")
+    timer = threading.Timer(0.2, signal.raise_signal, [signal.SIGINT])
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        world.step(10_000_000)
+    timer.join(timeout=60)
+    stopped = world.frame
+    assert 0 < stopped < 10_000_000 and world.time == pytest.approx(stopped * world.dt)
+    world.step()
+    assert world.frame == stopped + 1
 
 
 def test_worlds_of_their_own_run_in_threads_of_their_own():

@@ -9,6 +9,7 @@ mod scene;
 mod shadow;
 mod stage;
 mod targets;
+mod textures;
 mod window;
 
 use crate::list::bounds::Bounds;
@@ -20,8 +21,10 @@ use meshes::MeshCache;
 use nalgebra::Matrix4;
 use pipelines::Pipelines;
 pub use stage::Stage;
+use stage::Textures;
 use std::sync::{Arc, Mutex, PoisonError};
 use targets::{ShadowMaps, Targets};
+use textures::TextureCache;
 pub use window::{Screen, Shown};
 
 /// Targets of several sizes are kept while they have no more pixels than this together.
@@ -32,6 +35,7 @@ pub struct Renderer {
     gpu: Gpu,
     pipelines: Pipelines,
     meshes: MeshCache,
+    textures: TextureCache,
     finisher: Finisher,
     shadows: Option<ShadowMaps>,
     /// The one used last is the last.
@@ -67,8 +71,9 @@ impl Renderer {
         let gpu = pollster::block_on(Gpu::open(adapter))?;
         let pipelines = Pipelines::new(&gpu.device, gpu.sample_masks);
         let finisher = Finisher::new(&gpu);
+        let textures = TextureCache::new(&gpu, &pipelines.texture_layout);
         gpu.complaint()?;
-        Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), finisher, shadows: None, targets: Vec::new(), picture: None, stages: 0, ends: Default::default() })
+        Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), textures, finisher, shadows: None, targets: Vec::new(), picture: None, stages: 0, ends: Default::default() })
     }
 
     /// The adapter in use: its name, kind and interface.
@@ -166,7 +171,9 @@ impl Renderer {
 
     fn sent(&mut self, list: &DrawList, seen: Option<&Bounds>, part: bool) -> Result<Stage, RenderError> {
         self.stages += 1;
-        let stage = Stage::new(&self.gpu, &mut self.pipelines, &mut self.meshes, list, seen, part, self.stages)?;
+        let textures = self.textures.sync(&self.gpu, &self.pipelines.texture_layout, &list.textures)?;
+        let bound = Textures { white: self.textures.white.clone(), list: textures };
+        let stage = Stage::new(&self.gpu, &mut self.pipelines, &mut self.meshes, bound, list, seen, part, self.stages)?;
         self.gpu.complaint()?;
         Ok(stage)
     }
@@ -276,6 +283,8 @@ impl Gpu {
 
     /// What went wrong on the device since the last call.
     fn complaint(&self) -> Result<(), RenderError> {
+        // a loss is told at the next poll
+        let _ = self.device.poll(wgpu::PollType::Poll);
         if let Some(reason) = self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone() {
             return Err(self.failed(reason));
         }

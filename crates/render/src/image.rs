@@ -44,6 +44,30 @@ impl Image {
         writer.finish().map_err(|e| fail(e.to_string()))
     }
 
+    /// Reads any PNG as a picture to put on surfaces: grey, palettes and 16 bits are made 8-bit RGBA. Sides are at most 8192 pixels.
+    ///
+    /// # Errors
+    /// [`RenderError::File`] names the path and what is wrong.
+    pub fn load_png(path: impl AsRef<Path>) -> Result<Image, RenderError> {
+        let path = path.as_ref();
+        let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
+        let file = File::open(path).map_err(|e| fail(format!("the texture cannot be read: {e}")))?;
+        let mut decoder = png::Decoder::new(BufReader::new(file));
+        decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
+        let mut reader = decoder.read_info().map_err(|e| fail(format!("the texture is no PNG: {e}")))?;
+        let (width, height) = (reader.info().width, reader.info().height);
+        if width > 8192 || height > 8192 {
+            return Err(fail(format!("the texture is {width} x {height} pixels, and each side may have 8192")));
+        }
+        let size = reader.output_buffer_size().ok_or_else(|| fail("the texture is too large".into()))?;
+        let mut bytes = vec![0; size];
+        let info = reader.next_frame(&mut bytes).map_err(|e| fail(format!("the texture is damaged: {e}")))?;
+        let samples = info.color_type.samples();
+        let pixel = |p: &[u8]| if samples < 3 { [p[0], p[0], p[0], 255] } else { [p[0], p[1], p[2], 255] };
+        let rgba = bytes[..info.buffer_size()].chunks_exact(samples).flat_map(pixel).collect();
+        Ok(Image { width, height, rgba })
+    }
+
     /// Reads an 8-bit RGBA PNG such as [`Image::write_png`] makes (golden pictures).
     ///
     /// # Errors

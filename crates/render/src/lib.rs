@@ -36,16 +36,16 @@ mod window;
 
 pub use camera::Camera;
 pub use caption::caption;
-pub use draw::{DebugDraw, Drawing, UnknownOverlay, UpAxis, tree_over_mesh};
+pub use draw::{DebugDraw, Drawing, NamedView, UnknownOverlay, UnknownView, UpAxis, tree_over_mesh};
 pub use error::RenderError;
 pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Warp, calibration_picture, unfold};
 pub use gpu::{Renderer, Screen, Shown, Stage};
 pub use image::Image;
 pub use list::{
-    DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MeshId, Quality, Settings, Shadows, Sky, Sphere,
+    DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere,
     SphereStyle, UnknownQuality,
 };
-pub use material::{Material, Pattern, Shader};
+pub use material::{Material, Pattern, Shader, Texture};
 pub use mesh::{MAX_MESH_VERTICES, MeshData};
 pub use viewpoint::{Lens, Part, Viewpoint};
 pub use window::{Next, WindowApp, WindowOptions, run_window};

@@ -6,11 +6,11 @@ mod quality;
 mod text;
 mod validate;
 pub use quality::{Quality, Shadows, UnknownQuality};
-pub use validate::{MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS};
+pub use validate::{MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES};
 
 pub use debug::{DebugLine, DebugPoint, DebugSphere, DebugStyle, SphereStyle};
 
-use crate::{Camera, Material, MeshData, Pattern};
+use crate::{Camera, Image, Material, MeshData, Pattern};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -191,6 +191,8 @@ impl Default for Settings {
 pub struct DrawList {
     /// Meshes by [`MeshId`]. Shared, so that a list per frame copies nothing and the renderer uploads each once.
     pub meshes: Vec<Arc<MeshData>>,
+    /// Pictures on surfaces, by the number in [`crate::Texture`]; shared like meshes.
+    pub textures: Vec<Arc<Image>>,
     /// Placed meshes.
     pub instances: Vec<Instance>,
     /// Spheres.

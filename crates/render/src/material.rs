@@ -16,6 +16,17 @@ pub struct Material {
     pub pattern: Pattern,
     /// How light is applied.
     pub shader: Shader,
+    /// A picture over the base colour, which then only tints it; none under most.
+    pub texture: Option<Texture>,
+}
+
+/// A picture on a surface: around a sphere as a map of the earth, on all else from three sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Texture {
+    /// Which: its place in [`crate::DrawList::textures`].
+    pub id: usize,
+    /// Side of the square that the picture covers once, m; spheres wear it once around.
+    pub repeat_m: f32,
 }
 
 /// How light is applied to a surface.
@@ -142,7 +153,7 @@ const BALL_COLORS: [[f32; 3]; 9] = [
 impl Material {
     /// Satin plastic.
     pub fn plastic(color: [f32; 3]) -> Self {
-        Material { color, roughness: 0.45, metallic: 0.0, clearcoat: 0.0, pattern: Pattern::Plain, shader: Shader::Lit }
+        Material { color, roughness: 0.45, metallic: 0.0, clearcoat: 0.0, pattern: Pattern::Plain, shader: Shader::Lit, texture: None }
     }
 
     /// Chalky and dull.
@@ -205,10 +216,11 @@ impl Material {
         Material { roughness: 0.7, ..Material::plastic([0.55, 0.56, 0.58]) }.with_pattern(Pattern::Checker { other: [0.40, 0.41, 0.43], size_m })
     }
 
-    /// What its pipelines are made for: the pattern's number, 100 more where light does not matter, 1000 more under lacquer.
+    /// What its pipelines are made for: the pattern's number, 100 more where light does not matter, 1000 more under lacquer,
+    /// 10000 more with a texture.
     pub(crate) fn surface(&self) -> u32 {
         let unlit = self.shader == Shader::Unlit;
-        self.pattern.packed().0 + if unlit { 100 } else { 0 } + if self.clearcoat > 0.0 && !unlit { 1000 } else { 0 }
+        self.pattern.packed().0 + if unlit { 100 } else { 0 } + if self.clearcoat > 0.0 && !unlit { 1000 } else { 0 } + if self.texture.is_some() { 10_000 } else { 0 }
     }
 
     /// The same surface under another pattern.

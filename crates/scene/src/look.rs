@@ -71,7 +71,8 @@ pub struct Look {
     pub metallic: f64,
     /// Strength of a clear varnish on top, 0 to 1. Default 0.
     pub clearcoat: f64,
-    /// A picture (PNG) in the place of the main colour, which then only tints it; relative to the folder of the scene in the file, whole here.
+    /// A picture (PNG) over the main colour, which then only tints it, once every `pattern_scale_m`, and once around a sphere. In the file from the
+    /// folder of the scene; here as it is opened.
     pub texture: Option<PathBuf>,
     /// How much of it is drawn. Default full.
     pub detail: Detail,
@@ -106,10 +107,20 @@ impl Look {
             roughness: f.number_or("roughness", Bound::UNIT, base.roughness),
             metallic: f.number_or("metallic", Bound::UNIT, base.metallic),
             clearcoat: f.number_or("clearcoat", Bound::UNIT, base.clearcoat),
-            texture: f.optional_text("texture").map(|(file, _)| f.log.folder().join(file)).or_else(|| base.texture.clone()),
+            texture: read_texture(f).or_else(|| base.texture.clone()),
             detail: read_detail(f, base.detail),
         }
     }
+}
+
+/// The file of a texture, which must be there.
+fn read_texture(f: &mut Fields<'_>) -> Option<PathBuf> {
+    let (file, value) = f.optional_text("texture")?;
+    let path = f.log.folder().join(file);
+    if !path.is_file() {
+        f.wrong("texture", value, format!("a PNG file; there is none at {}", path.display()));
+    }
+    Some(path)
 }
 
 fn read_detail(f: &mut Fields<'_>, default: Detail) -> Detail {

@@ -88,9 +88,15 @@ pub struct RunOptions {
     /// Frames of the video, and pictures in the folder, per simulated second.
     #[arg(long, value_name = "N", default_value = "30", value_parser = pace)]
     pub fps: f64,
-    /// Draw over the picture: contacts, normals, velocities, forces, tree=LEVEL, all; with commas between them.
+    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, tree=LEVEL, all; with commas between them.
     #[arg(long, value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
+    /// Speed against looks: usual, fast, fastest, and shadows=off|hard|soft, samples=1|4, occlusion=on|off, map=TEXELS; with commas between them.
+    #[arg(long, value_name = "WHAT", default_value = "usual")]
+    pub quality: tumble::render::Quality,
+    /// See from this camera: scene, or the name of an object that carries one.
+    #[arg(long, value_name = "NAME", conflicts_with = "cave")]
+    pub camera: Option<String>,
     /// Restore a saved state before the first step.
     #[arg(long, value_name = "FILE")]
     pub restore: Option<PathBuf>,
@@ -131,7 +137,7 @@ pub struct ViewOptions {
     /// Show all facets of the cave, unfolded; so does --cave without --facet.
     #[arg(long, requires = "cave")]
     pub preview: bool,
-    /// The camera to begin with: scene, front, left, back, right or top.
+    /// The camera to begin with: scene, one that a body or link carries, front, left, back, right or top.
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     /// Draw over the picture: contacts, normals, velocities, forces, tree=LEVEL, all; with commas between them.

@@ -16,3 +16,5 @@ pub use tumble_core as core;
 pub use tumble_net as net;
 pub use tumble_render as render;
 pub use tumble_scene as scene;
+
+pub mod table;

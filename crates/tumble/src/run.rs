@@ -18,7 +18,7 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     let (mut world, notes) = scene.build().map_err(Failure::input)?;
     notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     restore(&mut world, options)?;
-    let mut shots = Shots::new(&scene, options)?;
+    let mut shots = Shots::new(&scene, &world, options)?;
     let mut recorder = recorder(&world, &scene, options)?;
     let start = State::of(&world);
     let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), shots.as_mut(), &scene, options)?;

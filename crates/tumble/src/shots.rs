@@ -5,14 +5,14 @@ use crate::failure::Failure;
 use crate::video::Video;
 use std::path::Path;
 use tumble::core::World;
-use tumble::render::{CaveView, DebugDraw, Drawing, Image, RenderError, Renderer};
+use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer};
 use tumble::scene::SceneFile;
 use tumble::scene::cave::{Facet, resolve_cave};
 
 /// Size of a picture where nothing is said, pixels.
 const USUAL: [u32; 2] = [1280, 720];
-/// Side of the shadow maps of a cave, which hold all that its screens show together.
-const CAVE_SHADOWS: u32 = 4096;
+/// Shadow maps of a cave, which hold all that its screens show together, are this much wider.
+const CAVE_SHADOWS: u32 = 2;
 
 /// Takes pictures of one scene.
 pub struct Shots {
@@ -20,6 +20,8 @@ pub struct Shots {
     renderer: Renderer,
     from: From,
     overlays: DebugDraw,
+    quality: Quality,
+    camera: Option<String>,
     frames: Option<Frames>,
 }
 
@@ -41,7 +43,7 @@ struct Frames {
 impl Shots {
     /// Checks all that can be wrong before the simulation starts. `None` where no picture is wanted, or where there is no graphics adapter:
     /// everything else still counts then, and the message says what brings one.
-    pub fn new(scene: &SceneFile, options: &RunOptions) -> Result<Option<Shots>, Failure> {
+    pub fn new(scene: &SceneFile, world: &World, options: &RunOptions) -> Result<Option<Shots>, Failure> {
         let from = from(scene, options)?;
         if options.picture.is_none() && options.frames_dir.is_none() && options.video.is_none() {
             return match from {
@@ -61,22 +63,37 @@ impl Shots {
             Err(error) => return Err(Failure::run("the picture", error)),
         };
         let frames = frames(&from, options)?;
-        Ok(Some(Shots { drawing: Drawing::new(scene), renderer, from, overlays: options.debug_draw.0, frames }))
+        let drawing = Drawing::new(scene);
+        let (overlays, quality, camera) = (options.debug_draw.0, options.quality, options.camera.clone());
+        let mut shots = Shots { drawing, renderer, from, overlays, quality, camera, frames };
+        // textures are read and the camera is found now
+        shots.list(world).map_err(Failure::input)?;
+        Ok(Some(shots))
+    }
+
+    /// What is drawn of the world as it is now.
+    fn list(&mut self, world: &World) -> Result<DrawList, String> {
+        let mut list = self.drawing.list(world, &self.overlays).map_err(|e| e.to_string())?;
+        self.quality.apply(&mut list.settings);
+        if let Some(name) = &self.camera {
+            list.look_from(world, name).map_err(|e| e.to_string())?;
+        }
+        Ok(list)
     }
 
     /// The world as it is now.
     pub fn take(&mut self, world: &World) -> Result<Image, Failure> {
         let failed = |e: RenderError| Failure::run("the picture", e);
-        let mut list = self.drawing.list(world, &self.overlays).map_err(failed)?;
+        let mut list = self.list(world).map_err(|e| Failure::run("the picture", e))?;
         let renderer = &mut self.renderer;
         match &self.from {
             From::Camera([w, h]) => renderer.render(&list, *w, *h),
             From::Facet(view, facet) => {
-                list.settings.shadow_map_size = CAVE_SHADOWS;
+                list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
                 view.draw(renderer, &list, facet)
             }
             From::Unfolded(view, most) => {
-                list.settings.shadow_map_size = CAVE_SHADOWS;
+                list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
                 view.draw_unfolded(renderer, &list, *most)
             }
         }

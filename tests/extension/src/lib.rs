@@ -5,14 +5,17 @@
 //! | [`Particle`] | 3 freedoms, state `[x, P]` | a sphere that cannot turn | | |
 //! | [`Bead`] | 1 freedom on a cycloid, inertia depends on the angle | a sphere | itself: a stop on the wire | |
 //! | [`Rod`] | | | two objects, or one and a point: fixed distance, or a rope | |
+//! | [`Lookout`] | as a particle | | | carries a camera and a lamp |
 //! | [`Wind`] | | | | drag on everything it is told of |
 
 mod bead;
+mod lookout;
 mod particle;
 mod rod;
 mod wind;
 
 pub use bead::Bead;
+pub use lookout::Lookout;
 pub use particle::Particle;
 pub use rod::{End, Rod};
 pub use wind::Wind;

@@ -42,7 +42,8 @@ type Backs = Mutex<BTreeMap<SocketAddr, Arc<UdpSocket>>>;
 /// Until it is killed.
 pub fn run(options: &Options) -> Result<(), Failure> {
     let server = options.address;
-    let relay = Arc::new(Relay { network: Mutex::new(Network::new(options.seed, options.faults)), earlier: Condvar::new(), start: Instant::now() });
+    let relay =
+        Arc::new(Relay { network: Mutex::new(Network::new(options.seed, options.faults)), earlier: Condvar::new(), start: Instant::now() });
     let front = Arc::new(UdpSocket::bind(options.listen)?);
     let backs: Arc<Backs> = Arc::default();
     {

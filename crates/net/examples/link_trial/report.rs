@@ -37,7 +37,10 @@ pub fn print(options: &Options, figures: &mut Figures, bytes: u64, counters: &[L
     row("whole barrier: state to all told to present", &mut figures.barrier_ns);
     row("skew of presentation", &mut figures.skew_ns);
     let rate = options.frames as f64 / figures.wall.as_secs_f64();
-    println!("held {rate:.1} Hz, {} frames more than a frame late; missing, double, torn or out of order: {}", figures.behind, figures.faults);
+    println!(
+        "held {rate:.1} Hz, {} frames more than a frame late; missing, double, torn or out of order: {}",
+        figures.behind, figures.faults
+    );
     let sum = |of: fn(&LinkCounters) -> u64| counters.iter().map(of).sum::<u64>();
     let refused: Vec<String> = Refused::ALL
         .into_iter()

@@ -91,12 +91,16 @@ impl Run {
         let end = Instant::now() + Duration::from_secs(10);
         while replies.len() < self.all.len() {
             match self.link.recv(Duration::from_secs(1), &mut self.message)? {
-                Some((_, LinkEvent::Message)) if (word(&self.message, 0), word(&self.message, 1)) == (kind, frame) => replies.push(self.message.clone()),
+                Some((_, LinkEvent::Message)) if (word(&self.message, 0), word(&self.message, 1)) == (kind, frame) => {
+                    replies.push(self.message.clone())
+                }
                 Some((facet, event)) => {
                     let what = (word(&self.message, 0), word(&self.message, 1));
                     return Err(format!("frame {frame}: facet {facet}: {event:?} {what:?} instead of {:?}", (kind, frame)).into());
                 }
-                None if Instant::now() > end => return Err(format!("frame {frame}: {} of {} facets answered", replies.len(), self.all.len()).into()),
+                None if Instant::now() > end => {
+                    return Err(format!("frame {frame}: {} of {} facets answered", replies.len(), self.all.len()).into());
+                }
                 None => {}
             }
         }

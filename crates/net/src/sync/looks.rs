@@ -156,7 +156,6 @@ fn get_look(rest: &mut Bytes<'_>) -> Result<Look, Fault> {
     let shader = text(rest)?;
     let count = rest.u8()?;
     let properties = (0..count).map(|_| Ok((text(rest)?, rest.f64()?))).collect::<Result<_, Fault>>()?;
-    // a path from outside is never opened, so pictures over the colour stay at home
     Ok(Look { color: [r, g, b], roughness, metallic, shader, properties, ..Look::default() })
 }
 

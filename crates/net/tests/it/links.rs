@@ -16,7 +16,7 @@ const FRAMES: u64 = 60;
 fn scene() -> World {
     let mut world = World::new(Settings::default()).unwrap();
     for k in 0..100 {
-        let ball = RigidBody::with_mass(&format!("ball {k}"), Shape::sphere(0.1).unwrap(), 1.0).unwrap();
+        let ball = RigidBody::with_mass(format!("ball {k}"), Shape::sphere(0.1).unwrap(), 1.0).unwrap();
         world.add(ball.at(Pose::translation(f64::from(k), 0.0, 1.0))).unwrap();
     }
     world

@@ -90,7 +90,9 @@ fn a_facet_that_looks_in_late_asks_for_what_it_missed() {
     for k in 0..20u64 {
         assert!(cave.facets[1].send(Delivery::Reliable, &message(k, 50)).unwrap());
     }
-    cave.until(|cave| cave.at_facet[2].len() == 300 && cave.at_facet[1].len() == 100 && cave.at_facet[0].len() == 100 && cave.at_server.len() == 20);
+    cave.until(|cave| {
+        cave.at_facet[2].len() == 300 && cave.at_facet[1].len() == 100 && cave.at_facet[0].len() == 100 && cave.at_server.len() == 20
+    });
     for facet in 0..3 {
         let step = if facet == 2 { 1 } else { 3 };
         assert!(cave.at_facet[facet].iter().enumerate().all(|(k, got)| *got == (LinkEvent::Message, message(step * k as u64, 1000))));
@@ -108,6 +110,34 @@ fn of_newest_messages_the_last_arrives() {
     }
     cave.until(|cave| cave.at_facet[0].last().is_some_and(|(_, got)| *got == message(99, 5000)));
     assert!(cave.at_facet[0].len() < 100);
+}
+
+/// As SIGSTOP and SIGCONT make it: one side does nothing for longer than the time of silence, the other goes on.
+#[test]
+fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
+    let mut cave = Cave::new("stopped", 2);
+    let end = Instant::now() + Duration::from_secs(20);
+    while cave.at_server.is_empty() {
+        cave.look_in_on_server();
+        cave.look_in_on(1);
+        assert!(Instant::now() < end);
+    }
+    assert_eq!(cave.at_server.pop().map(|(facet, event, _)| (facet, event)), Some((0, LinkEvent::Closed(Closed::Silent))));
+    cave.until(|cave| cave.at_server.len() == 1 && cave.at_facet[0].len() == 2);
+    let events: Vec<_> = cave.at_facet[0].drain(..).map(|(event, _)| event).collect();
+    assert_eq!(events, [LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened]);
+    assert_eq!(cave.at_server.pop().map(|(facet, event, _)| (facet, event)), Some((0, LinkEvent::Opened)));
+    assert!(cave.at_facet[1].is_empty());
+
+    while cave.at_facet[1].is_empty() || cave.at_facet[0].is_empty() {
+        cave.look_in_on(0);
+        cave.look_in_on(1);
+        assert!(Instant::now() < end);
+    }
+    cave.until(|cave| cave.at_facet.iter().all(|events| events.len() == 2));
+    for events in &cave.at_facet {
+        assert_eq!(events.iter().map(|(event, _)| *event).collect::<Vec<_>>(), [LinkEvent::Closed(Closed::Silent), LinkEvent::Opened]);
+    }
 }
 
 #[test]

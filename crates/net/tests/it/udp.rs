@@ -137,7 +137,9 @@ fn stream(frames: u64, length: usize, seed: u64, faults: Faults, numbering: Numb
     let ratio = (cave.network.bytes - before) as f64 / (frames as f64 * length as f64);
     let outcome = Outcome { latencies, ratio };
     let [p50, p99, p999, worst] = [0.5, 0.99, 0.999, 1.0].map(|q| 1e3 * outcome.quantile(q).as_secs_f64());
-    println!("{frames} frames of {length} bytes: p50 {p50:.2} ms, p99 {p99:.2} ms, p99.9 {p999:.2} ms, worst {worst:.2} ms, {ratio:.3} times the bytes");
+    println!(
+        "{frames} frames of {length} bytes: p50 {p50:.2} ms, p99 {p99:.2} ms, p99.9 {p999:.2} ms, worst {worst:.2} ms, {ratio:.3} times the bytes"
+    );
     outcome
 }
 

@@ -90,7 +90,7 @@ fn attacks_change_nothing_and_are_counted_by_reason() {
             cave.now = cave.network.next().unwrap_or(until).clamp(cave.now, until);
             while let Some((from, to, datagram)) = cave.network.receive(cave.now) {
                 let to_server = to == SERVER;
-                let mut receive = |cave: &mut Cave, datagram: &[u8]| match to_server {
+                let receive = |cave: &mut Cave, datagram: &[u8]| match to_server {
                     true => cave.server.receive(cave.now, from, datagram),
                     false => cave.facets[0].receive(cave.now, from, datagram),
                 };
@@ -142,7 +142,11 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
         let mut nonce = [0; 32];
         nonce[..8].copy_from_slice(&k.to_le_bytes());
         let cookie = [random.next_u64() as u8; 32];
-        Hello { nonce, facet: (k % 6) as u16, cookie }.write(if k % 2 == 0 { Kind::Hello } else { Kind::Answer }, &handshake, &mut datagram);
+        Hello { nonce, facet: (k % 6) as u16, cookie }.write(
+            if k % 2 == 0 { Kind::Hello } else { Kind::Answer },
+            &handshake,
+            &mut datagram,
+        );
         server.receive(now, from, &datagram);
         asked += datagram.len();
         let largest = datagram.len();

@@ -44,5 +44,13 @@ class BusyError(TumbleError, RuntimeError):
     """A world that is being stepped: by another thread, or by the step that this very call comes from."""
 
 
+class PictureError(TumbleError, RuntimeError):
+    """No graphics adapter, not even a software one, or one that fails; the text says what brings one."""
+
+
+class RecordingError(TumbleError, ValueError):
+    """A file that is no recording, or a damaged one; says where."""
+
+
 class InternalError(TumbleError, RuntimeError):
     """A fault of tumble itself. The world it happened in refuses further use; please report it."""

@@ -38,3 +38,12 @@ def _item(values: tuple[Any, ...], key: Any) -> Any:
     if isinstance(key, str) and key in values._fields:  # type: ignore[attr-defined]
         return getattr(values, key)
     return tuple.__getitem__(values, key)
+
+
+class SphereLevel(NamedTuple):
+    """The balls of one level of a :class:`SphereTree`, in the axes of its mesh."""
+
+    centers: NDArray[np.float64]
+    """Shape (n, 3), m."""
+    radii: NDArray[np.float64]
+    """Shape (n,), m."""

@@ -1,18 +1,23 @@
 //! From a world and its scene to a draw list. Reads the world, never writes it.
 
+mod detail;
 mod overlay;
 mod surface;
 mod tree;
+mod views;
 
 pub use overlay::{DebugDraw, UnknownOverlay};
 pub use tree::{UpAxis, tree_over_mesh};
+pub use views::{NamedView, UnknownView};
 
-use crate::{Camera, DrawList, Ground, Light, MeshData, MeshId, RenderError, Sky};
+use crate::{Camera, DebugStyle, DrawList, Ground, Image, Light, Material, MeshData, MeshId, Pattern, RenderError, Sky, Texture};
 use nalgebra::{Isometry3, Point3, Vector3};
+use overlay::islands;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 use tumble_collide::{Pose, Shape, TriMesh, Vec3};
-use tumble_core::{Visual, World};
+use tumble_core::{Detail, Look, Visual, World};
 use tumble_scene::{LightKind, LightSpec, SceneFile};
 
 /// Half the side of the square that stands for a half-space, metres.
@@ -29,12 +34,20 @@ const ROUNDING: f32 = 0.06;
 /// Makes draw lists of one scene; meshes are converted once and shared by all frames.
 pub struct Drawing {
     meshes: BTreeMap<String, Arc<MeshData>>,
+    edges: BTreeMap<String, Vec<[[f32; 3]; 2]>>,
+    textures: BTreeMap<Arc<Path>, Arc<Image>>,
     base: DrawList,
     camera: Option<Camera>,
+    /// How much of every object is drawn, instead of what each one says.
+    pub detail: Option<Detail>,
 }
 
-/// Meshes of one list by the key of their shape.
-type Placed = BTreeMap<String, MeshId>;
+/// Meshes of one list by the key of their shape, and textures by their file.
+#[derive(Default)]
+struct Placed {
+    meshes: BTreeMap<String, MeshId>,
+    textures: BTreeMap<Arc<Path>, usize>,
+}
 
 impl Drawing {
     /// Camera, lights, sky and floor of the scene.
@@ -63,7 +76,7 @@ impl Drawing {
             near_m: c.near_m as f32,
             far_m: c.far_m as f32,
         });
-        Drawing { meshes: BTreeMap::new(), base, camera }
+        Drawing { meshes: BTreeMap::new(), edges: BTreeMap::new(), textures: BTreeMap::new(), base, camera, detail: None }
     }
 
     /// The world as it is now, with overlays.
@@ -72,13 +85,20 @@ impl Drawing {
     /// [`RenderError`] where a mesh has more vertices than can be drawn.
     pub fn list(&mut self, world: &World, overlays: &DebugDraw) -> Result<DrawList, RenderError> {
         let mut list = self.base.clone();
-        let mut placed = Placed::new();
+        let mut placed = Placed::default();
+        let islands = overlays.islands.then(|| islands(world));
         for &id in world.ids() {
             let Some(object) = world.object(id) else { continue };
-            let Some(renderable) = object.renderable().filter(|_| world.status(id).is_some_and(|s| s.alive)) else { continue };
-            for visual in renderable.visuals() {
+            if !world.status(id).is_some_and(|s| s.alive) {
+                continue;
+            }
+            for mount in object.light().map_or(&[][..], |l| l.lights()) {
+                list.lights.extend(world.site(id, mount.part).map(|site| views::carried_light(mount, &(site.pose * mount.pose))));
+            }
+            let tint = islands.as_ref().and_then(|islands| islands.get(&id)).copied();
+            for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
                 let Some(site) = world.site(id, visual.part) else { continue };
-                self.place(&mut list, &mut placed, object.name(), visual, &(site.pose * visual.pose))?;
+                self.place(&mut list, &mut placed, object.name(), visual, &(site.pose * visual.pose), tint)?;
             }
         }
         list.camera = self.camera.unwrap_or_else(|| list.framing_camera(Vector3::new(-0.5, 1.0, -0.5)));
@@ -86,26 +106,88 @@ impl Drawing {
         Ok(list)
     }
 
-    fn place(&mut self, list: &mut DrawList, placed: &mut Placed, name: &str, visual: &Visual, pose: &Pose) -> Result<(), RenderError> {
-        let material = surface::of_look(&visual.look, name);
+    fn place(&mut self, list: &mut DrawList, placed: &mut Placed, name: &str, visual: &Visual, pose: &Pose, tint: Option<[f32; 3]>) -> Result<(), RenderError> {
+        let detail = self.detail.unwrap_or(visual.look.detail);
+        let mut material = match tint {
+            Some(color) => Material::matte(color),
+            None => surface::of_look(&visual.look, name),
+        };
+        if detail == Detail::Full && tint.is_none() {
+            material.texture = self.texture(list, placed, &visual.look)?;
+        } else {
+            material = Material { pattern: Pattern::Plain, clearcoat: 0.0, ..material };
+        }
+        if let Detail::SphereTree(level) = detail
+            && detail::draw_balls(list, &visual.shape, level, pose, material).is_some()
+        {
+            return Ok(());
+        }
+        if detail == Detail::Wireframe {
+            return self.place_edges(list, visual, pose, material.color);
+        }
         if let Shape::Sphere { radius } = visual.shape {
             list.add_sphere(Point3::from(small(&pose.translation.vector)), radius as f32, pose.rotation.cast(), material);
             return Ok(());
         }
-        let key = key(&visual.shape);
-        let mesh = match placed.get(&key) {
+        let simple = detail == Detail::Simplified;
+        let key = if simple { format!("simple {}", key(&visual.shape)) } else { key(&visual.shape) };
+        let mesh = match placed.meshes.get(&key) {
             Some(mesh) => *mesh,
             None => {
                 let data = match self.meshes.get(&key) {
                     Some(data) => data.clone(),
-                    None => self.meshes.entry(key.clone()).or_insert(Arc::new(mesh_of(&visual.shape)?)).clone(),
+                    None => {
+                        let full = mesh_of(&visual.shape)?;
+                        let data = if simple { detail::simplified(&full) } else { full };
+                        self.meshes.entry(key.clone()).or_insert(Arc::new(data)).clone()
+                    }
                 };
-                *placed.entry(key).or_insert(list.add_mesh(data))
+                *placed.meshes.entry(key).or_insert(list.add_mesh(data))
             }
         };
         let pose: Isometry3<f32> = pose.cast();
         list.add_instance(mesh, pose, material).casts_shadow = !matches!(visual.shape, Shape::HalfSpace);
         Ok(())
+    }
+}
+
+impl Drawing {
+    /// A wireframe: rings around a ball, else the edges of the mesh.
+    fn place_edges(&mut self, list: &mut DrawList, visual: &Visual, pose: &Pose, color: [f32; 3]) -> Result<(), RenderError> {
+        let pose: Isometry3<f32> = pose.cast();
+        if let Shape::Sphere { radius } = visual.shape {
+            list.wire_sphere(pose.translation.vector.into(), radius as f32, DebugStyle::new(color).width(1.5));
+            return Ok(());
+        }
+        let key = key(&visual.shape);
+        if !self.edges.contains_key(&key) {
+            let mesh = match &visual.shape {
+                // without the roundings, which would be edges beside edges
+                Shape::Box { half_extents } => MeshData::cuboid(small(half_extents).into()),
+                other => mesh_of(other)?,
+            };
+            self.edges.insert(key.clone(), detail::edges(&mesh));
+        }
+        detail::draw_edges(list, &self.edges[&key], &pose, color);
+        Ok(())
+    }
+
+    /// The texture of a look in the list, its file read when it is first met.
+    fn texture(&mut self, list: &mut DrawList, placed: &mut Placed, look: &Look) -> Result<Option<Texture>, RenderError> {
+        let Some(path) = &look.texture else { return Ok(None) };
+        let repeat_m = look.properties.iter().find(|(name, _)| name == "scale_m").map_or(1.0, |(_, value)| *value as f32);
+        let id = match placed.textures.get(path) {
+            Some(id) => *id,
+            None => {
+                if !self.textures.contains_key(path) {
+                    self.textures.insert(path.clone(), Arc::new(Image::load_png(path)?));
+                }
+                list.textures.push(self.textures[path].clone());
+                placed.textures.insert(path.clone(), list.textures.len() - 1);
+                list.textures.len() - 1
+            }
+        };
+        Ok(Some(Texture { id, repeat_m }))
     }
 }
 

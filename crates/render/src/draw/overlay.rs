@@ -2,10 +2,11 @@
 
 use super::small;
 use crate::{DebugStyle, DrawList};
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
-use tumble_core::collide::Shape;
-use tumble_core::{ContactPoint, Mode, World};
+use tumble_core::collide::{Pose, Shape, Vec3};
+use tumble_core::{ArticulatedBody, Closure, ClosureKind, ContactPoint, Joint, Mode, ObjectId, World};
 
 /// Which overlays to draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,13 +19,19 @@ pub struct DebugDraw {
     pub velocities: bool,
     /// Contact forces.
     pub forces: bool,
+    /// Axes of joints, and anchors of closures.
+    pub joints: bool,
+    /// Axes of every part: x red, y green, z blue.
+    pub frames: bool,
+    /// Objects that are solved together, each group in a colour of its own.
+    pub islands: bool,
     /// A level of every sphere tree, 0 for the root.
     pub tree_level: Option<u32>,
 }
 
 /// A word that names no overlay.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no overlay '{0}'; wanted contacts, normals, velocities, forces, tree=LEVEL or all, with commas between them")]
+#[error("no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, tree=LEVEL or all, with commas between them")]
 pub struct UnknownOverlay(String);
 
 impl FromStr for DebugDraw {
@@ -38,7 +45,10 @@ impl FromStr for DebugDraw {
                 "normals" => draw.normals = true,
                 "velocities" => draw.velocities = true,
                 "forces" => draw.forces = true,
-                "all" => draw = DebugDraw { contacts: true, normals: true, velocities: true, forces: true, ..draw },
+                "joints" => draw.joints = true,
+                "frames" => draw.frames = true,
+                "islands" => draw.islands = true,
+                "all" => draw = DebugDraw { contacts: true, normals: true, velocities: true, forces: true, joints: true, frames: true, ..draw },
                 other => {
                     let level = other.strip_prefix("tree=").and_then(|n| n.parse().ok());
                     draw.tree_level = Some(level.ok_or_else(|| UnknownOverlay(other.to_string()))?);
@@ -82,10 +92,110 @@ impl DebugDraw {
             let Some(site) = world.site(id, 0).filter(|s| s.velocity.norm() > 1e-3) else { continue };
             list.arrow(Point3::from(small(&site.position())), small(&(LOOK_AHEAD * site.velocity)), DebugStyle::new([0.1, 0.9, 0.3]).width(3.0).on_top());
         }
+        if self.frames {
+            frames(world, list, 0.3 * size);
+        }
+        if self.joints {
+            joints(world, list, 0.5 * size);
+        }
         if let Some(level) = self.tree_level {
             trees(world, list, level);
         }
     }
+}
+
+/// The axes of every part that is drawn.
+fn frames(world: &World, list: &mut DrawList, length: f32) {
+    for &id in world.ids() {
+        let visuals = world.object(id).and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
+        let parts: BTreeSet<usize> = visuals.iter().map(|v| v.part).collect();
+        for site in parts.into_iter().filter_map(|part| world.site(id, part)) {
+            let pose: Isometry3<f32> = site.pose.cast();
+            for (axis, color) in [[0.9, 0.1, 0.1], [0.1, 0.75, 0.15], [0.15, 0.3, 1.0]].into_iter().enumerate() {
+                let end = pose * Point3::from(Vector3::ith(axis, length));
+                list.line(pose.translation.vector.into(), end, DebugStyle::new(color).width(2.5).on_top());
+            }
+        }
+    }
+}
+
+const HINGE: [f32; 3] = [1.0, 0.55, 0.05];
+const SLIDER: [f32; 3] = [0.1, 0.8, 0.85];
+const BALL: [f32; 3] = [0.85, 0.25, 0.9];
+
+/// Joints: a dot, and an arrow along the axis of a hinge or slider. Closures: a dot at both ends, and a line that shows how far they are apart.
+fn joints(world: &World, list: &mut DrawList, length: f32) {
+    let mut joint = |at: Point3<f32>, axis: Option<Vector3<f32>>, color: [f32; 3]| {
+        let style = DebugStyle::new(color).on_top();
+        list.point(at, style.width(7.0));
+        if let Some(axis) = axis {
+            list.arrow(at - 0.5 * length * axis, length * axis, style.width(2.5));
+        }
+    };
+    for &id in world.ids() {
+        if let Some(body) = world.get::<ArticulatedBody>(id) {
+            for (link, l) in body.model().links().iter().enumerate() {
+                let Some(site) = world.site(id, link) else { continue };
+                let (at, along) = (Point3::from(small(&site.position())), |axis: &Vec3| Some(small(&(site.pose.rotation * axis))));
+                match &l.joint {
+                    Joint::Revolute { axis } => joint(at, along(axis), HINGE),
+                    Joint::Prismatic { axis } => joint(at, along(axis), SLIDER),
+                    Joint::Spherical => joint(at, None, BALL),
+                    Joint::Fixed | Joint::Floating => {}
+                }
+            }
+        }
+        if let Some(closure) = world.get::<Closure>(id) {
+            for side in closure.sides() {
+                let carrier = match side.part {
+                    Some((of, part)) => world.site(of, part).map(|site| site.pose),
+                    None => Some(Pose::identity()),
+                };
+                let Some(frame) = carrier.map(|pose| pose * side.frame) else { continue };
+                let axis = Some(small(&(frame.rotation * Vec3::z())));
+                let at = Point3::from(small(&frame.translation.vector));
+                match closure.kind() {
+                    ClosureKind::Hinge => joint(at, axis, HINGE),
+                    ClosureKind::Slider => joint(at, axis, SLIDER),
+                    ClosureKind::Point | ClosureKind::Weld => joint(at, None, BALL),
+                }
+            }
+        }
+    }
+}
+
+/// A colour for each moving object: the same where contacts or closures join them, directly or through others that move. Objects that nothing joins are grey.
+pub(super) fn islands(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
+    let moves = |id: ObjectId| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic);
+    let closures = world.ids().iter().filter_map(|&id| world.get::<Closure>(id)).filter_map(|c| {
+        let [a, b] = c.sides();
+        Some((a.part?.0, b.part?.0))
+    });
+    let contacts = world.contacts().iter().filter(|c| c.gap <= 1e-3 || c.force.norm() > 0.0).map(|c| (c.a, c.b));
+    let pairs: Vec<(ObjectId, ObjectId)> = contacts.chain(closures).filter(|(a, b)| moves(*a) && moves(*b) && a != b).collect();
+    let mut root: BTreeMap<ObjectId, ObjectId> = world.ids().iter().filter(|id| moves(**id)).map(|&id| (id, id)).collect();
+    fn find(root: &BTreeMap<ObjectId, ObjectId>, mut id: ObjectId) -> ObjectId {
+        while root[&id] != id {
+            id = root[&id];
+        }
+        id
+    }
+    for (a, b) in pairs {
+        let (a, b) = (find(&root, a), find(&root, b));
+        root.insert(a.max(b), a.min(b));
+    }
+    let mut members: BTreeMap<ObjectId, Vec<ObjectId>> = BTreeMap::new();
+    // in the order of the world, so that colours stay while islands do
+    let order: Vec<ObjectId> = world.ids().iter().copied().filter(|id| root.contains_key(id)).collect();
+    order.iter().for_each(|&id| members.entry(find(&root, id)).or_default().push(id));
+    let mut colors = SHELL_COLORS.iter().cycle();
+    let mut out = BTreeMap::new();
+    for first in order.iter().filter(|id| members.contains_key(id)) {
+        let group = &members[first];
+        let color = if group.len() == 1 { [0.55, 0.56, 0.58] } else { *colors.next().unwrap_or(&SHELL_COLORS[0]) };
+        out.extend(group.iter().map(|&id| (id, color)));
+    }
+    out
 }
 
 /// 1 where the arrows of a contact are those of its `a`, -1 where they are those of its `b`: of the body that moves, or of the upper one.

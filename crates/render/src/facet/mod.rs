@@ -13,6 +13,7 @@ mod view;
 mod warp;
 
 pub use blend::Blend;
+pub(crate) use blend::encoded;
 pub(crate) use compose::blank;
 pub use calibration::{CalibrationPattern, calibration_picture};
 pub use perspective::FacetView;

@@ -106,14 +106,15 @@ pub fn instance(x: &Instance, out: &mut Vec<f32>) {
     for i in 0..3 {
         out.extend([r[(i, 0)], r[(i, 1)], r[(i, 2)], x.pose.translation.vector[i]]);
     }
-    material(&x.material, out);
+    material(&x.material, x.material.texture.map_or(0.0, |t| t.repeat_m), out);
 }
 
 /// A sphere: centre and radius, turn, material.
 pub fn sphere(s: &Sphere, out: &mut Vec<f32>) {
     let (c, q) = (s.center, s.orientation.coords);
     out.extend([c.x, c.y, c.z, s.radius, q.x, q.y, q.z, q.w]);
-    material(&s.material, out);
+    // a sphere wears its texture once around
+    material(&s.material, 0.0, out);
 }
 
 /// A translucent sphere: its opacity takes the place of the roughness.
@@ -131,8 +132,8 @@ pub fn stroke(s: &Stroke, out: &mut Vec<f32>) {
     out.extend([r, g, b, s.style.opacity, f32::from(u8::from(s.round)), 0.0, 0.0, 0.0]);
 }
 
-fn material(m: &Material, out: &mut Vec<f32>) {
+fn material(m: &Material, repeat_m: f32, out: &mut Vec<f32>) {
     let (_, other, size) = m.pattern.packed();
     let ([r, g, b], [or, og, ob]) = (linear3(m.color), linear3(other));
-    out.extend([r, g, b, m.roughness, or, og, ob, m.metallic, m.clearcoat, 0.0, size[0], size[1]]);
+    out.extend([r, g, b, m.roughness, or, og, ob, m.metallic, m.clearcoat, repeat_m, size[0], size[1]]);
 }

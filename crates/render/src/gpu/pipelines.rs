@@ -75,6 +75,7 @@ pub struct Pipelines {
     pub view_layout: BindGroupLayout,
     pub scene_layout: BindGroupLayout,
     pub occlusion_layout: BindGroupLayout,
+    pub texture_layout: BindGroupLayout,
     pub shadow_sampler: wgpu::Sampler,
     /// Floor, meshes, spheres, and spheres that the eye is near to: depth alone.
     pub depth: [RenderPipeline; 4],
@@ -113,6 +114,9 @@ impl Pipelines {
                 texture(2, NUMBERS, wgpu::TextureViewDimension::D2),
             ],
         );
+        let filtered = wgpu::TextureSampleType::Float { filterable: true };
+        let albedo = [texture(0, filtered, wgpu::TextureViewDimension::D2), entry(1, BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
+        let texture_layout = layout(device, "texture", &albedo);
         let pixels = shader(device, "picture", &[PICTURE_WGSL, EDGE_PIXELS_WGSL].concat());
         let samples = if sample_masks { shader(device, "picture", &[PICTURE_WGSL, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
         let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
@@ -152,6 +156,7 @@ impl Pipelines {
             view_layout,
             scene_layout,
             occlusion_layout,
+            texture_layout,
             modules: [samples, pixels],
             known: BTreeMap::new(),
         }
@@ -190,13 +195,14 @@ impl Pipelines {
         let flag = |on: bool| f64::from(u8::from(on));
         let constants = [
             ("SURFACE", f64::from(surface % 1000)),
-            ("COAT", flag(surface >= 1000)),
+            ("COAT", flag(surface / 1000 % 10 == 1)),
+            ("TEXTURED", flag(surface >= 10_000)),
             ("SHADOWS", f64::from(variant.shadows)),
             ("OCCLUSION", flag(variant.occlusion)),
             ("SOFTBOX", flag(variant.softbox)),
         ];
         let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: variant.samples, constants: &constants };
-        plan.build(device, &self.modules[usize::from(first)], &[Some(&self.view_layout), Some(&self.scene_layout)])
+        plan.build(device, &self.modules[usize::from(first)], &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)])
     }
 }
 

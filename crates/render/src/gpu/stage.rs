@@ -25,7 +25,8 @@ pub struct Stage {
     shells: Vec<DebugSphere>,
     groups: Vec<Group>,
     instances: Buffer,
-    ground: Option<(MeshBuffers, Buffer, u32)>,
+    /// With its surface and texture.
+    ground: Option<(MeshBuffers, Buffer, (u32, Option<usize>))>,
     spheres: Buffer,
     balls: Vec<(Point3<f32>, f32)>,
     /// The same numbers as a texture, for pictures that light each pixel once.
@@ -34,11 +35,25 @@ pub struct Stage {
     /// First and last number of the spheres of each group.
     sphere_ranges: Buffer,
     strokes: [Batch; 2],
+    textures: Textures,
+}
+
+/// Textures of a list, bound.
+pub(super) struct Textures {
+    pub white: BindGroup,
+    pub list: Vec<BindGroup>,
+}
+
+impl Textures {
+    fn of(&self, number: Option<usize>) -> &BindGroup {
+        number.and_then(|i| self.list.get(i)).unwrap_or(&self.white)
+    }
 }
 
 /// Items with one surface, side by side in a buffer; those that throw shadows first.
 struct Same {
     surface: u32,
+    texture: Option<usize>,
     all: Range<u32>,
     casters: Range<u32>,
 }
@@ -57,7 +72,8 @@ pub struct Batch {
 
 impl Stage {
     /// `seen`: what shadows, floor and occlusion are fitted to; `part`: whether that is all there is.
-    pub(crate) fn new(gpu: &Gpu, pipelines: &mut Pipelines, meshes: &mut MeshCache, list: &DrawList, seen: Option<&Bounds>, part: bool, serial: u64) -> Result<Self, RenderError> {
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn new(gpu: &Gpu, pipelines: &mut Pipelines, meshes: &mut MeshCache, textures: Textures, list: &DrawList, seen: Option<&Bounds>, part: bool, serial: u64) -> Result<Self, RenderError> {
         let s = &list.settings;
         let shadows = if s.shadows == Shadows::Off { Vec::new() } else { scene::shadow_eyes(list, seen) };
         let reach = scene::occlusion_reach(list, seen, part);
@@ -82,6 +98,7 @@ impl Stage {
             sphere_data: sphere_texture(gpu, if s.samples == 1 { sphere_floats } else { Vec::new() })?,
             sphere_groups,
             sphere_ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), wgpu::BufferUsages::VERTEX, "sphere groups")?,
+            textures,
             strokes: [stroke_batch(gpu, list, false)?, stroke_batch(gpu, list, true)?],
         };
         pipelines.prepare(&gpu.device, stage.keys());
@@ -91,7 +108,7 @@ impl Stage {
     /// All pipelines that a picture of it may need.
     fn keys(&self) -> impl Iterator<Item = Key> {
         let fixed = [(Pass::Sky, 0), (Pass::Shell, 0), (Pass::Line, 0), (Pass::LineOnTop, 0)];
-        let ground = self.ground.iter().map(|(_, _, surface)| (Pass::Ground, *surface));
+        let ground = self.ground.iter().map(|(_, _, (surface, _))| (Pass::Ground, *surface));
         let meshes = self.groups.iter().map(|g| (Pass::Mesh, g.same.surface));
         let spheres = self.sphere_groups.iter().map(|g| (Pass::Sphere, g.surface));
         fixed.into_iter().chain(ground).chain(meshes).chain(spheres).map(|(pass, surface)| (pass, surface, self.variant))
@@ -135,15 +152,18 @@ impl Stage {
     /// Everything in colour, with the view's own shells.
     pub(super) fn draw_picture(&self, pass: &mut RenderPass, pipelines: &Pipelines, shells: &Batch) {
         let select = |pass: &mut RenderPass, which, surface| pipelines.of((which, surface, self.variant)).map(|p| pass.set_pipeline(p)).is_some();
+        pass.set_bind_group(2, &self.textures.white, &[]);
         if select(pass, Pass::Sky, 0) {
             pass.draw(0..3, 0..1);
         }
         for g in &self.groups {
+            pass.set_bind_group(2, self.textures.of(g.same.texture), &[]);
             if select(pass, Pass::Mesh, g.same.surface) {
                 draw_mesh(pass, &g.mesh, &self.instances, g.same.all.clone());
             }
         }
         for (i, same) in self.sphere_groups.iter().enumerate() {
+            pass.set_bind_group(2, self.textures.of(same.texture), &[]);
             if !select(pass, Pass::Sphere, same.surface) {
                 continue;
             }
@@ -155,9 +175,10 @@ impl Stage {
                 pass.draw(0..4, same.all.clone());
             }
         }
-        if let Some((mesh, instance, surface)) = &self.ground
+        if let Some((mesh, instance, (surface, texture))) = &self.ground
             && select(pass, Pass::Ground, *surface)
         {
+            pass.set_bind_group(2, self.textures.of(*texture), &[]);
             draw_mesh(pass, mesh, instance, 0..1);
         }
         for (which, batch) in [(Pass::Line, &self.strokes[0]), (Pass::Shell, shells), (Pass::LineOnTop, &self.strokes[1])] {
@@ -202,13 +223,13 @@ fn draw_mesh(pass: &mut RenderPass, mesh: &MeshBuffers, instances: &Buffer, rang
 fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result<(Vec<Group>, Buffer), RenderError> {
     let items = &list.instances;
     let mut order: Vec<usize> = (0..items.len()).collect();
-    let kind = |i: usize| (items[i].mesh, items[i].material.surface());
+    let kind = |i: usize| (items[i].mesh, items[i].material.surface(), items[i].material.texture.map(|t| t.id));
     order.sort_by_key(|&i| (kind(i), !items[i].casts_shadow, i));
     let mut floats = Vec::with_capacity(data::INSTANCE_FLOATS as usize * items.len());
     order.iter().for_each(|&i| data::instance(&items[i], &mut floats));
     let mut groups = Vec::new();
     for (same, first) in runs(&order, kind, |i| items[i].casts_shadow) {
-        groups.push(Group { mesh: meshes[items[first].mesh.0].clone(), same: Same { surface: kind(first).1, ..same } });
+        groups.push(Group { mesh: meshes[items[first].mesh.0].clone(), same: Same { surface: kind(first).1, texture: kind(first).2, ..same } });
     }
     Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
 }
@@ -216,11 +237,11 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
 fn group_spheres(list: &DrawList) -> (Vec<Same>, Vec<f32>) {
     let items = &list.spheres;
     let mut order: Vec<usize> = (0..items.len()).collect();
-    let kind = |i: usize| items[i].material.surface();
+    let kind = |i: usize| (items[i].material.surface(), items[i].material.texture.map(|t| t.id));
     order.sort_by_key(|&i| (kind(i), !items[i].casts_shadow, i));
     let mut floats = Vec::with_capacity(data::SPHERE_FLOATS as usize * items.len());
     order.iter().for_each(|&i| data::sphere(&items[i], &mut floats));
-    let groups = runs(&order, kind, |i| items[i].casts_shadow).map(|(same, first)| Same { surface: kind(first), ..same });
+    let groups = runs(&order, kind, |i| items[i].casts_shadow).map(|(same, first)| Same { surface: kind(first).0, texture: kind(first).1, ..same });
     (groups.collect(), floats)
 }
 
@@ -243,11 +264,11 @@ fn runs<K: PartialEq>(order: &[usize], kind: impl Fn(usize) -> K, casts: impl Fn
         let casting = run.iter().filter(|&&i| casts(i)).count() as u32;
         let all = start..start + run.len() as u32;
         start = all.end;
-        (Same { surface: 0, casters: all.start..all.start + casting, all }, run[0])
+        (Same { surface: 0, texture: None, casters: all.start..all.start + casting, all }, run[0])
     })
 }
 
-fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<(MeshBuffers, Buffer, u32)>, RenderError> {
+fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<(MeshBuffers, Buffer, (u32, Option<usize>))>, RenderError> {
     let Some(ground) = &list.ground else { return Ok(None) };
     let [x, y, reach, _] = scene::floor(list, seen);
     let mut quad = MeshData::ground_quad(reach);
@@ -256,7 +277,7 @@ fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<(M
     let placed =
         Instance { mesh: MeshId(0), pose: nalgebra::Isometry3::identity(), scale: nalgebra::Vector3::repeat(1.0), material: ground.material, casts_shadow: false };
     data::instance(&placed, &mut floats);
-    Ok(Some((MeshBuffers::new(gpu, &quad)?, vertex_buffer(gpu, &floats, "ground")?, ground.material.surface())))
+    Ok(Some((MeshBuffers::new(gpu, &quad)?, vertex_buffer(gpu, &floats, "ground")?, (ground.material.surface(), ground.material.texture.map(|t| t.id)))))
 }
 
 fn stroke_batch(gpu: &Gpu, list: &DrawList, on_top: bool) -> Result<Batch, RenderError> {

@@ -2,6 +2,7 @@
 //!
 //! Two steps, so that several machines can show their pictures at one moment: [`Screen::renderer`] draws, [`Screen::show`] brings it to the eye.
 
+use super::meshes::uniform_buffer;
 use super::pipelines::COLOR;
 use super::{Gpu, Renderer};
 use crate::{Image, RenderError};
@@ -156,7 +157,7 @@ impl Screen {
         let picture = self.renderer.picture().map(|texture| (texture, &self.copies.show));
         let caption = self.caption.as_ref().map(|(_, texture)| (texture, &self.copies.blend));
         for (texture, pipeline) in picture.into_iter().chain(caption) {
-            self.copies.copy(&gpu.device, &mut encoder, pipeline, texture, &target, frame.texture.size(), encode);
+            self.copies.copy(gpu, &mut encoder, pipeline, texture, &target, frame.texture.size(), encode)?;
         }
         gpu.queue.submit([encoder.finish()]);
         self.window.pre_present_notify();
@@ -223,29 +224,29 @@ impl Copies {
     /// A texture into the upper left corner of a target.
     fn copy(
         &self,
-        device: &wgpu::Device,
+        gpu: &Gpu,
         encoder: &mut CommandEncoder,
         pipeline: &wgpu::RenderPipeline,
         source: &wgpu::Texture,
         target: &TextureView,
         bounds: wgpu::Extent3d,
         encode: bool,
-    ) {
+    ) -> Result<(), RenderError> {
         let (w, h) = (source.width().min(bounds.width), source.height().min(bounds.height));
         let source = source.create_view(&wgpu::TextureViewDescriptor::default());
         let contents = [f32::from(u8::from(encode)), 0.0, 0.0, 0.0];
-        let usage = wgpu::BufferUsages::UNIFORM;
-        let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some("place"), contents: bytemuck::cast_slice(&contents), usage });
+        let uniform = uniform_buffer(gpu, &contents, "place")?;
         let entries = [
             wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
             wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::TextureView(&source) },
         ];
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("copy"), layout: &self.layout, entries: &entries });
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("copy"), layout: &self.layout, entries: &entries });
         let mut pass = pass(encoder, target, wgpu::LoadOp::Load);
         pass.set_scissor_rect(0, 0, w, h);
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..3, 0..1);
+        Ok(())
     }
 }
 

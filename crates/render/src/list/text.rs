@@ -28,6 +28,9 @@ impl Display for DrawList {
             let (lo, hi) = mesh.bounds().unwrap_or_default();
             writeln!(f, "mesh {i}: {} vertices {} triangles from {} to {}", mesh.positions.len(), mesh.indices.len() / 3, v(&lo), v(&hi))?;
         }
+        for (i, image) in self.textures.iter().enumerate() {
+            writeln!(f, "texture {i}: {} x {}", image.width, image.height)?;
+        }
         for (i, x) in self.instances.iter().enumerate() {
             let (t, q) = (x.pose.translation.vector, x.pose.rotation.coords);
             write!(f, "instance {i}: mesh {} at {} turned {}", x.mesh.0, v(t.as_slice()), v(q.as_slice()))?;
@@ -85,7 +88,8 @@ fn material(m: &Material) -> String {
         _ => format!(" pattern {} {} {}", m.pattern.name(), v(&other), v(&size)),
     };
     let shader = if m.shader == Shader::Unlit { " unlit" } else { "" };
-    format!("color {} rough {} metal {} coat {}{pattern}{shader}", v(&m.color), n(m.roughness), n(m.metallic), n(m.clearcoat))
+    let texture = m.texture.map_or(String::new(), |t| format!(" texture {} every {}", t.id, n(t.repeat_m)));
+    format!("color {} rough {} metal {} coat {}{pattern}{shader}{texture}", v(&m.color), n(m.roughness), n(m.metallic), n(m.clearcoat))
 }
 
 fn style(s: &DebugStyle) -> String {

@@ -7,6 +7,8 @@ use crate::{Material, RenderError};
 pub const MAX_LIGHTS: usize = 8;
 /// Most lights that throw shadows; further ones shine without.
 pub const MAX_SHADOWS: usize = 4;
+/// Most pictures on surfaces.
+pub const MAX_TEXTURES: usize = 256;
 /// Most items of each other kind in a list.
 pub const MAX_ITEMS: usize = 1 << 20;
 
@@ -25,6 +27,7 @@ impl DrawList {
             at.finite("pose", x.pose.rotation.coords.as_slice())?;
             at.check(x.scale.iter().all(|s| s.is_finite() && *s != 0.0), "scale", &x.scale.as_slice(), "finite factors other than 0")?;
             at.material(&x.material)?;
+            at.texture(&x.material, self.textures.len())?;
         }
         for (i, s) in self.spheres.iter().enumerate() {
             let at = Item("sphere", i);
@@ -32,6 +35,7 @@ impl DrawList {
             at.finite("orientation", s.orientation.coords.as_slice())?;
             at.check(s.radius > 0.0 && s.radius.is_finite(), "radius", &s.radius, "finite and above 0")?;
             at.material(&s.material)?;
+            at.texture(&s.material, self.textures.len())?;
         }
         for (i, light) in self.lights.iter().enumerate() {
             check_light(Item("light", i), light)?;
@@ -49,6 +53,7 @@ impl DrawList {
             ("points", self.points.len(), MAX_ITEMS),
             ("debug spheres", self.debug_spheres.len(), MAX_ITEMS / 64),
             ("lights", self.lights.len(), MAX_LIGHTS),
+            ("textures", self.textures.len(), MAX_TEXTURES),
         ];
         match counts.into_iter().find(|(_, count, cap)| count > cap) {
             Some((what, count, cap)) => Err(RenderError::TooMany { what, count, cap }),
@@ -87,6 +92,7 @@ impl DrawList {
             Item("ground", 0).finite("height_m", &[g.height_m])?;
             Item("ground", 0).check(g.reach_m > 0.0 && g.reach_m.is_finite(), "reach_m", &g.reach_m, "finite and above 0")?;
             Item("ground", 0).material(&g.material)?;
+            Item("ground", 0).texture(&g.material, self.textures.len())?;
         }
         let at = Item("settings", 0);
         at.check(in_range(s.exposure, 0.0, 1e6), "exposure", &s.exposure, "0 or more")?;
@@ -128,6 +134,13 @@ impl Item {
 
     fn color(self, field: &'static str, c: [f32; 3]) -> Result<(), RenderError> {
         self.check(c.iter().all(|&x| in_range(x, 0.0, 1.0)), field, &c, "three sRGB components from 0 to 1")
+    }
+
+    /// A texture that is there, at a scale.
+    fn texture(self, m: &Material, textures: usize) -> Result<(), RenderError> {
+        let Some(texture) = m.texture else { return Ok(()) };
+        self.check(texture.id < textures, "texture", &texture.id, "the number of a texture of this list")?;
+        self.check(in_range(texture.repeat_m, 1e-6, 1e6), "texture repeat_m", &texture.repeat_m, "0.000001 to 1000000")
     }
 
     fn material(self, m: &Material) -> Result<(), RenderError> {

@@ -125,3 +125,97 @@ fn every_preset_is_known_and_others_are_not() {
     }
     assert_eq!(Material::preset("velvet", None), None);
 }
+
+/// A body with a camera and a lamp, one with a sphere tree, one of each quality.
+const CARRIER: &str = "[camera]\neye_m = [0, -5, 2]\ntarget_m = [0, 0, 0]\n\
+    [[body]]\nname = \"cart\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [2, 0, 1]\nrotation_deg = [0, 0, 90]\nquality = \"wireframe\"\n\
+    camera = { position_m = [0.5, 0, 0.5], vertical_fov_deg = 60 }\nlight = { type = \"point\", position_m = [0, 0, 1], color = \"#ff0000\", intensity = 2 }\n\
+    [[body]]\nname = \"post\"\nmode = \"static\"\nshape = { type = \"cylinder\", radius_m = 0.2, height_m = 2 }\nquality = \"simplified\"\n";
+
+#[test]
+fn bodies_carry_cameras_and_lights_with_them() {
+    let scene = SceneFile::parse(CARRIER, "s.toml").unwrap_or_else(|e| panic!("{e}"));
+    let (world, _) = scene.build().unwrap();
+    let mut list = Drawing::new(&scene).list(&world, &DebugDraw::default()).unwrap();
+    let views = list.views(&world);
+    assert_eq!(views.iter().map(|v| v.name.as_str()).collect::<Vec<_>>(), ["scene", "cart"]);
+    assert_eq!(views[0].camera, list.camera);
+    // a quarter turn to the left: ahead is the world's y, and (0.5, 0, 0.5) of the cart lies at (2, 0.5, 1.5)
+    list.look_from(&world, "cart").unwrap();
+    assert!(list.to_text().starts_with("camera: eye (2 0.5 1.5) target (2 1.5 1.5) up (0 0 1) fov 1.0472 near 0.05 far 500\n"), "{}", list.to_text());
+    let lamp = list.to_text().lines().find(|l| l.contains("point at")).unwrap().to_owned();
+    assert_eq!(lamp, "light 1: point at (2 0 2) color (1 0 0) intensity 3.4 radius 0.1 no shadow");
+    let error = list.look_from(&world, "crat").unwrap_err().to_string();
+    assert_eq!(error, "no camera is named 'crat'; there are: scene, cart");
+    let wrong = SceneFile::parse(&CARRIER.replace("vertical_fov_deg = 60", "vertical_fov_deg = 60, up = [1, 0, 0]"), "s.toml").unwrap_err().to_string();
+    assert!(wrong.contains("the camera of body") && wrong.contains("looks along its own `up`"), "{wrong}");
+}
+
+#[test]
+fn quality_says_how_much_of_an_object_is_drawn() {
+    let scene = SceneFile::parse(CARRIER, "s.toml").unwrap();
+    let (world, _) = scene.build().unwrap();
+    let mut drawing = Drawing::new(&scene);
+    let list = drawing.list(&world, &DebugDraw::default()).unwrap();
+    // the box has 12 edges; the post has one mesh, of fewer triangles than in full
+    let triangles = |list: &DrawList| list.meshes.iter().map(|m| m.indices.len() / 3).sum::<usize>();
+    assert_eq!((list.lines.len(), list.instances.len()), (12, 1));
+    let corner = list.lines.iter().map(|l| (l.end - l.start).norm()).fold(0.0, f32::max);
+    assert!((corner - 1.0).abs() < 1e-6, "edges of a cube of 1 m: {corner}");
+    drawing.detail = Some("full".parse().unwrap());
+    let full = drawing.list(&world, &DebugDraw::default()).unwrap();
+    assert_eq!((full.lines.len(), full.instances.len()), (0, 2));
+    drawing.detail = Some("simplified".parse().unwrap());
+    let simple = drawing.list(&world, &DebugDraw::default()).unwrap();
+    assert!(triangles(&simple) * 2 < triangles(&full), "{} of {}", triangles(&simple), triangles(&full));
+    // level 0 of a tree is one ball that holds the post: at least half its diagonal
+    drawing.detail = Some("sphere_tree=0".parse().unwrap());
+    let balls = drawing.list(&world, &DebugDraw::default()).unwrap();
+    assert_eq!(balls.spheres.len(), 1);
+    assert!(balls.spheres[0].radius >= 1.04_f32.sqrt() - 1e-4, "{}", balls.spheres[0].radius);
+    assert!(SceneFile::parse(&CARRIER.replace("wireframe", "wirframe"), "s.toml").unwrap_err().to_string().contains("wanted full, simplified, wireframe or sphere_tree=LEVEL"));
+}
+
+#[test]
+fn a_texture_is_listed_once_and_a_missing_one_is_told_with_its_line() {
+    let folder = std::env::temp_dir().join(format!("tumble-texture-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    tumble_render::Image { width: 2, height: 1, rgba: vec![255, 0, 0, 255, 0, 0, 255, 255] }.write_png(folder.join("t.png")).unwrap();
+    let text = "[materials.m]\ntexture = \"t.png\"\npattern_scale_m = 0.5\n[[grid]]\nname = \"b\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\n\
+        material = \"m\"\ncount = [3, 1, 1]\nspacing_m = [2, 0, 0]\n";
+    let name = folder.join("s.toml").display().to_string();
+    let scene = SceneFile::parse(text, &name).unwrap_or_else(|e| panic!("{e}"));
+    let (world, _) = scene.build().unwrap();
+    let list = Drawing::new(&scene).list(&world, &DebugDraw::default()).unwrap();
+    assert!(list.to_text().contains("texture 0: 2 x 1\n"));
+    assert_eq!(list.to_text().matches(" texture 0 every 0.5").count(), 3);
+    list.validate().unwrap();
+    let missing = SceneFile::parse(&text.replace("t.png", "u.png"), &name).unwrap_err().to_string();
+    assert!(missing.contains("s.toml:2:") && missing.contains("wanted a PNG file; there is none at"), "{missing}");
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn islands_have_a_colour_each_and_joints_their_axes() {
+    // two stacks of two boxes, apart, on the floor; a pendulum
+    let text = "[[body]]\nname = \"floor\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n\
+        [[grid]]\nname = \"b\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [0, 0, 0.5]\ncount = [2, 1, 2]\nspacing_m = [3, 0, 1]\n\
+        [[articulated]]\nname = \"arm\"\nposition_m = [-4, 0, 3]\n[[articulated.link]]\nname = \"rod\"\njoint = \"revolute\"\naxis = [0, 1, 0]\n\
+        shape = { type = \"capsule\", radius_m = 0.1, length_m = 1 }\nmass_kg = 1\n";
+    let scene = SceneFile::parse(text, "s.toml").unwrap_or_else(|e| panic!("{e}"));
+    let (mut world, _) = scene.build().unwrap();
+    for _ in 0..5 {
+        world.step().unwrap();
+    }
+    let draw: DebugDraw = "islands,joints,frames".parse().unwrap();
+    let list = Drawing::new(&scene).list(&world, &draw).unwrap();
+    let colors: Vec<_> = (1..5).map(|i| list.instances[i].material.color).collect();
+    // the order of the grid: x first, then z
+    assert!(colors[0] == colors[2] && colors[1] == colors[3] && colors[0] != colors[1], "{colors:?}");
+    let arrows: Vec<_> = list.lines.iter().filter(|l| l.head_m > 0.0).collect();
+    assert_eq!(arrows.len(), 1, "one joint");
+    let along = (arrows[0].end - arrows[0].start).normalize();
+    assert!((along.y.abs() - 1.0).abs() < 1e-6, "{along}");
+    // three axes for each of the six parts that are drawn
+    assert_eq!(list.lines.len() - 1, 18);
+}

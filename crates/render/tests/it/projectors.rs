@@ -186,3 +186,57 @@ fn calibration_pictures_have_their_lines_where_a_tape_measures_them() {
     }
     assert!("gird".parse::<CalibrationPattern>().is_err());
 }
+
+/// A cave whose facet bends its picture by a wavy grid and darkens it towards an edge; the files are in a folder of their own.
+fn bent_cave(folder: &std::path::Path, facet: &str) -> CaveView {
+    std::fs::create_dir_all(folder).unwrap();
+    let (mut obj, n) = (String::new(), 8);
+    for y in 0..=n {
+        for x in 0..=n {
+            let (u, v) = (x as f64 / n as f64, y as f64 / n as f64);
+            obj += &format!("v {u} {v}\nvt {} {}\n", 0.06 + 0.88 * u + 0.03 * (5.0 * v).sin(), 0.05 + 0.9 * v + 0.03 * (7.0 * u).cos());
+        }
+    }
+    for y in 0..n {
+        for x in 0..n {
+            let a = y * (n + 1) + x + 1;
+            // a corner of the grid stays away, and black
+            if x + y > 0 {
+                obj += &[a, a + 1, a + n + 2, a + n + 1].iter().fold("f".to_string(), |f, i| format!("{f} {i}/{i}"));
+                obj += "\n";
+            }
+        }
+    }
+    std::fs::write(folder.join("warp.obj"), obj).unwrap();
+    let mask = Image { width: 100, height: 100, rgba: (0..10_000u32).flat_map(|i| [(255 - i % 100) as u8, (155 + i % 100) as u8, 255, 255]).collect() };
+    mask.write_png(folder.join("mask.png")).unwrap();
+    let (warp, blend) = (folder.join("warp.obj"), folder.join("mask.png"));
+    let cave = cave(&format!("{facet}\nwarp_file = \"{}\"\nblend_file = \"{}\"", warp.display(), blend.display()));
+    CaveView::new(cave, &empty_scene()).unwrap()
+}
+
+#[test]
+fn finishing_on_the_device_is_finishing_in_memory_within_a_level() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut list = ball();
+    for i in 0..40 {
+        let (x, z) = ((i % 8) as f32 * 0.3 - 1.0, (i / 8) as f32 * 0.4 + 0.2);
+        list.add_sphere(Point3::new(x, 4.0 + 0.1 * x, z), 0.12, nalgebra::UnitQuaternion::identity(), Material::plastic([0.3 + 0.01 * i as f32, 0.8 - 0.015 * i as f32, 0.5]));
+    }
+    let folder = std::env::temp_dir().join(format!("tumble-finish-{}", std::process::id()));
+    for stereo in ["mono", "side_by_side", "top_bottom", "anaglyph"] {
+        for flip in ["none", "horizontal", "both"] {
+            for bent in [false, true] {
+                let facet = format!("stereo = \"{stereo}\"\nflip = \"{flip}\"");
+                let view = if bent { bent_cave(&folder, &facet) } else { CaveView::new(cave(&facet), &empty_scene()).unwrap() };
+                let facet = &view.cave().facets[0];
+                let (device, memory) = (view.draw(&mut renderer, &list, facet).unwrap(), view.draw_in_memory(&mut renderer, &list, facet).unwrap());
+                assert_eq!((device.width, device.height), (memory.width, memory.height));
+                let most = device.rgba.iter().zip(&memory.rgba).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+                assert!(most <= if bent { 1 } else { 0 }, "{stereo}, flip {flip}, bent {bent}: {most} levels");
+                assert!(device.rgba.chunks_exact(4).filter(|p| p[0] > 40).count() > 300, "something is seen");
+            }
+        }
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}

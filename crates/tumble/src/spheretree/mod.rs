@@ -2,7 +2,6 @@
 
 mod picture;
 mod robot;
-mod table;
 
 use crate::args::SphereTreeOptions;
 use crate::failure::Failure;
@@ -11,6 +10,7 @@ use std::path::Path;
 use std::time::Instant;
 use tumble::collide::{Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
 use tumble::scene::read_solid;
+use tumble::table::table;
 
 /// Builds, measures, prints and writes.
 pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
@@ -41,7 +41,7 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
         let from = if built.found { "from the cache".into() } else { format!("built in {seconds:.2} s") };
         let volume = mesh.union_mass_properties(1.0).mass;
         println!("{}: {} triangles, volume {volume:.6e} m³, diagonal {:.6} m; {from}", path.display(), mesh.triangles.len(), mesh.diagonal());
-        print!("{}", table::table(&file, options.verbose));
+        print!("{}", table(&file, options.verbose));
     }
     if let Some(output) = &options.output {
         write(output, file.to_json().as_bytes())?;

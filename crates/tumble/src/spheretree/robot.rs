@@ -1,6 +1,5 @@
 //! `--urdf`: a robot whose collision geometry is spheres, and the lists that motion planners read.
 
-use super::table::{aligned, percent};
 use crate::args::SphereTreeOptions;
 use crate::failure::Failure;
 use crate::progress::Share;
@@ -8,6 +7,7 @@ use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use tumble::scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfOptions, spherize as cover};
+use tumble::table::{aligned, percent};
 
 /// Spheres per link unless told otherwise.
 const MOST: u32 = 32;

@@ -25,10 +25,10 @@ pub enum Command {
 }
 
 /// Overlays by number key from 1 on, as `--debug-draw` names them.
-pub const OVERLAYS: [&str; 5] = ["contacts", "normals", "velocities", "forces", "tree"];
+pub const OVERLAYS: [&str; 8] = ["contacts", "normals", "velocities", "forces", "joints", "frames", "islands", "tree"];
 
 /// What is told of keys and mouse.
-pub const HELP: [&str; 19] = [
+pub const HELP: [&str; 20] = [
     "W A S D     walk; arrows too, left and right turn",
     "E Q         up and down; also page up, page down",
     "shift       four times as fast",
@@ -43,7 +43,8 @@ pub const HELP: [&str; 19] = [
     "R           back to time 0",
     "+ -         time twice as fast, half as fast",
     "1 2 3 4     contacts, normals, velocities, forces",
-    "5           sphere trees, level by level",
+    "5 6 7       joints, frames, islands",
+    "8           sphere trees, level by level",
     "T, H or F1  statistics, this help",
     "G           looks: usual, fast, fastest",
     "P, F11      picture to a file, full screen",

@@ -21,6 +21,9 @@ impl Overlays {
             "normals" => draw.normals = !draw.normals,
             "velocities" => draw.velocities = !draw.velocities,
             "forces" => draw.forces = !draw.forces,
+            "joints" => draw.joints = !draw.joints,
+            "frames" => draw.frames = !draw.frames,
+            "islands" => draw.islands = !draw.islands,
             _ => draw.tree_level = Some(draw.tree_level.map_or(0, |level| level + 1)).filter(|level| *level <= DEEPEST),
         }
     }
@@ -28,7 +31,7 @@ impl Overlays {
     /// Names of those that are on, as `--debug-draw` takes them.
     pub fn names(&self) -> Vec<String> {
         let d = &self.draw;
-        let flags = [d.contacts, d.normals, d.velocities, d.forces];
+        let flags = [d.contacts, d.normals, d.velocities, d.forces, d.joints, d.frames, d.islands];
         let on = OVERLAYS.iter().zip(flags).filter(|(_, on)| *on).map(|(name, _)| name.to_string());
         on.chain(d.tree_level.map(|level| format!("tree={level}"))).collect()
     }

@@ -2,11 +2,11 @@
 
 use super::user::Body;
 use tumble::collide::Vec3;
-use tumble::render::{CaveView, DrawList, Image, Quality, RIM_PX, RenderError, Screen, Viewpoint, unfold};
+use tumble::render::{CaveView, DrawList, Image, RIM_PX, RenderError, Screen, Viewpoint, unfold};
 use tumble::scene::cave::{Facet, Flip, Stereo};
 
-/// Side of the shadow maps of a cave where it is the usual one elsewhere, as for its pictures.
-const CAVE_SHADOWS: u32 = 4096;
+/// Shadow maps of a cave are this much wider, as for its pictures.
+const CAVE_SHADOWS: u32 = 2;
 
 /// What is shown.
 pub enum Sight {
@@ -42,13 +42,15 @@ impl Sight {
     pub fn stand(&mut self, body: &Body, list: &mut DrawList) {
         match (self, body) {
             (Sight::Camera, Body::Eye(camera)) => list.camera = *camera,
-            (Sight::Facet(view, _) | Sight::Unfolded(view), Body::Cave { place, .. }) => {
-                view.stand(*place);
-                if list.settings.shadow_map_size == Quality::default().shadow_map_size {
-                    list.settings.shadow_map_size = CAVE_SHADOWS;
-                }
-            }
+            (Sight::Facet(view, _) | Sight::Unfolded(view), Body::Cave { place, .. }) => view.stand(*place),
             _ => {}
+        }
+    }
+
+    /// The shadow maps of a cave hold all that its screens show together.
+    pub fn widen_shadows(&self, list: &mut DrawList) {
+        if !matches!(self, Sight::Camera) {
+            list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
         }
     }
 

@@ -99,8 +99,8 @@ impl Viewer {
     /// Of a world at time 0.
     pub fn new(scene: &SceneFile, world: World, sight: Sight, options: &ViewOptions) -> Result<Viewer, Failure> {
         let mut drawing = Drawing::new(scene);
-        let list = drawing.list(&world, &DebugDraw::default()).map_err(|e| Failure::run("the picture", e))?;
-        let mut presets = Presets::new(list.camera);
+        let list = drawing.list(&world, &DebugDraw::default()).map_err(Failure::input)?;
+        let mut presets = Presets::new(&world, &list);
         let body = match &sight {
             Sight::Camera => Body::Eye(list.camera),
             Sight::Facet(view, _) | Sight::Unfolded(view) => {
@@ -116,7 +116,7 @@ impl Viewer {
             if !presets.find(name) {
                 return Err(Failure::input(format!("no camera `{name}`; wanted one of {}", presets.names().join(", "))));
             }
-            user.look_from(&presets.camera(&world, &list));
+            presets.camera(&world, &list).iter().for_each(|camera| user.look_from(camera));
         }
         let now = Instant::now();
         let dt = world.settings().dt;
@@ -197,8 +197,9 @@ impl Viewer {
 
     fn go_to(&mut self, by: isize) {
         self.presets.go(by);
-        let camera = self.presets.camera(&self.world, &self.list);
-        self.user.look_from(&camera);
+        if let Some(camera) = self.presets.camera(&self.world, &self.list) {
+            self.user.look_from(&camera);
+        }
     }
 
     fn reset(&mut self) -> Result<(), Failure> {
@@ -211,6 +212,7 @@ impl Viewer {
         let [dx, dy] = std::array::from_fn(|k| at_px[k] - self.pointer.at_px[k]);
         self.pointer.at_px = at_px;
         if self.pointer.turning {
+            self.presets.let_go();
             self.user.turn(-TURN_RAD_PER_PX * dx, -TURN_RAD_PER_PX * dy);
             self.stale = true;
         }
@@ -286,9 +288,13 @@ impl Viewer {
     /// The draw list of this moment.
     fn update_list(&mut self) -> Result<(), Failure> {
         self.list = self.drawing.list(&self.world, &self.overlays.draw).map_err(|e| Failure::run("the picture", e))?;
+        if let Some(camera) = self.presets.followed(&self.world, &self.list) {
+            self.user.look_from(&camera);
+        }
         if let Some(quality) = &self.quality {
             quality.apply(&mut self.list.settings);
         }
+        self.sight.widen_shadows(&mut self.list);
         self.sight.stand(self.user.body(), &mut self.list);
         if let Some(hand) = &self.hand {
             hand.draw(&self.world, &mut self.list);
@@ -438,6 +444,7 @@ impl WindowApp for Viewer {
         let passed = (now - self.times.turn).as_secs_f64();
         self.times.turn = now;
         if self.user.moves() {
+            self.presets.let_go();
             self.user.pass(passed);
             self.sight.stand(self.user.body(), &mut self.list);
             self.move_hand(screen);

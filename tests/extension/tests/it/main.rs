@@ -5,3 +5,4 @@ mod collisions;
 mod common;
 mod rods;
 mod wind;
+mod lookout;

@@ -20,6 +20,8 @@ use crate::{NormalFrom, Vec3};
 
 /// Pieces that an edge is halved into against a body that is not convex, in radii of the smaller body.
 pub(super) const PIECE: f64 = 0.03;
+/// The same where both faces of the edge belong to a smooth surface: its ends say enough.
+const SMOOTH_PIECE: f64 = 0.06;
 /// Slopes that differ by this are the same.
 pub(super) const LEVEL: f64 = 1e-7;
 /// An edge that slopes less than this over a face lies on it.
@@ -85,7 +87,9 @@ impl Pass<'_> {
     /// A piece that may be in reach, between two places that may have been looked at. Returns what was seen at them.
     fn halve(&self, line: &Line, low: (f64, Option<Look>), high: (f64, Option<Look>), found: &mut Collector) -> [Option<Look>; 2] {
         let (from, to) = (low.0, high.0);
-        if to - from > PIECE * self.size && to - from > 1e-3 * line.length {
+        let smooth = line.edge.is_some_and(|edge| edge.spared > 0.0);
+        let piece = if smooth { SMOOTH_PIECE } else { PIECE } * self.size;
+        if to - from > piece && to - from > 1e-3 * line.length {
             let middle = 0.5 * (from + to);
             let reaches = |from: f64, to: f64, found: &Collector| {
                 self.field.bound(&line.at(0.5 * (from + to))) - 0.5 * (to - from) - line.radius <= found.limit()

@@ -54,17 +54,22 @@ impl<'a> Pass<'a> {
     fn node(&self, tree: &SphereTree, elements: &Elements, index: usize, found: &mut Collector) {
         let ball = &tree.nodes()[index];
         let (fine, only_points) = (self.field.bent(), self.field.linear());
-        if self.field.bound(&self.place(&ball.center)) - elements.reach_of(index, fine) > found.limit() {
+        let bound = self.field.bound(&self.place(&ball.center));
+        if bound - elements.reach_of(index, fine) > found.limit() {
             return;
         }
         for point in elements.points_of(index) {
+            let longest = if only_points { 0.0 } else { point.longest[usize::from(fine)] };
+            if bound - (point.at - ball.center).norm() - longest > found.limit() {
+                continue;
+            }
             let at = self.place(&point.at);
             let bound = self.field.bound(&at);
             if bound <= found.limit() {
                 let normals: Normals = elements.normals_of(point).iter().map(|n| self.rotation * n).collect();
                 self.vertex(&at, &normals, elements.ways_of(point), point.index, found);
             }
-            if only_points || bound - point.longest[usize::from(fine)] > found.limit() {
+            if only_points || bound - longest > found.limit() {
                 continue;
             }
             for edge in elements.edges_of(point, fine) {

@@ -160,7 +160,14 @@ impl Order {
         !self.pending.is_empty()
     }
 
-    fn join(&mut self, mine: bool, newest: bool, more: bool, data: &[u8], deliver: &mut impl FnMut(Delivery, Vec<u8>)) -> Result<(), Overrun> {
+    fn join(
+        &mut self,
+        mine: bool,
+        newest: bool,
+        more: bool,
+        data: &[u8],
+        deliver: &mut impl FnMut(Delivery, Vec<u8>),
+    ) -> Result<(), Overrun> {
         self.next += 1;
         if !mine {
             return Ok(());
@@ -187,7 +194,8 @@ mod tests {
     fn a_slow_reader_gets_all_in_order() {
         let (mut memory, mut order, mut buffer) = (Memory::default(), Order::new(0), VecDeque::new());
         let mut got = Vec::new();
-        let head = |number, kept: &Kept| Head { number, mask: kept.mask, newest: kept.newest, more: kept.more, ..Head::new(Kind::Piece, 1) };
+        let head =
+            |number, kept: &Kept| Head { number, mask: kept.mask, newest: kept.newest, more: kept.more, ..Head::new(Kind::Piece, 1) };
         for round in 0..400u64 {
             if round < 100 {
                 for _ in 0..round % 23 {

@@ -39,12 +39,23 @@ impl Ports {
         let places = 2 * usize::from(facets) + 4;
         let data = |name: &str, publishers: usize, subscribers: usize| {
             let builder = node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>();
-            let builder = builder.enable_safe_overflow(true).subscriber_max_buffer_size(BUFFER).history_size(0).subscriber_max_borrowed_samples(2);
-            builder.max_publishers(publishers).max_subscribers(subscribers).max_nodes(places + 4).open_or_create().map_err(|why| refused(run, name, why))
+            let builder =
+                builder.enable_safe_overflow(true).subscriber_max_buffer_size(BUFFER).history_size(0).subscriber_max_borrowed_samples(2);
+            builder
+                .max_publishers(publishers)
+                .max_subscribers(subscribers)
+                .max_nodes(places + 4)
+                .open_or_create()
+                .map_err(|why| refused(run, name, why))
         };
         let event = |name: &str, notifiers: usize, listeners: usize| {
             let builder = node.service_builder(&service_name(run, name)?).event();
-            builder.max_notifiers(notifiers).max_listeners(listeners).max_nodes(places + 4).open_or_create().map_err(|why| refused(run, name, why))
+            builder
+                .max_notifiers(notifiers)
+                .max_listeners(listeners)
+                .max_nodes(places + 4)
+                .open_or_create()
+                .map_err(|why| refused(run, name, why))
         };
         let (down, up) = (data("down", 4, places)?, data("up", places, 4)?);
         let (down_event, up_event) = (event("down-event", 4, places)?, event("up-event", places, 4)?);
@@ -64,7 +75,9 @@ impl Ports {
         let node = node("tumble facet")?;
         let data = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().open().ok());
         let event = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).event().open().ok());
-        let (Some(down), Some(up), Some(down_event), Some(up_event)) = (data("down")?, data("up")?, event("down-event")?, event("up-event")?) else {
+        let (Some(down), Some(up), Some(down_event), Some(up_event)) =
+            (data("down")?, data("up")?, event("down-event")?, event("up-event")?)
+        else {
             return Ok(None);
         };
         let ports = Ports {
@@ -152,7 +165,8 @@ pub fn clean_up() -> Result<(), LinkError> {
 /// A folder of this user alone, made if need be; and the user's number.
 pub fn folder() -> Result<(PathBuf, u32), LinkError> {
     let user = std::fs::metadata("/proc/self").map_err(|why| LinkError::Io { what: "/proc/self".into(), why })?.uid();
-    let base = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|dir| std::fs::metadata(dir).is_ok_and(|about| about.uid() == user));
+    let base =
+        std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|dir| std::fs::metadata(dir).is_ok_and(|about| about.uid() == user));
     let folder = base.unwrap_or_else(std::env::temp_dir).join(format!("tumble-{user}"));
     let io = |why| LinkError::Io { what: format!("shared memory: folder {}", folder.display()), why };
     match std::fs::DirBuilder::new().mode(0o700).create(&folder) {
@@ -173,7 +187,9 @@ pub fn folder() -> Result<(PathBuf, u32), LinkError> {
 
 fn service_name(run: &str, name: &str) -> Result<iceoryx2::service::service_name::ServiceName, LinkError> {
     let full = format!("tumble/{run}/{name}");
-    full.as_str().try_into().map_err(|why| LinkError::Other(format!("shared memory: {full:?} is no name of a service: {why:?}; at most 200 bytes")))
+    full.as_str()
+        .try_into()
+        .map_err(|why| LinkError::Other(format!("shared memory: {full:?} is no name of a service: {why:?}; at most 200 bytes")))
 }
 
 fn refused(run: &str, name: &str, why: impl Debug) -> LinkError {

@@ -125,7 +125,8 @@ impl ShmServer {
         let known = |connection: &&mut Connection| connection.number == head.connection && head.reign == self.reign;
         let Some(connection) = self.connections[facet].as_mut().filter(known) else {
             self.counters[facet].refuse(Refused::Stale);
-            return Ok(());
+            // One that was stopped for long and goes on: it does not know yet that it was given up.
+            return self.tell(Head { facet: head.facet, connection: head.connection, ..Head::new(Kind::Close, self.reign) });
         };
         connection.heard = now;
         if head.until > self.memory.next() {
@@ -207,7 +208,8 @@ impl ShmServer {
     }
 
     fn end_all(&mut self, why: Closed, is_over: impl Fn(&Connection) -> bool) -> bool {
-        let over: Vec<u16> = (0..self.connections.len() as u16).filter(|k| self.connections[usize::from(*k)].as_ref().is_some_and(&is_over)).collect();
+        let over: Vec<u16> =
+            (0..self.connections.len() as u16).filter(|k| self.connections[usize::from(*k)].as_ref().is_some_and(&is_over)).collect();
         over.iter().for_each(|facet| self.end(*facet, why));
         !over.is_empty()
     }

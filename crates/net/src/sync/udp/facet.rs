@@ -1,10 +1,10 @@
 //! A facet's side, without socket or clock.
 
+use super::Timing;
 use super::handshake::{Hello, Reply};
 use super::keys::{Agreement, Entropy, Handshake, SharedKey, Side};
-use super::packet::{self, Header, Kind, TAG};
+use super::packet::{self, Header, Kind};
 use super::session::{Numbering, Session};
-use super::Timing;
 use crate::sync::transport::{Closed, Delivery, FacetNumber, LinkCounters, LinkEvent, MAX_MESSAGE_BYTES, Refused};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -157,7 +157,9 @@ impl FacetMachine {
             Kind::Welcome => self.take_welcome(now, &header, datagram),
             Kind::Unknown => self.take_unknown(now, &header, datagram),
             Kind::Data => match &mut self.stage {
-                Stage::Connected(session) if session.agreed.session == header.session => session.receive(now, &header, datagram, &mut self.counters),
+                Stage::Connected(session) if session.agreed.session == header.session => {
+                    session.receive(now, &header, datagram, &mut self.counters)
+                }
                 _ => Err(Refused::Stale),
             },
             Kind::Hello | Kind::Answer => Err(Refused::Foreign),
@@ -197,10 +199,9 @@ impl FacetMachine {
     }
 
     fn take_unknown(&mut self, now: Duration, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
-        if !self.handshake.open(&datagram[..])?.is_empty() {
+        if !self.handshake.open(datagram)?.is_empty() {
             return Err(Refused::Oversize);
         }
-        debug_assert!(datagram.len() >= TAG);
         match &self.stage {
             Stage::Connected(session) if session.agreed.session == header.session => self.end(now, Closed::ByPeer),
             _ => return Err(Refused::Stale),
@@ -219,7 +220,7 @@ impl FacetMachine {
 
     /// Begins anew, with a fresh nonce. An answer that leads nowhere for a second is given up too: the server may have been started again meanwhile.
     fn look(&mut self, now: Duration) {
-        let hello = Hello { nonce: self.entropy.next(), facet: self.settings.facet, cookie: [0; 32] };
+        let hello = Hello { nonce: self.entropy.next_bytes(), facet: self.settings.facet, cookie: [0; 32] };
         self.stage = Stage::Looking { hello, answering: false, next: now, give_up: now + 10 * self.settings.timing.ask };
     }
 }

@@ -42,14 +42,7 @@ pub struct Inbox {
 impl Inbox {
     /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
     pub fn new(first: u32) -> Inbox {
-        Inbox {
-            next: [first; 2],
-            assemblies: Default::default(),
-            held: 0,
-            ready: VecDeque::new(),
-            ready_bytes: 0,
-            superseded: 0,
-        }
+        Inbox { next: [first; 2], assemblies: Default::default(), held: 0, ready: VecDeque::new(), ready_bytes: 0, superseded: 0 }
     }
 
     /// What an acknowledgement says: messages before these are complete.
@@ -135,7 +128,9 @@ impl Inbox {
         if !self.assemblies[channel].get(&part.message).is_some_and(Assembly::whole) {
             return;
         }
-        if part.channel == Channel::Newest && let Some(assembly) = self.assemblies[channel].remove(&part.message) {
+        if part.channel == Channel::Newest
+            && let Some(assembly) = self.assemblies[channel].remove(&part.message)
+        {
             self.held -= assembly.held();
             let gone: Vec<u32> = self.assemblies[channel].keys().copied().filter(|k| before(*k, part.message)).collect();
             for gone in gone.iter().filter_map(|k| self.assemblies[channel].remove(k)) {

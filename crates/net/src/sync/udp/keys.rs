@@ -78,7 +78,11 @@ impl SharedKey {
         }
         let mut bytes = [0; 32];
         for (k, pair) in digits.chunks_exact(2).enumerate() {
-            let digit = |at: usize| (pair[at] as char).to_digit(16).ok_or_else(|| refuse(format!("character {} is no hexadecimal digit; {wanted}", 2 * k + at + 1)));
+            let digit = |at: usize| {
+                (pair[at] as char)
+                    .to_digit(16)
+                    .ok_or_else(|| refuse(format!("character {} is no hexadecimal digit; {wanted}", 2 * k + at + 1)))
+            };
             bytes[k] = (digit(0)? * 16 + digit(1)?) as u8;
         }
         if bytes == [0; 32] {
@@ -97,7 +101,8 @@ pub struct Entropy {
 impl Entropy {
     /// From the operating system.
     pub fn system() -> Result<Entropy, LinkError> {
-        let key = Key::<ChaCha20Poly1305>::try_generate().map_err(|why| LinkError::Other(format!("the system gives no random numbers: {why}")))?;
+        let key = Key::<ChaCha20Poly1305>::try_generate()
+            .map_err(|why| LinkError::Other(format!("the system gives no random numbers: {why}")))?;
         Ok(Entropy { key: key.into(), counter: 0 })
     }
 
@@ -107,14 +112,14 @@ impl Entropy {
     }
 
     /// The next 32 bytes.
-    pub fn next(&mut self) -> [u8; 32] {
+    pub fn next_bytes(&mut self) -> [u8; 32] {
         self.counter += 1;
         *blake3::keyed_hash(&self.key, &self.counter.to_le_bytes()).as_bytes()
     }
 
     /// The next number; never 0.
     pub fn next_u64(&mut self) -> u64 {
-        let [a, b, c, d, e, f, g, h, ..] = self.next();
+        let [a, b, c, d, e, f, g, h, ..] = self.next_bytes();
         u64::from_le_bytes([a, b, c, d, e, f, g, h]).max(1)
     }
 }
@@ -190,7 +195,8 @@ impl Seal {
     /// The keys of `side`. `first` is the first sequence number: 0 but in tests of the wrap.
     pub fn new(shared: &SharedKey, agreed: &Agreement, side: Side, first: u64) -> Seal {
         let material =
-            [&shared.bytes[..], &agreed.facet_nonce, &agreed.server_nonce, &agreed.session.to_le_bytes(), &agreed.facet.to_le_bytes()].concat();
+            [&shared.bytes[..], &agreed.facet_nonce, &agreed.server_nonce, &agreed.session.to_le_bytes(), &agreed.facet.to_le_bytes()]
+                .concat();
         let cipher = |context| ChaCha20Poly1305::new(&blake3::derive_key(context, &material).into());
         let (outgoing, incoming) = match side {
             Side::Server => (cipher(TO_FACET), cipher(TO_SERVER)),

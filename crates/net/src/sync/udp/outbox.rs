@@ -124,7 +124,8 @@ pub struct Outbox {
 impl Outbox {
     /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
     pub fn new(first: u32) -> Outbox {
-        let stream = || Stream { waiting: VecDeque::new(), begun: VecDeque::new(), begun_bytes: 0, waiting_bytes: 0, next: first, done: first };
+        let stream =
+            || Stream { waiting: VecDeque::new(), begun: VecDeque::new(), begun_bytes: 0, waiting_bytes: 0, next: first, done: first };
         Outbox {
             streams: [stream(), stream()],
             sent: VecDeque::new(),
@@ -413,7 +414,8 @@ impl Outbox {
 
     /// Forgets packets from the front that nothing is expected of any more.
     fn forget(&mut self) {
-        while self.sent.front().is_some_and(|sent| sent.fate == Fate::Arrived || (sent.fate == Fate::Lost && self.sent.len() > REMEMBERED)) {
+        while self.sent.front().is_some_and(|sent| sent.fate == Fate::Arrived || (sent.fate == Fate::Lost && self.sent.len() > REMEMBERED))
+        {
             self.sent.pop_front();
         }
     }

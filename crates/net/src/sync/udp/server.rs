@@ -1,10 +1,10 @@
 //! The server's side, without socket or clock.
 
+use super::Timing;
 use super::handshake::{Cookies, Hello, Reply, write_unknown};
 use super::keys::{Agreement, Entropy, Handshake, SharedKey, Side};
 use super::packet::{self, Header, Kind};
 use super::session::{Numbering, Session};
-use super::Timing;
 use crate::sync::transport::{Closed, Delivery, FacetNumber, LinkCounters, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused};
 use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;
@@ -54,7 +54,7 @@ impl ServerMachine {
             settings,
             handshake: Handshake::new(&shared),
             shared,
-            cookies: Cookies::new(entropy.next()),
+            cookies: Cookies::new(entropy.next_bytes()),
             entropy,
             sessions: BTreeMap::new(),
             live: vec![None; facets],
@@ -206,7 +206,9 @@ impl ServerMachine {
         if !self.cookies.fits(now, from, &answer) {
             return Err(Refused::Stale);
         }
-        let same = |session: &&Session| session.agreed.facet_nonce == answer.nonce && session.agreed.facet == answer.facet && session.address == from;
+        let same = |session: &&Session| {
+            session.agreed.facet_nonce == answer.nonce && session.agreed.facet == answer.facet && session.address == from
+        };
         let agreed = match self.sessions.values().find(same) {
             Some(session) => session.agreed,
             None => self.prepare(now, from, &answer),
@@ -228,7 +230,7 @@ impl ServerMachine {
         while self.sessions.contains_key(&session) {
             session = self.entropy.next_u64();
         }
-        let agreed = Agreement { session, facet: answer.facet, facet_nonce: answer.nonce, server_nonce: self.entropy.next() };
+        let agreed = Agreement { session, facet: answer.facet, facet_nonce: answer.nonce, server_nonce: self.entropy.next_bytes() };
         let prepared = Session::new(now, &self.shared, agreed, Side::Server, from, self.settings.timing, self.settings.numbering);
         self.sessions.insert(session, prepared);
         self.prepared.push_back(session);

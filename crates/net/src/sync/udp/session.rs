@@ -1,12 +1,12 @@
 //! One session, one side of it: packets and messages through seal, window, inbox and outbox.
 
+use super::Timing;
 use super::frames::{self, ACK_BYTES, Ack, Channel, Frame};
 use super::inbox::Inbox;
 use super::keys::{Agreement, Seal, SharedKey, Side};
 use super::outbox::{Full, Outbox};
 use super::packet::{HEADER, Header, MAX_DATAGRAM, TAG};
 use super::window::ReplayWindow;
-use super::Timing;
 use crate::sync::transport::{Delivery, LinkCounters, Refused};
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -53,7 +53,15 @@ pub struct Session {
 
 impl Session {
     /// Begins a session.
-    pub fn new(now: Duration, shared: &SharedKey, agreed: Agreement, side: Side, address: SocketAddr, timing: Timing, from: Numbering) -> Session {
+    pub fn new(
+        now: Duration,
+        shared: &SharedKey,
+        agreed: Agreement,
+        side: Side,
+        address: SocketAddr,
+        timing: Timing,
+        from: Numbering,
+    ) -> Session {
         Session {
             address,
             agreed,

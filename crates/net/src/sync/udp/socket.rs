@@ -150,14 +150,17 @@ impl<M: Machine> Running<M> {
         let state = State { machine, asleep_until: Duration::ZERO, stop: false, failed: None };
         let core =
             Arc::new(Core { state: Mutex::new(state), arrived: Condvar::new(), earlier: Condvar::new(), socket, start: Instant::now() });
-        let mut running = Running { core: core.clone(), threads: Vec::new() };
-        let works: [(&str, fn(&Core<M>)); 2] = [("udp receive", Core::receive_until_stopped), ("udp wait", Core::wait_until_stopped)];
-        for (name, work) in works {
-            let core = core.clone();
-            let thread = std::thread::Builder::new().name(name.into()).spawn(move || work(&core));
-            running.threads.push(thread.map_err(|why| LinkError::Io { what: format!("thread {name}"), why })?);
-        }
+        let mut running = Running { core, threads: Vec::new() };
+        running.spawn("udp receive", Core::receive_until_stopped)?;
+        running.spawn("udp wait", Core::wait_until_stopped)?;
         Ok(running)
+    }
+
+    fn spawn(&mut self, name: &str, work: fn(&Core<M>)) -> Result<(), LinkError> {
+        let core = self.core.clone();
+        let thread = std::thread::Builder::new().name(name.into()).spawn(move || work(&core));
+        self.threads.push(thread.map_err(|why| LinkError::Io { what: format!("thread {name}"), why })?);
+        Ok(())
     }
 }
 

@@ -1,7 +1,7 @@
-//! The figures of a tree as lines of text.
+//! The figures of a sphere tree as lines of text: what `tumble spheretree` prints.
 
 use std::fmt::Write;
-use tumble::collide::{LevelQuality, TreeFile};
+use tumble_collide::{LevelQuality, TreeFile};
 
 /// A column: its head in two lines, and the text of a level.
 type Column = (&'static str, &'static str, fn(&TreeFile, &LevelQuality) -> String);

@@ -1,0 +1,105 @@
+"""Every example runs as a newcomer runs it, in a folder of its own; so does the notebook."""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+NEEDS = {"cart_pole": "gymnasium"}
+WORDS = {  # what must stand in the output, beside what each script asserts itself
+    "arm_dynamics": "a batch of accelerations: (1000, 6)",
+    "bouncing_ball": "off the closed form",
+    "boids": "10 s: order 1.0",
+    "cart_pole": "episode 2: 500 steps upright",
+    "pendulum_energy": "period by theory            2.152875 s",
+    "recording": "the same end, bit for bit",
+    "sphere_tree": "level 2: 64 balls",
+    "wind_force": "falling at 0.981 m/s",
+}
+
+
+def run(words, folder):
+    settings = {**os.environ, "MPLBACKEND": "Agg"}
+    done = subprocess.run([sys.executable, *words], cwd=folder, env=settings, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_there_are_ten_and_they_are_short():
+    assert len(EXAMPLES) >= 10
+    listed = (ROOT / "examples" / "README.md").read_text()
+    for script in EXAMPLES:
+        assert len(script.read_text().splitlines()) <= 60, script.name
+        assert f"({script.name})" in listed
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs(script, tmp_path):
+    if script.stem in NEEDS and importlib.util.find_spec(NEEDS[script.stem]) is None:
+        pytest.skip(f"SKIPPED: {NEEDS[script.stem]} is not installed")
+    if script.stem == "cave_pictures":
+        probe = "import tumble; tumble.World().render(8, 8)"
+        if subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=120).returncode:
+            pytest.skip("SKIPPED: no graphics adapter")
+    said = run([script], tmp_path)
+    assert WORDS.get(script.stem, "") in said and said
+
+
+def test_the_notebook_runs(tmp_path):
+    nbclient = pytest.importorskip("nbclient", reason="SKIPPED: nbclient is not installed")
+    nbformat = pytest.importorskip("nbformat", reason="SKIPPED: nbformat is not installed")
+    pytest.importorskip("ipykernel", reason="SKIPPED: ipykernel is not installed")
+    path = ROOT / "examples" / "tour.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    # it is kept without outputs, so that a change of it can be read
+    kept = json.loads(path.read_text())
+    assert all(not cell.get("outputs") and not cell.get("execution_count") for cell in kept["cells"])
+    # this interpreter, whatever kernels the machine has
+    spec = tmp_path / "kernels" / "python3"
+    spec.mkdir(parents=True)
+    start = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
+    (spec / "kernel.json").write_text(json.dumps({"argv": start, "display_name": "Python 3", "language": "python"}))
+    nbclient.NotebookClient(notebook, timeout=120, startup_timeout=180, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}, **client(tmp_path)).execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    assert not [output for output in outputs if output.output_type == "error"]
+    shown = [output for output in outputs if "image/png" in output.get("data", {})]
+    assert len(shown) >= 2
+
+
+def client(folder):
+    """A kernel manager that knows our kernel alone."""
+    from jupyter_client import AsyncKernelManager
+    from jupyter_client.kernelspec import KernelSpecManager
+
+    manager = AsyncKernelManager(kernel_name="python3", kernel_spec_manager=KernelSpecManager(kernel_dirs=[str(folder / "kernels")]))
+    return {"km": manager}
+
+
+def test_the_snippets_of_the_book_run_one_after_the_other(tmp_path, monkeypatch):
+    import tumble
+
+    pytest.importorskip("gymnasium", reason="SKIPPED: gymnasium is not installed")
+    monkeypatch.chdir(tmp_path)
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    sides = "013 032 467 475 045 051 237 276 026 064 157 173".split()
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f " + " ".join(str(int(k) + 1) for k in side) for side in sides]
+    Path("bunny.obj").write_text("\n".join(lines) + "\n")
+    text = (ROOT / "docs" / "python_extending.md").read_text()
+    blocks = [part.split("```")[0] for part in text.split("```python\n")[1:]]
+    assert len(blocks) == 6
+    names = {}
+    for block in blocks:
+        try:
+            exec(compile(block, "python_extending.md", "exec"), names)
+        except tumble.PictureError as error:
+            print(f"SKIPPED: {error}")
+    world, run = names["world"], names["run"]
+    assert names["tree"].levels[0].radii[0] >= 3**0.5 / 2 and list(world.behaviours) == ["cruise"]
+    assert run.position("bird").shape == (61, 3) and run.times[-1] - run.times[0] == pytest.approx(1.0)
+    assert len(names["run"].states) == 61 and world.time == pytest.approx(2.0)

@@ -1,0 +1,107 @@
+"""Sphere trees: what is promised of them, by numpy."""
+
+import subprocess
+
+import numpy as np
+import pytest
+
+import tumble
+
+CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+SIDES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+)
+
+
+@pytest.fixture(scope="module", params=["medial", "hubbard", "grid", "octree"])
+def tree(request):
+    return tumble.SphereTree.build(CUBE, SIDES, method=request.param, depth=2, cache=False)
+
+
+def test_every_level_covers_the_surface(tree):
+    rng = np.random.default_rng(5)
+    corners = CUBE[SIDES[rng.integers(0, 12, 4000)]]
+    weights = rng.dirichlet((1, 1, 1), 4000)
+    points = np.einsum("nk,nkd->nd", weights, corners)
+    for level in tree.levels:
+        away = np.linalg.norm(points[:, None] - level.centers, axis=2) - level.radii
+        assert away.min(axis=1).max() <= 1e-9
+
+
+def test_children_lie_inside_their_parents(tree):
+    for k in range(1, len(tree)):
+        above, below, parents = tree.levels[k - 1], tree.levels[k], tree.parents[k]
+        far = np.linalg.norm(below.centers - above.centers[parents], axis=1) + below.radii
+        assert (far <= above.radii[parents] + 1e-9).all()
+    assert tree.parents[0].tolist() == [-1]
+
+
+def test_balls_reach_out_no_further_than_the_bound(tree):
+    # directions all around each ball; the cube's signed distance in closed form, outside of it
+    rng = np.random.default_rng(6)
+    directions = rng.normal(size=(500, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    last = tree.levels[-1]
+    points = last.centers[:, None] + last.radii[:, None, None] * directions
+    outside = np.linalg.norm(np.maximum(np.abs(points) - 0.5, 0.0), axis=2)
+    assert 0.0 < outside.max() <= tree.outward_error + 1e-12
+
+
+def test_the_branch_and_the_method_are_those_asked_for(tree):
+    assert tree.branch == 8 and tree.depth == 2 and f": {tree.method}, " in repr(tree)
+    for parents in tree.parents[1:]:
+        assert np.bincount(parents).max() <= 8
+
+
+def test_a_file_brings_the_same_tree_back(tree, tmp_path):
+    tree.save(tmp_path / "cube.json")
+    again = tumble.SphereTree.load(tmp_path / "cube.json")
+    assert again.to_json() == tree.to_json() and again.report() == tree.report()
+    assert all((a.centers == b.centers).all() and (a.radii == b.radii).all() for a, b in zip(again.levels, tree.levels))
+
+
+def test_the_report_is_the_command_s(command, tmp_path):
+    mesh = tmp_path / "cube.obj"
+    lines = [f"v {x} {y} {z}" for x, y, z in CUBE] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in SIDES]
+    mesh.write_text("\n".join(lines) + "\n")
+    words = ["spheretree", mesh, "--method", "octree", "--depth", "2", "--no-cache", "-o", tmp_path / "theirs.json"]
+    said = subprocess.run([command, *words], capture_output=True, text=True, timeout=60, check=True).stdout
+    tree = tumble.SphereTree.build(mesh, method="octree", depth=2, cache=False)
+    assert tree.report() and tree.report() in said
+    assert tree.to_json() == (tmp_path / "theirs.json").read_text()
+
+
+def test_an_object_with_vertices_and_faces_is_a_mesh():
+    trimesh = pytest.importorskip("trimesh", reason="SKIPPED: trimesh is not installed")
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.5)
+    tree = tumble.SphereTree.build(ball, method="grid", depth=1, cache=False)
+    root = tree.levels[0]
+    assert np.allclose(root.centers, 0, atol=0.02) and 0.5 <= root.radii[0] < 0.52
+    # volume of a ball over that of the mesh in it
+    assert tree.quality["volume_ratio"][0] == pytest.approx(4 / 3 * np.pi * root.radii[0] ** 3 / ball.volume, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [
+        ({"method": "best"}, "medial, hubbard, grid, octree"),
+        ({"branch": 1}, "2 to 64"),
+        ({"depth": 10}, "1 to 9"),
+        ({"error": 2.0}, "0.0001 to 1"),
+    ],
+)
+def test_settings_out_of_range_are_value_errors(words, said):
+    with pytest.raises(ValueError, match=said):
+        tumble.SphereTree.build(CUBE, SIDES, **words)
+
+
+def test_what_is_no_closed_mesh_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="open|boundary|closed|edge"):
+        tumble.SphereTree.build(CUBE, SIDES[:-1])
+    with pytest.raises(ValueError, match=r"vertices: wanted shape \(n, 3\)"):
+        tumble.SphereTree.build(CUBE[:, :2], SIDES)
+    with pytest.raises(FileNotFoundError):
+        tumble.SphereTree.build(tmp_path / "none.obj")
+    (tmp_path / "tree.json").write_text('{"format": "something else"}')
+    with pytest.raises(tumble.InvalidValueError, match="tree.json"):
+        tumble.SphereTree.load(tmp_path / "tree.json")

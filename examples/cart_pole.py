@@ -1,0 +1,48 @@
+"""A pole balanced on a cart, by a controller worked out from the library's own derivatives. Needs gymnasium (``pip install tumble[gym]``).
+
+    python examples/cart_pole.py
+"""
+
+import gymnasium
+import numpy as np
+
+import tumble.gym  # noqa: F401  registers tumble/CartPole-v0
+
+env = gymnasium.make("tumble/CartPole-v0")
+body = env.unwrapped.body
+
+
+def linear_model() -> tuple[np.ndarray, np.ndarray]:
+    """z' = A z + B u about upright rest, z = (x, θ, x', θ'), by central differences of forward dynamics."""
+    h = 1e-5
+    steps = h * np.eye(5)
+    rows = np.concatenate([steps, -steps])
+    tau = np.zeros((10, 2))
+    tau[:, 0] = rows[:, 4]
+    qdd = body.forward_dynamics(rows[:, :2], rows[:, 2:4], tau)
+    slopes = ((qdd[:5] - qdd[5:]) / (2 * h)).T
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [slopes[:, :4]]])
+    return A, np.concatenate([np.zeros(2), slopes[:, 4]])
+
+
+def regulator(A: np.ndarray, B: np.ndarray, dt: float = 0.02) -> np.ndarray:
+    """Gains of the discrete linear-quadratic regulator, by iterating Riccati's equation."""
+    Ad, Bd = np.eye(4) + dt * A, (dt * B)[:, None]
+    Q, R, P = np.diag([1.0, 10.0, 0.1, 0.1]), 0.01, np.eye(4)
+    for _ in range(2000):
+        K = np.linalg.solve(R + Bd.T @ P @ Bd, Bd.T @ P @ Ad)
+        P = Q + Ad.T @ P @ (Ad - Bd @ K)
+    return K[0]
+
+
+gains = regulator(*linear_model())
+print(f"gains on (x, angle, speed, rate): {np.array2string(gains, precision=2)}")
+for episode in range(3):
+    (x, v, angle, rate), _ = env.reset(seed=episode)
+    total, over = 0.0, False
+    while not over:
+        push = -gains @ (x, angle, v, rate)
+        (x, v, angle, rate), reward, fallen, cut, _ = env.step(int(push > 0))  # all or nothing, to the side that is wanted
+        total, over = total + reward, fallen or cut
+    print(f"episode {episode}: {total:.0f} steps upright, the cart {x:+.2f} m from the middle")
+    assert total == 500
