@@ -1,5 +1,6 @@
 //! What can be typed.
 
+use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use tumble::collide::Builder;
@@ -20,6 +21,16 @@ pub enum Command {
     Run(RunOptions),
     /// Show a scene in a window: keys and mouse move the user, time stands and goes, bodies are pulled.
     View(ViewOptions),
+    /// Show a scene in a cave: a server that simulates, and a process per facet that draws.
+    Cave(Box<CaveOptions>),
+    /// The server of `tumble cave` alone; facets are started by hand, here or on other machines.
+    Serve(Box<ServeOptions>),
+    /// One facet of a run, for a server that is there or will be.
+    Facet(Box<FacetOptions>),
+    /// Drive the facets of a cave from a recording, and compare what they show with what they showed.
+    Replay(Box<ReplayOptions>),
+    /// Save what can be saved of a recording that was cut or damaged.
+    Recover(RecoverOptions),
     /// Check scenes, caves, URDF robots and meshes; nothing is run.
     Check(CheckOptions),
     /// Build a sphere tree around a mesh, or replace a robot's collision geometry by spheres; say how good they are.
@@ -265,19 +276,19 @@ fn number(text: &str, from: f64, to: f64) -> Result<f64, String> {
     }
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
+pub fn seconds(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1e6)
 }
 
-fn frame(text: &str) -> Result<f64, String> {
+pub fn frame(text: &str) -> Result<f64, String> {
     number(text, 1e-6, 1.0)
 }
 
-fn pace(text: &str) -> Result<f64, String> {
+pub fn pace(text: &str) -> Result<f64, String> {
     number(text, 0.01, 1000.0)
 }
 
-fn solver(text: &str) -> Result<Solver, String> {
+pub fn solver(text: &str) -> Result<Solver, String> {
     let name = if text == "lcp" { "lcp_pyramid" } else { text };
     name.parse().map_err(|e: tumble::scene::UnknownName| e.to_string())
 }

@@ -3,6 +3,7 @@
 //! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
 
 mod args;
+mod cave;
 mod caves;
 mod check;
 mod failure;
@@ -25,6 +26,11 @@ fn main() -> ExitCode {
     let outcome = match Tumble::parse().command {
         Command::Run(options) => run::run(&options),
         Command::View(options) => view::view(&options),
+        Command::Cave(options) => cave::cave(&options),
+        Command::Serve(options) => cave::serve(&options),
+        Command::Facet(options) => cave::facet(&options),
+        Command::Replay(options) => cave::replay(&options),
+        Command::Recover(options) => cave::recover(&options),
         Command::Check(options) => check::check(&options),
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),

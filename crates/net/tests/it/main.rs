@@ -1,4 +1,4 @@
-//! Recordings, from outside.
+//! Recordings and sessions, from outside.
 
 mod damage;
 mod hostile;
@@ -8,8 +8,8 @@ mod links;
 mod outside;
 mod recover;
 mod roundtrip;
-mod support;
 mod shm;
+mod support;
 mod sync;
 mod udp;
 mod udp_hostile;

@@ -8,7 +8,7 @@ use crate::gpu::{Finish, Placed};
 use crate::{DrawList, Image, RenderError, Renderer, Stage};
 use nalgebra::{Point3, Vector3};
 use std::sync::Arc;
-use tumble_scene::cave::{Cave, Facet, Flip, Stereo};
+use tumble_scene::cave::{Cave, Facet, Flip, Stereo, User};
 use tumble_scene::{CavePlace, SceneFile};
 
 /// Pixels drawn beyond the edges of a facet and cut off again: what occlusion may reach across an edge.
@@ -58,6 +58,11 @@ impl CaveView {
     /// Puts it elsewhere in the scene.
     pub fn stand(&mut self, place: CavePlace) {
         self.place = place;
+    }
+
+    /// The users, to be moved as they move: what is drawn next is seen by their new eyes.
+    pub fn users_mut(&mut self) -> &mut [User] {
+        &mut self.cave.users
     }
 
     /// What the eye to the `side` (−1 left, 0 between, +1 right) sees through a facet's screen, in the scene.

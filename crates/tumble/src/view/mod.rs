@@ -8,7 +8,7 @@ mod keys;
 mod overlays;
 mod pace;
 mod presets;
-mod sight;
+pub mod sight;
 mod statistics;
 mod status;
 mod user;

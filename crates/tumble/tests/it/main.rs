@@ -2,6 +2,8 @@
 
 mod articulated_scenes;
 mod bad_input;
+mod cave_processes;
+mod cave_users;
 mod caves;
 mod common;
 mod determinism;

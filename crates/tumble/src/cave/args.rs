@@ -1,0 +1,164 @@
+//! What can be typed after `tumble cave`, `tumble serve` and `tumble facet`.
+
+use clap::{Args, ValueEnum};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use tumble::render::Quality;
+use tumble::scene::{Solver, Stepper};
+
+/// What is shown, and in which cave: the server and all facets must mean the same.
+#[derive(Args, Clone)]
+pub struct Stage {
+    /// A scene file, a folder that holds a scene.toml, or the name of a shipped scene.
+    pub scene: String,
+    /// A cave file or the name of a shipped cave.
+    #[arg(long, value_name = "CAVE")]
+    pub cave: String,
+    /// Another scene that brings camera, lights, sky, the cave's place, and bodies that do not move; they are drawn and never touched. Those of the
+    /// first scene (but for its bodies) are then ignored.
+    #[arg(long, value_name = "FILE")]
+    pub environment: Option<String>,
+}
+
+/// What carries the frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Carrier {
+    /// Memory that processes of one machine share.
+    #[value(name = "shared_memory")]
+    SharedMemory,
+    /// Datagrams.
+    Udp,
+}
+
+/// What a server is told.
+#[derive(Args, Clone)]
+pub struct ServeOptions {
+    #[command(flatten)]
+    pub stage: Stage,
+    /// Simulated time to run for, s (default: until Ctrl-C).
+    #[arg(long, value_name = "S", value_parser = crate::args::seconds)]
+    pub seconds: Option<f64>,
+    /// Length of a frame, s (default: what the scene says).
+    #[arg(long, value_name = "S", value_parser = crate::args::frame)]
+    pub dt: Option<f64>,
+    /// time_stepping or backtracking.
+    #[arg(long, value_name = "NAME")]
+    pub stepper: Option<Stepper>,
+    /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
+    #[arg(long, value_name = "NAME", value_parser = crate::args::solver)]
+    pub solver: Option<Solver>,
+    /// Frames shown per simulated second, at most; a frame holds as many steps as fit, at least one.
+    #[arg(long, value_name = "N", default_value = "60", value_parser = crate::args::pace)]
+    pub fps: f64,
+    /// Do not keep to the clock: the next frame begins when the last one is shown, and waits for its facets as long as the start does.
+    #[arg(long)]
+    pub fast: bool,
+    /// What carries the frames (default: what the cave says).
+    #[arg(long, value_name = "NAME")]
+    pub transport: Option<Carrier>,
+    /// Where to listen with --transport udp (default: 127.0.0.1 and a free port, or every address and port 47100 where the cave has machines elsewhere).
+    #[arg(long, value_name = "ADDR:PORT")]
+    pub listen: Option<SocketAddr>,
+    /// How long the start waits for facets, s (default: connect_timeout_ms of the cave).
+    #[arg(long, value_name = "S", value_parser = crate::args::seconds)]
+    pub wait: Option<f64>,
+    /// End the run that is going on in this cave, and take its place.
+    #[arg(long)]
+    pub replace: bool,
+    /// Record states, inputs and answers (MCAP), in place of what the cave file says under [recording].
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Write what was counted and measured (JSON).
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
+    /// The users' bodies push what they walk into: an upright capsule of 0.25 m around each.
+    #[arg(long)]
+    pub push: bool,
+    /// Say nothing but errors.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// How facets draw.
+#[derive(Args, Clone, Default)]
+pub struct DrawOptions {
+    /// Write every frame that is shown into a folder for each facet, frame_000000.png and so on, with frames.jsonl beside them.
+    #[arg(long, value_name = "DIR")]
+    pub frames_dir: Option<PathBuf>,
+    /// Write only frames.jsonl of each facet: number, state and picture of every frame that was shown.
+    #[arg(long, value_name = "DIR", conflicts_with = "frames_dir")]
+    pub log_dir: Option<PathBuf>,
+    /// Draw the number of the frame into the picture: in figures, and as squares for programs.
+    #[arg(long)]
+    pub stamp: bool,
+    /// usual, fast or fastest, or parts of it as for tumble view (default: usual; fast in windows where a software driver draws).
+    #[arg(long, value_name = "NAME")]
+    pub quality: Option<Quality>,
+    /// Draw into memory even where there is a display.
+    #[arg(long)]
+    pub offscreen: bool,
+    /// Draw nothing: states are applied and acknowledged.
+    #[arg(long, conflicts_with_all = ["frames_dir", "stamp"])]
+    pub no_pictures: bool,
+}
+
+/// `tumble cave`.
+#[derive(Args, Clone)]
+pub struct CaveOptions {
+    #[command(flatten)]
+    pub serve: ServeOptions,
+    #[command(flatten)]
+    pub draw: DrawOptions,
+    /// One process that draws all facets, unfolded into one picture, in place of one process per facet.
+    #[arg(long)]
+    pub preview: bool,
+    /// Start a facet again that ended by itself or was killed; at most 5 times in a minute.
+    #[arg(long)]
+    pub restart: bool,
+}
+
+/// `tumble replay`.
+#[derive(Args, Clone)]
+pub struct ReplayOptions {
+    /// A recording of a run in a cave (`tumble cave --record`), complete or cut.
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub cave: CaveOptions,
+}
+
+/// `tumble recover`.
+#[derive(Args, Clone)]
+pub struct RecoverOptions {
+    /// A recording (MCAP) that was cut or damaged.
+    pub file: PathBuf,
+    /// Where all of it goes that can be saved; must not exist.
+    #[arg(long, short, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
+/// `tumble facet`.
+#[derive(Args, Clone)]
+pub struct FacetOptions {
+    #[command(flatten)]
+    pub stage: Stage,
+    /// The facet of the cave.
+    #[arg(long, value_name = "NAME", required_unless_present = "preview")]
+    pub facet: Option<String>,
+    /// All facets in one picture, for a server that was started with --preview.
+    #[arg(long, conflicts_with = "facet")]
+    pub preview: bool,
+    /// The server, where frames come as datagrams (default: the run that goes on in this cave on this machine).
+    #[arg(long, value_name = "ADDR:PORT")]
+    pub server: Option<SocketAddr>,
+    /// The run, where frames come through shared memory.
+    #[arg(long, value_name = "NUMBER", conflicts_with = "server")]
+    pub run: Option<String>,
+    /// How long to wait for a server, at the start and when it is lost, s.
+    #[arg(long, value_name = "S", default_value = "10", value_parser = crate::args::seconds)]
+    pub wait: f64,
+    #[command(flatten)]
+    pub draw: DrawOptions,
+    /// Started by a launcher: ends when stdin does, which is when the launcher ends, however that is.
+    #[arg(long, hide = true)]
+    pub led: bool,
+}

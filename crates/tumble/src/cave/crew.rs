@@ -1,0 +1,238 @@
+//! The facets of a run as processes: those of this machine are started, watched and ended; of the others it is told how to start them.
+
+use super::args::{Carrier, CaveOptions, ServeOptions};
+use super::ends::{Address, seen_from};
+use super::stage::PREVIEW;
+use crate::failure::Failure;
+use std::collections::VecDeque;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+use tumble::net::sync::Seat;
+use tumble::scene::cave::Cave;
+
+/// How long facets may take to end by themselves after they were told, and again after their pipe was closed.
+const GRACE: Duration = Duration::from_secs(2);
+/// Restarts of a facet within a minute, at most.
+const MOST_RESTARTS: usize = 5;
+const MINUTE: Duration = Duration::from_secs(60);
+/// Between an end and the restart.
+const PAUSE: Duration = Duration::from_millis(200);
+
+/// The facets that are started here.
+pub struct Crew {
+    members: Vec<Member>,
+    restart: bool,
+    quiet: bool,
+}
+
+struct Member {
+    name: String,
+    args: Vec<String>,
+    child: Option<Child>,
+    ended: Option<Instant>,
+    /// Ended for good: closed by the user, or too often.
+    over: bool,
+    /// It ended last by a failure.
+    failed: bool,
+    restarts: VecDeque<Instant>,
+}
+
+/// How the crew stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Crewed {
+    /// Somebody is there, or nobody had to be.
+    Yes,
+    /// All have ended as their users wished.
+    Left,
+    /// All have ended, at least one by a failure.
+    Lost,
+}
+
+/// The seats of a run: all facets, or the preview alone.
+pub fn seats(cave: &Cave, preview: bool) -> Vec<Seat> {
+    if preview {
+        return vec![Seat { name: PREVIEW.into(), critical: true }];
+    }
+    cave.facets.iter().map(|f| Seat { name: f.name.clone(), critical: f.critical }).collect()
+}
+
+impl Crew {
+    /// Starts the facets of this machine, if there is a launcher, and says how the others are started.
+    pub fn start(serve: &ServeOptions, cave: &Cave, launcher: Option<&CaveOptions>, address: &Address) -> Result<Crew, Failure> {
+        let mut crew = Crew { members: Vec::new(), restart: launcher.is_some_and(|l| l.restart), quiet: serve.quiet };
+        for (k, seat) in seats(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
+            let far = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
+            match (launcher, far) {
+                (Some(launcher), None) => crew.members.push(Member::new(&seat.name, led(launcher, &seat.name, address))),
+                (_, node) => {
+                    let server = match (address, node) {
+                        (Address::Udp(at), Some(node)) => {
+                            let ip = seen_from(&node.address, node.port).filter(|_| at.ip().is_unspecified()).unwrap_or(at.ip());
+                            format!(" --server {}", std::net::SocketAddr::new(ip, at.port()))
+                        }
+                        _ => String::new(),
+                    };
+                    let place = node.map_or("here".to_owned(), |n| format!("on {} ({})", n.name, n.address));
+                    let what = stage_args(serve).iter().map(|a| quoted(a)).collect::<Vec<_>>().join(" ");
+                    crew.say(&format!("facet {}: start it {place}: tumble facet {what} --facet {}{server}", seat.name, quoted(&seat.name)));
+                }
+            }
+        }
+        for k in 0..crew.members.len() {
+            crew.spawn(k)?;
+        }
+        Ok(crew)
+    }
+
+    /// Looks whether somebody ended, and restarts if asked to. `joining`: before the first frame, where an end is a failure.
+    pub fn watch(&mut self, joining: bool) -> Result<Crewed, Failure> {
+        for k in 0..self.members.len() {
+            let member = &mut self.members[k];
+            if let Some(status) = member.child.as_mut().and_then(|child| child.try_wait().ok().flatten()) {
+                (member.child, member.ended) = (None, Some(Instant::now()));
+                member.over = status.success() || !self.restart;
+                let title = format!("facet {}", member.name);
+                if joining {
+                    return Err(Failure::run(&title, format!("ended before the start ({}); what it said stands above", told(status))));
+                }
+                self.say(&if status.success() { format!("{title} has left") } else { format!("{title} ended ({})", told(status)) });
+                self.members[k].failed = !status.success();
+            }
+            let member = &mut self.members[k];
+            let due = member.ended.is_some_and(|at| at.elapsed() > PAUSE) && member.child.is_none() && !member.over;
+            if due {
+                member.restarts.retain(|at| at.elapsed() < MINUTE);
+                if member.restarts.len() >= MOST_RESTARTS {
+                    member.over = true;
+                    let text = format!("facet {} ended {MOST_RESTARTS} times within a minute and is not started again", member.name);
+                    self.say(&text);
+                    continue;
+                }
+                member.restarts.push_back(Instant::now());
+                self.spawn(k)?;
+            }
+        }
+        let all_over = !self.members.is_empty() && self.members.iter().all(|m| m.over && m.child.is_none());
+        Ok(match all_over {
+            false => Crewed::Yes,
+            true if self.members.iter().any(|m| m.failed) => Crewed::Lost,
+            true => Crewed::Left,
+        })
+    }
+
+    /// After the facets were told that the run is over: waits for them, and ends who does not.
+    pub fn end(&mut self) {
+        self.wait(GRACE);
+        // who has not heard it finds its pipe closed
+        self.members.iter_mut().filter_map(|m| m.child.as_mut()).for_each(|child| drop(child.stdin.take()));
+        self.wait(GRACE);
+        for member in &mut self.members {
+            let Some(mut child) = member.child.take() else { continue };
+            if let Ok(None) = child.try_wait() {
+                eprintln!("facet {}: does not end and is killed", member.name);
+            }
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+
+    /// Until all have ended, at most so long.
+    fn wait(&mut self, most: Duration) {
+        let until = Instant::now() + most;
+        while Instant::now() < until && self.members.iter_mut().any(|m| m.child.as_mut().is_some_and(|c| matches!(c.try_wait(), Ok(None)))) {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    fn spawn(&mut self, k: usize) -> Result<(), Failure> {
+        let member = &mut self.members[k];
+        let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
+        let mut command = Command::new(program);
+        // a group of its own: Ctrl-C is for the launcher, who ends the run in order
+        command.args(&member.args).stdin(Stdio::piped()).stdout(Stdio::null()).process_group(0);
+        let child = command.spawn().map_err(|e| Failure::run(&format!("starting facet {}", member.name), e))?;
+        (member.child, member.ended) = (Some(child), None);
+        Ok(())
+    }
+
+    fn say(&self, what: &str) {
+        if !self.quiet {
+            eprintln!("{what}");
+        }
+    }
+}
+
+impl Drop for Crew {
+    fn drop(&mut self) {
+        for child in self.members.iter_mut().filter_map(|m| m.child.as_mut()) {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+impl Member {
+    fn new(name: &str, args: Vec<String>) -> Member {
+        Member { name: name.to_owned(), args, child: None, ended: None, over: false, failed: false, restarts: VecDeque::new() }
+    }
+}
+
+/// What a facet is started with.
+fn led(launcher: &CaveOptions, name: &str, address: &Address) -> Vec<String> {
+    let mut args = vec!["facet".to_owned()];
+    args.extend(stage_args(&launcher.serve));
+    if name == PREVIEW && launcher.preview { args.push("--preview".into()) } else { args.extend(["--facet".into(), name.to_owned()]) }
+    args.extend(match address {
+        Address::Memory(run) => ["--run".into(), run.clone()],
+        Address::Udp(server) => ["--server".into(), local(*server).to_string()],
+    });
+    let draw = &launcher.draw;
+    let folder = |option: &str, path: &Option<std::path::PathBuf>| path.iter().flat_map(|p| [option.to_owned(), p.display().to_string()]).collect::<Vec<_>>();
+    args.extend(folder("--frames-dir", &draw.frames_dir));
+    args.extend(folder("--log-dir", &draw.log_dir));
+    args.extend(draw.quality.iter().flat_map(|q| ["--quality".to_owned(), q.to_string()]));
+    let switches = [("--stamp", draw.stamp), ("--offscreen", draw.offscreen), ("--no-pictures", draw.no_pictures)];
+    args.extend(switches.iter().filter(|(_, on)| *on).map(|(name, _)| (*name).to_owned()));
+    // the launcher gives up before its facets do
+    let wait = launcher.serve.wait.map_or("600".to_owned(), |s| (s + 10.0).to_string());
+    args.extend(["--wait".into(), wait, "--led".into()]);
+    args
+}
+
+fn stage_args(serve: &ServeOptions) -> Vec<String> {
+    let stage = &serve.stage;
+    let mut args = vec![stage.scene.clone(), "--cave".into(), stage.cave.clone()];
+    args.extend(stage.environment.iter().flat_map(|e| ["--environment".into(), e.clone()]));
+    args
+}
+
+/// An address that this machine listens on, as it reaches itself.
+fn local(at: std::net::SocketAddr) -> std::net::SocketAddr {
+    match at.ip().is_unspecified() {
+        true if at.is_ipv4() => (std::net::Ipv4Addr::LOCALHOST, at.port()).into(),
+        true => (std::net::Ipv6Addr::LOCALHOST, at.port()).into(),
+        false => at,
+    }
+}
+
+/// As a shell takes it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:".contains(c);
+    if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
+fn told(status: ExitStatus) -> String {
+    use std::os::unix::process::ExitStatusExt;
+    match (status.code(), status.signal()) {
+        (Some(code), _) => format!("exit code {code}"),
+        (None, Some(signal)) => format!("killed by signal {signal}"),
+        _ => "of unknown cause".into(),
+    }
+}
+
+/// What carries the frames: as the command line says, else the cave.
+pub fn carrier(serve: &ServeOptions, cave: &Cave) -> Carrier {
+    let of_cave = if cave.sync.transport == tumble::scene::cave::Transport::Udp { Carrier::Udp } else { Carrier::SharedMemory };
+    serve.transport.unwrap_or(of_cave)
+}

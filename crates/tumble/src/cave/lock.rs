@@ -1,0 +1,173 @@
+//! One run per cave and user: a file that is locked while the run lives, and says which it is (thesis §IV.C: a run that is going on is found).
+//!
+//! The lock is the system's, so it goes with the process however that ends. The text is for people and for facets that are started by hand.
+
+use super::ends::Address;
+use crate::failure::Failure;
+use serde::{Deserialize, Serialize};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use tumble::net::sync::shm::ports::folder;
+use tumble::scene::cave::Cave;
+
+/// How long a run that is to be replaced may take to end by itself, and then to be gone.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Most bytes of the text.
+const MOST: u64 = 4096;
+
+/// What the file says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    pub pid: i32,
+    pub scene: String,
+    pub cave: String,
+    /// Seconds since 1970.
+    pub since_unix_s: u64,
+    pub address: Address,
+}
+
+impl Run {
+    /// This process's run.
+    pub fn here(scene: &str, cave: &str, address: Address) -> Run {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Run { pid: std::process::id() as i32, scene: scene.into(), cave: cave.into(), since_unix_s: since.as_secs(), address }
+    }
+
+    fn described(&self) -> String {
+        format!("process {}, scene {}, since {}", self.pid, self.scene, utc(self.since_unix_s))
+    }
+}
+
+/// Held while the run lives; the file goes with it.
+pub struct Lock {
+    file: File,
+    path: PathBuf,
+}
+
+impl Lock {
+    /// Takes the cave, or refuses by the name of who has it. With `replace` that run is asked to end, then killed.
+    pub fn take(cave: &Cave, run: &Run, replace: bool) -> Result<Lock, Failure> {
+        let path = path(cave)?;
+        let until = Instant::now() + 2 * PATIENCE;
+        let (mut asked, mut killed) = (None, false);
+        loop {
+            if let Some(file) = try_take(&path)? {
+                let mut lock = Lock { file, path };
+                lock.write(run)?;
+                return Ok(lock);
+            }
+            let other = read(&path);
+            let name = other.as_ref().map_or("another process, which has not said yet who it is".to_owned(), Run::described);
+            if !replace {
+                return Err(Failure::run("the cave", format!("a run is going on in {} already: {name}; end it first, or take its place with --replace", cave.file)));
+            }
+            let now = Instant::now();
+            if now > until {
+                return Err(Failure::run("the cave", format!("the run in {} does not end: {name}", cave.file)));
+            }
+            match (&other, asked) {
+                (Some(other), None) => {
+                    eprintln!("ending the run in {}: {name}", cave.file);
+                    signal(other.pid, rustix::process::Signal::TERM);
+                    asked = Some(now);
+                }
+                (Some(other), Some(since)) if !killed && now > since + PATIENCE => {
+                    signal(other.pid, rustix::process::Signal::KILL);
+                    killed = true;
+                }
+                _ => std::thread::sleep(Duration::from_millis(20)),
+            }
+        }
+    }
+
+    /// Says which run it is.
+    pub fn write(&mut self, run: &Run) -> Result<(), Failure> {
+        let failed = |e: std::io::Error| Failure::run("the cave's lock", e);
+        let text = serde_json::to_string(run).map_err(|e| Failure::run("the cave's lock", e))?;
+        self.file.set_len(0).and_then(|()| self.file.rewind()).map_err(failed)?;
+        self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush()).map_err(failed)
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // while it is still locked: who waits for it then finds that the path is another file's
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+/// The run that goes on in a cave on this machine, if there is one.
+pub fn find(cave: &Cave) -> Result<Option<Run>, Failure> {
+    let path = path(cave)?;
+    let Ok(file) = File::open(&path) else { return Ok(None) };
+    match file.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => Ok(read(&path)),
+        _ => Ok(None),
+    }
+}
+
+fn path(cave: &Cave) -> Result<PathBuf, Failure> {
+    let (folder, _) = folder().map_err(|e| Failure::run("the cave's lock", e))?;
+    let name = Path::new(&cave.file).canonicalize().map_or_else(|_| cave.file.clone(), |path| path.display().to_string());
+    let hash = blake3::hash(name.as_bytes()).to_hex();
+    Ok(folder.join(format!("cave-{}.lock", &hash[..16])))
+}
+
+/// The file, locked; `None` where another process has it.
+fn try_take(path: &Path) -> Result<Option<File>, Failure> {
+    let failed = |e: std::io::Error| Failure::run(&format!("the cave's lock {}", path.display()), e);
+    for _ in 0..100 {
+        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).mode(0o600).open(path).map_err(failed)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            Err(TryLockError::Error(e)) => return Err(failed(e)),
+        }
+        // the run before may have removed the file between opening and locking
+        let (ours, there) = (file.metadata().map_err(failed)?.ino(), std::fs::metadata(path).map(|m| m.ino()).ok());
+        if there == Some(ours) {
+            return Ok(Some(file));
+        }
+    }
+    Ok(None)
+}
+
+fn read(path: &Path) -> Option<Run> {
+    let mut text = String::new();
+    File::open(path).ok()?.take(MOST).read_to_string(&mut text).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+fn signal(pid: i32, signal: rustix::process::Signal) {
+    if let Some(pid) = rustix::process::Pid::from_raw(pid).filter(|_| pid > 1) {
+        let _ = rustix::process::kill_process(pid, signal); // it may be gone already
+    }
+}
+
+/// `2026-11-21 13:05:22 UTC`. Days to a date by the proleptic Gregorian calendar, with years that begin in March.
+fn utc(unix_s: u64) -> String {
+    let (days, s) = ((unix_s / 86_400) as i64 + 719_468, unix_s % 86_400);
+    let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month_from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+    let year = 400 * era + year_of_era + i64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02} {:02}:{:02}:{:02} UTC", s / 3600, s / 60 % 60, s % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        // by `date -u -d @N`
+        assert_eq!(super::utc(0), "1970-01-01 00:00:00 UTC");
+        assert_eq!(super::utc(951_782_399), "2000-02-28 23:59:59 UTC");
+        assert_eq!(super::utc(951_782_400), "2000-02-29 00:00:00 UTC");
+        assert_eq!(super::utc(4_102_444_800), "2100-01-01 00:00:00 UTC");
+    }
+}

@@ -1,0 +1,325 @@
+//! The server's process: it simulates, publishes, keeps time, and looks after facets, recording and users.
+
+use super::args::{Carrier, CaveOptions, ServeOptions};
+use super::crew::{Crew, Crewed, carrier, seats};
+use super::ends::{Address, ServerEnd, key, timing};
+use super::lock::{Lock, Run};
+use super::replay::Tape;
+use super::signals::Signals;
+use super::stage::Setting;
+use super::summary::{Meter, Status, Summary, skew};
+use super::users::Users;
+use crate::failure::Failure;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use tumble::core::World;
+use tumble::net::record::RecorderOptions;
+use tumble::net::sync::shm::{ShmServer, clean_up};
+use tumble::net::sync::udp::{Entropy, UdpServer};
+use tumble::net::sync::{Pace, Seat, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder};
+use tumble::scene::cave::{Cave, Mode};
+
+/// Between two looks at signals and processes while nothing happens.
+const TURN: Duration = Duration::from_millis(20);
+/// The port where a cave of several machines is served.
+const PORT: u16 = 47_100;
+
+/// Runs a scene in a cave, or shows a recording of one; with a launcher's options, also the facets of this machine.
+pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
+    let signals = Signals::watch()?;
+    let setting = Setting::load(&options.stage, |w| {
+        w.dt_s = options.dt.unwrap_or(w.dt_s);
+        w.stepper = options.stepper.unwrap_or(w.stepper);
+        w.solver = options.solver.unwrap_or(w.solver);
+    })?;
+    let say = |what: &str| (!options.quiet).then(|| eprintln!("{what}"));
+    setting.notes.iter().for_each(|note| _ = say(note));
+    let tape = recording.map(|path| Tape::open(path, setting.hash)).transpose()?;
+    let key = key(&setting.cave)?;
+    let number = Entropy::system().map_err(|e| Failure::run("the run", e))?.next_u64();
+    let name = format!("{number:016x}");
+    let mut run = Run::here(&setting.scene.file, &setting.cave.file, Address::Memory(name.clone()));
+    let mut lock = Lock::take(&setting.cave, &run, options.replace)?;
+    let seats = seats(&setting.cave, launcher.is_some_and(|l| l.preview));
+    let count = seats.len() as u16;
+    let failed = |e| Failure::run("the server", e);
+    let end = match carrier(options, &setting.cave) {
+        Carrier::SharedMemory => ServerEnd::Shm(Box::new(ShmServer::new(&name, count).map_err(failed)?)),
+        Carrier::Udp => {
+            let server = UdpServer::bind(listen(options, &setting.cave), count, key, timing(&setting.cave)).map_err(failed)?;
+            run.address = Address::Udp(server.address().map_err(failed)?);
+            lock.write(&run)?;
+            say(&format!("server: {}", server.describe()));
+            ServerEnd::Udp(Box::new(server))
+        }
+    };
+    let shared_memory = matches!(end, ServerEnd::Shm(_));
+    let server = Server::new(end, told(options, &setting, number, &seats), &setting.world);
+    let mut crew = Crew::start(options, &setting.cave, launcher, &run.address)?;
+    let log_dir = launcher.and_then(|l| l.draw.frames_dir.clone().or(l.draw.log_dir.clone()));
+    let outcome = Host::new(options, setting, server, seats, &signals, (log_dir, tape)).and_then(|mut host| {
+        let outcome = host.show(&mut crew);
+        let ended = host.end(&mut crew);
+        outcome.and(ended)
+    });
+    drop(crew);
+    if shared_memory {
+        // what killed facets left
+        clean_up().map_err(|e| Failure::run("cleaning up", e))?;
+    }
+    drop(lock);
+    outcome
+}
+
+fn listen(options: &ServeOptions, cave: &Cave) -> SocketAddr {
+    let far = cave.nodes.iter().any(|n| !n.is_local());
+    let usual = if far { (Ipv4Addr::UNSPECIFIED, PORT) } else { (Ipv4Addr::LOCALHOST, 0) };
+    options.listen.unwrap_or(usual.into())
+}
+
+/// How long the start waits for facets.
+fn patience(options: &ServeOptions, cave: &Cave) -> Duration {
+    options.wait.map_or(Duration::from_millis(cave.sync.connect_timeout_ms.into()), Duration::from_secs_f64)
+}
+
+/// What the session is told: as the cave file says.
+fn told(options: &ServeOptions, setting: &Setting, run: u64, seats: &[Seat]) -> ServerOptions {
+    let (sync, wait) = (&setting.cave.sync, patience(options, &setting.cave));
+    let ms = |ms: u32| Duration::from_millis(ms.into());
+    ServerOptions {
+        pace: if sync.mode == Mode::Lockstep { Pace::Lockstep } else { Pace::Latest },
+        ready_after: if options.fast { wait } else { ms(sync.ready_timeout_ms) },
+        first_after: wait,
+        drop_after: ms(sync.drop_timeout_ms),
+        history: sync.history_frames as usize,
+        ..ServerOptions::new(run, setting.hash, seats.to_vec())
+    }
+}
+
+struct Host<'a> {
+    options: &'a ServeOptions,
+    signals: &'a Signals,
+    server: Server<ServerEnd>,
+    world: World,
+    users: Users,
+    recorder: Option<(SessionRecorder, PathBuf)>,
+    recorded: bool,
+    cave: Cave,
+    scene: String,
+    seconds: Option<f64>,
+    seats: Vec<Seat>,
+    meter: Meter,
+    status: Status,
+    log_dir: Option<PathBuf>,
+    /// What is shown, where nothing is simulated.
+    tape: Option<Tape>,
+    time_s: f64,
+    began: Instant,
+    behind_s: f64,
+    frames: u64,
+}
+
+impl<'a> Host<'a> {
+    fn new(
+        options: &'a ServeOptions, setting: Setting, server: Server<ServerEnd>, seats: Vec<Seat>, signals: &'a Signals,
+        (log_dir, tape): (Option<PathBuf>, Option<Tape>),
+    ) -> Result<Host<'a>, Failure> {
+        let viewer = setting.viewer()?;
+        let Setting { scene, cave, mut world, hash, .. } = setting;
+        let users = Users::new(viewer, &mut world, options.push)?;
+        let described = cave.recording.as_ref().filter(|_| tape.is_none()).map(|r| (r.file.clone(), r.every_frames));
+        let recorder = options.record.clone().map(|file| (file, 1)).or(described).map(|(file, every)| {
+            let recorder = SessionRecorder::create(&file, &scene.file, hash, &world, every, RecorderOptions::default());
+            recorder.map(|r| (r, file)).map_err(|e| Failure::run("recording", e))
+        });
+        Ok(Host {
+            options, signals, server, world, users, recorder: recorder.transpose()?, recorded: false, cave, scene: scene.file, seconds: options.seconds,
+            meter: Meter::new(seats.len()), seats, status: Status::new(options.quiet), log_dir, tape, time_s: 0.0, began: Instant::now(), behind_s: 0.0, frames: 0,
+        })
+    }
+
+    /// From the first joining to the last frame.
+    fn show(&mut self, crew: &mut Crew) -> Result<(), Failure> {
+        if !self.gather(crew)? {
+            return Ok(());
+        }
+        let step_s = self.world.settings().dt;
+        let steps = ((1.0 / (self.options.fps * step_s) + 1e-9).floor() as u32).max(1);
+        let dt = self.frame_length(step_s * f64::from(steps));
+        let last = self.seconds.map(|s| (s / dt).round() as u64);
+        self.began = Instant::now();
+        let mut due = self.server.now();
+        for frame in 0.. {
+            let begin = Instant::now();
+            if !self.publish(frame, steps)? {
+                return Ok(());
+            }
+            if last == Some(frame) || self.signals.end() {
+                return Ok(());
+            }
+            match crew.watch(false)? {
+                Crewed::Yes => {}
+                Crewed::Left => return Ok(()),
+                Crewed::Lost => return Err(Failure::run("the run", "no facet is left")),
+            }
+            if !self.options.fast {
+                due = self.keep_time(due, dt)?;
+            }
+            self.meter.frame.add(begin.elapsed().as_secs_f64(), frame, self.time_s);
+        }
+        Ok(())
+    }
+
+    /// Waits for the critical facets; `false` when the end was asked for meanwhile.
+    fn gather(&mut self, crew: &mut Crew) -> Result<bool, Failure> {
+        let wait = patience(self.options, &self.cave);
+        let until = self.server.now() + wait;
+        while !self.server.session().complete() {
+            if self.signals.end() {
+                return Ok(false);
+            }
+            let now = self.server.now();
+            if now > until {
+                let absent = self.server.session().absent().into_iter().map(str::to_owned).collect();
+                return Err(Failure::run("the start", SessionError::Missing(absent, wait)));
+            }
+            self.server.idle_until(now + TURN).map_err(failed)?;
+            self.take_events(0.0);
+            crew.watch(true)?;
+        }
+        Ok(true)
+    }
+
+    /// The steps of one frame.
+    fn simulate(&mut self, frame: u64, steps: u32) -> Result<(), Failure> {
+        let (clock, dt) = (Instant::now(), self.world.settings().dt);
+        for _ in 0..steps {
+            self.users.act(&mut self.world, dt)?;
+            self.world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
+        }
+        self.meter.step.add(clock.elapsed().as_secs_f64(), frame, self.world.time());
+        Ok(())
+    }
+
+    /// Of the simulation, s; a recording has its own.
+    fn frame_length(&self, simulated: f64) -> f64 {
+        self.tape.as_ref().and_then(Tape::frame_length).unwrap_or(simulated)
+    }
+
+    /// The next frame, to its being shown: simulated, or from the recording. `false` where that is over.
+    fn publish(&mut self, frame: u64, steps: u32) -> Result<bool, Failure> {
+        let recorded = self.tape.as_mut().map(Tape::next).transpose()?;
+        if recorded.is_none() && frame > 0 {
+            self.simulate(frame, steps)?;
+        }
+        let clock = Instant::now();
+        match recorded {
+            Some(None) => return Ok(false),
+            Some(Some(recorded)) => {
+                self.server.replay(&recorded).map_err(failed)?;
+                self.time_s = recorded.time_s;
+            }
+            None => {
+                self.server.frame(&self.world, &self.users.viewer).map_err(failed)?;
+                self.time_s = self.world.time();
+            }
+        }
+        self.meter.barrier.add(clock.elapsed().as_secs_f64(), frame, self.time_s);
+        self.frames += 1;
+        if let Some((recorder, _)) = &mut self.recorder
+            && let Some(recorded) = self.server.session().recorded(!self.recorded)
+        {
+            recorder.frame(&self.world, recorded).map_err(|e| Failure::run("recording", e))?;
+            self.recorded = true;
+        }
+        self.take_events(self.time_s);
+        self.status.at(&self.server, &self.seats, &self.meter, frame, self.time_s);
+        Ok(true)
+    }
+
+    /// Waits until the next frame is due, and when that is. What is late by more than a frame is given up: time then goes slower, and no frame is left out.
+    fn keep_time(&mut self, due: Duration, dt: f64) -> Result<Duration, Failure> {
+        let (next, now) = (due + Duration::from_secs_f64(dt), self.server.now());
+        let late = now.saturating_sub(next);
+        if late > Duration::from_secs_f64(dt) {
+            self.behind_s += late.as_secs_f64();
+            return Ok(now);
+        }
+        self.server.idle_until(next).map_err(failed)?;
+        Ok(next)
+    }
+
+    fn take_events(&mut self, time_s: f64) {
+        let events = self.server.events();
+        if let Some((recorder, _)) = &mut self.recorder {
+            recorder.events(&events);
+        }
+        for event in events {
+            self.meter.take(&event, time_s);
+            self.tape.iter_mut().for_each(|tape| tape.take(&event));
+            let seat = |k: &u16| self.seats.get(*k as usize).map_or("", |s| s.name.as_str());
+            let said = match &event {
+                ServerEvent::Joined(k) => Some(format!("facet {} is there", seat(k))),
+                ServerEvent::Refused(k, why) => Some(format!("facet {} is not let in: {why}", seat(k))),
+                ServerEvent::Gone(k, true) => Some(format!("facet {} left", seat(k))),
+                ServerEvent::Gone(k, false) => Some(format!("facet {} is dropped; the others go on", seat(k))),
+                ServerEvent::Late(k, frame) => Some(format!("facet {} is late with frame {frame}", seat(k))),
+                ServerEvent::Presented(k, frame, _, false) => Some(format!("facet {} drew another frame {frame} than was sent", seat(k))),
+                _ => None,
+            };
+            if let (Some(said), false) = (said, self.options.quiet) {
+                eprintln!("{said}");
+                self.status.interrupted();
+            }
+            if let ServerEvent::Input(_, input) = event {
+                self.users.take(input, time_s);
+            }
+        }
+    }
+
+    /// Ends the run: facets, recording, summary. As much of it as can be done is.
+    fn end(&mut self, crew: &mut Crew) -> Result<(), Failure> {
+        let wall_s = self.began.elapsed().as_secs_f64();
+        let told = self.server.end().map_err(failed);
+        crew.end();
+        let recorded = match self.recorder.take() {
+            Some((recorder, path)) => recorder.finish().map(|_| Some(path)).map_err(|e| Failure::run("recording", e)),
+            None => Ok(None),
+        };
+        if self.frames > 0 {
+            let summary = Summary {
+                scene: self.scene.clone(),
+                cave: self.cave.file.clone(),
+                transport: if carrier(self.options, &self.cave) == Carrier::Udp { "udp" } else { "shared memory" },
+                mode: if self.cave.sync.mode == Mode::Lockstep { "lockstep" } else { "latest" },
+                frames: self.frames,
+                simulated_s: self.time_s,
+                wall_s,
+                behind_s: self.behind_s,
+                simulation: self.meter.step.figures(),
+                barrier: self.meter.barrier.figures(),
+                frame: self.meter.frame.figures(),
+                skew: self.log_dir.as_ref().and_then(|folder| skew(folder, &self.seats)),
+                replay: self.tape.as_ref().map(|tape| tape.counts),
+                facets: self.meter.facets(&self.server, &self.seats),
+            };
+            if !self.options.quiet {
+                print!("{}", summary.lines());
+            }
+            if let Some(path) = &self.options.summary {
+                let text = serde_json::to_string_pretty(&summary).map_err(|e| Failure::run("the summary", e))? + "\n";
+                std::fs::write(path, text).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))?;
+            }
+        }
+        told.and(recorded).map(|path| {
+            if let (Some(path), false) = (path, self.options.quiet) {
+                println!("recording: {}", path.display());
+            }
+        })
+    }
+}
+
+fn failed(error: SessionError) -> Failure {
+    Failure::run("the server", error)
+}

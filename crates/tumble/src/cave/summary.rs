@@ -1,0 +1,207 @@
+//! What a run counted and measured: lines while it runs, a few at its end, and all of it as JSON.
+
+use super::ends::ServerEnd;
+use super::log::Line;
+use super::measure::{Figures, Spread};
+use super::replay::Counts;
+use super::stage::facet_folder;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::io::IsTerminal;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use tumble::net::sync::transport::{FacetNumber, Refused};
+use tumble::net::sync::{Seat, Server, ServerEvent, Standing};
+
+/// Between two reports.
+const EVERY: Duration = Duration::from_secs(5);
+
+/// Times of the run.
+#[derive(Default)]
+pub struct Meter {
+    /// The steps of one frame.
+    pub step: Spread,
+    /// From publishing a frame to when all who are waited for have shown it.
+    pub barrier: Spread,
+    /// From the beginning of one frame to the next.
+    pub frame: Spread,
+    /// By seat: from the arrival of a frame at the facet to the end of drawing it.
+    draw: Vec<Spread>,
+    last: Vec<(u64, f64)>,
+}
+
+/// The whole summary. Units stand in the names.
+#[derive(Serialize)]
+pub struct Summary {
+    pub scene: String,
+    pub cave: String,
+    pub transport: &'static str,
+    pub mode: &'static str,
+    pub frames: u64,
+    pub simulated_s: f64,
+    pub wall_s: f64,
+    /// Time that was given up because frames took longer than their length.
+    pub behind_s: f64,
+    /// Simulating one frame: all its steps.
+    pub simulation: Figures,
+    pub barrier: Figures,
+    pub frame: Figures,
+    /// Between the first and the last facet to show a frame, where facets of this machine wrote `frames.jsonl`.
+    pub skew: Option<Figures>,
+    /// Of a replay: pictures, compared with those of the recording.
+    pub replay: Option<Counts>,
+    pub facets: Vec<FacetSummary>,
+}
+
+/// Of one facet, as the server counted.
+#[derive(Serialize)]
+pub struct FacetSummary {
+    pub name: String,
+    pub joined: u64,
+    pub dropped: u64,
+    pub presented: u64,
+    pub late: u64,
+    pub missing: u64,
+    pub duplicate: u64,
+    pub stale: u64,
+    pub torn: u64,
+    pub refused: u64,
+    pub mismatched: u64,
+    pub draw: Figures,
+    pub bytes_out: u64,
+    pub bytes_in: u64,
+    pub repeated: u64,
+    /// What its link refused, by reason; reasons that never came are left out.
+    pub refused_packets: BTreeMap<&'static str, u64>,
+}
+
+impl Meter {
+    /// For so many seats.
+    pub fn new(seats: usize) -> Meter {
+        Meter { draw: (0..seats).map(|_| Spread::default()).collect(), last: vec![(0, 0.0); seats], ..Meter::default() }
+    }
+
+    /// What facets answered.
+    pub fn take(&mut self, event: &ServerEvent, time_s: f64) {
+        let (ServerEvent::Ready(facet, frame, done, _) | ServerEvent::Presented(facet, frame, done, _)) = event else { return };
+        let k = *facet as usize;
+        if let (ServerEvent::Ready(..), Some(draw)) = (event, self.draw.get_mut(k)) {
+            draw.add(f64::from(done.took_us) * 1e-6, *frame, time_s);
+            self.last[k].1 = f64::from(done.took_us) * 1e-3;
+        }
+        if let Some(last) = self.last.get_mut(k) {
+            last.0 = *frame;
+        }
+    }
+
+    /// All facets, as they stand.
+    pub fn facets(&self, server: &Server<ServerEnd>, seats: &[Seat]) -> Vec<FacetSummary> {
+        let one = |(k, seat): (usize, &Seat)| {
+            let (here, _, link) = server.counts(k as FacetNumber);
+            let refused_packets = Refused::ALL.iter().map(|&why| (why.name(), link.refused_for(why))).filter(|(_, n)| *n > 0).collect();
+            FacetSummary {
+                name: seat.name.clone(), joined: here.joined, dropped: here.dropped, presented: here.presented, late: here.late, missing: here.missing,
+                duplicate: here.duplicate, stale: here.stale, torn: here.torn, refused: here.refused, mismatched: here.mismatched,
+                draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets,
+            }
+        };
+        seats.iter().enumerate().map(one).collect()
+    }
+}
+
+impl Summary {
+    /// The few lines for a person.
+    pub fn lines(&self) -> String {
+        let mut text = format!(
+            "{} in {}: {:.3} s in {} frames, {} over {}; {:.3} s by the clock, {:.3} s behind\n",
+            self.scene, self.cave, self.simulated_s, self.frames, self.mode, self.transport, self.wall_s, self.behind_s
+        );
+        let figures = |what: &str, f: &Figures| {
+            format!("{what} {:.2} ms (half), {:.2} ms (99 %), {:.2} ms (all; frame {} at {:.3} s)\n", f.p50_ms, f.p99_ms, f.max_ms, f.max_at_frame, f.max_at_s)
+        };
+        text += &figures("simulating a frame took at most", &self.simulation);
+        text += &figures("sent, drawn and shown within", &self.barrier);
+        text += &figures("a frame took at most", &self.frame);
+        if let Some(skew) = &self.skew {
+            text += &figures("facets showed a frame within", skew);
+        }
+        if let Some(Counts { same, different, not_compared }) = self.replay {
+            text += &format!("pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n");
+        }
+        for f in &self.facets {
+            text += &format!(
+                "facet {}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times\n",
+                f.name, f.presented, f.late, f.missing, f.duplicate, f.stale, f.torn, f.mismatched, f.dropped
+            );
+        }
+        text
+    }
+}
+
+/// How far apart facets of this machine showed the same frames, by their logs.
+pub fn skew(folder: &Path, seats: &[Seat]) -> Option<Figures> {
+    let mut shown: BTreeMap<u64, (u64, u64, usize, f64)> = BTreeMap::new();
+    for seat in seats {
+        let text = std::fs::read_to_string(facet_folder(folder, &seat.name).join("frames.jsonl")).ok()?;
+        for line in text.lines().filter_map(|line| serde_json::from_str::<Line>(line).ok()) {
+            let (first, last, count, _) = shown.entry(line.frame).or_insert((line.shown_unix_us, line.shown_unix_us, 0, line.time_s));
+            (*first, *last, *count) = ((*first).min(line.shown_unix_us), (*last).max(line.shown_unix_us), *count + 1);
+        }
+    }
+    let mut spread = Spread::default();
+    for (frame, (first, last, _, time_s)) in shown.iter().filter(|(_, (_, _, count, _))| *count == seats.len()) {
+        spread.add((last - first) as f64 * 1e-6, *frame, *time_s);
+    }
+    (spread.figures().count > 0).then(|| spread.figures())
+}
+
+/// Lines while it runs: in place on a terminal, every few seconds elsewhere.
+pub struct Status {
+    quiet: bool,
+    terminal: bool,
+    since: Instant,
+    frame: u64,
+    shown: Vec<u64>,
+    lines: usize,
+}
+
+impl Status {
+    /// From now on.
+    pub fn new(quiet: bool) -> Status {
+        Status { quiet, terminal: std::io::stderr().is_terminal(), since: Instant::now(), frame: 0, shown: Vec::new(), lines: 0 }
+    }
+
+    /// What is said next must not be written over.
+    pub fn interrupted(&mut self) {
+        self.lines = 0;
+    }
+
+    /// After each frame.
+    pub fn at(&mut self, server: &Server<ServerEnd>, seats: &[Seat], meter: &Meter, frame: u64, time_s: f64) {
+        let passed = self.since.elapsed();
+        let every = if self.terminal { EVERY / 5 } else { EVERY };
+        if self.quiet || passed < every {
+            return;
+        }
+        let per_s = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed.as_secs_f64();
+        let mut text = if self.terminal && self.lines > 0 { format!("\x1b[{}A", self.lines) } else { String::new() };
+        text += &format!("\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms\n", per_s(frame, self.frame), 1e3 * meter.step.within(0.5));
+        self.shown.resize(seats.len(), 0);
+        for (k, seat) in seats.iter().enumerate() {
+            let (counts, _, _) = server.counts(k as FacetNumber);
+            let standing = match server.standing(k as FacetNumber) {
+                Standing::Absent => "absent",
+                Standing::Following => "behind",
+                Standing::InStep => "in step",
+            };
+            let (last, took_ms) = meter.last[k];
+            text += &format!(
+                "\x1b[K  {:<12} {standing:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms\n",
+                seat.name, per_s(counts.presented, self.shown[k]), counts.late + counts.missing, counts.dropped
+            );
+            self.shown[k] = counts.presented;
+        }
+        eprint!("{}", if self.terminal { text } else { text.replace("\x1b[K", "") });
+        (self.lines, self.since, self.frame) = (seats.len() + 1, Instant::now(), frame);
+    }
+}

@@ -1,0 +1,233 @@
+//! What users do in a cave, by a facet of the test's own: keys walk, the wand pulls, bodies push; and recordings that are shown again.
+
+use crate::common::*;
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::time::{Duration, Instant};
+use tumble::collide::{Pose, Vec3};
+use tumble::net::sync::udp::{Timing, UdpFacet};
+use tumble::net::sync::{Facet, FacetOptions, Input, Replay, Task};
+
+/// Nothing here waits longer.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A ball of 2 kg that floats at 1 m height, 2 m in front of the user, whose cave is the world's frame. Nothing else acts.
+const SCENE: &str = "description = \"A ball that floats\"
+[world]
+dt_s = 0.01
+gravity_m_per_s2 = [0, 0, 0]
+[[body]]
+name = \"ball\"
+shape = { type = \"sphere\", radius_m = 0.2 }
+mass_kg = 2.0
+position_m = [0, 2, 1]
+[cave]
+origin_m = [0, 0, 0]
+";
+
+const CAVE: &str = "
+[[user]]
+name = \"u\"
+eye_m = [0, 0, 1.5]
+[[screen]]
+name = \"s\"
+lower_left_m = [-1, 3, 0.5]
+lower_right_m = [1, 3, 0.5]
+upper_left_m = [-1, 3, 2.0]
+[[facet]]
+name = \"f\"
+screen = \"s\"
+size_px = [80, 60]
+[sync]
+transport = \"udp\"
+ready_timeout_ms = 2000
+drop_timeout_ms = 4000
+connect_timeout_ms = 60000
+";
+
+struct Server {
+    child: Child,
+    facet: Facet<UdpFacet>,
+    // what is said goes on being taken
+    _stderr: BufReader<ChildStderr>,
+    sequence: u64,
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn place(test: &str) -> (Folder, String, String) {
+    let folder = Folder::new(test);
+    let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", CAVE));
+    use std::os::unix::fs::DirBuilderExt;
+    std::fs::DirBuilder::new().mode(0o700).create(folder.path("run")).unwrap();
+    (folder, scene, cave)
+}
+
+fn in_place(folder: &Folder, args: &[&str]) -> Command {
+    let mut command = command(args);
+    command.env("XDG_RUNTIME_DIR", folder.path("run")).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command
+}
+
+/// The hash by which the server knows the scene: a recording has it.
+fn scene_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
+    let file = text(&folder.path("hash.mcap"));
+    let args = ["cave", scene, "--cave", cave, "--no-pictures", "--fast", "--seconds", "0.05", "--record", &file, "--quiet"];
+    let out = in_place(folder, &args).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    Replay::open(&file).unwrap().scene()
+}
+
+impl Server {
+    fn start(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> Server {
+        let hash = scene_hash(folder, scene, cave);
+        let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--fast"], args].concat()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+        let mut stderr = BufReader::new(child.stderr.take().unwrap());
+        let address: SocketAddr = loop {
+            let mut line = String::new();
+            assert!(stderr.read_line(&mut line).unwrap() > 0, "the server ended");
+            if let Some(rest) = line.strip_prefix("server: udp ") {
+                break rest.split(',').next().unwrap().parse().unwrap();
+            }
+        };
+        let link = UdpFacet::connect(address, 0, None, Timing::default()).unwrap();
+        let (world, _) = tumble::scene::SceneFile::load(scene).unwrap().build().unwrap();
+        Server { child, facet: Facet::new(link, FacetOptions::new("f", hash, 1), world), _stderr: stderr, sequence: 0 }
+    }
+
+    /// Shows frames until one is numbered `frame` or more, and does this before each.
+    fn show_until(&mut self, frame: u64, mut doing: impl FnMut(&mut Input)) {
+        let start = Instant::now();
+        loop {
+            assert!(start.elapsed() < PATIENCE, "frame {frame} did not come");
+            match self.facet.next(Duration::from_millis(20)).unwrap() {
+                Task::Draw => {
+                    if self.facet.begin().is_some() {
+                        self.facet.drawn([0; 16]).unwrap();
+                    }
+                }
+                Task::Present(number) => {
+                    self.sequence += 1;
+                    let mut input = Input { sequence: self.sequence, user: 0, head: None, wand: None, buttons: 0, keys: Vec::new() };
+                    doing(&mut input);
+                    self.facet.send_input(&input).unwrap();
+                    self.facet.presented().unwrap();
+                    if number >= frame {
+                        return;
+                    }
+                }
+                Task::Wait(_) => {}
+                Task::Over(why) => panic!("{why:?}"),
+            }
+        }
+    }
+
+    fn ball(&self) -> Vec3 {
+        let world = self.facet.world();
+        world.site(world.find("ball").unwrap(), 0).unwrap().position()
+    }
+
+    fn cave(&self) -> Vec3 {
+        self.facet.viewer().cave.translation.vector
+    }
+}
+
+#[test]
+fn a_key_walks_the_cave_ahead_at_its_pace() {
+    let (folder, scene, cave) = place("cave-walk");
+    let mut server = Server::start(&folder, &scene, &cave, &[]);
+    server.show_until(20, |_| {});
+    assert_eq!((server.cave(), server.ball()), (Vec3::zeros(), Vec3::new(0.0, 2.0, 1.0)));
+    // 100 frames of 0.01 s at 1.5 m/s, along y; the frame at which it begins may be one later
+    server.show_until(120, |input| input.keys = vec![0x1A]);
+    let walked = server.cave();
+    assert!((walked.y - 1.5).abs() < 0.06 && walked.x == 0.0 && walked.z == 0.0, "{walked:?}");
+    // who lets go stands
+    server.show_until(130, |_| {});
+    let stands = server.cave();
+    server.show_until(150, |_| {});
+    assert_eq!(server.cave(), stands);
+    // no body was asked for, so none pushes
+    assert_eq!(server.ball(), Vec3::new(0.0, 2.0, 1.0));
+    assert!(server.facet.viewer().users[0].input > 100);
+}
+
+#[test]
+fn a_wand_pulls_what_it_points_at() {
+    let (folder, scene, cave) = place("cave-pull");
+    let mut server = Server::start(&folder, &scene, &cave, &[]);
+    let from = |x: f64| Pose::from_parts(Vec3::new(x, 0.0, 1.0).into(), tumble::collide::Quat::identity());
+    // it points along y at the ball, then goes aside with it by half a metre
+    server.show_until(20, |input| (input.wand, input.buttons) = (Some(from(0.0)), 1));
+    server.show_until(300, |input| (input.wand, input.buttons) = (Some(from(0.5)), 1));
+    // the point that is held is the one nearest to the user, on the ball's surface; nothing keeps the ball from turning about it
+    let ball = server.ball();
+    let from_hand = (ball - Vec3::new(0.5, 1.8, 1.0)).norm();
+    assert!((from_hand - 0.2).abs() < 0.005 && ball.x > 0.25, "{ball:?}, {from_hand} m from the hand");
+    // a wand that points past it pulls nothing
+    let (folder, scene, cave) = place("cave-miss");
+    let mut server = Server::start(&folder, &scene, &cave, &[]);
+    server.show_until(20, |input| (input.wand, input.buttons) = (Some(from(0.3)), 1));
+    server.show_until(60, |input| (input.wand, input.buttons) = (Some(from(0.6)), 1));
+    assert_eq!(server.ball(), Vec3::new(0.0, 2.0, 1.0));
+}
+
+#[test]
+fn a_body_pushes_what_it_walks_into() {
+    let (folder, scene, cave) = place("cave-push");
+    let mut server = Server::start(&folder, &scene, &cave, &["--push"]);
+    // the capsule of 0.25 m meets the ball of 0.2 m when the cave has gone 1.55 m; at 1.5 m/s after 1.03 s
+    server.show_until(90, |input| input.keys = vec![0x1A]);
+    assert_eq!(server.ball(), Vec3::new(0.0, 2.0, 1.0));
+    server.show_until(220, |input| input.keys = vec![0x1A]);
+    let (ball, cave) = (server.ball(), server.cave());
+    assert!(ball.y > 2.3 && ball.y - cave.y > 0.44, "the ball is at {ball:?}, the cave at {cave:?}");
+    assert!(ball.x.abs() < 1e-3 && (ball.z - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
+    let (folder, scene, cave) = place("cave-replay");
+    let file = text(&folder.path("run.mcap"));
+    let run = |args: &[&str]| {
+        let out = in_place(&folder, &[args, &["--cave", &cave, "--fast", "--quiet", "--offscreen"]].concat()).output().unwrap();
+        let wrong = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success(), "{wrong}");
+    };
+    let lines = |folder_name: &str| -> Vec<serde_json::Value> {
+        let text = std::fs::read_to_string(folder.path(folder_name).join("f").join("frames.jsonl")).unwrap();
+        text.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()).map(|l| serde_json::json!([l["frame"], l["state"], l["image"]])).collect()
+    };
+    let moving = folder.write("moving.toml", SCENE.replace("mass_kg = 2.0", "mass_kg = 2.0\nvelocity_m_per_s = [0.3, 0, 0.2]"));
+    let path = |name: &str| text(&folder.path(name));
+    if tumble::render::Renderer::new().is_err() {
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter\n"));
+        return;
+    }
+    run(&["cave", &moving, "--seconds", "0.6", "--record", &file, "--log-dir", &path("a")]);
+    let recorded = lines("a");
+    assert_eq!(recorded.len(), 61);
+    run(&["replay", &file, &moving, "--log-dir", &path("b"), "--summary", &path("b.json")]);
+    run(&["replay", &file, &moving, "--log-dir", &path("c")]);
+    assert_eq!((lines("b"), lines("c")), (recorded.clone(), recorded.clone()));
+    assert_eq!(json(&folder.path("b.json"))["replay"], serde_json::json!({ "same": 61, "different": 0, "not_compared": 0 }));
+    // half of it, mended
+    let bytes = std::fs::read(&file).unwrap();
+    let cut = folder.write("cut.mcap", &bytes[..bytes.len() / 2]);
+    let said = succeed(&["recover", &cut, "-o", &path("mended.mcap")]);
+    assert!(said.contains("frames in") && said.contains("what was wrong: cut at byte"), "{said}");
+    run(&["replay", &path("mended.mcap"), &moving, "--log-dir", &path("d")]);
+    let saved = lines("d");
+    assert!(!saved.is_empty() && saved.len() < 61 && saved[..] == recorded[..saved.len()], "{} frames", saved.len());
+    // another scene is another matter
+    let larger = folder.write("larger.toml", SCENE.replace("radius_m = 0.2", "radius_m = 0.21"));
+    let out = in_place(&folder, &["replay", &file, &larger, "--cave", &cave]).output().unwrap();
+    let wrong = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(2) && wrong.contains("the recording is of a scene with the hash"), "{wrong}");
+}
