@@ -1,11 +1,12 @@
 # Short names for the scripts; each can be run by itself where there is no make.
 
-.PHONY: help demo test test-slow goldens references lint bench clean
+.PHONY: help demo test test-slow cave-trial goldens references lint bench clean
 
 help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/"
 	@echo "make test       install what is missing, run all tests, check the papers"
 	@echo "make test-slow  the same, and determinism and energy over a minute"
+	@echo "make cave-trial 600 frames of cube4 by five processes, the pin strike of bowling, 20 kills: long"
 	@echo "make goldens    draws the kept pictures of crates/render/tests/goldens anew; look at them before committing"
 	@echo "make references installs Pinocchio, MuJoCo and real robots from PyPI into target/python; tests that compare with them then run"
 	@echo "make lint       clippy; warnings are errors"
@@ -20,6 +21,11 @@ test:
 
 test-slow:
 	@scripts/test.sh --slow
+
+cave-trial:
+	@scripts/setup.sh
+	cargo build --release --locked -p tumble
+	scripts/cave_trial.py
 
 goldens:
 	TUMBLE_KEEP_PICTURES=1 cargo test --release --locked -p tumble-render --test it goldens

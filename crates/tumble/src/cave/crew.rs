@@ -12,7 +12,7 @@ use tumble::net::sync::Seat;
 use tumble::scene::cave::Cave;
 
 /// How long facets may take to end by themselves after they were told, and again after their pipe was closed.
-const GRACE: Duration = Duration::from_secs(2);
+const GRACE: Duration = Duration::from_secs(5);
 /// Restarts of a facet within a minute, at most.
 const MOST_RESTARTS: usize = 5;
 const MINUTE: Duration = Duration::from_secs(60);

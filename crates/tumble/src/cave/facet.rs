@@ -56,7 +56,7 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     };
     // whatever happened, the server need not find out by silence
     let _ = running.facet.leave();
-    outcome
+    outcome.and(running.log.as_mut().map_or(Ok(()), FrameLog::finish))
 }
 
 /// What the session is told, as the cave file says.
@@ -208,6 +208,11 @@ impl Running {
         }
     }
 
+    /// Whether what was shown is written, so far that there is room for more.
+    pub fn has_room(&self) -> bool {
+        self.log.as_ref().is_none_or(FrameLog::has_room)
+    }
+
     /// For how many whole seconds there has been no server.
     pub fn alone_s(&self) -> u64 {
         self.alone.since.map_or(0, |(_, since)| since.elapsed().as_secs())
@@ -220,6 +225,8 @@ impl Running {
                 // what was begun is finished first, also where nobody waits for it any more
                 Task::Wait(_) | Task::Draw if self.drawing.is_some() => self.see_the_picture()?,
                 Task::Wait(_) | Task::Over(_) => {}
+                // packing pictures is behind: the server hears that this facet lives, and waits
+                Task::Draw if !self.has_room() => std::thread::sleep(MOMENT / 200),
                 Task::Draw => self.draw()?,
                 Task::Present(frame) => self.present(frame)?,
             }
@@ -262,7 +269,7 @@ impl Running {
         let shown = self.facet.session().shown();
         let Some(drawn) = self.picture.take().filter(|d| d.frame == frame) else { return Ok(()) };
         if let (Some(log), Some((_, done))) = (&mut self.log, shown) {
-            log.shown(frame, drawn.time_s, &done.hash, &drawn.hash, drawn.image.as_ref())?;
+            log.shown(frame, drawn.time_s, &done.hash, &drawn.hash, drawn.image)?;
         }
         Ok(())
     }

@@ -4,8 +4,12 @@ use super::stage::facet_folder;
 use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
 use tumble::render::Image;
 
@@ -22,10 +26,14 @@ pub struct Line {
     pub shown_unix_us: u64,
 }
 
-/// A facet's folder.
+/// Frames that wait to be written; a facet draws no further one meanwhile.
+const MOST_WAITING: usize = 2;
+
+/// A facet's folder. It is written by a thread of its own: a large picture takes longer to pack than a server waits for a sign of life.
 pub struct FrameLog {
-    folder: PathBuf,
-    lines: BufWriter<File>,
+    orders: Option<SyncSender<(Line, Option<Image>)>>,
+    writer: Option<JoinHandle<Result<(), Failure>>>,
+    waiting: Arc<AtomicUsize>,
     pictures: bool,
 }
 
@@ -44,19 +52,46 @@ impl FrameLog {
                 std::fs::remove_file(entry.path()).map_err(failed)?;
             }
         }
-        Ok(FrameLog { folder, lines: BufWriter::new(file), pictures })
+        let (orders, wanted) = sync_channel(MOST_WAITING + 1);
+        let waiting = Arc::new(AtomicUsize::new(0));
+        let left = waiting.clone();
+        let writer = std::thread::Builder::new().name("frames".into()).spawn(move || write_all(&folder, file, &wanted, &left));
+        let writer = writer.map_err(|e| Failure::run("the frames", e))?;
+        Ok(FrameLog { orders: Some(orders), writer: Some(writer), waiting, pictures })
     }
 
-    /// A frame that is on the screen. The line is written whole, behind the picture.
-    pub fn shown(&mut self, frame: u64, time_s: f64, state: &[u8; 16], hash: &[u8; 16], image: Option<&Image>) -> Result<(), Failure> {
-        let shown = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        if let Some(image) = image.filter(|_| self.pictures) {
-            image.write_png(self.folder.join(format!("frame_{frame:06}.png"))).map_err(|e| Failure::run("the frames", e))?;
-        }
-        let line = Line { frame, time_s, state: hex(state), image: hex(hash), shown_unix_us: shown.as_micros() as u64 };
-        let text = serde_json::to_string(&line).map_err(|e| Failure::run("the frames", e))? + "\n";
-        self.lines.write_all(text.as_bytes()).and_then(|()| self.lines.flush()).map_err(|e| Failure::run("the frames", e))
+    /// Whether another frame may be drawn.
+    pub fn has_room(&self) -> bool {
+        self.waiting.load(Ordering::Acquire) < MOST_WAITING
     }
+
+    /// A frame that is on the screen.
+    pub fn shown(&mut self, frame: u64, time_s: f64, state: &[u8; 16], hash: &[u8; 16], image: Option<Image>) -> Result<(), Failure> {
+        let shown = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let line = Line { frame, time_s, state: hex(state), image: hex(hash), shown_unix_us: shown.as_micros() as u64 };
+        self.waiting.fetch_add(1, Ordering::AcqRel);
+        let sent = self.orders.as_ref().is_some_and(|orders| orders.send((line, image.filter(|_| self.pictures))).is_ok());
+        if sent { Ok(()) } else { self.finish() }
+    }
+
+    /// Waits until all is written; what went wrong.
+    pub fn finish(&mut self) -> Result<(), Failure> {
+        self.orders = None;
+        self.writer.take().map_or(Ok(()), |writer| writer.join().unwrap_or_else(|_| Err(Failure::run("the frames", "their writer has gone"))))
+    }
+}
+
+/// Each picture, and behind it its line, whole.
+fn write_all(folder: &Path, mut file: File, wanted: &Receiver<(Line, Option<Image>)>, waiting: &AtomicUsize) -> Result<(), Failure> {
+    while let Ok((line, image)) = wanted.recv() {
+        if let Some(image) = image {
+            image.write_png(folder.join(format!("frame_{:06}.png", line.frame))).map_err(|e| Failure::run("the frames", e))?;
+        }
+        let text = serde_json::to_string(&line).map_err(|e| Failure::run("the frames", e))? + "\n";
+        file.write_all(text.as_bytes()).map_err(|e| Failure::run("the frames", e))?;
+        waiting.fetch_sub(1, Ordering::AcqRel);
+    }
+    Ok(())
 }
 
 /// In hexadecimal.

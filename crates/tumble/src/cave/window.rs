@@ -187,6 +187,7 @@ impl WindowApp for Window<'_> {
     fn turn(&mut self, screen: &mut Screen) -> Result<Next, Failure> {
         let Some(task) = self.running.next(TURN)?.filter(|_| !self.ended) else { return Ok(Next::End) };
         match task {
+            Task::Draw if !self.running.has_room() => std::thread::sleep(TURN),
             Task::Draw => self.draw(screen)?,
             Task::Present(frame) => self.present(screen, frame)?,
             Task::Wait(Waiting::Server | Waiting::Lost) => self.warn(screen)?,
