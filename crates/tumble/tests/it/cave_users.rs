@@ -193,7 +193,7 @@ fn a_body_pushes_what_it_walks_into() {
 
 #[test]
 fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
-    let (folder, scene, cave) = place("cave-replay");
+    let (folder, _, cave) = place("cave-replay");
     let file = text(&folder.path("run.mcap"));
     let run = |args: &[&str]| {
         let out = in_place(&folder, &[args, &["--cave", &cave, "--fast", "--quiet", "--offscreen"]].concat()).output().unwrap();
