@@ -268,7 +268,10 @@ fn runs<K: PartialEq>(order: &[usize], kind: impl Fn(usize) -> K, casts: impl Fn
     })
 }
 
-fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<(MeshBuffers, Buffer, (u32, Option<usize>))>, RenderError> {
+/// The ground's mesh, its one instance, and its surface and texture.
+type GroundBatch = (MeshBuffers, Buffer, (u32, Option<usize>));
+
+fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<GroundBatch>, RenderError> {
     let Some(ground) = &list.ground else { return Ok(None) };
     let [x, y, reach, _] = scene::floor(list, seen);
     let mut quad = MeshData::ground_quad(reach);

@@ -157,7 +157,7 @@ impl Screen {
         let picture = self.renderer.picture().map(|texture| (texture, &self.copies.show));
         let caption = self.caption.as_ref().map(|(_, texture)| (texture, &self.copies.blend));
         for (texture, pipeline) in picture.into_iter().chain(caption) {
-            self.copies.copy(gpu, &mut encoder, pipeline, texture, &target, frame.texture.size(), encode)?;
+            self.copies.copy(gpu, &mut encoder, pipeline, texture, (&target, frame.texture.size()), encode)?;
         }
         gpu.queue.submit([encoder.finish()]);
         self.window.pre_present_notify();
@@ -228,8 +228,7 @@ impl Copies {
         encoder: &mut CommandEncoder,
         pipeline: &wgpu::RenderPipeline,
         source: &wgpu::Texture,
-        target: &TextureView,
-        bounds: wgpu::Extent3d,
+        (target, bounds): (&TextureView, wgpu::Extent3d),
         encode: bool,
     ) -> Result<(), RenderError> {
         let (w, h) = (source.width().min(bounds.width), source.height().min(bounds.height));

@@ -20,6 +20,8 @@ pub struct Status {
     /// Pictures shown.
     pub shown: u64,
     pub size_px: [u32; 2],
+    /// Whether keys come to the window.
+    pub focused: bool,
     pub eye_m: [f64; 3],
     /// Unit vector.
     pub forward: [f64; 3],

@@ -62,6 +62,7 @@ pub struct Viewer {
     shown: u64,
     /// Of the window.
     size_px: [u32; 2],
+    focused: bool,
     times: Times,
 }
 
@@ -145,6 +146,7 @@ impl Viewer {
             ended: false,
             shown: 0,
             size_px: [0; 2],
+            focused: false,
             times: Times { turn: now, picture: None, told: None },
             world,
         })
@@ -351,6 +353,7 @@ impl Viewer {
             behind_s: self.pace.behind_s,
             shown: self.shown,
             size_px: self.size_px,
+            focused: self.focused,
             eye_m: self.user.eye(),
             forward: self.user.forward(),
             camera: self.presets.name().to_string(),
@@ -427,7 +430,9 @@ impl WindowApp for Viewer {
                     self.wheel(screen, up);
                 }
             }
+            WindowEvent::Focused(true) => self.focused = true,
             WindowEvent::Focused(false) => {
+                self.focused = false;
                 self.user.release_all();
                 (self.hand, self.pointer.turning) = (None, false);
             }

@@ -98,6 +98,7 @@ impl<'a> Session<'a> {
         let windows = String::from_utf8(desktop.run("xdotool", &["search", "--name", "^tumble: "])).unwrap();
         session.window = windows.lines().next().unwrap().to_string();
         desktop.run("xdotool", &["windowfocus", &session.window]);
+        session.until("the keyboard", |s| s["focused"] == true);
         Some(session)
     }
 
@@ -298,8 +299,14 @@ fn a_run_that_nobody_touches_is_the_run_of_the_command() {
     let Some(desktop) = Desktop::open() else { return };
     let folder = Folder::new("view-same");
     for scene in ["billiards", "robot"] {
-        let Some(mut view) = Session::open(&desktop, "view-same-status", &[scene, "--size", "64x48", "--fps", "15", "--seconds", "0.5"]) else { return };
-        assert_eq!(view.end(), (Some(0), String::new()));
+        // it may end before anyone finds its window
+        let args = [scene, "--size", "64x48", "--fps", "15", "--seconds", "0.5"];
+        let mut view = Session::spawn(&desktop, Folder::new("view-same-status"), &args);
+        let (code, said) = view.end();
+        if said.contains("no graphics adapter") {
+            return skip(&format!("this machine has no graphics adapter; {said}"));
+        }
+        assert_eq!((code, said.as_str()), (Some(0), ""));
         let last = view.status().unwrap();
         assert!((last["time_s"].as_f64().unwrap() - 0.5).abs() < 1e-9, "{last}");
         assert_eq!(last["state_blake3"], state_of_run(&folder, scene, "0.5").as_str(), "{scene}");
@@ -376,7 +383,7 @@ fn windows_that_end_end_well() {
     let Some(mut view) = Session::open(&desktop, "view-close", &args) else { return };
     view.ask_to_close();
     assert_eq!(view.end(), (Some(0), String::new()), "closed");
-    let Some(mut view) = Session::open(&desktop, "view-frames", &[&args[..], &["--frames", "3", "--paused"]].concat()) else { return };
+    let mut view = Session::spawn(&desktop, Folder::new("view-frames"), &[&args[..], &["--frames", "3", "--paused"]].concat());
     assert_eq!(view.end(), (Some(0), String::new()));
     assert_eq!(view.status().unwrap()["shown"], 3);
     // without its X server a window ends too: X's own library sees to that, and says so
