@@ -2,11 +2,12 @@
 
 use super::viewer::put_exact_pose;
 use super::wire::{put_f64, put_name};
+use std::path::Path;
 use tumble_collide::{Shape, TriMesh};
-use tumble_core::World;
+use tumble_core::{Look, World};
 
 /// The BLAKE3 of a scene: the text of its file (lights, camera, sky), and everything in the world as it makes it that can be seen: names, modes, poses,
-/// shapes with every corner of every mesh, looks. So a mesh file that differs is found even where the scene file is the same.
+/// shapes with every corner of every mesh, looks (textures by the names of their files). So a mesh file that differs is found even where the scene file is the same.
 pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&(text.len() as u64).to_le_bytes());
@@ -27,7 +28,9 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
                 Shape::Cylinder(c) => put_f64(&mut out, &[4.0, c.radius(), c.half_length()]),
                 other => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
             }
-            out.extend(format!("{:?}", visual.look).bytes());
+            // a texture by its file's name: the folder is another one on another machine
+            let texture = visual.look.texture.as_deref().and_then(|path| path.file_name()).map(|name| Path::new(name).into());
+            out.extend(format!("{:?}", Look { texture, ..visual.look.clone() }).bytes());
         }
         hasher.update(&(out.len() as u64).to_le_bytes());
         hasher.update(&out);

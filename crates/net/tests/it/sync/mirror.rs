@@ -244,3 +244,18 @@ fn the_hash_of_a_scene_sees_what_can_be_seen() {
     let faster = |w: &mut World| w.set_velocity(find(w, "ball 0"), Vec3::x(), Vec3::zeros()).unwrap();
     assert_eq!(hash(&faster), same);
 }
+
+/// The same scene lies in another folder on another machine: a texture counts by the name of its file.
+#[test]
+fn the_hash_of_a_scene_does_not_see_folders() {
+    let hash = |texture: &str| {
+        let mut world = scene();
+        let shape = Shape::sphere(0.1).unwrap();
+        let look = Look { texture: Some(std::path::Path::new(texture).into()), ..Look::default() };
+        let visual = Visual { part: 0, pose: Pose::identity(), shape: shape.clone(), look };
+        world.add(RigidBody::with_mass("textured", shape, 1.0).unwrap().drawn_as(vec![visual])).unwrap();
+        tumble_net::sync::scene_hash("text", &world)
+    };
+    assert_eq!(hash("one/scenes/wood.png"), hash("elsewhere/wood.png"));
+    assert_ne!(hash("one/scenes/wood.png"), hash("one/scenes/felt.png"));
+}
