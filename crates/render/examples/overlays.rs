@@ -9,7 +9,7 @@ const PICTURES: [(&str, &str, u32); 8] = [
     ("normals", "stack", 30),
     ("forces", "stack", 60),
     ("velocities", "billiards", 120),
-    ("joints", "robot", 240),
+    ("joints", "skeleton", 300),
     ("frames", "piston", 10),
     ("islands", "falling", 240),
     ("tree=3", "falling", 60),
