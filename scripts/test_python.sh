@@ -26,7 +26,8 @@ fi
 site="$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')"
 rm -f "$site/references.pth"
 for folder in target/python/lib/"$(basename "$(dirname "$site")")"/site-packages; do
-    [ ! -d "$folder" ] || echo "$PWD/$folder" >"$site/references.pth"
+    # with the paths that its own .pth files add: Pinocchio's is one
+    [ ! -d "$folder" ] || echo "import site; site.addsitedir('$PWD/$folder')" >"$site/references.pth"
 done
 
 PATH="$venv/bin:$PATH"
