@@ -3,7 +3,7 @@
 .PHONY: help demo test test-slow cave-trial goldens references lint bench clean
 
 help:
-	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/"
+	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/, run an example in Python"
 	@echo "make test       install what is missing, run all tests, check the papers"
 	@echo "make test-slow  the same, and determinism and energy over a minute"
 	@echo "make cave-trial 600 frames of cube4 by five processes, the pin strike of bowling, 20 kills: long"

@@ -1,5 +1,5 @@
 #!/bin/sh
-# A demo scene from end to end: simulated, recorded, summed up, pictured.
+# A demo scene from end to end: simulated, recorded, summed up, pictured; then an example of the Python package, in an environment of its own.
 . "$(dirname "$0")/env.sh"
 
 scene="${1:-billiards}"
@@ -7,8 +7,9 @@ mkdir -p out
 rm -f "out/$scene.mcap" "out/$scene.png" "out/$scene.json"
 
 stage set-up scripts/setup.sh
-stage build cargo build --release --locked -p tumble
-stage run cargo run --release --locked --quiet -- run "$scene" --record "out/$scene.mcap" --picture "out/$scene.png" --summary "out/$scene.json"
+# both at once: the Python package is made of what the command is made of, and the tests use the same
+stage build cargo build --release --locked -p tumble -p tumble-py
+stage run target/release/tumble run "$scene" --record "out/$scene.mcap" --picture "out/$scene.png" --summary "out/$scene.json"
 
 echo
 echo "In $(pwd):"
@@ -20,3 +21,21 @@ for made in mcap:"the recording, for Foxglove" png:"the picture of the last fram
         printf '  %-22s not made; the reason stands above\n' "$file"
     fi
 done
+
+# What pip lacks (a network, the first time) leaves out Python alone.
+python_example() {
+    python="target/py-demo/bin/python"
+    [ -x "$python" ] || python3 -m venv target/py-demo || return
+    "$python" -c 'import maturin, numpy' 2>/dev/null ||
+        timeout 300 "$python" -m pip install --quiet --disable-pip-version-check --timeout 20 --retries 2 'maturin>=1.16,<2' numpy </dev/null || return
+    PATH="$PWD/target/py-demo/bin:$PATH" "$python" -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall . || return
+    "$python" examples/pendulum_energy.py
+}
+
+echo
+echo "==> python: examples/pendulum_energy.py"
+if python_example; then
+    echo "For programs of your own: . target/py-demo/bin/activate"
+else
+    echo "The Python package was left out; the reason stands above." >&2
+fi

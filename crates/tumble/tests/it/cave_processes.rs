@@ -413,14 +413,14 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
     drop(run);
     // by hand
     let server = place.start("serve", &["--quiet"]);
-    let l = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("hand"), "--wait", "2"]);
+    let l = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("hand"), "--wait", "10"]);
     let r = place.start("facet", &["--facet", "r", "--no-pictures", "--log-dir", &place.path("hand"), "--wait", "60"]);
     place.wait_for("hand", "r", 5);
     place.wait_for("hand", "l", 5);
     signal(server.pid(), Signal::KILL);
     let (code, _, wrong) = l.end();
     assert_eq!(code, Some(1), "{wrong}");
-    assert!(wrong.contains("facet l: has lost its server") && wrong.contains("did not come back, 2 s long"), "{wrong}");
+    assert!(wrong.contains("facet l: has lost its server") && wrong.contains("did not come back, 10 s long"), "{wrong}");
     // Ctrl-C while it waits is no failure
     signal(r.pid(), Signal::INT);
     let (code, _, wrong) = r.end();

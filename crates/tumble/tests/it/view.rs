@@ -55,7 +55,8 @@ impl Desktop {
             return None;
         }
         let mut command = Command::new("Xvfb");
-        command.args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp"]).stdout(Stdio::piped()).stderr(Stdio::null());
+        // without -noreset it begins anew when the last window closes, and refuses who comes in that moment
+        command.args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp", "-noreset"]).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut server = Running(command.spawn().unwrap());
         let mut number = String::new();
         // the server closes its end when it fails, so this ends
