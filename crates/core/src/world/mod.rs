@@ -133,6 +133,7 @@ impl World {
         let core = &mut self.core;
         core.report = StepReport::default();
         core.let_go();
+        core.detect_scratch.forget();
         self.before.clone_from(&core.x);
         let (time, warm, inner_step) = (core.time, core.warm.clone(), core.inner_step);
         let outcome = self.stepper.step(Frame { core });
