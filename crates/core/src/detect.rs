@@ -1,5 +1,6 @@
 //! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
 
+use crate::apart::{Oriented, apart};
 use crate::collidable::ContactFrame;
 use crate::settings::Settings;
 use crate::site::Site;
@@ -165,6 +166,16 @@ impl Travel {
         Aabb { min: grown.min + self.way.inf(&Vec3::zeros()), max: grown.max + self.way.sup(&Vec3::zeros()) }
     }
 
+    /// The same along a unit direction, from the other to this one.
+    fn along(&self, n: &Vec3, other: &Travel, reach: Reach) -> f64 {
+        let turns = self.turn + other.turn + self.gain.norm() + other.gain.norm();
+        let (this, that) = (-n.dot(&self.way), n.dot(&other.way));
+        turns + match reach {
+            Reach::Relative => (this + that).max(0.0),
+            Reach::Each => this.max(0.0) + that.max(0.0),
+        }
+    }
+
     /// By how much a gap between two parts may close, metres.
     fn between(&self, other: &Travel, reach: Reach) -> f64 {
         let turns = self.turn + other.turn;
@@ -277,12 +288,19 @@ impl Detector<'_> {
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
         let (site_a, site_b) = (&self.sites[a as usize], &self.sites[b as usize]);
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
-        let mut margin = 2.0 * self.settings.drift_tolerance + self.scratch.travel[i].between(&self.scratch.travel[j], reach);
+        let (near, travel) = (2.0 * self.settings.drift_tolerance, [self.scratch.travel[i], self.scratch.travel[j]]);
+        if shape_a.tree().is_some() || shape_b.tree().is_some() {
+            let boxes = (Oriented::around(shape_a, &site_a.pose), Oriented::around(shape_b, &site_b.pose));
+            if apart(&boxes.0, &boxes.1, |n| near + travel[0].along(n, &travel[1], reach)) {
+                return;
+            }
+        }
+        let mut margin = near + travel[0].between(&travel[1], reach);
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
         if mode == ContactMode::Spheres && let (Some(_), Some(_)) = (shape_a.tree(), shape_b.tree()) {
             // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
             let size = shape_a.bounding_radius().min(shape_b.bounding_radius());
-            margin = margin.min(2.0 * self.settings.drift_tolerance + TREE_REACH * size);
+            margin = margin.min(near + TREE_REACH * size);
         }
         let poses = [site_a.pose, site_b.pose];
         let found = &mut self.scratch.found;

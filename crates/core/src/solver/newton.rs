@@ -35,6 +35,8 @@ const MOST_FREEDOMS: usize = 120;
 const FIRST: u32 = 10;
 /// Sweeps after a jump before it is judged.
 const TRIAL: u32 = 3;
+/// A jump after which sweeps change more than this share of what they did before is not followed by another at once.
+const WORTH: f64 = 0.5;
 
 /// When to jump, and what to go back to.
 pub(super) struct Newton {
@@ -67,12 +69,15 @@ impl Newton {
             return false;
         }
         if let Some((lambda, before)) = self.before.take()
-            && (change.is_nan() || change >= before)
+            && (change.is_nan() || change > WORTH * before)
         {
-            locals.iter_mut().zip(lambda).for_each(|(local, lambda)| local.lambda = lambda);
-            self.wait *= 2;
             self.due = sweep + self.wait;
-            return true;
+            let worse = change.is_nan() || change >= before;
+            if worse {
+                locals.iter_mut().zip(lambda).for_each(|(local, lambda)| local.lambda = lambda);
+                self.wait *= 2;
+            }
+            return worse;
         }
         if left <= TRIAL {
             return false;
