@@ -16,6 +16,7 @@
 //! # Ok::<(), tumble_core::WorldError>(())
 //! ```
 
+mod apart;
 pub mod articulated;
 mod closure;
 mod collidable;

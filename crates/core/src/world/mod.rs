@@ -140,6 +140,7 @@ impl World {
         let outcome = loop {
             core.report = StepReport::default();
             core.let_go();
+            core.detect_scratch.forget();
             let outcome = self.stepper.step(Frame { core });
             if outcome.is_err() || !core.stirred() {
                 break outcome;
