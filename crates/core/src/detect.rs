@@ -53,6 +53,20 @@ pub(crate) struct WarmStarts {
 }
 
 impl WarmStarts {
+    /// Takes out what is filed under the keys that `which` picks.
+    pub fn take(&mut self, which: impl Fn(&Key) -> bool) -> Vec<(Key, [f64; 3])> {
+        let (taken, kept) = std::mem::take(&mut self.entries).into_iter().partition(|e| which(&e.0));
+        self.entries = kept;
+        taken
+    }
+
+    /// Files what was taken.
+    pub fn add(&mut self, entries: Vec<(Key, [f64; 3])>) {
+        self.entries.extend(entries);
+        self.entries.sort_by_key(|e| e.0);
+        self.entries.dedup_by_key(|e| e.0);
+    }
+
     /// Files anew; `entries` may come in any order.
     pub fn replace(&mut self, entries: impl Iterator<Item = (Key, Vec3)>) {
         self.entries.clear();
@@ -208,6 +222,8 @@ pub(crate) struct Detector<'a> {
     pub settings: &'a Settings,
     pub broad: &'a mut dyn BroadPhase,
     pub scratch: &'a mut Scratch,
+    /// Serials of sleepers that something comes near.
+    pub stirred: &'a mut Vec<u32>,
 }
 
 impl Detector<'_> {
@@ -246,7 +262,7 @@ impl Detector<'_> {
                 let around = (tight.max - site.position()).sup(&(site.position() - tight.min));
                 let travel = Travel::new(site, shape.bounding_radius(), around, horizon);
                 let bounds = travel.swept(&tight, self.settings.drift_tolerance);
-                let moving = entry.status.mode != Mode::Static;
+                let moving = entry.status.mode != Mode::Static && !entry.asleep;
                 let who = [entry.serial, part as u32];
                 while let Some(gone) = filed.next_if(|f| f.who < who) {
                     self.broad.remove(gone.handle);
@@ -288,7 +304,7 @@ impl Detector<'_> {
         let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
         let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
         let (entry_a, entry_b) = (&self.table.slots[owner_a.id], &self.table.slots[owner_b.id]);
-        if !meet(entry_a, owner_a.part as usize, entry_b, owner_b.part as usize) {
+        if !meet(entry_a, owner_a.part as usize, entry_b, owner_b.part as usize, self.sites) {
             return;
         }
         let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
@@ -331,6 +347,11 @@ impl Detector<'_> {
                     break;
                 }
             }
+        }
+        if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
+            // the frame will be done again with it awake
+            self.stirred.extend((!found.is_empty()).then_some(sleeper.serial));
+            return;
         }
         let first = out.len();
         let (ma, mb) = (body_a.material(part_a), body_b.material(part_b));
@@ -383,10 +404,11 @@ fn across(v: Vec3, along: &Vec3) -> Vec3 {
     v - along * along.dot(&v)
 }
 
-/// Whether two parts are to be tested: one of them moves, and both kinds say yes.
-fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize) -> bool {
+/// Whether two parts are to be tested: one of them moves (or is led towards a sleeper), and both kinds say yes.
+fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize, sites: &[Site]) -> bool {
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
-    if !(a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
+    let stirs = a.asleep && b.comes(sites) || b.asleep && a.comes(sites);
+    if !(stirs || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
         return false;
     }
     if a.serial == b.serial && !ca.parts_meet(part_a, part_b) {

@@ -73,7 +73,7 @@ pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(),
 pub(crate) fn detect(core: &mut Core, horizon: f64, reach: Reach, out: &mut Vec<Touch>) {
     let mut detector = Detector {
         table: &core.table, owners: &core.owners, sites: &core.sites, settings: &core.settings,
-        broad: core.broad.as_mut(), scratch: &mut core.detect_scratch,
+        broad: core.broad.as_mut(), scratch: &mut core.detect_scratch, stirred: &mut core.sleepers.stirred,
     };
     detector.detect(horizon, reach, out);
     let deepest = out.iter().map(|t| -t.contact.gap).fold(0.0, f64::max);
