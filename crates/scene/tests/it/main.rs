@@ -4,6 +4,7 @@ mod articulated;
 mod articulated_world;
 mod bad_input;
 mod caves;
+mod contacts;
 mod expansion;
 mod finding;
 mod pinocchio;
