@@ -181,6 +181,9 @@ pub struct ViewOptions {
     /// Write what is shown as JSON, a line whenever the user changes something and four a second; - for stdout.
     #[arg(long, value_name = "FILE|-")]
     pub status: Option<PathBuf>,
+    /// Lose the graphics device after so many pictures, as a driver that crashes does: to see what comes then.
+    #[arg(long, value_name = "N", hide = true)]
+    pub lose_device: Option<u64>,
 }
 
 #[derive(Args)]

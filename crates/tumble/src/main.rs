@@ -69,6 +69,7 @@ fn end_with_the_reader() {
                 let _ = writeln!(std::io::stderr(), "Error: stdout: {why}");
                 std::process::exit(1)
             }
+            None if message.is_some_and(|m| m.starts_with("failed printing to stderr")) => std::process::exit(1),
             None => usual(panic),
         }
     }));

@@ -82,6 +82,8 @@ struct Captions {
 struct Limits {
     pictures: Option<u64>,
     per_second: Option<f64>,
+    /// The picture after which the device is lost.
+    device: Option<u64>,
 }
 
 /// Moments of the last turn and status line.
@@ -118,7 +120,7 @@ impl Viewer {
             statistics: Statistics::new(now),
             log: Log::create(options.status.as_deref())?,
             show: Captions { any: !options.plain, statistics: true, help: false },
-            limits: Limits { pictures: options.frames, per_second: options.fps },
+            limits: Limits { pictures: options.frames, per_second: options.fps, device: options.lose_device },
             quality: options.quality,
             shots: options.shots.clone(),
             picture_wanted: options.picture.is_some(),
@@ -174,6 +176,9 @@ impl Viewer {
         if screen.show()? == Shown::Yes {
             self.stale = false;
             self.shown += 1;
+        }
+        if self.limits.device == Some(self.shown) {
+            screen.lose_device();
         }
         self.statistics.pictures.add(clock.elapsed());
         Ok(())
