@@ -172,3 +172,64 @@ fn file_name(run: &str) -> Result<FileName, LinkError> {
 fn refused(why: impl Debug) -> LinkError {
     LinkError::Other(format!("shared memory: the bell: {why:?}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+
+    const NOBODY: u32 = 4_000_000_000; // a user that there is not
+
+    #[test]
+    fn one_ring_wakes_all_and_only_the_last_answer_wakes_the_server() {
+        let run = format!("bell-{}", std::process::id());
+        let server = Bell::serve(&run, NOBODY).unwrap();
+        let facets: Vec<Bell> = (0..3).map(|_| Bell::join(&run, NOBODY).unwrap().unwrap()).collect();
+        let (long, moment) = (Duration::from_secs(30), Duration::from_millis(50));
+        std::thread::scope(|scope| {
+            let waiting: Vec<_> = facets.iter().map(|facet| (facet.rung(), facet)).collect();
+            let waiting: Vec<_> = waiting.into_iter().map(|(seen, facet)| scope.spawn(move || facet.wait_for_ring(seen, long))).collect();
+            server.ring();
+            waiting.into_iter().for_each(|facet| facet.join().unwrap().unwrap());
+            let (seen, awake) = (server.answers(), AtomicBool::new(false));
+            let waits = scope.spawn(|| {
+                server.wait_for_answers(seen, 3, long).unwrap();
+                awake.store(true, SeqCst);
+            });
+            while server.counter(WANTED).load(SeqCst) != seen + 3 {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            std::thread::sleep(moment); // asleep by now
+            facets[0].answer(false);
+            facets[1].answer(false);
+            std::thread::sleep(moment);
+            assert!(!awake.load(SeqCst), "two of three answers woke it");
+            facets[2].answer(false);
+            waits.join().unwrap();
+            // what came between looking and waiting is not slept over
+            server.wait_for_answers(seen, 6, long).unwrap();
+        });
+    }
+
+    #[test]
+    fn a_bell_goes_with_its_server_and_is_cleaned_up_after_a_killed_one() {
+        let there = |run: &str| Bell::join(run, NOBODY).unwrap().is_some();
+        let [alive, dead] = ["alive", "dead"].map(|name| format!("bell-{}-{name}", std::process::id()));
+        let server = Bell::serve(&alive, NOBODY).unwrap();
+        let mut child = std::process::Command::new("true").spawn().unwrap();
+        child.wait().unwrap();
+        let killed = Bell::serve(&dead, NOBODY).unwrap();
+        killed.counter(PROCESS).store(child.id(), SeqCst);
+        killed.memory.release_ownership();
+        drop(killed);
+        assert!(there(&alive) && there(&dead));
+        clean_up(NOBODY);
+        assert!(there(&alive) && !there(&dead));
+        // one that took over keeps it when the first goes
+        let second = Bell::serve(&alive, NOBODY).unwrap();
+        drop(server);
+        assert!(there(&alive));
+        drop(second);
+        assert!(!there(&alive));
+    }
+}

@@ -20,13 +20,16 @@
 //! Something redundant is sent only while the balance covers it. Ordering over a fixed time rather than over a count of later packets keeps reordering
 //! from looking like loss.
 
+mod stream;
+
 use super::frames::{Ack, Channel, FRAGMENT, Frame, PARITY_HEAD, Part, before};
+use super::inbox::parity;
 use super::packet::whole;
-use super::inbox::{BYTES_AHEAD, NEWEST_AHEAD, RELIABLE_AHEAD, parity};
 use crate::sync::transport::MAX_QUEUED_BYTES;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
+use stream::Stream;
 
 /// Packets under way at once; half of what a socket's default buffer holds.
 const PACKETS_AHEAD: usize = 64;
@@ -38,27 +41,6 @@ const LONGEST_TIMEOUT: Duration = Duration::from_millis(250);
 const LOSSY: f64 = 0.005;
 /// Bytes by which the balance may run ahead or behind.
 const BALANCE: i64 = 32 << 10;
-
-/// A fragment under way.
-#[derive(Clone, Copy, Default)]
-struct Progress {
-    /// Packets under way that hold it.
-    copies: u8,
-    arrived: bool,
-}
-
-/// A message under way.
-struct Outgoing {
-    part: Part,
-    data: Arc<[u8]>,
-    progress: Vec<Progress>,
-    missing: u16,
-    /// Fragments from here on were never sent.
-    unsent: u16,
-    /// Parity groups, 0 until the last fragment was sent; and those from here on were never sent.
-    groups: u16,
-    unsent_parity: u16,
-}
 
 /// What a packet holds.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -90,18 +72,6 @@ pub struct Full;
 #[derive(Debug, PartialEq, Eq)]
 pub struct Impossible;
 
-/// One stream of messages.
-struct Stream {
-    /// Messages that were not begun; at most one of the newest.
-    waiting: VecDeque<Arc<[u8]>>,
-    begun: VecDeque<Outgoing>,
-    begun_bytes: usize,
-    waiting_bytes: usize,
-    next: u32,
-    /// The other side has all before this one.
-    done: u32,
-}
-
 /// What is to be sent of one connection.
 pub struct Outbox {
     streams: [Stream; 2],
@@ -125,10 +95,8 @@ pub struct Outbox {
 impl Outbox {
     /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
     pub fn new(first: u32) -> Outbox {
-        let stream =
-            || Stream { waiting: VecDeque::new(), begun: VecDeque::new(), begun_bytes: 0, waiting_bytes: 0, next: first, done: first };
         Outbox {
-            streams: [stream(), stream()],
+            streams: [(); 2].map(|()| Stream::new(first)),
             sent: VecDeque::new(),
             under_way: 0,
             repairs: VecDeque::new(),
@@ -440,46 +408,4 @@ fn parity_groups(part: &Part, balance: i64) -> u16 {
     let affordable = balance.max(0) / (FRAGMENT + 100) as i64;
     let fragments = i64::from(part.fragments());
     ((fragments + 3) / 4).min(affordable).min(fragments - 1) as u16
-}
-
-impl Outgoing {
-    /// Whether a fragment, or a parity that may still help, was never sent.
-    fn has_unsent(&self) -> bool {
-        self.unsent < self.part.fragments() || (self.unsent_parity < self.groups && self.missing > 0)
-    }
-}
-
-impl Stream {
-    fn may_begin(&self, channel: Channel) -> bool {
-        let ahead = if channel == Channel::Reliable { RELIABLE_AHEAD } else { NEWEST_AHEAD };
-        let Some(first) = self.waiting.front() else { return false };
-        self.begun.is_empty() || (self.next.wrapping_sub(self.done) < ahead && self.begun_bytes + first.len() <= BYTES_AHEAD)
-    }
-
-    fn begin(&mut self, channel: Channel, data: Arc<[u8]>) {
-        let part = Part { channel, message: self.next, total: data.len() as u32 };
-        let fragments = part.fragments();
-        self.next = self.next.wrapping_add(1);
-        self.waiting_bytes -= data.len();
-        self.begun_bytes += data.len();
-        let progress = vec![Progress::default(); usize::from(fragments)];
-        self.begun.push_back(Outgoing { part, data, progress, missing: fragments, unsent: 0, groups: 0, unsent_parity: 0 });
-    }
-
-    /// The message, if it is still under way.
-    fn find(&mut self, message: u32) -> Option<&mut Outgoing> {
-        let first = self.begun.front()?.part.message;
-        self.begun.get_mut(message.wrapping_sub(first) as usize)
-    }
-
-    /// The other side has all messages before `done`.
-    fn finish(&mut self, done: u32) {
-        if before(self.done, done) {
-            self.done = done;
-        }
-        while let Some(front) = self.begun.front().filter(|outgoing| before(outgoing.part.message, self.done)) {
-            self.begun_bytes -= front.data.len();
-            self.begun.pop_front();
-        }
-    }
 }
