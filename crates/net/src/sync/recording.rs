@@ -93,7 +93,7 @@ impl SessionRecorder {
             out.extend(message(&head(Kind::Snapshot), |out| out.extend(list.iter())));
         }
         out.extend(message(&head(Kind::State), |out| out.extend(&recorded.state)));
-        let done = Done { hash: recorded.hash, image: [0; 16], took_us: 0 };
+        let done = Done { hash: recorded.hash, ..Done::default() };
         out.extend(message(&head(Kind::Ready), |out| done.write(out)));
         self.waiting = Some((recorded.frame, recorded.time_s, poses(world), out));
         Ok(())
