@@ -128,6 +128,11 @@ impl<L: ServerLink> Server<L> {
         self.session.standing(facet)
     }
 
+    /// What was counted about those who are no facet.
+    pub fn strangers(&self) -> LinkCounters {
+        self.link.strangers()
+    }
+
     /// What was counted about a facet: here, by itself, and on its link.
     pub fn counts(&self, facet: FacetNumber) -> (SeatCounts, FacetCounts, LinkCounters) {
         let (here, there) = self.session.counts(facet);

@@ -2,12 +2,13 @@
 
 use super::args::{Carrier, CaveOptions, ServeOptions};
 use super::crew::{Crew, Crewed, carrier, seats};
+use super::devices::Devices;
 use super::ends::{Address, ServerEnd, key, timing};
 use super::lock::{Lock, Run};
 use super::replay::Tape;
 use super::signals::Signals;
 use super::stage::Setting;
-use super::summary::{Meter, Status, Summary, skew};
+use super::summary::{Meter, Status, Summary, refused, skew};
 use super::users::Users;
 use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -17,7 +18,8 @@ use tumble::core::World;
 use tumble::net::record::RecorderOptions;
 use tumble::net::sync::shm::{ShmServer, clean_up};
 use tumble::net::sync::udp::{Entropy, UdpServer};
-use tumble::net::sync::{Pace, Seat, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder};
+use tumble::net::sync::transport::FacetNumber;
+use tumble::net::sync::{Input, Pace, Seat, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder};
 use tumble::scene::cave::{Cave, Mode};
 
 /// Between two looks at signals and processes while nothing happens.
@@ -103,6 +105,7 @@ struct Host<'a> {
     server: Server<ServerEnd>,
     world: World,
     users: Users,
+    devices: Devices,
     recorder: Option<(SessionRecorder, PathBuf)>,
     recorded: bool,
     cave: Cave,
@@ -127,14 +130,15 @@ impl<'a> Host<'a> {
     ) -> Result<Host<'a>, Failure> {
         let viewer = setting.viewer()?;
         let Setting { scene, cave, mut world, hash, .. } = setting;
-        let users = Users::new(viewer, &mut world, options.push)?;
+        let users = Users::new(viewer, &cave, &mut world, options.push)?;
+        let devices = Devices::open(options, &cave, hash, tape.is_none())?;
         let described = cave.recording.as_ref().filter(|_| tape.is_none()).map(|r| (r.file.clone(), r.every_frames));
         let recorder = options.record.clone().map(|file| (file, 1)).or(described).map(|(file, every)| {
             let recorder = SessionRecorder::create(&file, &scene.file, hash, &world, every, RecorderOptions::default());
             recorder.map(|r| (r, file)).map_err(|e| Failure::run("recording", e))
         });
         Ok(Host {
-            options, signals, server, world, users, recorder: recorder.transpose()?, recorded: false, cave, scene: scene.file, seconds: options.seconds,
+            options, signals, server, world, users, devices, recorder: recorder.transpose()?, recorded: false, cave, scene: scene.file, seconds: options.seconds,
             meter: Meter::new(seats.len()), seats, status: Status::new(options.quiet), log_dir, tape, time_s: 0.0, began: Instant::now(), behind_s: 0.0, frames: 0,
         })
     }
@@ -155,7 +159,7 @@ impl<'a> Host<'a> {
             if !self.publish(frame, steps)? {
                 return Ok(());
             }
-            if last == Some(frame) || self.signals.end() {
+            if last.map_or(self.devices.over(), |last| last == frame) || self.signals.end() {
                 return Ok(());
             }
             match crew.watch(false)? {
@@ -211,6 +215,9 @@ impl<'a> Host<'a> {
     fn publish(&mut self, frame: u64, steps: u32) -> Result<bool, Failure> {
         let recorded = self.tape.as_mut().map(Tape::next).transpose()?;
         if recorded.is_none() && frame > 0 {
+            // what came since the last frame counts in this one
+            self.take_events(self.time_s);
+            self.devices.tracked().into_iter().for_each(|(from, input)| self.take_input(from, input));
             self.simulate(frame, steps)?;
         }
         let clock = Instant::now();
@@ -233,6 +240,9 @@ impl<'a> Host<'a> {
             recorder.frame(&self.world, recorded).map_err(|e| Failure::run("recording", e))?;
             self.recorded = true;
         }
+        let session = self.server.session();
+        let played = self.devices.after(|| session.recorded(false))?;
+        played.into_iter().for_each(|(from, input)| self.take_input(from, input));
         self.take_events(self.time_s);
         self.status.at(&self.server, &self.seats, &self.meter, frame, self.time_s);
         Ok(true)
@@ -251,7 +261,8 @@ impl<'a> Host<'a> {
     }
 
     fn take_events(&mut self, time_s: f64) {
-        let events = self.server.events();
+        let mut events = self.server.events();
+        events.retain(|event| self.devices.live() || !matches!(event, ServerEvent::Input(..)));
         if let Some((recorder, _)) = &mut self.recorder {
             recorder.events(&events);
         }
@@ -272,9 +283,20 @@ impl<'a> Host<'a> {
                 eprintln!("{said}");
                 self.status.interrupted();
             }
-            if let ServerEvent::Input(_, input) = event {
-                self.users.take(input, time_s);
+            if let ServerEvent::Input(from, input) = event {
+                self.users.take(from, input, time_s);
             }
+        }
+    }
+
+    /// What a user did by another device than a facet's window.
+    fn take_input(&mut self, from: FacetNumber, input: Input) {
+        let event = ServerEvent::Input(from, input);
+        if let Some((recorder, _)) = &mut self.recorder {
+            recorder.events(std::slice::from_ref(&event));
+        }
+        if let ServerEvent::Input(from, input) = event {
+            self.users.take(from, input, self.time_s);
         }
     }
 
@@ -302,6 +324,10 @@ impl<'a> Host<'a> {
                 frame: self.meter.frame.figures(),
                 skew: self.log_dir.as_ref().and_then(|folder| skew(folder, &self.seats)),
                 replay: self.tape.as_ref().map(|tape| tape.counts),
+                input_from: self.devices.played_counts(),
+                tracker: self.devices.tracker_counts(),
+                heads_refused: self.users.heads_refused,
+                strangers: refused(&self.server.strangers()),
                 facets: self.meter.facets(&self.server, &self.seats),
             };
             if !self.options.quiet {

@@ -4,13 +4,14 @@ use super::ends::ServerEnd;
 use super::log::Line;
 use super::measure::{Figures, Spread};
 use super::replay::Counts;
+use super::{osc, played};
 use super::stage::facet_folder;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use tumble::net::sync::transport::{FacetNumber, Refused};
+use tumble::net::sync::transport::{FacetNumber, LinkCounters, Refused};
 use tumble::net::sync::{Seat, Server, ServerEvent, Standing};
 
 /// Between two reports.
@@ -28,6 +29,14 @@ pub struct Meter {
     /// By seat: from the arrival of a frame at the facet to the end of drawing it.
     draw: Vec<Spread>,
     last: Vec<(u64, f64)>,
+}
+
+/// Packets that a link refused, by reason.
+pub type Refusals = BTreeMap<&'static str, u64>;
+
+/// What a link refused.
+pub fn refused(link: &LinkCounters) -> Refusals {
+    Refused::ALL.iter().map(|&why| (why.name(), link.refused_for(why))).filter(|(_, n)| *n > 0).collect()
 }
 
 /// The whole summary. Units stand in the names.
@@ -50,6 +59,14 @@ pub struct Summary {
     pub skew: Option<Figures>,
     /// Of a replay: pictures, compared with those of the recording.
     pub replay: Option<Counts>,
+    /// Of inputs that were played.
+    pub input_from: Option<played::Counts>,
+    /// What came from a tracker.
+    pub tracker: Option<osc::Counts>,
+    /// Heads that were not followed, because an eye would be behind a screen or in it.
+    pub heads_refused: u64,
+    /// What was refused from who is no facet, by reason; reasons that never came are left out.
+    pub strangers: Refusals,
     pub facets: Vec<FacetSummary>,
 }
 
@@ -72,7 +89,7 @@ pub struct FacetSummary {
     pub bytes_in: u64,
     pub repeated: u64,
     /// What its link refused, by reason; reasons that never came are left out.
-    pub refused_packets: BTreeMap<&'static str, u64>,
+    pub refused_packets: Refusals,
 }
 
 impl Meter {
@@ -98,11 +115,10 @@ impl Meter {
     pub fn facets(&self, server: &Server<ServerEnd>, seats: &[Seat]) -> Vec<FacetSummary> {
         let one = |(k, seat): (usize, &Seat)| {
             let (here, _, link) = server.counts(k as FacetNumber);
-            let refused_packets = Refused::ALL.iter().map(|&why| (why.name(), link.refused_for(why))).filter(|(_, n)| *n > 0).collect();
             FacetSummary {
                 name: seat.name.clone(), joined: here.joined, dropped: here.dropped, presented: here.presented, late: here.late, missing: here.missing,
                 duplicate: here.duplicate, stale: here.stale, torn: here.torn, refused: here.refused, mismatched: here.mismatched,
-                draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets,
+                draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets: refused(&link),
             }
         };
         seats.iter().enumerate().map(one).collect()
@@ -128,14 +144,32 @@ impl Summary {
         if let Some(Counts { same, different, not_compared }) = self.replay {
             text += &format!("pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n");
         }
+        if let Some(played) = &self.input_from {
+            text += &format!("{} inputs played: {} states as they were recorded, {} different\n", played.inputs, played.same, played.different);
+        }
+        if let Some(tracker) = &self.tracker {
+            text += &format!("tracker: {} messages taken in {} datagrams{}\n", tracker.taken, tracker.datagrams, reasons(", dropped", &tracker.dropped));
+        }
+        if self.heads_refused > 0 {
+            text += &format!("{} heads not followed: an eye would be behind a screen\n", self.heads_refused);
+        }
         for f in &self.facets {
             text += &format!(
-                "facet {}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times\n",
-                f.name, f.presented, f.late, f.missing, f.duplicate, f.stale, f.torn, f.mismatched, f.dropped
+                "facet {}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                f.name, f.presented, f.late, f.missing, f.duplicate, f.stale, f.torn, f.mismatched, f.dropped, reasons("; packets refused", &f.refused_packets)
             );
+        }
+        if !self.strangers.is_empty() {
+            text += &format!("from who is no facet{}\n", reasons(": packets refused", &self.strangers));
         }
         text
     }
+}
+
+/// `; packets refused: 3 forged, 1 replayed`; nothing for nothing.
+fn reasons(what: &str, counts: &Refusals) -> String {
+    let each: Vec<String> = counts.iter().map(|(why, n)| format!("{n} {why}")).collect();
+    if each.is_empty() { String::new() } else { format!("{what}: {}", each.join(", ")) }
 }
 
 /// How far apart facets of this machine showed the same frames, by their logs.

@@ -1,6 +1,6 @@
 //! A facet in a window of its own, where its cave says; keys and mouse go to the server as a user's input.
 //!
-//! W A S D, Q E and the arrows move the cave, a body is pulled by the left button, escape ends the facet.
+//! W A S D, Q E and the arrows move the cave, R and F stretch out the left and the right hand (`--push`), a body is pulled by the left button, escape ends the facet.
 
 use super::facet::{Running, failed};
 use super::painter::{PREVIEW_PX, draw_list, seat_name};
@@ -129,7 +129,7 @@ impl Window<'_> {
             return Ok(());
         }
         self.sequence += 1;
-        let input = Input { sequence: self.sequence, user: self.parts.user, head: None, wand, buttons, keys };
+        let input = Input { sequence: self.sequence, user: self.parts.user, head: None, wand, hands: [None; 2], buttons, keys };
         if self.running.facet.send_input(&input).map_err(failed)? {
             self.sent = Some((input, Instant::now()));
         }
@@ -204,7 +204,9 @@ fn usage(code: KeyCode) -> Option<u16> {
         KeyCode::KeyA => 0x04,
         KeyCode::KeyD => 0x07,
         KeyCode::KeyE | KeyCode::PageUp => 0x08,
+        KeyCode::KeyF => 0x09,
         KeyCode::KeyQ | KeyCode::PageDown => 0x14,
+        KeyCode::KeyR => 0x15,
         KeyCode::KeyS => 0x16,
         KeyCode::KeyW => 0x1A,
         KeyCode::ArrowRight => 0x4F,

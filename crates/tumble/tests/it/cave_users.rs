@@ -114,7 +114,7 @@ impl Server {
                 }
                 Task::Present(number) => {
                     self.sequence += 1;
-                    let mut input = Input { sequence: self.sequence, user: 0, head: None, wand: None, buttons: 0, keys: Vec::new() };
+                    let mut input = Input { sequence: self.sequence, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() };
                     doing(&mut input);
                     self.facet.send_input(&input).unwrap();
                     self.facet.presented().unwrap();
