@@ -226,3 +226,74 @@ fn whole<T: TryFrom<i64>>(arguments: &[OscType]) -> Result<Vec<T>, Dropped> {
     };
     arguments.iter().map(one).collect::<Option<_>>().ok_or(Dropped::Arguments)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::Ipv4Addr;
+
+    fn book() -> Book {
+        let user = |name: &str| tumble::scene::cave::User {
+            name: name.into(), eye_m: nalgebra::Point3::origin(), forward: Vec3::y(), up: Vec3::z(), interpupillary_m: 0.06,
+        };
+        Book::new(&Tracker { senders: vec![Ipv4Addr::LOCALHOST.into()], ..Tracker::of(&[user("a"), user("b")]) })
+    }
+
+    /// `/tumble/user/a/head`, seven floats: a metre up, no turn.
+    fn head() -> Vec<u8> {
+        let mut bytes = b"/tumble/user/a/head\0,fffffff\0\0\0\0".to_vec();
+        [0.0f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].iter().for_each(|x| bytes.extend(x.to_be_bytes()));
+        bytes
+    }
+
+    #[test]
+    fn only_listed_senders_are_heard() {
+        let mut book = book();
+        book.take(Ipv4Addr::new(10, 0, 0, 7).into(), &head());
+        assert!(book.inputs().is_empty() && book.counts.dropped["stranger"] == 1);
+        book.take(Ipv4Addr::LOCALHOST.into(), &head());
+        let inputs = book.inputs();
+        assert_eq!((inputs.len(), inputs[0].user, inputs[0].sequence, inputs[0].head.unwrap().translation.z), (1, 0, 1, 1.0));
+        // told once
+        assert!(book.inputs().is_empty());
+    }
+
+    /// A million packets: random bytes, and a good one with random changes, cuts and repeats. All of them are counted, none does what a message cannot.
+    #[test]
+    fn a_million_random_packets_do_no_harm() {
+        let (mut book, good) = (book(), head());
+        let mut x = 0x9E37_79B9_7F4A_7C15u64;
+        let mut random = |most: usize| {
+            // xorshift (Marsaglia 2003)
+            x ^= x << 13;
+            x ^= x >> 7;
+            x ^= x << 17;
+            (x >> 11) as usize % most
+        };
+        let mut bytes = Vec::new();
+        for round in 0..1_000_000u32 {
+            bytes.clear();
+            if round % 2 == 0 {
+                let first = [b'/', b'#', 0, b',', random(256) as u8][random(5)];
+                bytes.push(first);
+                bytes.extend((0..random(96)).map(|_| random(256) as u8));
+            } else {
+                (0..1 + random(2)).for_each(|_| bytes.extend(&good));
+                (0..random(4)).for_each(|_| {
+                    let at = random(bytes.len());
+                    bytes[at] = random(256) as u8;
+                });
+                bytes.truncate(1 + random(2 * bytes.len()));
+            }
+            book.take(Ipv4Addr::LOCALHOST.into(), &bytes);
+        }
+        assert_eq!(book.counts.datagrams, 1_000_000);
+        assert_eq!(book.counts.taken + book.counts.dropped.values().sum::<u64>(), 1_000_000);
+        assert!(book.counts.taken > 10_000 && book.counts.dropped["malformed"] > 100_000, "{:?}", book.counts);
+        for input in book.inputs() {
+            for pose in [input.head, input.wand, input.hands[0], input.hands[1]].into_iter().flatten() {
+                assert!(pose.translation.vector.norm() <= MOST_M && (pose.rotation.norm() - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+}
