@@ -4,7 +4,8 @@ launch command in a network namespace.
 
 usage: scripts/cave_trial.py [--long] [--seed 1] [--quality usual] [--frames N] [--kills N] [--soak N] [--minute N] [TRIAL ...]
 
-Without names all but `bowling`, `soak` and `namespace` run, short; --long has the full numbers and all of them (hours where a software driver draws).
+Without names the short ones run that need neither root nor another build: frames, kills, freezes, launchers, servers, minute, cuts. --long has the full numbers,
+and all but `namespace` (root) and `viewers` (a build with --features foxglove).
 Ends with 1 if a trial does not show what it must. Nothing is left behind but out/cave_trial.
 """
 
@@ -416,7 +417,42 @@ def namespace(options):
     return same and not after_end and len(there) == 2
 
 
-TRIALS = [frames, bowling, kills, drawn_kills, freezes, launchers, servers, soak, minute, cuts, namespace]
+def viewers(options):
+    """One viewer reads, another never does: the first sees every topic, and the wall keeps its pace. Needs the package websockets and a build with
+    `--features foxglove`."""
+    from websockets.sync.client import connect
+
+    folder = OUT / "viewers"
+    run = start("cave", "billiards", "--cave", small_cave("viewers"), "--no-pictures", "--log-dir", folder, "--quiet", "--wait", 60, "--foxglove", "127.0.0.1:47865",
+                "--summary", OUT / "viewers.json")
+    topics, counts = {}, {}
+    try:
+        wait_for(lambda: all(last_line(folder, facet) for facet in FACETS))
+        idle = connect("ws://127.0.0.1:47865", subprotocols=["foxglove.sdk.v1"], max_queue=1)
+        with connect("ws://127.0.0.1:47865", subprotocols=["foxglove.sdk.v1"], max_size=None) as live:
+            began = time.time()
+            while time.time() - began < 5:
+                message = live.recv(timeout=5)
+                if isinstance(message, str):
+                    told = json.loads(message)
+                    if told["op"] == "advertise":
+                        wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in told["channels"]]
+                        topics.update({channel["id"]: channel["topic"] for channel in told["channels"]})
+                        live.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+                        idle.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+                elif message[0] == 1:
+                    topic = topics[struct.unpack_from("<I", message, 1)[0]]
+                    counts[topic] = counts.get(topic, 0) + 1
+    finally:
+        [code] = end(run)
+    summary = json.loads((OUT / "viewers.json").read_text())
+    rate = (summary["frames"] - 1) / summary["wall_s"]
+    late = sum(facet["late"] for facet in summary["facets"])
+    print(f"viewers: in 5 s one viewer got {counts}, another read nothing; {rate:.1f} frames a second, {late} late, exit code {code}", flush=True)
+    return code == 0 and counts.get("/scene", 0) >= 1 and counts.get("/tf", 0) > 30
+
+
+TRIALS = [frames, bowling, kills, drawn_kills, freezes, launchers, servers, soak, minute, cuts, namespace, viewers]
 SHORT = [frames, kills, freezes, launchers, servers, minute, cuts]
 
 
@@ -441,7 +477,7 @@ def main():
     unknown = [name for name in options.trials if name not in named]
     if unknown:
         parser.error(f"there is no trial {', '.join(unknown)}; there are {', '.join(named)}")
-    trials = [named[name] for name in options.trials] or (TRIALS if options.long else SHORT)
+    trials = [named[name] for name in options.trials] or ([t for t in TRIALS if t not in (namespace, viewers)] if options.long else SHORT)
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)
     sys.exit(0 if all([trial(options) for trial in trials]) else 1)

@@ -16,8 +16,12 @@ use super::table::Snapshot;
 use super::transport::{Delivery, LinkEvent};
 use super::viewer::Viewer;
 use super::wire::{Fault, HEADER_BYTES, Hash, Header, Kind, VERSION, later, message, open};
+use std::collections::VecDeque;
 use std::time::Duration;
 use tumble_core::World;
+
+/// Inputs remembered until a picture shows them.
+const MAX_INPUTS: usize = 256;
 
 /// What a facet is told at the start.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,6 +127,10 @@ pub struct FacetSession {
     /// Drawn: frame, what READY said, when it was drawn.
     held: Option<(u64, Done, Duration)>,
     show: bool,
+    /// When PRESENT came for the frame that is held.
+    told: Option<Duration>,
+    /// Inputs that no picture has shown yet: user, number, when they were sent.
+    inputs: VecDeque<(u16, u64, Duration)>,
     shown: Option<(u64, Done)>,
     counts: FacetCounts,
     out: Vec<(Delivery, Vec<u8>)>,
@@ -135,7 +143,7 @@ impl FacetSession {
         let mut session = FacetSession {
             options, mirror: Mirror::new(base), phase: Phase::Joining, lost: false, run: 0, join: 0, asked: None, heard: Duration::ZERO,
             beaten: Duration::ZERO, resynced: None, listed: None, newest: None, pending: None, early: None, list: None, drawing: None, held: None, show: false,
-            shown: None, counts: FacetCounts::default(), out: Vec::new(), close: false,
+            told: None, inputs: VecDeque::new(), shown: None, counts: FacetCounts::default(), out: Vec::new(), close: false,
         };
         session.join_anew();
         session
@@ -200,9 +208,11 @@ impl FacetSession {
     /// The frame of [`begin`](Self::begin) is drawn. `image`: first 16 bytes of the BLAKE3 of its pixels, zeros where there are none.
     pub fn drawn(&mut self, now: Duration, image: Hash) {
         let Some((frame, arrived)) = self.drawing.take() else { return };
-        let done = Done { hash: self.mirror.hash(), image, took_us: micros(now.saturating_sub(arrived)) };
+        let took_us = short_micros(now.saturating_sub(arrived));
+        let done = Done { hash: self.mirror.hash(), image, took_us, input_us: None, heard_us: Some(micros(arrived)), at_us: micros(now) };
         self.held = Some((frame, done, now));
         self.show = self.options.pace == Pace::Latest || self.pending.is_some();
+        self.told = (self.options.pace == Pace::Latest).then_some(arrived);
         if self.options.pace == Pace::Lockstep {
             self.answer(Kind::Ready, frame, &done);
         }
@@ -216,16 +226,30 @@ impl FacetSession {
     /// The frame that was held is on the screen.
     pub fn presented(&mut self, now: Duration) {
         let Some((frame, done, since)) = self.held.take() else { return };
-        let done = Done { took_us: micros(now.saturating_sub(since)), ..done };
+        let (took_us, input_us) = (short_micros(now.saturating_sub(since)), self.take_shown_input().map(|sent| short_micros(now.saturating_sub(sent))));
+        let done = Done { took_us, input_us, heard_us: self.told.take().map(micros), at_us: micros(now), ..done };
         (self.show, self.shown) = (false, Some((frame, done)));
         count(&mut self.counts.shown);
         self.answer(Kind::Presented, frame, &done);
     }
 
+    /// When the newest of our inputs was sent that the picture shows, if it is the first to; all up to it are forgotten.
+    fn take_shown_input(&mut self) -> Option<Duration> {
+        let users = &self.mirror.viewer().users;
+        let shows = |user: u16| users.get(user as usize).map(|u| u.input);
+        let newest = self.inputs.iter().rev().find(|(user, sequence, _)| shows(*user) == Some(*sequence)).map(|(.., sent)| *sent);
+        self.inputs.retain(|(user, sequence, _)| shows(*user).is_none_or(|shown| later(*sequence, shown)));
+        newest
+    }
+
     /// Sends what a user does; `false` while there is no server.
-    pub fn send_input(&mut self, input: &Input) -> bool {
+    pub fn send_input(&mut self, now: Duration, input: &Input) -> bool {
         let live = self.phase == Phase::Live;
         if live {
+            if self.inputs.len() == MAX_INPUTS {
+                self.inputs.pop_front();
+            }
+            self.inputs.push_back((input.user, input.sequence, now));
             self.send(Kind::Input, 0, |out| input.write(out));
         }
         live
@@ -285,6 +309,7 @@ impl FacetSession {
         (self.phase, self.run, self.join, self.asked) = (Phase::Joining, 0, mixed(self.options.seed), None);
         (self.listed, self.newest, self.resynced) = (None, None, None);
         (self.pending, self.early, self.list, self.drawing, self.held, self.show, self.shown) = (None, None, None, None, None, false, None);
+        (self.told, self.inputs) = (None, VecDeque::new());
     }
 
     fn on_message(&mut self, now: Duration, bytes: &[u8]) {
@@ -322,7 +347,7 @@ impl FacetSession {
             Kind::End if live || about_us => self.phase = Phase::Over(Over::Ended),
             Kind::State if self.phase == Phase::Joining => self.keep_early(now, header, bytes),
             Kind::State if live => return self.on_state(now, header, payload, bytes),
-            Kind::Present if live => self.on_present(header.frame),
+            Kind::Present if live => self.on_present(now, header.frame),
             Kind::Beat if live => {}
             Kind::Snapshot | Kind::Refused | Kind::Rejoin | Kind::End | Kind::State | Kind::Present | Kind::Beat => {
                 count(&mut self.counts.stale);
@@ -402,10 +427,13 @@ impl FacetSession {
         self.show |= self.held.is_some();
     }
 
-    fn on_present(&mut self, frame: u64) {
+    fn on_present(&mut self, now: Duration, frame: u64) {
         let held = self.held.as_ref().map(|(held, ..)| *held);
         let shown = self.shown.map(|(shown, _)| shown);
         if held == Some(frame) {
+            if !self.show {
+                self.told = Some(now);
+            }
             self.show = true;
         } else if shown == Some(frame) {
             count(&mut self.counts.duplicate);
@@ -441,8 +469,12 @@ impl FacetSession {
     }
 }
 
-fn micros(duration: Duration) -> u32 {
+fn short_micros(duration: Duration) -> u32 {
     u32::try_from(duration.as_micros()).unwrap_or(u32::MAX)
+}
+
+fn micros(duration: Duration) -> u64 {
+    u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
 }
 
 /// A number that looks nothing like its neighbours: splitmix64.

@@ -82,5 +82,5 @@ pub use mirror::Mirror;
 pub use publisher::{PublishError, Publisher};
 pub use recording::{Recorded, Replay, ReplayError, ReplayFrame, SessionRecorder};
 pub use scene_hash::scene_hash;
-pub use server::{Pace, Seat, SeatCounts, ServerEvent, ServerOptions, ServerSession, Standing};
+pub use server::{FrameTimes, Pace, Seat, SeatCounts, ServerEvent, ServerOptions, ServerSession, Standing};
 pub use viewer::{User, VIEWER_NAME, Viewer};

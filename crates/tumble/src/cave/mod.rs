@@ -29,6 +29,7 @@ mod stamp;
 mod summary;
 mod tracker;
 mod users;
+mod viewers;
 mod window;
 
 use crate::failure::Failure;

@@ -1,15 +1,12 @@
 //! What a run counted and measured: lines while it runs, a few at its end, and all of it as JSON.
 
 use super::ends::ServerEnd;
-use super::log::Line;
 use super::measure::{Figures, Spread};
 use super::replay::Counts;
 use super::{osc, played};
-use super::stage::facet_folder;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
-use std::path::Path;
 use std::time::{Duration, Instant};
 use tumble::net::sync::transport::{FacetNumber, LinkCounters, Refused};
 use tumble::net::sync::{Seat, Server, ServerEvent, Standing};
@@ -26,6 +23,10 @@ pub struct Meter {
     pub barrier: Spread,
     /// From the beginning of one frame to the next.
     pub frame: Spread,
+    /// Between the first and the last facet to show a frame, by the server's clock.
+    pub skew: Spread,
+    /// From what a user did to the last facet that shows it.
+    pub input: Spread,
     /// By seat: from the arrival of a frame at the facet to the end of drawing it.
     draw: Vec<Spread>,
     last: Vec<(u64, f64)>,
@@ -55,8 +56,10 @@ pub struct Summary {
     pub simulation: Figures,
     pub barrier: Figures,
     pub frame: Figures,
-    /// Between the first and the last facet to show a frame, where facets of this machine wrote `frames.jsonl`.
+    /// Between the first and the last facet to show a frame, by the server's clock.
     pub skew: Option<Figures>,
+    /// From what a user did to the last facet that shows it; where users did anything.
+    pub input_to_picture: Option<Figures>,
     /// Of a replay: pictures, compared with those of the recording.
     pub replay: Option<Counts>,
     /// Of inputs that were played.
@@ -100,6 +103,12 @@ impl Meter {
 
     /// What facets answered.
     pub fn take(&mut self, event: &ServerEvent, time_s: f64) {
+        if let ServerEvent::Shown(shown) = event {
+            if shown.facets > 1 {
+                self.skew.add(shown.skew.as_secs_f64(), shown.frame, time_s);
+            }
+            shown.input.iter().for_each(|input| self.input.add(input.as_secs_f64(), shown.frame, time_s));
+        }
         let (ServerEvent::Ready(facet, frame, done, _) | ServerEvent::Presented(facet, frame, done, _)) = event else { return };
         let k = *facet as usize;
         if let (ServerEvent::Ready(..), Some(draw)) = (event, self.draw.get_mut(k)) {
@@ -141,6 +150,9 @@ impl Summary {
         if let Some(skew) = &self.skew {
             text += &figures("facets showed a frame within", skew);
         }
+        if let Some(input) = &self.input_to_picture {
+            text += &figures("what users did was to be seen within", input);
+        }
         if let Some(Counts { same, different, not_compared }) = self.replay {
             text += &format!("pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n");
         }
@@ -170,23 +182,6 @@ impl Summary {
 fn reasons(what: &str, counts: &Refusals) -> String {
     let each: Vec<String> = counts.iter().map(|(why, n)| format!("{n} {why}")).collect();
     if each.is_empty() { String::new() } else { format!("{what}: {}", each.join(", ")) }
-}
-
-/// How far apart facets of this machine showed the same frames, by their logs.
-pub fn skew(folder: &Path, seats: &[Seat]) -> Option<Figures> {
-    let mut shown: BTreeMap<u64, (u64, u64, usize, f64)> = BTreeMap::new();
-    for seat in seats {
-        let text = std::fs::read_to_string(facet_folder(folder, &seat.name).join("frames.jsonl")).ok()?;
-        for line in text.lines().filter_map(|line| serde_json::from_str::<Line>(line).ok()) {
-            let (first, last, count, _) = shown.entry(line.frame).or_insert((line.shown_unix_us, line.shown_unix_us, 0, line.time_s));
-            (*first, *last, *count) = ((*first).min(line.shown_unix_us), (*last).max(line.shown_unix_us), *count + 1);
-        }
-    }
-    let mut spread = Spread::default();
-    for (frame, (first, last, _, time_s)) in shown.iter().filter(|(_, (_, _, count, _))| *count == seats.len()) {
-        spread.add((last - first) as f64 * 1e-6, *frame, *time_s);
-    }
-    (spread.figures().count > 0).then(|| spread.figures())
 }
 
 /// Lines while it runs: in place on a terminal, every few seconds elsewhere.
@@ -219,7 +214,9 @@ impl Status {
         }
         let per_s = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed.as_secs_f64();
         let mut text = if self.terminal && self.lines > 0 { format!("\x1b[{}A", self.lines) } else { String::new() };
-        text += &format!("\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms\n", per_s(frame, self.frame), 1e3 * meter.step.within(0.5));
+        let more = |what: &str, spread: &Spread| spread.some().map_or(String::new(), |f| format!(", {what} {:.2} ms", f.p50_ms));
+        let (skew, input) = (more("skew", &meter.skew), more("input to picture", &meter.input));
+        text += &format!("\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms{skew}{input}\n", per_s(frame, self.frame), 1e3 * meter.step.within(0.5));
         self.shown.resize(seats.len(), 0);
         for (k, seat) in seats.iter().enumerate() {
             let (counts, _, _) = server.counts(k as FacetNumber);
