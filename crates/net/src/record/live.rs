@@ -5,7 +5,8 @@
 
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
 use super::schemas::{TOPIC_SCENE, TOPIC_TRANSFORMS};
-use super::{MAX_TIME_S, RecordError, Result};
+use super::error::Result;
+use super::{MAX_TIME_S, RecordError};
 use crate::world::{entities, names, poses};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 use foxglove::websocket::{ChannelView, Client, ServerListener};

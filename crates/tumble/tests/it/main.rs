@@ -3,6 +3,7 @@
 mod articulated_scenes;
 mod bad_input;
 mod cave_processes;
+mod cave_recordings;
 mod cave_tracker;
 mod cave_users;
 mod cave_windows;
