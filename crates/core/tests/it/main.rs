@@ -33,6 +33,7 @@ mod pull;
 mod regressions;
 mod regressions_rows;
 mod soft_rows;
+mod sleep;
 mod solvers;
 mod stacks;
 mod state;
