@@ -14,13 +14,14 @@
 //! of one is sent twice, again where the budget allows. The budget is what keeps the bytes in bounds:
 //!
 //! ```text
-//! balance += 1.45 · length of a message        balance −= length of each packet sent, and of each acknowledgement received
+//! balance += 1.5 · length of a message        balance −= length of each packet sent or received
 //! ```
 //!
 //! Something redundant is sent only while the balance covers it. Ordering over a fixed time rather than over a count of later packets keeps reordering
 //! from looking like loss.
 
-use super::frames::{Ack, Channel, FRAGMENT, FRAGMENT_HEAD, Frame, PARITY_HEAD, Part, before};
+use super::frames::{Ack, Channel, FRAGMENT, Frame, PARITY_HEAD, Part, before};
+use super::packet::whole;
 use super::inbox::{BYTES_AHEAD, NEWEST_AHEAD, RELIABLE_AHEAD, parity};
 use crate::sync::transport::MAX_QUEUED_BYTES;
 use std::collections::VecDeque;
@@ -147,7 +148,7 @@ impl Outbox {
 
     /// Takes a message of 1 to [`MAX_MESSAGE_BYTES`](crate::sync::transport::MAX_MESSAGE_BYTES) bytes.
     pub fn push(&mut self, channel: Channel, message: Arc<[u8]>) -> Result<(), Full> {
-        self.earn(message.len() * 29 / 20);
+        self.earn(message.len() * 3 / 2);
         let stream = &mut self.streams[channel as usize];
         if channel == Channel::Newest {
             self.superseded += stream.waiting.len() as u64;
@@ -204,7 +205,7 @@ impl Outbox {
         true
     }
 
-    /// A packet of so many bytes was sent (or one with nothing but an acknowledgement received): it is paid for.
+    /// A packet of so many bytes was sent or received: it is paid for.
     pub fn pay(&mut self, bytes: usize) {
         self.balance = (self.balance - bytes as i64).max(-BALANCE);
     }
@@ -216,14 +217,16 @@ impl Outbox {
 
     /// Takes an acknowledgement.
     pub fn acknowledged(&mut self, now: Duration, ack: &Ack, next_sequence: u64) -> Result<(), Impossible> {
-        let possible = |stream: &Stream, done: u32| !before(stream.next, done);
-        if ack.largest >= next_sequence || !self.streams.iter().zip(ack.complete).all(|(stream, done)| possible(stream, done)) {
+        let largest = whole(ack.largest, next_sequence);
+        let complete = [Some(ack.reliable), ack.newest];
+        let possible = |(stream, done): (&Stream, Option<u32>)| done.is_none_or(|done| !before(stream.next, done));
+        if largest >= next_sequence || !self.streams.iter().zip(complete).all(possible) {
             return Err(Impossible);
         }
-        self.largest = self.largest.max(Some(ack.largest));
-        self.mark(now, ack);
-        for (stream, done) in self.streams.iter_mut().zip(ack.complete) {
-            stream.finish(done);
+        self.largest = self.largest.max(Some(largest));
+        self.mark(now, largest, ack.mask);
+        for (stream, done) in self.streams.iter_mut().zip(complete) {
+            done.into_iter().for_each(|done| stream.finish(done));
         }
         self.forget();
         self.begin_messages();
@@ -264,11 +267,11 @@ impl Outbox {
         sent.at + timeout.min(LONGEST_TIMEOUT)
     }
 
-    fn mark(&mut self, now: Duration, ack: &Ack) {
+    fn mark(&mut self, now: Duration, largest: u64, mask: u128) {
         let mut newest = None;
         for k in 0..self.sent.len() {
             let sent = &mut self.sent[k];
-            let taken = ack.largest.checked_sub(sent.sequence).is_some_and(|age| age < 128 && ack.mask >> age & 1 == 1);
+            let taken = largest.checked_sub(sent.sequence).is_some_and(|age| age < 128 && mask >> age & 1 == 1);
             if !taken || sent.fate == Fate::Arrived {
                 continue;
             }
@@ -365,7 +368,8 @@ impl Outbox {
             return Some(Piece::Parity(channel, message, outgoing.unsent_parity - 1));
         }
         let (index, length) = (outgoing.unsent, outgoing.part.length(outgoing.unsent));
-        if length + FRAGMENT_HEAD > room {
+        let head = outgoing.part.head();
+        if length + head > room {
             return None;
         }
         outgoing.unsent += 1;
@@ -373,7 +377,7 @@ impl Outbox {
         if outgoing.unsent == outgoing.part.fragments() && loss > LOSSY {
             outgoing.groups = parity_groups(&outgoing.part, balance - length as i64);
             if outgoing.part.fragments() == 1 {
-                self.repeat(piece, length + FRAGMENT_HEAD);
+                self.repeat(piece, length + head);
             }
         }
         Some(piece)
@@ -390,7 +394,7 @@ impl Outbox {
     fn size(&mut self, piece: Piece) -> Option<usize> {
         let Piece::Fragment(channel, message, index) = piece else { return Some(1) };
         let outgoing = self.streams[channel as usize].find(message)?;
-        (!outgoing.progress[usize::from(index)].arrived).then(|| outgoing.part.length(index) + FRAGMENT_HEAD)
+        (!outgoing.progress[usize::from(index)].arrived).then(|| outgoing.part.length(index) + outgoing.part.head())
     }
 
     fn write(&mut self, piece: Piece, body: &mut Vec<u8>) {
