@@ -7,6 +7,7 @@ struct MeshIn {
     @location(5) color_rough: vec4f,
     @location(6) other_metal: vec4f,
     @location(7) pattern: vec4f,
+    @location(8) place: vec3f, // in the texture, and shares of it per metre
 };
 // Taken at a point inside the triangle (centroid): at the middle of a pixel that a thin triangle only grazes they would run beyond it.
 struct MeshOut {
@@ -19,6 +20,7 @@ struct MeshOut {
     @location(5) @interpolate(flat) other_metal: vec4f,
     @location(6) @interpolate(flat) pattern: vec4f,
     @location(7) @interpolate(flat) side: f32,
+    @location(8) @interpolate(perspective, centroid) place: vec3f,
 };
 
 fn world_of(in: MeshIn) -> vec3f {
@@ -42,6 +44,7 @@ fn world_of(in: MeshIn) -> vec3f {
     out.other_metal = in.other_metal;
     out.pattern = in.pattern;
     out.side = side;
+    out.place = vec3f(in.place.x, 1.0 - in.place.y, in.place.z / max(length(cx), 1e-9));
     return out;
 }
 
@@ -52,11 +55,14 @@ fn world_of(in: MeshIn) -> vec3f {
 // Where the number of the nearest sphere is asked for: it is none.
 @fragment fn fs_no_id() -> @location(0) u32 { return 0u; }
 
+// Depth alone, in a pass that has a colour.
+@fragment fn fs_nothing() {}
+
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     let facing = select(-1.0, 1.0, front) * in.side;
     let s = view_depth_at(in.world);
     let to_eye = -normalize(ray_at(in.clip.xy).dir);
-    return pixel_color(in.world, normalize(in.normal) * facing, to_eye, in.object, normalize(in.object_normal), s, in.clip.xy,
+    return pixel_color(in.world, normalize(in.normal) * facing, to_eye, in.object, normalize(in.object_normal), s, in.clip.xy, in.place,
         Look(in.color_rough, in.other_metal, in.pattern));
 }
 

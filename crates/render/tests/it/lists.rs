@@ -24,7 +24,7 @@ fn sample() -> DrawList {
 fn text_form_is_stable_and_rounded() {
     let expected = "\
 camera: eye (4 -4 3) target (0 0 0) up (0 0 1) fov 0.6981 near 0.05 far 500
-settings: exposure 1 shadow map 2048 occlusion auto tone map true shadows soft samples 4
+settings: exposure 1 shadow map 2048 occlusion auto tone map true shadows soft samples 4 reflections true
 sky: zenith (0.42 0.53 0.68) horizon (0.8 0.84 0.88) ground (0.42 0.4 0.38) ambient 1 softbox 0 backdrop none
 ground: height 0 reach 60 color (0.6 0.61 0.63) rough 0.9 metal 0 coat 0 pattern grid (0.46 0.47 0.49) (1 0.02)
 light 0: directional along (0 0 -1) color (1 0.97 0.92) intensity 2 radius 0.02 rad
