@@ -31,10 +31,10 @@ pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>, part: bool) -> f3
     }
 }
 
-/// Middle x and y of the floor, and its reach.
+/// Middle x and y of the floor, its reach and its height.
 pub fn floor(list: &DrawList, seen: Option<&Bounds>) -> [f32; 4] {
     let middle = seen.map_or([0.0; 2], |b| ball_of(b).0.xy().into());
-    [middle[0], middle[1], list.ground.as_ref().map_or(1.0, |g| g.reach_m), 0.0]
+    [middle[0], middle[1], list.ground.as_ref().map_or(1.0, |g| g.reach_m), list.ground.as_ref().map_or(0.0, |g| g.height_m)]
 }
 
 /// Linear radiance that comes back from below, in units of the ambient factor: a floor returns its colour times the light that falls on it

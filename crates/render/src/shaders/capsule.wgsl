@@ -94,7 +94,7 @@ fn capsule_depth(in: CapsuleOut) -> f32 {
     let p = inside_capsule(in.ball, in.axis, in.clip.xy);
     let h = hit_capsule(in.ball, in.axis, in.clip.xy);
     let depth = depth_of(h.s);
-    if (p < 0.0 || h.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
+    if (p < 0.0 || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
     return depth;
 }
 
@@ -112,7 +112,7 @@ fn capsule_depth(in: CapsuleOut) -> f32 {
     let mask = capsule_mask(in.ball, in.axis, pixel);
     let h = hit_capsule(in.ball, in.axis, pixel);
     let depth = depth_of(h.s);
-    if (mask == 0u || h.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
+    if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
     let to_eye = -normalize(ray_at(pixel).dir);
     let color = pixel_color(h.position, h.normal, to_eye, unturn(in.turn, h.position - in.ball.xyz), unturn(in.turn, h.normal), h.s, pixel, vec3f(0.0),
         Look(in.color_rough, in.other_metal, in.pattern));

@@ -22,7 +22,7 @@ struct Scene {
     ground: vec4f,   // w: softbox
     backdrop: vec4f, // w: 1 for a flat backdrop
     tone: vec4f,     // exposure, 1 for the filmic curve, unused, side of the shadow maps
-    floor: vec4f,    // middle x, y and reach of the ground
+    floor: vec4f,    // middle x, y, reach and height of the ground
     bounce: vec4f,   // radiance that comes back from below
 };
 @group(1) @binding(0) var<uniform> scene: Scene;

@@ -59,10 +59,12 @@ fn world_of(in: MeshIn) -> vec3f {
 @fragment fn fs_nothing() {}
 
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
-    let facing = select(-1.0, 1.0, front) * in.side;
     let s = view_depth_at(in.world);
     let to_eye = -normalize(ray_at(in.clip.xy).dir);
-    return pixel_color(in.world, normalize(in.normal) * facing, to_eye, in.object, normalize(in.object_normal), s, in.clip.xy, in.place,
+    var normal = normalize(in.normal) * in.side;
+    // seen from behind; triangles thinner than a pixel may be rounded over, so the normal must say so too
+    if (!front && dot(normal, to_eye) < 0.0) { normal = -normal; }
+    return pixel_color(in.world, normal, to_eye, in.object, normalize(in.object_normal), s, in.clip.xy, in.place,
         Look(in.color_rough, in.other_metal, in.pattern));
 }
 
@@ -70,9 +72,17 @@ fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     return vec4f(mesh_color(in, front), 1.0);
 }
 
-// The floor fades into what lies behind it.
+// The floor fades into what lies behind it. It is met by the ray through the pixel's middle, not between the corners of its triangles: these are cut where they
+// leave the view, so that their edges lie elsewhere in each picture, and a pixel across one would show another place.
 @fragment fn fs_ground(in: MeshOut, @builtin(front_facing) front: bool) -> @location(0) vec4f {
-    let away = length(in.world.xy - scene.floor.xy) / scene.floor.z;
+    var met = in;
+    let ray = ray_at(in.clip.xy);
+    let s = (scene.floor.w - ray.origin.z) / ray.dir.z;
+    if (s > 0.0 && s < 1e6) {
+        met.world = vec3f((ray.origin + s * ray.dir).xy, scene.floor.w);
+        met.object = met.world;
+    }
+    let away = length(met.world.xy - scene.floor.xy) / scene.floor.z;
     let fade = smoothstep(0.15, 0.95, away);
-    return vec4f(mix(mesh_color(in, front), backdrop_at(normalize(ray_at(in.clip.xy).dir)), fade), 1.0);
+    return vec4f(mix(mesh_color(met, front), backdrop_at(normalize(ray_at(in.clip.xy).dir)), fade), 1.0);
 }

@@ -42,7 +42,7 @@ fn a_cast_capsule_and_a_tessellated_one_agree() {
     ] {
         let pictures = [true, false].map(|cast| {
             let mut list = bare(camera);
-            list.lights.push(Light::sun(Vector3::new(0.3, 0.4, -1.0), 0.6));
+            list.lights.push(crate::support::white_sun([0.3, 0.4, -1.0], 0.6, false));
             if cast {
                 list.add_capsule(pose, 0.5, 0.3, lit);
             } else {
@@ -57,6 +57,24 @@ fn a_cast_capsule_and_a_tessellated_one_agree() {
         // light within two levels everywhere but at edges of coverage, which may differ by a chord's sagitta
         assert!(off(2) < 400 && off(40) < 60, "{} channels differ by more than 2 levels, {} by more than 40", off(2), off(40));
     }
+}
+
+#[test]
+fn the_shadow_of_a_capsule_lies_where_the_light_leaves_it() {
+    // along y at height 2, light leaning 45 degrees towards +x: around x = 2, 0.3 sqrt 2 wide to both sides, from y = -0.8 to 0.8
+    let mut list = bare(from_above(10.0));
+    let floor = list.add_mesh(MeshData::ground_quad(3.5));
+    list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) }).casts_shadow = false;
+    let along_y = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI as f32 / 2.0);
+    list.add_capsule(Isometry3::from_parts(Vector3::new(0.0, 0.0, 2.0).into(), along_y), 0.5, 0.3, Material::unlit([0.0; 3]));
+    list.lights.push(crate::support::white_sun([1.0, 0.0, -1.0], 1.0, true));
+    let Some(image) = picture(&list, 400, 400) else { return };
+    let scale = 200.0 / 0.4f64.tan() / 10.0;
+    let at = |x: f64, y: f64| linear(&image, (200.0 + x * scale) as u32, (200.0 - y * scale) as u32, 1);
+    for y in [-0.45, 0.0, 0.45] {
+        assert!(at(2.0, y) < 0.02 && at(2.37, y) < 0.02 && at(1.63, y) < 0.02 && at(2.48, y) > 0.6 && at(1.52, y) > 0.6, "across at {y}: {:?}", [1.52, 1.63, 2.0, 2.37, 2.48].map(|x| at(x, y)));
+    }
+    assert!(at(2.0, 0.75) < 0.02 && at(2.0, -0.75) < 0.02 && at(2.0, 0.86) > 0.6 && at(2.0, -0.86) > 0.6, "along: {:?}", [-0.86, -0.75, 0.75, 0.86].map(|y| at(2.0, y)));
 }
 
 /// Balls, capsules and blocks that hide and cut each other, over a floor, by colours that take no light.
