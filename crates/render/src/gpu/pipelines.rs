@@ -128,17 +128,9 @@ impl Pipelines {
         let filtered = wgpu::TextureSampleType::Float { filterable: true };
         let albedo = [texture(0, filtered, wgpu::TextureViewDimension::D2), entry(1, BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
         let texture_layout = layout(device, "texture", &albedo);
-        // TEMPORARY
-        let (pw, ow) = match std::env::var("TW") {
-            Ok(d) => {
-                let r = |names: &[&str]| names.iter().map(|n| std::fs::read_to_string(format!("{d}/{n}.wgsl")).unwrap()).collect::<String>();
-                (r(&["variant", "view", "noise", "pattern", "light", "surface", "mesh", "sphere", "capsule", "line", "sky"]), r(&["view", "occlusion"]))
-            }
-            Err(_) => (PICTURE_WGSL.to_string(), OCCLUSION_WGSL.to_string()),
-        };
-        let pixels = shader(device, "picture", &[&pw, EDGE_PIXELS_WGSL].concat());
-        let samples = if sample_masks { shader(device, "picture", &[&pw, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
-        let occlusion = shader(device, "occlusion", &ow);
+        let pixels = shader(device, "picture", &[PICTURE_WGSL, EDGE_PIXELS_WGSL].concat());
+        let samples = if sample_masks { shader(device, "picture", &[PICTURE_WGSL, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
+        let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
         let depth_only = [Some(&view_layout)];
         let screen = [Some(&view_layout), Some(&occlusion_layout)];
         let depth = |vs, fs, input, color, depth| {

@@ -68,9 +68,11 @@ pub struct ShadowMaps {
 }
 
 impl ShadowMaps {
-    pub fn new(device: &wgpu::Device, size: u32, count: usize) -> Self {
+    pub fn new(gpu: &Gpu, size: u32, count: usize) -> Self {
         let count = count.clamp(1, MAX_LAYERS) as u32;
-        let maps = texture(device, "shadow maps", [size, size, count], 1, DEPTH, LOOK);
+        // OpenGL takes one layer for no array, and each six for a cube
+        let spare = u32::from(gpu.opengl && (count == 1 || count.is_multiple_of(6)));
+        let maps = texture(&gpu.device, "shadow maps", [size, size, count + spare], 1, DEPTH, LOOK);
         let layer = |i| TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2), base_array_layer: i, array_layer_count: Some(1), ..Default::default() };
         ShadowMaps {
             size,
