@@ -9,10 +9,12 @@ struct MeshIn {
     @location(7) pattern: vec4f,
     @location(8) place: vec3f, // in the texture, and shares of it per metre
 };
-// Taken at a point inside the triangle (centroid): at the middle of a pixel that a thin triangle only grazes they would run beyond it.
+// Taken at a point inside the triangle (centroid): at the middle of a pixel that a thin triangle only grazes they would run beyond it. There llvmpipe
+// multiplies by the w of the pixel's middle all the same, which is wrong by a share: centimetres, far from the origin, and speckled shadows on meshes
+// finer than a pixel. A one that is interpolated with the rest comes out as that share.
 struct MeshOut {
     @invariant @builtin(position) clip: vec4f,
-    @location(0) @interpolate(perspective, centroid) world: vec3f,
+    @location(0) @interpolate(perspective, centroid) offset: vec3f,
     @location(1) @interpolate(perspective, centroid) normal: vec3f,
     @location(2) @interpolate(perspective, centroid) object: vec3f,
     @location(3) @interpolate(perspective, centroid) object_normal: vec3f,
@@ -21,6 +23,8 @@ struct MeshOut {
     @location(6) @interpolate(flat) pattern: vec4f,
     @location(7) @interpolate(flat) side: f32,
     @location(8) @interpolate(perspective, centroid) place: vec3f,
+    @location(9) @interpolate(flat) origin: vec3f,
+    @location(10) @interpolate(perspective, centroid) one: f32,
 };
 
 fn world_of(in: MeshIn) -> vec3f {
@@ -30,8 +34,11 @@ fn world_of(in: MeshIn) -> vec3f {
 
 @vertex fn vs_mesh(in: MeshIn) -> MeshOut {
     var out: MeshOut;
-    out.world = world_of(in);
-    out.clip = view.clip_from_world * vec4f(out.world, 1.0);
+    out.clip = view.clip_from_world * vec4f(world_of(in), 1.0);
+    // width times its inverse, so that no compiler takes it for a constant
+    out.one = view.size.x * view.size.z;
+    out.origin = vec3f(in.row_x.w, in.row_y.w, in.row_z.w);
+    out.offset = vec3f(dot(in.row_x.xyz, in.position), dot(in.row_y.xyz, in.position), dot(in.row_z.xyz, in.position));
     let cx = vec3f(in.row_x.x, in.row_y.x, in.row_z.x);
     let cy = vec3f(in.row_x.y, in.row_y.y, in.row_z.y);
     let cz = vec3f(in.row_x.z, in.row_y.z, in.row_z.z);
@@ -59,12 +66,13 @@ fn world_of(in: MeshIn) -> vec3f {
 @fragment fn fs_nothing() {}
 
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
-    let s = view_depth_at(in.world);
+    let world = in.origin + in.offset / in.one;
+    let s = view_depth_at(world);
     let to_eye = -normalize(ray_at(in.clip.xy).dir);
     var normal = normalize(in.normal) * in.side;
     // seen from behind; triangles thinner than a pixel may be rounded over, so the normal must say so too
     if (!front && dot(normal, to_eye) < 0.0) { normal = -normal; }
-    return pixel_color(in.world, normal, to_eye, in.object, normalize(in.object_normal), s, in.clip.xy, in.place,
+    return pixel_color(world, normal, to_eye, in.object / in.one, normalize(in.object_normal), s, in.clip.xy, in.place / in.one,
         Look(in.color_rough, in.other_metal, in.pattern));
 }
 
@@ -79,10 +87,11 @@ fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     let ray = ray_at(in.clip.xy);
     let s = (scene.floor.w - ray.origin.z) / ray.dir.z;
     if (s > 0.0 && s < 1e6) {
-        met.world = vec3f((ray.origin + s * ray.dir).xy, scene.floor.w);
-        met.object = met.world;
+        met.offset = vec3f((ray.origin + s * ray.dir).xy, scene.floor.w) - in.origin;
+        met.object = met.offset;
+        met.one = 1.0;
     }
-    let away = length(met.world.xy - scene.floor.xy) / scene.floor.z;
+    let away = length(in.origin.xy + met.offset.xy / met.one - scene.floor.xy) / scene.floor.z;
     let fade = smoothstep(0.15, 0.95, away);
     return vec4f(mix(mesh_color(met, front), backdrop_at(normalize(ray_at(in.clip.xy).dir)), fade), 1.0);
 }
