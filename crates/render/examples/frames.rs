@@ -3,7 +3,7 @@
 //! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn.
 //! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes about four minutes on
 //! two idle cores: a row ends after `--seconds S` (default 2), slow ones after a frame to warm up and one that counts. Other options: `--only WORDS` (rows that contain the words),
-//! `--quality WORDS` (instead of the two shown), `--readback` (with the way back to memory), `--stages` (where the
+//! `--quality WORDS` (instead of the five shown), `--readback` (with the way back to memory), `--stages` (where the
 //! time of each row goes), `--pictures FOLDER` (the last picture of each row).
 
 use nalgebra::{Point3, Vector3};
@@ -18,7 +18,7 @@ type Failure = Box<dyn std::error::Error>;
 struct Options {
     seconds: f64,
     only: String,
-    quality: Option<Quality>,
+    quality: Option<String>,
     readback: bool,
     stages: bool,
     pictures: Option<std::path::PathBuf>,
@@ -38,15 +38,22 @@ fn main() -> Result<(), Failure> {
     let adapter = renderer.adapter().to_owned();
     println!("adapter: {adapter}; {} threads", std::thread::available_parallelism().map_or(1, |n| n.get()));
     println!("\n| world | facets | quality | frames per second | ms per frame | processor ms per frame |\n|---|---|---|---|---|---|");
-    let qualities: Vec<Quality> = match &options.quality {
-        Some(quality) => vec![*quality],
-        None => ["fastest", "fastest,samples=4", "fast", "fast,samples=4", "usual"].iter().map(|words| words.parse()).collect::<Result<_, _>>()?,
+    let words: Vec<String> = match &options.quality {
+        Some(words) => vec![words.clone()],
+        None => ["fastest", "fastest,samples=4", "fast", "fast,samples=4", "usual"].map(String::from).to_vec(),
     };
+    let qualities: Vec<Quality> = words.iter().map(|words| words.parse()).collect::<Result<_, _>>()?;
+    let mut summary = Vec::new();
     let mut subjects = [billiards()?, bodies("1,000 bodies", [25, 20, 2])?, bodies("10,000 bodies", [50, 50, 4])?];
     for subject in &mut subjects {
         for facets in [1, 4, 6] {
+            let mut cells = Vec::new();
             for quality in &qualities {
-                row(&options, &mut renderer, subject, facets, [1024, 768], Stereo::Mono, quality)?;
+                cells.push(row(&options, &mut renderer, subject, facets, [1024, 768], Stereo::Mono, quality)?);
+            }
+            if cells.iter().any(Option::is_some) {
+                let shown: Vec<String> = cells.iter().map(|fps| fps.map_or(String::new(), |fps| format!("{fps:.1}"))).collect();
+                summary.push(format!("| {} | {facets} | {} |", subject.name, shown.join(" | ")));
             }
         }
     }
@@ -55,6 +62,8 @@ fn main() -> Result<(), Failure> {
             row(&options, &mut renderer, &mut subjects[2], 6, [1920, 1080], Stereo::SideBySide, quality)?;
         }
     }
+    println!("\nFrames per second:\n\n| world | facets | `{}` |\n|---|---|{}", words.join("` | `"), "---|".repeat(words.len()));
+    summary.iter().for_each(|row| println!("{row}"));
     Ok(())
 }
 
@@ -66,7 +75,7 @@ fn options() -> Result<Options, Failure> {
         match word.as_str() {
             "--seconds" => options.seconds = value()?.parse()?,
             "--only" => options.only = value()?,
-            "--quality" => options.quality = Some(value()?.parse()?),
+            "--quality" => options.quality = Some(value()?),
             "--readback" => options.readback = true,
             "--pictures" => options.pictures = Some(value()?.into()),
             "--stages" => options.stages = true,
@@ -100,11 +109,12 @@ fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failu
     Ok(Subject { name, world: scene.build()?.0, scene, camera: Some(camera) })
 }
 
-fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets: usize, size: [u32; 2], stereo: Stereo, quality: &Quality) -> Result<(), Failure> {
+/// One cell: frames per second, or none where it was not asked for.
+fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets: usize, size: [u32; 2], stereo: Stereo, quality: &Quality) -> Result<Option<f64>, Failure> {
     let shown = if stereo == Stereo::Mono { format!("{facets}") } else { format!("{facets} of {} x {} in stereo", size[0], size[1]) };
     let label = format!("{} | {shown} | {quality}", subject.name);
     if !label.contains(&options.only) {
-        return Ok(());
+        return Ok(None);
     }
     let mut drawing = Drawing::new(&subject.scene);
     let cave = (facets > 1).then(|| cave(&subject.scene, facets, size, stereo)).transpose()?;
@@ -147,7 +157,7 @@ fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets
         let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + warm);
         println!("  list {:.2} ms, picture {:.2} ms", ms(stages[0]), ms(stages[1]));
     }
-    Ok(())
+    Ok(Some(1.0 / each))
 }
 
 fn draw(renderer: &mut Renderer, list: &DrawList, cave: Option<&CaveView>, [w, h]: [u32; 2], readback: bool) -> Result<(), RenderError> {

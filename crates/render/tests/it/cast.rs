@@ -28,6 +28,7 @@ fn a_capsule_covers_a_disc_and_a_strip() {
     }
 }
 
+/// Triangles of half a pixel: shadow speckled them while their places were a little beside the surface (1,100 pixels of the first pair).
 #[test]
 fn a_cast_capsule_and_a_tessellated_one_agree() {
     if !exact_edges() {
@@ -42,7 +43,7 @@ fn a_cast_capsule_and_a_tessellated_one_agree() {
     ] {
         let pictures = [true, false].map(|cast| {
             let mut list = bare(camera);
-            list.lights.push(crate::support::white_sun([0.3, 0.4, -1.0], 0.6, false));
+            list.lights.push(Light::sun(Vector3::new(0.3, 0.4, -1.0), 0.6));
             if cast {
                 list.add_capsule(pose, 0.5, 0.3, lit);
             } else {
@@ -57,27 +58,6 @@ fn a_cast_capsule_and_a_tessellated_one_agree() {
         // light within two levels everywhere but at edges of coverage, which may differ by a chord's sagitta
         assert!(off(2) < 400 && off(40) < 60, "{} channels differ by more than 2 levels, {} by more than 40", off(2), off(40));
     }
-}
-
-/// Triangles of a twentieth of a pixel, 30 m from the origin of the world: speckles of shadow on them were the driver's places beside the surface.
-#[test]
-fn a_mesh_finer_than_a_pixel_has_no_speckles() {
-    let center = Point3::new(20.0, 20.0, 1.0);
-    let dull = Material { roughness: 1.0, ..Material::matte([0.8; 3]) };
-    let pictures = [true, false].map(|cast| {
-        let mut list = bare(Camera::look_at(center + Vector3::new(0.9, -0.5, 0.4), center));
-        list.lights.push(crate::support::white_sun([-0.2, 0.3, -1.0], 0.6, true));
-        if cast {
-            list.add_sphere(center, 0.12, UnitQuaternion::identity(), dull);
-        } else {
-            let mesh = list.add_mesh(MeshData::uv_sphere(0.12, 300));
-            list.add_instance(mesh, Isometry3::translation(20.0, 20.0, 1.0), dull);
-        }
-        picture(&list, 160, 120)
-    });
-    let [Some(cast), Some(mesh)] = pictures else { return };
-    let off = cast.rgba.chunks(4).zip(mesh.rgba.chunks(4)).filter(|(a, b)| a[0].abs_diff(b[0]) > 20).count();
-    assert!(area(&cast, 0) > 100.0 && off < 30, "{off} pixels differ by more than 20 levels, light {}", area(&cast, 0));
 }
 
 #[test]

@@ -25,7 +25,7 @@ const SMOOTH_PIECE: f64 = 0.06;
 /// Slopes that differ by this are the same.
 pub(super) const LEVEL: f64 = 1e-7;
 /// An edge that slopes less than this over a face lies on it.
-const LYING_EDGE: f64 = 0.15;
+pub(super) const LYING_EDGE: f64 = 0.15;
 /// Looks for the end of a flat bottom at most.
 const LOOKS: usize = 20;
 /// Looks for the minimum at most: a third of them halve what is left.

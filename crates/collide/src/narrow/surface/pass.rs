@@ -2,7 +2,8 @@
 
 use super::super::reduce::Collector;
 use super::{Body, Source};
-use crate::surface::elements::{Elements, Point};
+use super::line::LYING_EDGE;
+use crate::surface::elements::{Edge, Elements, Point};
 use crate::surface::field::MeshField;
 use crate::surface::{Feature, Field, Hit, OVERHANG};
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
@@ -11,6 +12,14 @@ use std::cell::{Cell, RefCell};
 
 /// Normals of an element, in the frame of the field.
 pub(super) type Normals = ArrayVec<Vec3, 12>;
+
+/// What is known of the field at a point.
+struct Seen {
+    /// At most the distance.
+    bound: f64,
+    /// The normal, where every element meets the same.
+    up: Option<Vec3>,
+}
 
 /// Slopes across an edge down to this are rounding's.
 pub(super) const ASIDE: f64 = 1e-6;
@@ -79,12 +88,16 @@ impl<'a> Pass<'a> {
             return;
         }
         let at = self.place(&point.at);
-        let bound = bound.max(self.vertex(&at, elements, point, found));
+        let seen = self.vertex(&at, elements, point, found);
+        let bound = bound.max(seen.bound);
         if only_points || bound - longest > found.limit() {
             return;
         }
+        // where the distance rises steeply from here an edge has nothing but its end
+        let up = seen.up.map(|up| self.rotation.tr_mul(&up));
+        let rises = |edge: &Edge| up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= LYING_EDGE * edge.length);
         for edge in elements.edges_of(point, fine) {
-            if bound - edge.length <= found.limit() {
+            if bound - edge.length <= found.limit() && !rises(edge) {
                 self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
             }
         }
@@ -143,28 +156,33 @@ impl<'a> Pass<'a> {
         self.point_at(at, radius, self.field.hit(at, normals, OVERHANG), ways, index, found);
     }
 
-    /// A point of a mesh. Returns its distance, or less.
-    fn vertex(&self, at: &Vec3, elements: &Elements, point: &Point, found: &mut Collector) -> f64 {
+    /// A point of a mesh.
+    fn vertex(&self, at: &Vec3, elements: &Elements, point: &Point, found: &mut Collector) -> Seen {
         let turned = || -> Normals { elements.normals_of(point).iter().map(|n| self.rotation * n).collect() };
-        let hit = match self.mesh {
+        let (hit, seen) = match self.mesh {
             Some(mesh) => {
                 let nearest = match self.nearest_named(mesh, at, point.index, found.limit()) {
-                    Ok(nearest) if nearest.distance <= found.limit() => nearest,
-                    Ok(nearest) => return nearest.distance,
-                    Err(bound) => return bound,
+                    Ok(nearest) => nearest,
+                    Err(bound) => return Seen { bound, up: None },
                 };
-                mesh.hit_by(at, nearest, &turned(), OVERHANG)
+                // of what is closer, the elements' normals have a say
+                let up = Some(nearest.normal).filter(|_| nearest.distance > mesh.touching());
+                let seen = Seen { bound: nearest.distance, up };
+                if nearest.distance > found.limit() {
+                    return seen;
+                }
+                (mesh.hit_by(at, nearest, &turned(), OVERHANG), seen)
             }
             None => {
-                let bound = self.field.bound(at);
-                if bound > found.limit() {
-                    return bound;
+                let seen = Seen { bound: self.field.bound(at), up: None };
+                if seen.bound > found.limit() {
+                    return seen;
                 }
-                self.field.hit(at, &turned(), OVERHANG)
+                (self.field.hit(at, &turned(), OVERHANG), seen)
             }
         };
         self.point_at(at, 0.0, hit, elements.ways_of(point), point.index, found);
-        f64::NEG_INFINITY
+        seen
     }
 
     /// What the field says of a place that may have a name.

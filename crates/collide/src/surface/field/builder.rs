@@ -10,7 +10,8 @@
 //! inside:      −d(p) ≤ d_0(p), so e = e₀ + h·|g + g_0|₁             signs: d_c = −d_0(c)
 //! ```
 //!
-//! A child is told at first all triangles with `d_t(c) ≤ d_0(c) + 2r`, since `|d(p) − d(c)| ≤ |p − c| ≤ r` for each and for all.
+//! A child is told at first all triangles with `d_t(c) ≤ d_0(c) + 2r`, since `|d(p) − d(c)| ≤ |p − c| ≤ r` for each and for all; of those
+//! the first line tells which need no look.
 //! A cell is divided until its list is short. Far from the surface it may have no list, only the bound.
 
 use super::octree::{Cell, Octree};
@@ -23,7 +24,7 @@ const SHORT: usize = 16;
 /// At the last level, or far from the surface, lists up to this length are kept.
 const LONG: usize = 96;
 /// A cell further from the surface than this many half diagonals is not divided, if its list is not too long,
-const FAR: f64 = 3.0;
+const FAR: f64 = 2.0;
 /// or it is further than this, as a part of the diagonal.
 const FARTHEST: f64 = 0.06;
 /// The outermost cell reaches this far beyond the mesh, as a part of the diagonal.
@@ -36,6 +37,8 @@ const FINEST: f64 = 0.6;
 const DEEPEST: f64 = 9.0;
 /// Keeps a distance rounded to single precision below it.
 const BELOW: f64 = 1.0 - 2e-7;
+/// A distance that has a direction in spite of rounding, as a part of the diagonal.
+const SOME: f64 = 1e-9;
 /// Of single precision, and more.
 const ROUNDING: f64 = 1e-7;
 /// Cells and listed triangles at most; beyond, the tree of boxes answers.
@@ -45,18 +48,11 @@ const MOST_LISTED: usize = 1 << 23;
 /// A triangle that may count in a cell.
 #[derive(Clone, Copy)]
 struct Near {
-    /// Of the cell's centre; may be less where only a bound is known.
+    /// Of the cell's centre.
     distance: f64,
     triangle: u32,
-    /// From its closest point to the cell's centre, metres.
-    from: Vec3,
-}
-
-impl Near {
-    /// The slope of its distance at the cell's centre; none on the triangle itself, where the distance is least.
-    fn slope(&self) -> Vec3 {
-        if self.distance > 0.0 { self.from / self.distance } else { Vec3::zeros() }
-    }
+    /// Of the distance at the cell's centre; none on the triangle itself, where the distance is least.
+    slope: Vec3,
 }
 
 pub(super) struct Builder<'a> {
@@ -72,9 +68,9 @@ pub(super) fn build(field: &mut MeshField) {
     let lengths: f64 = field.corners.iter().map(|[a, b, _]| (b - a).norm()).sum();
     let mean = lengths / field.corners.len() as f64;
     let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
-    let all: Vec<Near> = (0..field.corners.len() as u32).map(|triangle| Near { distance: 0.0, triangle, from: Vec3::zeros() }).collect();
-    Builder { field, deepest }.cell(0, center, half, &all, f64::INFINITY, 0);
-    field.tree.finish();
+    let all: Vec<Near> = (0..field.corners.len() as u32).map(|triangle| Near { distance: 0.0, triangle, slope: Vec3::zeros() }).collect();
+    Builder { field, deepest }.cell(0, center, half, &all, &Vec3::zeros(), 0);
+    field.tree.finish(deepest);
     field.lists.shrink_to_fit();
 }
 
@@ -88,18 +84,21 @@ fn corners(half: f64) -> impl Iterator<Item = Vec3> {
 }
 
 impl Builder<'_> {
-    /// `list`: the triangles that count in the parent, with their distances from its centre, which is `moved` from this one.
-    fn cell(&mut self, index: usize, center: Vec3, half: f64, list: &[Near], moved: f64, depth: u32) {
+    /// `list`: the triangles that count in the parent, with their distances from its centre, from which this one is `moved`.
+    fn cell(&mut self, index: usize, center: Vec3, half: f64, list: &[Near], moved: &Vec3, depth: u32) {
         let field = &*self.field;
         let at = |triangle: u32| {
             let from = center - closest_on_triangle(&center, &field.corners[triangle as usize]).0;
-            Near { distance: from.norm(), triangle, from }
+            let distance = from.norm();
+            let slope = if distance > SOME * field.diagonal { from / distance } else { Vec3::zeros() };
+            Near { distance, triangle, slope }
         };
         let reach = 3.0_f64.sqrt() * half;
-        let Some(guess) = list.iter().min_by(|a, b| order(a, b)) else { return };
-        // no more than this counts, and no triangle came closer than it was moved
+        // convex: no triangle is closer than its tangent plane in the parent tells
+        let below = |n: &Near| n.distance + n.slope.dot(moved);
+        let Some(guess) = list.iter().min_by(|a, b| below(a).total_cmp(&below(b))) else { return };
         let most = at(guess.triangle).distance + 2.0 * reach;
-        let may_be = |n: &Near, most: f64| n.distance - moved <= most && field.ball_away(&center, n.triangle as usize) <= most;
+        let may_be = |n: &Near, most: f64| below(n) <= most;
         let mut near: Vec<Near> = list.iter().filter(|n| may_be(n, most)).map(|n| at(n.triangle)).collect();
         let Some(&first) = near.iter().min_by(|a, b| order(a, b)) else { return };
         let (least, found) = (first.distance, field.closest_of(&center, first.triangle as usize));
@@ -122,13 +121,13 @@ impl Builder<'_> {
         cell.set_distance(distance - ROUNDING * (distance.abs() + field.diagonal));
         let excess = self.excess(&center, half, &first);
         if least > reach {
-            let slope = cell.set_slope(&(first.from / distance));
+            let slope = cell.set_slope(&(first.slope * distance.signum()));
             cell.set_short(self.short(half, distance, &slope, &near, &first, excess), half);
         }
         let slack = excess + ROUNDING * field.diagonal;
         let counts = |n: &Near| {
             let more = if turned(n.triangle) { field.around } else { 0.0 };
-            n.distance - least <= slack + more + half * (n.slope() - first.slope()).abs().sum()
+            n.distance - least <= slack + more + half * (n.slope - first.slope).abs().sum()
         };
         near.retain(counts);
         if near.len() <= if away { SHORT } else { LONG } && !full {
@@ -144,13 +143,13 @@ impl Builder<'_> {
         self.field.tree.cells[index].link = children as u32;
         self.field.tree.cells.extend([Cell::empty(); 8]);
         for (octant, offset) in corners(0.5 * half).enumerate() {
-            self.cell(children + octant, center + offset, 0.5 * half, near, 0.5 * 3.0_f64.sqrt() * half, depth + 1);
+            self.cell(children + octant, center + offset, 0.5 * half, near, &offset, depth + 1);
         }
     }
 
     /// `e₀`: how far the distance of a triangle rises above its tangent plane within the cell, at most, metres.
     fn excess(&self, center: &Vec3, half: f64, n: &Near) -> f64 {
-        let (slope, triangle) = (n.slope(), &self.field.corners[n.triangle as usize]);
+        let (slope, triangle) = (n.slope, &self.field.corners[n.triangle as usize]);
         let of = |offset: Vec3| {
             let corner = center + offset;
             (closest_on_triangle(&corner, triangle).0 - corner).norm() - n.distance - slope.dot(&offset)
@@ -162,9 +161,9 @@ impl Builder<'_> {
     /// nothing of the surface.
     fn short(&self, half: f64, distance: f64, slope: &Vec3, near: &[Near], first: &Near, excess: f64) -> f64 {
         if distance > 0.0 {
-            let of = |n: &Near| distance - n.distance + half * (slope - n.slope()).abs().sum();
+            let of = |n: &Near| distance - n.distance + half * (slope - n.slope).abs().sum();
             return near.iter().map(of).fold(0.0, f64::max);
         }
-        excess + half * (slope + first.slope()).abs().sum()
+        excess + half * (slope + first.slope).abs().sum()
     }
 }

@@ -90,10 +90,15 @@ impl MeshField {
         field
     }
 
-    /// At most the distance of triangle `t` from a point.
-    fn ball_away(&self, p: &Vec3, t: usize) -> f64 {
+    /// Corners of all triangles.
+    pub fn faces(&self) -> &[[Vec3; 3]] {
+        &self.corners
+    }
+
+    /// Centre and radius of a ball around triangle `t`.
+    pub fn ball(&self, t: usize) -> (Vec3, f64) {
         let [x, y, z, radius] = self.balls[t].map(f64::from);
-        (p - self.tree.center - Vec3::new(x, y, z)).norm() - radius
+        (self.tree.center + Vec3::new(x, y, z), radius)
     }
 
     /// The closest of a cell's listed triangles; of those that share the closest point, the one that faces `p` most squarely.
@@ -148,6 +153,11 @@ impl MeshField {
     fn nearest_in(&self, p: &Vec3, place: Option<&Place>) -> Hit {
         let closest = place.and_then(|place| self.closest(p, place));
         self.describe(p, &closest.unwrap_or_else(|| self.closest_of(p, self.boxes.closest(p).triangle)))
+    }
+
+    /// How far beside a face a place on an edge still counts as above it, metres.
+    pub fn touching(&self) -> f64 {
+        self.touching
     }
 
     /// [`Field::hit`], told [`MeshField::nearest`].

@@ -10,8 +10,8 @@
 
 use crate::Vec3;
 
-/// Divisions that are passed at once on the way down.
-const TOP: usize = 4;
+/// Divisions that are passed at once on the way down, at most.
+const TOP: usize = 5;
 /// `e` is kept in parts of this many half sides.
 const MOST_SHORT: f64 = 8.0;
 
@@ -75,7 +75,10 @@ impl Place<'_> {
     /// At most the signed distance here.
     pub fn bound(&self) -> f64 {
         let plane = self.cell.kept_slope().dot(&self.offset) - f64::from(self.cell.short) * self.half;
-        f64::from(self.cell.distance) + plane.max(-self.offset.norm())
+        let square = self.offset.norm_squared();
+        // the cone is above it
+        let below = plane < 0.0 && square < plane * plane;
+        f64::from(self.cell.distance) + if below { -square.sqrt() } else { plane }
     }
 }
 
@@ -86,31 +89,39 @@ pub(super) struct Octree {
     pub center: Vec3,
     /// Half the side.
     pub half: f64,
-    /// The cell, and its depth, at or above each of the cubes that the outermost cell makes when it is divided [`TOP`] times.
-    top: Vec<(u32, u32)>,
+    /// How often the outermost cell is divided for `top`, and how many of the cubes that makes go into a metre.
+    level: usize,
+    per_metre: f64,
+    /// The cell, times 16, plus its depth, at or above each of these cubes.
+    top: Vec<u32>,
+    /// Half the side of a cell by its depth.
+    halves: [f64; 16],
 }
 
 impl Octree {
     /// One cell.
     pub fn new(center: Vec3, half: f64) -> Octree {
-        Octree { cells: vec![Cell::empty()], center, half, top: Vec::new() }
+        let halves = std::array::from_fn(|depth| half / f64::from(1_u32 << depth));
+        Octree { cells: vec![Cell::empty()], center, half, level: 0, per_metre: 0.5 / half, top: Vec::new(), halves }
     }
 
-    /// To be called once all cells are there.
-    pub fn finish(&mut self) {
+    /// To be called once all cells are there, and divided so often at most.
+    pub fn finish(&mut self, deepest: u32) {
         self.cells.shrink_to_fit();
-        self.top = (0..1 << (3 * TOP)).map(|n| self.cell_above(n)).collect();
+        self.level = TOP.min(deepest as usize);
+        self.per_metre = 0.5 / self.halves[self.level];
+        self.top = (0..1 << (3 * self.level)).map(|n| self.cell_above(n)).collect();
     }
 
     /// The cell at or above a cube of the top.
-    fn cell_above(&self, cube: usize) -> (u32, u32) {
+    fn cell_above(&self, cube: usize) -> u32 {
         let (mut cell, mut depth) = (0, 0);
-        while depth < TOP && self.cells[cell].children() > 0 {
+        while depth < self.level && self.cells[cell].children() > 0 {
             depth += 1;
-            let octant: usize = (0..3).map(|k| (cube >> (k * TOP + TOP - depth) & 1) << k).sum();
+            let octant: usize = (0..3).map(|k| (cube >> (k * self.level + self.level - depth) & 1) << k).sum();
             cell = self.cells[cell].children() + octant;
         }
-        (cell as u32, depth as u32)
+        (cell << 4 | depth) as u32
     }
 
     /// The smallest cell that holds `p`; `None` outside all.
@@ -132,21 +143,16 @@ impl Octree {
 
     /// The smallest cell around a place that lies so far from the lowest corner.
     fn descend(&self, from_low: &Vec3) -> Place<'_> {
-        const SIDE: usize = 1 << TOP;
-        let scale = SIDE as f64 / (2.0 * self.half);
-        let place: [usize; 3] = std::array::from_fn(|k| ((from_low[k] * scale) as usize).min(SIDE - 1));
-        let (index, depth) = self.top[place[0] | place[1] << TOP | place[2] << (2 * TOP)];
-        let mut cell = &self.cells[index as usize];
-        let mut half = self.half / f64::from(1_u32 << depth);
-        let mut offset = Vec3::from_fn(|k, _| from_low[k] - ((place[k] >> (TOP - depth as usize)) as f64 * 2.0 + 1.0) * half);
+        let (level, most) = (self.level, (1 << self.level) - 1);
+        let place: [usize; 3] = std::array::from_fn(|k| ((from_low[k] * self.per_metre) as i32 as usize).min(most));
+        let top = self.top[place[0] | place[1] << level | place[2] << (2 * level)];
+        let (mut cell, depth) = (&self.cells[(top >> 4) as usize], (top & 15) as usize);
+        let mut half = self.halves[depth];
+        let mut offset = Vec3::from_fn(|k, _| from_low[k] - ((place[k] >> (level - depth)) as f64 * 2.0 + 1.0) * half);
         while cell.children() > 0 {
             half *= 0.5;
-            let mut octant = 0;
-            for k in 0..3 {
-                let above = offset[k] >= 0.0;
-                octant |= usize::from(above) << k;
-                offset[k] += if above { -half } else { half };
-            }
+            let octant: usize = (0..3).map(|k| usize::from(offset[k].is_sign_positive()) << k).sum();
+            offset = Vec3::from_fn(|k, _| offset[k] - half.copysign(offset[k]));
             cell = &self.cells[cell.children() + octant];
         }
         Place { cell, offset, half }
