@@ -1,11 +1,13 @@
 //! Articulated bodies: a description from a file, or a handle of one in a world. Both answer the same questions.
 
 use crate::body::{Place, hash};
+use crate::collect::{Anchor, anchor};
 use crate::convert::{Numbers, array, numbers, path, shown, vec3, vector};
 use crate::errors::{Error, Result, caught};
 use crate::robot::{Robot, Rows};
 use crate::shared::Inner;
 use numpy::{IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -27,6 +29,7 @@ pub struct Articulation {
     name: Arc<str>,
     robot: Arc<Robot>,
     spot: Spot,
+    anchor: Option<Py<Anchor>>,
 }
 
 /// A description by itself, or one in a world.
@@ -95,8 +98,8 @@ impl Source {
 
 impl Articulation {
     /// A handle of one in a world.
-    pub fn placed(place: Place, robot: Arc<Robot>) -> Articulation {
-        Articulation { name: place.name.clone(), robot, spot: Spot::Placed(place) }
+    pub fn placed(py: Python<'_>, place: Place, robot: Arc<Robot>) -> Result<Articulation> {
+        Ok(Articulation { name: place.name.clone(), robot, anchor: Some(anchor(py, &place.shared)?), spot: Spot::Placed(place) })
     }
 
     /// Where it stands, if it is in a world.
@@ -289,7 +292,7 @@ impl Articulation {
         let (q, qd) = start.split_at(read.model.positions());
         let now = Now { gravity: Vec3::new(0.0, 0.0, -9.81), q: q.to_vec(), qd: qd.to_vec(), tau: vec![0.0; qd.len()] };
         let robot = Robot { model: read.model, base: Pose::identity(), joints: read.joints };
-        Ok(Articulation { name: read.name.into(), robot: Arc::new(robot), spot: Spot::Free { source: Source { file, options }, now: Mutex::new(now) } })
+        Ok(Articulation { name: read.name.into(), robot: Arc::new(robot), spot: Spot::Free { source: Source { file, options }, now: Mutex::new(now) }, anchor: None })
     }
 
     /// The robot's name in its file, or the body's in its world.
@@ -362,8 +365,8 @@ impl Articulation {
         self.set(py, Which::Qd, value)
     }
 
-    /// Generalized forces, shape (dof,), N·m and N: they act in every step until they are set anew, beside drives and damping. An input and no state:
-    /// forks take it along, ``save`` does not.
+    /// Generalized forces, shape (dof,), N·m and N: they act in every step until they are set anew, beside drives and damping. ``save`` and forks take
+    /// them along; ``World.state`` does not hold them.
     #[getter]
     fn tau<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(array(py, &self.get(Which::Tau)?))
@@ -522,6 +525,10 @@ impl Articulation {
             (Some(a), Some(b)) => a.same(b),
             _ => slf.is(other),
         }
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
     }
 
     fn __hash__(slf: &Bound<'_, Self>) -> u64 {

@@ -3,6 +3,7 @@
 use crate::articulation::{Articulation, described};
 use crate::bodies::{Bodies, by_name, handle};
 use crate::body::{Place, RigidBody};
+use crate::collect::{Anchor, anchor};
 use crate::convert::{Numbers, numbers, path, pose, shown, vec3, vec3_or, vector};
 use crate::errors::{Error, Result, caught};
 use crate::report::StepReport;
@@ -11,19 +12,17 @@ use crate::shapes::Shape;
 use crate::shared::{Inner, Shared};
 use crate::picture::Shot;
 use crate::rollout::Plan;
-use crate::{bodies, contacts, looks};
+use crate::{bodies, contacts, looks, saved};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use tumble::collide::Vec3;
 use tumble::core::{ArticulatedBody, Joint, Mode, ObjectId, RigidBody as Rigid, Settings};
 use tumble::scene::{SceneFile, WorldSettings, resolve_scene};
-
-/// How long a call steps before it looks whether the user pressed Ctrl-C.
-const PATIENCE: Duration = Duration::from_millis(50);
 
 /// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions are (x, y, z, w).
 ///
@@ -37,10 +36,17 @@ const PATIENCE: Duration = Duration::from_millis(50);
 pub struct World {
     pub shared: Arc<Shared>,
     notes: Vec<String>,
+    anchor: Py<Anchor>,
 }
 
 impl World {
-    fn build(scene: SceneFile) -> Result<World> {
+    fn of(py: Python<'_>, (inner, notes): (Inner, Vec<String>)) -> Result<World> {
+        let shared = Shared::new(inner);
+        Ok(World { anchor: anchor(py, &shared)?, shared, notes })
+    }
+
+    /// The world of a scene and what is to be said of it.
+    fn build(scene: SceneFile) -> Result<(Inner, Vec<String>)> {
         let (world, notes) = caught(|| Ok(scene.build()?))?;
         let mut inner = Inner::new(world, Arc::new(scene));
         let scene = inner.scene.clone();
@@ -50,7 +56,7 @@ impl World {
             let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
             inner.robots.insert(id, Arc::new(robot));
         }
-        Ok(World { shared: Shared::new(inner), notes })
+        Ok((inner, notes))
     }
 
     fn settings<T>(&self, get: impl FnOnce(&Settings) -> T) -> Result<T> {
@@ -88,11 +94,10 @@ impl World {
             let id = inner.world.add_boxed(Box::new(body), mode)?;
             inner.world.set_alive(id, alive)?;
             inner.world.set_collidable(id, collidable)?;
-            inner.mirror.renew();
             let name = inner.world.object(id).map_or("", |o| o.name()).into();
             Ok(Place { shared: self.shared.clone(), id, name })
         })?;
-        Ok(RigidBody { place })
+        RigidBody::new(py, place)
     }
 }
 
@@ -122,7 +127,7 @@ impl World {
         contact_tolerance=1e-7, integrator_tolerance=1e-6))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
-        gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, substeps: u32, iterations: u32, contact_tolerance: f64,
+        py: Python<'_>, gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, substeps: u32, iterations: u32, contact_tolerance: f64,
         integrator_tolerance: f64,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
@@ -131,7 +136,7 @@ impl World {
         Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }.apply(world)?;
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
-        World::build(scene)
+        World::of(py, World::build(scene)?)
     }
 
     /// The world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a shipped scene.
@@ -144,17 +149,18 @@ impl World {
         py: Python<'_>, path_or_name: &Bound<'_, PyAny>, dt: Option<f64>, stepper: Option<&str>, integrator: Option<&str>, solver: Option<&str>,
     ) -> Result<World> {
         let asked = path(path_or_name)?;
-        py.detach(|| {
+        let built = py.detach(|| {
             let mut scene = caught(|| Ok(resolve_scene(&asked.to_string_lossy(), &[])?.load()?))?;
             Choices { stepper, integrator, solver, dt }.apply(&mut scene.world)?;
             World::build(scene)
-        })
+        })?;
+        World::of(py, built)
     }
 
     /// The world of a scene that is given as the text of its file.
     #[staticmethod]
     fn parse(py: Python<'_>, text: &str) -> Result<World> {
-        py.detach(|| World::build(caught(|| Ok(SceneFile::parse(text, "scene.toml")?))?))
+        World::of(py, py.detach(|| World::build(caught(|| Ok(SceneFile::parse(text, "scene.toml")?))?))?)
     }
 
     /// What is to be said of the files of a loaded scene, such as what was mended in a mesh: a list of sentences.
@@ -169,12 +175,12 @@ impl World {
     #[pyo3(signature = (n=1))]
     fn step(&self, py: Python<'_>, n: i64) -> Result<()> {
         let Ok(mut left) = u64::try_from(n) else { return Err(Error::value(format!("n is {n}; it must be at least 0"))) };
-        self.shared.work_in_parts(py, |inner| {
+        self.shared.work_in_parts(py, |inner, turn| {
             let begun = (left > 1).then(Instant::now);
             while left > 0 {
                 inner.step()?;
                 left -= 1;
-                if begun.is_some_and(|begun| begun.elapsed() > PATIENCE) {
+                if begun.is_some_and(|begun| begun.elapsed() > turn) {
                     break;
                 }
             }
@@ -237,8 +243,8 @@ impl World {
 
     /// All bodies, in the order in which they were added; by number or by name.
     #[getter]
-    fn bodies(&self) -> Bodies {
-        Bodies { shared: self.shared.clone() }
+    fn bodies(&self, py: Python<'_>) -> Result<Bodies> {
+        Bodies::new(py, self.shared.clone())
     }
 
     /// ``world[name]``: the body of that name.
@@ -274,24 +280,24 @@ impl World {
         self.shared.read(|inner| Ok(StepReport::of(&inner.world)))
     }
 
-    /// All that the next step reads, as bytes: for ``restore`` in a world of the same bodies.
+    /// All that the next step reads, as bytes: for ``restore`` in a world of the same bodies. Shapes, masses, settings and drives are not in it.
     fn save<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
-        let bytes = self.shared.read(|inner| Ok(inner.world.save()))?;
+        let bytes = self.shared.read(|inner| Ok(saved::write(inner)))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
     /// Goes back to what ``save`` gave. Bytes that are none, or of another world, are a ``SnapshotError`` and change nothing.
     fn restore(&self, py: Python<'_>, snapshot: &[u8]) -> Result<()> {
-        self.shared.write(py, |inner| Ok(inner.world.restore(snapshot)?))
+        self.shared.write(py, |inner| saved::read(inner, snapshot))
     }
 
     /// An independent copy: same state, same future.
     ///
     /// Forces and behaviours are copied by their own ``fork``.
-    fn fork(&self) -> Result<World> {
+    fn fork(&self, py: Python<'_>) -> Result<World> {
         let inner = self.shared.read(|inner| Ok(inner.fork()))?;
         inner.take_raised()?;
-        Ok(World { shared: Shared::new(inner), notes: self.notes.clone() })
+        World::of(py, (inner, self.notes.clone()))
     }
 
     /// The futures of many forks, each under forces of its own, on all cores with the interpreter let go. This world stays as it is.
@@ -324,15 +330,16 @@ impl World {
         Ok(PyArray1::from_vec(py, out).reshape(shape)?)
     }
 
-    /// The flat state, shape (n,): a read-only view that follows the world until bodies are added or removed, and then keeps what it showed last.
+    /// The flat state, shape (n,): a read-only view of the world's own memory, until bodies are added or removed; then it keeps what it showed last.
     ///
-    /// A rigid body has 13 numbers: position, quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Making
-    /// a view copies nothing. Setting it writes every body's numbers.
+    /// A rigid body has 13 numbers: position, quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Nothing
+    /// is copied, neither here nor by steps. While a view is held, a step holds the interpreter but for other threads' turns between two frames.
+    /// Setting it writes every body's numbers.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.shared.write(py, |inner| {
-            let Inner { world, mirror, .. } = inner;
-            Ok(mirror.view(py, world.state())?)
+            let Inner { world, shown, .. } = inner;
+            Ok(shown.view(py, world)?)
         })
     }
 
@@ -396,17 +403,16 @@ impl World {
             let id = inner.world.add(body)?;
             inner.robots.insert(id, robot.clone());
             efforts.map(|tau| inner.efforts.insert(id, tau));
-            inner.mirror.renew();
             let name = inner.world.object(id).map_or("", |o| o.name()).into();
             Ok(Place { shared: self.shared.clone(), id, name })
         })?;
-        Ok(Articulation::placed(place, robot))
+        Articulation::placed(py, place, robot)
     }
 
     /// Removes a body, given as a handle or by name, or a force or behaviour by name. Handles of a body raise ``RemovedError`` from then on.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         if let Ok(name) = body.extract::<String>()
-            && self.shared.write(py, |inner| inner.remove_extension(&name))?
+            && self.shared.extend(py, |inner| inner.remove_extension(&name))?
         {
             return Ok(());
         }
@@ -421,7 +427,7 @@ impl World {
     /// Adds a force of your own: an object of a subclass of ``tumble.Force``. Its name is unique among bodies, forces and behaviours.
     fn add_force(&self, py: Python<'_>, name: &str, force: &Bound<'_, PyAny>) -> Result<()> {
         py.import("tumble._extension")?.call_method1("check_force", (force,))?;
-        self.shared.write(py, |inner| inner.add_force(name, force))
+        self.shared.extend(py, |inner| inner.add_force(name, force))
     }
 
     /// Adds a behaviour of your own, an object of a subclass of ``tumble.Behaviour``, to bodies given by name or as handles.
@@ -432,7 +438,7 @@ impl World {
             false => bodies.try_iter()?.collect::<PyResult<_>>()?,
         };
         let places = given.iter().map(|body| self.own_place(body)).collect::<Result<Vec<_>>>()?;
-        self.shared.write(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
+        self.shared.extend(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
     }
 
     /// Forces of your own by name: a new dict.
@@ -485,6 +491,10 @@ impl World {
         Ok(slf.py().import("tumble._plots")?.call_method1("paths", (slf, seconds, bodies, along, ax))?.unbind())
     }
 
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
+    }
+
     fn __repr__(&self) -> Result<String> {
         self.shared.read(|inner| {
             let (stepper, solver) = inner.world.methods();
@@ -522,7 +532,6 @@ impl Inner {
     fn forget(&mut self, id: ObjectId) {
         self.robots.remove(&id);
         self.efforts.remove(&id);
-        self.mirror.renew();
     }
 
     /// Writes the whole state; all or nothing.

@@ -50,14 +50,18 @@ impl State {
 
     /// Makes room at the end, filled with zeros, or cuts it off.
     pub fn resize(&mut self, len: usize) {
-        self.leave(len);
-        self.numbers.resize(len, 0.0);
+        if len != self.numbers.len() {
+            self.leave(len);
+            self.numbers.resize(len, 0.0);
+        }
     }
 
     /// Takes a stretch out.
     pub fn cut(&mut self, range: Range<usize>) {
-        self.leave(self.numbers.len());
-        self.numbers.drain(range);
+        if !range.is_empty() {
+            self.leave(self.numbers.len());
+            self.numbers.drain(range);
+        }
     }
 
     /// Moves to new memory with room for `room` numbers, if anybody holds this one.
