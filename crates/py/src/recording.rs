@@ -1,6 +1,6 @@
 //! Recordings: written from worlds, read back as arrays.
 
-use crate::convert::path;
+use crate::convert::{path, whole_number};
 use crate::errors::{Error, Result, caught};
 use crate::shared::{Inner, Shared};
 use crate::world::World;
@@ -96,7 +96,7 @@ impl Recorder {
 
     /// Steps the world ``n`` times and adds it after every ``every`` steps; before the first step too where nothing is recorded yet.
     #[pyo3(signature = (world, n, *, every=1))]
-    fn run(&self, py: Python<'_>, world: &Bound<'_, World>, n: u32, every: u32) -> Result<()> {
+    fn run(&self, py: Python<'_>, world: &Bound<'_, World>, #[pyo3(from_py_with = whole_number)] n: u32, #[pyo3(from_py_with = whole_number)] every: u32) -> Result<()> {
         if every == 0 {
             return Err(Error::value("every is 0; it must be at least 1"));
         }

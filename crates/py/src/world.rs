@@ -4,7 +4,7 @@ use crate::articulation::{Articulation, described};
 use crate::bodies::{Bodies, by_name, handle};
 use crate::body::{Place, RigidBody};
 use crate::collect::{Anchor, anchor};
-use crate::convert::{Numbers, numbers, path, pose, shown, vec3, vec3_or, vector};
+use crate::convert::{Numbers, numbers, path, pose, shown, vec3, vec3_or, vector, whole_number};
 use crate::errors::{Error, Result, caught};
 use crate::report::StepReport;
 use crate::robot::Robot;
@@ -16,6 +16,7 @@ use crate::{bodies, contacts, looks, saved};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -127,7 +128,8 @@ impl World {
         contact_tolerance=1e-7, integrator_tolerance=1e-6))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
-        py: Python<'_>, gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, substeps: u32, iterations: u32, contact_tolerance: f64,
+        py: Python<'_>, gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, #[pyo3(from_py_with = whole_number)] substeps: u32,
+        #[pyo3(from_py_with = whole_number)] iterations: u32, contact_tolerance: f64,
         integrator_tolerance: f64,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
@@ -173,7 +175,7 @@ impl World {
     ///
     /// On a ``StepError`` the world is as it was before the step that failed; the steps before that stand.
     #[pyo3(signature = (n=1))]
-    fn step(&self, py: Python<'_>, n: i64) -> Result<()> {
+    fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] n: i64) -> Result<()> {
         let Ok(mut left) = u64::try_from(n) else { return Err(Error::value(format!("n is {n}; it must be at least 0"))) };
         self.shared.work_in_parts(py, |inner, turn| {
             let begun = (left > 1).then(Instant::now);
@@ -287,8 +289,8 @@ impl World {
     }
 
     /// Goes back to what ``save`` gave. Bytes that are none, or of another world, are a ``SnapshotError`` and change nothing.
-    fn restore(&self, py: Python<'_>, snapshot: &[u8]) -> Result<()> {
-        self.shared.write(py, |inner| saved::read(inner, snapshot))
+    fn restore(&self, py: Python<'_>, snapshot: PyBackedBytes) -> Result<()> {
+        self.shared.write(py, |inner| saved::read(inner, &snapshot))
     }
 
     /// An independent copy: same state, same future.
@@ -308,8 +310,8 @@ impl World {
     /// (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which.
     #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
     fn rollout<'py>(
-        &self, py: Python<'py>, controls: &Bound<'py, PyAny>, articulations: Option<Vec<Bound<'py, PyAny>>>, states: Option<&Bound<'py, PyAny>>, every: usize,
-        threads: Option<usize>,
+        &self, py: Python<'py>, controls: &Bound<'py, PyAny>, articulations: Option<Vec<Bound<'py, PyAny>>>, states: Option<&Bound<'py, PyAny>>,
+        #[pyo3(from_py_with = whole_number)] every: usize, #[pyo3(from_py_with = whole_number)] threads: Option<usize>,
     ) -> Result<Bound<'py, PyArray3<f64>>> {
         if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
             return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
@@ -462,7 +464,8 @@ impl World {
     #[pyo3(signature = (width=None, height=None, *, camera=None, facet=None, cave=None, overlays=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn render<'py>(
-        &self, py: Python<'py>, width: Option<u32>, height: Option<u32>, camera: Option<&Bound<'py, PyAny>>, facet: Option<&str>, cave: Option<&str>,
+        &self, py: Python<'py>, #[pyo3(from_py_with = whole_number)] width: Option<u32>, #[pyo3(from_py_with = whole_number)] height: Option<u32>,
+        camera: Option<&Bound<'py, PyAny>>, facet: Option<&str>, cave: Option<&str>,
         overlays: Option<&str>,
     ) -> Result<Bound<'py, PyArray3<u8>>> {
         Shot::new([width, height], camera, facet, cave, overlays)?.take(py, &self.shared)
