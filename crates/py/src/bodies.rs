@@ -4,9 +4,9 @@ use crate::articulation::Articulation;
 use crate::body::{Place, RigidBody};
 use crate::collect::{Anchor, anchor};
 use crate::errors::{Error, Result};
-use crate::world::place_of;
 use crate::robot::Robot;
-use crate::shared::{Inner, Shared};
+use crate::inner::Inner;
+use crate::shared::Shared;
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -79,6 +79,17 @@ pub fn by_name(inner: &Inner, name: &str) -> Result<Found> {
         let known = if names.is_empty() { "it has none".to_string() } else { format!("there are {}", names.join(", ")) };
         Error::Name(format!("the world has no body named '{name}'; {known}"))
     })
+}
+
+/// Where a handle of any kind points.
+pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
+    if let Some(place) = body.cast::<Articulation>().ok().and_then(|body| body.get().place().cloned()) {
+        return Ok(place);
+    }
+    match body.cast::<RigidBody>() {
+        Ok(body) => Ok(body.get().place.clone()),
+        Err(_) => Err(PyTypeError::new_err("wanted a body: a handle or a name").into()),
+    }
 }
 
 #[pymethods]

@@ -91,6 +91,19 @@ pub fn pose(position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, 
     Ok(Pose::from_parts(Translation3::from(position), rotation))
 }
 
+/// A pose from 3 numbers or 7.
+pub fn base_pose(base: &Bound<'_, PyAny>) -> Result<Pose> {
+    let Numbers { shape, data } = numbers(base, "base")?;
+    match shape.as_slice() {
+        [3] => Ok(Vec3::from_column_slice(&data).into()),
+        [7] if (data[3..].iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() <= 1e-6 => {
+            Ok(Pose::from_parts(Vec3::from_column_slice(&data[..3]).into(), unit(&data[3..])))
+        }
+        [7] => Err(Error::value("base: the quaternion (x, y, z, w) in its last four numbers must have length 1")),
+        _ => Err(Error::value(format!("base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}", shown(&shape)))),
+    }
+}
+
 /// A pose as 7 numbers: position, quaternion `x, y, z, w`.
 pub fn pose_numbers(pose: &Pose) -> [f64; 7] {
     let (p, q) = (pose.translation.vector, pose.rotation.coords);

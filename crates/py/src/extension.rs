@@ -6,7 +6,7 @@
 
 use crate::collect::Callable;
 use crate::errors::{Error, Result};
-use crate::shared::Inner;
+use crate::inner::Inner;
 use crate::view::{Arrays, Layout, View};
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard};

@@ -2,7 +2,8 @@
 
 use crate::convert::{path, whole_number};
 use crate::errors::{Error, Result, caught};
-use crate::shared::{Inner, Shared};
+use crate::inner::Inner;
+use crate::shared::Shared;
 use crate::world::World;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;

@@ -10,7 +10,7 @@
 //! Little-endian. Without such forces the last three are not there: the bytes are those of the command.
 
 use crate::errors::Result;
-use crate::shared::Inner;
+use crate::inner::Inner;
 use tumble::core::{ObjectId, SnapshotError};
 
 const MAGIC: [u8; 8] = *b"tumbleT1";

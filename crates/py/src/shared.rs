@@ -2,64 +2,12 @@
 
 use crate::collect::Ground;
 use crate::errors::{Error, Result, caught};
-use crate::extension::Extension;
-use crate::robot::Robot;
-use crate::state::Shown;
+use crate::inner::Inner;
 use pyo3::prelude::*;
-use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::thread::ThreadId;
 use std::time::Duration;
-use tumble::core::{ObjectId, World};
-use tumble::scene::SceneFile;
-
-/// A world and what belongs to it on Python's side.
-pub struct Inner {
-    /// The world itself.
-    pub world: World,
-    /// The scene that it was made of: its camera, lights and names.
-    pub scene: Arc<SceneFile>,
-    /// The trees of articulated bodies.
-    pub robots: BTreeMap<ObjectId, Arc<Robot>>,
-    /// Generalized forces that act on articulated bodies in every frame.
-    pub efforts: BTreeMap<ObjectId, Vec<f64>>,
-    /// Forces and behaviours written in Python.
-    pub extension: Extension,
-    /// The array that Python sees the state by.
-    pub shown: Shown,
-    /// Whether a panic left it half-way.
-    broken: bool,
-}
-
-impl Inner {
-    /// A world of a scene.
-    pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
-        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), extension: Extension::default(), shown: Shown::default(), broken: false }
-    }
-
-    /// An independent copy, with no arrays yet.
-    pub fn fork(&self) -> Inner {
-        Inner {
-            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), extension: self.extension.fork(),
-            shown: Shown::default(), broken: false,
-        }
-    }
-
-    /// One frame.
-    pub fn step(&mut self) -> Result<()> {
-        if self.extension.is_empty() { self.frame() } else { self.extended_frame() }
-    }
-
-    /// One frame of the world alone.
-    pub fn frame(&mut self) -> Result<()> {
-        for (&id, effort) in &self.efforts {
-            self.world.apply_generalized(id, effort)?;
-        }
-        self.world.step()?;
-        Ok(())
-    }
-}
 
 /// How long a call steps before it looks whether the user pressed Ctrl-C.
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -118,24 +66,26 @@ impl Shared {
         guarded(&mut held, call)
     }
 
-    /// The same with the interpreter let go, for what takes long: other threads run on meanwhile.
+    /// The same for what takes long: with the interpreter let go, if it can be.
     pub fn work<T: Send>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
         let mut held = self.hold()?;
-        apart(py, &mut held, call)
+        apart(py, &mut held, |py, inner| leave(py, inner, call))
     }
 
     /// The same in parts of the given length, until one answers that it was the last: the world stays held over all of them, and Ctrl-C is heard between
     /// two.
     pub fn work_in_parts(&self, py: Python<'_>, mut part: impl FnMut(&mut Inner, Duration) -> Result<bool> + Send) -> Result<()> {
         let mut held = self.hold()?;
-        loop {
-            let turn = if held.shown.alive(py) { TURN } else { PATIENCE };
-            if apart(py, &mut held, |inner| part(inner, turn))? {
-                return Ok(());
+        apart(py, &mut held, |py, inner| {
+            loop {
+                let turn = if inner.looked_into(py) { TURN } else { PATIENCE };
+                if leave(py, inner, |inner| part(inner, turn))? {
+                    return Ok(());
+                }
+                py.check_signals()?;
+                py.detach(|| ()); // others' turn
             }
-            py.check_signals()?;
-            py.detach(|| ()); // others' turn
-        }
+        })
     }
 
     /// Adds or removes forces or behaviours, and tells the collector.
@@ -153,19 +103,20 @@ impl Shared {
     }
 }
 
-/// Runs what takes long, with the interpreter let go if no array looks into the world's memory. Where one does and Python runs within the call too, it
-/// sees the state as it was before.
-fn apart<T: Send>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
-    if !inner.shown.alive(py) {
-        return py.detach(|| guarded(inner, call));
-    }
-    if inner.extension.is_empty() {
-        return guarded(inner, call);
+/// Where Python runs within the call too, an array that looks into the world's memory shows the state as it was before, until the call is over.
+fn apart<T>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(Python<'_>, &mut Inner) -> Result<T>) -> Result<T> {
+    if inner.extension.is_empty() || !inner.shown.alive(py) {
+        return call(py, inner);
     }
     inner.world.set_state_aside();
-    let outcome = py.detach(|| guarded(inner, call));
+    let outcome = call(py, inner);
     inner.world.show_state();
     outcome
+}
+
+/// Lets the interpreter go meanwhile, if nobody looks into the memory that changes.
+fn leave<T: Send>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
+    if inner.looked_into(py) { guarded(inner, call) } else { py.detach(|| guarded(inner, call)) }
 }
 
 /// A panic in a call that changes the world may leave it half-way: later calls say so.

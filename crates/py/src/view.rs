@@ -7,7 +7,7 @@
 use crate::convert::vec3;
 use crate::errors::{Error, Result};
 use crate::state::holders;
-use crate::world::place_of;
+use crate::bodies::place_of;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
@@ -17,15 +17,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use tumble::collide::Vec3;
 use tumble::core::{ArticulatedBody, ObjectId, RigidBody as Rigid, Site, WorldView, Wrench};
 
-/// What of a row is shown, and how many numbers it has.
-const SHOWN: [(fn(&Site) -> &[f64], usize); 6] = [
-    (|site| site.pose.translation.vector.as_slice(), 3),
-    (|site| site.pose.rotation.coords.as_slice(), 4),
-    (|site| site.velocity.as_slice(), 3),
-    (|site| site.angular_velocity.as_slice(), 3),
-    (|site| site.acceleration.as_slice(), 3),
-    (|site| site.angular_acceleration.as_slice(), 3),
-];
+/// Numbers of a row: position, quaternion, velocity, angular velocity, acceleration, angular acceleration.
+const WIDTHS: [usize; 6] = [3, 4, 3, 3, 3, 3];
 
 /// Which rows belong to whom: made once and kept until objects come or go.
 pub struct Layout {
@@ -83,11 +76,14 @@ fn mass(view: &WorldView, id: ObjectId, part: usize) -> f64 {
     view.get::<ArticulatedBody>(id).and_then(of_link).unwrap_or(0.0)
 }
 
+/// An array that is written here, and a read-only view of it, of which Python gets views.
+type Column = (Py<PyArray2<f64>>, Py<PyAny>);
+
 /// The arrays of a view.
 pub struct Arrays {
     rows: usize,
-    /// Of what is shown: the array that is written here, and a read-only view of it, of which Python gets views.
-    shown: [(Py<PyArray2<f64>>, Py<PyAny>); 6],
+    /// In the order of [`WIDTHS`].
+    shown: [Column; 6],
     force: Py<PyArray2<f64>>,
     torque: Py<PyArray2<f64>>,
 }
@@ -96,8 +92,8 @@ impl Arrays {
     /// For a number of rows.
     pub fn new(py: Python<'_>, rows: usize) -> Result<Arrays> {
         let zeros = |width| PyArray2::zeros(py, [rows, width], false);
-        let mut shown = Vec::with_capacity(SHOWN.len());
-        for (_, width) in SHOWN {
+        let mut shown = Vec::with_capacity(WIDTHS.len());
+        for width in WIDTHS {
             let array = zeros(width);
             let view = array.call_method0("view")?;
             view.call_method1("setflags", (false,))?;
@@ -109,18 +105,20 @@ impl Arrays {
 
     /// Whether they may be written again: Python holds none of them, nor a view of one.
     pub fn free(self: &Arc<Arrays>, py: Python<'_>, rows: usize) -> bool {
-        let own = |(array, view): &(Py<PyArray2<f64>>, Py<PyAny>)| holders(array, py) == 2 && holders(view, py) == 1;
+        let own = |(array, view): &Column| holders(array, py) == 2 && holders(view, py) == 1;
         let wrenches = [&self.force, &self.torque].iter().all(|array| holders(array, py) == 1);
         self.rows == rows && Arc::strong_count(self) == 1 && wrenches && self.shown.iter().all(own)
     }
 
     /// Writes the sites, and zeros for what will act.
     pub fn fill(&self, py: Python<'_>, sites: &[Site]) -> Result<()> {
-        for ((array, _), (get, width)) in self.shown.iter().zip(SHOWN) {
-            let mut out = array.bind(py).try_readwrite().map_err(PyErr::from)?;
-            let out = out.as_slice_mut().map_err(PyErr::from)?;
-            out.chunks_exact_mut(width).zip(sites).for_each(|(row, site)| row.copy_from_slice(get(site)));
-        }
+        let [position, orientation, velocity, angular_velocity, acceleration, angular_acceleration] = &self.shown;
+        copy(py, position, sites, |s| s.position().into())?;
+        copy(py, orientation, sites, |s| s.pose.rotation.coords.into())?;
+        copy(py, velocity, sites, |s| s.velocity.into())?;
+        copy(py, angular_velocity, sites, |s| s.angular_velocity.into())?;
+        copy(py, acceleration, sites, |s| s.acceleration.into())?;
+        copy(py, angular_acceleration, sites, |s| s.angular_acceleration.into())?;
         for array in [&self.force, &self.torque] {
             array.bind(py).try_readwrite().map_err(PyErr::from)?.as_slice_mut().map_err(PyErr::from)?.fill(0.0);
         }
@@ -142,6 +140,14 @@ impl Arrays {
         }
         Ok(())
     }
+}
+
+/// Writes one row of each site.
+fn copy<const N: usize>(py: Python<'_>, (array, _): &Column, sites: &[Site], get: impl Fn(&Site) -> [f64; N]) -> Result<()> {
+    let mut out = array.bind(py).try_readwrite().map_err(PyErr::from)?;
+    let rows = out.as_slice_mut().map_err(PyErr::from)?.as_chunks_mut().0;
+    rows.iter_mut().zip(sites).for_each(|(row, site)| *row = get(site));
+    Ok(())
 }
 
 /// The world as a force or a behaviour sees it while it is called: a row for every rigid body and every link, in world axes.
@@ -180,7 +186,7 @@ impl View {
         }
     }
 
-    /// A view of what is shown, by its place in [`SHOWN`].
+    /// A view of what is shown, by its place in [`WIDTHS`].
     fn shown<'py>(&self, py: Python<'py>, which: usize) -> Result<Bound<'py, PyAny>> {
         self.open()?;
         Ok(self.arrays.shown[which].1.bind(py).call_method0("view")?)

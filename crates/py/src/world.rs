@@ -1,15 +1,16 @@
 //! The world: made or loaded, filled, stepped, asked.
 
 use crate::articulation::{Articulation, described};
-use crate::bodies::{Bodies, by_name, handle};
+use crate::bodies::{Bodies, by_name, handle, place_of};
 use crate::body::{Place, RigidBody};
 use crate::collect::{Anchor, anchor};
-use crate::convert::{Numbers, numbers, path, pose, shown, vec3, vec3_or, vector, whole_number};
+use crate::building::{Choices, build};
+use crate::convert::{Numbers, base_pose, numbers, path, pose, vec3, vec3_or, vector, whole_number};
 use crate::errors::{Error, Result, caught};
 use crate::report::StepReport;
-use crate::robot::Robot;
 use crate::shapes::Shape;
-use crate::shared::{Inner, Shared};
+use crate::inner::Inner;
+use crate::shared::Shared;
 use crate::picture::Shot;
 use crate::rollout::Plan;
 use crate::{bodies, contacts, looks, saved};
@@ -22,8 +23,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 use tumble::collide::Vec3;
-use tumble::core::{ArticulatedBody, Joint, Mode, ObjectId, RigidBody as Rigid, Settings};
-use tumble::scene::{SceneFile, WorldSettings, resolve_scene};
+use tumble::core::{Mode, RigidBody as Rigid, Settings};
+use tumble::scene::{SceneFile, resolve_scene};
 
 /// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions are (x, y, z, w).
 ///
@@ -44,20 +45,6 @@ impl World {
     fn of(py: Python<'_>, (inner, notes): (Inner, Vec<String>)) -> Result<World> {
         let shared = Shared::new(inner);
         Ok(World { anchor: anchor(py, &shared)?, shared, notes })
-    }
-
-    /// The world of a scene and what is to be said of it.
-    fn build(scene: SceneFile) -> Result<(Inner, Vec<String>)> {
-        let (world, notes) = caught(|| Ok(scene.build()?))?;
-        let mut inner = Inner::new(world, Arc::new(scene));
-        let scene = inner.scene.clone();
-        for spec in &scene.articulated {
-            let Some((id, body)) = inner.world.find(&spec.name).and_then(|id| Some((id, inner.world.get::<ArticulatedBody>(id)?))) else { continue };
-            let joints = spec.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.clone()).collect();
-            let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
-            inner.robots.insert(id, Arc::new(robot));
-        }
-        Ok((inner, notes))
     }
 
     fn settings<T>(&self, get: impl FnOnce(&Settings) -> T) -> Result<T> {
@@ -102,25 +89,6 @@ impl World {
     }
 }
 
-/// What the words and numbers of a constructor make of settings.
-struct Choices<'a> {
-    stepper: Option<&'a str>,
-    integrator: Option<&'a str>,
-    solver: Option<&'a str>,
-    dt: Option<f64>,
-}
-
-impl Choices<'_> {
-    fn apply(&self, world: &mut WorldSettings) -> Result<()> {
-        world.dt_s = self.dt.unwrap_or(world.dt_s);
-        let told = |what: &str| { let what = what.to_string(); move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}")) };
-        world.stepper = self.stepper.map_or(Ok(world.stepper), |s| s.parse().map_err(told("stepper")))?;
-        world.integrator = self.integrator.map_or(Ok(world.integrator), |s| s.parse().map_err(told("integrator")))?;
-        world.solver = self.solver.map_or(Ok(world.solver), |s| s.parse().map_err(told("solver")))?;
-        Ok(())
-    }
-}
-
 #[pymethods]
 impl World {
     #[new]
@@ -138,7 +106,7 @@ impl World {
         Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }.apply(world)?;
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
-        World::of(py, World::build(scene)?)
+        World::of(py, build(scene)?)
     }
 
     /// The world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a shipped scene.
@@ -154,7 +122,7 @@ impl World {
         let built = py.detach(|| {
             let mut scene = caught(|| Ok(resolve_scene(&asked.to_string_lossy(), &[])?.load()?))?;
             Choices { stepper, integrator, solver, dt }.apply(&mut scene.world)?;
-            World::build(scene)
+            build(scene)
         })?;
         World::of(py, built)
     }
@@ -162,7 +130,7 @@ impl World {
     /// The world of a scene that is given as the text of its file.
     #[staticmethod]
     fn parse(py: Python<'_>, text: &str) -> Result<World> {
-        World::of(py, py.detach(|| World::build(caught(|| Ok(SceneFile::parse(text, "scene.toml")?))?))?)
+        World::of(py, py.detach(|| build(caught(|| Ok(SceneFile::parse(text, "scene.toml")?))?))?)
     }
 
     /// What is to be said of the files of a loaded scene, such as what was mended in a mesh: a list of sentences.
@@ -316,15 +284,9 @@ impl World {
         if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
             return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
         }
-        let asked = articulations.map(|all| all.iter().map(|one| self.own_place(one)).collect::<Result<Vec<_>>>()).transpose()?;
+        let asked = articulations.map(|all| all.iter().map(|one| Ok(self.own_place(one)?.id)).collect::<Result<Vec<_>>>()).transpose()?;
         let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
-        let (plan, fork) = self.shared.read(|inner| {
-            let all = || bodies::body_ids(&inner.world).into_iter().filter(|id| inner.robots.contains_key(id)).collect();
-            let ids: Vec<ObjectId> = asked.map_or_else(all, |places| places.iter().map(|place| place.id).collect());
-            let freedoms = |id: ObjectId| inner.robots.get(&id).map(|robot| (id, robot.dof())).ok_or_else(|| Error::value("controls are of articulations"));
-            let driven = ids.into_iter().map(freedoms).collect::<Result<Vec<_>>>()?;
-            Ok((Plan::new(inner, driven, controls, states, every)?, inner.fork()))
-        })?;
+        let (plan, fork) = self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
         let (shape, out) = py.detach(|| {
             let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
             plan.run(fork, threads).map(|out| (shape, out))
@@ -400,7 +362,7 @@ impl World {
         let description = described(articulation)?;
         let description = description.get();
         let (body, robot) = description.body(py, base.map_or(Ok(tumble::collide::Pose::identity()), base_pose)?, name)?;
-        let (robot, efforts) = (Arc::new(robot), description.efforts());
+        let (robot, efforts) = (Arc::new(robot), description.spot.efforts());
         let place = self.shared.write(py, |inner| {
             let id = inner.world.add(body)?;
             inner.robots.insert(id, robot.clone());
@@ -503,59 +465,5 @@ impl World {
             let (stepper, solver) = inner.world.methods();
             Ok(format!("<tumble.World {} bodies, t = {} s, {stepper}, {solver}>", bodies::body_ids(&inner.world).len(), inner.world.time()))
         })
-    }
-}
-
-/// A pose from 3 numbers or 7.
-fn base_pose(base: &Bound<'_, PyAny>) -> Result<tumble::collide::Pose> {
-    let Numbers { shape, data } = numbers(base, "base")?;
-    match shape.as_slice() {
-        [3] => Ok(Vec3::from_column_slice(&data).into()),
-        [7] if (data[3..].iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() <= 1e-6 => {
-            Ok(tumble::collide::Pose::from_parts(Vec3::from_column_slice(&data[..3]).into(), crate::convert::unit(&data[3..])))
-        }
-        [7] => Err(Error::value("base: the quaternion (x, y, z, w) in its last four numbers must have length 1")),
-        _ => Err(Error::value(format!("base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}", shown(&shape)))),
-    }
-}
-
-/// Where a handle of any kind points.
-pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
-    if let Some(place) = body.cast::<Articulation>().ok().and_then(|body| body.get().place().cloned()) {
-        return Ok(place);
-    }
-    match body.cast::<RigidBody>() {
-        Ok(body) => Ok(body.get().place.clone()),
-        Err(_) => Err(pyo3::exceptions::PyTypeError::new_err("wanted a body: a handle or a name").into()),
-    }
-}
-
-impl Inner {
-    /// What is kept about an object that is gone.
-    fn forget(&mut self, id: ObjectId) {
-        self.robots.remove(&id);
-        self.efforts.remove(&id);
-    }
-
-    /// Writes the whole state; all or nothing.
-    pub fn write_state(&mut self, shape: &[usize], x: &[f64]) -> Result<()> {
-        let wanted = self.world.state().len();
-        if shape != [wanted] {
-            return Err(Error::value(format!("state: wanted shape ({wanted},), and got {}", shown(shape))));
-        }
-        let before = self.world.state().to_vec();
-        let mut write = |from: &[f64]| -> Result<()> {
-            let ids = self.world.ids().to_vec();
-            for id in ids {
-                let Some(span) = self.world.view().span(id).map(|span| span.x.clone()).filter(|x| !x.is_empty()) else { continue };
-                self.world.write_state_of(id, &from[span])?;
-            }
-            Ok(())
-        };
-        let outcome = write(x);
-        if outcome.is_err() {
-            write(&before)?;
-        }
-        outcome
     }
 }
