@@ -54,4 +54,4 @@ pub use sleep::Sleep;
 pub use step::{Backtracking, Frame, STEPPERS, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
 pub use view::{Mode, ObjectId, Status, WorldView};
-pub use world::{ContactPoint, MirrorError, Pull, SnapshotError, StepError, World, WorldError};
+pub use world::{Checkpoint, ContactPoint, MirrorError, Pull, SnapshotError, StateHold, StepError, World, WorldError};

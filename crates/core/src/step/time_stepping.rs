@@ -85,7 +85,7 @@ impl TimeStepping {
 
     /// Rate of momentum at the midpoint into `work.dp`; state and caches are left at the start.
     fn smooth_forces(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
-        self.x0.clone_from(&core.x);
+        core.x.clone_into(&mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
         let mut motion = core.motion();
@@ -93,7 +93,7 @@ impl TimeStepping {
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.take_off_coasting(&mut self.work.dp);
         core.check_finite(&self.work.dp)?;
-        let middle = core.x.clone();
+        let middle = core.x.to_vec();
         core.x.copy_from_slice(&self.x0);
         core.pin(middle);
         core.motion().refresh();
