@@ -4,11 +4,17 @@ use crate::apart::{Oriented, apart};
 use crate::collidable::ContactFrame;
 use crate::settings::Settings;
 use crate::site::Site;
+use crate::step::{coasted, meet as meet_at};
 use crate::view::{Entry, Mode, ObjectId, Table};
 use tumble_collide::{Aabb, BroadPhase, Contact, ContactMode, NormalFrom, Pose, Vec3};
 
 /// How far two sphere trees look ahead in the `spheres` mode, as a share of the smaller one's radius.
 const TREE_REACH: f64 = 0.02;
+
+/// How far two meshes look ahead by their surfaces, likewise: further away they are followed along free motion. A wide margin has most of both surfaces in it.
+const MESH_REACH: f64 = 0.05;
+/// Looks along free motion at most.
+const MOST_LOOKS: f64 = 16.0;
 
 /// Who owns a row of the site table.
 #[derive(Clone, Copy, Debug)]
@@ -232,7 +238,7 @@ impl Detector<'_> {
         self.scratch.fresh_contacts.clear();
         let mut place = 0;
         for &[i, j] in &pairs {
-            self.narrow([i as usize, j as usize], reach, &mut place, out);
+            self.narrow([i as usize, j as usize], (horizon, reach), &mut place, out);
         }
         let s = &mut *self.scratch;
         s.pairs = pairs;
@@ -292,8 +298,9 @@ impl Detector<'_> {
         pairs.sort_unstable();
     }
 
-    /// The contacts of one pair. `place` is how far the pairs of the last detection have been passed.
-    fn narrow(&mut self, [i, j]: [usize; 2], reach: Reach, place: &mut usize, out: &mut Vec<Touch>) {
+    /// The contacts of one pair; of two meshes that are further apart than they look, those of the first look along free motion that sees any: no look can miss
+    /// what comes between it and the next by more than they move. `place` is how far the pairs of the last detection have been passed.
+    fn narrow(&mut self, [i, j]: [usize; 2], (horizon, reach): (f64, Reach), place: &mut usize, out: &mut Vec<Touch>) {
         let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
         let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
         let (entry_a, entry_b) = (&self.table.slots[owner_a.id], &self.table.slots[owner_b.id]);
@@ -311,13 +318,14 @@ impl Detector<'_> {
                 return;
             }
         }
-        let mut margin = near + travel[0].between(&travel[1], reach);
-        let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
-        if mode == ContactMode::Spheres && let (Some(_), Some(_)) = (shape_a.tree(), shape_b.tree()) {
+        let closing = near + travel[0].between(&travel[1], reach);
+        let (mode, size) = (body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b)), shape_a.bounding_radius().min(shape_b.bounding_radius()));
+        let margin = match (mode, shape_a.tree(), shape_b.tree()) {
             // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
-            let size = shape_a.bounding_radius().min(shape_b.bounding_radius());
-            margin = margin.min(near + TREE_REACH * size);
-        }
+            (ContactMode::Spheres, Some(_), Some(_)) => closing.min(near + TREE_REACH * size),
+            (ContactMode::Surface, Some(_), Some(_)) => closing.min(near + MESH_REACH * size),
+            _ => closing,
+        };
         let poses = [site_a.pose, site_b.pose];
         let found = &mut self.scratch.found;
         found.clear();
@@ -327,11 +335,25 @@ impl Detector<'_> {
         }
         self.scratch.fresh_contacts.extend_from_slice(found);
         self.scratch.fresh.push(Kept { sites: [a, b], poses, margin, end: self.scratch.fresh_contacts.len() });
+        let mut moment = 0.0;
+        if found.is_empty() && reach == Reach::Each && mode == ContactMode::Surface && margin < closing {
+            let looks = (closing / margin).ceil().min(MOST_LOOKS);
+            for look in 1..=looks as u32 {
+                moment = horizon * f64::from(look) / looks;
+                let (pose_a, pose_b) = (coasted(site_a, moment), coasted(site_b, moment));
+                tumble_collide::contacts_in(mode, shape_a, &pose_a, shape_b, &pose_b, margin, found);
+                if !found.is_empty() {
+                    found.sort_by_key(|contact| contact.feature);
+                    break;
+                }
+            }
+        }
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
             // the frame will be done again with it awake
             self.stirred.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
+        let first = out.len();
         let (ma, mb) = (body_a.material(part_a), body_b.material(part_b));
         let friction = self.settings.combine_friction.of(ma.friction, mb.friction);
         let restitution = self.settings.combine_restitution.of(ma.restitution, mb.restitution);
@@ -353,6 +375,9 @@ impl Detector<'_> {
             restitution,
             key: Key { pair, feature: contact.feature },
         }));
+        if moment > 0.0 {
+            out[first..].iter_mut().for_each(|touch| meet_at(touch, &touch.contact.clone(), site_a, site_b, moment));
+        }
     }
 }
 

@@ -54,7 +54,8 @@ pub(crate) struct Gpu {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     adapter: String,
-    sample_masks: bool,
+    /// Where shaders cannot write which samples of a pixel they cover, among other things.
+    opengl: bool,
     complaint: Arc<Mutex<Option<String>>>,
     lost: Arc<Mutex<Option<String>>>,
 }
@@ -71,7 +72,7 @@ impl Renderer {
     /// On an adapter that was chosen.
     fn on(adapter: wgpu::Adapter) -> Result<Self, RenderError> {
         let gpu = pollster::block_on(Gpu::open(adapter))?;
-        let pipelines = Pipelines::new(&gpu.device, gpu.sample_masks);
+        let pipelines = Pipelines::new(&gpu.device, !gpu.opengl);
         let finisher = Finisher::new(&gpu);
         let textures = TextureCache::new(&gpu, &pipelines.texture_layout);
         gpu.complaint()?;
@@ -206,7 +207,7 @@ impl Renderer {
         let (size, count) = (stage.shadow_map_size, stage.shadow_views.len());
         let maps = match self.shadows.take().filter(|maps| maps.fits(size, count)) {
             Some(maps) => self.shadows.insert(maps),
-            None => self.shadows.insert(ShadowMaps::new(&self.gpu.device, size, count)),
+            None => self.shadows.insert(ShadowMaps::new(&self.gpu, size, count)),
         };
         if maps.drawn != stage.serial {
             stage.draw_shadows(&mut encoder, &self.pipelines, maps);
@@ -264,7 +265,7 @@ impl Gpu {
         let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
         let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
         limits.max_buffer_size = adapter.limits().max_buffer_size;
-        let sample_masks = info.backend != wgpu::Backend::Gl;
+        let opengl = info.backend == wgpu::Backend::Gl;
         let asked = adapter
             .request_device(&wgpu::DeviceDescriptor { label: Some("tumble"), required_limits: limits, ..Default::default() })
             .await
@@ -280,7 +281,7 @@ impl Gpu {
             let why = if message.is_empty() { String::new() } else { format!(" ({message})") };
             note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("the device was lost{why}; a new renderer can be made"));
         });
-        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, sample_masks, complaint, lost })
+        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, opengl, complaint, lost })
     }
 
     /// What went wrong on the device since the last call.

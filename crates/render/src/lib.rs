@@ -42,7 +42,7 @@ pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Wa
 pub use gpu::{Renderer, Screen, Shown, Stage};
 pub use image::Image;
 pub use list::{
-    DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere,
+    Capsule, DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere,
     SphereStyle, UnknownQuality,
 };
 pub use material::{Material, Pattern, Shader, Texture};

@@ -3,7 +3,10 @@
 mod articulated_scenes;
 mod bad_input;
 mod cave_processes;
+mod cave_recordings;
+mod cave_tracker;
 mod cave_users;
+mod cave_windows;
 mod caves;
 mod common;
 mod desktop;

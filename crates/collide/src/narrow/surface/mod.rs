@@ -17,13 +17,13 @@ use super::reduce::Collector;
 use crate::surface::Field;
 use crate::surface::elements::Elements;
 use crate::surface::field::MeshField;
-use crate::{Contact, Pose, SphereTree, Vec3};
+use crate::{Contact, Pose, Vec3};
 use pass::Pass;
 
 /// A body as the pass sees it that takes its elements.
 pub(in crate::narrow) enum Source<'a> {
-    /// A mesh, culled by its tree.
-    Mesh(&'a SphereTree, &'a Elements),
+    /// A mesh.
+    Mesh(&'a Elements),
     /// A block's corners and edges.
     Box(Vec3),
     /// All within a radius of the segment `±half_length` on z; a ball if that is 0.
