@@ -29,6 +29,8 @@ pub use window::{Screen, Shown};
 
 /// Targets of several sizes are kept while they have no more pixels than this together.
 const KEPT_PIXELS: u64 = 8 << 20;
+/// Longest wait for the last work of a device that complained.
+const LAST_WORK: std::time::Duration = std::time::Duration::from_secs(2);
 
 /// A graphics device that draws into memory. Making one takes a moment; keep it for all pictures of a run.
 pub struct Renderer {
@@ -271,7 +273,7 @@ impl Gpu {
         let complaint = Arc::new(Mutex::new(None));
         let note = complaint.clone();
         asked.0.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
+            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| one_line(&error.to_string()));
         }));
         let lost = Arc::new(Mutex::new(None));
         let note = lost.clone();
@@ -286,18 +288,23 @@ impl Gpu {
     fn complaint(&self) -> Result<(), RenderError> {
         // a loss is told at the next poll
         let _ = self.device.poll(wgpu::PollType::Poll);
-        if let Some(reason) = self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone() {
-            return Err(self.failed(reason));
+        let complaint = self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if complaint.is_some() {
+            // what is lost complains at once, and tells its loss when its last work is done
+            let _ = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORK) });
         }
-        match self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            Some(reason) => Err(self.failed(reason)),
-            None => Ok(()),
-        }
+        let lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        lost.or(complaint).map_or(Ok(()), |reason| Err(self.failed(reason)))
     }
 
     pub(crate) fn failed(&self, reason: String) -> RenderError {
         RenderError::Device { adapter: self.adapter.clone(), reason }
     }
+}
+
+/// A message of many lines as one.
+fn one_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// A Vulkan adapter, else one of OpenGL. Asked one after the other, so that OpenGL's libraries are loaded only where needed.

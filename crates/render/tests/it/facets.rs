@@ -181,6 +181,19 @@ fn unfolded_caves_are_nets_without_overlap() {
     }
 }
 
+/// A window is made of the size that an unfolded cave has, and the cave is then unfolded into the window.
+#[test]
+fn what_is_unfolded_into_its_own_size_stays_as_it_is() {
+    for cave in tumble_scene::cave::shipped_caves() {
+        let cave = cave.read().unwrap();
+        for most in (20..400).step_by(7).map(|w| [w, 100]).chain([[1280, 720], [1920, 1080], [150, 100]]) {
+            let (size, tiles) = unfold(&cave, most);
+            assert!((0..2).all(|k| size[k] <= most[k]) && (0..2).any(|k| size[k] == most[k]), "{}: {size:?} in {most:?}", cave.file);
+            assert_eq!(unfold(&cave, size), (size, tiles), "{}: {most:?}", cave.file);
+        }
+    }
+}
+
 // Pictures.
 
 /// Things, a floor, sun and lamp shadows, occlusion, gloss: all that could depend on the facet.

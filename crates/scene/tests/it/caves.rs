@@ -258,6 +258,7 @@ fn schema_and_parser_know_the_same_keys() {
         (format!("{SMALL}[sync]\n{odd}"), "sync", "sync", vec![]),
         (format!("{SMALL}[security]\nkey_file = \"k\"\n{odd}"), "security", "security", vec!["key_file"]),
         (format!("{SMALL}[recording]\nfile = \"k\"\n{odd}"), "recording", "recording", vec!["file"]),
+        (format!("{SMALL}[tracker]\n{odd}"), "tracker", "tracker", vec![]),
     ];
     for (text, called, name, present) in tables {
         let rule = if name.is_empty() { &schema } else { &schema["$defs"][name] };
