@@ -116,8 +116,8 @@ impl FromStr for Quality {
 
 impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let word = |on: bool| if on { "on" } else { "off" };
-        let (occlusion, reflections) = (word(self.occlusion), word(self.reflections));
-        write!(f, "shadows={},samples={},occlusion={occlusion},reflections={reflections},map={}", self.shadows.name(), self.samples, self.shadow_map_size)
+        let occlusion = if self.occlusion { "on" } else { "off" };
+        let reflections = if self.reflections { "" } else { "reflections=off," };
+        write!(f, "shadows={},samples={},occlusion={occlusion},{reflections}map={}", self.shadows.name(), self.samples, self.shadow_map_size)
     }
 }
