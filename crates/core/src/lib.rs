@@ -25,6 +25,7 @@ mod integrators;
 mod motion;
 mod mounts;
 mod object;
+mod pair;
 mod rigid;
 mod rotation;
 mod row_builder;

@@ -2,7 +2,8 @@
 
 use super::closing;
 use super::projection::Projection;
-use crate::detect::{Detector, Reach, Touch};
+use crate::detect::{Detector, Touch};
+use crate::pair::Reach;
 use crate::motion::coast;
 use crate::object::{Integratable, Level, RowTarget};
 use crate::row_builder::{RowBuilder, RowKind, constraints};
