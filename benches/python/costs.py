@@ -116,12 +116,11 @@ def stepping():
     told("the same against itself", paired(of_two(together, together)))
 
 
-class Rust:
-    """The same in a program in Rust, of the same crates in the same profile."""
+class Child:
+    """A program that steps a scene as it is told: in Rust, of the same crates in the same profile, or in Python."""
 
-    def __init__(self, scene):
-        program = Path(os.environ.get("TUMBLE_STEPS", ROOT / "target" / "release" / "examples" / "steps"))
-        self.child = subprocess.Popen([program, scene], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+    def __init__(self, scene, words):
+        self.child = subprocess.Popen([*words, scene], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
         self.step(WARM)
 
     def step(self, n):
@@ -142,29 +141,39 @@ class Rust:
         self.child.wait(timeout=30)
 
 
+def child(scene, at_once):
+    """What the program in Python does: for every line that many steps, by a call each or by one."""
+    world = tumble.World.load(scene)
+    for line in sys.stdin:
+        if at_once:
+            world.step(int(line))
+        else:
+            for _ in range(int(line)):
+                world.step()
+        print(world.frame, flush=True)
+
+
 def against_rust():
     """100 bodies: a program in Python against a program in Rust, in turns."""
+    rust = [os.environ.get("TUMBLE_STEPS", ROOT / "target" / "release" / "examples" / "steps")]
+    if not Path(rust[0]).is_file():
+        print(f"{rust[0]} is not built; not compared with a program in Rust")
+        return
+    loop, once = ([sys.executable, __file__, word] for word in ("--loop", "--once"))
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.toml"
         scene.write_text(GRID)
 
-        def begin(kind):
+        def begin(one, other):
             def start():
-                world, rust = grid(), Rust(scene)
-                return lambda: kind(world), rust.turn, rust.end
+                a, b = Child(scene, one), Child(scene, other)
+                return a.turn, b.turn, lambda: (a.end(), b.end())
 
             return start
 
-        def itself():
-            one, other = Rust(scene), Rust(scene)
-            return one.turn, other.turn, lambda: (one.end(), other.end())
-
-        try:
-            told("100 bodies, a program in Python against one in Rust", paired(begin(each)))
-            told("the same, step(n) against one in Rust", paired(begin(together)))
-            told("one in Rust against itself", paired(itself))
-        except OSError as error:
-            print(f"not compared with a program in Rust: {error}")
+        told("100 bodies, a program in Python against one in Rust", paired(begin(loop, rust)))
+        told("the same, step(n) against one in Rust", paired(begin(once, rust)))
+        told("one in Rust against itself", paired(begin(rust, rust)))
 
 
 def view_held():
@@ -243,6 +252,9 @@ def reads():
 
 
 if __name__ == "__main__":
+    if sys.argv[1:2] in (["--loop"], ["--once"]):
+        child(sys.argv[2], sys.argv[1] == "--once")
+        sys.exit()
     asked = sys.argv[1:] or [""]
     for run in (stepping, against_rust, view_held, forces, setting, rollouts, reads):
         if any(run.__name__.startswith(name) for name in asked):

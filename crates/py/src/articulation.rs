@@ -2,7 +2,7 @@
 
 use crate::body::{Place, hash};
 use crate::collect::{Anchor, anchor};
-use crate::convert::{Numbers, array, numbers, path, shown, vec3, vector};
+use crate::convert::{Numbers, array, numbers, path, vec3, vector};
 use crate::errors::{Error, Result, caught};
 use crate::robot::{Robot, Rows};
 use crate::spot::{Now, Source, Spot, Which, locked, start};

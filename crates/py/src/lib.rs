@@ -1,5 +1,6 @@
 //! The Python module `tumble._native`: conversion between Python and the crates, and no physics.
 
+mod adding;
 mod articulation;
 mod bodies;
 mod body;

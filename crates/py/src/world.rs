@@ -1,11 +1,12 @@
 //! The world: made or loaded, filled, stepped, asked.
 
-use crate::articulation::{Articulation, described};
+use crate::adding::{add, articulated, own_place, rigid};
+use crate::articulation::Articulation;
 use crate::bodies::{Bodies, by_name, handle, place_of};
-use crate::body::{Place, RigidBody};
+use crate::body::RigidBody;
 use crate::collect::{Anchor, anchor};
 use crate::building::{Choices, build};
-use crate::convert::{Numbers, base_pose, numbers, path, pose, vec3, vec3_or, vector, whole_number};
+use crate::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
 use crate::errors::{Error, Result, caught};
 use crate::report::StepReport;
 use crate::shapes::Shape;
@@ -13,7 +14,7 @@ use crate::inner::Inner;
 use crate::shared::Shared;
 use crate::picture::Shot;
 use crate::rollout::Plan;
-use crate::{bodies, contacts, looks, saved};
+use crate::{bodies, contacts, saved};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -57,35 +58,6 @@ impl World {
             change(&mut settings);
             Ok(inner.world.set_settings(settings)?)
         })
-    }
-
-    /// Where a body of this world is, given as a handle or by name.
-    fn own_place(&self, body: &Bound<'_, PyAny>) -> Result<Place> {
-        let place = match body.extract::<String>() {
-            Ok(name) => {
-                let found = self.shared.read(|inner| by_name(inner, &name))?;
-                Place { shared: self.shared.clone(), id: found.id, name: name.into() }
-            }
-            Err(_) => place_of(body)?,
-        };
-        match Arc::ptr_eq(&place.shared, &self.shared) {
-            true => place.status().map(|_| place),
-            false => Err(Error::value(format!("'{}' is a body of another world", place.name))),
-        }
-    }
-
-    /// Adds a body and gives its handle.
-    fn add(&self, py: Python<'_>, body: Rigid, mode: Mode, switches: [bool; 2]) -> Result<RigidBody> {
-        let [alive, collidable] = switches;
-        let place = self.shared.write(py, |inner| {
-            let body = looks::usual(body, inner.world.ids().len());
-            let id = inner.world.add_boxed(Box::new(body), mode)?;
-            inner.world.set_alive(id, alive)?;
-            inner.world.set_collidable(id, collidable)?;
-            let name = inner.world.object(id).map_or("", |o| o.name()).into();
-            Ok(Place { shared: self.shared.clone(), id, name })
-        })?;
-        RigidBody::new(py, place)
     }
 }
 
@@ -284,7 +256,7 @@ impl World {
         if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
             return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
         }
-        let asked = articulations.map(|all| all.iter().map(|one| Ok(self.own_place(one)?.id)).collect::<Result<Vec<_>>>()).transpose()?;
+        let asked = articulations.map(|all| all.iter().map(|one| Ok(own_place(&self.shared, one)?.id)).collect::<Result<Vec<_>>>()).transpose()?;
         let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
         let (plan, fork) = self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
         let (shape, out) = py.detach(|| {
@@ -325,17 +297,11 @@ impl World {
         orientation: Option<&Bound<'_, PyAny>>, velocity: Option<&Bound<'_, PyAny>>, angular_velocity: Option<&Bound<'_, PyAny>>, restitution: f64,
         friction: f64, linear_damping: f64, angular_damping: f64, kinematic: bool, collidable: bool,
     ) -> Result<RigidBody> {
-        let solid = shape.solid.clone();
-        let body = match (mass, density) {
-            (Some(mass), None) => Rigid::with_mass(name, solid, mass)?,
-            (None, Some(density)) => Rigid::with_density(name, solid, density)?,
-            (None, None) if kinematic => Rigid::fixture(name, solid),
-            _ => return Err(Error::value(format!("body '{name}': wanted a mass or a density, and one of the two alone"))),
-        };
-        let (v, w) = (vec3_or(velocity, "velocity", Vec3::zeros())?, vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?);
-        let mut body = body.at(pose(position, orientation)? * shape.placement).moving(v, w).surface(restitution, friction);
+        let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
+        let motion = [vec3_or(velocity, "velocity", Vec3::zeros())?, vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?];
+        let mut body = rigid(name, &shape, mass, density, kinematic)?.at(pose(position, orientation)? * shape.placement).surface(restitution, friction);
         (body.linear_damping, body.angular_damping) = (linear_damping, angular_damping);
-        self.add(py, body, if kinematic { Mode::Kinematic } else { Mode::Dynamic }, [true, collidable])
+        add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
     }
 
     /// Adds geometry that never moves. position, orientation, restitution, friction: as in ``add_rigid``.
@@ -347,7 +313,7 @@ impl World {
     ) -> Result<RigidBody> {
         let pose = pose(position, orientation)? * shape.placement;
         let body = Rigid::fixture(name, shape.solid.clone()).at(pose).surface(restitution, friction);
-        self.add(py, body, Mode::Static, [true, collidable])
+        add(&self.shared, py, body, Mode::Static, collidable)
     }
 
     /// Adds an articulated body, and gives the handle of it.
@@ -359,18 +325,7 @@ impl World {
     fn add_articulation(
         &self, py: Python<'_>, articulation: &Bound<'_, PyAny>, base: Option<&Bound<'_, PyAny>>, name: Option<&str>,
     ) -> Result<Articulation> {
-        let description = described(articulation)?;
-        let description = description.get();
-        let (body, robot) = description.body(py, base.map_or(Ok(tumble::collide::Pose::identity()), base_pose)?, name)?;
-        let (robot, efforts) = (Arc::new(robot), description.spot.efforts());
-        let place = self.shared.write(py, |inner| {
-            let id = inner.world.add(body)?;
-            inner.robots.insert(id, robot.clone());
-            efforts.map(|tau| inner.efforts.insert(id, tau));
-            let name = inner.world.object(id).map_or("", |o| o.name()).into();
-            Ok(Place { shared: self.shared.clone(), id, name })
-        })?;
-        Articulation::placed(py, place, robot)
+        articulated(&self.shared, py, articulation, base, name)
     }
 
     /// Removes a body, given as a handle or by name, or a force or behaviour by name. Handles of a body raise ``RemovedError`` from then on.
@@ -380,7 +335,7 @@ impl World {
         {
             return Ok(());
         }
-        let place = self.own_place(body)?;
+        let place = own_place(&self.shared, body)?;
         place.write(py, |inner| {
             inner.world.remove(place.id)?;
             inner.forget(place.id);
@@ -401,7 +356,7 @@ impl World {
             true => vec![bodies.clone()],
             false => bodies.try_iter()?.collect::<PyResult<_>>()?,
         };
-        let places = given.iter().map(|body| self.own_place(body)).collect::<Result<Vec<_>>>()?;
+        let places = given.iter().map(|body| own_place(&self.shared, body)).collect::<Result<Vec<_>>>()?;
         self.shared.extend(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
     }
 
