@@ -230,6 +230,13 @@ impl RigidBody {
         self.place.write(py, |inner| Ok(inner.world.set_alive(self.place.id, value)?))
     }
 
+    /// Whether it sleeps: left out of the steps until something touches it (``World(sleep_after=…)``). What is done to it wakes it.
+    #[getter]
+    fn asleep(&self) -> Result<bool> {
+        self.place.status()?;
+        self.place.shared.read(|inner| Ok(inner.world.asleep(self.place.id)))
+    }
+
     /// Whether it meets others.
     #[getter]
     fn collidable(&self) -> Result<bool> {

@@ -32,7 +32,8 @@ use tumble::scene::{SceneFile, resolve_scene};
 /// gravity: shape (3,), m/s²; dt: length of a step, s; stepper: ``"time_stepping"`` or ``"backtracking"``; integrator: ``"verlet"``,
 /// ``"symplectic_euler"``, ``"explicit_euler"``, ``"rk4"`` or ``"dormand_prince"``; solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or
 /// ``"lcp_sliding"``: the words of scene files, with their defaults. substeps: parts of each step; iterations: sweeps of the solver at most;
-/// contact_tolerance: metres; integrator_tolerance: of ``dormand_prince``.
+/// contact_tolerance: metres; integrator_tolerance: of ``dormand_prince``. sleep_after: seconds after which islands that have moved by less than
+/// sleep_within (metres) are left out of the steps until something touches them; None: never.
 ///
 /// One thread at a time: while one steps a world, calls on it from another raise ``BusyError``. The interpreter is let go while a world steps.
 #[pyclass(frozen, weakref, module = "tumble")]
@@ -65,12 +66,12 @@ impl World {
 impl World {
     #[new]
     #[pyo3(signature = (gravity=None, dt=1.0/240.0, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
-        contact_tolerance=1e-7, integrator_tolerance=1e-6))]
+        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>, gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, #[pyo3(from_py_with = whole_number)] substeps: u32,
         #[pyo3(from_py_with = whole_number)] iterations: u32, contact_tolerance: f64,
-        integrator_tolerance: f64,
+        integrator_tolerance: f64, sleep_after: Option<f64>, sleep_within: f64,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
@@ -78,6 +79,7 @@ impl World {
         Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }.apply(world)?;
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
+        (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
         World::of(py, build(scene)?)
     }
 

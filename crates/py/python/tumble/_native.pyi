@@ -112,6 +112,8 @@ class RigidBody:
     @alive.setter
     def alive(self, value: bool) -> None: ...
     @property
+    def asleep(self) -> bool: ...
+    @property
     def collidable(self) -> bool: ...
     @collidable.setter
     def collidable(self, value: bool) -> None: ...
@@ -359,6 +361,8 @@ class World:
         iterations: int = 200,
         contact_tolerance: float = 1e-7,
         integrator_tolerance: float = 1e-6,
+        sleep_after: float | None = None,
+        sleep_within: float = 1e-5,
     ) -> World: ...
     @staticmethod
     def load(

@@ -25,7 +25,7 @@ pub struct DebugDraw {
     pub frames: bool,
     /// Objects that are solved together, each group in a colour of its own.
     pub islands: bool,
-    /// Objects that stand still in blue-grey, those that move in orange.
+    /// Sleepers in blue-grey, what stands still awake in olive, what moves in orange.
     pub resting: bool,
     /// A level of every sphere tree, 0 for the root.
     pub tree_level: Option<u32>,
@@ -204,12 +204,17 @@ pub(super) fn islands(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
 /// An object stands still below this speed of each of its parts, m/s and rad/s.
 const STILL: f64 = 5e-3;
 
-/// Blue-grey for each moving object that stands still, orange for those that do not.
+/// Blue-grey for each dynamic object that sleeps, olive for those that stand still awake, orange for those that move.
 pub(super) fn resting(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moving = world.ids().iter().copied().filter(|&id| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic));
     let parts = |id| (0..).map_while(move |part| world.site(id, part));
     let still = |id| parts(id).all(|site| site.velocity.norm() < STILL && site.angular_velocity.norm() < STILL);
-    moving.map(|id| (id, if still(id) { [0.32, 0.42, 0.60] } else { [0.95, 0.55, 0.15] })).collect()
+    let color = |id| match (world.asleep(id), still(id)) {
+        (true, _) => [0.32, 0.42, 0.60],
+        (_, true) => [0.50, 0.58, 0.30],
+        _ => [0.95, 0.55, 0.15],
+    };
+    moving.map(|id| (id, color(id))).collect()
 }
 
 /// 1 where the arrows of a contact are those of its `a`, -1 where they are those of its `b`: of the body that moves, or of the upper one.
