@@ -129,7 +129,7 @@ impl Motion<'_> {
     }
 
     fn drift(&mut self, v: &[f64], h: f64) {
-        for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode != Mode::Static) {
+        for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode != Mode::Static && !e.asleep) {
             let (x, v) = (&mut self.x[entry.span.x.clone()], &v[entry.span.v.clone()]);
             if let Some(body) = entry.object.integratable() {
                 body.drift(x, v, h);
@@ -236,7 +236,7 @@ fn refresh(entry: &mut Entry, x: &[f64], sites: &mut [Site]) {
 
 /// One object goes on for `h`: freely where it moves, with its given velocity where it is led, not at all where it is static.
 pub(crate) fn coast(entry: &Entry, x: &mut [f64], h: f64) {
-    let Some(body) = entry.object.integratable().filter(|_| entry.status.alive) else { return };
+    let Some(body) = entry.object.integratable().filter(|_| entry.status.alive && !entry.asleep) else { return };
     match entry.status.mode {
         Mode::Static => {}
         Mode::Dynamic => body.coast(x, h),

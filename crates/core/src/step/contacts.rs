@@ -3,6 +3,7 @@
 use super::closing;
 use super::projection::Projection;
 use crate::detect::{Detector, Touch};
+use crate::pair::Reach;
 use crate::motion::coast;
 use crate::object::{Integratable, Level, RowTarget};
 use crate::row_builder::{RowBuilder, RowKind, constraints};
@@ -70,12 +71,12 @@ pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(),
 }
 
 /// Finds the contacts within reach of the next `horizon` seconds.
-pub(crate) fn detect(core: &mut Core, horizon: f64, out: &mut Vec<Touch>) {
+pub(crate) fn detect(core: &mut Core, horizon: f64, reach: Reach, out: &mut Vec<Touch>) {
     let mut detector = Detector {
         table: &core.table, owners: &core.owners, sites: &core.sites, settings: &core.settings,
-        broad: core.broad.as_mut(), scratch: &mut core.detect_scratch,
+        broad: core.broad.as_mut(), scratch: &mut core.detect_scratch, stirred: &mut core.sleepers.stirred,
     };
-    detector.detect(horizon, out);
+    detector.detect(horizon, reach, out);
     let deepest = out.iter().map(|t| -t.contact.gap).fold(0.0, f64::max);
     core.report.max_penetration = core.report.max_penetration.max(deepest);
     core.report.contacts = out.len() as u32;

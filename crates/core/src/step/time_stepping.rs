@@ -26,6 +26,7 @@ use super::{closing, hold, reach};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
+use crate::pair::Reach;
 use crate::motion::coast;
 use crate::object::Level;
 use crate::rows::RowSet;
@@ -69,7 +70,7 @@ impl TimeStepping {
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
         core.implicit = true;
         self.smooth_forces(core, h)?;
-        detect(core, h, &mut self.work.touches);
+        detect(core, h, Reach::Each, &mut self.work.touches);
         flight::time_contacts(core, h, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
@@ -164,7 +165,7 @@ impl TimeStepping {
         push(core, &change);
         core.motion().refresh();
         let mut found = Vec::new();
-        detect(core, h, &mut found);
+        detect(core, h, Reach::Each, &mut found);
         core.x.copy_from_slice(&self.x0);
         core.motion().refresh();
         let work = &mut self.work;

@@ -3,6 +3,7 @@
 use super::World;
 use crate::detect::WarmStarts;
 use crate::site::Wrench;
+use crate::sleep::{Sleepers, Still};
 use tumble_collide::Vec3;
 
 /// What a frame changes: state, accelerations, applied forces, warm starts, time. Its memory is used again by the next [`World::mark`].
@@ -17,6 +18,9 @@ pub struct Checkpoint {
     applied_generalized: Vec<f64>,
     warm: WarmStarts,
     inner_step: f64,
+    sleepers: Sleepers,
+    /// Whether each object sleeps, and since when it is still; empty where nobody may sleep.
+    still: Vec<(bool, Still)>,
 }
 
 impl World {
@@ -30,6 +34,11 @@ impl World {
         at.applied.clone_from(&c.applied);
         at.applied_generalized.clone_from(&c.applied_generalized);
         at.warm.clone_from(&c.warm);
+        at.sleepers.clone_from(&c.sleepers);
+        at.still.clear();
+        if c.settings.sleep.is_some() {
+            at.still.extend(c.table.iter().map(|e| (e.asleep, e.still.clone())));
+        }
     }
 
     /// Goes back to where [`mark`](Self::mark) was called last. Switches and constants stay as they are; after objects came or went nothing is done.
@@ -46,6 +55,11 @@ impl World {
         core.applied.clone_from(&to.applied);
         core.applied_generalized.clone_from(&to.applied_generalized);
         core.warm.clone_from(&to.warm);
+        core.sleepers.clone_from(&to.sleepers);
+        let mut still = to.still.iter();
+        core.table.for_each_mut(|e| {
+            (e.asleep, e.still) = still.next().cloned().unwrap_or_default();
+        });
         core.contacts.clear();
         core.let_go();
         core.motion().refresh();

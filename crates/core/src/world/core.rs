@@ -5,6 +5,7 @@ use crate::detect::{Owner, Scratch, Touch, WarmStarts};
 use crate::motion::Motion;
 use crate::settings::{Settings, StepReport};
 use crate::site::{Forces, Site, Wrench};
+use crate::sleep::Sleepers;
 use crate::solver::RowSolver;
 use crate::view::{Entry, ObjectId, Table};
 use tumble_collide::{BroadPhase, Vec3};
@@ -108,6 +109,7 @@ pub struct Core {
     pub(crate) contacts: Vec<ContactPoint>,
     pub(crate) report: StepReport,
     pub(crate) next_serial: u32,
+    pub(crate) sleepers: Sleepers,
     /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
     pub(crate) inner_step: f64,
 }
