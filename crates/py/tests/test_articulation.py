@@ -178,3 +178,39 @@ def test_a_missing_urdf_is_a_missing_file(tmp_path):
     (tmp_path / "bad.urdf").write_text("<robot name='r'><link/></robot>")
     with pytest.raises(ValueError, match="bad.urdf:1"):
         tumble.Articulation.from_urdf(str(tmp_path / "bad.urdf"))
+
+
+def test_saved_worlds_go_on_under_the_same_torques(root):
+    def arm_world():
+        world = tumble.World()
+        world.add_static("ground", tumble.HalfSpace())
+        return world, world.add_articulation(root / "scenes" / "robot" / "arm.urdf", base=(0, 0, 1), name="arm")
+
+    world, arm = arm_world()
+    plain = world.save()
+    arm.tau = np.zeros(arm.dof)
+    assert world.save() == plain  # none and zeros are the same
+    arm.tau = (3.0, -20.0, 5.0, 0.25, 1.0, 0.0)
+    world.step(20)
+    saved = world.save()
+    world.step(30)
+    other, twin = arm_world()
+    twin.tau = (9.0,) * 6
+    other.restore(saved)
+    assert (twin.tau == arm.tau).all() and other.save() == saved
+    other.step(30)
+    assert other.save() == world.save()
+    other.restore(plain)  # saved without torques: there are none
+    assert (twin.tau == 0).all() and other.save() == plain
+    # what is damaged or of another world changes nothing
+    before = other.save()
+    numbers = bytearray(saved)
+    numbers[-20:-12] = b"\xff" * 8  # the last torque: no number
+    count = bytearray(saved)
+    count[-64:-60] = (7).to_bytes(4, "little")
+    for bad in (bytes(numbers), bytes(count), saved[: len(plain)][:-9] + saved[-12:], saved[-12:], b"tumbleT1"):
+        with pytest.raises(tumble.SnapshotError):
+            other.restore(bad)
+    with pytest.raises(tumble.SnapshotError, match="of another world"):
+        tumble.World().restore(saved)
+    assert other.save() == before
