@@ -12,7 +12,7 @@ use tumble_collide::{Aabb, Contact, ContactMode, Pose, Shape, Vec3};
 const TREE_REACH: f64 = 0.02;
 /// How far two meshes look ahead by their surfaces, likewise: further away they are followed along free motion. A wide margin has most of both surfaces in it.
 const MESH_REACH: f64 = 0.05;
-/// Looks along free motion at most.
+/// Looks along free motion, unless they come near and do not touch: then twice as many.
 const MOST_LOOKS: f64 = 16.0;
 
 /// How far apart two parts are looked for.
@@ -107,8 +107,8 @@ impl Pair<'_> {
         (margin, closing)
     }
 
-    /// The contacts at present, by feature, and 0. Of two meshes without any that are further apart than they look, those of the first look along free motion that sees some, and
-    /// its time in s: from one look to the next no gap closes by more than a look's margin. `rows` are the places of both in the site table.
+    /// The contacts at present, by feature, and 0. Of two meshes without any that are further apart than they look, those of where free motion brings them near, and when in
+    /// s. `rows` are the places of both in the site table.
     pub fn contacts(&self, rows: [u32; 2], horizon: f64, recalled: &mut Recalled, found: &mut Vec<Contact>) -> f64 {
         let (margin, closing) = self.margins();
         let poses = self.sites.map(|site| site.pose);
@@ -124,13 +124,25 @@ impl Pair<'_> {
         if !found.is_empty() || self.mode == ContactMode::Spheres || margin >= closing {
             return 0.0;
         }
-        let looks = (closing / margin).ceil().min(MOST_LOOKS);
-        let moments = (1..=looks as u32).map(|look| horizon * f64::from(look) / looks);
-        for moment in moments {
-            self.ask(&self.sites.map(|site| coasted(site, moment)), margin, found);
-            if !found.is_empty() {
+        self.follow((margin, closing), horizon, found)
+    }
+
+    /// Conservative advancement: no gap closes faster than `closing/horizon`, so a look that sees nothing within its margin, or a least gap, lets that much time pass.
+    fn follow(&self, (margin, closing): (f64, f64), horizon: f64, found: &mut Vec<Contact>) -> f64 {
+        let (speed, wide) = (closing / horizon, margin.max(closing / MOST_LOOKS));
+        let mut moment = margin / speed;
+        for look in 1.. {
+            found.clear();
+            if moment > horizon {
+                break;
+            }
+            self.ask(&self.sites.map(|site| coasted(site, moment)), wide, found);
+            let least = found.iter().map(|contact| contact.gap).fold(f64::INFINITY, f64::min);
+            if least <= margin || (least.is_finite() && look >= 2 * MOST_LOOKS as u32) {
+                found.retain(|contact| contact.gap <= least.max(margin));
                 return moment;
             }
+            moment += least.min(wide) / speed;
         }
         0.0
     }

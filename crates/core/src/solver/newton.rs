@@ -36,7 +36,9 @@ const FIRST: u32 = 10;
 /// Sweeps after a jump before it is judged.
 const TRIAL: u32 = 3;
 /// A jump after which sweeps change more than this share of what they did before is not followed by another at once.
-const WORTH: f64 = 0.5;
+const WORTH: f64 = 0.8;
+/// From this sweep on a jump that was none doubles the wait for the next.
+const LATE: u32 = 200;
 
 /// When to jump, and what to go back to.
 pub(super) struct Newton {
@@ -71,12 +73,12 @@ impl Newton {
         if let Some((lambda, before)) = self.before.take()
             && (change.is_nan() || change > WORTH * before)
         {
-            self.due = sweep + self.wait;
             let worse = change.is_nan() || change >= before;
             if worse {
                 locals.iter_mut().zip(lambda).for_each(|(local, lambda)| local.lambda = lambda);
-                self.wait *= 2;
+                self.wait *= if sweep > LATE { 2 } else { 1 };
             }
+            self.due = sweep + self.wait;
             return worse;
         }
         if left <= TRIAL {

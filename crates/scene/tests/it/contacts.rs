@@ -52,5 +52,5 @@ fn the_word_decides_what_touches() {
 
 #[test]
 fn a_wrong_word_is_told_where_and_what_would_be_right() {
-    told(&ball("contacts = \"sphere\"", ""), &["s.toml:2:12: `contacts` of [world] is \"sphere\"; wanted `surface` or `spheres`"]);
+    told(&ball("contacts = \"sphere\"", ""), &["s.toml:2:12: `contacts` of [world] is \"sphere\"; did you mean `spheres`?"]);
 }

@@ -22,7 +22,6 @@ fn pin(mu: f64) -> Bodies {
 fn wrong(rows: &Rows, c: &[f64]) -> f64 {
     let (blocks, mut lambda, mut du) = (all(rows), vec![0.0; rows.len], vec![0.0; rows.dof]);
     lambda[0] = IMPULSE;
-    use crate::solver::RowSolver;
     GaussSeidel.solve(rows, &blocks, c, &mut lambda, &mut du, USUAL);
     residual(rows, &blocks, c, &lambda, &du)
 }
