@@ -3,11 +3,10 @@
 use crate::collidable::ContactFrame;
 use crate::settings::Settings;
 use crate::site::Site;
+use crate::pair::{Pair, Reach, Recalled, Travel};
+use crate::step::meet_at;
 use crate::view::{Entry, Mode, ObjectId, Table};
-use tumble_collide::{BroadPhase, Contact, ContactMode, NormalFrom, Vec3};
-
-/// How far two sphere trees look ahead in the `spheres` mode, as a share of the smaller one's radius.
-const TREE_REACH: f64 = 0.02;
+use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
 
 /// Who owns a row of the site table.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +45,20 @@ pub(crate) struct WarmStarts {
 }
 
 impl WarmStarts {
+    /// Takes out what is filed under the keys that `which` picks.
+    pub fn take(&mut self, which: impl Fn(&Key) -> bool) -> Vec<(Key, [f64; 3])> {
+        let (taken, kept) = std::mem::take(&mut self.entries).into_iter().partition(|e| which(&e.0));
+        self.entries = kept;
+        taken
+    }
+
+    /// Files what was taken.
+    pub fn add(&mut self, entries: Vec<(Key, [f64; 3])>) {
+        self.entries.extend(entries);
+        self.entries.sort_by_key(|e| e.0);
+        self.entries.dedup_by_key(|e| e.0);
+    }
+
     /// Files anew; `entries` may come in any order.
     pub fn replace(&mut self, entries: impl Iterator<Item = (Key, Vec3)>) {
         self.entries.clear();
@@ -97,7 +110,8 @@ fn gallop(entries: &[(Key, [f64; 3])], key: &Key) -> usize {
 #[derive(Default)]
 pub(crate) struct Scratch {
     proxies: Vec<u32>,
-    reach: Vec<f64>,
+    travel: Vec<Travel>,
+    recalled: Recalled,
     /// Who has which box of the broad phase: those of the last detection, and of this one. Ascending, as the site table is.
     filed: Vec<Filed>,
     gathered: Vec<Filed>,
@@ -105,6 +119,13 @@ pub(crate) struct Scratch {
     place: Vec<u32>,
     pairs: Vec<[u32; 2]>,
     found: Vec<Contact>,
+}
+
+impl Scratch {
+    /// Drops what was found: a frame knows nothing of the one before.
+    pub fn forget(&mut self) {
+        self.recalled.forget();
+    }
 }
 
 /// A part that has a box in the broad phase, under a handle.
@@ -123,27 +144,31 @@ pub(crate) struct Detector<'a> {
     pub settings: &'a Settings,
     pub broad: &'a mut dyn BroadPhase,
     pub scratch: &'a mut Scratch,
+    /// Serials of sleepers that something comes near.
+    pub stirred: &'a mut Vec<u32>,
 }
 
 impl Detector<'_> {
     /// All contacts whose gap is at most what the pair may close within `horizon` seconds, plus the drift tolerance.
-    pub fn detect(&mut self, horizon: f64, out: &mut Vec<Touch>) {
+    pub fn detect(&mut self, horizon: f64, reach: Reach, out: &mut Vec<Touch>) {
         out.clear();
         self.gather(horizon);
         let mut pairs = std::mem::take(&mut self.scratch.pairs);
         self.broad.pairs(&mut pairs);
         self.order_by_site(&mut pairs);
+        self.scratch.recalled.begin();
         for &[i, j] in &pairs {
-            self.narrow(i as usize, j as usize, out);
+            self.narrow([i as usize, j as usize], (horizon, reach), out);
         }
+        self.scratch.recalled.end();
         self.scratch.pairs = pairs;
     }
 
-    /// One grown box per part that can meet anything, filed in the broad phase.
+    /// One box per part that can meet anything, around all its way, filed in the broad phase.
     fn gather(&mut self, horizon: f64) {
         let s = &mut *self.scratch;
         s.proxies.clear();
-        s.reach.clear();
+        s.travel.clear();
         s.gathered.clear();
         let mut filed = s.filed.iter().peekable();
         for entry in self.table.iter().filter(|e| e.status.alive && e.status.collidable) {
@@ -151,12 +176,11 @@ impl Detector<'_> {
             for (part, index) in entry.span.site.clone().enumerate() {
                 let Some(shape) = collidable.shape(part) else { continue };
                 let site = &self.sites[index];
-                let bound = shape.bounding_radius();
-                let turning = if bound.is_finite() { site.angular_velocity.norm() * bound } else { 0.0 };
-                let gain = horizon * horizon * site.acceleration.norm();
-                let reach = self.settings.drift_tolerance + horizon * (site.velocity.norm() + turning) + gain;
-                let bounds = shape.aabb(&site.pose).grown(reach);
-                let moving = entry.status.mode != Mode::Static;
+                let tight = shape.aabb(&site.pose);
+                let around = (tight.max - site.position()).sup(&(site.position() - tight.min));
+                let travel = Travel::new(site, shape.bounding_radius(), around, horizon);
+                let bounds = travel.swept(&tight, self.settings.drift_tolerance);
+                let moving = entry.status.mode != Mode::Static && !entry.asleep;
                 let who = [entry.serial, part as u32];
                 while let Some(gone) = filed.next_if(|f| f.who < who) {
                     self.broad.remove(gone.handle);
@@ -169,7 +193,7 @@ impl Detector<'_> {
                     None => self.broad.insert(&bounds, moving),
                 };
                 s.proxies.push(index as u32);
-                s.reach.push(reach);
+                s.travel.push(travel);
                 s.gathered.push(Filed { who, handle });
             }
         }
@@ -192,32 +216,36 @@ impl Detector<'_> {
         pairs.sort_unstable();
     }
 
-    fn narrow(&mut self, i: usize, j: usize, out: &mut Vec<Touch>) {
+    /// The contacts of one pair.
+    fn narrow(&mut self, [i, j]: [usize; 2], (horizon, reach): (f64, Reach), out: &mut Vec<Touch>) {
         let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
         let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
         let (entry_a, entry_b) = (&self.table.slots[owner_a.id], &self.table.slots[owner_b.id]);
-        if !meet(entry_a, owner_a.part as usize, entry_b, owner_b.part as usize) {
+        if !meet(entry_a, owner_a.part as usize, entry_b, owner_b.part as usize, self.sites) {
             return;
         }
         let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
         let (site_a, site_b) = (&self.sites[a as usize], &self.sites[b as usize]);
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
-        let mut margin = self.scratch.reach[i] + self.scratch.reach[j];
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
-        if mode == ContactMode::Spheres && let (Some(_), Some(_)) = (shape_a.tree(), shape_b.tree()) {
-            // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
-            let size = shape_a.bounding_radius().min(shape_b.bounding_radius());
-            margin = margin.min(2.0 * self.settings.drift_tolerance + TREE_REACH * size);
+        let near = 2.0 * self.settings.drift_tolerance;
+        let pair = Pair { mode, shapes: [shape_a, shape_b], sites: [site_a, site_b], travel: [self.scratch.travel[i], self.scratch.travel[j]], near, reach };
+        if pair.is_dear() && pair.stays_apart() {
+            return;
         }
         let found = &mut self.scratch.found;
-        found.clear();
-        tumble_collide::contacts_in(mode, shape_a, &site_a.pose, shape_b, &site_b.pose, margin, found);
+        let moment = pair.contacts([a, b], horizon, &mut self.scratch.recalled, found);
+        let first = out.len();
+        if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
+            // the frame will be done again with it awake
+            self.stirred.extend((!found.is_empty()).then_some(sleeper.serial));
+            return;
+        }
         let (ma, mb) = (body_a.material(part_a), body_b.material(part_b));
         let friction = self.settings.combine_friction.of(ma.friction, mb.friction);
         let restitution = self.settings.combine_restitution.of(ma.restitution, mb.restitution);
         let pair = [owner_a.serial, owner_a.part, owner_b.serial, owner_b.part];
-        found.sort_by_key(|contact| contact.feature);
         let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
         let mut frame_of = |contact: &Contact| {
             if contact.normal != frame.axes[0] {
@@ -235,6 +263,9 @@ impl Detector<'_> {
             restitution,
             key: Key { pair, feature: contact.feature },
         }));
+        if moment > 0.0 {
+            out[first..].iter_mut().for_each(|touch| meet_at(touch, &touch.contact.clone(), site_a, site_b, moment));
+        }
     }
 }
 
@@ -249,10 +280,11 @@ fn across(v: Vec3, along: &Vec3) -> Vec3 {
     v - along * along.dot(&v)
 }
 
-/// Whether two parts are to be tested: one of them moves, and both kinds say yes.
-fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize) -> bool {
+/// Whether two parts are to be tested: one of them moves (or is led towards a sleeper), and both kinds say yes.
+fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize, sites: &[Site]) -> bool {
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
-    if !(a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
+    let stirs = a.asleep && b.comes(sites) || b.asleep && a.comes(sites);
+    if !(stirs || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
         return false;
     }
     if a.serial == b.serial && !ca.parts_meet(part_a, part_b) {

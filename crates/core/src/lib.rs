@@ -16,6 +16,7 @@
 //! # Ok::<(), tumble_core::WorldError>(())
 //! ```
 
+mod apart;
 pub mod articulated;
 mod closure;
 mod collidable;
@@ -24,6 +25,7 @@ mod integrators;
 mod motion;
 mod mounts;
 mod object;
+mod pair;
 mod rigid;
 mod rotation;
 mod row_builder;
@@ -32,6 +34,7 @@ mod settings;
 mod site;
 pub mod solver;
 pub mod spatial;
+mod sleep;
 mod step;
 mod sync;
 mod view;
@@ -48,7 +51,8 @@ pub use rigid::{BodyError, RigidBody};
 pub use row_builder::RowBuilder;
 pub use settings::{Integrator, OutOfReach, Settings, SettingsError, StepReport};
 pub use site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
+pub use sleep::Sleep;
 pub use step::{Backtracking, Frame, STEPPERS, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
 pub use view::{Mode, ObjectId, Status, WorldView};
-pub use world::{ContactPoint, MirrorError, Pull, SnapshotError, StepError, World, WorldError};
+pub use world::{Checkpoint, ContactPoint, MirrorError, Pull, SnapshotError, StateHold, StepError, World, WorldError};

@@ -8,7 +8,7 @@ use crate::collidable::Collidable;
 use crate::mounts::{CameraCarrier, Detail, LightCarrier};
 use crate::rows::RowSet;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
-use crate::view::WorldView;
+use crate::view::{ObjectId, WorldView};
 use crate::row_builder::RowBuilder;
 use std::any::Any;
 use std::path::Path;
@@ -139,6 +139,10 @@ pub trait Integratable {
     fn unwhiten_rate(&self, du: &[f64], dp: &mut [f64]) {
         self.recover(du, dp);
     }
+    /// Whether it may be left out of the steps while it lies still (see [`Sleep`](crate::Sleep)): nothing that it feels of itself changes with time.
+    fn may_sleep(&self) -> bool {
+        false
+    }
     /// Called once per committed step, for what must be put right after integration.
     fn stabilize(&self, x: &mut [f64], h: f64) {
         let _ = (x, h);
@@ -209,6 +213,11 @@ pub trait Constraint {
     /// constraint that tells nothing the limits act over the whole of the step in which they are reached.
     fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
         let _ = (me, view, out);
+    }
+    /// Appends all objects that its rows can take hold of; `false` where it does not say, and then nothing in the world falls asleep.
+    fn partners(&self, out: &mut Vec<ObjectId>) -> bool {
+        let _ = out;
+        false
     }
     /// Whether its rows act on nothing but itself. They are left out while impulses do not move it: what is led may pass its own limits.
     fn on_itself(&self) -> bool {

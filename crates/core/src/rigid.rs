@@ -465,6 +465,10 @@ impl Integratable for RigidBody {
         write6(dp, &(self.cache.recover * vec3(du)), &(self.root_mass * vec3(&du[3..])));
     }
 
+    fn may_sleep(&self) -> bool {
+        true
+    }
+
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
         let (p, l) = (vec3(&x[7..]), vec3(&x[10..]));
         let kinetic = 0.5 * (p.norm_squared() / self.mass + l.dot(&self.omega(&orientation(x), &l)));

@@ -1,6 +1,7 @@
 //! What a world can be told, and what a step reports.
 
 use crate::collidable::Combine;
+use crate::sleep::Sleep;
 use crate::solver::Accuracy;
 use crate::view::ObjectId;
 use tumble_collide::Vec3;
@@ -48,6 +49,8 @@ pub struct Settings {
     pub drift_tolerance: f64,
     /// Greatest speed at which existing penetration is pushed out, m/s.
     pub recovery_speed: f64,
+    /// When what lies still is left out of the steps; `None`: never.
+    pub sleep: Option<Sleep>,
     /// How the friction of two bodies combines.
     pub combine_friction: Combine,
     /// How the restitution of two bodies combines.
@@ -68,6 +71,7 @@ impl Default for Settings {
             contact_tolerance: 1e-7,
             drift_tolerance: 1e-4,
             recovery_speed: 3.0,
+            sleep: None,
             combine_friction: Combine::GeometricMean,
             combine_restitution: Combine::Min,
         }
@@ -101,6 +105,10 @@ impl Settings {
         check("solver tolerance", self.accuracy.tolerance, self.accuracy.tolerance >= 0.0, "at least 0")?;
         check("contact tolerance", self.contact_tolerance, self.contact_tolerance > 0.0, "above 0 m")?;
         check("drift tolerance", self.drift_tolerance, self.drift_tolerance >= self.contact_tolerance, "at least the contact tolerance")?;
+        if let Some(sleep) = &self.sleep {
+            check("sleep: seconds", sleep.after, sleep.after > 0.0, "above 0 s")?;
+            check("sleep: distance", sleep.within, sleep.within > 0.0, "above 0 m")?;
+        }
         check("recovery speed", self.recovery_speed, self.recovery_speed >= 0.0, "at least 0 m/s")
     }
 }
@@ -129,6 +137,8 @@ pub struct StepReport {
     pub floor_hits: u32,
     /// Contacts at the last sub-step: what the narrow phase found within its margin.
     pub contacts: u32,
+    /// Objects asleep at its end.
+    pub asleep: u32,
     /// Passes of the impact phase.
     pub impact_passes: u32,
     /// Largest residual of any solve, m/s (see [`crate::solver::residual`]).

@@ -2,6 +2,7 @@
 
 use crate::object::Object;
 use crate::site::{Site, Span};
+use crate::sleep::Still;
 use slotmap::{SlotMap, new_key_type};
 use tumble_collide::Vec3;
 
@@ -53,18 +54,31 @@ pub(crate) struct Entry {
     pub status: Status,
     /// Never used twice in a world: what warm starts are filed under.
     pub serial: u32,
+    /// Left out of the steps until something stirs it.
+    pub asleep: bool,
+    pub still: Still,
 }
 
 impl Entry {
-    /// Whether forces and impulses move it: dynamic, alive, and with a state.
-    pub fn moves(&self) -> bool {
+    pub fn new(object: Box<dyn Object>, span: Span, status: Status, serial: u32) -> Entry {
+        Entry { object, span, status, serial, asleep: false, still: Still::default() }
+    }
+
+    /// Whether it takes part in dynamics: dynamic, alive, and with a state; awake or asleep.
+    pub fn dynamic(&self) -> bool {
         self.status.moves() && !self.span.v.is_empty()
+    }
+
+    /// Whether forces and impulses move it: dynamic and awake.
+    pub fn moves(&self) -> bool {
+        self.dynamic() && !self.asleep
     }
 }
 
 impl Clone for Entry {
     fn clone(&self) -> Entry {
-        Entry { object: self.object.fork(), span: self.span.clone(), status: self.status, serial: self.serial }
+        let (asleep, still) = (self.asleep, self.still.clone());
+        Entry { asleep, still, ..Entry::new(self.object.fork(), self.span.clone(), self.status, self.serial) }
     }
 }
 
@@ -129,6 +143,11 @@ impl WorldView<'_> {
     /// An object's switches.
     pub fn status(&self, id: ObjectId) -> Option<Status> {
         self.table.slots.get(id).map(|e| e.status)
+    }
+
+    /// Whether an object sleeps (see [`Sleep`](crate::Sleep)).
+    pub fn asleep(&self, id: ObjectId) -> bool {
+        self.table.slots.get(id).is_some_and(|e| e.asleep)
     }
 
     /// All ids in the order in which the objects were added.

@@ -6,7 +6,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
 use tumble_collide::{Pose, RepairSettings, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble_core::solver::{self, Accuracy};
-use tumble_core::{ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, RigidBody, Settings, Visual, World, WorldError, stepper_by_name};
+use tumble_core::{ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, RigidBody, Settings, Sleep, Visual, World, WorldError, stepper_by_name};
 
 use crate::body::{BodySpec, MassSpec};
 use crate::articulated::ArticulatedSpec;
@@ -165,6 +165,7 @@ impl SceneFile {
             accuracy: Accuracy { sweeps: w.iterations, ..base.accuracy },
             contact_tolerance: w.contact_tolerance_m,
             drift_tolerance: base.drift_tolerance.max(w.contact_tolerance_m),
+            sleep: w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }),
             combine_friction: w.combine_friction,
             combine_restitution: w.combine_restitution,
             ..base

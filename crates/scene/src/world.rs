@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use thiserror::Error;
-use tumble_core::Combine;
+use tumble_core::{Combine, Sleep};
 use tumble_core::collide::ContactMode;
 
 use crate::bound::Bound;
@@ -161,6 +161,10 @@ pub struct WorldSettings {
     pub iterations: u32,
     /// `backtracking`: surfaces closer than this touch, and a rebound lower than this rests, metres. Default 1e-7.
     pub contact_tolerance_m: f64,
+    /// Islands that have been still for so long are left out of the steps, seconds. Default: never.
+    pub sleep_after_s: Option<f64>,
+    /// How far the furthest point of what is still may have moved in that time, metres. Default 1e-5.
+    pub sleep_within_m: f64,
     /// Restitution of a pair from those of its bodies. Default `min`.
     pub combine_restitution: Combine,
     /// Friction of a pair from those of its bodies. Default `geometric_mean`.
@@ -182,6 +186,8 @@ impl Default for WorldSettings {
             solver: Solver::GaussSeidel,
             iterations: 200,
             contact_tolerance_m: 1e-7,
+            sleep_after_s: None,
+            sleep_within_m: Sleep::default().within,
             combine_restitution: Combine::Min,
             combine_friction: Combine::GeometricMean,
             contacts: ContactMode::Surface,
@@ -192,6 +198,7 @@ impl Default for WorldSettings {
 const DT: Bound = Bound::new(1e-6, 1.0, "a time from 1e-6 to 1 s");
 const TOLERANCE: Bound = Bound::new(1e-9, 1.0, "a length from 1e-9 to 1 m");
 const ACCURACY: Bound = Bound::new(1e-14, 0.1, "a tolerance from 1e-14 to 0.1");
+const AFTER: Bound = Bound::new(1e-3, 1e6, "a time from 0.001 to 1e6 s");
 const SECONDS: Bound = Bound::new(0.0, 1e6, "a time from 0 to 1e6 s");
 
 impl WorldSettings {
@@ -208,6 +215,8 @@ impl WorldSettings {
             solver: f.choice_or("solver", Solver::NAMES, usual.solver),
             iterations: f.integer_or("iterations", 1..=100_000, usual.iterations),
             contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, usual.contact_tolerance_m),
+            sleep_after_s: f.optional_number("sleep_after_s", AFTER),
+            sleep_within_m: f.number_or("sleep_within_m", TOLERANCE, usual.sleep_within_m),
             combine_restitution: f.choice_or("combine_restitution", COMBINE, usual.combine_restitution),
             combine_friction: f.choice_or("combine_friction", COMBINE, usual.combine_friction),
             contacts: f.choice_or("contacts", CONTACTS, usual.contacts),

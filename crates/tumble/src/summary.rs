@@ -48,6 +48,7 @@ struct Body {
     name: String,
     position_m: [f64; 3],
     orientation_xyzw: [f64; 4],
+    asleep: bool,
 }
 
 /// Adds up the reports of a run.
@@ -171,6 +172,7 @@ fn bodies(world: &World) -> Vec<Body> {
             name: object.name().to_string(),
             position_m: site.position().into(),
             orientation_xyzw: site.pose.rotation.coords.into(),
+            asleep: world.asleep(id),
         })
     };
     world.ids().iter().filter_map(body).collect()

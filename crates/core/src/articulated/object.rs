@@ -212,6 +212,10 @@ impl Integratable for ArticulatedBody {
         self.dynamics.unwhiten(&mut self.working().scratch, du, dp);
     }
 
+    fn may_sleep(&self) -> bool {
+        true
+    }
+
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
         let sum = energy(&self.model, self.working().moved(&self.model, x), gravity);
         Energy { potential: sum.potential + self.spring_energy(x), ..sum }

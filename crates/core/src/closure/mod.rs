@@ -343,6 +343,11 @@ impl Object for Closure {
 }
 
 impl Constraint for Closure {
+    fn partners(&self, out: &mut Vec<ObjectId>) -> bool {
+        out.extend([&self.a, &self.b].into_iter().filter_map(|end| end.part).map(|(id, _)| id));
+        true
+    }
+
     fn rows(&self, _me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
         let (Some(a), Some(b)) = (End::of(&self.a, view), End::of(&self.b, view)) else { return };
         let pair = Pair { a, b };

@@ -34,7 +34,7 @@ impl Pairing {
             all.dof = span.v.end;
             crate::object::Integratable::write_initial(&body, &mut all.x[span.x.clone()]);
             let status = Status { mode, ..Status::default() };
-            let id = all.table.slots.insert(Entry { object: Box::new(body), span, status, serial: serial as u32 });
+            let id = all.table.slots.insert(Entry::new(Box::new(body), span, status, serial as u32));
             all.table.order.push(id);
             all.ids.push(id);
         }

@@ -54,7 +54,7 @@ impl Bench {
         let spans = [Span { x: 0..13, v: 0..6, site: 0..1 }, Span { x: 13..13, v: 6..6, site: 1..1 }];
         let objects: [Box<dyn Object>; 2] = [Box::new(body), Box::new(Spring)];
         for (serial, (object, span)) in (0..).zip(objects.into_iter().zip(spans)) {
-            let id = table.slots.insert(Entry { object, span, status: Status::default(), serial });
+            let id = table.slots.insert(Entry::new(object, span, Status::default(), serial));
             table.order.push(id);
         }
         Bench { table, x, sites: vec![Site::default()], forces: Forces::default(), applied: vec![Wrench::default()], held: vec![0.0; 6] }

@@ -15,9 +15,11 @@
 //! `θ_{k+1} = ½(1 + √(1 + 4θ_k²))`, and a restart whenever the sweep goes against the last move, `(y − λ_{k+1})·(λ_{k+1} − λ_k) > 0`
 //! (O'Donoghue and Candès, *Adaptive restart for accelerated gradient schemes*, 2015). Plain sweeps carry a load down a stack one
 //! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. With friction the problem is not convex and the
-//! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. High mass ratios stay slow; the residual says how far.
+//! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. What is slow even so (nearly redundant contacts, high mass ratios) is
+//! finished by Newton's method where an island is small (`newton.rs`); elsewhere the residual says how far.
 
 use super::linkage::{Linkages, Reach};
+use super::newton::Newton;
 use super::one_contact::{Contact, Symmetric};
 use super::six::Six;
 use super::{Accuracy, Outcome, RowSolver};
@@ -46,6 +48,7 @@ impl RowSolver for GaussSeidel {
         apply(&locals, &linkages, rows, c, lambda, du);
         let sweeps = accuracy.sweeps_of(locals.len());
         let mut momentum = Momentum::new(&locals, &linkages, du);
+        let mut newton = linkages.is_empty().then(|| Newton::new(&momentum));
         let mut outcome = Outcome { iterations: sweeps, converged: false, ray: false };
         for sweep in 1..=sweeps {
             let mut progress = Progress::default();
@@ -55,6 +58,12 @@ impl RowSolver for GaussSeidel {
             if progress.change <= accuracy.tolerance {
                 outcome = Outcome { iterations: sweep, converged: true, ray: false };
                 break;
+            }
+            if let Some(newton) = &mut newton
+                && newton.after(sweep, sweeps - sweep, progress.change, &mut locals, rows, &momentum, du)
+            {
+                momentum.renew(&locals, &linkages, rows, c, lambda, du);
+                continue;
             }
             if sweep < sweeps {
                 let plain = sweep > ACCELERATED || sweep + SETTLE >= sweeps;
@@ -102,13 +111,13 @@ fn apply(locals: &[Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: 
 }
 
 /// A block as the sweeps read it; of a scalar block only the first of each three numbers counts.
-struct Local<'a> {
-    block: &'a Block,
-    c: [f64; 3],
-    lambda: [f64; 3],
+pub(super) struct Local<'a> {
+    pub block: &'a Block,
+    pub c: [f64; 3],
+    pub lambda: [f64; 3],
     /// `λ` of the sweep before.
     last: [f64; 3],
-    step: Step,
+    pub step: Step,
     reach: Reach,
     six: Option<Six>,
 }
@@ -133,7 +142,7 @@ impl Progress {
 }
 
 /// The extrapolation between sweeps, over the stretches of `du` that the island acts on. Multipliers follow when it is their turn to be relaxed.
-struct Momentum {
+pub(super) struct Momentum {
     theta: f64,
     /// `β` of the sweep to come.
     beta: f64,
@@ -163,6 +172,23 @@ impl Momentum {
         });
         let last = stretches.iter().flat_map(|&(start, end)| &du[start as usize..end as usize]).copied().collect();
         Momentum { theta: 1.0, beta: 0.0, stretches, last }
+    }
+
+    /// How many freedoms the island has.
+    pub fn size(&self) -> usize {
+        self.last.len()
+    }
+
+    /// The place of a freedom of the island, given by its index in `du`, among those of the island.
+    pub fn place(&self, index: u32) -> usize {
+        let mut before = 0;
+        for &(start, end) in &self.stretches {
+            if index < end {
+                return (before + index - start) as usize;
+            }
+            before += end - start;
+        }
+        before as usize
     }
 
     fn extrapolate(&mut self, restart: bool, du: &mut [f64]) {
@@ -199,7 +225,7 @@ fn go_on(x: &mut f64, last: &mut f64, beta: f64) {
     *last = now;
 }
 
-enum Step {
+pub(super) enum Step {
     /// No response: no impulse.
     Dead,
     Scalar(Scalar),
@@ -207,13 +233,13 @@ enum Step {
 }
 
 /// A row by itself.
-struct Scalar {
+pub(super) struct Scalar {
     /// Its diagonal of `K + R`.
-    k: f64,
+    pub k: f64,
     inverse: f64,
-    compliance: f64,
-    lo: f64,
-    hi: f64,
+    pub compliance: f64,
+    pub lo: f64,
+    pub hi: f64,
 }
 
 impl Step {
@@ -300,6 +326,15 @@ impl<'a> Local<'a> {
                     }
                 }
             }
+        }
+    }
+
+    /// Brings the multipliers back to what they may be.
+    pub fn bound(&mut self) {
+        match &self.step {
+            Step::Dead => self.lambda = [0.0; 3],
+            Step::Scalar(scalar) => self.lambda[0] = clamp(self.lambda[0], scalar.lo, scalar.hi),
+            Step::Contact(contact) => self.lambda = contact.bounded(self.lambda),
         }
     }
 

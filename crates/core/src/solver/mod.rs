@@ -8,6 +8,7 @@ mod island;
 mod lcp;
 mod lemke;
 mod linkage;
+mod newton;
 mod one_contact;
 mod residual;
 mod six;

@@ -20,7 +20,7 @@ const SLIDE_STEPS: u32 = 12;
 
 /// A contact with what its own block of `K` gives.
 pub(super) struct Contact {
-    mu: f64,
+    pub mu: f64,
     /// Its own block of `K`.
     pub k: Symmetric,
     /// `K⁻¹`, absent where a direction has no response.
@@ -127,10 +127,16 @@ impl Contact {
     fn descend(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let normal = (old[0] - w[0] / self.k.m00).max(0.0);
         let dn = normal - old[0];
-        let t = [old[1] - self.rho * (w[1] + self.k.m10 * dn), old[2] - self.rho * (w[2] + self.k.m20 * dn)];
-        let (square, bound) = (t[0] * t[0] + t[1] * t[1], self.mu * normal);
+        self.bounded([normal, old[1] - self.rho * (w[1] + self.k.m10 * dn), old[2] - self.rho * (w[2] + self.k.m20 * dn)])
+    }
+
+    /// A normal multiplier of at least 0, and tangents shortened to the disc of `μ` times that.
+    #[inline(always)]
+    pub fn bounded(&self, [n, t1, t2]: [f64; 3]) -> [f64; 3] {
+        let n = n.max(0.0);
+        let (square, bound) = (t1 * t1 + t2 * t2, self.mu * n);
         let scale = if square > bound * bound { bound / square.sqrt() } else { 1.0 };
-        [normal, scale * t[0], scale * t[1]]
+        [n, scale * t1, scale * t2]
     }
 }
 

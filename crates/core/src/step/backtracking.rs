@@ -26,6 +26,7 @@ use super::impact::{self, Candidate};
 use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection, reach};
 use crate::detect::Touch;
+use crate::pair::Reach;
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
 use crate::rows::RowSet;
@@ -98,14 +99,14 @@ impl Stepper for Backtracking {
 impl Backtracking {
     /// Contacts, rows and smooth accelerations at the present state; overlap beyond the contact tolerance is projected out first.
     fn gather(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
-        detect(core, left, &mut self.work.touches);
+        detect(core, left, Reach::Relative, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = |t: &RowTarget| t.set == RowSet::HalfLine && off(t.error);
         if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
             projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance)?;
             core.motion().refresh();
-            detect(core, left, &mut self.work.touches);
+            detect(core, left, Reach::Relative, &mut self.work.touches);
         }
         let recovery = core.settings.recovery_speed * left;
         self.kept = reach::left(&self.work, |i| self.work.targets[i].error, recovery);
@@ -233,7 +234,7 @@ impl Backtracking {
     fn advance(&mut self, core: &mut Core, held: &[f64], left: f64) -> Result<f64, StepError> {
         core.held.copy_from_slice(held);
         self.adaptive.path.clear();
-        let start = core.x.clone();
+        let start = core.x.to_vec();
         let floor = core.settings.dt * FLOOR;
         let tolerance = core.settings.contact_tolerance;
         let mut bracket = Bracket::new(self.watch.nearest(&self.work.touches, tolerance));
@@ -292,7 +293,7 @@ impl Backtracking {
     /// full order, and forces and accelerations of its own. Where that one has not landed, because the two differ by more than the contact
     /// tolerance, the moment is corrected; if that does not help (or `f` is not known) the dense state stays. The time taken.
     fn settle(&mut self, core: &mut Core, h: f64, bracket: &Bracket, f: f64) -> Result<f64, StepError> {
-        let (dense, tolerance, time) = (core.x.clone(), core.settings.contact_tolerance, core.time);
+        let (dense, tolerance, time) = (core.x.to_vec(), core.settings.contact_tolerance, core.time);
         let deepest = core.report.max_penetration;
         let slope = bracket.slope(h, f);
         let (from, length) = (self.adaptive.path.before(h).0, self.adaptive.path.length(h));
@@ -322,7 +323,7 @@ impl Backtracking {
     /// The margin of the present state, `h` after the start of the sub-step: one try.
     fn margin(&mut self, core: &mut Core, h: f64) -> Result<f64, StepError> {
         core.report.tries += 1;
-        detect(core, 0.0, &mut self.after);
+        detect(core, 0.0, Reach::Relative, &mut self.after);
         limits(core, core.time + h, &mut self.limits_after)?;
         Ok(self.watch.margin(&self.work.touches, &self.after, &self.limits_after, core.settings.contact_tolerance))
     }

@@ -26,6 +26,7 @@ use super::{closing, hold, reach};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
 use crate::detect::Touch;
+use crate::pair::Reach;
 use crate::motion::coast;
 use crate::object::Level;
 use crate::rows::RowSet;
@@ -69,7 +70,7 @@ impl TimeStepping {
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
         core.implicit = true;
         self.smooth_forces(core, h)?;
-        detect(core, h, &mut self.work.touches);
+        detect(core, h, Reach::Each, &mut self.work.touches);
         flight::time_contacts(core, h, &mut self.work.touches);
         build_rows(core, &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
@@ -85,7 +86,7 @@ impl TimeStepping {
 
     /// Rate of momentum at the midpoint into `work.dp`; state and caches are left at the start.
     fn smooth_forces(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
-        self.x0.clone_from(&core.x);
+        core.x.clone_into(&mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
         let mut motion = core.motion();
@@ -93,7 +94,7 @@ impl TimeStepping {
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.take_off_coasting(&mut self.work.dp);
         core.check_finite(&self.work.dp)?;
-        let middle = core.x.clone();
+        let middle = core.x.to_vec();
         core.x.copy_from_slice(&self.x0);
         core.pin(middle);
         core.motion().refresh();
@@ -164,7 +165,7 @@ impl TimeStepping {
         push(core, &change);
         core.motion().refresh();
         let mut found = Vec::new();
-        detect(core, h, &mut found);
+        detect(core, h, Reach::Each, &mut found);
         core.x.copy_from_slice(&self.x0);
         core.motion().refresh();
         let work = &mut self.work;

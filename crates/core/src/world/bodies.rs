@@ -21,6 +21,7 @@ impl World {
 
     /// An object's constants, to be changed between steps. What of it is state lies in the world.
     pub fn get_mut<T: Object>(&mut self, id: ObjectId) -> Option<&mut T> {
+        self.core.wake(id);
         let object: &mut dyn std::any::Any = self.core.table.slots.get_mut(id)?.object.as_mut();
         object.downcast_mut()
     }
@@ -32,20 +33,28 @@ impl World {
 
     /// Switches an object between static, kinematic and dynamic.
     pub fn set_mode(&mut self, id: ObjectId, mode: Mode) -> Result<(), WorldError> {
+        self.core.wake(id);
         self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.mode = mode;
         Ok(())
     }
 
     /// Takes an object out of the world's doings, or back in; its state stays.
     pub fn set_alive(&mut self, id: ObjectId, alive: bool) -> Result<(), WorldError> {
+        self.core.wake(id);
         self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.alive = alive;
         Ok(())
     }
 
     /// Switches an object's collisions.
     pub fn set_collidable(&mut self, id: ObjectId, collidable: bool) -> Result<(), WorldError> {
+        self.core.wake(id);
         self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.collidable = collidable;
         Ok(())
+    }
+
+    /// Whether an object sleeps (see [`Sleep`](crate::Sleep)); what is done to it wakes it.
+    pub fn asleep(&self, id: ObjectId) -> bool {
+        self.view().asleep(id)
     }
 
     /// The site of one part: pose, velocity, acceleration.
@@ -61,13 +70,14 @@ impl World {
 
     /// Writes an object's slice of the state, all of it (see the object's type for what the numbers mean). Refused where it is no state of it.
     pub fn write_state_of(&mut self, id: ObjectId, x: &[f64]) -> Result<(), WorldError> {
+        self.core.wake(id);
         let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
         let accepted = |body: &dyn Integratable| x.len() == entry.span.x.len() && body.accepts(x);
         if !entry.object.integratable().is_some_and(accepted) {
             return Err(WorldError::BadState(entry.object.name().to_string()));
         }
         self.core.x[entry.span.x.clone()].copy_from_slice(x);
-        self.core.motion().refresh();
+        self.core.motion().refresh_one(id);
         Ok(())
     }
 
@@ -136,6 +146,7 @@ impl World {
     /// Applies an impulse (N·s) at a world point of one part, at once.
     pub fn apply_impulse(&mut self, id: ObjectId, part: usize, impulse: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[impulse, *point])?;
+        self.core.wake(id);
         let core = &mut self.core;
         let entry = &core.table.slots[id];
         let (Some(collidable), Some(body), true) = (entry.object.collidable(), entry.object.integratable(), entry.moves()) else { return Ok(()) };
@@ -145,7 +156,7 @@ impl World {
         let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
         body.unwhiten_rate(&du, &mut dp);
         body.kick(&mut core.x[entry.span.x.clone()], &dp, 1.0);
-        core.motion().refresh();
+        core.motion().refresh_one(id);
         Ok(())
     }
 
@@ -161,6 +172,7 @@ impl World {
     }
 
     fn edit_rigid(&mut self, id: ObjectId, edit: impl FnOnce(&RigidBody, &mut [f64])) -> Result<(), WorldError> {
+        self.core.wake(id);
         let core = &mut self.core;
         let entry = core.table.slots.get(id).ok_or(WorldError::Stale)?;
         let any: &dyn std::any::Any = entry.object.as_ref();
@@ -171,7 +183,7 @@ impl World {
             return Err(WorldError::BadState(entry.object.name().to_string()));
         }
         core.x[entry.span.x.clone()].copy_from_slice(&x);
-        core.motion().refresh();
+        core.motion().refresh_one(id);
         Ok(())
     }
 }

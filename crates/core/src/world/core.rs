@@ -1,9 +1,11 @@
 //! The inside of a world: what the steppers work on.
 
+use super::flat::State;
 use crate::detect::{Owner, Scratch, Touch, WarmStarts};
 use crate::motion::Motion;
 use crate::settings::{Settings, StepReport};
 use crate::site::{Forces, Site, Wrench};
+use crate::sleep::Sleepers;
 use crate::solver::RowSolver;
 use crate::view::{Entry, ObjectId, Table};
 use tumble_collide::{BroadPhase, Vec3};
@@ -83,7 +85,7 @@ pub struct ContactPoint {
 /// Everything of a world but its stepper.
 pub struct Core {
     pub(crate) table: Table,
-    pub(crate) x: Vec<f64>,
+    pub(crate) x: State,
     pub(crate) dof: usize,
     pub(crate) sites: Vec<Site>,
     pub(crate) owners: Vec<Owner>,
@@ -107,6 +109,7 @@ pub struct Core {
     pub(crate) contacts: Vec<ContactPoint>,
     pub(crate) report: StepReport,
     pub(crate) next_serial: u32,
+    pub(crate) sleepers: Sleepers,
     /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
     pub(crate) inner_step: f64,
 }
@@ -134,8 +137,8 @@ impl Core {
     }
 
     /// The state of the pinned caches.
-    pub(crate) fn pinned(&self) -> Option<&Vec<f64>> {
-        Some(&self.pinned.0).filter(|x| !x.is_empty())
+    pub(crate) fn pinned(&self) -> Option<&[f64]> {
+        Some(&self.pinned.0[..]).filter(|x| !x.is_empty())
     }
 
     /// The sites of the pinned caches; only those of what moves are there.

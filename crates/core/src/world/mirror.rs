@@ -55,6 +55,7 @@ impl World {
 
     /// Applies such a message (thesis `ReadData`). It is not trusted: what is no state of the object is refused.
     pub fn read_data(&mut self, id: ObjectId, data: &[u8]) -> Result<(), MirrorError> {
+        self.core.wake(id);
         let core = &mut self.core;
         let entry = core.table.slots.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.object.name().to_string();

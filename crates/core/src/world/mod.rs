@@ -1,12 +1,16 @@
 //! The world: objects in, frames out (the thesis's `Engine`, §IV.B).
 
 mod bodies;
+mod checkpoint;
 mod core;
+mod flat;
 mod mirror;
 mod pull;
 mod snapshot;
 
 pub use self::core::{ContactPoint, Core, StepError};
+pub use checkpoint::Checkpoint;
+pub use flat::StateHold;
 pub use mirror::MirrorError;
 pub use pull::Pull;
 pub use snapshot::SnapshotError;
@@ -16,6 +20,7 @@ use crate::object::{Energy, Momentum, Object};
 use crate::rigid::{BodyError, RigidBody};
 use crate::settings::{Settings, SettingsError, StepReport};
 use crate::site::{Dims, Forces, Site, Span, Wrench};
+use crate::sleep::Sleepers;
 use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{Frame, Stepper, TimeStepping};
 use crate::view::{Entry, Mode, ObjectId, Status, Table, WorldView};
@@ -93,10 +98,10 @@ impl World {
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
         let core = Core {
-            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), held_wrenches: Vec::new(), pinned: Default::default(),
+            table: Table::default(), x: Default::default(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), held_wrenches: Vec::new(), pinned: Default::default(),
             forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
-            report: StepReport::default(), next_serial: 0, inner_step: 0.0,
+            report: StepReport::default(), next_serial: 0, sleepers: Sleepers::default(), inner_step: 0.0,
         };
         Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new(), names: BTreeMap::new() })
     }
@@ -124,6 +129,7 @@ impl World {
     /// Changes the constants from the next step on.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), WorldError> {
         settings.validate()?;
+        self.core.wake_all();
         self.core.settings = settings;
         Ok(())
     }
@@ -131,15 +137,33 @@ impl World {
     /// Advances by one frame. On an error state and time are as they were before it; the forces applied for the frame are spent either way.
     pub fn step(&mut self) -> Result<&StepReport, StepError> {
         let core = &mut self.core;
-        core.report = StepReport::default();
-        core.let_go();
-        self.before.clone_from(&core.x);
+        core.wake_disturbed();
+        core.x.clone_into(&mut self.before);
         let (time, warm, inner_step) = (core.time, core.warm.clone(), core.inner_step);
-        let outcome = self.stepper.step(Frame { core });
+        let sites = if core.sleepers.groups.is_empty() { Vec::new() } else { core.sites.clone() };
+        let outcome = loop {
+            core.report = StepReport::default();
+            core.let_go();
+            core.detect_scratch.forget();
+            let outcome = self.stepper.step(Frame { core });
+            if outcome.is_err() || !core.stirred() {
+                break outcome;
+            }
+            core.x.copy_from_slice(&self.before);
+            core.unpin();
+            core.sites.clone_from(&sites);
+            (core.time, core.warm, core.inner_step) = (time, warm.clone(), inner_step);
+            core.motion().refresh();
+            core.wake_stirred();
+        };
+        if outcome.is_ok() {
+            core.fall_asleep();
+            core.report.asleep = core.table.iter().filter(|e| e.asleep).count() as u32;
+        }
         core.applied.fill(Wrench::default());
         core.applied_generalized.fill(0.0);
         if let Err(error) = outcome {
-            core.x.clone_from(&self.before);
+            core.x.copy_from_slice(&self.before);
             core.unpin();
             (core.time, core.warm, core.inner_step) = (time, warm, inner_step);
             core.sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
@@ -214,7 +238,7 @@ impl World {
     }
 
     fn moving(&self) -> impl Iterator<Item = (&[f64], &dyn crate::object::Integratable)> {
-        let moving = self.core.table.iter().filter(|e| e.moves());
+        let moving = self.core.table.iter().filter(|e| e.dynamic());
         moving.filter_map(|e| Some((&self.core.x[e.span.x.clone()], e.object.integratable()?)))
     }
 
@@ -254,12 +278,12 @@ impl World {
             v: core.dof..core.dof + dims.dof,
             site: core.sites.len()..core.sites.len() + dims.sites,
         };
-        core.x.resize(span.x.end, 0.0);
+        core.x.resize(span.x.end);
         if let Some(body) = object.integratable() {
             body.write_initial(&mut core.x[span.x.clone()]);
         }
         if core.x[span.x.clone()].iter().any(|x| !x.is_finite()) {
-            core.x.truncate(span.x.start);
+            core.x.resize(span.x.start);
             return Err(WorldError::NotFinite(name));
         }
         core.dof = span.v.end;
@@ -269,7 +293,7 @@ impl World {
         core.applied.resize(span.site.end, Wrench::default());
         let serial = core.next_serial;
         core.next_serial += 1;
-        let id = core.table.slots.insert(Entry { object, span: span.clone(), status: Status { mode, ..Status::default() }, serial });
+        let id = core.table.slots.insert(Entry::new(object, span.clone(), Status { mode, ..Status::default() }, serial));
         core.table.order.push(id);
         core.owners.extend((0..dims.sites).map(|part| Owner { id, part: part as u32, serial }));
         core.motion().refresh_one(id);
@@ -279,11 +303,12 @@ impl World {
 
     /// Removes an object and gives it back; its state goes, and the slices behind it move up.
     pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
+        self.core.wake(id);
         let core = &mut self.core;
         let gone = core.table.slots.remove(id).ok_or(WorldError::Stale)?;
         self.names.remove(gone.object.name());
         core.table.order.retain(|&other| other != id);
-        core.x.drain(gone.span.x.clone());
+        core.x.cut(gone.span.x.clone());
         core.sites.drain(gone.span.site.clone());
         core.owners.drain(gone.span.site.clone());
         core.applied.drain(gone.span.site.clone());
@@ -311,10 +336,10 @@ impl World {
         let c = &self.core;
         World {
             core: Core {
-                table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(),
+                table: c.table.clone(), x: c.x.fork(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(),
                 held: c.held.clone(), held_wrenches: c.held_wrenches.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
-                contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, inner_step: c.inner_step,
+                contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, sleepers: c.sleepers.clone(), inner_step: c.inner_step,
             },
             stepper: self.stepper.fork(),
             before: Vec::new(),

@@ -53,6 +53,7 @@ impl World {
     /// [`WorldError::Stale`], [`WorldError::NoPart`], [`WorldError::NotFinite`].
     pub fn pull(&mut self, pull: &Pull) -> Result<Wrench, WorldError> {
         let index = self.part(pull.id, pull.part, &[pull.point, pull.target, Vec3::repeat(pull.frequency)])?;
+        self.core.wake(pull.id);
         let entry = &self.core.table.slots[pull.id];
         let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pull.part)) else { return Ok(Wrench::default()) };
         let (site, dof, h) = (self.core.sites[index], entry.span.v.len(), self.core.settings.dt);

@@ -1,12 +1,13 @@
 //! Saving and restoring: everything that the next step reads, and nothing else.
 //!
-//! A snapshot is the state `X`, the switches, the sites' accelerations (objects may read them), the forces that users applied, the warm starts,
+//! A snapshot is the state `X`, the switches, who sleeps and since when who is still, the sites' accelerations (objects may read them), the forces that users applied, the warm starts,
 //! time and frame, and the adaptive integrator's inner step. Shapes, masses and settings are the scene's and are not in it: it is restored into
 //! a world of the same objects, which is checked by their names and sizes. The sweep order of the broad phase is left out because its pairs come sorted: no result depends on it.
 
 use super::World;
 use crate::detect::WarmStarts;
 use crate::site::Wrench;
+use crate::sleep::{Group, Sleepers, Still};
 use crate::view::Status;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Vec3;
@@ -32,7 +33,7 @@ pub enum SnapshotError {
     NotFinite,
 }
 
-const MAGIC: [u8; 8] = *b"tumbleS2";
+const MAGIC: [u8; 8] = *b"tumbleS3";
 /// Objects that a world may have seen, at most; frames are capped by its square.
 const MOST: u32 = 1 << 31;
 
@@ -52,6 +53,7 @@ struct Snapshot {
     warm: WarmStarts,
     /// Inner step of the adaptive integrator, s.
     inner_step: f64,
+    groups: Vec<Group>,
 }
 
 #[derive(Serialize, Deserialize, PartialEq)]
@@ -60,6 +62,8 @@ struct Saved {
     sizes: [u32; 3],
     serial: u32,
     status: Status,
+    asleep: bool,
+    still: Still,
 }
 
 impl Saved {
@@ -86,12 +90,13 @@ impl World {
             frame: c.frame,
             next_serial: c.next_serial,
             objects: self.inventory(),
-            x: c.x.clone(),
+            x: c.x.to_vec(),
             accelerations: c.sites.iter().map(|s| six(&s.angular_acceleration, &s.acceleration)).collect(),
             applied: c.applied.iter().map(|w| six(&w.torque, &w.force)).collect(),
             applied_generalized: c.applied_generalized.clone(),
             warm: c.warm.clone(),
             inner_step: c.inner_step,
+            groups: c.sleepers.groups.clone(),
         };
         postcard::to_stdvec(&snapshot).unwrap_or_default() // writing plain numbers to memory cannot fail
     }
@@ -100,16 +105,17 @@ impl World {
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
         let saved: Snapshot = postcard::from_bytes(bytes).map_err(|e| SnapshotError::Format(e.to_string()))?;
         if saved.magic != MAGIC {
-            return Err(SnapshotError::Format("the first eight bytes are not 'tumbleS2'".into()));
+            return Err(SnapshotError::Format("the first eight bytes are not 'tumbleS3'".into()));
         }
         self.check(&saved)?;
         let core = &mut self.core;
         (core.time, core.frame, core.next_serial, core.warm) = (saved.time, saved.frame, saved.next_serial, saved.warm);
         core.inner_step = saved.inner_step;
-        core.x = saved.x;
+        core.x.copy_from_slice(&saved.x);
         for (i, object) in saved.objects.iter().enumerate() {
             let entry = &mut core.table.slots[core.table.order[i]];
-            (entry.status, entry.serial) = (object.status, object.serial);
+            (entry.status, entry.serial, entry.asleep) = (object.status, object.serial, object.asleep);
+            entry.still.clone_from(&object.still);
             core.owners[entry.span.site.clone()].iter_mut().for_each(|o| o.serial = object.serial);
         }
         for (site, a) in core.sites.iter_mut().zip(&saved.accelerations) {
@@ -120,6 +126,7 @@ impl World {
             *wrench = Wrench { torque, force };
         }
         core.applied_generalized = saved.applied_generalized;
+        core.sleepers = Sleepers { groups: saved.groups, stirred: Vec::new() };
         core.contacts.clear();
         core.let_go();
         core.motion().refresh();
@@ -132,6 +139,8 @@ impl World {
             sizes: [e.span.x.len() as u32, e.span.v.len() as u32, e.span.site.len() as u32],
             serial: e.serial,
             status: e.status,
+            asleep: e.asleep,
+            still: e.still.clone(),
         };
         self.core.table.iter().map(saved).collect()
     }
@@ -156,6 +165,13 @@ impl World {
         let states = c.table.iter().all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.span.x.clone()])));
         if !(finite && states) {
             return Err(SnapshotError::NotFinite);
+        }
+        let mut members: Vec<u32> = saved.groups.iter().flat_map(|g| &g.members).copied().collect();
+        members.sort_unstable();
+        let still = saved.objects.iter().flat_map(|o| o.still.from.iter().flatten().chain([&o.still.since])).all(|x| x.is_finite());
+        let asleep = saved.objects.iter().filter(|o| o.asleep).map(|o| o.serial);
+        if !(still && saved.groups.iter().all(Group::sound) && asleep.eq(members)) {
+            return Err(SnapshotError::Format("its sleepers do not add up".into()));
         }
         let counts = saved.objects.is_sorted_by(|a, b| a.serial < b.serial) && saved.objects.iter().all(|o| o.serial < saved.next_serial);
         if counts && saved.next_serial < MOST && saved.frame < MOST as u64 * MOST as u64 && saved.warm.in_order() {

@@ -1,8 +1,8 @@
 //! The hash of what a facet has drawn. The server makes it of what it sent, a facet of the world it drew, read back after drawing: so it can differ.
 
-use super::quantise::{PER_M, nearest};
-use super::wire::{Hash, put_name, short};
+use super::wire::{Hash, put_name};
 use tumble_collide::Pose;
+use xxhash_rust::xxh3::xxh3_128;
 
 /// Collects what is seen, object by object.
 #[derive(Default)]
@@ -28,21 +28,19 @@ impl Drawn {
         put_name(&mut self.0, name);
     }
 
+    #[inline]
     pub fn alive(&mut self, alive: bool) {
         self.0.push(alive as u8);
     }
 
-    /// A pose as it is drawn: positions in the units in which they travel, rotations in the renderer's precision. Poses that differ as they
-    /// travel differ here.
+    /// A pose as it is drawn: positions as they are, rotations in the renderer's precision. Poses that differ as they travel differ here.
+    #[inline]
     pub fn pose(&mut self, pose: &Pose) {
-        let (p, q) = (pose.translation.vector, pose.rotation.coords);
-        let mut out = [0; 28];
-        for k in 0..3 {
-            out[4 * k..4 * k + 4].copy_from_slice(&nearest(p[k] * PER_M).to_le_bytes());
-        }
-        for k in 0..4 {
-            out[12 + 4 * k..16 + 4 * k].copy_from_slice(&(q[k] as f32).to_le_bytes());
-        }
+        let (p, q) = (&pose.translation.vector, &pose.rotation.coords);
+        let mut out = [0; 40];
+        let (position, rotation) = out.split_at_mut(24);
+        position.as_chunks_mut().0.iter_mut().zip(p.iter()).for_each(|(to, x)| *to = x.to_le_bytes());
+        rotation.as_chunks_mut().0.iter_mut().zip(q.iter()).for_each(|(to, x)| *to = (*x as f32).to_le_bytes());
         self.0.extend_from_slice(&out);
     }
 
@@ -52,8 +50,6 @@ impl Drawn {
 
     /// The hash; the memory is kept for the next.
     pub fn hash(self) -> (Hash, Drawn) {
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(&self.0);
-        (short(&hasher), self)
+        (xxh3_128(&self.0).to_le_bytes(), self)
     }
 }

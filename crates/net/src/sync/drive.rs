@@ -128,6 +128,16 @@ impl<L: ServerLink> Server<L> {
         self.session.standing(facet)
     }
 
+    /// What was counted about those who are no facet.
+    pub fn strangers(&self) -> LinkCounters {
+        self.link.strangers()
+    }
+
+    /// Notes when an input came that no facet sent, so that the picture that shows it is timed: see [`ServerSession::note_input`].
+    pub fn note_input(&mut self, user: u16, sequence: u64) {
+        self.session.note_input(self.now(), user, sequence);
+    }
+
     /// What was counted about a facet: here, by itself, and on its link.
     pub fn counts(&self, facet: FacetNumber) -> (SeatCounts, FacetCounts, LinkCounters) {
         let (here, there) = self.session.counts(facet);
@@ -223,7 +233,7 @@ impl<L: FacetLink> Facet<L> {
     /// # Errors
     /// The link's.
     pub fn send_input(&mut self, input: &Input) -> Result<bool, SessionError> {
-        let sent = self.session.send_input(input);
+        let sent = self.session.send_input(self.now(), input);
         self.flush().map(|()| sent)
     }
 

@@ -63,7 +63,7 @@ impl Refusal {
 }
 
 /// READY and PRESENTED: what a facet has drawn or shown. The frame is in the header.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Done {
     /// Hash of what it applied and drew.
     pub hash: Hash,
@@ -71,14 +71,23 @@ pub struct Done {
     pub image: Hash,
     /// READY: from the arrival of the state to the end of drawing. PRESENTED: from there to being shown. µs, saturating.
     pub took_us: u32,
+    /// From when the facet sent the newest of its inputs that the picture is the first to show, to showing it, µs, saturating; `None` in READY, and where there is none.
+    pub input_us: Option<u32>,
+    /// When the state (READY) or PRESENT (PRESENTED; in `latest` the state) came, µs by the facet's own clock; `None`: something else stood for it.
+    pub heard_us: Option<u64>,
+    /// When the frame was drawn (READY) or shown (PRESENTED), µs by the facet's own clock.
+    pub at_us: u64,
 }
 
 impl Done {
-    /// Appends it: 36 bytes.
+    /// Appends it: 56 bytes. What there is not travels as the largest number.
     pub fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.hash);
         out.extend(self.image);
         out.extend(self.took_us.to_le_bytes());
+        out.extend(self.input_us.unwrap_or(u32::MAX).to_le_bytes());
+        out.extend(self.heard_us.unwrap_or(u64::MAX).to_le_bytes());
+        out.extend(self.at_us.to_le_bytes());
     }
 
     /// Reads it.
@@ -87,7 +96,9 @@ impl Done {
     /// [`Fault::Malformed`].
     pub fn read(payload: &[u8]) -> Result<Done, Fault> {
         let mut rest = Bytes(payload);
-        let done = Done { hash: rest.array()?, image: rest.array()?, took_us: rest.u32()? };
+        let (hash, image, took_us) = (rest.array()?, rest.array()?, rest.u32()?);
+        let (input_us, heard_us, at_us) = (Some(rest.u32()?).filter(|us| *us < u32::MAX), Some(rest.u64()?).filter(|us| *us < u64::MAX), rest.u64()?);
+        let done = Done { hash, image, took_us, input_us, heard_us, at_us };
         rest.end()?;
         Ok(done)
     }

@@ -27,6 +27,10 @@ pub struct Mirror {
     base: World,
     world: World,
     slots: Vec<Slot>,
+    /// How many of them do not stand still.
+    moving: usize,
+    /// Memory for the poses of a frame.
+    poses: Vec<Pose>,
     revision: Option<u32>,
     viewer: Viewer,
     frame: u64,
@@ -38,7 +42,7 @@ impl Mirror {
     /// `base`: the world as the scene file makes it.
     pub fn new(base: World) -> Mirror {
         let world = base.fork();
-        Mirror { base, world, slots: Vec::new(), revision: None, viewer: Viewer::default(), frame: 0, table: [0; 16], scratch: Drawn::default() }
+        Mirror { base, world, slots: Vec::new(), moving: 0, poses: Vec::new(), revision: None, viewer: Viewer::default(), frame: 0, table: [0; 16], scratch: Drawn::default() }
     }
 
     /// What is to be drawn.
@@ -87,6 +91,7 @@ impl Mirror {
         for entry in &snapshot.entries {
             slots.push(self.slot(&mut world, entry)?);
         }
+        self.moving = slots.iter().filter(|slot| !slot.still).count();
         (self.world, self.slots, self.revision) = (world, slots, Some(snapshot.revision));
         self.hash_table();
         Ok(())
@@ -143,21 +148,18 @@ impl Mirror {
     /// # Errors
     /// [`Fault::Malformed`], [`Fault::Unfit`]; nothing has changed then.
     pub fn apply_state(&mut self, frame: u64, time_s: f64, payload: &[u8]) -> Result<(), Fault> {
-        parse_state(payload)?.2.try_for_each(|record| record.map(drop))?;
-        let (revision, count, records) = parse_state(payload)?;
+        let (revision, count, mut records) = parse_state(payload)?;
         if Some(revision) != self.revision {
             return Err(Fault::Unfit(format!("list of objects {revision}; here is {:?}", self.revision)));
         }
-        let moving: Vec<usize> = (0..self.slots.len()).filter(|&i| !self.slots[i].still).collect();
-        if count as usize != moving.len() {
+        if count as usize != self.moving {
             return Err(Fault::Malformed("not as many objects as move"));
         }
         let (mut viewer, mut told) = (None, Vec::new());
-        let mut poses = Vec::with_capacity(self.slots.iter().map(|slot| slot.parts as usize).sum()); // of our own list
-        let mut shown = Vec::with_capacity(moving.len());
-        for (record, &wanted) in records.zip(&moving) {
-            let (index, body) = record?;
-            let slot = &self.slots[wanted];
+        let (mut poses, mut shown) = (std::mem::take(&mut self.poses), Vec::with_capacity(self.moving));
+        poses.clear();
+        for (wanted, slot) in self.slots.iter().enumerate().filter(|(_, slot)| !slot.still) {
+            let (index, body) = records.next().ok_or(Fault::Malformed("it ends too early"))??;
             match (slot.id, slot.kind) {
                 _ if index != wanted => return Err(Fault::Malformed("objects out of order")),
                 (None, _) => viewer = Some(Viewer::read(body)?),
@@ -170,6 +172,7 @@ impl Mirror {
                 }
             }
         }
+        records.next().map_or(Ok(()), |more| more.map(drop))?; // what follows the last
         let viewer = viewer.ok_or(Fault::Malformed("no viewer"))?;
         self.tell(&told)?;
         for (id, range) in shown {
@@ -182,7 +185,7 @@ impl Mirror {
             }
         }
         self.world.show_time(time_s);
-        (self.viewer, self.frame) = (viewer, frame);
+        (self.viewer, self.frame, self.poses) = (viewer, frame, poses);
         Ok(())
     }
 

@@ -75,12 +75,12 @@ pub mod wire;
 
 pub use drive::{Facet, Server, SessionError};
 pub use facet::{FacetOptions, FacetSession, Over, Task, Waiting};
-pub use input::Input;
+pub use input::{Input, MAX_KEYS};
 pub use local::Hub;
 pub use messages::FacetCounts;
 pub use mirror::Mirror;
 pub use publisher::{PublishError, Publisher};
 pub use recording::{Recorded, Replay, ReplayError, ReplayFrame, SessionRecorder};
 pub use scene_hash::scene_hash;
-pub use server::{Pace, Seat, SeatCounts, ServerEvent, ServerOptions, ServerSession, Standing};
+pub use server::{FrameTimes, Pace, Seat, SeatCounts, ServerEvent, ServerOptions, ServerSession, Standing};
 pub use viewer::{User, VIEWER_NAME, Viewer};

@@ -100,7 +100,7 @@ impl Publisher {
         }
         let mut drawn = std::mem::take(&mut self.scratch).frame(frame, world.time(), self.table);
         let moving = self.rows.iter().filter(|row| !row.still).count() + 1;
-        let mut state = Vec::with_capacity(8 + 28 * moving);
+        let mut state = Vec::with_capacity(1024 + 28 * self.rows.iter().map(|row| row.parts.max(1)).sum::<usize>());
         put_state_head(&mut state, self.revision, moving);
         let mut saturated = 0;
         for (index, row) in self.rows.iter().enumerate().filter(|(_, row)| !row.still) {

@@ -31,28 +31,28 @@ const SCALE: f64 = std::f64::consts::SQRT_2 * N as f64;
 const MASK: u64 = (1 << 20) - 1;
 
 /// Appends a finite pose; whether its position fitted.
+#[inline]
 pub fn put_pose(out: &mut Vec<u8>, pose: &Pose) -> bool {
     let position = pose.translation.vector;
     let mut bytes = [0; POSE_BYTES];
-    for k in 0..3 {
-        let units = nearest(position[k] * PER_M);
-        bytes[4 * k..4 * k + 4].copy_from_slice(&units.to_le_bytes());
-    }
+    bytes.as_chunks_mut().0.iter_mut().zip(position.iter()).for_each(|(to, x)| *to = nearest(x * PER_M).to_le_bytes());
     bytes[12..].copy_from_slice(&pack(&pose.rotation).to_le_bytes());
     out.extend_from_slice(&bytes);
     position.amax() <= MOST_M
 }
 
 /// Reads a pose.
+#[inline]
 pub(crate) fn get_pose(bytes: &[u8; POSE_BYTES]) -> Result<Pose, Fault> {
-    let units = |k: usize| i32::from_le_bytes([bytes[k], bytes[k + 1], bytes[k + 2], bytes[k + 3]]) as f64 * (1.0 / PER_M);
-    let mut packed = [0; 8];
-    packed.copy_from_slice(&bytes[12..]);
-    let rotation = unpack(u64::from_le_bytes(packed)).ok_or(Fault::Malformed("a rotation that is none"))?;
-    Ok(Pose::from_parts(Vec3::new(units(0), units(4), units(8)).into(), rotation))
+    let [x, y, z, low, high] = *bytes.as_chunks().0 else { return Err(Fault::Malformed("a pose of another length")) };
+    let metres = |units: [u8; 4]| f64::from(i32::from_le_bytes(units)) * (1.0 / PER_M);
+    let packed = u64::from(u32::from_le_bytes(high)) << 32 | u64::from(u32::from_le_bytes(low));
+    let rotation = unpack(packed).ok_or(Fault::Malformed("a rotation that is none"))?;
+    Ok(Pose::from_parts(Vec3::new(metres(x), metres(y), metres(z)).into(), rotation))
 }
 
 /// The nearest whole number (of two the even one), saturating: adding 1.5·2⁵² leaves no room for a fraction.
+#[inline]
 pub(crate) fn nearest(x: f64) -> i32 {
     const ROOM: f64 = 6_755_399_441_055_744.0;
     (x.clamp(i32::MIN as f64, i32::MAX as f64) + ROOM - ROOM) as i32
@@ -60,10 +60,16 @@ pub(crate) fn nearest(x: f64) -> i32 {
 
 fn pack(rotation: &Quat) -> u64 {
     let c = rotation.coords;
-    let left_out = c.iamax();
-    let scale = if c[left_out] < 0.0 { -SCALE } else { SCALE };
-    let packed = |packed: u64, &k: &usize| packed << 20 | (nearest(scale * c[k]).clamp(-N, N) + N) as u64;
-    OTHERS[left_out].iter().fold(left_out as u64, packed)
+    let (mut left_out, mut largest) = (0, c[0]);
+    for k in 1..4 {
+        if c[k].abs() > largest.abs() {
+            (left_out, largest) = (k, c[k]);
+        }
+    }
+    let scale = if largest < 0.0 { -SCALE } else { SCALE };
+    let field = |k: usize| (nearest(scale * c[k & 3]).clamp(-N, N) + N) as u64;
+    let [a, b, d] = OTHERS[left_out];
+    (left_out as u64) << 60 | field(a) << 40 | field(b) << 20 | field(d)
 }
 
 fn unpack(packed: u64) -> Option<Quat> {
@@ -75,12 +81,10 @@ fn unpack(packed: u64) -> Option<Quat> {
         return None;
     }
     let largest = rest.sqrt();
-    let (x, y, z, w) = match left_out {
-        0 => (largest, a, b, d),
-        1 => (a, largest, b, d),
-        2 => (a, b, largest, d),
-        3 => (a, b, d, largest),
-        _ => return None,
-    };
-    Some(Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)))
+    // chosen and not stored: a vector that is written in parts and read whole stalls
+    let x = if left_out == 0 { largest } else { a };
+    let y = if left_out == 0 { a } else if left_out == 1 { largest } else { b };
+    let z = if left_out < 2 { b } else if left_out == 2 { largest } else { d };
+    let w = if left_out == 3 { largest } else { d };
+    (left_out < 4).then(|| Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)))
 }

@@ -4,7 +4,6 @@ mod damage;
 mod hostile;
 mod inputs;
 mod kill;
-mod links;
 mod outside;
 mod recover;
 mod roundtrip;

@@ -140,6 +140,20 @@ fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
     }
 }
 
+/// Two frozen facets: that of the server that was told to wait less is given up first.
+#[test]
+fn silence_is_as_long_as_was_said() {
+    let (mut usual, mut short) = (Cave::new("usual", 1), Cave::new("short", 1));
+    short.server = short.server.silent_after(Duration::from_millis(300));
+    let end = Instant::now() + Duration::from_secs(20);
+    while short.at_server.is_empty() {
+        short.look_in_on_server();
+        usual.look_in_on_server();
+        assert!(Instant::now() < end && usual.at_server.is_empty());
+    }
+    assert_eq!(short.at_server.pop().map(|(facet, event, _)| (facet, event)), Some((0, LinkEvent::Closed(Closed::Silent))));
+}
+
 #[test]
 fn a_server_started_again_in_the_same_run_is_found() {
     let mut cave = Cave::new("again", 2);

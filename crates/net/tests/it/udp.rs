@@ -153,9 +153,7 @@ fn a_bad_network_delivers_each_frame_once_in_order_and_soon_full_length() {
         let long = if length > 16 << 10 { 10_000 } else { 100_000 };
         let outcome = stream(frames(2_000, long), length, seed, BAD, Numbering::default());
         assert!(outcome.quantile(0.999) < Duration::from_millis(12), "{length}: {:?}", outcome.quantile(0.999));
-        // Around 400 bytes and their answer stand 200 of headers and seals: no redundancy could be paid, and none is sent.
-        let most = if length < 1024 { 1.75 } else { 1.6 };
-        assert!(outcome.ratio <= most, "{length}: {}", outcome.ratio);
+        assert!(outcome.ratio <= 1.6, "{length}: {}", outcome.ratio);
     }
 }
 
@@ -163,8 +161,8 @@ fn a_bad_network_delivers_each_frame_once_in_order_and_soon_full_length() {
 fn a_quiet_network_carries_little_more_than_the_messages() {
     let quiet = Faults { delay_s: 0.0002, ..Faults::default() };
     let outcome = stream(500, 16 << 10, 4, quiet, Numbering::default());
-    // 15 fragments with 54 bytes around each, three acknowledgements of 75 and one answer of about 100 bytes.
-    assert!(outcome.ratio < 1.0 + (15.0 * 54.0 + 3.0 * 75.0 + 2.0 * 110.0) / 16384.0, "{}", outcome.ratio);
+    // 15 fragments with 44 bytes around each, three acknowledgements of 48 and one answer of 63 bytes.
+    assert!(outcome.ratio < 1.0 + (15.0 * 44.0 + 3.0 * 48.0 + 63.0) / 16384.0, "{}", outcome.ratio);
     assert_eq!(outcome.quantile(1.0), Duration::from_micros(200));
 }
 

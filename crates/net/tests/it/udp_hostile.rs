@@ -18,7 +18,7 @@ const QUIET: Faults = Faults { loss: 0.0, reorder: 0.0, duplicate: 0.0, flip: 0.
 fn mend(datagram: &mut [u8]) {
     let mut crc = u32::MAX;
     for (at, byte) in datagram.iter().enumerate() {
-        if (6..10).contains(&at) {
+        if (5..9).contains(&at) {
             continue;
         }
         crc ^= u32::from(*byte);
@@ -26,7 +26,7 @@ fn mend(datagram: &mut [u8]) {
             crc = crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 };
         }
     }
-    datagram[6..10].copy_from_slice(&(!crc).to_le_bytes());
+    datagram[5..9].copy_from_slice(&(!crc).to_le_bytes());
 }
 
 fn changed(datagram: &[u8], change: impl FnOnce(&mut Vec<u8>), mended: bool) -> Vec<u8> {
@@ -41,8 +41,8 @@ fn changed(datagram: &[u8], change: impl FnOnce(&mut Vec<u8>), mended: bool) -> 
 /// What an attacker on the path makes of a genuine sealed packet, and why it must be refused.
 fn attacks(genuine: &[u8], random: &mut Random) -> Vec<(Refused, Vec<u8>)> {
     let bit = |random: &mut Random, from: usize| (from + random.below(genuine.len() - from), 1u8 << random.below(8));
-    let (at, mask) = bit(random, 26);
-    let (covered, covered_mask) = [bit(random, 18), (18 + random.below(8), 1)][random.below(2)];
+    let (at, mask) = bit(random, 17);
+    let (covered, covered_mask) = [bit(random, 13), (13 + random.below(4), 1)][random.below(2)];
     let cut = random.below(genuine.len());
     vec![
         (Refused::Replayed, genuine.to_vec()),
@@ -51,10 +51,10 @@ fn attacks(genuine: &[u8], random: &mut Random) -> Vec<(Refused, Vec<u8>)> {
         (Refused::Oversize, changed(genuine, |d| d.resize(1201, 0), false)),
         (Refused::Torn, changed(genuine, |d| d[at] ^= mask, false)),
         // A new number or other bytes under a good checksum. A number that was taken is refused as a replay before the seal is looked at.
-        (Refused::Forged, changed(genuine, |d| d[covered.max(26)] ^= covered_mask, true)).fresh(),
-        (Refused::Foreign, changed(genuine, |d| d[2] = packet::VERSION + 1, true)),
+        (Refused::Forged, changed(genuine, |d| d[covered.max(17)] ^= covered_mask, true)).fresh(),
+        (Refused::Foreign, changed(genuine, |d| d[2] = (packet::VERSION + 1) << 4 | d[2] & 15, true)),
         (Refused::Foreign, changed(genuine, |d| d[0] ^= 1, true)),
-        (Refused::Stale, changed(genuine, |d| d[10] ^= 1, true)),
+        (Refused::Stale, changed(genuine, |d| d[9] ^= 1, true)),
     ]
 }
 
@@ -65,8 +65,8 @@ trait Fresh {
 impl Fresh for (Refused, Vec<u8>) {
     /// Under the number after next: not taken yet, so that only the seal can tell.
     fn fresh(mut self) -> Self {
-        let sequence = u64::from_le_bytes(self.1[18..26].try_into().unwrap());
-        self.1[18..26].copy_from_slice(&(sequence + 1000).to_le_bytes());
+        let sequence = u32::from_le_bytes(self.1[13..17].try_into().unwrap());
+        self.1[13..17].copy_from_slice(&(sequence + 1000).to_le_bytes());
         mend(&mut self.1);
         self
     }
@@ -155,7 +155,7 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
             answered += reply.len();
         });
         // Data of unknown sessions: the shortest that is taken for a packet.
-        packet::begin(&mut datagram, Header { kind: Kind::Data, session: random.next_u64(), sequence: 1 });
+        packet::begin(&mut datagram, Header { kind: Kind::Data, session: random.next_u64() as u32 | 1, sequence: 1 });
         datagram.push(0);
         handshake.tag(&mut datagram);
         server.receive(now, from, &datagram);
@@ -241,17 +241,16 @@ fn a_million_random_packets_per_parser_full_length() {
             if packet::parse(&noise).is_ok() {
                 let _ = (Hello::read(&noise, &handshake), Reply::read(&noise, &handshake));
             }
-            if round == 0 && noise.len() >= 42 && noise.len() <= 1200 {
+            if round == 0 && noise.len() >= 33 && noise.len() <= 1200 {
                 let length = (noise.len() as u16).to_le_bytes();
-                noise[..6].copy_from_slice(&[0x74, 0xdb, 1, 1 + (k % 6) as u8, length[0], length[1]]);
+                noise[..5].copy_from_slice(&[0x74, 0xdb, packet::VERSION << 4 | (1 + k % 6) as u8, length[0], length[1]]);
                 mend(&mut noise);
             }
         }
         // Sealed: first bytes that are frames, so that the noise goes deep.
         noise.truncate(1100);
-        if let [kind, channel, rest @ ..] = &mut noise[..] {
-            *kind = 1 + (k % 5) as u8;
-            *channel %= 2;
+        if let [kind, rest @ ..] = &mut noise[..] {
+            *kind = 1 + (k % 6) as u8 + 16 * (*kind & 1);
             // Small numbers, so that they meet.
             rest.iter_mut().take(12).enumerate().for_each(|(at, byte)| *byte = if at % 4 > 0 { 0 } else { *byte & 31 });
         }

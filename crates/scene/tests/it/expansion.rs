@@ -26,6 +26,7 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
     assert_eq!(scene.world.dt_s, 1.0 / 240.0);
     assert_eq!((scene.world.substeps, scene.world.iterations), (1, 200));
     assert_eq!((scene.world.seconds, scene.world.contact_tolerance_m), (5.0, 1e-7));
+    assert_eq!((scene.world.sleep_after_s, scene.world.sleep_within_m), (None, 1e-5));
     assert_eq!(scene.world.stepper, Stepper::TimeStepping);
     assert_eq!(scene.world.integrator, Integrator::Verlet);
     assert_eq!(scene.world.solver, Solver::GaussSeidel);
@@ -41,7 +42,7 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
 fn every_word_of_the_world() {
     let scene = read(
         "[world]\nstepper = \"backtracking\"\nintegrator = \"dormand_prince\"\nintegrator_tolerance = 1e-9\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
-         seconds = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"max\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\n",
+         seconds = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"max\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\n",
     );
     let world = scene.world;
     assert_eq!(
@@ -50,6 +51,7 @@ fn every_word_of_the_world() {
     );
     assert_eq!((world.substeps, world.iterations, world.seconds), (4, 7, 2.0));
     assert_eq!(world.integrator_tolerance, 1e-9);
+    assert_eq!((world.sleep_after_s, world.sleep_within_m), (Some(0.25), 1e-6));
     assert_eq!((world.contact_tolerance_m, world.gravity_m_per_s2), (1e-5, [1.0, 2.0, 3.0]));
     assert_eq!((world.combine_restitution, world.combine_friction), (Combine::Max, Combine::Product));
 }

@@ -4,6 +4,7 @@ use super::super::input::Input;
 use super::super::messages::{Done, FacetCounts, Join, Refusal, count};
 use super::super::transport::FacetNumber;
 use super::super::wire::{Fault, Hash, Header, Kind, VERSION, later, open};
+use super::times::Clock;
 use super::{MAX_RETIRED, Pace, ServerEvent, ServerSession, Stage, Standing, hex};
 use std::time::Duration;
 
@@ -46,11 +47,11 @@ impl ServerSession {
         place.heard = now;
         match header.kind {
             Kind::Ready => self.on_ready(now, facet, header.frame, Done::read(payload)?),
-            Kind::Presented => self.on_presented(facet, header.frame, Done::read(payload)?),
-            Kind::Resync => self.send_all_again(facet),
+            Kind::Presented => self.on_presented(now, facet, header.frame, Done::read(payload)?),
+            Kind::Resync => self.send_all_again(now, facet),
             Kind::Beat => place.told = FacetCounts::read(payload)?,
             Kind::Leave => self.gone(facet, true),
-            Kind::Input => self.on_input(facet, Input::read(payload)?),
+            Kind::Input => self.on_input(now, facet, Input::read(payload)?),
             _ => return Err(Fault::Malformed("a kind that only servers send")),
         }
         Ok(())
@@ -67,7 +68,7 @@ impl ServerSession {
             }
             place.heard = now;
             if !place.synced {
-                self.send_all_again(facet);
+                self.send_all_again(now, facet);
             }
             return;
         }
@@ -84,9 +85,10 @@ impl ServerSession {
         (place.standing, place.join, place.exact, place.heard, place.sent) = (Standing::Following, join, wanted.exact, now, now);
         (place.synced, place.ready, place.presented, place.told) = (false, None, None, FacetCounts::default());
         place.inputs.clear();
+        (place.clock, place.asked_state, place.asked_present) = (Clock::default(), None, None);
         count(&mut place.counts.joined);
         self.tell(ServerEvent::Joined(facet));
-        self.send_all_again(facet);
+        self.send_all_again(now, facet);
     }
 
     /// Why a facet cannot be let in.
@@ -128,17 +130,18 @@ impl ServerSession {
             if !right {
                 count(&mut place.counts.mismatched);
             }
+            self.time_ready(now, facet as usize, frame, &done);
             self.tell(ServerEvent::Ready(facet, frame, done, right));
         }
         let at_the_barrier = self.frame == Some(frame) && matches!(self.stage, Stage::Ready(_));
         self.turn(now);
         // who comes when the frame has been shown, or asks again, is answered by itself
         if !at_the_barrier && self.places[facet as usize].presented != Some(frame) {
-            self.send_present(vec![facet], frame);
+            self.send_present(now, vec![facet], frame);
         }
     }
 
-    pub(super) fn on_presented(&mut self, facet: FacetNumber, frame: u64, done: Done) {
+    pub(super) fn on_presented(&mut self, now: Duration, facet: FacetNumber, frame: u64, done: Done) {
         let place = &self.places[facet as usize];
         let right = self.check(place.exact, frame, &done.hash);
         let latest = self.options.pace == Pace::Latest;
@@ -156,10 +159,11 @@ impl ServerSession {
         if !right && latest {
             count(&mut place.counts.mismatched);
         }
+        self.time_presented(now, facet as usize, frame, &done);
         self.tell(ServerEvent::Presented(facet, frame, done, right));
     }
 
-    pub(super) fn on_input(&mut self, facet: FacetNumber, input: Input) {
+    pub(super) fn on_input(&mut self, now: Duration, facet: FacetNumber, input: Input) {
         let place = &mut self.places[facet as usize];
         if let Some(&newest) = place.inputs.get(&input.user)
             && !later(input.sequence, newest)
@@ -167,6 +171,7 @@ impl ServerSession {
             return count(if input.sequence == newest { &mut place.counts.duplicate } else { &mut place.counts.stale });
         }
         place.inputs.insert(input.user, input.sequence);
+        self.times.input(now, input.user, input.sequence);
         self.tell(ServerEvent::Input(facet, input));
     }
 

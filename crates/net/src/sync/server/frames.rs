@@ -6,6 +6,7 @@ use super::super::recording::Recorded;
 use super::super::transport::FacetNumber;
 use super::super::viewer::Viewer;
 use super::super::wire::{HEADER_BYTES, Hash, Kind, message};
+use super::times::ask;
 use super::{Pace, Place, SeatCounts, ServerEvent, ServerSession, Stage, Standing};
 use std::sync::Arc;
 use std::time::Duration;
@@ -32,6 +33,7 @@ impl ServerSession {
             self.time_s = world.time();
             self.take(exact, frame, list, &published.state, published.hash);
         }
+        self.begin_times(frame, Some(viewer));
         self.send_frame(now, frame);
         Ok(frame)
     }
@@ -41,7 +43,14 @@ impl ServerSession {
         self.give_up();
         self.time_s = recorded.time_s;
         self.take(false, recorded.frame, recorded.snapshot.clone(), &recorded.state, recorded.hash);
+        self.begin_times(recorded.frame, None);
         self.send_frame(now, recorded.frame);
+    }
+
+    fn begin_times(&mut self, frame: u64, viewer: Option<&Viewer>) {
+        if let Some(times) = self.times.publish(frame, viewer) {
+            self.tell(ServerEvent::Shown(times));
+        }
     }
 
     /// The frame published last, as a recording keeps it; `fresh`: with its list of objects even if that is an old one.
@@ -83,6 +92,7 @@ impl ServerSession {
         }
         for place in self.places.iter_mut().filter(|p| p.standing != Standing::Absent) {
             place.sent = now;
+            ask(&mut place.asked_state, frame, now);
             if first && place.standing == Standing::Following {
                 place.standing = Standing::InStep;
             }
@@ -107,7 +117,7 @@ impl ServerSession {
                 self.leave_behind(frame, |p| p.ready == Some(frame), |counts| &mut counts.late);
                 let to: Vec<FacetNumber> = self.there().filter(|(_, p)| p.ready == Some(frame)).map(|(k, _)| k).collect();
                 self.stage = Stage::Presented(now);
-                self.send_present(to, frame);
+                self.send_present(now, to, frame);
             }
             Stage::Presented(since) => {
                 if !self.waited_for().all(|p| p.presented == Some(frame)) && now < since.saturating_add(self.options.ready_after) {
@@ -115,6 +125,9 @@ impl ServerSession {
                 }
                 self.leave_behind(frame, |p| p.presented == Some(frame), |counts| &mut counts.missing);
                 self.stage = Stage::Idle;
+                if let Some(times) = self.times.finish(frame) {
+                    self.tell(ServerEvent::Shown(times));
+                }
                 self.tell(ServerEvent::Finished(frame));
             }
         }

@@ -15,6 +15,9 @@
 mod answers;
 mod frames;
 mod sending;
+mod times;
+
+pub use times::FrameTimes;
 
 use super::input::Input;
 use super::messages::{Done, FacetCounts};
@@ -24,6 +27,7 @@ use super::wire::{Hash, Kind, message};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
+use times::{Asked, Clock, Times};
 use tumble_core::World;
 
 /// When a frame is shown.
@@ -131,6 +135,8 @@ pub enum ServerEvent {
     Presented(FacetNumber, u64, Done, bool),
     /// A frame went on without a facet.
     Late(FacetNumber, u64),
+    /// When a frame was shown, of those who showed it. In lockstep just before `Finished`, in `latest` some frames later.
+    Shown(FrameTimes),
     /// A frame has been shown by all who were waited for.
     Finished(u64),
     /// What a user did.
@@ -168,6 +174,9 @@ struct Place {
     counts: SeatCounts,
     told: FacetCounts,
     inputs: std::collections::BTreeMap<u16, u64>,
+    clock: Clock,
+    asked_state: Asked,
+    asked_present: Asked,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -202,6 +211,7 @@ pub struct ServerSession {
     events: VecDeque<ServerEvent>,
     close: Vec<FacetNumber>,
     ended: bool,
+    times: Times,
 }
 
 impl ServerSession {
@@ -211,14 +221,14 @@ impl ServerSession {
         options.history = options.history.clamp(1, 1024);
         let place = |seat: &Seat| Place {
             seat: seat.clone(), standing: Standing::Absent, join: 0, retired: VecDeque::new(), exact: false, heard: Duration::ZERO, sent: Duration::ZERO,
-            synced: false, ready: None, presented: None, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(),
+            synced: false, ready: None, presented: None, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(), clock: Clock::default(), asked_state: None, asked_present: None,
         };
         let places = options.seats.iter().map(place).collect();
         let stream = |exact| Stream { publisher: Publisher::new(base, exact, 0), snapshot: Arc::default(), listed: None, state: Arc::default(), hashes: VecDeque::new() };
         let next = options.first_frame;
         ServerSession {
             options, places, streams: [stream(false), stream(true)], frame: None, next, time_s: 0.0, stage: Stage::Idle, out: Vec::new(),
-            events: VecDeque::new(), close: Vec::new(), ended: false,
+            events: VecDeque::new(), close: Vec::new(), ended: false, times: Times::default(),
         }
     }
 

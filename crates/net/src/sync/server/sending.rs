@@ -2,6 +2,7 @@
 
 use super::super::transport::{Delivery, FacetNumber};
 use super::super::wire::{Header, Kind, message};
+use super::times::ask;
 use super::{Pace, Place, ServerSession, Stage, Standing, ToFacets};
 use std::sync::Arc;
 use std::time::Duration;
@@ -24,9 +25,9 @@ impl ServerSession {
             place.sent = now;
             let (synced, ready, presented) = (place.synced, place.ready == self.frame, place.presented == self.frame);
             match self.stage {
-                _ if !synced => self.send_all_again(facet),
-                Stage::Ready(_) if !ready => self.send_state(facet),
-                Stage::Presented(_) if ready && !presented => self.send_present(vec![facet], self.frame.unwrap_or(0)),
+                _ if !synced => self.send_all_again(now, facet),
+                Stage::Ready(_) if !ready => self.send_state(now, facet),
+                Stage::Presented(_) if ready && !presented => self.send_present(now, vec![facet], self.frame.unwrap_or(0)),
                 _ => {}
             }
         }
@@ -61,10 +62,10 @@ impl ServerSession {
     }
 
     /// The snapshot, and the frame published last: what a facet needs to begin.
-    pub(super) fn send_all_again(&mut self, facet: FacetNumber) {
+    pub(super) fn send_all_again(&mut self, now: Duration, facet: FacetNumber) {
         if self.frame.is_some() {
             self.send_snapshot(facet);
-            self.send_state(facet);
+            self.send_state(now, facet);
         }
     }
 
@@ -76,15 +77,17 @@ impl ServerSession {
         }
     }
 
-    pub(super) fn send_state(&mut self, facet: FacetNumber) {
+    pub(super) fn send_state(&mut self, now: Duration, facet: FacetNumber) {
         let state = self.streams[self.places[facet as usize].exact as usize].state.clone();
         if !state.is_empty() {
+            ask(&mut self.places[facet as usize].asked_state, self.frame.unwrap_or(0), now);
             self.send(vec![facet], self.state_delivery(), state);
         }
     }
 
-    pub(super) fn send_present(&mut self, to: Vec<FacetNumber>, frame: u64) {
+    pub(super) fn send_present(&mut self, now: Duration, to: Vec<FacetNumber>, frame: u64) {
         if self.options.pace == Pace::Lockstep {
+            to.iter().for_each(|&k| ask(&mut self.places[k as usize].asked_present, frame, now));
             let present = message(&self.head(Kind::Present, 0, frame), |_| {});
             self.send(to, Delivery::Reliable, Arc::new(present));
         }

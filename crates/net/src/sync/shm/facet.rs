@@ -36,6 +36,7 @@ pub struct ShmFacet {
     memory: Memory,
     waiting: VecDeque<Waiting>,
     counters: LinkCounters,
+    silence: Duration,
 }
 
 impl ShmFacet {
@@ -56,7 +57,14 @@ impl ShmFacet {
             memory: Memory::default(),
             waiting: VecDeque::new(),
             counters: LinkCounters::default(),
+            silence: SILENCE,
         })
+    }
+
+    /// A server of which nothing was heard for so long is given up, in place of [`SILENCE`].
+    pub fn silent_after(mut self, silence: Duration) -> ShmFacet {
+        self.silence = silence;
+        self
     }
 
     fn head(&self, kind: Kind) -> Head {
@@ -70,12 +78,16 @@ impl ShmFacet {
     fn tell(&mut self, head: Head, data: &[u8]) -> Result<(), LinkError> {
         let Some(ports) = &self.ports else { return Ok(()) };
         ports.publish(&head.bytes(), data)?;
+        let rings = !head.more;
         self.counters.bytes_out += (HEAD + data.len()) as u64;
         let now = self.start.elapsed();
         if let Stage::Connected { sent, .. } = &mut self.stage {
             *sent = now;
         }
-        ports.wake()
+        if rings {
+            ports.bell().answer(!matches!(head.kind, Kind::Piece | Kind::Ping));
+        }
+        Ok(())
     }
 
     fn take_all(&mut self) -> Result<(), LinkError> {
@@ -159,22 +171,23 @@ impl ShmFacet {
         match &mut self.stage {
             Stage::Looking { next } if now >= *next => {
                 *next = now + ASK;
-                if self.ports.is_none() {
-                    self.ports = Ports::join(&self.run)?;
+                match &mut self.ports {
+                    Some(ports) => ports.look_for_bell(&self.run)?,
+                    none => *none = Ports::join(&self.run)?,
                 }
                 let hello = self.head(Kind::Hello);
                 self.tell(hello, &[])?;
             }
             Stage::Looking { .. } => {}
             Stage::Connected { order, heard, sent, .. } => {
-                if now >= *heard + SILENCE {
+                if now >= *heard + self.silence {
                     self.end(Closed::Silent);
                     // The services may be those of a server that was killed: join anew.
                     self.ports = None;
                 } else if let Some((number, until)) = order.ask(now) {
                     let head = Head { number, until, ..self.head(Kind::Again) };
                     self.tell(head, &[])?;
-                } else if now >= *sent + PING {
+                } else if now >= *sent + PING.min(self.silence / 4) {
                     let ping = self.head(Kind::Ping);
                     self.tell(ping, &[])?;
                 }
@@ -248,6 +261,7 @@ impl FacetLink for ShmFacet {
             if let Some(event) = self.next_event(message) {
                 return Ok(Some(event));
             }
+            let seen = self.ports.as_ref().map_or(0, |ports| ports.bell().rung());
             self.take_all()?;
             self.keep_house()?;
             if let Some(event) = self.next_event(message) {
@@ -260,7 +274,7 @@ impl FacetLink for ShmFacet {
             let gap = matches!(&self.stage, Stage::Connected { order, .. } if order.has_gap());
             let wait = left.min(if gap { Duration::from_millis(2) } else { ASK });
             match &self.ports {
-                Some(ports) => ports.wait(wait)?,
+                Some(ports) => ports.bell().wait_for_ring(seen, wait)?,
                 None => std::thread::sleep(wait),
             }
         }

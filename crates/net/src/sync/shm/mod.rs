@@ -1,10 +1,11 @@
 //! Shared memory between the processes of one machine, by iceoryx2.
 //!
-//! A message is written once for all facets that it is for, and read where it lies; an event wakes who waits, nobody spins. The buffers overflow safely: a
+//! A message is written once for all facets that it is for, and read where it lies; a [`bell`] wakes who waits, nobody spins. The buffers overflow safely: a
 //! reader that was stopped or killed never holds the writer up. What that costs, reliability, comes back by numbers: see [`order`].
 //!
 //! All work is done in `recv`; there is no thread. A side that looks in only after a long picture finds its samples in the buffer, or asks for them again.
 
+pub mod bell;
 pub mod facet;
 pub mod order;
 pub mod ports;

@@ -1,18 +1,18 @@
-//! The four ends of iceoryx2 that one process holds, and where its files lie.
+//! The ends of iceoryx2 that one process holds, the bell, and where its files lie.
 //!
-//! Two services of samples and two of events per run, named by the run: `tumble/RUN/down` and `…/up`. Files lie in a folder of this user alone, objects in
+//! Two services of samples per run, named by the run: `tumble/RUN/down` and `…/up`, and a [`Bell`]. Files lie in a folder of this user alone, objects in
 //! `/dev/shm` carry the user's number: another user's run is neither seen nor disturbed. What a killed process leaves is removed when the next node begins,
 //! or when a server ends.
 
+use super::bell::{self, Bell};
 use crate::sync::transport::{FacetNumber, LinkError};
 use iceoryx2::node::{Node, NodeBuilder};
-use iceoryx2::port::{listener::Listener, listener::ListenerWaitError, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
+use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::{AllocationStrategy, Config, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
 use iceoryx2::service::ipc_threadsafe::Service;
 use std::fmt::Debug;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// Most bytes of a sample from the server; a longer message goes in pieces.
 pub const DOWN_BYTES: usize = 128 << 10;
@@ -25,16 +25,16 @@ const BUFFER: usize = 8;
 pub struct Ports {
     publisher: Publisher<Service, [u8], ()>,
     subscriber: Subscriber<Service, [u8], ()>,
-    notifier: Notifier<Service>,
-    listener: Listener<Service>,
+    bell: Bell,
     sample: usize,
     node: Node<Service>,
+    user: u32,
 }
 
 impl Ports {
     /// Begins the services of a run, or joins those that an earlier server of it left.
     pub fn serve(run: &str, facets: FacetNumber) -> Result<Ports, LinkError> {
-        let node = node("tumble server")?;
+        let (node, user) = node("tumble server")?;
         // Killed processes hold their places until they are cleaned up.
         let places = 2 * usize::from(facets) + 4;
         let data = |name: &str, publishers: usize, subscribers: usize| {
@@ -48,45 +48,32 @@ impl Ports {
                 .open_or_create()
                 .map_err(|why| refused(run, name, why))
         };
-        let event = |name: &str, notifiers: usize, listeners: usize| {
-            let builder = node.service_builder(&service_name(run, name)?).event();
-            builder
-                .max_notifiers(notifiers)
-                .max_listeners(listeners)
-                .max_nodes(places + 4)
-                .open_or_create()
-                .map_err(|why| refused(run, name, why))
-        };
+        // Before the services: who finds them finds it.
+        let bell = Bell::serve(run, user)?;
         let (down, up) = (data("down", 4, places)?, data("up", places, 4)?);
-        let (down_event, up_event) = (event("down-event", 4, places)?, event("up-event", places, 4)?);
         let ports = Ports {
             publisher: publisher(&down, DOWN_BYTES).map_err(|why| refused(run, "down", why))?,
             subscriber: up.subscriber_builder().create().map_err(|why| refused(run, "up", why))?,
-            notifier: down_event.notifier_builder().create().map_err(|why| refused(run, "down-event", why))?,
-            listener: up_event.listener_builder().create().map_err(|why| refused(run, "up-event", why))?,
+            bell,
             sample: DOWN_BYTES,
             node,
+            user,
         };
         Ok(ports)
     }
 
     /// Joins a run's services as a facet; `None` while there are none.
     pub fn join(run: &str) -> Result<Option<Ports>, LinkError> {
-        let node = node("tumble facet")?;
+        let (node, user) = node("tumble facet")?;
         let data = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().open().ok());
-        let event = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).event().open().ok());
-        let (Some(down), Some(up), Some(down_event), Some(up_event)) =
-            (data("down")?, data("up")?, event("down-event")?, event("up-event")?)
-        else {
-            return Ok(None);
-        };
+        let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, user)?) else { return Ok(None) };
         let ports = Ports {
             publisher: publisher(&up, UP_BYTES).map_err(|why| refused(run, "up", why))?,
             subscriber: down.subscriber_builder().create().map_err(|why| refused(run, "down", why))?,
-            notifier: up_event.notifier_builder().create().map_err(|why| refused(run, "up-event", why))?,
-            listener: down_event.listener_builder().create().map_err(|why| refused(run, "down-event", why))?,
+            bell,
             sample: UP_BYTES,
             node,
+            user,
         };
         Ok(Some(ports))
     }
@@ -106,10 +93,17 @@ impl Ports {
         Ok(())
     }
 
-    /// Wakes the other side.
-    pub fn wake(&self) -> Result<(), LinkError> {
-        self.notifier.notify().map_err(|why| failed("notify", why))?;
+    /// Looks again for the bell of a run: a new server of it may have another one.
+    pub fn look_for_bell(&mut self, run: &str) -> Result<(), LinkError> {
+        if let Some(bell) = Bell::join(run, self.user)? {
+            self.bell = bell;
+        }
         Ok(())
+    }
+
+    /// What wakes the other side.
+    pub fn bell(&self) -> &Bell {
+        &self.bell
     }
 
     /// Hands the next sample to `take`; `false` when there is none.
@@ -123,18 +117,10 @@ impl Ports {
         }
     }
 
-    /// Waits until the other side wakes this one, at most `timeout`.
-    pub fn wait(&self, timeout: Duration) -> Result<(), LinkError> {
-        match self.listener.timed_wait(|_| {}, timeout) {
-            // A signal ends the wait early: this process was stopped and goes on, or is being watched.
-            Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
-            Err(why) => Err(failed("wait", why)),
-        }
-    }
-
     /// Removes what killed processes left.
     pub fn clean_up(&self) {
         self.node.try_cleanup_dead_nodes();
+        bell::clean_up(self.user);
     }
 }
 
@@ -144,7 +130,8 @@ fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Service, [u8],
     service.publisher_builder().initial_max_slice_len(bytes + super::wire::HEAD).allocation_strategy(AllocationStrategy::Static).create()
 }
 
-fn node(name: &str) -> Result<Node<Service>, LinkError> {
+/// A node, which removes what is stale as it begins, and the number of its user.
+fn node(name: &str) -> Result<(Node<Service>, u32), LinkError> {
     set_log_level(LogLevel::Fatal); // what goes wrong is told by our errors
     let (folder, user) = folder()?;
     let text = folder.display().to_string();
@@ -154,12 +141,14 @@ fn node(name: &str) -> Result<Node<Service>, LinkError> {
     config.global.set_root_path(&Path::new(text.as_bytes()).map_err(|why| unusable(&why))?);
     let name = name.try_into().map_err(|why| unusable(&why))?;
     let builder = NodeBuilder::new().name(&name).config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
-    builder.create::<Service>().map_err(|why| unusable(&why))
+    let node = builder.create::<Service>().map_err(|why| unusable(&why))?;
+    bell::clean_up(user);
+    Ok((node, user))
 }
 
-/// A node removes what is stale when it begins.
+/// Removes what killed processes left.
 pub fn clean_up() -> Result<(), LinkError> {
-    node("tumble clean-up").map(|node| _ = node.try_cleanup_dead_nodes())
+    node("tumble clean-up").map(|(node, _)| _ = node.try_cleanup_dead_nodes())
 }
 
 /// A folder of this user alone, made if need be; and the user's number.

@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 /// Pieces remembered for those who missed them.
 const MEMORY: usize = 16_384;
 
+/// How long the server sleeps while it waits for the answers of several facets, before it takes those that are there.
+const GATHER: Duration = Duration::from_millis(2);
+
 /// A facet that is connected.
 struct Connection {
     number: u64,
@@ -20,6 +23,8 @@ struct Connection {
     /// The first piece it has not taken.
     taken: u64,
     heard: Duration,
+    /// It was sent something since its last message.
+    owes: bool,
 }
 
 /// What waits for the user.
@@ -39,6 +44,7 @@ pub struct ShmServer {
     counters: Vec<LinkCounters>,
     strangers: LinkCounters,
     sent: Duration,
+    silence: Duration,
 }
 
 impl ShmServer {
@@ -58,7 +64,14 @@ impl ShmServer {
             counters: vec![LinkCounters::default(); count],
             strangers: LinkCounters::default(),
             sent: Duration::ZERO,
+            silence: SILENCE,
         })
+    }
+
+    /// A facet of which nothing was heard for so long is given up, in place of [`SILENCE`]. While it draws it says nothing: give it more than a picture takes.
+    pub fn silent_after(mut self, silence: Duration) -> ShmServer {
+        self.silence = silence;
+        self
     }
 
     fn mask_of(&self, to: &[FacetNumber]) -> u64 {
@@ -75,13 +88,15 @@ impl ShmServer {
             let head = Head { newest, more, mask, number: self.memory.next(), ..Head::new(Kind::Piece, self.reign) };
             self.ports.publish(&head.bytes(), chunk)?;
             if !more {
-                self.ports.wake()?;
+                self.ports.bell().ring();
             }
             for counters in of_mask(&mut self.counters, mask) {
                 counters.bytes_out += (HEAD + chunk.len()) as u64;
             }
             self.memory.keep(mask, newest, more, chunk);
         }
+        let here = self.connections.iter_mut().enumerate().filter(|(k, _)| mask >> k & 1 == 1);
+        here.filter_map(|(_, connection)| connection.as_mut()).for_each(|connection| connection.owes = true);
         self.sent = self.start.elapsed();
         let first = self.memory.trim(MEMORY);
         self.end_all(Closed::Overrun, |connection| connection.taken < first);
@@ -91,7 +106,8 @@ impl ShmServer {
     fn tell(&mut self, head: Head) -> Result<(), LinkError> {
         self.sent = self.start.elapsed();
         self.ports.publish(&head.bytes(), &[])?;
-        self.ports.wake()
+        self.ports.bell().ring();
+        Ok(())
     }
 
     fn take_all(&mut self) -> Result<(), LinkError> {
@@ -136,6 +152,7 @@ impl ShmServer {
         match head.kind {
             Kind::Piece => {
                 connection.taken = connection.taken.max(head.until);
+                connection.owes &= head.more;
                 let waiting = &mut self.waiting;
                 let taken = connection.order.take(&head, true, data, |delivery, message| queue(waiting, head.facet, delivery, message));
                 if taken.is_err() {
@@ -156,7 +173,7 @@ impl ShmServer {
         let same = self.connections[facet].as_ref().is_some_and(|connection| connection.number == hello.connection);
         if !same {
             self.end(hello.facet, Closed::Replaced);
-            let connection = Connection { number: hello.connection, order: Order::new(0), taken: next, heard: self.start.elapsed() };
+            let connection = Connection { number: hello.connection, order: Order::new(0), taken: next, heard: self.start.elapsed(), owes: false };
             self.connections[facet] = Some(connection);
             self.counters[facet].opened += 1;
             self.waiting.push_back((hello.facet, Waiting::Event(LinkEvent::Opened)));
@@ -182,7 +199,8 @@ impl ShmServer {
             counters.repeated += 1;
             counters.bytes_out += (HEAD + data.len()) as u64;
         }
-        self.ports.wake()
+        self.ports.bell().ring();
+        Ok(())
     }
 
     /// Pings, asks again, forgets what all have, and finds who is silent.
@@ -195,13 +213,14 @@ impl ShmServer {
                 self.tell(head)?;
             }
         }
-        if now >= self.sent + PING {
+        let silence = self.silence;
+        if now >= self.sent + PING.min(silence / 4) {
             self.tell(Head::new(Kind::Ping, self.reign))?;
         }
         let next = self.memory.next();
         let taken = self.connections.iter().flatten().map(|connection| connection.taken).min().unwrap_or(next);
         self.memory.forget_before(taken);
-        if self.end_all(Closed::Silent, |connection| now >= connection.heard + SILENCE) {
+        if self.end_all(Closed::Silent, |connection| now >= connection.heard + silence) {
             self.ports.clean_up();
         }
         Ok(())
@@ -262,6 +281,7 @@ impl ServerLink for ShmServer {
         message.clear();
         let end = self.start.elapsed() + timeout;
         loop {
+            let seen = self.ports.bell().answers();
             if self.waiting.is_empty() {
                 self.take_all()?;
                 self.keep_house()?;
@@ -279,8 +299,10 @@ impl ServerLink for ShmServer {
             if left.is_zero() {
                 return Ok(None);
             }
+            let owed = self.connections.iter().flatten().filter(|connection| connection.owes).count() as u32;
             let gap = self.connections.iter().flatten().any(|connection| connection.order.has_gap());
-            self.ports.wait(left.min(if gap { Duration::from_millis(2) } else { PING / 4 }))?;
+            let most = if gap || owed > 1 { GATHER } else { PING / 4 };
+            self.ports.bell().wait_for_answers(seen, owed, left.min(most))?;
         }
     }
 

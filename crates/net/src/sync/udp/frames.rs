@@ -2,24 +2,27 @@
 //!
 //! | frame | bytes, after its first byte | what |
 //! |---|---|---|
-//! | 1 acknowledgement | reliable u32, newest u32, largest u64, mask 16 | all reliable messages before `reliable` and all newest ones before `newest` are there; so is packet `largest - k` for each bit k of the mask |
-//! | 2 fragment | channel u8, message u32, total u32, index u16, data | bytes `1100 index …` of a message of `total` bytes |
-//! | 3 parity | channel u8, message u32, total u32, group u16, groups u16, 1100 bytes | exclusive or of the fragments i with `i mod groups = group`, padded with zeros |
-//! | 4 ping | | acknowledge this |
-//! | 5 close | | the session is over |
+//! | 1 acknowledgement | reliable u32, [newest u32], largest u32, n u8, mask n | all reliable messages before `reliable` and all newest ones before `newest` are there; so is packet `largest - k` for each bit k of the mask; of packets beyond the mask nothing is said |
+//! | 2 whole | message u32, total u16, data | a message of at most 1120 bytes |
+//! | 3 fragment | message u32, total u32, index u16, data | bytes `1120 index …` of a message of `total` bytes |
+//! | 4 parity | message u32, total u32, group u16, groups u16, 1120 bytes | exclusive or of the fragments i with `i mod groups = group`, padded with zeros |
+//! | 5 ping | | acknowledge this |
+//! | 6 close | | the session is over |
+//!
+//! The first byte is the number of the frame; 16 more, of 2 to 4, where the message is a newest one, of 1, where `newest` is said. `largest` is the lower half.
 //!
 //! The length of a fragment follows from `total` and `index`, so there is no second number that could contradict it.
 
 use crate::sync::transport::{Delivery, MAX_MESSAGE_BYTES};
 
 /// Bytes of a whole fragment. With header, seal, an acknowledgement and its own head it stays below 1200.
-pub const FRAGMENT: usize = 1100;
-/// Bytes of an acknowledgement.
-pub const ACK_BYTES: usize = 33;
-/// Bytes around the data of a fragment.
-pub const FRAGMENT_HEAD: usize = 12;
+pub const FRAGMENT: usize = 1120;
+/// Most bytes of an acknowledgement.
+pub const ACK_BYTES: usize = 30;
 /// Bytes around the data of a parity frame.
-pub const PARITY_HEAD: usize = 14;
+pub const PARITY_HEAD: usize = 13;
+/// Added to a frame's number for the newest messages.
+const NEWEST: u8 = 16;
 /// Most frames in a packet.
 const MAX_FRAMES: usize = 128;
 
@@ -44,11 +47,15 @@ impl From<Delivery> for Channel {
 /// What has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ack {
-    /// Messages before this one are complete, per channel.
-    pub complete: [u32; 2],
-    /// The largest packet taken.
-    pub largest: u64,
-    /// Bit k: packet `largest - k` was taken.
+    /// Reliable messages before this one are complete.
+    pub reliable: u32,
+    /// Newest messages before this one are complete; nothing is said while none came.
+    pub newest: Option<u32>,
+    /// The largest packet taken: the lower half of its number.
+    pub largest: u32,
+    /// Bytes of the mask, 1 to 16.
+    pub bytes: u8,
+    /// Bit k: packet `largest - k` was taken. Bits beyond its bytes are zero.
     pub mask: u128,
 }
 
@@ -67,6 +74,11 @@ impl Part {
     /// Number of fragments.
     pub fn fragments(&self) -> u16 {
         (self.total as usize).div_ceil(FRAGMENT) as u16
+    }
+
+    /// Bytes around the data of a fragment.
+    pub fn head(&self) -> usize {
+        if self.fragments() == 1 { 7 } else { 11 }
     }
 
     /// Length of a fragment.
@@ -95,30 +107,36 @@ impl Frame<'_> {
     pub fn write(&self, out: &mut Vec<u8>) {
         match self {
             Frame::Ack(ack) => {
-                out.push(1);
-                ack.complete.iter().for_each(|next| out.extend_from_slice(&next.to_le_bytes()));
-                out.extend_from_slice(&ack.largest.to_le_bytes());
-                out.extend_from_slice(&ack.mask.to_le_bytes());
+                out.push(1 + if ack.newest.is_some() { NEWEST } else { 0 });
+                [Some(ack.reliable), ack.newest, Some(ack.largest)].iter().flatten().for_each(|n| out.extend_from_slice(&n.to_le_bytes()));
+                out.push(ack.bytes);
+                out.extend_from_slice(&ack.mask.to_le_bytes()[..usize::from(ack.bytes.min(16))]);
+            }
+            Frame::Fragment(part, _, data) if part.fragments() == 1 => {
+                out.push(2 + NEWEST * part.channel as u8);
+                out.extend_from_slice(&part.message.to_le_bytes());
+                out.extend_from_slice(&(part.total as u16).to_le_bytes());
+                out.extend_from_slice(data);
             }
             Frame::Fragment(part, index, data) => {
-                write_part(2, part, out);
+                write_part(3, part, out);
                 out.extend_from_slice(&index.to_le_bytes());
                 out.extend_from_slice(data);
             }
             Frame::Parity(part, group, groups, data) => {
-                write_part(3, part, out);
+                write_part(4, part, out);
                 out.extend_from_slice(&group.to_le_bytes());
                 out.extend_from_slice(&groups.to_le_bytes());
                 out.extend_from_slice(data);
             }
-            Frame::Ping => out.push(4),
-            Frame::Close => out.push(5),
+            Frame::Ping => out.push(5),
+            Frame::Close => out.push(6),
         }
     }
 }
 
 fn write_part(kind: u8, part: &Part, out: &mut Vec<u8>) {
-    out.extend_from_slice(&[kind, part.channel as u8]);
+    out.push(kind + NEWEST * part.channel as u8);
     out.extend_from_slice(&part.message.to_le_bytes());
     out.extend_from_slice(&part.total.to_le_bytes());
 }
@@ -131,42 +149,55 @@ pub fn parse(mut body: &[u8]) -> Option<Vec<Frame<'_>>> {
             return None;
         }
         let body = &mut body;
-        frames.push(match take::<1>(body)? {
-            [1] => Frame::Ack(Ack {
-                complete: [u32::from_le_bytes(take(body)?), u32::from_le_bytes(take(body)?)],
-                largest: u64::from_le_bytes(take(body)?),
-                mask: u128::from_le_bytes(take(body)?),
-            }),
-            [2] => {
-                let part = take_part(body)?;
+        let [first] = take::<1>(body)?;
+        let channel = if first & NEWEST == 0 { Channel::Reliable } else { Channel::Newest };
+        frames.push(match (first & !NEWEST, channel) {
+            (1, _) => Frame::Ack(take_ack(body, channel)?),
+            (2, _) => {
+                let (message, total) = (u32::from_le_bytes(take(body)?), u16::from_le_bytes(take(body)?));
+                let part = Part { channel, message, total: total.into() };
+                if !(1..=FRAGMENT).contains(&usize::from(total)) {
+                    return None;
+                }
+                Frame::Fragment(part, 0, take_slice(body, total.into())?)
+            }
+            (3, _) => {
+                let part = take_part(body, channel)?;
                 let index = u16::from_le_bytes(take(body)?);
-                if index >= part.fragments() {
+                if index >= part.fragments() || part.fragments() == 1 {
                     return None;
                 }
                 Frame::Fragment(part, index, take_slice(body, part.length(index))?)
             }
-            [3] => {
-                let part = take_part(body)?;
+            (4, _) => {
+                let part = take_part(body, channel)?;
                 let (group, groups) = (u16::from_le_bytes(take(body)?), u16::from_le_bytes(take(body)?));
                 if group >= groups || groups >= part.fragments() {
                     return None;
                 }
                 Frame::Parity(part, group, groups, take_slice(body, FRAGMENT)?)
             }
-            [4] => Frame::Ping,
-            [5] => Frame::Close,
+            (5, Channel::Reliable) => Frame::Ping,
+            (6, Channel::Reliable) => Frame::Close,
             _ => return None,
         });
     }
     Some(frames)
 }
 
-fn take_part(body: &mut &[u8]) -> Option<Part> {
-    let channel = match take::<1>(body)? {
-        [0] => Channel::Reliable,
-        [1] => Channel::Newest,
-        _ => return None,
-    };
+fn take_ack(body: &mut &[u8], channel: Channel) -> Option<Ack> {
+    let reliable = u32::from_le_bytes(take(body)?);
+    let newest = if channel == Channel::Newest { Some(u32::from_le_bytes(take(body)?)) } else { None };
+    let (largest, [bytes]) = (u32::from_le_bytes(take(body)?), take::<1>(body)?);
+    let mut mask = [0; 16];
+    if !(1..=16).contains(&bytes) {
+        return None;
+    }
+    mask[..usize::from(bytes)].copy_from_slice(take_slice(body, bytes.into())?);
+    Some(Ack { reliable, newest, largest, bytes, mask: u128::from_le_bytes(mask) })
+}
+
+fn take_part(body: &mut &[u8], channel: Channel) -> Option<Part> {
     let part = Part { channel, message: u32::from_le_bytes(take(body)?), total: u32::from_le_bytes(take(body)?) };
     (1..=MAX_MESSAGE_BYTES).contains(&(part.total as usize)).then_some(part)
 }

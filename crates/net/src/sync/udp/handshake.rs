@@ -3,9 +3,9 @@
 //! ```text
 //! facet                                             server
 //!   Hello(nonce, facet), padded to 256 bytes    →            nothing kept
-//!                                               ←   Challenge(nonce, cookie), 106 bytes
+//!                                               ←   Challenge(nonce, cookie), 97 bytes
 //!   Answer(nonce, facet, cookie), padded        →            cookie fits: the session is prepared
-//!                                               ←   Welcome(nonce, server's nonce, session), 106 bytes
+//!                                               ←   Welcome(nonce, server's nonce, session), 97 bytes
 //!   Data: the first sealed packet               →            the session is live, and replaces an older one of this facet
 //! ```
 //!
@@ -69,7 +69,7 @@ impl Hello {
 
 impl Reply {
     /// Writes a Challenge or a Welcome.
-    pub fn write(&self, kind: Kind, session: u64, handshake: &Handshake, datagram: &mut Vec<u8>) {
+    pub fn write(&self, kind: Kind, session: u32, handshake: &Handshake, datagram: &mut Vec<u8>) {
         packet::begin(datagram, Header { kind, session, sequence: 0 });
         datagram.extend_from_slice(&self.nonce);
         datagram.extend_from_slice(&self.value);
@@ -90,8 +90,8 @@ impl Reply {
     }
 }
 
-/// Writes the server's word that it does not know a session: 42 bytes, less than any sealed packet has.
-pub fn write_unknown(session: u64, handshake: &Handshake, datagram: &mut Vec<u8>) {
+/// Writes the server's word that it does not know a session: 33 bytes, less than any sealed packet has.
+pub fn write_unknown(session: u32, handshake: &Handshake, datagram: &mut Vec<u8>) {
     packet::begin(datagram, Header { kind: Kind::Unknown, session, sequence: 0 });
     handshake.tag(datagram);
 }

@@ -32,6 +32,7 @@ pub struct Contradiction;
 pub struct Inbox {
     /// The first message that is not complete (reliable), and the one after the last that was delivered (newest).
     next: [u32; 2],
+    first: u32,
     assemblies: [BTreeMap<u32, Assembly>; 2],
     held: usize,
     ready: VecDeque<(Delivery, Vec<u8>)>,
@@ -42,7 +43,12 @@ pub struct Inbox {
 impl Inbox {
     /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
     pub fn new(first: u32) -> Inbox {
-        Inbox { next: [first; 2], assemblies: Default::default(), held: 0, ready: VecDeque::new(), ready_bytes: 0, superseded: 0 }
+        Inbox { first, next: [first; 2], assemblies: Default::default(), held: 0, ready: VecDeque::new(), ready_bytes: 0, superseded: 0 }
+    }
+
+    /// Where message numbers begin.
+    pub fn first(&self) -> u32 {
+        self.first
     }
 
     /// What an acknowledgement says: messages before these are complete.

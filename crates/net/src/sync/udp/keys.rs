@@ -15,9 +15,9 @@ use chacha20poly1305::aead::{AeadInOut, Generate, Key, KeyInit};
 use chacha20poly1305::{ChaCha20Poly1305, Nonce, Tag};
 use std::path::Path;
 
-const HANDSHAKE: &str = "tumble-net udp v1 handshake";
-const TO_SERVER: &str = "tumble-net udp v1 facet to server";
-const TO_FACET: &str = "tumble-net udp v1 server to facet";
+const HANDSHAKE: &str = "tumble-net udp v2 handshake";
+const TO_SERVER: &str = "tumble-net udp v2 facet to server";
+const TO_FACET: &str = "tumble-net udp v2 server to facet";
 const ENTROPY: &str = "tumble-net udp v1 random numbers of one process";
 
 /// The key that all machines of a cave share.
@@ -174,7 +174,7 @@ pub enum Side {
 #[derive(Clone, Copy)]
 pub struct Agreement {
     /// The session's number, drawn by the server.
-    pub session: u64,
+    pub session: u32,
     /// Whose it is.
     pub facet: FacetNumber,
     /// Drawn by the facet.
@@ -185,7 +185,7 @@ pub struct Agreement {
 
 /// Seals what one side sends and opens what it receives.
 pub struct Seal {
-    session: u64,
+    session: u32,
     outgoing: ChaCha20Poly1305,
     incoming: ChaCha20Poly1305,
     next: u64,
@@ -227,7 +227,7 @@ impl Seal {
         true
     }
 
-    /// The body of a packet, opened into `body`.
+    /// The body of a packet with its whole number, opened into `body`.
     pub fn open(&self, header: &Header, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
         let (covered, tag) = datagram.split_at(datagram.len() - TAG);
         body.clear();

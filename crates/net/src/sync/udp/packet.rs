@@ -5,30 +5,30 @@
 //! | byte | size | what |
 //! |---|---|---|
 //! | 0 | 2 | magic `74 db` |
-//! | 2 | 1 | version, [`VERSION`] |
-//! | 3 | 1 | [`Kind`] |
-//! | 4 | 2 | length of the whole datagram |
-//! | 6 | 4 | CRC-32 of all bytes but these four: tells a packet damaged on its way from a forged one |
-//! | 10 | 8 | session (0 before there is one) |
-//! | 18 | 8 | sequence: the number of this packet within its session and direction, and the nonce of its seal |
-//! | 26 | n | body: sealed in [`Kind::Data`], plain in the others |
-//! | 26 + n | 16 | tag: Poly1305 in [`Kind::Data`], keyed BLAKE3 in the others |
+//! | 2 | 1 | version, [`VERSION`] (upper four bits), and [`Kind`] (lower four) |
+//! | 3 | 2 | length of the whole datagram |
+//! | 5 | 4 | CRC-32 of all bytes but these four: tells a packet damaged on its way from a forged one |
+//! | 9 | 4 | session (0 before there is one) |
+//! | 13 | 4 | sequence, its lower half: the number of this packet within its session and direction |
+//! | 17 | n | body: sealed in [`Kind::Data`], plain in the others |
+//! | 17 + n | 16 | tag: Poly1305 in [`Kind::Data`], keyed BLAKE3 in the others |
 //!
-//! Everything of the header but the checksum is associated data of the tag, so none of it can be changed.
+//! Everything of the header but the checksum is associated data of the tag, so none of it can be changed. The whole sequence number, 64 bits, is the nonce of
+//! the seal; its upper half follows from what came before ([`whole`]), and where that guess is wrong the seal does not fit.
 
 use crate::sync::transport::Refused;
 
 /// The protocol's version; a datagram of another one is refused.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 /// Most bytes of a datagram (payload of UDP): passes every path of 1280 bytes, which IPv6 demands.
 pub const MAX_DATAGRAM: usize = 1200;
 /// Bytes before the body.
-pub const HEADER: usize = 26;
+pub const HEADER: usize = 17;
 /// Bytes after the body.
 pub const TAG: usize = 16;
 
 const MAGIC: [u8; 2] = [0x74, 0xdb];
-const CHECKSUM: std::ops::Range<usize> = 6..10;
+const CHECKSUM: std::ops::Range<usize> = 5..9;
 
 /// What a datagram is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,8 +55,8 @@ pub struct Header {
     /// What the datagram is for.
     pub kind: Kind,
     /// Whose it is.
-    pub session: u64,
-    /// Its number.
+    pub session: u32,
+    /// Its number; as [`parse`] reads it only the lower half.
     pub sequence: u64,
 }
 
@@ -68,10 +68,10 @@ pub fn parse(datagram: &[u8]) -> Result<Header, Refused> {
     if datagram.len() > MAX_DATAGRAM {
         return Err(Refused::Oversize);
     }
-    if datagram[..2] != MAGIC || datagram[2] != VERSION {
+    if datagram[..2] != MAGIC || datagram[2] >> 4 != VERSION {
         return Err(Refused::Foreign);
     }
-    let claimed = usize::from(u16::from_le_bytes([datagram[4], datagram[5]]));
+    let claimed = usize::from(u16::from_le_bytes([datagram[3], datagram[4]]));
     if claimed > datagram.len() {
         return Err(Refused::Truncated);
     }
@@ -81,24 +81,31 @@ pub fn parse(datagram: &[u8]) -> Result<Header, Refused> {
     if u32_at(datagram, CHECKSUM.start) != checksum(datagram) {
         return Err(Refused::Torn);
     }
-    let kind = KINDS.into_iter().find(|kind| *kind as u8 == datagram[3]).ok_or(Refused::Foreign)?;
-    Ok(Header { kind, session: u64_at(datagram, 10), sequence: u64_at(datagram, 18) })
+    let kind = KINDS.into_iter().find(|kind| *kind as u8 == datagram[2] & 15).ok_or(Refused::Foreign)?;
+    Ok(Header { kind, session: u32_at(datagram, 9), sequence: u64::from(u32_at(datagram, 13)) })
+}
+
+/// The whole number whose lower half this is, nearest to `near`.
+pub fn whole(lower: u32, near: u64) -> u64 {
+    let same = near & !u64::from(u32::MAX) | u64::from(lower);
+    let others = [same.checked_sub(1 << 32), same.checked_add(1 << 32)];
+    others.into_iter().flatten().fold(same, |best, other| if other.abs_diff(near) < best.abs_diff(near) { other } else { best })
 }
 
 /// Clears `datagram` and writes the header into it; `seal_off` or [`finish`] set length and checksum.
 pub fn begin(datagram: &mut Vec<u8>, header: Header) {
     datagram.clear();
     datagram.extend_from_slice(&MAGIC);
-    datagram.extend_from_slice(&[VERSION, header.kind as u8]);
+    datagram.push(VERSION << 4 | header.kind as u8);
     datagram.extend_from_slice(&[0; 6]);
     datagram.extend_from_slice(&header.session.to_le_bytes());
-    datagram.extend_from_slice(&header.sequence.to_le_bytes());
+    datagram.extend_from_slice(&(header.sequence as u32).to_le_bytes());
 }
 
 /// Sets the length that the datagram will have with its tag. Before the tag is made, because the tag covers it.
 pub fn set_length(datagram: &mut [u8]) {
     let length = (datagram.len() + TAG) as u16;
-    datagram[4..6].copy_from_slice(&length.to_le_bytes());
+    datagram[3..5].copy_from_slice(&length.to_le_bytes());
 }
 
 /// Appends the tag, then sets the checksum.
@@ -127,6 +134,19 @@ fn u32_at(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
-fn u64_at(bytes: &[u8], at: usize) -> u64 {
-    u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
+#[cfg(test)]
+mod tests {
+    use super::whole;
+
+    #[test]
+    fn the_upper_half_of_a_number_is_that_of_its_neighbours() {
+        let corners = [0u64, 1, 200, (1 << 31) - 1, 1 << 31, (1 << 32) - 1, 1 << 32, 7 << 32 | 5, u64::MAX - (1 << 31), u64::MAX - 1, u64::MAX];
+        for near in corners {
+            for step in [0u64, 1, 255, (1 << 31) - 1] {
+                for number in [near.checked_sub(step), near.checked_add(step)].into_iter().flatten() {
+                    assert_eq!(whole(number as u32, near), number, "near {near}");
+                }
+            }
+        }
+    }
 }

@@ -34,10 +34,10 @@ pub struct ServerMachine {
     handshake: Handshake,
     entropy: Entropy,
     cookies: Cookies,
-    sessions: BTreeMap<u64, Session>,
+    sessions: BTreeMap<u32, Session>,
     /// The live session of each facet.
-    live: Vec<Option<u64>>,
-    prepared: VecDeque<u64>,
+    live: Vec<Option<u32>>,
+    prepared: VecDeque<u32>,
     replies: VecDeque<(SocketAddr, Vec<u8>)>,
     events: VecDeque<(FacetNumber, LinkEvent, Vec<u8>)>,
     counters: Vec<LinkCounters>,
@@ -226,9 +226,9 @@ impl ServerMachine {
                 self.sessions.remove(&oldest);
             }
         }
-        let mut session = self.entropy.next_u64();
-        while self.sessions.contains_key(&session) {
-            session = self.entropy.next_u64();
+        let mut session = 0;
+        while session == 0 || self.sessions.contains_key(&session) {
+            session = self.entropy.next_u64() as u32;
         }
         let agreed = Agreement { session, facet: answer.facet, facet_nonce: answer.nonce, server_nonce: self.entropy.next_bytes() };
         let prepared = Session::new(now, &self.shared, agreed, Side::Server, from, self.settings.timing, self.settings.numbering);
@@ -237,7 +237,7 @@ impl ServerMachine {
         agreed
     }
 
-    fn bring_to_life(&mut self, id: u64, facet: FacetNumber) {
+    fn bring_to_life(&mut self, id: u32, facet: FacetNumber) {
         self.prepared.retain(|prepared| *prepared != id);
         if let Some(old) = self.live[usize::from(facet)] {
             self.end(old, Closed::Replaced);
@@ -248,7 +248,7 @@ impl ServerMachine {
     }
 
     /// What had arrived is told before.
-    fn end(&mut self, id: u64, why: Closed) {
+    fn end(&mut self, id: u32, why: Closed) {
         let Some(mut session) = self.sessions.remove(&id) else { return };
         self.prepared.retain(|prepared| *prepared != id);
         let facet = session.agreed.facet;

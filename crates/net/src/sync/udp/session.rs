@@ -5,7 +5,7 @@ use super::frames::{self, ACK_BYTES, Ack, Channel, Frame};
 use super::inbox::Inbox;
 use super::keys::{Agreement, Seal, SharedKey, Side};
 use super::outbox::{Full, Outbox};
-use super::packet::{HEADER, Header, MAX_DATAGRAM, TAG};
+use super::packet::{HEADER, Header, MAX_DATAGRAM, TAG, whole};
 use super::window::ReplayWindow;
 use crate::sync::transport::{Delivery, LinkCounters, Refused};
 use std::net::SocketAddr;
@@ -16,6 +16,8 @@ use std::time::Duration;
 const PACKETS_PER_ACK: u32 = 8;
 /// How long an acknowledgement may wait for a message that it can travel with: what is answered at once costs no packet of its own.
 const ACK_DELAY: Duration = Duration::from_micros(500);
+/// Each packet is told by so many acknowledgements, so that one that is lost does no harm.
+const ACKS_THAT_TELL: usize = 4;
 const BODY: usize = MAX_DATAGRAM - HEADER - TAG;
 
 /// Where the counting begins; other than 0 in tests of the wrap.
@@ -45,6 +47,10 @@ pub struct Session {
     /// Packets that want an acknowledgement, and when it is due.
     unacknowledged: u32,
     ack_due: Option<Duration>,
+    /// The largest packets that the last acknowledgements told, the oldest first.
+    told: [u64; ACKS_THAT_TELL],
+    /// Number of the first packet of either side.
+    first: u64,
     closed_by_peer: bool,
     exhausted: bool,
     body: Vec<u8>,
@@ -75,6 +81,8 @@ impl Session {
             sent: now,
             unacknowledged: 0,
             ack_due: None,
+            told: [from.sequence; ACKS_THAT_TELL],
+            first: from.sequence,
             closed_by_peer: false,
             exhausted: false,
             body: Vec::new(),
@@ -84,6 +92,7 @@ impl Session {
 
     /// Takes a packet. Nothing of it is believed before its seal was checked, and nothing of it is taken where one frame contradicts.
     pub fn receive(&mut self, now: Duration, header: &Header, datagram: &[u8], counters: &mut LinkCounters) -> Result<(), Refused> {
+        let header = &Header { sequence: whole(header.sequence as u32, self.window.largest().unwrap_or(self.first)), ..*header };
         self.window.check(header.sequence)?;
         let mut body = std::mem::take(&mut self.body);
         let result = self.seal.open(header, datagram, &mut body).and_then(|()| {
@@ -99,9 +108,7 @@ impl Session {
     }
 
     fn take_frames(&mut self, now: Duration, frames: &[Frame], bytes: usize) -> Result<(), Refused> {
-        if let [Frame::Ack(_)] = frames {
-            self.outbox.pay(bytes);
-        }
+        self.outbox.pay(bytes);
         let mut wants_ack = false;
         for frame in frames {
             match frame {
@@ -155,6 +162,10 @@ impl Session {
             if !self.outbox.fill(now, sequence, room, &mut self.body) && !ack_is_due {
                 break;
             }
+            if self.unacknowledged > 0 {
+                self.told.rotate_left(1);
+                self.told[ACKS_THAT_TELL - 1] = self.window.largest().unwrap_or(self.first);
+            }
             self.unacknowledged = 0;
             self.ack_due = None;
             self.seal_and_emit(now, counters, emit);
@@ -200,7 +211,12 @@ impl Session {
 
     fn write_ack(&mut self) {
         if let Some((largest, mask)) = self.window.taken() {
-            Frame::Ack(Ack { complete: self.inbox.complete(), largest, mask }).write(&mut self.body);
+            let bits = largest.saturating_sub(self.told[0]).clamp(1, 128);
+            let bytes = bits.div_ceil(8) as u8;
+            let [reliable, newest] = self.inbox.complete();
+            let newest = (newest != self.inbox.first()).then_some(newest);
+            let mask = mask & (u128::MAX >> (128 - 8 * u32::from(bytes)));
+            Frame::Ack(Ack { reliable, newest, largest: largest as u32, bytes, mask }).write(&mut self.body);
         }
     }
 

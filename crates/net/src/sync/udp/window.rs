@@ -38,6 +38,11 @@ impl ReplayWindow {
         }
     }
 
+    /// The largest packet taken.
+    pub fn largest(&self) -> Option<u64> {
+        self.largest
+    }
+
     /// The largest packet taken and the 128 before it: bit k stands for `largest - k`.
     pub fn taken(&self) -> Option<(u64, u128)> {
         Some((self.largest?, u128::from(self.bits[0]) | u128::from(self.bits[1]) << 64))

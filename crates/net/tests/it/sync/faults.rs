@@ -155,7 +155,7 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
     assert!(told.contains("'facet 1'") && told.contains("'left'"), "{told}");
     assert_eq!(task, over(&told));
     let (told, _) = refusal(FacetOptions::new("facet 1", SCENE, 1), |bytes| bytes[76] = 9);
-    assert!(told.contains("version 1") && told.contains("version 9"), "{told}");
+    assert!(told.contains("version 2") && told.contains("version 9"), "{told}");
 }
 
 /// A facet that draws something else than was sent is found out by its hash, and the wall goes on.

@@ -1,6 +1,6 @@
 //! The same session over each link: every facet shows every frame once, and the hashes are the same on all of them.
 
-use super::stage::{scene, viewer};
+use super::stage::{SCENE, scene, viewer};
 use super::threads::{facet, hashes, options};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -8,7 +8,7 @@ use std::time::Duration;
 use tumble_net::sync::shm::{ShmFacet, ShmServer};
 use tumble_net::sync::transport::{FacetLink, ServerLink};
 use tumble_net::sync::udp::{SharedKey, Timing, UdpFacet, UdpServer};
-use tumble_net::sync::{FacetCounts, Hub, Server};
+use tumble_net::sync::{Facet, FacetCounts, FacetOptions, Hub, Over, Seat, Server, ServerOptions, Task};
 
 type Frames = Vec<(u64, [u8; 16], [u8; 16])>;
 
@@ -50,4 +50,38 @@ fn a_session_is_the_same_over_every_link() {
     let shm = run(ShmServer::new(&name, 3).unwrap(), (0..3).map(|k| ShmFacet::new(&name, k).unwrap()).collect());
     assert_eq!(local.iter().map(|f| f.0).collect::<Vec<_>>(), (0..60).collect::<Vec<_>>());
     assert!(local == udp && local == shm);
+}
+
+/// A facet of another scene, until it is told why it is not let in.
+fn refused(link: impl FacetLink + Send + 'static) -> std::thread::JoinHandle<String> {
+    std::thread::spawn(move || {
+        let mut facet = Facet::new(link, FacetOptions::new("facet 0", [8; 32], 1), scene());
+        for _ in 0..200 {
+            if let Task::Over(Over::Refused(why)) = facet.next(Duration::from_millis(50)).unwrap() {
+                return why;
+            }
+        }
+        "never told".into()
+    })
+}
+
+fn refuse(link: impl ServerLink) {
+    let options = ServerOptions::new(1, SCENE, vec![Seat { name: "facet 0".into(), critical: true }]);
+    let mut server = Server::new(link, options, &scene());
+    assert!(server.wait_for_facets(Duration::from_secs(3)).unwrap_err().to_string().contains("facet 0 did not join"));
+}
+
+/// The server closes right after it said why: what it said arrives first.
+#[test]
+fn a_facet_of_another_scene_hears_why_it_is_refused_on_both_links() {
+    let run = format!("refused-{}", std::process::id());
+    let udp = UdpServer::bind(([127, 0, 0, 1], 0).into(), 1, None, Timing::default()).unwrap();
+    let facets = [refused(UdpFacet::connect(udp.address().unwrap(), 0, None, Timing::default()).unwrap()), refused(ShmFacet::new(&run, 0).unwrap())];
+    let links: [Box<dyn FnOnce() + Send>; 2] = [Box::new(move || refuse(udp)), Box::new(move || refuse(ShmServer::new(&run, 1).unwrap()))];
+    let servers = links.map(std::thread::spawn);
+    for facet in facets {
+        let why = facet.join().unwrap();
+        assert!(why.contains(&"08".repeat(32)) && why.contains(&"07".repeat(32)), "{why}");
+    }
+    servers.into_iter().for_each(|server| server.join().unwrap());
 }

@@ -7,4 +7,5 @@ mod lockstep;
 mod mirror;
 mod quantise;
 mod threads;
+mod times;
 pub mod stage;

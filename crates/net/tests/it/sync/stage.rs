@@ -40,8 +40,15 @@ pub struct Actor {
     pub busy_until: Duration,
     pub drawing: bool,
     pub takes: Duration,
+    /// From being told to show a frame to showing it.
+    pub shows_after: Duration,
+    told: Option<Duration>,
+    /// Its clock is ahead by so much.
+    pub clock: Duration,
     /// Frames shown, with what was answered, over all its lives.
     pub shown: Vec<(u64, Done)>,
+    /// When, by the stage's clock.
+    pub shown_at: Vec<Duration>,
     born: u64,
 }
 
@@ -66,7 +73,8 @@ impl Stage {
         let mut options = ServerOptions::new(1, SCENE, seats);
         (options.pace, options.resend_after) = (pace, Some(5 * MS));
         let actor = |_| Actor {
-            session: None, frozen_until: Duration::ZERO, busy_until: Duration::ZERO, drawing: false, takes: Duration::from_millis(2), shown: Vec::new(), born: 0,
+            session: None, frozen_until: Duration::ZERO, busy_until: Duration::ZERO, drawing: false, takes: Duration::from_millis(2),
+            shows_after: Duration::ZERO, told: None, clock: Duration::ZERO, shown: Vec::new(), shown_at: Vec::new(), born: 0,
         };
         let base = scene();
         let mut stage = Stage {
@@ -124,8 +132,9 @@ impl Stage {
                 }
                 // what comes to a frozen process waits in its socket; here it is lost, which is worse
                 To::Facet(k) if self.now >= self.facets[k as usize].frozen_until => {
-                    if let Some(facet) = &mut self.facets[k as usize].session {
-                        facet.on_event(self.now, LinkEvent::Message, &bytes);
+                    let actor = &mut self.facets[k as usize];
+                    if let Some(facet) = &mut actor.session {
+                        facet.on_event(self.now + actor.clock, LinkEvent::Message, &bytes);
                     }
                 }
                 To::Facet(_) => {}
@@ -155,17 +164,20 @@ impl Stage {
     fn act(&mut self, k: usize) {
         let actor = &mut self.facets[k];
         let Some(session) = actor.session.as_mut().filter(|_| self.now >= actor.frozen_until) else { return };
-        session.advance(self.now);
+        let there = self.now + actor.clock;
+        session.advance(there);
         match session.task() {
             Task::Draw if !actor.drawing => (actor.drawing, actor.busy_until) = (session.begin().is_some(), self.now + actor.takes),
-            Task::Present(_) => {
-                session.presented(self.now);
+            Task::Present(_) if self.now >= *actor.told.get_or_insert(self.now) + actor.shows_after => {
+                session.presented(there);
                 actor.shown.extend(session.shown());
+                actor.shown_at.push(self.now);
+                actor.told = None;
             }
             _ => {}
         }
         if actor.drawing && self.now >= actor.busy_until {
-            session.drawn(self.now, [k as u8; 16]);
+            session.drawn(there, [k as u8; 16]);
             actor.drawing = false;
         }
         session.outgoing().iter().for_each(|(_, bytes)| self.net.send(self.now, To::Server(k as u16), bytes));

@@ -14,18 +14,22 @@
 //! of one is sent twice, again where the budget allows. The budget is what keeps the bytes in bounds:
 //!
 //! ```text
-//! balance += 1.45 · length of a message        balance −= length of each packet sent, and of each acknowledgement received
+//! balance += 1.5 · length of a message        balance −= length of each packet sent or received
 //! ```
 //!
 //! Something redundant is sent only while the balance covers it. Ordering over a fixed time rather than over a count of later packets keeps reordering
 //! from looking like loss.
 
-use super::frames::{Ack, Channel, FRAGMENT, FRAGMENT_HEAD, Frame, PARITY_HEAD, Part, before};
-use super::inbox::{BYTES_AHEAD, NEWEST_AHEAD, RELIABLE_AHEAD, parity};
+mod stream;
+
+use super::frames::{Ack, Channel, FRAGMENT, Frame, PARITY_HEAD, Part, before};
+use super::inbox::parity;
+use super::packet::whole;
 use crate::sync::transport::MAX_QUEUED_BYTES;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
+use stream::Stream;
 
 /// Packets under way at once; half of what a socket's default buffer holds.
 const PACKETS_AHEAD: usize = 64;
@@ -37,27 +41,6 @@ const LONGEST_TIMEOUT: Duration = Duration::from_millis(250);
 const LOSSY: f64 = 0.005;
 /// Bytes by which the balance may run ahead or behind.
 const BALANCE: i64 = 32 << 10;
-
-/// A fragment under way.
-#[derive(Clone, Copy, Default)]
-struct Progress {
-    /// Packets under way that hold it.
-    copies: u8,
-    arrived: bool,
-}
-
-/// A message under way.
-struct Outgoing {
-    part: Part,
-    data: Arc<[u8]>,
-    progress: Vec<Progress>,
-    missing: u16,
-    /// Fragments from here on were never sent.
-    unsent: u16,
-    /// Parity groups, 0 until the last fragment was sent; and those from here on were never sent.
-    groups: u16,
-    unsent_parity: u16,
-}
 
 /// What a packet holds.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -89,18 +72,6 @@ pub struct Full;
 #[derive(Debug, PartialEq, Eq)]
 pub struct Impossible;
 
-/// One stream of messages.
-struct Stream {
-    /// Messages that were not begun; at most one of the newest.
-    waiting: VecDeque<Arc<[u8]>>,
-    begun: VecDeque<Outgoing>,
-    begun_bytes: usize,
-    waiting_bytes: usize,
-    next: u32,
-    /// The other side has all before this one.
-    done: u32,
-}
-
 /// What is to be sent of one connection.
 pub struct Outbox {
     streams: [Stream; 2],
@@ -124,10 +95,8 @@ pub struct Outbox {
 impl Outbox {
     /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
     pub fn new(first: u32) -> Outbox {
-        let stream =
-            || Stream { waiting: VecDeque::new(), begun: VecDeque::new(), begun_bytes: 0, waiting_bytes: 0, next: first, done: first };
         Outbox {
-            streams: [stream(), stream()],
+            streams: [(); 2].map(|()| Stream::new(first)),
             sent: VecDeque::new(),
             under_way: 0,
             repairs: VecDeque::new(),
@@ -147,7 +116,7 @@ impl Outbox {
 
     /// Takes a message of 1 to [`MAX_MESSAGE_BYTES`](crate::sync::transport::MAX_MESSAGE_BYTES) bytes.
     pub fn push(&mut self, channel: Channel, message: Arc<[u8]>) -> Result<(), Full> {
-        self.earn(message.len() * 29 / 20);
+        self.earn(message.len() * 3 / 2);
         let stream = &mut self.streams[channel as usize];
         if channel == Channel::Newest {
             self.superseded += stream.waiting.len() as u64;
@@ -204,7 +173,7 @@ impl Outbox {
         true
     }
 
-    /// A packet of so many bytes was sent (or one with nothing but an acknowledgement received): it is paid for.
+    /// A packet of so many bytes was sent or received: it is paid for.
     pub fn pay(&mut self, bytes: usize) {
         self.balance = (self.balance - bytes as i64).max(-BALANCE);
     }
@@ -216,14 +185,16 @@ impl Outbox {
 
     /// Takes an acknowledgement.
     pub fn acknowledged(&mut self, now: Duration, ack: &Ack, next_sequence: u64) -> Result<(), Impossible> {
-        let possible = |stream: &Stream, done: u32| !before(stream.next, done);
-        if ack.largest >= next_sequence || !self.streams.iter().zip(ack.complete).all(|(stream, done)| possible(stream, done)) {
+        let largest = whole(ack.largest, next_sequence);
+        let complete = [Some(ack.reliable), ack.newest];
+        let possible = |(stream, done): (&Stream, Option<u32>)| done.is_none_or(|done| !before(stream.next, done));
+        if largest >= next_sequence || !self.streams.iter().zip(complete).all(possible) {
             return Err(Impossible);
         }
-        self.largest = self.largest.max(Some(ack.largest));
-        self.mark(now, ack);
-        for (stream, done) in self.streams.iter_mut().zip(ack.complete) {
-            stream.finish(done);
+        self.largest = self.largest.max(Some(largest));
+        self.mark(now, largest, ack.mask);
+        for (stream, done) in self.streams.iter_mut().zip(complete) {
+            done.into_iter().for_each(|done| stream.finish(done));
         }
         self.forget();
         self.begin_messages();
@@ -264,11 +235,11 @@ impl Outbox {
         sent.at + timeout.min(LONGEST_TIMEOUT)
     }
 
-    fn mark(&mut self, now: Duration, ack: &Ack) {
+    fn mark(&mut self, now: Duration, largest: u64, mask: u128) {
         let mut newest = None;
         for k in 0..self.sent.len() {
             let sent = &mut self.sent[k];
-            let taken = ack.largest.checked_sub(sent.sequence).is_some_and(|age| age < 128 && ack.mask >> age & 1 == 1);
+            let taken = largest.checked_sub(sent.sequence).is_some_and(|age| age < 128 && mask >> age & 1 == 1);
             if !taken || sent.fate == Fate::Arrived {
                 continue;
             }
@@ -365,7 +336,8 @@ impl Outbox {
             return Some(Piece::Parity(channel, message, outgoing.unsent_parity - 1));
         }
         let (index, length) = (outgoing.unsent, outgoing.part.length(outgoing.unsent));
-        if length + FRAGMENT_HEAD > room {
+        let head = outgoing.part.head();
+        if length + head > room {
             return None;
         }
         outgoing.unsent += 1;
@@ -373,7 +345,7 @@ impl Outbox {
         if outgoing.unsent == outgoing.part.fragments() && loss > LOSSY {
             outgoing.groups = parity_groups(&outgoing.part, balance - length as i64);
             if outgoing.part.fragments() == 1 {
-                self.repeat(piece, length + FRAGMENT_HEAD);
+                self.repeat(piece, length + head);
             }
         }
         Some(piece)
@@ -390,7 +362,7 @@ impl Outbox {
     fn size(&mut self, piece: Piece) -> Option<usize> {
         let Piece::Fragment(channel, message, index) = piece else { return Some(1) };
         let outgoing = self.streams[channel as usize].find(message)?;
-        (!outgoing.progress[usize::from(index)].arrived).then(|| outgoing.part.length(index) + FRAGMENT_HEAD)
+        (!outgoing.progress[usize::from(index)].arrived).then(|| outgoing.part.length(index) + outgoing.part.head())
     }
 
     fn write(&mut self, piece: Piece, body: &mut Vec<u8>) {
@@ -436,46 +408,4 @@ fn parity_groups(part: &Part, balance: i64) -> u16 {
     let affordable = balance.max(0) / (FRAGMENT + 100) as i64;
     let fragments = i64::from(part.fragments());
     ((fragments + 3) / 4).min(affordable).min(fragments - 1) as u16
-}
-
-impl Outgoing {
-    /// Whether a fragment, or a parity that may still help, was never sent.
-    fn has_unsent(&self) -> bool {
-        self.unsent < self.part.fragments() || (self.unsent_parity < self.groups && self.missing > 0)
-    }
-}
-
-impl Stream {
-    fn may_begin(&self, channel: Channel) -> bool {
-        let ahead = if channel == Channel::Reliable { RELIABLE_AHEAD } else { NEWEST_AHEAD };
-        let Some(first) = self.waiting.front() else { return false };
-        self.begun.is_empty() || (self.next.wrapping_sub(self.done) < ahead && self.begun_bytes + first.len() <= BYTES_AHEAD)
-    }
-
-    fn begin(&mut self, channel: Channel, data: Arc<[u8]>) {
-        let part = Part { channel, message: self.next, total: data.len() as u32 };
-        let fragments = part.fragments();
-        self.next = self.next.wrapping_add(1);
-        self.waiting_bytes -= data.len();
-        self.begun_bytes += data.len();
-        let progress = vec![Progress::default(); usize::from(fragments)];
-        self.begun.push_back(Outgoing { part, data, progress, missing: fragments, unsent: 0, groups: 0, unsent_parity: 0 });
-    }
-
-    /// The message, if it is still under way.
-    fn find(&mut self, message: u32) -> Option<&mut Outgoing> {
-        let first = self.begun.front()?.part.message;
-        self.begun.get_mut(message.wrapping_sub(first) as usize)
-    }
-
-    /// The other side has all messages before `done`.
-    fn finish(&mut self, done: u32) {
-        if before(self.done, done) {
-            self.done = done;
-        }
-        while let Some(front) = self.begun.front().filter(|outgoing| before(outgoing.part.message, self.done)) {
-            self.begun_bytes -= front.data.len();
-            self.begun.pop_front();
-        }
-    }
 }

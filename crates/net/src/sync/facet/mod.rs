@@ -8,16 +8,21 @@
 //!
 //! A state of a later frame stands for the PRESENT of the one that is drawn: the server would not have sent it before.
 
+mod receiving;
+
 use super::input::Input;
-use super::messages::{Done, FacetCounts, Join, Refusal, count};
+use super::messages::{Done, FacetCounts, Join, count};
 use super::mirror::Mirror;
 use super::server::Pace;
-use super::table::Snapshot;
 use super::transport::{Delivery, LinkEvent};
 use super::viewer::Viewer;
-use super::wire::{Fault, HEADER_BYTES, Hash, Header, Kind, VERSION, later, message, open};
+use super::wire::{HEADER_BYTES, Hash, Header, Kind, later, message};
+use std::collections::VecDeque;
 use std::time::Duration;
 use tumble_core::World;
+
+/// Inputs remembered until a picture shows them.
+const MAX_INPUTS: usize = 256;
 
 /// What a facet is told at the start.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,6 +128,10 @@ pub struct FacetSession {
     /// Drawn: frame, what READY said, when it was drawn.
     held: Option<(u64, Done, Duration)>,
     show: bool,
+    /// When PRESENT came for the frame that is held.
+    told: Option<Duration>,
+    /// Inputs that no picture has shown yet: user, number, when they were sent.
+    inputs: VecDeque<(u16, u64, Duration)>,
     shown: Option<(u64, Done)>,
     counts: FacetCounts,
     out: Vec<(Delivery, Vec<u8>)>,
@@ -135,7 +144,7 @@ impl FacetSession {
         let mut session = FacetSession {
             options, mirror: Mirror::new(base), phase: Phase::Joining, lost: false, run: 0, join: 0, asked: None, heard: Duration::ZERO,
             beaten: Duration::ZERO, resynced: None, listed: None, newest: None, pending: None, early: None, list: None, drawing: None, held: None, show: false,
-            shown: None, counts: FacetCounts::default(), out: Vec::new(), close: false,
+            told: None, inputs: VecDeque::new(), shown: None, counts: FacetCounts::default(), out: Vec::new(), close: false,
         };
         session.join_anew();
         session
@@ -200,9 +209,11 @@ impl FacetSession {
     /// The frame of [`begin`](Self::begin) is drawn. `image`: first 16 bytes of the BLAKE3 of its pixels, zeros where there are none.
     pub fn drawn(&mut self, now: Duration, image: Hash) {
         let Some((frame, arrived)) = self.drawing.take() else { return };
-        let done = Done { hash: self.mirror.hash(), image, took_us: micros(now.saturating_sub(arrived)) };
+        let took_us = short_micros(now.saturating_sub(arrived));
+        let done = Done { hash: self.mirror.hash(), image, took_us, input_us: None, heard_us: Some(micros(arrived)), at_us: micros(now) };
         self.held = Some((frame, done, now));
         self.show = self.options.pace == Pace::Latest || self.pending.is_some();
+        self.told = (self.options.pace == Pace::Latest).then_some(arrived);
         if self.options.pace == Pace::Lockstep {
             self.answer(Kind::Ready, frame, &done);
         }
@@ -216,16 +227,30 @@ impl FacetSession {
     /// The frame that was held is on the screen.
     pub fn presented(&mut self, now: Duration) {
         let Some((frame, done, since)) = self.held.take() else { return };
-        let done = Done { took_us: micros(now.saturating_sub(since)), ..done };
+        let (took_us, input_us) = (short_micros(now.saturating_sub(since)), self.take_shown_input().map(|sent| short_micros(now.saturating_sub(sent))));
+        let done = Done { took_us, input_us, heard_us: self.told.take().map(micros), at_us: micros(now), ..done };
         (self.show, self.shown) = (false, Some((frame, done)));
         count(&mut self.counts.shown);
         self.answer(Kind::Presented, frame, &done);
     }
 
+    /// When the newest of our inputs was sent that the picture shows, if it is the first to; all up to it are forgotten.
+    fn take_shown_input(&mut self) -> Option<Duration> {
+        let users = &self.mirror.viewer().users;
+        let shows = |user: u16| users.get(user as usize).map(|u| u.input);
+        let newest = self.inputs.iter().rev().find(|(user, sequence, _)| shows(*user) == Some(*sequence)).map(|(.., sent)| *sent);
+        self.inputs.retain(|(user, sequence, _)| shows(*user).is_none_or(|shown| later(*sequence, shown)));
+        newest
+    }
+
     /// Sends what a user does; `false` while there is no server.
-    pub fn send_input(&mut self, input: &Input) -> bool {
+    pub fn send_input(&mut self, now: Duration, input: &Input) -> bool {
         let live = self.phase == Phase::Live;
         if live {
+            if self.inputs.len() == MAX_INPUTS {
+                self.inputs.pop_front();
+            }
+            self.inputs.push_back((input.user, input.sequence, now));
             self.send(Kind::Input, 0, |out| input.write(out));
         }
         live
@@ -285,148 +310,7 @@ impl FacetSession {
         (self.phase, self.run, self.join, self.asked) = (Phase::Joining, 0, mixed(self.options.seed), None);
         (self.listed, self.newest, self.resynced) = (None, None, None);
         (self.pending, self.early, self.list, self.drawing, self.held, self.show, self.shown) = (None, None, None, None, None, false, None);
-    }
-
-    fn on_message(&mut self, now: Duration, bytes: &[u8]) {
-        if let Phase::Over(_) = self.phase {
-            return;
-        }
-        let taken = match open(bytes) {
-            Ok((header, payload)) => self.on_header(now, header, payload, bytes),
-            Err(Fault::Version(theirs)) if self.phase == Phase::Joining => {
-                let why = format!("the server speaks NetSync version {theirs}, this facet version {VERSION}: use the same build of tumble on both");
-                self.phase = Phase::Over(Over::Refused(why));
-                Ok(())
-            }
-            Err(fault) => Err(fault),
-        };
-        if let Err(fault) = taken {
-            count(if fault == Fault::Torn { &mut self.counts.torn } else { &mut self.counts.refused });
-        }
-    }
-
-    fn on_header(&mut self, now: Duration, header: Header, payload: &[u8], bytes: &[u8]) -> Result<(), Fault> {
-        let about_us = header.join == self.join;
-        let live = self.phase == Phase::Live && header.run == self.run;
-        match header.kind {
-            Kind::Snapshot if about_us && (live || self.phase == Phase::Joining) => {
-                if self.drawing.is_some() {
-                    self.list = Some(Pending { header, message: payload.to_vec(), arrived: now });
-                } else {
-                    self.on_snapshot(now, &header, payload)?;
-                }
-            }
-            Kind::Refused if about_us => self.phase = Phase::Over(Over::Refused(Refusal::read(payload)?.0)),
-            Kind::Rejoin if about_us && self.phase == Phase::Live => self.lose(),
-            Kind::Rejoin if about_us => {}
-            Kind::End if live || about_us => self.phase = Phase::Over(Over::Ended),
-            Kind::State if self.phase == Phase::Joining => self.keep_early(now, header, bytes),
-            Kind::State if live => return self.on_state(now, header, payload, bytes),
-            Kind::Present if live => self.on_present(header.frame),
-            Kind::Beat if live => {}
-            Kind::Snapshot | Kind::Refused | Kind::Rejoin | Kind::End | Kind::State | Kind::Present | Kind::Beat => {
-                count(&mut self.counts.stale);
-                return Ok(());
-            }
-            _ => return Err(Fault::Malformed("a kind that only facets send")),
-        }
-        self.heard = now;
-        Ok(())
-    }
-
-    fn on_snapshot(&mut self, now: Duration, header: &Header, payload: &[u8]) -> Result<(), Fault> {
-        self.heard = now;
-        if let Some(listed) = self.listed.filter(|listed| !later(header.frame, *listed)) {
-            count(if listed == header.frame { &mut self.counts.duplicate } else { &mut self.counts.stale });
-            return Ok(());
-        }
-        if self.phase == Phase::Live && Some(Snapshot::revision_of(payload)?) == self.mirror.revision() {
-            count(&mut self.counts.duplicate);
-            return Ok(());
-        }
-        self.mirror.apply_snapshot(payload)?;
-        (self.phase, self.run, self.listed, self.lost, self.resynced) = (Phase::Live, header.run, Some(header.frame), false, None);
-        if self.pending.take().is_some() {
-            count(&mut self.counts.missing); // it belonged to the old list
-        }
-        let early = self.early.take().filter(|early| early.header.run == self.run);
-        let fits = early.filter(|early| Mirror::revision_of(&early.message[HEADER_BYTES..]).ok() == self.mirror.revision());
-        fits.into_iter().for_each(|early| self.take_state(early));
-        Ok(())
-    }
-
-    fn on_state(&mut self, now: Duration, header: Header, payload: &[u8], bytes: &[u8]) -> Result<(), Fault> {
-        self.heard = now;
-        if Some(Mirror::revision_of(payload)?) == self.mirror.revision() {
-            self.take_state(Pending { header, message: bytes.to_vec(), arrived: now });
-            return Ok(());
-        }
-        if self.newest.is_some_and(|newest| !later(header.frame, newest)) {
-            count(&mut self.counts.stale);
-            return Ok(());
-        }
-        self.keep_early(now, header, bytes);
-        self.resync(now);
-        Ok(())
-    }
-
-    /// Asks for the list and the frame again, unless it did so a moment ago.
-    fn resync(&mut self, now: Duration) {
-        if self.resynced.is_none_or(|asked| now >= asked.saturating_add(self.options.join_every)) {
-            self.resynced = Some(now);
-            self.send(Kind::Resync, 0, |_| {});
-        }
-    }
-
-    fn keep_early(&mut self, now: Duration, header: Header, bytes: &[u8]) {
-        count(&mut self.counts.early);
-        self.early = Some(Pending { header, message: bytes.to_vec(), arrived: now });
-    }
-
-    fn take_state(&mut self, state: Pending) {
-        let frame = state.header.frame;
-        if let Some(newest) = self.newest {
-            if frame == newest {
-                count(&mut self.counts.duplicate);
-                return self.answer_again(frame);
-            }
-            if !later(frame, newest) {
-                return count(&mut self.counts.stale);
-            }
-            self.counts.missing = self.counts.missing.wrapping_add(frame.wrapping_sub(newest) - 1);
-        }
-        self.newest = Some(frame);
-        if self.pending.replace(state).is_some() {
-            count(&mut self.counts.missing);
-        }
-        self.show |= self.held.is_some();
-    }
-
-    fn on_present(&mut self, frame: u64) {
-        let held = self.held.as_ref().map(|(held, ..)| *held);
-        let shown = self.shown.map(|(shown, _)| shown);
-        if held == Some(frame) {
-            self.show = true;
-        } else if shown == Some(frame) {
-            count(&mut self.counts.duplicate);
-            self.answer_again(frame);
-        } else if self.newest.is_none_or(|newest| later(frame, newest) || frame == newest) {
-            count(&mut self.counts.early);
-        } else {
-            count(&mut self.counts.stale);
-        }
-    }
-
-    /// The server asks again: the answer was lost.
-    fn answer_again(&mut self, frame: u64) {
-        if let Some((held, done, _)) = self.held.filter(|(held, ..)| *held == frame) {
-            self.answer(Kind::Ready, held, &done);
-        } else if let Some((shown, done)) = self.shown.filter(|(shown, _)| *shown == frame) {
-            if self.options.pace == Pace::Lockstep {
-                self.answer(Kind::Ready, shown, &done);
-            }
-            self.answer(Kind::Presented, shown, &done);
-        }
+        (self.told, self.inputs) = (None, VecDeque::new());
     }
 
     fn answer(&mut self, kind: Kind, frame: u64, done: &Done) {
@@ -441,8 +325,12 @@ impl FacetSession {
     }
 }
 
-fn micros(duration: Duration) -> u32 {
+fn short_micros(duration: Duration) -> u32 {
     u32::try_from(duration.as_micros()).unwrap_or(u32::MAX)
+}
+
+fn micros(duration: Duration) -> u64 {
+    u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
 }
 
 /// A number that looks nothing like its neighbours: splitmix64.

@@ -1,0 +1,207 @@
+//! Newton's method for what sweeps leave: all blocks of an island at once.
+//!
+//! A contact among others that carry the same body is nearly redundant, and sweeps pass load between such contacts by small shares (a pin on
+//! its base wants hundreds). The conditions of all blocks are smooth but for the choice open, stick or slide; with that choice as the multipliers have
+//! it, one linear solve goes to where all hold (semismooth Newton; Alart and Curnier, *A mixed formulation for frictional contact problems prone to
+//! Newton like solution methods*, 1991). Sweeps between the jumps choose anew.
+//!
+//! Of each block, with `w = c + Yᵀ(Yλ) + Rλ` and the trial `τ = λ − w/k`, normal `τ_n` and `τ_t`:
+//!
+//! ```text
+//! open      τ_n ≤ 0           δλ = −λ
+//! stick     |τ_t| ≤ μ τ_n     δλ = −(w + δw)/ε
+//! slide     else              δλ_n = −(w_n + δw_n)/ε,   δλ·t = μ δλ_n + r·t,   δλ·s = (r·s − κρ δw·s)/(1 − κ + ερ)
+//!           t = τ_t/|τ_t|,  s across it,  κ = μλ_n/|τ_t|,  ρ = 1/k_t,  r = μλ_n t − λ_t
+//! scalar    τ within          δλ = −(w + δw)/(ε + R);   else to the bound
+//! ```
+//!
+//! `ε` makes redundant multipliers one answer: the one nearest to those that are there, a proximal step that jumps again until nothing is left of it. So
+//! `δλ = a − G·Yᵀδu` for each block, and `δu = Σ Y·δλ` is one system with as many unknowns as the island has freedoms:
+//!
+//! ```text
+//! (1 + Σ Y G Yᵀ) δu = Σ Y a
+//! ```
+
+use super::gauss_seidel::{Local, Momentum, Step};
+use super::one_contact::Contact;
+use crate::rows::Rows;
+use nalgebra::{DMatrix, DVector};
+
+/// `ε` as a share of the mean diagonal of `K`.
+const PROXIMAL: f64 = 1e-7;
+/// Islands of more freedoms than this are left to sweeps.
+const MOST_FREEDOMS: usize = 120;
+/// Sweeps before the first jump, besides half the number of freedoms.
+const FIRST: u32 = 10;
+/// Sweeps after a jump before it is judged.
+const TRIAL: u32 = 3;
+/// A jump after which sweeps change more than this share of what they did before is not followed by another at once.
+const WORTH: f64 = 0.5;
+
+/// When to jump, and what to go back to.
+pub(super) struct Newton {
+    size: usize,
+    /// The sweep after which the next jump is due, or the present one is judged.
+    due: u32,
+    wait: u32,
+    /// Multipliers and change per sweep before a jump on trial.
+    before: Option<(Vec<[f64; 3]>, f64)>,
+}
+
+/// `δλ = a − G·δw` of one block.
+#[derive(Clone, Copy, Default)]
+struct Answer {
+    a: [f64; 3],
+    g: [[f64; 3]; 3],
+}
+
+impl Newton {
+    pub fn new(momentum: &Momentum) -> Newton {
+        let size = momentum.size();
+        let wait = FIRST + size as u32 / 2;
+        Newton { size, due: if size <= MOST_FREEDOMS { wait } else { u32::MAX }, wait, before: None }
+    }
+
+    /// After a sweep that changed row velocities by `change`, of `left` that may follow: whether the multipliers jumped, or went back from a jump that was
+    /// none. The velocities are then to be made anew.
+    pub fn after(&mut self, sweep: u32, left: u32, change: f64, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du: &[f64]) -> bool {
+        if sweep < self.due {
+            return false;
+        }
+        if let Some((lambda, before)) = self.before.take()
+            && (change.is_nan() || change > WORTH * before)
+        {
+            self.due = sweep + self.wait;
+            let worse = change.is_nan() || change >= before;
+            if worse {
+                locals.iter_mut().zip(lambda).for_each(|(local, lambda)| local.lambda = lambda);
+                self.wait *= 2;
+            }
+            return worse;
+        }
+        if left <= TRIAL {
+            return false;
+        }
+        let lambda = locals.iter().map(|local| local.lambda).collect();
+        self.due = sweep + TRIAL;
+        if jump(self.size, locals, rows, momentum, du) {
+            self.before = Some((lambda, change));
+            return true;
+        }
+        self.due = sweep + self.wait;
+        false
+    }
+}
+
+/// One jump of all multipliers, back within their bounds; whether the system could be solved. `du` is that of the multipliers.
+fn jump(size: usize, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du: &[f64]) -> bool {
+    let Some(epsilon) = proximal(locals) else { return false };
+    let mut matrix = DMatrix::identity(size, size);
+    let mut right = DVector::zeros(size);
+    let answers: Vec<Answer> = locals.iter().map(|local| answer(local, rows, du, epsilon)).collect();
+    for (local, answer) in locals.iter().zip(&answers) {
+        gather(local, answer, rows, momentum, &mut matrix, &mut right);
+    }
+    if !matrix.lu().solve_mut(&mut right) || !right.iter().all(|x| x.is_finite()) {
+        return false;
+    }
+    for (local, answer) in locals.iter_mut().zip(&answers) {
+        let n = local.block.set.rows();
+        let mut velocity = [0.0; 3];
+        for side in local.block.sides() {
+            let change = &right.as_slice()[momentum.place(side.u)..][..side.dof as usize];
+            (0..n).for_each(|k| velocity[k] += crate::rows::dot(rows.response(side, k), change));
+        }
+        for k in 0..n {
+            local.lambda[k] += answer.a[k] - (0..n).map(|j| answer.g[k][j] * velocity[j]).sum::<f64>();
+        }
+        local.bound();
+    }
+    true
+}
+
+/// `ε`; `None` where nothing responds.
+fn proximal(locals: &[Local]) -> Option<f64> {
+    let diagonal = |local: &Local| match &local.step {
+        Step::Dead => None,
+        Step::Scalar(scalar) => Some(scalar.k - scalar.compliance),
+        Step::Contact(contact) => Some(contact.k.m00),
+    };
+    let (sum, count) = locals.iter().filter_map(diagonal).fold((0.0, 0.0), |(s, n), k| (s + k, n + 1.0));
+    (sum > 0.0).then(|| PROXIMAL * sum / count)
+}
+
+fn answer(local: &Local, rows: &Rows, du: &[f64], epsilon: f64) -> Answer {
+    let velocity = |k: usize| local.c[k] + rows.row_velocity(local.block, k, du);
+    let mut answer = Answer::default();
+    match &local.step {
+        Step::Dead => {}
+        Step::Scalar(scalar) => {
+            let old = local.lambda[0];
+            let w = velocity(0) + scalar.compliance * old;
+            let trial = old - w / scalar.k;
+            if trial <= scalar.lo || trial >= scalar.hi {
+                answer.a[0] = if trial <= scalar.lo { scalar.lo - old } else { scalar.hi - old };
+            } else {
+                answer.g[0][0] = 1.0 / (epsilon + scalar.compliance);
+                answer.a[0] = -w * answer.g[0][0];
+            }
+        }
+        Step::Contact(contact) => answer = of_contact(contact, local.lambda, [0, 1, 2].map(velocity), epsilon),
+    }
+    answer
+}
+
+fn of_contact(contact: &Contact, old: [f64; 3], w: [f64; 3], epsilon: f64) -> Answer {
+    let (k, mu, mut answer) = (&contact.k, contact.mu, Answer::default());
+    let normal = old[0] - w[0] / k.m00;
+    if normal <= 0.0 {
+        answer.a = old.map(|x| -x);
+        return answer;
+    }
+    let stiff = 1.0 / epsilon;
+    let mean = 0.5 * (k.m11 + k.m22);
+    let rho = if mean > f64::MIN_POSITIVE { 1.0 / mean } else { 0.0 };
+    let trial = [old[1] - rho * w[1], old[2] - rho * w[2]];
+    let size = (trial[0] * trial[0] + trial[1] * trial[1]).sqrt();
+    if size <= mu * normal {
+        for i in 0..3 {
+            answer.g[i][i] = stiff;
+            answer.a[i] = -stiff * w[i];
+        }
+        return answer;
+    }
+    let (t, s) = ([trial[0] / size, trial[1] / size], [-trial[1] / size, trial[0] / size]);
+    let kappa = (mu * old[0] / size).min(1.0);
+    let r = [mu * old[0] * t[0] - old[1], mu * old[0] * t[1] - old[2]];
+    let across = 1.0 / (1.0 - kappa + epsilon * rho);
+    answer.g[0][0] = stiff;
+    answer.a[0] = -stiff * w[0];
+    let (along, aside) = (mu * answer.a[0] + r[0] * t[0] + r[1] * t[1], across * (r[0] * s[0] + r[1] * s[1]));
+    for i in 0..2 {
+        answer.g[i + 1] = [mu * stiff * t[i], kappa * rho * across * s[i] * s[0], kappa * rho * across * s[i] * s[1]];
+        answer.a[i + 1] = along * t[i] + aside * s[i];
+    }
+    answer
+}
+
+/// Adds `Y G Yᵀ` and `Y a` of one block.
+fn gather(local: &Local, answer: &Answer, rows: &Rows, momentum: &Momentum, matrix: &mut DMatrix<f64>, right: &mut DVector<f64>) {
+    let n = local.block.set.rows();
+    for side in local.block.sides() {
+        let (at, d) = (momentum.place(side.u), side.dof as usize);
+        for k in 0..n {
+            let y = rows.response(side, k);
+            right.as_mut_slice()[at..at + d].iter_mut().zip(y).for_each(|(r, y)| *r += y * answer.a[k]);
+            for other in local.block.sides() {
+                let from = momentum.place(other.u);
+                for j in (0..n).filter(|&j| answer.g[k][j] != 0.0) {
+                    for (column, x) in rows.response(other, j).iter().enumerate() {
+                        let share = answer.g[k][j] * x;
+                        matrix.column_mut(from + column).as_mut_slice()[at..at + d].iter_mut().zip(y).for_each(|(m, y)| *m += y * share);
+                    }
+                }
+            }
+        }
+    }
+}

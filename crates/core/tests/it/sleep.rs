@@ -1,0 +1,257 @@
+//! Sleep: who lies still is left alone, and nothing can be told from a world in which nobody sleeps.
+
+use crate::common::*;
+use tumble_core::collide::{Pose, Vec3};
+use tumble_core::*;
+
+const H: f64 = 1.0 / 60.0;
+
+fn sleepy(stepper: &str) -> World {
+    let mut world = world(stepper, H);
+    let settings = Settings { sleep: Some(Sleep::default()), ..*world.settings() };
+    world.set_settings(settings).unwrap();
+    world
+}
+
+fn run(world: &mut World, frames: usize) {
+    (0..frames).for_each(|_| { world.step().unwrap(); });
+}
+
+fn bits(world: &World) -> Vec<u64> {
+    world.state().iter().map(|x| x.to_bits()).collect()
+}
+
+fn stack(world: &mut World, name: &str, x: f64, n: usize) -> Vec<ObjectId> {
+    let body = |i| RigidBody::with_mass(format!("{name}{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
+    (0..n).map(|i| world.add(body(i).at(Pose::translation(x, 0.0, 0.25 + 0.5 * i as f64))).unwrap()).collect()
+}
+
+/// A stack on the ground, asleep.
+fn bed(stepper: &str) -> (World, Vec<ObjectId>) {
+    let mut world = sleepy(stepper);
+    ground(&mut world, 0.0, 0.5);
+    let ids = stack(&mut world, "box", 0.0, 3);
+    run(&mut world, 60);
+    assert!(ids.iter().all(|&id| world.asleep(id)), "{stepper}: still awake after a second: {:?}", world.report());
+    (world, ids)
+}
+
+fn asleep(world: &World, ids: &[ObjectId]) -> usize {
+    ids.iter().filter(|&&id| world.asleep(id)).count()
+}
+
+#[test]
+fn a_stack_falls_asleep_and_costs_nothing() {
+    for stepper in STEPPERS {
+        let (mut world, _) = bed(stepper);
+        let (state, energy) = (bits(&world), world.energy());
+        assert!(energy.kinetic == 0.0 && (energy.potential - 10.0 * G * (0.25 + 0.75 + 1.25)).abs() < 1e-3, "{energy:?}: sleepers keep their energy");
+        run(&mut world, 60);
+        assert_eq!(bits(&world), state, "{stepper}: sleepers stay where they are");
+        assert_eq!((world.report().contacts, world.report().iterations, world.report().asleep), (0, 0, 3), "{stepper}");
+    }
+}
+
+/// In a world without gravity a ball at rest is asleep at exactly its state: what strikes it cannot tell, to the last bit.
+#[test]
+fn a_strike_on_sleepers_is_the_same_bits_as_on_the_waking() {
+    for stepper in STEPPERS {
+        let cradle = |sleep: Option<Sleep>| {
+            let mut world = no_gravity(sleepy(stepper));
+            let settings = Settings { sleep, ..*world.settings() };
+            world.set_settings(settings).unwrap();
+            let ball = |name: String| RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(1.0, 0.3);
+            let ids: Vec<ObjectId> = (0..5).map(|i| world.add(ball(format!("ball{i}")).at(Pose::translation(0.2 * i as f64, 0.0, 0.0))).unwrap()).collect();
+            world.add(ball("striker".into()).at(Pose::translation(-2.1, 0.02, 0.0)).moving(Vec3::x(), Vec3::zeros())).unwrap();
+            (world, ids)
+        };
+        let ((mut sleeping, ids), (mut waking, _)) = (cradle(Some(Sleep::default())), cradle(None));
+        run(&mut sleeping, 90);
+        run(&mut waking, 90);
+        assert_eq!(asleep(&sleeping, &ids), 5, "{stepper}");
+        for frame in 0..120 {
+            run(&mut sleeping, 1);
+            run(&mut waking, 1);
+            assert_eq!(bits(&sleeping), bits(&waking), "{stepper}: frame {frame}");
+        }
+        assert!(velocity(&waking, ids[4]).x > 0.5, "{stepper}: the last ball never left");
+    }
+}
+
+#[test]
+fn only_the_island_that_is_struck_wakes() {
+    for stepper in STEPPERS {
+        let mut world = sleepy(stepper);
+        ground(&mut world, 0.0, 0.5);
+        let (left, right) = (stack(&mut world, "left", -2.0, 3), stack(&mut world, "right", 2.0, 3));
+        run(&mut world, 60);
+        assert_eq!((asleep(&world, &left), asleep(&world, &right)), (3, 3), "{stepper}");
+        let ball = RigidBody::with_mass("ball", sphere(0.2), 5.0).unwrap();
+        world.add(ball.at(Pose::translation(-4.0, 0.0, 0.25)).moving(Vec3::new(6.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+        run(&mut world, 40);
+        assert_eq!((asleep(&world, &left), asleep(&world, &right)), (0, 3), "{stepper}");
+    }
+}
+
+/// Everything that a user or a neighbour can do to sleepers wakes all of them in the frame in which it happens.
+#[test]
+fn whatever_is_done_to_a_sleeper_wakes_its_island() {
+    type Deed = (&'static str, fn(&mut World, &[ObjectId]));
+    let deeds: [Deed; 10] = [
+        ("a force", |w, ids| w.apply_force(ids[2], 0, Vec3::x(), &Vec3::zeros()).unwrap()),
+        ("a torque", |w, ids| w.apply_torque(ids[2], 0, Vec3::x()).unwrap()),
+        ("a generalized force", |w, ids| w.apply_generalized(ids[1], &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]).unwrap()),
+        ("an impulse", |w, ids| w.apply_impulse(ids[0], 0, Vec3::x(), &Vec3::zeros()).unwrap()),
+        ("a velocity", |w, ids| w.set_velocity(ids[0], Vec3::x(), Vec3::zeros()).unwrap()),
+        ("a pose", |w, ids| w.set_pose(ids[2], Pose::translation(0.0, 0.0, 3.0)).unwrap()),
+        ("gravity", |w, _| {
+            let settings = Settings { gravity: Vec3::new(3.0, 0.0, -9.81), ..*w.settings() };
+            w.set_settings(settings).unwrap();
+        }),
+        ("the ground goes", |w, _| drop(w.remove(w.find("ground").unwrap()).unwrap())),
+        ("one of them goes", |w, ids| drop(w.remove(ids[0]).unwrap())),
+        ("the ground is put lower", |w, _| w.set_pose(w.find("ground").unwrap(), Pose::translation(0.0, 0.0, -1.0)).unwrap()),
+    ];
+    for stepper in STEPPERS {
+        for (name, deed) in deeds {
+            let (mut world, ids) = bed(stepper);
+            deed(&mut world, &ids);
+            run(&mut world, 1);
+            assert_eq!(asleep(&world, &ids), 0, "{stepper}: {name}");
+        }
+    }
+}
+
+/// A lift that stands still is a bed like any other; when it goes it takes them along, and a pusher led from afar is felt.
+#[test]
+fn what_is_led_wakes_those_it_carries_or_strikes() {
+    for stepper in STEPPERS {
+        let mut world = sleepy(stepper);
+        let lift = world.add_boxed(Box::new(RigidBody::with_mass("lift", cube(1.0), 1.0).unwrap().surface(0.0, 0.5)), Mode::Kinematic).unwrap();
+        let cargo = RigidBody::with_mass("cargo", cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
+        let cargo = world.add(cargo.at(Pose::translation(0.0, 0.0, 0.75))).unwrap();
+        run(&mut world, 60);
+        assert!(world.asleep(cargo), "{stepper}");
+        world.set_velocity(lift, Vec3::new(0.0, 0.0, 0.5), Vec3::zeros()).unwrap();
+        run(&mut world, 60);
+        assert!(!world.asleep(cargo) && (position(&world, cargo).z - 1.25).abs() < 1e-3, "{stepper}: {}", position(&world, cargo));
+        world.set_velocity(lift, Vec3::zeros(), Vec3::zeros()).unwrap();
+        run(&mut world, 90);
+        assert!(world.asleep(cargo), "{stepper}: not asleep again");
+        let pusher = RigidBody::with_mass("pusher", cube(0.4), 1.0).unwrap().at(Pose::translation(-3.0, 0.0, position(&world, cargo).z));
+        let pusher = world.add_boxed(Box::new(pusher), Mode::Kinematic).unwrap();
+        world.set_velocity(pusher, Vec3::new(2.0, 0.0, 0.0), Vec3::zeros()).unwrap();
+        run(&mut world, 75);
+        // 2.5 m from -3 puts its face at -0.3; the cargo's was at -0.25: not yet. Then 0.3 m more.
+        assert!(world.asleep(cargo), "{stepper}: woken without a touch");
+        run(&mut world, 9);
+        assert!(position(&world, cargo).x > 0.2, "{stepper}: the pusher went through: {}", position(&world, cargo));
+    }
+}
+
+struct Gust;
+
+impl Object for Gust {
+    fn name(&self) -> &str {
+        "gust"
+    }
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(Gust)
+    }
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        Some(self)
+    }
+}
+
+impl ForceGenerator for Gust {
+    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
+        let blows = if view.time > 2.0 { 80.0 } else { 1.0 };
+        out.wrenches.iter_mut().skip(1).for_each(|w| w.force.x += blows);
+    }
+}
+
+/// A steady breeze lets them sleep; the gust of 2 s wakes them, and drives them as if they had never slept.
+#[test]
+fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
+    for stepper in STEPPERS {
+        let blown = |sleep: Option<Sleep>| {
+            let mut world = sleepy(stepper);
+            let settings = Settings { sleep, ..*world.settings() };
+            world.set_settings(settings).unwrap();
+            ground(&mut world, 0.0, 0.5);
+            let ids = stack(&mut world, "box", 0.0, 1);
+            world.add(Gust).unwrap();
+            run(&mut world, 100);
+            let slept = world.asleep(ids[0]);
+            run(&mut world, 80);
+            (slept, position(&world, ids[0]).x)
+        };
+        let ((slept, x), (never, waking)) = (blown(Some(Sleep::default())), blown(None));
+        assert!(slept && !never, "{stepper}");
+        // 80 N against μ·m·g = 49 N for a second; a gust that begins within a step may find the friction of its start for all of it: μ·g·h for a second
+        assert!((waking - 0.5 * (8.0 - 0.5 * G)).abs() < 1.2 * 0.5 * G * H && (x - waking).abs() < 1e-6, "{stepper}: {x} m, and {waking} m without sleep");
+    }
+}
+
+/// A pendulum at its turning points, and a ball that rolls at a millimetre a second, are not still.
+#[test]
+fn what_pauses_or_creeps_stays_awake() {
+    for stepper in STEPPERS {
+        let mut world = sleepy(stepper);
+        ground(&mut world, 0.0, 0.5);
+        let bob = RigidBody::with_mass("bob", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 0.3, 2.0));
+        let bob = world.add(bob).unwrap();
+        let hinge = Closure::hinge_at("hinge", &world, Some((bob, 0)), None, Vec3::new(5.0, 0.0, 3.0), Vec3::x()).unwrap();
+        world.add(hinge).unwrap();
+        let roller = RigidBody::with_mass("roller", sphere(0.2), 1.0).unwrap().surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, 0.2));
+        let roller = world.add(roller.moving(Vec3::new(1e-3, 0.0, 0.0), Vec3::new(0.0, 1e-3 / 0.2, 0.0))).unwrap();
+        for _ in 0..300 {
+            run(&mut world, 1);
+            assert!(!world.asleep(bob) && !world.asleep(roller), "{stepper} at {} s", world.time());
+        }
+        assert!((position(&world, roller).x - 5e-3).abs() < 1e-5, "{stepper}: {}", position(&world, roller).x);
+    }
+}
+
+/// A chain hung from the world sleeps as one, and a pull at its end is felt by all.
+#[test]
+fn joints_hold_an_island_together() {
+    let mut world = sleepy("time_stepping");
+    let mut above: Option<(ObjectId, usize)> = None;
+    let mut ids = Vec::new();
+    for i in 0..4 {
+        let rod = RigidBody::with_mass(format!("rod{i}"), cube(0.2), 1.0).unwrap().at(Pose::translation(0.0, 0.0, -0.5 * i as f64));
+        let id = world.add(rod).unwrap();
+        let pin = Closure::hinge_at(format!("pin{i}"), &world, Some((id, 0)), above, Vec3::new(0.0, 0.0, 0.25 - 0.5 * i as f64), Vec3::y()).unwrap();
+        world.add(pin).unwrap();
+        above = Some((id, 0));
+        ids.push(id);
+    }
+    run(&mut world, 60);
+    assert_eq!(asleep(&world, &ids), 4);
+    let tip = position(&world, ids[3]);
+    world.apply_force(ids[3], 0, Vec3::new(20.0, 0.0, 0.0), &tip).unwrap();
+    run(&mut world, 30);
+    assert_eq!(asleep(&world, &ids), 0);
+    assert!(ids.iter().all(|&id| velocity(&world, id).norm() > 1e-3), "the pull did not reach the top");
+}
+
+#[test]
+fn saved_and_forked_sleepers_wake_to_the_same_bytes() {
+    for stepper in STEPPERS {
+        let (mut world, ids) = bed(stepper);
+        let ball = RigidBody::with_mass("ball", sphere(0.2), 5.0).unwrap();
+        world.add(ball.at(Pose::translation(-4.0, 0.1, 0.6)).moving(Vec3::new(6.0, 0.0, 2.0), Vec3::zeros())).unwrap();
+        run(&mut world, 10);
+        assert_eq!(asleep(&world, &ids), 3, "{stepper}");
+        let (saved, mut fork) = (world.save(), world.fork());
+        run(&mut world, 60);
+        assert_eq!(asleep(&world, &ids), 0, "{stepper}");
+        let after = world.save();
+        world.restore(&saved).unwrap();
+        assert_eq!(world.save(), saved, "{stepper}");
+        run(&mut world, 60);
+        run(&mut fork, 60);
+        assert!(world.save() == after && fork.save() == after, "{stepper}");
+    }
+}

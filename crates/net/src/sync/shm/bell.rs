@@ -1,0 +1,237 @@
+//! How the processes of a run wake each other: a few counters in shared memory that the kernel can wait on (futex).
+//!
+//! ```text
+//! server, to all facets at once                     facet, to the server
+//!   rung  ← rung + 1                                  answers ← answers + 1
+//!   wake all who wait for `rung` to change            wake it if answers has reached wanted
+//!
+//! facet waits                                       server waits
+//!   while rung = what it was before it looked         wanted ← what answers was before it looked + those who owe one
+//!                                                     while answers = what it was before it looked
+//! ```
+//!
+//! So a message to any number of facets costs one system call here and one in each of them, and of all answers only the last one wakes the server. Nothing is
+//! lost between looking and waiting: the kernel compares before it sleeps. The counters carry no data; whoever misses a ring looks again after its time-out.
+//!
+//! The memory is one page per run, `tumble_USER_RUN.bell`. Its server removes it; what a killed server left is removed by [`clean_up`].
+
+use crate::sync::transport::LinkError;
+use iceoryx2::prelude::{FileName, SemanticString};
+use iceoryx2_bb_concurrency::atomic::AtomicU32;
+use iceoryx2_bb_posix::access_mode::AccessMode;
+use iceoryx2_cal::dynamic_storage::posix_shared_memory::{Builder, Configuration, Storage};
+use iceoryx2_cal::dynamic_storage::{DynamicStorage, DynamicStorageBuilder};
+use iceoryx2_cal::named_concept::{NamedConceptBuilder, NamedConceptConfiguration};
+use rustix::io::Errno;
+use rustix::thread::futex;
+use std::fmt::Debug;
+use std::path::Path;
+use std::sync::atomic::Ordering::SeqCst;
+use std::time::Duration;
+
+/// Rung to the facets; answers to the server; answers at which it wants to be woken; number of its process; servers so far.
+type Counters = [AtomicU32; 5];
+const RUNG: usize = 0;
+const ANSWERS: usize = 1;
+const WANTED: usize = 2;
+const PROCESS: usize = 3;
+const SERVERS: usize = 4;
+
+const SUFFIX: &str = ".bell";
+/// Where shared memory lies as files.
+const FOLDER: &str = "/dev/shm";
+
+/// One end of it.
+pub struct Bell {
+    memory: Storage<Counters>,
+    /// Which server of the run this is; `None` for a facet.
+    server: Option<u32>,
+}
+
+impl Bell {
+    /// The server's: makes it, or takes over the one that an earlier server of the run left.
+    ///
+    /// Errors: the system refuses.
+    pub fn serve(run: &str, user: u32) -> Result<Bell, LinkError> {
+        let name = file_name(run)?;
+        let mut fresh = |value: &mut std::mem::MaybeUninit<Counters>, _: &mut _| {
+            value.write(Default::default());
+            true
+        };
+        let builder = Builder::<Counters>::new(&name).config(&configuration(user)?).has_ownership(true).timeout(Duration::from_secs(1));
+        let storage = builder.initializer(&mut fresh).open_or_create().map_err(refused)?;
+        storage.acquire_ownership();
+        let server = storage.get()[SERVERS].fetch_add(1, SeqCst).wrapping_add(1);
+        storage.get()[PROCESS].store(std::process::id(), SeqCst);
+        Ok(Bell { memory: storage, server: Some(server) })
+    }
+
+    /// A facet's; `None` while there is no server.
+    ///
+    /// Errors: the run's name is too long.
+    pub fn join(run: &str, user: u32) -> Result<Option<Bell>, LinkError> {
+        Ok(Builder::<Counters>::new(&file_name(run)?).config(&configuration(user)?).has_ownership(false).open(AccessMode::ReadWrite).ok().map(|memory| Bell { memory, server: None }))
+    }
+
+    /// To all facets.
+    pub fn ring(&self) {
+        self.counter(RUNG).fetch_add(1, SeqCst);
+        self.wake(RUNG, i32::MAX as u32);
+    }
+
+    /// To the server; `now`: even if it waits for others.
+    pub fn answer(&self, now: bool) {
+        let answers = self.counter(ANSWERS).fetch_add(1, SeqCst).wrapping_add(1);
+        let past = answers.wrapping_sub(self.counter(WANTED).load(SeqCst));
+        if now || past <= u32::MAX / 2 {
+            self.wake(ANSWERS, 1);
+        }
+    }
+
+    /// How often it rang: to be asked before looking for messages.
+    pub fn rung(&self) -> u32 {
+        self.counter(RUNG).load(SeqCst)
+    }
+
+    /// How many answers there were: to be asked before looking for messages.
+    pub fn answers(&self) -> u32 {
+        self.counter(ANSWERS).load(SeqCst)
+    }
+
+    /// A facet waits for the next ring, at most `timeout`.
+    pub fn wait_for_ring(&self, seen: u32, timeout: Duration) -> Result<(), LinkError> {
+        self.wait(RUNG, seen, timeout)
+    }
+
+    /// The server waits for so many more answers (at least one), at most `timeout`.
+    pub fn wait_for_answers(&self, seen: u32, owed: u32, timeout: Duration) -> Result<(), LinkError> {
+        self.counter(WANTED).store(seen.wrapping_add(owed.max(1)), SeqCst);
+        self.wait(ANSWERS, seen, timeout)
+    }
+
+    fn counter(&self, which: usize) -> &std::sync::atomic::AtomicU32 {
+        &self.memory.get()[which]
+    }
+
+    fn wake(&self, which: usize, most: u32) {
+        // It fails only for an address that is none.
+        let _ = futex::wake(self.counter(which), futex::Flags::empty(), most);
+    }
+
+    fn wait(&self, which: usize, seen: u32, timeout: Duration) -> Result<(), LinkError> {
+        let timeout = timeout.try_into().ok();
+        match futex::wait(self.counter(which), futex::Flags::empty(), seen, timeout.as_ref()) {
+            // Changed before it slept; the time is over; a signal: look again.
+            Ok(()) | Err(Errno::AGAIN | Errno::TIMEDOUT | Errno::INTR) => Ok(()),
+            Err(why) => Err(LinkError::Io { what: "shared memory: wait".into(), why: why.into() }),
+        }
+    }
+}
+
+impl Drop for Bell {
+    /// The file goes with its server, unless another one has taken over.
+    fn drop(&mut self) {
+        if self.server.is_some_and(|server| self.counter(SERVERS).load(SeqCst) != server) {
+            self.memory.release_ownership();
+        }
+    }
+}
+
+/// Removes the bells of this user's servers that are gone.
+pub fn clean_up(user: u32) {
+    let Ok(files) = std::fs::read_dir(FOLDER) else { return };
+    let prefix = prefix(user);
+    for file in files.flatten() {
+        let name = file.file_name();
+        let Some(inner) = name.to_str().and_then(|n| n.strip_prefix(&prefix)?.strip_suffix(SUFFIX)) else { continue };
+        let Ok(inner) = FileName::new(inner.as_bytes()) else { continue };
+        let Ok(configuration) = configuration(user) else { return };
+        let Ok(storage) = Builder::<Counters>::new(&inner).config(&configuration).has_ownership(false).open(AccessMode::Read) else { continue };
+        let process = storage.get()[PROCESS].load(SeqCst);
+        if process != 0 && !Path::new(&format!("/proc/{process}")).exists() {
+            // Another process may have been quicker.
+            let _ = std::fs::remove_file(file.path());
+        }
+    }
+}
+
+fn prefix(user: u32) -> String {
+    format!("tumble_{user}_")
+}
+
+fn configuration(user: u32) -> Result<Configuration<Counters>, LinkError> {
+    let name = |text: &str| FileName::new(text.as_bytes()).map_err(refused);
+    Ok(Configuration::default().prefix(&name(&prefix(user))?).suffix(&name(SUFFIX)?))
+}
+
+/// Of any run's name one that is a file's: its hash.
+fn file_name(run: &str) -> Result<FileName, LinkError> {
+    FileName::new(&blake3::hash(run.as_bytes()).to_hex().as_bytes()[..32]).map_err(refused)
+}
+
+fn refused(why: impl Debug) -> LinkError {
+    LinkError::Other(format!("shared memory: the bell: {why:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+
+    const NOBODY: u32 = 4_000_000_000; // a user that there is not
+
+    #[test]
+    fn one_ring_wakes_all_and_only_the_last_answer_wakes_the_server() {
+        let run = format!("bell-{}", std::process::id());
+        let server = Bell::serve(&run, NOBODY).unwrap();
+        let facets: Vec<Bell> = (0..3).map(|_| Bell::join(&run, NOBODY).unwrap().unwrap()).collect();
+        let (long, moment) = (Duration::from_secs(30), Duration::from_millis(50));
+        let awake = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let waiting: Vec<_> = facets.iter().map(|facet| (facet.rung(), facet)).collect();
+            let waiting: Vec<_> = waiting.into_iter().map(|(seen, facet)| scope.spawn(move || facet.wait_for_ring(seen, long))).collect();
+            server.ring();
+            waiting.into_iter().for_each(|facet| facet.join().unwrap().unwrap());
+            let seen = server.answers();
+            let (server, awake) = (&server, &awake);
+            let waits = scope.spawn(move || {
+                server.wait_for_answers(seen, 3, long).unwrap();
+                awake.store(true, SeqCst);
+            });
+            while server.counter(WANTED).load(SeqCst) != seen + 3 {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            std::thread::sleep(moment); // asleep by now
+            facets[0].answer(false);
+            facets[1].answer(false);
+            std::thread::sleep(moment);
+            assert!(!awake.load(SeqCst), "two of three answers woke it");
+            facets[2].answer(false);
+            waits.join().unwrap();
+            // what came between looking and waiting is not slept over
+            server.wait_for_answers(seen, 6, long).unwrap();
+        });
+    }
+
+    #[test]
+    fn a_bell_goes_with_its_server_and_is_cleaned_up_after_a_killed_one() {
+        let there = |run: &str| Bell::join(run, NOBODY).unwrap().is_some();
+        let [alive, dead] = ["alive", "dead"].map(|name| format!("bell-{}-{name}", std::process::id()));
+        let server = Bell::serve(&alive, NOBODY).unwrap();
+        let mut child = std::process::Command::new("true").spawn().unwrap();
+        child.wait().unwrap();
+        let killed = Bell::serve(&dead, NOBODY).unwrap();
+        killed.counter(PROCESS).store(child.id(), SeqCst);
+        killed.memory.release_ownership();
+        drop(killed);
+        assert!(there(&alive) && there(&dead));
+        clean_up(NOBODY);
+        assert!(there(&alive) && !there(&dead));
+        // one that took over keeps it when the first goes
+        let second = Bell::serve(&alive, NOBODY).unwrap();
+        drop(server);
+        assert!(there(&alive));
+        drop(second);
+        assert!(!there(&alive));
+    }
+}

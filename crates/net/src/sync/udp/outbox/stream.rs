@@ -1,0 +1,86 @@
+//! One stream of messages on its way out: those that wait, those that are begun, and how far each of their fragments is.
+
+use super::super::frames::{Channel, Part, before};
+use super::super::inbox::{BYTES_AHEAD, NEWEST_AHEAD, RELIABLE_AHEAD};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// A fragment under way.
+#[derive(Clone, Copy, Default)]
+pub struct Progress {
+    /// Packets under way that hold it.
+    pub copies: u8,
+    pub arrived: bool,
+}
+
+/// A message under way.
+pub struct Outgoing {
+    pub part: Part,
+    pub data: Arc<[u8]>,
+    pub progress: Vec<Progress>,
+    pub missing: u16,
+    /// Fragments from here on were never sent.
+    pub unsent: u16,
+    /// Parity groups, 0 until the last fragment was sent; and those from here on were never sent.
+    pub groups: u16,
+    pub unsent_parity: u16,
+}
+
+/// One stream of messages.
+pub struct Stream {
+    /// Messages that were not begun; at most one of the newest.
+    pub waiting: VecDeque<Arc<[u8]>>,
+    pub begun: VecDeque<Outgoing>,
+    pub begun_bytes: usize,
+    pub waiting_bytes: usize,
+    pub next: u32,
+    /// The other side has all before this one.
+    pub done: u32,
+}
+
+impl Outgoing {
+    /// Whether a fragment, or a parity that may still help, was never sent.
+    pub fn has_unsent(&self) -> bool {
+        self.unsent < self.part.fragments() || (self.unsent_parity < self.groups && self.missing > 0)
+    }
+}
+
+impl Stream {
+    /// Empty; numbers begin at `first`.
+    pub fn new(first: u32) -> Stream {
+        Stream { waiting: VecDeque::new(), begun: VecDeque::new(), begun_bytes: 0, waiting_bytes: 0, next: first, done: first }
+    }
+
+    pub fn may_begin(&self, channel: Channel) -> bool {
+        let ahead = if channel == Channel::Reliable { RELIABLE_AHEAD } else { NEWEST_AHEAD };
+        let Some(first) = self.waiting.front() else { return false };
+        self.begun.is_empty() || (self.next.wrapping_sub(self.done) < ahead && self.begun_bytes + first.len() <= BYTES_AHEAD)
+    }
+
+    pub fn begin(&mut self, channel: Channel, data: Arc<[u8]>) {
+        let part = Part { channel, message: self.next, total: data.len() as u32 };
+        let fragments = part.fragments();
+        self.next = self.next.wrapping_add(1);
+        self.waiting_bytes -= data.len();
+        self.begun_bytes += data.len();
+        let progress = vec![Progress::default(); usize::from(fragments)];
+        self.begun.push_back(Outgoing { part, data, progress, missing: fragments, unsent: 0, groups: 0, unsent_parity: 0 });
+    }
+
+    /// The message, if it is still under way.
+    pub fn find(&mut self, message: u32) -> Option<&mut Outgoing> {
+        let first = self.begun.front()?.part.message;
+        self.begun.get_mut(message.wrapping_sub(first) as usize)
+    }
+
+    /// The other side has all messages before `done`.
+    pub fn finish(&mut self, done: u32) {
+        if before(self.done, done) {
+            self.done = done;
+        }
+        while let Some(front) = self.begun.front().filter(|outgoing| before(outgoing.part.message, self.done)) {
+            self.begun_bytes -= front.data.len();
+            self.begun.pop_front();
+        }
+    }
+}

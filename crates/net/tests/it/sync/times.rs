@@ -1,0 +1,84 @@
+//! When frames are shown, told by clocks that disagree: against the times of the stage's own clock.
+
+use super::lockstep::STORM;
+use super::stage::*;
+use std::time::Duration;
+use tumble_net::sync::simulate::{To, Weather};
+use tumble_net::sync::{FrameTimes, Input, Pace, ServerEvent};
+
+const US: Duration = Duration::from_micros(1);
+
+fn times(stage: &Stage) -> Vec<FrameTimes> {
+    stage.events.iter().filter_map(|e| if let ServerEvent::Shown(times) = e { Some(*times) } else { None }).collect()
+}
+
+/// When each facet showed a frame first, by the stage's clock.
+fn truth(stage: &Stage, frame: u64) -> Vec<Duration> {
+    let at = |k: usize| stage.facets[k].shown.iter().position(|(f, _)| *f == frame).map(|at| stage.facets[k].shown_at[at]);
+    (0..stage.facets.len()).filter_map(at).collect()
+}
+
+/// Clocks seconds to weeks apart, screens that show 0, 3 and 7 ms after they are told.
+fn stage(weather: Weather, pace: Pace) -> Stage {
+    let mut stage = Stage::new(11, weather, 3, pace);
+    for (facet, (clock_s, after_ms)) in stage.facets.iter_mut().zip([(0, 3), (1_000_000, 0), (7, 7)]) {
+        (facet.clock, facet.shows_after) = (Duration::from_secs(clock_s), after_ms * MS);
+    }
+    stage
+}
+
+#[test]
+fn the_skew_is_that_of_the_screens_whatever_the_clocks_say() {
+    let mut stage = stage(Weather { delay: [500 * US; 2], ..Weather::CLEAR }, Pace::Lockstep);
+    stage.run(Duration::from_secs(1));
+    let times = times(&stage);
+    assert!(times.len() > 50);
+    for t in &times {
+        assert_eq!((t.facets, t.skew), (3, 7 * MS), "frame {}", t.frame);
+        assert!(t.error <= 1200 * US, "both ways take 1 ms and the stage's tenths: {:?}", t.error);
+    }
+}
+
+#[test]
+fn over_a_bad_network_the_skew_is_right_within_its_stated_error() {
+    for pace in [Pace::Lockstep, Pace::Latest] {
+        let mut stage = stage(STORM, pace);
+        stage.run(Duration::from_secs(5));
+        let times = times(&stage);
+        assert!(times.len() > 100, "{pace:?}: {}", times.len());
+        for t in times.iter().filter(|t| t.facets == 3) {
+            let shown = truth(&stage, t.frame);
+            let skew = *shown.iter().max().unwrap() - *shown.iter().min().unwrap();
+            assert!(t.skew.abs_diff(skew) <= t.error, "{pace:?} frame {}: {:?} and {skew:?}, stated {:?}", t.frame, t.skew, t.error);
+            assert!(t.error < 5 * MS, "{:?}", t.error);
+        }
+    }
+}
+
+/// An input of a facet, and one that comes to the server by itself: each is timed once, to the last screen that shows it.
+#[test]
+fn from_what_a_user_does_to_the_picture_that_shows_it() {
+    let mut stage = stage(Weather { delay: [500 * US; 2], ..Weather::CLEAR }, Pace::Lockstep);
+    stage.run(200 * MS);
+    // the stage's viewer carries the number of the world's frame as that of the newest input
+    let (by_facet, by_server) = (stage.world.frame() + 5, stage.world.frame() + 10);
+    let sent = stage.now;
+    let there = sent + stage.facets[1].clock;
+    let input = Input { sequence: by_facet, user: 0, head: None, wand: None, buttons: 0, keys: Vec::new() };
+    let facet = stage.facets[1].session.as_mut().unwrap();
+    assert!(facet.send_input(there, &input));
+    facet.outgoing().iter().for_each(|(_, bytes)| stage.net.send(sent, To::Server(1), bytes));
+    while stage.world.frame() < by_facet + 2 {
+        stage.tick();
+    }
+    let came = stage.now;
+    stage.server.as_mut().unwrap().note_input(came, 0, by_server);
+    stage.run(400 * MS);
+    let timed: Vec<FrameTimes> = times(&stage).into_iter().filter(|t| t.input.is_some()).collect();
+    assert_eq!(timed.len(), 2, "{timed:?}");
+    for (t, since) in timed.iter().zip([sent, came]) {
+        let shown = truth(&stage, t.frame).into_iter().max().unwrap();
+        assert_eq!(t.input, Some(shown - since), "frame {}", t.frame);
+    }
+    assert!(timed[1].input.unwrap() > 50 * MS, "three frames of 16 ms and the screen: {:?}", timed[1].input);
+}

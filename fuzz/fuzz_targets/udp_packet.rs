@@ -1,0 +1,39 @@
+//! The outside and the inside of a datagram, the packets of a handshake, and the head of a sample in shared memory: what is read is written back to the same bytes.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tumble_net::sync::shm::wire::{HEAD, Head};
+use tumble_net::sync::udp::handshake::{Hello, Reply};
+use tumble_net::sync::udp::keys::Handshake;
+use tumble_net::sync::udp::{SharedKey, frames, packet};
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Some(frames) = frames::parse(bytes) {
+        let mut written = Vec::new();
+        frames.iter().for_each(|frame| frame.write(&mut written));
+        assert_eq!(written, bytes);
+    }
+    if let Ok((head, rest)) = Head::parse(bytes) {
+        assert_eq!((&head.bytes()[..], rest.len() + HEAD), (&bytes[..HEAD], bytes.len()));
+    }
+    // a header and a checksum that fit, so that what comes behind them is reached
+    let mut datagram = bytes[..bytes.len().min(packet::MAX_DATAGRAM - packet::TAG)].to_vec();
+    if datagram.len() < packet::HEADER {
+        assert!(packet::parse(bytes).is_err());
+        return;
+    }
+    let _ = packet::parse(&datagram);
+    let handshake = Handshake::new(&SharedKey::new([7; 32]));
+    packet::set_length(&mut datagram);
+    let tagged = &mut datagram.clone();
+    handshake.tag(tagged);
+    packet::finish(&mut datagram, &[0; packet::TAG]);
+    for datagram in [&datagram, tagged] {
+        if let Ok(header) = packet::parse(datagram) {
+            let mut again = Vec::new();
+            packet::begin(&mut again, header);
+            assert_eq!((again[..3].to_vec(), &again[9..]), (datagram[..3].to_vec(), &datagram[9..packet::HEADER]));
+            let _ = (Hello::read(datagram, &handshake), Reply::read(datagram, &handshake));
+        }
+    }
+});
