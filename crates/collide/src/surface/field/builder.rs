@@ -24,7 +24,7 @@ const SHORT: usize = 16;
 /// At the last level, or far from the surface, lists up to this length are kept.
 const LONG: usize = 96;
 /// A cell further from the surface than this many half diagonals is not divided, if its list is not too long,
-const FAR: f64 = 2.0;
+const FAR: f64 = 3.0;
 /// or it is further than this, as a part of the diagonal.
 const FARTHEST: f64 = 0.06;
 /// The outermost cell reaches this far beyond the mesh, as a part of the diagonal.

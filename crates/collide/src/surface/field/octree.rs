@@ -11,7 +11,7 @@
 use crate::Vec3;
 
 /// Divisions that are passed at once on the way down, at most.
-const TOP: usize = 5;
+const TOP: usize = 6;
 /// `e` is kept in parts of this many half sides.
 const MOST_SHORT: f64 = 8.0;
 
