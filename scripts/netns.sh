@@ -1,14 +1,13 @@
 #!/bin/sh
 # A server and its facets in network namespaces of their own, over sealed UDP, with a bad network between them; prints the table of latency and loss.
-#   sudo scripts/netns.sh [--frames 6000] [--bytes 16384] [--facets 1] [--rate 60] [--loss 0.05] [--reorder 0.1] [--duplicate 0.02] [--delay-ms 1] [--netem]
-# The bad network is a relay process in a third namespace; with --netem it is the kernel's own (a kernel with sch_netem).
+#   sudo scripts/netns.sh [--frames 6000] [--bytes 16384] [--facets 1] [--rate 60] [--loss 0.05] [--reorder 0.1] [--duplicate 0.02] [--delay-ms 1]
+# The bad network is a relay process in a third namespace.
 runtime="${XDG_RUNTIME_DIR:-}"
 . "$(dirname "$0")/env.sh"
 
-frames=6000 bytes=16384 facets=1 rate=60 loss=0.05 reorder=0.1 duplicate=0.02 delay=1 netem=""
+frames=6000 bytes=16384 facets=1 rate=60 loss=0.05 reorder=0.1 duplicate=0.02 delay=1
 while [ $# -gt 0 ]; do
     case "$1" in
-        --netem) netem=1 && shift && continue ;;
         --frames) frames=$2 ;;
         --bytes) bytes=$2 ;;
         --facets) facets=$2 ;;
@@ -63,26 +62,14 @@ join "$facet" 10.77.2.1 10.77.2.2 b
 # Replaces the shell it runs in, so that its number is the program's and `finish` ends it.
 # shellcheck disable=SC2086  # words
 within() { exec ip netns exec "$1" "$trial" --transport udp --key "$key" --bytes "$bytes" --address 10.77.1.1:7700 --role "$2" $3; }
-if [ -n "$netem" ]; then
-    ip netns exec "$middle" sysctl -q -w net.ipv4.ip_forward=1
-    ip -n "$server" route add default via 10.77.1.2
-    ip -n "$facet" route add default via 10.77.2.2
-    percent() { awk "BEGIN { print 100 * $1 \"%\" }"; }
-    for device in "tma$$" "tmb$$"; do
-        ip netns exec "$middle" tc qdisc add dev "$device" root netem limit 10000 \
-            delay "${delay}ms" reorder "$(percent "$reorder")" loss "$(percent "$loss")" duplicate "$(percent "$duplicate")"
-    done
-    target=10.77.1.1:7700
-else
-    target=10.77.2.2:7701
-    within "$middle" relay "--listen $target --loss $loss --reorder $reorder --duplicate $duplicate --delay-ms $delay" &
-    children="$children $!"
-fi
+target=10.77.2.2:7701
+within "$middle" relay "--listen $target --loss $loss --reorder $reorder --duplicate $duplicate --delay-ms $delay" &
+children="$children $!"
 k=0
 while [ "$k" -lt "$facets" ]; do
     within "$facet" facet "--facet $k --connect $target" &
     children="$children $!"
     k=$((k + 1))
 done
-echo "loss $loss, reorder $reorder, duplicate $duplicate each way, delay $delay ms, by $([ -n "$netem" ] && echo netem || echo a relay in its own namespace)"
+echo "loss $loss, reorder $reorder, duplicate $duplicate each way, delay $delay ms, by a relay in its own namespace"
 (within "$server" server "--facets $facets --frames $frames --rate $rate")

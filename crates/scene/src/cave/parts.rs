@@ -123,8 +123,6 @@ pub struct Node {
     pub name: String,
     /// An IP address, or a host name.
     pub address: String,
-    /// UDP port on which it listens, 1 to 65535. Default 47100.
-    pub port: u16,
     /// The command, word by word, that starts a facet there; none where that is done by hand. In its words stand [`LAUNCH_WORDS`].
     pub launch: Vec<String>,
 }
@@ -141,12 +139,11 @@ impl Node {
         let address = f.text("address", "an IP address or a host name, such as \"127.0.0.1\"");
         if let Some((text, value)) = address.filter(|(text, _)| !is_address(text)) {
             let port = text.rsplit_once(':').is_some_and(|(host, port)| is_address(host) && port.parse::<u16>().is_ok());
-            f.wrong("address", value, if port { "an address without its port; that is `port`" } else { "an IP address or a host name" });
+            f.wrong("address", value, if port { "an address without a port; the server's is `port` of [sync]" } else { "an IP address or a host name" });
         }
-        let port = f.integer_or("port", 1..=65535, 47100);
         let launch = read_launch(&mut f);
         f.finish();
-        Some(Node { name, address: address.map_or(String::new(), |(text, _)| text.to_owned()), port: port as u16, launch })
+        Some(Node { name, address: address.map_or(String::new(), |(text, _)| text.to_owned()), launch })
     }
 
     /// Whether it is this machine by its address: 127.x.x.x, ::1 or `localhost`.

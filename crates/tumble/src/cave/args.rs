@@ -56,7 +56,7 @@ pub struct ServeOptions {
     /// What carries the frames (default: what the cave says).
     #[arg(long, value_name = "NAME")]
     pub transport: Option<Carrier>,
-    /// Where to listen with --transport udp (default: 127.0.0.1 and a free port, or every address and port 47100 where the cave has machines elsewhere).
+    /// Where to listen with --transport udp (default: 127.0.0.1 and a free port, or every address and the cave's port where it has machines elsewhere).
     #[arg(long, value_name = "ADDR:PORT")]
     pub listen: Option<SocketAddr>,
     /// How long the start waits for facets, s (default: connect_timeout_ms of the cave).

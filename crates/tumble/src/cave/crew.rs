@@ -191,7 +191,7 @@ impl Member {
 /// The server's address, as a node reaches it.
 fn seen_by(node: &Node, address: &Address) -> Address {
     match *address {
-        Address::Udp(at) if at.ip().is_unspecified() => Address::Udp((seen_from(&node.address, node.port).unwrap_or(at.ip()), at.port()).into()),
+        Address::Udp(at) if at.ip().is_unspecified() => Address::Udp((seen_from(&node.address, at.port()).unwrap_or(at.ip()), at.port()).into()),
         _ => address.clone(),
     }
 }

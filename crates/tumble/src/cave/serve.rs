@@ -25,8 +25,6 @@ use tumble::scene::cave::{Cave, Mode};
 
 /// Between two looks at signals and processes while nothing happens.
 const TURN: Duration = Duration::from_millis(20);
-/// The port where a cave of several machines is served.
-const PORT: u16 = 47_100;
 
 /// Runs a scene in a cave, or shows a recording of one; with a launcher's options, also the facets of this machine.
 pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
@@ -76,7 +74,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
 
 fn listen(options: &ServeOptions, cave: &Cave) -> SocketAddr {
     let far = cave.nodes.iter().any(|n| !n.is_local());
-    let usual = if far { (Ipv4Addr::UNSPECIFIED, PORT) } else { (Ipv4Addr::LOCALHOST, 0) };
+    let usual = if far { (Ipv4Addr::UNSPECIFIED, cave.sync.port) } else { (Ipv4Addr::LOCALHOST, 0) };
     options.listen.unwrap_or(usual.into())
 }
 

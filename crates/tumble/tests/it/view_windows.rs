@@ -54,7 +54,7 @@ fn facets_and_unfolded_caves_show_what_run_takes() {
         (&warped, &["--facet", "f"], [120, 90]),
         (&both, &["--facet", "f"], [120, 180]),
         ("cube4", &["--size", "150x100"], [150, 100]),
-        ("wall3", &["--size", "150x100", "--preview"], [150, 37]),
+        ("wall3", &["--size", "150x100", "--preview"], [150, 38]),
     ];
     let mut pictures = Vec::new();
     for (cave, more, size) in cases {

@@ -186,13 +186,15 @@ mod tests {
         let server = Bell::serve(&run, NOBODY).unwrap();
         let facets: Vec<Bell> = (0..3).map(|_| Bell::join(&run, NOBODY).unwrap().unwrap()).collect();
         let (long, moment) = (Duration::from_secs(30), Duration::from_millis(50));
+        let awake = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let waiting: Vec<_> = facets.iter().map(|facet| (facet.rung(), facet)).collect();
             let waiting: Vec<_> = waiting.into_iter().map(|(seen, facet)| scope.spawn(move || facet.wait_for_ring(seen, long))).collect();
             server.ring();
             waiting.into_iter().for_each(|facet| facet.join().unwrap().unwrap());
-            let (seen, awake) = (server.answers(), AtomicBool::new(false));
-            let waits = scope.spawn(|| {
+            let seen = server.answers();
+            let (server, awake) = (&server, &awake);
+            let waits = scope.spawn(move || {
                 server.wait_for_answers(seen, 3, long).unwrap();
                 awake.store(true, SeqCst);
             });
