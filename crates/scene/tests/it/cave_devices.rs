@@ -37,7 +37,7 @@ fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
         ("[tracker]\nusers = [\"a\", \"b\"]\n", "one name for each of the cave's 1 users"),
         ("[tracker]\nusers = [\"a/b\"]\n", "without /"),
         ("[tracker]\nsenders = [7]\n", "`senders`"),
-        ("[tracker]\naxes = \"x_up\"\n", "`y_up`"),
+        ("[tracker]\naxes = \"east\"\n", "`y_up`"),
         ("[tracker]\norigin_m = [0, nan, 0]\n", "finite"),
     ];
     for (text, said) in cases {
