@@ -6,7 +6,7 @@ help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/, run an example in Python"
 	@echo "make test       install what is missing, run all tests, check the papers"
 	@echo "make test-slow  the same, and determinism and energy over a minute"
-	@echo "make cave-trial 600 frames of cube4 by five processes, the pin strike of bowling, 20 kills: long"
+	@echo "make cave-trial a cave of five processes: frames, kills, freezes, a recording shown again and cut; minutes (scripts/cave_trial.py --long: all of it)"
 	@echo "make goldens    draws the kept pictures of crates/render/tests/goldens anew; look at them before committing"
 	@echo "make references installs Pinocchio, MuJoCo and real robots from PyPI into target/python; tests that compare with them then run"
 	@echo "make lint       clippy; warnings are errors"

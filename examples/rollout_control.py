@@ -1,55 +1,57 @@
-"""Control by sampling: a pendulum is swung up by a motor too weak to lift it, by trying many futures at each turn.
+"""Control by sampling: a robot arm leads its paddle past a post to a point, by trying many futures at each turn.
 
     python examples/rollout_control.py
 
-Model predictive path integral control (Williams et al., 2017). The futures are forks of the world that run on all cores.
+Model predictive path integral control (Williams et al., 2017). The futures are forks of the world, contacts included, that run on all cores. What is
+sampled are accelerations: inverse dynamics makes torques of them, which hold the arm against gravity too. Torques sampled about zero would let every
+future sag, and the arm would stall below its goal.
 """
+
+from pathlib import Path
 
 import numpy as np
 
 import tumble
 
-ROD = """
-[world]
-dt_s = 0.01
+URDF = Path(__file__).parents[1] / "scenes" / "robot" / "arm.urdf"
+GOAL, POST = np.array((0.15, 0.45, 0.35)), np.array((0.40, 0.22, 0.40))
+FORKS, HORIZON, HOLD = 48, 8, 8  # futures, controls in each, steps that each control holds
+STRONGEST = np.array((60, 90, 50, 20, 20, 10))  # N·m, the efforts of the file
 
-[[articulated]]
-name = "pendulum"
-
-[[articulated.link]]
-name = "bob"
-joint = "revolute"
-axis = [0, 1, 0]
-mass_kg = 1
-center_m = [0, 0, -1]
-inertia_kg_m2 = [0, 0, 0]   # a point, 1 m below the hinge
-shape = { type = "sphere", radius_m = 0.1, position_m = [0, 0, -1] }
-"""
-FORKS, HORIZON, HOLD = 64, 25, 5  # futures, controls in each, steps that each control holds
-STRONGEST = 0.4 * 1.0 * 9.81 * 1.0  # N·m: four tenths of what holds the bob out level
-
-world = tumble.World.parse(ROD)
-pendulum = world["pendulum"]
-rng = np.random.default_rng(0)
+world = tumble.World(dt=1 / 120)
+post = world.add_static("post", tumble.Cylinder(0.04, 0.8), position=POST)
+arm = world.add_articulation(URDF)
+arm.q = (-0.6, 0.6, -0.4, 0, 0.6, 0)
+start = 13  # of the arm's numbers in the state: the post has 13
 
 
-def cost(states: np.ndarray) -> np.ndarray:
-    """Of futures, shape (forks, kept, 2): q is 0 when it hangs, π upright; less height and more speed cost more."""
-    q, qd = states[..., 0], states[..., 1]
-    return ((1 + np.cos(q)) ** 2 + 0.02 * qd**2 * (np.cos(q) < -0.7)).sum(axis=1)
+def torques(accelerations):
+    """Of a batch, shape (…, 6): what accelerates the arm so from where it is, in place of its present speed, which it gives up within half a second."""
+    wanted = (accelerations - 2 * arm.qd).reshape(-1, 6)
+    return np.clip(arm.inverse_dynamics(qd=np.zeros(6), qdd=wanted), -STRONGEST, STRONGEST).reshape(accelerations.shape)
 
 
-plan = np.zeros(HORIZON)
-for turn in range(100):
-    controls = np.clip(plan + rng.normal(0, 0.5 * STRONGEST, (FORKS, HORIZON)), -STRONGEST, STRONGEST)
-    futures = world.rollout(np.repeat(controls, HOLD, axis=1)[..., None], every=HOLD)
-    costs = cost(futures)
-    weights = np.exp(-(costs - costs.min()) / (0.1 * costs.std() + 1e-9))
-    plan = weights @ controls / weights.sum()
-    pendulum.tau = plan[:1]
+def cost(states):
+    """Of futures, shape (forks, kept, numbers): far from the goal, fast, or with a link within 10 cm of the post's axis."""
+    q, qd = states[..., start : start + 6], states[..., start + 6 :]
+    places = arm.link_poses(q.reshape(-1, 6))[..., :3].reshape(*q.shape[:2], -1, 3)
+    away = np.linalg.norm(places[:, :, -1] - GOAL, axis=2)
+    near = np.linalg.norm(places[..., :2] - POST[:2], axis=3).min(axis=2) < 0.1
+    return (away + 2 * near + 0.005 * (qd**2).sum(axis=2)).sum(axis=1) + 4 * away[:, -1]
+
+
+rng, plan, away, touched = np.random.default_rng(0), np.zeros((HORIZON, 6)), 0.8, False
+for turn in range(50):
+    samples = plan + rng.normal(0, 1 + 8 * away, (FORKS, HORIZON, 6))
+    samples[0] = plan
+    costs = cost(world.rollout(np.repeat(torques(samples), HOLD, axis=1), every=HOLD))
+    weights = np.exp(-(costs - costs.min()) / (0.1 * costs.std()))
+    plan = np.tensordot(weights / weights.sum(), samples, 1)
+    arm.tau = torques(plan[0])
     world.step(HOLD)
-    plan = np.append(plan[1:], 0.0)
-    if turn % 20 == 19:
-        height = -np.cos(pendulum.q[0])
-        print(f"{world.time:.1f} s: the bob is {height:+.2f} m above the hinge, {pendulum.qd[0]:+.2f} rad/s")
-assert -np.cos(pendulum.q[0]) > 0.9
+    plan = np.vstack([plan[1:], np.zeros((1, 6))])
+    away = np.linalg.norm(arm.link_pose("paddle")[:3] - GOAL)
+    touched |= 0 in world.contacts["bodies"]
+    if turn % 10 == 9:
+        print(f"{world.time:.1f} s: {1000 * away:3.0f} mm from the goal, fastest joint {np.abs(arm.qd).max():.2f} rad/s, touched: {touched}")
+assert away < 0.05 and not touched

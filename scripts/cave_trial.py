@@ -1,8 +1,11 @@
 #!/usr/bin/env python3
-"""Long trials of `tumble cave`: the same frames on all facets, the worst frame of the pin strike, kills at random times.
+"""Trials of `tumble cave`: the same frames on all facets, kills and freezes at random times, a long run, a recording shown again and cut, nodes with a
+launch command in a network namespace.
 
-usage: scripts/cave_trial.py [--frames 600] [--kills 20] [--quality usual] [--seed 1] [frames] [bowling] [kills]
+usage: scripts/cave_trial.py [--long] [--seed 1] [--quality usual] [--frames N] [--kills N] [--soak N] [--minute N] [TRIAL ...]
 
+Without names the short ones run that need neither root nor another build: frames, kills, freezes, launchers, servers, minute, cuts. --long has the full numbers,
+and all but `namespace` (root) and `viewers` (a build with --features foxglove).
 Ends with 1 if a trial does not show what it must. Nothing is left behind but out/cave_trial.
 """
 
@@ -10,8 +13,11 @@ import argparse
 import json
 import os
 import random
+import re
+import secrets
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -19,8 +25,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TUMBLE = Path(os.environ.get("TUMBLE", ROOT / "target/release/tumble"))
-OUT = ROOT / "out/cave_trial"
+OUT = Path(os.environ.get("OUT", ROOT / "out/cave_trial"))
 FACETS = ["front", "left", "right", "floor"]
+
+
+# What is read and started.
 
 
 def log(folder, facet):
@@ -29,17 +38,99 @@ def log(folder, facet):
     return [json.loads(line) for line in lines if line.endswith("}")]
 
 
-def tumble(*args, timeout=7200):
+def last_line(folder, facet):
+    """Without reading all of it."""
+    path = folder / facet / "frames.jsonl"
+    if not path.exists():
+        return None
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 2000))
+        lines = [line for line in file.read().decode().splitlines() if line.startswith("{") and line.endswith("}")]
+    return json.loads(lines[-1]) if lines else None
+
+
+def tumble(*args, timeout=36000):
     done = subprocess.run([TUMBLE, *map(str, args)], timeout=timeout, capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(f"tumble {' '.join(map(str, args))} ended with {done.returncode}:\n{done.stderr[-2000:]}")
     return done.stdout
 
 
-def frames(count, quality):
+def start(*args, **more):
+    return subprocess.Popen([TUMBLE, *map(str, args)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, **more)
+
+
+def end(*processes):
+    for process in processes:
+        process.terminate()
+    return [process.wait(timeout=30) for process in processes]
+
+
+def small_cave(name, side=80, sync="", facet="", nodes=""):
+    """cube4 with small pictures."""
+    text = (ROOT / "caves/cube4.toml").read_text()
+    text = re.sub(r"size_px = .*", f"size_px = [{side}, {side}]\n{facet}", text)
+    if sync:
+        text = re.sub(r"\[sync\][^\[]*", "", text) + f"\n[sync]\n{sync}\n"
+    path = OUT / f"{name}.toml"
+    path.write_text(text + nodes)
+    return path
+
+
+def facets_of(parent):
+    """By name: the processes that draw for a launcher."""
+    found = {}
+    for child in Path(f"/proc/{parent}/task/{parent}/children").read_text().split():
+        words = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
+        for facet in FACETS:
+            if facet.encode() in words:
+                found[facet] = int(child)
+    return found
+
+
+def alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_for(ready, seconds=60):
+    until = time.time() + seconds
+    while not ready():
+        if time.time() > until:
+            sys.exit(f"it did not come within {seconds} s")
+        time.sleep(0.01)
+
+
+def shown_after(folder, facet, moment):
+    """When a facet showed its first frame after a moment, s since 1970; waits for it."""
+    wait_for(lambda: (last_line(folder, facet) or {"shown_unix_us": 0})["shown_unix_us"] * 1e-6 > moment)
+    return next(line["shown_unix_us"] * 1e-6 for line in log(folder, facet) if line["shown_unix_us"] * 1e-6 > moment)
+
+
+def same_states(folder):
+    """Whether all facets that showed a frame showed the same state, and who was never disturbed missed none."""
+    states = {}
+    for facet in FACETS:
+        for line in log(folder, facet):
+            if states.setdefault(line["frame"], line["state"]) != line["state"]:
+                return False
+    return True
+
+
+def spread(values, unit=1e3):
+    values = sorted(values)
+    return f"{values[len(values) // 2] * unit:.0f} ms (half), {values[-1] * unit:.0f} ms (all)"
+
+
+# The trials.
+
+
+def frames(options):
     """Five processes, lockstep: 0 missing, duplicated or torn frames; the same numbers and states on all facets."""
-    folder = OUT / "frames"
-    said = tumble("cave", "billiards", "--cave", "cube4", "--seconds", count / 60, "--fast", "--offscreen", "--quality", quality, "--stamp", "--wait", 60,
+    count, folder = options.frames, OUT / "frames"
+    said = tumble("cave", "billiards", "--cave", "cube4", "--seconds", count / 60, "--fast", "--offscreen", "--quality", options.quality, "--stamp", "--wait", 60,
                   "--log-dir", folder, "--quiet", "--summary", OUT / "frames.json")
     logs = [log(folder, facet) for facet in FACETS]
     numbers = [[line["frame"] for line in lines] for lines in logs]
@@ -55,7 +146,7 @@ def frames(count, quality):
     return whole and same and faults == 0
 
 
-def bowling():
+def bowling(options):
     """The pin strike: the worst frame."""
     tumble("cave", "bowling", "--cave", "cube4", "--seconds", 5, "--fast", "--no-pictures", "--wait", 60, "--quiet", "--summary", OUT / "bowling.json")
     summary = json.loads((OUT / "bowling.json").read_text())
@@ -65,65 +156,331 @@ def bowling():
     return True
 
 
-def kills(count, seed):
+def kills(options, pictures=False):
     """A facet is killed at random times and started again: the others miss nothing, and it is back within 1 s."""
-    folder, rng, back = OUT / "kills", random.Random(seed), []
-    arguments = ["cave", "billiards", "--cave", "cube4", "--no-pictures", "--restart", "--log-dir", folder, "--quiet", "--summary", OUT / "kills.json"]
-    run = subprocess.Popen([TUMBLE, *map(str, arguments)], stderr=subprocess.DEVNULL)
+    name = "drawn kills" if pictures else "kills"
+    folder, rng, back = OUT / name.replace(" ", "_"), random.Random(options.seed), []
+    cave = small_cave(name.replace(" ", "_"))
+    draw = ["--offscreen", "--quality", "fastest"] if pictures else ["--no-pictures"]
+    run = start("cave", "billiards", "--cave", cave, *draw, "--restart", "--log-dir", folder, "--quiet", "--wait", 60, "--summary", folder.with_suffix(".json"))
     try:
-        wait_for(lambda: all(len(log(folder, facet)) > 20 for facet in FACETS))
-        for _ in range(count):
+        wait_for(lambda: all(last_line(folder, facet) and last_line(folder, facet)["frame"] > 20 for facet in FACETS))
+        for k in range(options.kills):
             # no facet is started more than 5 times in a minute
             time.sleep(rng.uniform(3.2, 4.2))
-            victim = FACETS[len(back) % len(FACETS)]
-            os.kill(pid_of(run.pid, victim), signal.SIGKILL)
+            victim = FACETS[k % len(FACETS)]
+            os.kill(facets_of(run.pid)[victim], signal.SIGKILL)
             killed = time.time()
-            wait_for(lambda: log(folder, victim)[-1]["shown_unix_us"] * 1e-6 > killed + 0.02)
-            back.append(next(line["shown_unix_us"] * 1e-6 for line in log(folder, victim) if line["shown_unix_us"] * 1e-6 > killed + 0.02) - killed)
+            back.append(shown_after(folder, victim, killed + 0.02) - killed)
     finally:
-        run.terminate()
-        code = run.wait(timeout=30)
-    seen = [{line["frame"]: line["state"] for line in log(folder, facet)} for facet in FACETS]
-    same = all(states[frame] == seen[0].get(frame, states[frame]) for states in seen for frame in states)
-    summary = json.loads((OUT / "kills.json").read_text())
+        [code] = end(run)
+    same, summary = same_states(folder), json.loads(folder.with_suffix(".json").read_text())
     wrong = sum(facet["mismatched"] + facet["torn"] for facet in summary["facets"])
-    print(f"kills: {count} times kill -9; back after {sorted(back)[len(back) // 2] * 1e3:.0f} ms (half), {max(back) * 1e3:.0f} ms (all), of which 200 ms are a pause; "
-          f"states {'the same' if same else 'DIFFERENT'}, {wrong} mismatched or torn, exit code {code}")
+    print(f"{name}: {options.kills} times kill -9 of a facet; back after {spread(back)}, of which 200 ms are a pause; "
+          f"states {'the same' if same else 'DIFFERENT'}, {wrong} mismatched or torn, exit code {code}", flush=True)
     return same and wrong == 0 and code == 0 and max(back) < 1.0
 
 
-def pid_of(parent, facet):
-    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    for child in children:
-        words = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
-        if facet.encode() in words:
-            return int(child)
-    sys.exit(f"no process draws {facet}")
+def drawn_kills(options):
+    """The same with small pictures."""
+    return kills(options, pictures=True)
 
 
-def wait_for(ready, seconds=60):
-    end = time.time() + seconds
-    while not ready():
-        if time.time() > end:
-            sys.exit("it did not come within a minute")
-        time.sleep(0.01)
+def freezes(options):
+    """A facet is stopped at random times for longer than it may be silent: it is dropped, the others stand still once and miss nothing, and it is back within 1 s
+    when it goes on."""
+    folder, rng, back, still = OUT / "freezes", random.Random(options.seed), [], []
+    cave = small_cave("freezes", sync="ready_timeout_ms = 200\ndrop_timeout_ms = 1000\nconnect_timeout_ms = 60000")
+    run = start("cave", "billiards", "--cave", cave, "--no-pictures", "--log-dir", folder, "--quiet", "--summary", OUT / "freezes.json")
+    try:
+        wait_for(lambda: all(last_line(folder, facet) and last_line(folder, facet)["frame"] > 20 for facet in FACETS))
+        for k in range(options.kills):
+            time.sleep(rng.uniform(0.5, 1.5))
+            victim = FACETS[k % len(FACETS)]
+            pid = facets_of(run.pid)[victim]
+            os.kill(pid, signal.SIGSTOP)
+            stopped = time.time()
+            time.sleep(rng.uniform(2.0, 3.0))
+            os.kill(pid, signal.SIGCONT)
+            went_on = time.time()
+            back.append(shown_after(folder, victim, went_on + 0.02) - went_on)
+            other = [line["shown_unix_us"] * 1e-6 for line in log(folder, FACETS[(k + 1) % len(FACETS)])]
+            still.append(max(b - a for a, b in zip(other, other[1:]) if stopped - 0.5 < a < went_on))
+    finally:
+        [code] = end(run)
+    same, summary = same_states(folder), json.loads((OUT / "freezes.json").read_text())
+    dropped = sum(facet["dropped"] for facet in summary["facets"])
+    wrong = sum(facet["mismatched"] + facet["torn"] for facet in summary["facets"])
+    print(f"freezes: {options.kills} times SIGSTOP of a facet, SIGCONT after 2 to 3 s; dropped {dropped} times; the others stood still for {spread(still)}; "
+          f"back after {spread(back)}; states {'the same' if same else 'DIFFERENT'}, {wrong} mismatched or torn, exit code {code}", flush=True)
+    return same and wrong == 0 and code == 0 and dropped == options.kills and max(back) < 1.0
+
+
+def launchers(options):
+    """The launcher, which is the server, is killed at random times: its facets end by themselves, and the next run begins."""
+    rng, gone, left = random.Random(options.seed), [], 0
+    cave = small_cave("launchers")
+    for k in range(options.kills):
+        folder = OUT / f"launchers_{k}"
+        run = start("cave", "billiards", "--cave", cave, "--no-pictures", "--log-dir", folder, "--quiet", "--wait", 60)
+        wait_for(lambda: all(last_line(folder, facet) for facet in FACETS))
+        time.sleep(rng.uniform(0.0, 1.0))
+        pids = list(facets_of(run.pid).values())
+        run.kill()
+        killed = time.time()
+        run.wait(timeout=30)
+        wait_for(lambda: not any(alive(pid) for pid in pids))
+        gone.append(time.time() - killed)
+        left += len(pids) != len(FACETS)
+        shutil.rmtree(folder)
+    print(f"launchers: {options.kills} times kill -9 of the launcher; all its facets had ended after {spread(gone)}; the next run began each time", flush=True)
+    return left == 0
+
+
+def servers(options):
+    """A server by itself is killed at random times and started again at the same address: facets that were started by hand keep their pictures, and go on with
+    the new one."""
+    folder, rng, back = OUT / "servers", random.Random(options.seed), []
+    cave = small_cave("servers", sync='transport = "udp"\nready_timeout_ms = 200\ndrop_timeout_ms = 1000\nconnect_timeout_ms = 60000')
+    serve = lambda: start("serve", "billiards", "--cave", cave, "--quiet", "--listen", "127.0.0.1:47911", "--wait", 60)
+    server = serve()
+    facets = [start("facet", "billiards", "--cave", cave, "--facet", facet, "--no-pictures", "--server", "127.0.0.1:47911", "--wait", 60, "--log-dir", folder)
+              for facet in FACETS]
+    try:
+        for _ in range(options.kills):
+            wait_for(lambda: all(last_line(folder, facet) for facet in FACETS))
+            time.sleep(rng.uniform(0.2, 1.2))
+            server.kill()
+            server.wait(timeout=30)
+            time.sleep(rng.uniform(0.0, 2.0))
+            server, again = serve(), time.time()
+            back.append(max(shown_after(folder, facet, again + 0.02) for facet in FACETS) - again)
+        held = all(facet.poll() is None for facet in facets)
+    finally:
+        codes = end(server, *facets)
+    print(f"servers: {options.kills} times kill -9 of the server, started again after up to 2 s; all four facets, started once by hand, showed its frames "
+          f"{spread(back)} after its start; exit codes {sorted(set(codes))}", flush=True)
+    return held and set(codes) == {0}
+
+
+def resident(pid):
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(re.search(r"VmRSS:\s+(\d+)", status).group(1)) / 1024
+
+
+def soak(options):
+    """Half an hour of simulated time, as fast as it goes: memory stays flat, and all facets show the same states."""
+    folder = OUT / "soak"
+    cave = small_cave("soak")
+    began = time.time()
+    run = start("cave", options.scene, "--cave", cave, "--no-pictures", "--fast", "--seconds", options.soak / 60, "--log-dir", folder, "--quiet", "--wait", 60,
+                "--summary", OUT / "soak.json")
+    samples = []
+    while run.poll() is None:
+        time.sleep(min(1.0, 2 * 108000 / options.soak))
+        newest = last_line(folder, "front")
+        try:
+            pids = [run.pid, *facets_of(run.pid).values()]
+            if newest and len(pids) == 1 + len(FACETS):
+                samples.append((newest["frame"], [resident(pid) for pid in pids]))
+        except (OSError, AttributeError):
+            pass  # it is ending
+    summary = json.loads((OUT / "soak.json").read_text())
+    logs = [log(folder, facet) for facet in FACETS]
+    states = [[(line["frame"], line["state"]) for line in lines] for lines in logs]
+    whole = [frame for frame, _ in states[0]] == list(range(options.soak + 1))
+    same = all(s == states[0] for s in states)
+    moving = len({state for _, state in states[0]})
+    faults = sum(facet[key] for facet in summary["facets"] for key in ["late", "missing", "torn", "mismatched", "dropped"])
+    # what a process starts with is not yet all it needs: from a tenth of the run to its end
+    steady = [rss for frame, rss in samples if frame > options.soak / 10]
+    grown = [steady[-1][k] - steady[0][k] for k in range(1 + len(FACETS))]
+    print(f"soak: {options.soak} frames ({summary['simulated_s']:.0f} s) of {options.scene} in {time.time() - began:.0f} s; {'all' if whole else 'NOT ALL'} frames on each facet, "
+          f"states {'the same' if same else 'DIFFERENT'} ({moving} different ones), {faults} faults; memory of the server {steady[0][0]:.1f} MiB after a tenth, "
+          f"{steady[-1][0]:.1f} MiB at the end, of facets {', '.join(f'{a:.1f} to {b:.1f}' for a, b in zip(steady[0][1:], steady[-1][1:]))} MiB", flush=True)
+    return whole and same and faults == 0 and max(grown) < 2.0
+
+
+def minute(options):
+    """A recording of a minute, shown twice: the same states and the same pictures, bit by bit."""
+    cave, file = small_cave("minute", sync="ready_timeout_ms = 10000\ndrop_timeout_ms = 10000\nconnect_timeout_ms = 60000"), OUT / "minute.mcap"
+    common = ["billiards", "--cave", cave, "--fast", "--offscreen", "--quality", "fastest", "--quiet", "--wait", 60]
+    tumble("cave", *common, "--seconds", options.minute / 60, "--record", file, "--log-dir", OUT / "minute_run")
+    counts = []
+    for k in range(2):
+        tumble("replay", file, *common, "--log-dir", OUT / f"minute_{k}", "--summary", OUT / f"minute_{k}.json")
+        counts.append(json.loads((OUT / f"minute_{k}.json").read_text())["replay"])
+    key = lambda line: (line["frame"], line["state"], line["image"])
+    first = {facet: [key(line) for line in log(OUT / "minute_run", facet)] for facet in FACETS}
+    same = all([key(line) for line in log(OUT / f"minute_{k}", facet)] == first[facet] for k in range(2) for facet in FACETS)
+    whole = all(len(lines) == options.minute + 1 for lines in first.values())
+    pictures = len({image for lines in first.values() for _, _, image in lines})
+    print(f"minute: {options.minute + 1} frames recorded ({file.stat().st_size / 1e6:.1f} MB), shown twice: states and pictures {'the same' if same else 'DIFFERENT'} on all four facets "
+          f"({pictures} different pictures); {counts}", flush=True)
+    return same and whole and all(c["different"] == 0 and c["not_compared"] == 0 for c in counts)
+
+
+def records(data):
+    """Of an MCAP file: where each record begins and ends, and its opcode."""
+    at = 8
+    while at + 9 <= len(data) - 8:
+        length = struct.unpack_from("<Q", data, at + 1)[0]
+        yield at, at + 9 + length, data[at]
+        at += 9 + length
+
+
+def frames_by_chunk(data):
+    """Where each chunk ends, and how many frames it holds: by the index behind it, which is not packed."""
+    chunks, states = [], None
+    for begin, stop, opcode in records(data):
+        if opcode == 0x04:  # a channel, of those that the summary repeats
+            number, _, length = struct.unpack_from("<HHI", data, begin + 9)
+            if data[begin + 17:begin + 17 + length] == b"/tumble/state":
+                states = number
+    for begin, stop, opcode in records(data):
+        body = data[begin + 9:stop]
+        if opcode == 0x06:  # chunk
+            chunks.append([stop, 0])
+        elif opcode == 0x07 and struct.unpack_from("<H", body)[0] == states:  # index of messages
+            chunks[-1][1] += struct.unpack_from("<I", body, 2)[0] // 16
+    return chunks
+
+
+def cuts(options):
+    """A recording cut at every structural boundary, beside it, and at random bytes: all frames of chunks that are whole are saved, and none that is not there."""
+    file, cut, mended = OUT / "cuts.mcap", OUT / "cut.mcap", OUT / "mended.mcap"
+    tumble("cave", "billiards", "--cave", small_cave("cuts"), "--fast", "--no-pictures", "--quiet", "--wait", 60, "--seconds", 4, "--record", file)
+    data, rng = file.read_bytes(), random.Random(options.seed)
+    chunks = frames_by_chunk(data)
+    points = {p for begin, stop, _ in records(data) for p in (begin, begin + 1, begin + 9, (begin + stop) // 2, stop - 1)}
+    points |= {rng.randrange(8, len(data)) for _ in range(options.kills * 10)} | {len(data), len(data) - 1, len(data) - 8}
+    points = sorted(p for p in points if p >= 8)
+    if len(points) > options.cuts:
+        points = sorted(rng.sample(points, options.cuts))
+    wrong = []
+    for at in points:
+        cut.write_bytes(data[:at])
+        mended.unlink(missing_ok=True)
+        expected = sum(count for stop, count in chunks if stop <= at)
+        done = subprocess.run([TUMBLE, "recover", cut, "-o", mended], capture_output=True, text=True)
+        found = re.search(r"(\d+) frames in", done.stdout)
+        if not found or int(found.group(1)) != expected:
+            # before the first record there is nothing to save, which is said
+            if expected or done.returncode == 0 and found and int(found.group(1)):
+                wrong.append((at, expected, done.stdout + done.stderr))
+    print(f"cuts: a recording of {len(data)} bytes, {sum(count for _, count in chunks)} frames in {len(chunks)} chunks, cut at {len(points)} places: "
+          f"{len(wrong)} where not all that was flushed was saved {wrong[:2] if wrong else ''}", flush=True)
+    return not wrong and sum(count for _, count in chunks) > 0
+
+
+def namespace(options):
+    """Two facets on a machine that is a network namespace, started by the cave file's launch command; nothing of them is left. Needs root."""
+    if os.geteuid() != 0 or not shutil.which("ip"):
+        sys.exit("namespace: needs root and the command ip (on Debian: apt-get install iproute2)")
+    space, folder = f"tumble-cave-{os.getpid()}", OUT / "namespace"
+    key = OUT / "key"
+    key.write_text(secrets.token_hex(32))
+    key.chmod(0o600)
+    launch = json.dumps(["ip", "netns", "exec", space, str(TUMBLE), "{arguments}"])
+    nodes = f'\n[[node]]\nname = "far"\naddress = "10.78.1.2"\nlaunch = {launch}\n[security]\nkey_file = "{key}"\n'
+    cave = small_cave("namespace", sync='transport = "udp"\nready_timeout_ms = 1000\ndrop_timeout_ms = 2000\nconnect_timeout_ms = 60000', nodes=nodes)
+    text = cave.read_text()
+    for facet in ["left", "right"]:
+        text = re.sub(rf'(\[\[facet\]\]\nname = "{facet}"\n)', r'\1node = "far"\n', text)
+    cave.write_text(text)
+    ip = lambda *words: subprocess.run(["ip", *words], check=True)
+    ip("netns", "add", space)
+    try:
+        ip("link", "add", f"tc{os.getpid()}", "type", "veth", "peer", "name", "far0", "netns", space)
+        ip("address", "add", "10.78.1.1/24", "dev", f"tc{os.getpid()}")
+        ip("link", "set", f"tc{os.getpid()}", "up")
+        ip("-n", space, "address", "add", "10.78.1.2/24", "dev", "far0")
+        ip("-n", space, "link", "set", "far0", "up")
+        said = subprocess.run([TUMBLE, "cave", "billiards", "--cave", cave, "--seconds", str(options.frames / 60), "--fast", "--no-pictures", "--log-dir", folder,
+                               "--listen", "10.78.1.1:47100", "--wait", "60"], capture_output=True, text=True, timeout=600)
+        logs = {facet: [(line["frame"], line["state"]) for line in log(folder, facet)] for facet in FACETS}
+        same = said.returncode == 0 and all(lines == logs["front"] and len(lines) == options.frames + 1 for lines in logs.values())
+        inside = lambda: subprocess.run(["ip", "netns", "pids", space], capture_output=True, text=True).stdout.split()
+        after_end = inside()
+        # and when the launcher dies
+        shutil.rmtree(folder)
+        run = start("cave", "billiards", "--cave", cave, "--no-pictures", "--log-dir", folder, "--listen", "10.78.1.1:47100", "--wait", 60)
+        wait_for(lambda: all(last_line(folder, facet) for facet in FACETS))
+        there = inside()
+        run.kill()
+        run.wait(timeout=30)
+        wait_for(lambda: not inside(), 30)
+    finally:
+        subprocess.run(["ip", "netns", "del", space])
+    print(f"namespace: two facets started by the launch command in a network namespace: {options.frames + 1} frames, states {'the same' if same else 'DIFFERENT'}; processes left there "
+          f"{len(after_end)}; of {len(there)} after kill -9 of the launcher none is left {'' if same else said.stderr[-1000:]}", flush=True)
+    return same and not after_end and len(there) == 2
+
+
+def viewers(options):
+    """One viewer reads, another never does: the first sees every topic, and the wall keeps its pace. Needs the package websockets and a build with
+    `--features foxglove`."""
+    from websockets.sync.client import connect
+
+    folder = OUT / "viewers"
+    run = start("cave", "billiards", "--cave", small_cave("viewers"), "--no-pictures", "--log-dir", folder, "--quiet", "--wait", 60, "--foxglove", "127.0.0.1:47865",
+                "--summary", OUT / "viewers.json")
+    topics, counts = {}, {}
+    try:
+        wait_for(lambda: all(last_line(folder, facet) for facet in FACETS))
+        idle = connect("ws://127.0.0.1:47865", subprotocols=["foxglove.sdk.v1"], max_queue=1)
+        with connect("ws://127.0.0.1:47865", subprotocols=["foxglove.sdk.v1"], max_size=None) as live:
+            began = time.time()
+            while time.time() - began < 5:
+                message = live.recv(timeout=5)
+                if isinstance(message, str):
+                    told = json.loads(message)
+                    if told["op"] == "advertise":
+                        wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in told["channels"]]
+                        topics.update({channel["id"]: channel["topic"] for channel in told["channels"]})
+                        live.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+                        idle.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+                elif message[0] == 1:
+                    topic = topics[struct.unpack_from("<I", message, 1)[0]]
+                    counts[topic] = counts.get(topic, 0) + 1
+    finally:
+        [code] = end(run)
+    summary = json.loads((OUT / "viewers.json").read_text())
+    rate = (summary["frames"] - 1) / summary["wall_s"]
+    late = sum(facet["late"] for facet in summary["facets"])
+    print(f"viewers: in 5 s one viewer got {counts}, another read nothing; {rate:.1f} frames a second, {late} late, exit code {code}", flush=True)
+    return code == 0 and counts.get("/scene", 0) >= 1 and counts.get("/tf", 0) > 30
+
+
+TRIALS = [frames, bowling, kills, drawn_kills, freezes, launchers, servers, soak, minute, cuts, namespace, viewers]
+SHORT = [frames, kills, freezes, launchers, servers, minute, cuts]
 
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--frames", type=int, default=600)
-    parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument("--quality", default="usual")
+    parser.add_argument("--long", action="store_true", help="the full numbers, and all trials")
+    parser.add_argument("--frames", type=int, help="frames of `frames` and `namespace` (30; long 600)")
+    parser.add_argument("--kills", type=int, help="kills and freezes of each kind (2; long 20)")
+    parser.add_argument("--soak", type=int, help="frames of `soak` (6,000; long 108,000)")
+    parser.add_argument("--minute", type=int, help="frames of `minute` (120; long 3,600)")
+    parser.add_argument("--cuts", type=int, help="cuts, at most (100; long all)")
+    parser.add_argument("--scene", default="pendulum", help="scene of `soak`")
+    parser.add_argument("--quality", default="fastest")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("trials", nargs="*", help="frames, bowling, kills (default: all)")
+    parser.add_argument("trials", nargs="*", help=", ".join(trial.__name__ for trial in TRIALS))
     options = parser.parse_args()
-    trials = options.trials or ["frames", "bowling", "kills"]
+    usual = {"frames": (30, 600), "kills": (2, 20), "soak": (6000, 108000), "minute": (120, 3600), "cuts": (100, 1 << 30)}
+    for name, numbers in usual.items():
+        if getattr(options, name) is None:
+            setattr(options, name, numbers[options.long])
+    named = {trial.__name__: trial for trial in TRIALS}
+    unknown = [name for name in options.trials if name not in named]
+    if unknown:
+        parser.error(f"there is no trial {', '.join(unknown)}; there are {', '.join(named)}")
+    trials = [named[name] for name in options.trials] or ([t for t in TRIALS if t not in (namespace, viewers)] if options.long else SHORT)
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)
-    outcome = {
-        "frames": lambda: frames(options.frames, options.quality), "bowling": bowling, "kills": lambda: kills(options.kills, options.seed),
-    }
-    sys.exit(0 if all([outcome[trial]() for trial in trials]) else 1)
+    sys.exit(0 if all([trial(options) for trial in trials]) else 1)
 
 
 main()

@@ -82,19 +82,21 @@ fn time(mut call: impl FnMut()) -> f64 {
     let mut run = |times: usize| {
         let before = clock.seconds();
         (0..times).for_each(|_| call());
-        (clock.seconds() - before) / times as f64
+        clock.seconds() - before
     };
-    let start = std::time::Instant::now();
-    run(1);
-    // the clock of the thread may stand still for milliseconds
-    let once = start.elapsed().as_secs_f64();
-    if once > PATIENCE {
-        return 1e6 * once;
+    // the clock of the thread stands still for milliseconds, so a run must be long
+    let mut times = 1;
+    let mut seconds = run(times);
+    while seconds < PATIENCE / 3.0 && times < 1 << 20 {
+        times *= 2;
+        seconds = run(times);
     }
-    let times = (PATIENCE / 3.0 / once.max(1e-7)).ceil().min(10_000.0) as usize;
-    let mut runs = [run(times), run(times), run(times)];
+    if times == 1 {
+        return 1e6 * seconds;
+    }
+    let mut runs = [seconds, run(times), run(times)];
     runs.sort_by(f64::total_cmp);
-    1e6 * runs[1]
+    1e6 * runs[1] / times as f64
 }
 
 /// The `n`th pose of the first body where it touches the second, moved `into` it, metres.

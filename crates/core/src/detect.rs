@@ -1,14 +1,12 @@
 //! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
 
-use crate::apart::{Oriented, apart};
 use crate::collidable::ContactFrame;
 use crate::settings::Settings;
 use crate::site::Site;
+use crate::pair::{Pair, Reach, Recalled, Travel};
+use crate::step::meet_at;
 use crate::view::{Entry, Mode, ObjectId, Table};
-use tumble_collide::{Aabb, BroadPhase, Contact, ContactMode, NormalFrom, Pose, Vec3};
-
-/// How far two sphere trees look ahead in the `spheres` mode, as a share of the smaller one's radius.
-const TREE_REACH: f64 = 0.02;
+use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
 
 /// Who owns a row of the site table.
 #[derive(Clone, Copy, Debug)]
@@ -108,45 +106,12 @@ fn gallop(entries: &[(Key, [f64; 3])], key: &Key) -> usize {
     low + entries[low..high].partition_point(|e| e.0 < *key)
 }
 
-/// How far apart two parts are looked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Reach {
-    /// As far as they come towards each other if neither is stopped: for who looks again after a stop.
-    Relative,
-    /// As far as either moves.
-    Each,
-}
-
-/// What a part may do within the horizon.
-#[derive(Clone, Copy, Default)]
-struct Travel {
-    /// Of its origin at its present velocity, metres.
-    way: Vec3,
-    /// What its acceleration adds, metres.
-    gain: Vec3,
-    /// Of its points around its origin, metres at most.
-    turn: f64,
-}
-
-/// The contacts of a pair as the last detection found them.
-struct Kept {
-    sites: [u32; 2],
-    poses: [Pose; 2],
-    margin: f64,
-    /// Where its contacts end in `kept_contacts`; they begin where those of the pair before end.
-    end: usize,
-}
-
 /// The detector's working memory.
 #[derive(Default)]
 pub(crate) struct Scratch {
     proxies: Vec<u32>,
     travel: Vec<Travel>,
-    /// What the last detection of this frame found, by ascending pair; a pair that has not moved since is not asked again.
-    kept: Vec<Kept>,
-    kept_contacts: Vec<Contact>,
-    fresh: Vec<Kept>,
-    fresh_contacts: Vec<Contact>,
+    recalled: Recalled,
     /// Who has which box of the broad phase: those of the last detection, and of this one. Ascending, as the site table is.
     filed: Vec<Filed>,
     gathered: Vec<Filed>,
@@ -159,44 +124,7 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// Drops what was found: a frame knows nothing of the one before.
     pub fn forget(&mut self) {
-        self.kept.clear();
-        self.kept_contacts.clear();
-    }
-}
-
-impl Travel {
-    /// `around` are the part's greatest distances from its origin along the world's axes, metres.
-    fn new(site: &Site, bound: f64, around: Vec3, horizon: f64) -> Travel {
-        let (w, e) = (site.angular_velocity.abs(), around);
-        // |ω × r| by components, and as a whole
-        let sweep = Vec3::new(w.y * e.z + w.z * e.y, w.z * e.x + w.x * e.z, w.x * e.y + w.y * e.x).norm();
-        let turning = if bound.is_finite() { sweep.min(w.norm() * bound) } else { 0.0 };
-        Travel { way: horizon * site.velocity, gain: horizon * horizon * site.acceleration, turn: horizon * turning }
-    }
-
-    /// All that a box around the part may meet, `near` aside.
-    fn swept(&self, tight: &Aabb, near: f64) -> Aabb {
-        let grown = tight.grown(near + self.turn + self.gain.norm());
-        Aabb { min: grown.min + self.way.inf(&Vec3::zeros()), max: grown.max + self.way.sup(&Vec3::zeros()) }
-    }
-
-    /// The same along a unit direction, from the other to this one.
-    fn along(&self, n: &Vec3, other: &Travel, reach: Reach) -> f64 {
-        let turns = self.turn + other.turn + self.gain.norm() + other.gain.norm();
-        let (this, that) = (-n.dot(&self.way), n.dot(&other.way));
-        turns + match reach {
-            Reach::Relative => (this + that).max(0.0),
-            Reach::Each => this.max(0.0) + that.max(0.0),
-        }
-    }
-
-    /// By how much a gap between two parts may close, metres.
-    fn between(&self, other: &Travel, reach: Reach) -> f64 {
-        let turns = self.turn + other.turn;
-        match reach {
-            Reach::Relative => turns + (self.way - other.way).norm() + (self.gain - other.gain).norm(),
-            Reach::Each => turns + self.way.norm() + other.way.norm() + self.gain.norm() + other.gain.norm(),
-        }
+        self.recalled.forget();
     }
 }
 
@@ -228,16 +156,12 @@ impl Detector<'_> {
         let mut pairs = std::mem::take(&mut self.scratch.pairs);
         self.broad.pairs(&mut pairs);
         self.order_by_site(&mut pairs);
-        self.scratch.fresh.clear();
-        self.scratch.fresh_contacts.clear();
-        let mut place = 0;
+        self.scratch.recalled.begin();
         for &[i, j] in &pairs {
-            self.narrow([i as usize, j as usize], reach, &mut place, out);
+            self.narrow([i as usize, j as usize], (horizon, reach), out);
         }
-        let s = &mut *self.scratch;
-        s.pairs = pairs;
-        std::mem::swap(&mut s.kept, &mut s.fresh);
-        std::mem::swap(&mut s.kept_contacts, &mut s.fresh_contacts);
+        self.scratch.recalled.end();
+        self.scratch.pairs = pairs;
     }
 
     /// One box per part that can meet anything, around all its way, filed in the broad phase.
@@ -292,8 +216,8 @@ impl Detector<'_> {
         pairs.sort_unstable();
     }
 
-    /// The contacts of one pair. `place` is how far the pairs of the last detection have been passed.
-    fn narrow(&mut self, [i, j]: [usize; 2], reach: Reach, place: &mut usize, out: &mut Vec<Touch>) {
+    /// The contacts of one pair.
+    fn narrow(&mut self, [i, j]: [usize; 2], (horizon, reach): (f64, Reach), out: &mut Vec<Touch>) {
         let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
         let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
         let (entry_a, entry_b) = (&self.table.slots[owner_a.id], &self.table.slots[owner_b.id]);
@@ -304,29 +228,15 @@ impl Detector<'_> {
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
         let (site_a, site_b) = (&self.sites[a as usize], &self.sites[b as usize]);
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
-        let (near, travel) = (2.0 * self.settings.drift_tolerance, [self.scratch.travel[i], self.scratch.travel[j]]);
-        if shape_a.tree().is_some() || shape_b.tree().is_some() {
-            let boxes = (Oriented::around(shape_a, &site_a.pose), Oriented::around(shape_b, &site_b.pose));
-            if apart(&boxes.0, &boxes.1, |n| near + travel[0].along(n, &travel[1], reach)) {
-                return;
-            }
-        }
-        let mut margin = near + travel[0].between(&travel[1], reach);
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
-        if mode == ContactMode::Spheres && let (Some(_), Some(_)) = (shape_a.tree(), shape_b.tree()) {
-            // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
-            let size = shape_a.bounding_radius().min(shape_b.bounding_radius());
-            margin = margin.min(near + TREE_REACH * size);
+        let near = 2.0 * self.settings.drift_tolerance;
+        let pair = Pair { mode, shapes: [shape_a, shape_b], sites: [site_a, site_b], travel: [self.scratch.travel[i], self.scratch.travel[j]], near, reach };
+        if pair.is_dear() && pair.stays_apart() {
+            return;
         }
-        let poses = [site_a.pose, site_b.pose];
         let found = &mut self.scratch.found;
-        found.clear();
-        if !recall(&self.scratch.kept, &self.scratch.kept_contacts, place, [a, b], &poses, margin, found) {
-            tumble_collide::contacts_in(mode, shape_a, &site_a.pose, shape_b, &site_b.pose, margin, found);
-            found.sort_by_key(|contact| contact.feature);
-        }
-        self.scratch.fresh_contacts.extend_from_slice(found);
-        self.scratch.fresh.push(Kept { sites: [a, b], poses, margin, end: self.scratch.fresh_contacts.len() });
+        let moment = pair.contacts([a, b], horizon, &mut self.scratch.recalled, found);
+        let first = out.len();
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
             // the frame will be done again with it awake
             self.stirred.extend((!found.is_empty()).then_some(sleeper.serial));
@@ -353,19 +263,10 @@ impl Detector<'_> {
             restitution,
             key: Key { pair, feature: contact.feature },
         }));
+        if moment > 0.0 {
+            out[first..].iter_mut().for_each(|touch| meet_at(touch, &touch.contact.clone(), site_a, site_b, moment));
+        }
     }
-}
-
-/// Writes to `found` what the last detection found for a pair, if neither side has moved since and it looked as far; whether it did. `place` goes on to the
-/// pair: they come in ascending order.
-fn recall(kept: &[Kept], contacts: &[Contact], place: &mut usize, sites: [u32; 2], poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) -> bool {
-    while kept.get(*place).is_some_and(|k| k.sites < sites) {
-        *place += 1;
-    }
-    let Some(known) = kept.get(*place).filter(|k| k.sites == sites && k.poses == *poses && k.margin >= margin) else { return false };
-    let start = place.checked_sub(1).map_or(0, |before| kept[before].end);
-    found.extend(contacts[start..known.end].iter().filter(|contact| contact.gap <= margin));
-    true
 }
 
 /// Rate of a normal that points from B's core point to A's, for the relative velocity of the two.

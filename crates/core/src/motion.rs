@@ -18,7 +18,7 @@ use tumble_collide::Vec3;
 /// What the integrators work on, borrowed from the world.
 pub(crate) struct Motion<'a> {
     pub table: &'a mut Table,
-    pub x: &'a mut Vec<f64>,
+    pub x: &'a mut [f64],
     pub sites: &'a mut [Site],
     pub forces: &'a mut Forces,
     pub gravity: Vec3,
@@ -140,7 +140,7 @@ impl Motion<'_> {
     /// Integrates over `h` from time `t`: one step, or as many inner steps of `adaptive` as its tolerance asks for, which it records. Returns how far
     /// it came, s: `h`, but for a record that is full. Sites and caches are left at the new state.
     pub fn integrate(&mut self, integrator: Integrator, t: f64, h: f64, dp: &mut [f64], adaptive: &mut Adaptive) -> Result<f64, StepError> {
-        let start = self.x.clone();
+        let start = self.x.to_vec();
         match integrator {
             Integrator::Verlet => {
                 self.coast(0.5 * h);
@@ -173,14 +173,14 @@ impl Motion<'_> {
 
     fn rk4(&mut self, t: f64, h: f64, dp: &mut [f64]) {
         let n = dp.len();
-        let start = self.x.clone();
+        let start = self.x.to_vec();
         let (mut v, mut f) = (vec![vec![0.0; n]; 4], vec![vec![0.0; n]; 4]);
         self.stage(t, &mut v[0], &mut f[0]);
         let led = v[0].clone();
         // stages 2 and 3 start from x0 with half a step
         self.kick(&f[0], 0.5 * h);
         self.drift(&v[0], 0.5 * h);
-        let second = self.x.clone();
+        let second = self.x.to_vec();
         self.stage(t + 0.5 * h, &mut v[1], &mut f[1]);
         self.keep_led(&led, &mut v[1]);
         self.x.copy_from_slice(&start);

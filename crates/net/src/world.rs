@@ -17,6 +17,17 @@ pub fn poses(world: &World) -> Vec<Pose> {
     sites(world).filter_map(|(id, part)| world.site(id, part)).map(|site| pose(&site.pose)).collect()
 }
 
+/// Their names, without the rest.
+pub fn names(world: &World) -> Vec<String> {
+    sites(world).map(|(id, part)| name(world, id, part)).collect()
+}
+
+fn name(world: &World, id: ObjectId, part: usize) -> String {
+    let name = world.object(id).map_or("", |o| o.name());
+    let several = world.view().span(id).is_some_and(|span| span.site.len() > 1);
+    if several { format!("{name}/{part}") } else { name.to_owned() }
+}
+
 fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {
     let parts = |id: ObjectId| world.view().span(id).map_or(0, |span| span.site.len());
     world.ids().iter().flat_map(move |&id| (0..parts(id)).map(move |part| (id, part)))
@@ -24,14 +35,12 @@ fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {
 
 fn entity(world: &World, id: ObjectId, part: usize) -> Entity {
     let object = world.object(id);
-    let name = object.map_or(String::new(), |o| o.name().to_string());
-    let several = world.view().span(id).is_some_and(|span| span.site.len() > 1);
     let visuals = object.and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
     let parts = visuals.iter().filter(|v| v.part == part).map(|v| {
         let [r, g, b] = v.look.color;
         VisualPart { shape: shape(&v.shape), pose: pose(&v.pose), color: [r, g, b, 1.0].map(f64::from).map(|c| c as _) }
     });
-    Entity { name: if several { format!("{name}/{part}") } else { name }, parts: parts.collect() }
+    Entity { name: name(world, id, part), parts: parts.collect() }
 }
 
 fn pose(pose: &tumble_collide::Pose) -> Pose {

@@ -1,15 +1,18 @@
 //! Articulated bodies: a description from a file, or a handle of one in a world. Both answer the same questions.
 
 use crate::body::{Place, hash};
-use crate::convert::{Numbers, array, numbers, path, shown, vec3, vector};
+use crate::collect::{Anchor, anchor};
+use crate::convert::{Numbers, array, numbers, path, vec3, vector};
 use crate::errors::{Error, Result, caught};
 use crate::robot::{Robot, Rows};
-use crate::shared::Inner;
+use crate::spot::{Now, Source, Spot, Which, locked, start};
+use crate::inner::Inner;
 use numpy::{IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 use tumble::collide::{Pose, Vec3};
 use tumble::core::{ArticulatedBody, Drive, Freedom};
 use tumble::scene::urdf::{self, CollisionMeshes, MissingMeshes, UrdfOptions};
@@ -26,77 +29,14 @@ use tumble::scene::urdf::{self, CollisionMeshes, MissingMeshes, UrdfOptions};
 pub struct Articulation {
     name: Arc<str>,
     robot: Arc<Robot>,
-    spot: Spot,
-}
-
-/// A description by itself, or one in a world.
-#[allow(clippy::large_enum_variant, reason = "each is the inside of one Python object")]
-enum Spot {
-    Free { source: Source, now: Mutex<Now> },
-    Placed(Place),
-}
-
-/// Where a description comes from; its shapes are read when it is put into a world.
-#[derive(Clone)]
-struct Source {
-    file: PathBuf,
-    options: UrdfOptions,
-}
-
-/// The numbers of a description.
-#[derive(Clone)]
-struct Now {
-    gravity: Vec3,
-    q: Vec<f64>,
-    qd: Vec<f64>,
-    tau: Vec<f64>,
-}
-
-/// Which of the numbers.
-#[derive(Clone, Copy)]
-enum Which {
-    Q,
-    Qd,
-    Tau,
-}
-
-impl Which {
-    fn name(self) -> &'static str {
-        match self {
-            Which::Q => "q",
-            Which::Qd => "qd",
-            Which::Tau => "tau",
-        }
-    }
-
-    fn of(self, now: &mut Now) -> &mut Vec<f64> {
-        match self {
-            Which::Q => &mut now.q,
-            Which::Qd => &mut now.qd,
-            Which::Tau => &mut now.tau,
-        }
-    }
-
-    fn width(self, robot: &Robot) -> usize {
-        if matches!(self, Which::Q) { robot.positions() } else { robot.dof() }
-    }
-}
-
-impl Source {
-    fn body(&self, options: &UrdfOptions) -> Result<ArticulatedBody> {
-        caught(|| Ok(urdf::load(&self.file, options)?.0))
-    }
-
-    /// The body for its joints alone: whatever meshes can be read.
-    fn joints(&self) -> Result<ArticulatedBody> {
-        self.body(&UrdfOptions { missing_meshes: MissingMeshes::Skip, ..self.options.clone() })
-    }
+    pub spot: Spot,
+    anchor: Option<Py<Anchor>>,
 }
 
 impl Articulation {
     /// A handle of one in a world.
-    pub fn placed(place: Place, robot: Arc<Robot>) -> Articulation {
-        Articulation { name: place.name.clone(), robot, spot: Spot::Placed(place) }
+    pub fn placed(py: Python<'_>, place: Place, robot: Arc<Robot>) -> Result<Articulation> {
+        Ok(Articulation { name: place.name.clone(), robot, anchor: Some(anchor(py, &place.shared)?), spot: Spot::Placed(place) })
     }
 
     /// Where it stands, if it is in a world.
@@ -125,84 +65,17 @@ impl Articulation {
         Ok((body, robot))
     }
 
-    /// Forces that act on it from the first frame on.
-    pub fn efforts(&self) -> Option<Vec<f64>> {
-        match &self.spot {
-            Spot::Free { now, .. } => Some(locked(now).tau.clone()).filter(|tau| tau.iter().any(|t| *t != 0.0)),
-            Spot::Placed(_) => None,
-        }
-    }
-
-    fn gravity_now(&self) -> Result<Vec3> {
-        match &self.spot {
-            Spot::Free { now, .. } => Ok(locked(now).gravity),
-            Spot::Placed(place) => place.read(|inner| inner.world.status(place.id).map(|_| inner.world.settings().gravity)),
-        }
-    }
-
-    fn get(&self, which: Which) -> Result<Vec<f64>> {
-        let (positions, dof) = (self.robot.positions(), self.robot.dof());
-        match &self.spot {
-            Spot::Free { now, .. } => Ok(which.of(&mut locked(now)).clone()),
-            Spot::Placed(place) => place.read(|inner| {
-                let x = inner.world.state_of(place.id)?;
-                Some(match which {
-                    Which::Q => x[..positions].to_vec(),
-                    Which::Qd => x[positions..].to_vec(),
-                    Which::Tau => inner.efforts.get(&place.id).cloned().unwrap_or_else(|| vec![0.0; dof]),
-                })
-            }),
-        }
-    }
-
-    fn set(&self, py: Python<'_>, which: Which, value: &Bound<'_, PyAny>) -> Result<()> {
-        let (name, width) = (which.name(), which.width(&self.robot));
-        let Numbers { shape, data } = numbers(value, name)?;
-        if shape != [width] {
-            return Err(Error::value(format!("{name}: wanted shape ({width},), and got {}", shown(&shape))));
-        }
-        let data = if matches!(which, Which::Q) { crate::robot::settled(&self.robot, data)? } else { data };
-        match &self.spot {
-            Spot::Free { now, .. } => {
-                *which.of(&mut locked(now)) = data;
-                Ok(())
-            }
-            Spot::Placed(place) => place.write(py, |inner| {
-                let mut x = inner.world.state_of(place.id).ok_or_else(|| place.removed())?.to_vec();
-                match which {
-                    Which::Q => x[..width].copy_from_slice(&data),
-                    Which::Qd => {
-                        let first = x.len() - width;
-                        x[first..].copy_from_slice(&data);
-                    }
-                    Which::Tau => {
-                        inner.efforts.insert(place.id, data);
-                        return Ok(());
-                    }
-                }
-                Ok(inner.world.write_state_of(place.id, &x)?)
-            }),
-        }
-    }
-
     /// Arguments of an algorithm: what is not given is what it is now.
     fn rows(&self, arguments: &[(Which, &'static str, Option<&Bound<'_, PyAny>>)]) -> Result<Rows> {
         let read = |&(which, name, value): &(Which, &'static str, Option<&Bound<'_, PyAny>>)| {
             let width = which.width(&self.robot);
             let numbers = match value {
                 Some(value) => numbers(value, name)?,
-                None => Numbers { shape: vec![width], data: self.get(which)? },
+                None => Numbers { shape: vec![width], data: self.spot.get(which, &self.robot)? },
             };
             Ok((name, numbers, width))
         };
         Rows::new(arguments.iter().map(read).collect::<Result<Vec<_>>>()?)
-    }
-
-    fn freedoms(&self, py: Python<'_>) -> Result<Vec<Freedom>> {
-        match &self.spot {
-            Spot::Free { source, .. } => Ok(py.detach(|| source.joints())?.freedoms().to_vec()),
-            Spot::Placed(place) => place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.freedoms().to_vec())),
-        }
     }
 
     fn in_world(&self) -> Result<&Place> {
@@ -241,10 +114,6 @@ impl Articulation {
             apply(inner, place, part, at)
         })
     }
-}
-
-fn locked(now: &Mutex<Now>) -> MutexGuard<'_, Now> {
-    now.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
 /// Results in the shape that their arguments ask for.
@@ -289,7 +158,7 @@ impl Articulation {
         let (q, qd) = start.split_at(read.model.positions());
         let now = Now { gravity: Vec3::new(0.0, 0.0, -9.81), q: q.to_vec(), qd: qd.to_vec(), tau: vec![0.0; qd.len()] };
         let robot = Robot { model: read.model, base: Pose::identity(), joints: read.joints };
-        Ok(Articulation { name: read.name.into(), robot: Arc::new(robot), spot: Spot::Free { source: Source { file, options }, now: Mutex::new(now) } })
+        Ok(Articulation { name: read.name.into(), robot: Arc::new(robot), spot: Spot::Free { source: Source { file, options }, now: Mutex::new(now) }, anchor: None })
     }
 
     /// The robot's name in its file, or the body's in its world.
@@ -343,41 +212,41 @@ impl Articulation {
     /// Positions, shape (nq,), rad and m.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(array(py, &self.get(Which::Q)?))
+        Ok(array(py, &self.spot.get(Which::Q, &self.robot)?))
     }
 
     #[setter]
     fn set_q(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
-        self.set(py, Which::Q, value)
+        self.spot.set(py, Which::Q, &self.robot, value)
     }
 
     /// Velocities, shape (dof,), rad/s and m/s.
     #[getter]
     fn qd<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(array(py, &self.get(Which::Qd)?))
+        Ok(array(py, &self.spot.get(Which::Qd, &self.robot)?))
     }
 
     #[setter]
     fn set_qd(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
-        self.set(py, Which::Qd, value)
+        self.spot.set(py, Which::Qd, &self.robot, value)
     }
 
-    /// Generalized forces, shape (dof,), N·m and N: they act in every step until they are set anew, beside drives and damping. An input and no state:
-    /// forks take it along, ``save`` does not.
+    /// Generalized forces, shape (dof,), N·m and N: they act in every step until they are set anew, beside drives and damping. ``save`` and forks take
+    /// them along; ``World.state`` does not hold them.
     #[getter]
     fn tau<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(array(py, &self.get(Which::Tau)?))
+        Ok(array(py, &self.spot.get(Which::Tau, &self.robot)?))
     }
 
     #[setter]
     fn set_tau(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
-        self.set(py, Which::Tau, value)
+        self.spot.set(py, Which::Tau, &self.robot, value)
     }
 
     /// Gravity that its functions count with, shape (3,), m/s². In a world it is the world's and set there.
     #[getter]
     fn gravity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.gravity_now()?))
+        Ok(vector(py, &self.spot.gravity()?))
     }
 
     #[setter]
@@ -393,7 +262,7 @@ impl Articulation {
     /// Least and greatest position of each freedom, shape (dof, 2), rad or m; infinite where there is no limit.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
-        let freedoms = self.freedoms(py)?;
+        let freedoms = self.spot.freedoms(py)?;
         let flat = freedoms.iter().flat_map(|f| f.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect();
         Ok(PyArray1::from_vec(py, flat).reshape([freedoms.len(), 2])?)
     }
@@ -403,7 +272,7 @@ impl Articulation {
     #[pyo3(signature = (q=None, qd=None, tau=None))]
     fn forward_dynamics<'py>(&self, py: Python<'py>, q: Given<'_, 'py>, qd: Given<'_, 'py>, tau: Given<'_, 'py>) -> Result<Array<'py>> {
         let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "tau", tau)])?;
-        let gravity = self.gravity_now()?;
+        let gravity = self.spot.gravity()?;
         let out = py.detach(|| self.robot.forward_dynamics(&gravity, &mut rows))?;
         result(py, &rows, out, &[self.robot.dof()])
     }
@@ -414,7 +283,7 @@ impl Articulation {
     fn inverse_dynamics<'py>(&self, py: Python<'py>, q: Given<'_, 'py>, qd: Given<'_, 'py>, qdd: Given<'_, 'py>) -> Result<Array<'py>> {
         let still = array(py, &vec![0.0; self.robot.dof()]).into_any();
         let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "qdd", Some(qdd.unwrap_or(&still)))])?;
-        let gravity = self.gravity_now()?;
+        let gravity = self.spot.gravity()?;
         let out = py.detach(|| self.robot.inverse_dynamics(&gravity, &mut rows))?;
         result(py, &rows, out, &[self.robot.dof()])
     }
@@ -524,18 +393,13 @@ impl Articulation {
         }
     }
 
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
+    }
+
     fn __hash__(slf: &Bound<'_, Self>) -> u64 {
         slf.get().place().map_or(slf.as_ptr() as u64 >> 4, hash)
     }
-}
-
-/// The state that a body starts in.
-fn start(body: &ArticulatedBody) -> Vec<f64> {
-    use tumble::core::Object;
-    let Some(own) = body.integratable() else { return Vec::new() };
-    let mut x = vec![0.0; own.dims().x];
-    own.write_initial(&mut x);
-    x
 }
 
 /// A description of a URDF, from a path.

@@ -2,11 +2,13 @@
 
 use crate::articulation::Articulation;
 use crate::body::{Place, RigidBody};
+use crate::collect::{Anchor, anchor};
 use crate::errors::{Error, Result};
-use crate::world::place_of;
 use crate::robot::Robot;
-use crate::shared::{Inner, Shared};
+use crate::inner::Inner;
+use crate::shared::Shared;
 use pyo3::exceptions::{PyIndexError, PyTypeError};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyInt, PyIterator, PyList};
 use std::sync::Arc;
@@ -17,7 +19,8 @@ use tumble::core::{ArticulatedBody, ObjectId, RigidBody as Rigid, World as Core}
 /// It follows the world. Constraints and forces are no bodies and not in it.
 #[pyclass(frozen, sequence, module = "tumble")]
 pub struct Bodies {
-    pub shared: Arc<Shared>,
+    shared: Arc<Shared>,
+    anchor: Py<Anchor>,
 }
 
 /// Ids of what counts as a body, in the order of adding.
@@ -47,12 +50,17 @@ pub fn found(inner: &Inner, id: ObjectId) -> Option<Found> {
 pub fn handle(py: Python<'_>, shared: &Arc<Shared>, found: Found) -> Result<Py<PyAny>> {
     let place = Place { shared: shared.clone(), id: found.id, name: found.name };
     Ok(match found.robot {
-        Some(robot) => Py::new(py, Articulation::placed(place, robot))?.into_any(),
-        None => Py::new(py, RigidBody { place })?.into_any(),
+        Some(robot) => Py::new(py, Articulation::placed(py, place, robot)?)?.into_any(),
+        None => Py::new(py, RigidBody::new(py, place)?)?.into_any(),
     })
 }
 
 impl Bodies {
+    /// Of a world.
+    pub fn new(py: Python<'_>, shared: Arc<Shared>) -> Result<Bodies> {
+        Ok(Bodies { anchor: anchor(py, &shared)?, shared })
+    }
+
     fn all(&self) -> Result<Vec<Found>> {
         self.shared.read(|inner| Ok(body_ids(&inner.world).into_iter().filter_map(|id| found(inner, id)).collect()))
     }
@@ -71,6 +79,17 @@ pub fn by_name(inner: &Inner, name: &str) -> Result<Found> {
         let known = if names.is_empty() { "it has none".to_string() } else { format!("there are {}", names.join(", ")) };
         Error::Name(format!("the world has no body named '{name}'; {known}"))
     })
+}
+
+/// Where a handle of any kind points.
+pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
+    if let Some(place) = body.cast::<Articulation>().ok().and_then(|body| body.get().place().cloned()) {
+        return Ok(place);
+    }
+    match body.cast::<RigidBody>() {
+        Ok(body) => Ok(body.get().place.clone()),
+        Err(_) => Err(PyTypeError::new_err("wanted a body: a handle or a name").into()),
+    }
 }
 
 #[pymethods]
@@ -114,6 +133,10 @@ impl Bodies {
     /// Their names, in order.
     fn names(&self) -> Result<Vec<String>> {
         Ok(self.all()?.into_iter().map(|found| found.name.to_string()).collect())
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
     }
 
     fn __repr__(&self) -> Result<String> {

@@ -1,10 +1,13 @@
 //! A rigid body of a world: a handle, which asks the world each time.
 
+use crate::collect::{Anchor, anchor};
 use crate::convert::{array, pose, quaternion, rotation, some, symmetric, vec3, vec3_or, vector};
 use crate::errors::{Error, Result};
 use crate::looks;
-use crate::shared::{Inner, Shared};
+use crate::inner::Inner;
+use crate::shared::Shared;
 use numpy::{PyArray1, PyArray2};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::{Pose, Vec3};
@@ -81,9 +84,15 @@ pub fn mode_of(name: &str) -> Result<Mode> {
 #[pyclass(frozen, module = "tumble")]
 pub struct RigidBody {
     pub place: Place,
+    anchor: Py<Anchor>,
 }
 
 impl RigidBody {
+    /// A handle.
+    pub fn new(py: Python<'_>, place: Place) -> Result<RigidBody> {
+        Ok(RigidBody { anchor: anchor(py, &place.shared)?, place })
+    }
+
     fn constant<T>(&self, get: impl FnOnce(&Rigid) -> T) -> Result<T> {
         self.place.read(|inner| inner.world.get::<Rigid>(self.place.id).map(get))
     }
@@ -348,6 +357,10 @@ impl RigidBody {
 
     fn __hash__(&self) -> u64 {
         hash(&self.place)
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::bodies::body_ids;
 use crate::errors::Result;
-use crate::shared::Inner;
+use crate::inner::Inner;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;

@@ -2,8 +2,8 @@
 
 use crate::errors::{Error, Result};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::exceptions::PyTypeError;
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayDescrMethods, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use tumble::collide::{Mat3, Pose, Quat, Vec3};
@@ -21,6 +21,10 @@ pub struct Numbers {
 
 /// Anything that numpy makes an array of; `what` stands in errors.
 pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
+    // numpy would drop imaginary parts and count days
+    if value.cast::<PyUntypedArray>().is_ok_and(|array| b"cmMSUV".contains(&array.dtype().kind())) {
+        return Err(not_numbers(value, what));
+    }
     let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = value.extract().map_err(|_| not_numbers(value, what))?;
     let shape = array.shape().to_vec();
     let data: Vec<f64> = match array.as_slice() {
@@ -87,6 +91,19 @@ pub fn pose(position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, 
     Ok(Pose::from_parts(Translation3::from(position), rotation))
 }
 
+/// A pose from 3 numbers or 7.
+pub fn base_pose(base: &Bound<'_, PyAny>) -> Result<Pose> {
+    let Numbers { shape, data } = numbers(base, "base")?;
+    match shape.as_slice() {
+        [3] => Ok(Vec3::from_column_slice(&data).into()),
+        [7] if (data[3..].iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() <= 1e-6 => {
+            Ok(Pose::from_parts(Vec3::from_column_slice(&data[..3]).into(), unit(&data[3..])))
+        }
+        [7] => Err(Error::value("base: the quaternion (x, y, z, w) in its last four numbers must have length 1")),
+        _ => Err(Error::value(format!("base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}", shown(&shape)))),
+    }
+}
+
 /// A pose as 7 numbers: position, quaternion `x, y, z, w`.
 pub fn pose_numbers(pose: &Pose) -> [f64; 7] {
     let (p, q) = (pose.translation.vector, pose.rotation.coords);
@@ -96,6 +113,18 @@ pub fn pose_numbers(pose: &Pose) -> [f64; 7] {
 /// The rotation of four numbers `x, y, z, w`, made unit.
 pub fn unit(q: &[f64]) -> Quat {
     UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2]))
+}
+
+/// A whole number, for `from_py_with`: one that does not fit is a bad value, and not an overflow.
+pub fn whole_number<'py, T: for<'a> FromPyObject<'a, 'py>>(value: &Bound<'py, PyAny>) -> PyResult<T> {
+    value.extract::<T>().map_err(|error| {
+        let error: PyErr = error.into();
+        if !error.is_instance_of::<PyOverflowError>(value.py()) {
+            return error;
+        }
+        let written: String = value.str().map_or_else(|_| "the number".into(), |s| s.to_string()).chars().take(40).collect();
+        Error::value(format!("{written}: wanted a whole number that is neither negative nor that large")).into()
+    })
 }
 
 /// A path: `str` or `os.PathLike`.

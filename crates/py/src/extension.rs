@@ -4,18 +4,21 @@
 //! a frame, before it, and what it does acts during that frame. Both see a [`View`]. What Python raises is kept, and handed to the caller of the step
 //! with its traceback; the frame is run to its end without that force, and then the world is put back to where it was before.
 
+use crate::collect::Callable;
 use crate::errors::{Error, Result};
-use crate::shared::Inner;
-use crate::view::{Layout, View};
+use crate::inner::Inner;
+use crate::view::{Arrays, Layout, View};
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard};
-use tumble::core::{ForceGenerator, Forces, Mode, Object, ObjectId, Span, WorldView, Wrench};
+use tumble::core::{Checkpoint, ForceGenerator, Forces, Mode, Object, ObjectId, Span, WorldView, Wrench};
 
 /// A Python object that is called, which rows are whose, and what it raised.
 struct Code {
     name: String,
-    object: Py<PyAny>,
+    object: Callable,
     layout: Mutex<Option<Arc<Layout>>>,
+    /// Of the call before.
+    arrays: Mutex<Option<Arc<Arrays>>>,
     raised: Mutex<Option<PyErr>>,
 }
 
@@ -25,17 +28,18 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Code {
     fn new(name: &str, object: &Bound<'_, PyAny>) -> Code {
-        Code { name: name.into(), object: object.clone().unbind(), layout: Mutex::default(), raised: Mutex::default() }
+        Code::of(name, Arc::new(object.clone().unbind()))
+    }
+
+    fn of(name: &str, object: Callable) -> Code {
+        Code { name: name.into(), object, layout: Mutex::default(), arrays: Mutex::default(), raised: Mutex::default() }
     }
 
     /// For a fork of the world: what the object's own `fork` answers. What that raises is kept like what a call raises.
     fn fork(&self) -> Code {
-        Python::attach(|py| {
-            let (object, raised) = match self.object.call_method0(py, "fork") {
-                Ok(object) => (object, None),
-                Err(error) => (self.object.clone_ref(py), Some(error)),
-            };
-            Code { name: self.name.clone(), object, layout: Mutex::default(), raised: Mutex::new(raised) }
+        Python::attach(|py| match self.object.call_method0(py, "fork") {
+            Ok(object) => Code::of(&self.name, Arc::new(object)),
+            Err(error) => Code { raised: Mutex::new(Some(error)), ..Code::of(&self.name, self.object.clone()) },
         })
     }
 
@@ -47,21 +51,29 @@ impl Code {
         }
     }
 
-    /// Calls a method with a view; what was added to it, by row.
-    fn call(&self, world: &WorldView, method: &str, rows: impl FnOnce(Python<'_>, &Layout) -> Result<Option<Py<PyAny>>>) -> Result<Vec<Wrench>> {
+    /// Calls a method with a view; `each` gets what was added to it, by row.
+    fn call(&self, world: &WorldView, method: &str, rows: Option<&[i64]>, each: impl FnMut(usize, Wrench)) -> Result<()> {
         let layout = self.layout(world);
         Python::attach(|py| {
-            let view = Bound::new(py, View::new(py, world, &layout)?)?;
+            let arrays = match lock(&self.arrays).take().filter(|arrays| arrays.free(py, layout.len())) {
+                Some(arrays) => arrays,
+                None => Arc::new(Arrays::new(py, layout.len())?),
+            };
+            arrays.fill(py, world.sites)?;
+            let view = Bound::new(py, View::new(world, &layout, &arrays))?;
             let object = self.object.bind(py);
-            let outcome = match rows(py, &layout)? {
-                Some(rows) => object.call_method1(method, (&view, rows)),
+            let outcome = match rows {
+                Some(rows) => object.call_method1(method, (&view, numpy::PyArray1::from_slice(py, rows))),
                 None => object.call_method1(method, (&view,)),
             };
-            let wrenches = view.get().end(py, &self.name);
-            match outcome?.is_none() {
-                true => wrenches,
-                false => Err(Error::value(format!("'{}': `{method}` must return None; add what it does to view.force and view.torque", self.name))),
+            view.get().end();
+            drop(view);
+            if !outcome?.is_none() {
+                return Err(Error::value(format!("'{}': `{method}` must return None; add what it does to view.force and view.torque", self.name)));
             }
+            arrays.take(py, &layout, &self.name, each)?;
+            *lock(&self.arrays) = Some(arrays);
+            Ok(())
         })
     }
 }
@@ -91,14 +103,12 @@ impl ForceGenerator for PythonForce {
         if lock(&self.code.raised).is_some() {
             return;
         }
-        match self.code.call(view, "apply", |_, _| Ok(None)) {
-            Ok(wrenches) => {
-                for (sum, wrench) in out.wrenches.iter_mut().zip(wrenches) {
-                    sum.force += wrench.force;
-                    sum.torque += wrench.torque;
-                }
-            }
-            Err(error) => *lock(&self.code.raised) = Some(error.into()),
+        let add = |row: usize, wrench: Wrench| {
+            out.wrenches[row].force += wrench.force;
+            out.wrenches[row].torque += wrench.torque;
+        };
+        if let Err(error) = self.code.call(view, "apply", None, add) {
+            *lock(&self.code.raised) = Some(error.into());
         }
     }
 }
@@ -114,6 +124,8 @@ struct Attached {
 pub struct Extension {
     forces: Vec<ObjectId>,
     behaviours: Vec<Attached>,
+    /// Where the world was before the frame; its memory is used again.
+    before: Checkpoint,
 }
 
 impl Extension {
@@ -125,7 +137,7 @@ impl Extension {
     /// For a fork of the world.
     pub fn fork(&self) -> Extension {
         let attached = |a: &Attached| Attached { code: a.code.fork(), bodies: a.bodies.clone() };
-        Extension { forces: self.forces.clone(), behaviours: self.behaviours.iter().map(attached).collect() }
+        Extension { forces: self.forces.clone(), behaviours: self.behaviours.iter().map(attached).collect(), before: Checkpoint::default() }
     }
 }
 
@@ -142,17 +154,15 @@ impl Inner {
     pub fn extended_frame(&mut self) -> Result<()> {
         // what could not be forked
         self.take_raised()?;
-        let before = self.world.save();
-        if let Err(error) = self.behave() {
-            self.world.restore(&before)?;
-            return Err(error);
-        }
-        let outcome = self.frame();
-        if let Err(error) = self.take_raised() {
-            self.world.restore(&before)?;
-            return Err(error);
-        }
-        outcome
+        self.world.mark(&mut self.extension.before);
+        let outcome = self.behave().and_then(|()| {
+            let outcome = self.frame();
+            self.take_raised().map(|()| outcome)
+        });
+        outcome.unwrap_or_else(|raised| {
+            self.world.go_back(&self.extension.before);
+            Err(raised)
+        })
     }
 
     fn behave(&mut self) -> Result<()> {
@@ -163,9 +173,9 @@ impl Inner {
             if rows.is_empty() {
                 continue;
             }
-            let array = |py: Python<'_>, _: &Layout| Ok(Some(numpy::PyArray1::from_slice(py, &rows).into_any().unbind()));
-            let wrenches = code.call(&view, "act", array)?;
-            for (row, wrench) in wrenches.iter().enumerate().filter(|(_, wrench)| **wrench != Wrench::default()) {
+            let mut wrenches = Vec::new();
+            code.call(&view, "act", Some(&rows), |row, wrench| wrenches.push((row, wrench)))?;
+            for (row, wrench) in wrenches.into_iter().filter(|(_, wrench)| *wrench != Wrench::default()) {
                 let Some((id, part, _)) = layout.owner(row) else { continue };
                 let Some(point) = self.world.site(id, part).map(|site| site.position()) else { continue };
                 self.world.apply_force(id, part, wrench.force, &point)?;
@@ -210,6 +220,19 @@ impl Inner {
         self.world.remove(id)?;
         self.extension.forces.retain(|other| *other != id);
         Ok(true)
+    }
+
+    /// The objects of all forces and behaviours.
+    pub fn callables(&self) -> Vec<Callable> {
+        let forces = self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
+        forces.chain(self.extension.behaviours.iter().map(|b| &b.code)).map(|code| code.object.clone()).collect()
+    }
+
+    /// Takes all forces and behaviours out, for who drops them.
+    pub fn take_extension(&mut self) -> impl Send + use<> {
+        let Extension { forces, behaviours, .. } = std::mem::take(&mut self.extension);
+        let forces: Vec<Option<Box<dyn Object>>> = forces.into_iter().map(|id| self.world.remove(id).ok()).collect();
+        (forces, behaviours)
     }
 
     /// Names and objects of the forces, then of the behaviours, in the order of adding.

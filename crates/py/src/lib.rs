@@ -1,21 +1,28 @@
 //! The Python module `tumble._native`: conversion between Python and the crates, and no physics.
 
+mod adding;
 mod articulation;
 mod bodies;
 mod body;
+mod building;
+mod collect;
 mod contacts;
 mod convert;
 mod errors;
 mod extension;
+mod faults;
+mod inner;
 mod looks;
 mod picture;
 mod recording;
 mod report;
 mod robot;
 mod rollout;
+mod saved;
 mod shapes;
 mod shared;
 mod spheretree;
+mod spot;
 mod state;
 mod view;
 mod world;
@@ -33,6 +40,8 @@ mod _native {
     use super::bodies::Bodies;
     #[pymodule_export]
     use super::body::RigidBody;
+    #[pymodule_export]
+    use super::faults::_panic;
     #[pymodule_export]
     use super::recording::{Recorder, read_recording};
     #[pymodule_export]

@@ -1,8 +1,9 @@
 //! Recordings: written from worlds, read back as arrays.
 
-use crate::convert::path;
+use crate::convert::{path, whole_number};
 use crate::errors::{Error, Result, caught};
-use crate::shared::{Inner, Shared};
+use crate::inner::Inner;
+use crate::shared::Shared;
 use crate::world::World;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -96,7 +97,7 @@ impl Recorder {
 
     /// Steps the world ``n`` times and adds it after every ``every`` steps; before the first step too where nothing is recorded yet.
     #[pyo3(signature = (world, n, *, every=1))]
-    fn run(&self, py: Python<'_>, world: &Bound<'_, World>, n: u32, every: u32) -> Result<()> {
+    fn run(&self, py: Python<'_>, world: &Bound<'_, World>, #[pyo3(from_py_with = whole_number)] n: u32, #[pyo3(from_py_with = whole_number)] every: u32) -> Result<()> {
         if every == 0 {
             return Err(Error::value("every is 0; it must be at least 1"));
         }

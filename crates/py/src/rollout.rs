@@ -1,8 +1,9 @@
 //! Many futures of one world at once: forks, each under controls of its own, on all cores.
 
+use crate::bodies::body_ids;
 use crate::convert::{Numbers, shown};
 use crate::errors::{Error, Result, caught};
-use crate::shared::Inner;
+use crate::inner::Inner;
 use rayon::prelude::*;
 use std::sync::Mutex;
 use tumble::core::ObjectId;
@@ -27,8 +28,11 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Checks shapes against each other and the world.
-    pub fn new(inner: &Inner, driven: Vec<(ObjectId, usize)>, controls: Numbers, states: Option<Numbers>, every: usize) -> Result<Plan> {
+    /// For some articulated bodies, or all. Checks shapes against each other and the world.
+    pub fn new(inner: &Inner, asked: Option<Vec<ObjectId>>, controls: Numbers, states: Option<Numbers>, every: usize) -> Result<Plan> {
+        let all = || body_ids(&inner.world).into_iter().filter(|id| inner.robots.contains_key(id)).collect();
+        let freedoms = |id: ObjectId| inner.robots.get(&id).map(|robot| (id, robot.dof())).ok_or_else(|| Error::value("controls are of articulations"));
+        let driven = asked.unwrap_or_else(all).into_iter().map(freedoms).collect::<Result<Vec<_>>>()?;
         let width: usize = driven.iter().map(|(_, dof)| dof).sum();
         let [count, frames, got] = controls.shape[..] else {
             return Err(Error::value(format!("controls: wanted shape (forks, steps, {width}), and got {}", shown(&controls.shape))));

@@ -1,68 +1,25 @@
 //! One world that many Python objects hold: behind a lock that is tried and never waited for, so that nothing can block or deadlock.
 
+use crate::collect::Ground;
 use crate::errors::{Error, Result, caught};
-use crate::extension::Extension;
-use crate::robot::Robot;
-use crate::state::Mirror;
+use crate::inner::Inner;
 use pyo3::prelude::*;
-use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::thread::ThreadId;
-use tumble::core::{ObjectId, World};
-use tumble::scene::SceneFile;
+use std::time::Duration;
 
-/// A world and what belongs to it on Python's side.
-pub struct Inner {
-    /// The world itself.
-    pub world: World,
-    /// The scene that it was made of: its camera, lights and names.
-    pub scene: Arc<SceneFile>,
-    /// The trees of articulated bodies.
-    pub robots: BTreeMap<ObjectId, Arc<Robot>>,
-    /// Generalized forces that act on articulated bodies in every frame.
-    pub efforts: BTreeMap<ObjectId, Vec<f64>>,
-    /// Forces and behaviours written in Python.
-    pub extension: Extension,
-    /// The arrays that Python sees the state by.
-    pub mirror: Mirror,
-    /// Whether a panic left it half-way.
-    broken: bool,
-}
-
-impl Inner {
-    /// A world of a scene.
-    pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
-        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), extension: Extension::default(), mirror: Mirror::default(), broken: false }
-    }
-
-    /// An independent copy, with no arrays yet.
-    pub fn fork(&self) -> Inner {
-        Inner {
-            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), extension: self.extension.fork(),
-            mirror: Mirror::default(), broken: false,
-        }
-    }
-
-    /// One frame.
-    pub fn step(&mut self) -> Result<()> {
-        if self.extension.is_empty() { self.frame() } else { self.extended_frame() }
-    }
-
-    /// One frame of the world alone.
-    pub fn frame(&mut self) -> Result<()> {
-        for (&id, effort) in &self.efforts {
-            self.world.apply_generalized(id, effort)?;
-        }
-        self.world.step()?;
-        Ok(())
-    }
-}
+/// How long a call steps before it looks whether the user pressed Ctrl-C.
+const PATIENCE: Duration = Duration::from_millis(50);
+/// The same while the interpreter is held: as long as the interpreter lets one thread run while others wait.
+const TURN: Duration = Duration::from_millis(5);
 
 /// A world behind its lock, and who is stepping it.
 pub struct Shared {
     inner: Mutex<Inner>,
     stepping: Mutex<Option<ThreadId>>,
+    /// What Python's collector knows of it.
+    pub ground: Ground,
 }
 
 /// The world while one call works on it.
@@ -74,7 +31,9 @@ pub struct Held<'a> {
 impl Shared {
     /// A world to be held by handles.
     pub fn new(inner: Inner) -> Arc<Shared> {
-        Arc::new(Shared { inner: Mutex::new(inner), stepping: Mutex::new(None) })
+        let ground = Ground::default();
+        ground.list(inner.callables());
+        Arc::new(Shared { inner: Mutex::new(inner), stepping: Mutex::new(None), ground })
     }
 
     /// The world, if nobody works on it.
@@ -101,40 +60,63 @@ impl Shared {
         caught(|| call(&held))
     }
 
-    /// Changes the world, and shows the change to the arrays that Python holds. The call itself runs no Python.
-    pub fn write<T>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
+    /// Changes the world, under the interpreter's lock: Python may be looking at the state.
+    pub fn write<T>(&self, _py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
         let mut held = self.hold()?;
-        let outcome = guarded(&mut held, call);
-        held.publish(py);
-        outcome
+        guarded(&mut held, call)
     }
 
-    /// The same with the interpreter let go, for what takes long: other threads run on meanwhile.
+    /// The same for what takes long: with the interpreter let go, if it can be.
     pub fn work<T: Send>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
         let mut held = self.hold()?;
-        let inner: &mut Inner = &mut held;
-        let outcome = py.detach(|| guarded(inner, call));
-        held.publish(py);
-        outcome
+        apart(py, &mut held, |py, inner| leave(py, inner, call))
     }
 
-    /// The same in parts, until one answers that it was the last: the world stays held over all of them, and Ctrl-C is heard between two.
-    pub fn work_in_parts(&self, py: Python<'_>, mut part: impl FnMut(&mut Inner) -> Result<bool> + Send) -> Result<()> {
+    /// The same in parts of the given length, until one answers that it was the last: the world stays held over all of them, and Ctrl-C is heard between
+    /// two.
+    pub fn work_in_parts(&self, py: Python<'_>, mut part: impl FnMut(&mut Inner, Duration) -> Result<bool> + Send) -> Result<()> {
         let mut held = self.hold()?;
-        let outcome = loop {
-            let inner: &mut Inner = &mut held;
-            match py.detach(|| guarded(inner, &mut part)) {
-                Ok(false) => {}
-                Ok(true) => break Ok(()),
-                Err(error) => break Err(error),
+        apart(py, &mut held, |py, inner| {
+            loop {
+                let turn = if inner.looked_into(py) { TURN } else { PATIENCE };
+                if leave(py, inner, |inner| part(inner, turn))? {
+                    return Ok(());
+                }
+                py.check_signals()?;
+                py.detach(|| ()); // others' turn
             }
-            if let Err(raised) = py.check_signals() {
-                break Err(raised.into());
-            }
-        };
-        held.publish(py);
-        outcome
+        })
     }
+
+    /// Adds or removes forces or behaviours, and tells the collector.
+    pub fn extend<T>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
+        let (out, callables) = self.write(py, |inner| Ok((call(inner)?, inner.callables())))?;
+        self.ground.list(callables);
+        Ok(out)
+    }
+
+    /// Drops forces and behaviours: nothing can reach this world any more but they themselves.
+    pub fn forsake(&self) {
+        self.ground.list(Vec::new());
+        let gone = self.inner.try_lock().map(|mut inner| inner.take_extension());
+        drop(gone); // not under the lock: it may run Python
+    }
+}
+
+/// Where Python runs within the call too, an array that looks into the world's memory shows the state as it was before, until the call is over.
+fn apart<T>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(Python<'_>, &mut Inner) -> Result<T>) -> Result<T> {
+    if inner.extension.is_empty() || !inner.shown.alive(py) {
+        return call(py, inner);
+    }
+    inner.world.set_state_aside();
+    let outcome = call(py, inner);
+    inner.world.show_state();
+    outcome
+}
+
+/// Lets the interpreter go meanwhile, if nobody looks into the memory that changes.
+fn leave<T: Send>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
+    if inner.looked_into(py) { guarded(inner, call) } else { py.detach(|| guarded(inner, call)) }
 }
 
 /// A panic in a call that changes the world may leave it half-way: later calls say so.
@@ -154,13 +136,6 @@ impl Deref for Held<'_> {
 impl DerefMut for Held<'_> {
     fn deref_mut(&mut self) -> &mut Inner {
         &mut self.guard
-    }
-}
-
-impl Held<'_> {
-    fn publish(&mut self, py: Python<'_>) {
-        let Inner { world, mirror, .. } = &mut **self;
-        mirror.follow(py, world.state());
     }
 }
 

@@ -1,59 +1,75 @@
-//! The state as numpy sees it.
+//! The state as numpy sees it: the world's own memory, not a copy. The only `unsafe` of the package is here.
 //!
-//! Arrays that Python holds cannot look into the world's own memory: a step in another thread would change it under a reader. So the state has a
-//! mirror: one numpy array, written under the interpreter's lock after every call that changes the world, and only while Python holds a view of it
-//! (some 0.1 µs per kilobyte). Views of it are read-only, cost nothing to make, and follow the world until a body is added or removed; the mirror is
-//! then made anew and old views keep the old one. No `unsafe` is needed for that.
+//! An array looks straight into the memory that the world steps in ([`World::hold_state`]); making one, and stepping under it, copies nothing. When a body
+//! comes or goes the world moves to new memory once, and old arrays keep the old. Why this is sound:
+//!
+//! - *The memory stays.* The world writes it in place and never gives it back while a hold lives; each array keeps a [`Memory`] alive, which has one.
+//! - *Nobody writes under a reader.* Python reads while it has the interpreter's lock. Every call that changes the world has that lock too, for as long as an
+//!   array lives: [`Shared`](crate::shared::Shared) lets go of it while stepping only when there is none. Where forces or behaviours in Python run in the
+//!   middle of a step, the world steps on a copy meanwhile, and readers see the state as it was before the call.
+//! - *Nobody writes through it.* The arrays are read-only, and numpy cannot be talked out of that: what they look into is no buffer that can be written.
+//!
+//! numpy lets go of the lock inside of a large operation. One that reads a state in one thread, while another thread steps that world, may see numbers of two
+//! moments, as with any array that another thread writes.
 
-use numpy::{PyArray1, PyArrayMethods};
+#![allow(unsafe_code, reason = "an array over memory that is not numpy's")]
+
+use numpy::PyArray1;
+use numpy::ndarray::ArrayView1;
 use pyo3::prelude::*;
 use pyo3::types::{PyWeakrefMethods, PyWeakrefReference};
+use std::sync::Arc;
+use tumble::core::{StateHold, World};
 
-/// The array that views look at, while anybody holds one.
+/// Keeps alive what an array looks into.
+#[pyclass(frozen, module = "tumble", name = "_Memory")]
+struct Memory {
+    _hold: Arc<StateHold>,
+}
+
+/// The array that views look at, while anybody holds one, and where it looks.
 #[derive(Default)]
-pub struct Mirror(Option<Py<PyWeakrefReference>>);
+pub struct Shown(Option<(Py<PyWeakrefReference>, usize)>);
 
-impl Mirror {
-    /// A read-only view that follows the world; `x` is the state now.
-    pub fn view<'py>(&mut self, py: Python<'py>, x: &[f64]) -> PyResult<Bound<'py, PyAny>> {
-        let base = match self.array(py) {
-            Some(base) => base,
+impl Shown {
+    /// A read-only view that follows the world.
+    pub fn view<'py>(&mut self, py: Python<'py>, world: &mut World) -> PyResult<Bound<'py, PyAny>> {
+        let now = world.state_address().0.addr();
+        let base = match self.array(py).filter(|(_, address)| *address == now) {
+            Some((base, _)) => base,
             None => {
-                let base = PyArray1::from_slice(py, x);
-                self.0 = Some(PyWeakrefReference::new(&base)?.unbind());
+                let base = over(py, world)?;
+                base.call_method1("setflags", (false,))?;
+                self.0 = Some((PyWeakrefReference::new(&base)?.unbind(), now));
                 base
             }
         };
-        let view = base.call_method0("view")?;
-        view.call_method1("setflags", (false,))?;
-        Ok(view)
+        base.call_method0("view")
     }
 
-    /// Writes the state to the views that are still held; forgets the mirror where there are none.
-    pub fn follow(&mut self, py: Python<'_>, x: &[f64]) {
-        if self.0.is_none() {
-            return;
-        }
-        let written = self.array(py).is_some_and(|base| {
-            base.try_readwrite().is_ok_and(|mut all| match all.as_slice_mut() {
-                Ok(all) if all.len() == x.len() => {
-                    all.copy_from_slice(x);
-                    true
-                }
-                _ => false,
-            })
-        });
-        if !written {
-            self.0 = None;
-        }
+    /// Whether Python holds a view.
+    pub fn alive(&self, py: Python<'_>) -> bool {
+        self.array(py).is_some()
     }
 
-    /// Leaves the array to those who hold views of it: bodies came or went.
-    pub fn renew(&mut self) {
-        self.0 = None;
+    fn array<'py>(&self, py: Python<'py>) -> Option<(Bound<'py, PyAny>, usize)> {
+        let (weak, address) = self.0.as_ref()?;
+        Some((weak.bind(py).upgrade()?, *address))
     }
+}
 
-    fn array<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.0.as_ref()?.bind(py).upgrade()?.cast_into().ok()
-    }
+/// An array over the memory of a world's state.
+fn over<'py>(py: Python<'py>, world: &mut World) -> PyResult<Bound<'py, PyAny>> {
+    let keeper = Bound::new(py, Memory { _hold: world.hold_state() })?.into_any();
+    let (start, len) = world.state_address();
+    // SAFETY: `start` is the start of `len` initialized numbers that stay there while `keeper` lives; when they are written is told above. No
+    // reference to them is made: the view is taken apart into pointer, length and stride.
+    let array = unsafe { PyArray1::borrow_from_array(&ArrayView1::from_shape_ptr(len, start), keeper) };
+    Ok(array.into_any())
+}
+
+/// How many hold an object: its references as Python counts them.
+pub fn holders<T>(object: &Py<T>, _py: Python<'_>) -> isize {
+    // SAFETY: the pointer is to an object that is alive, and the interpreter is held.
+    unsafe { pyo3::ffi::Py_REFCNT(object.as_ptr()) }
 }

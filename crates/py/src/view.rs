@@ -1,13 +1,14 @@
 //! What a force or a behaviour written in Python sees of the world, and where it puts what it does.
 //!
-//! The site table is copied into one numpy array for each call: the world's own memory changes while it is stepped, and an array that a callback
-//! kept would look into it. 19 numbers per row are copied, which takes less than the call itself. After the call the view
+//! The site table is copied into numpy arrays for each call: the world's own memory changes while it is stepped, and an array that a callback
+//! kept would look into it. The arrays of one call serve the next, unless Python kept any. After the call the view
 //! refuses to be asked, and what was added to its arrays is read once and then no more.
 
-use crate::convert::{numbers, some, vec3};
+use crate::convert::vec3;
 use crate::errors::{Error, Result};
-use crate::world::place_of;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use crate::state::holders;
+use crate::bodies::place_of;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 use std::ops::Range;
@@ -17,7 +18,7 @@ use tumble::collide::Vec3;
 use tumble::core::{ArticulatedBody, ObjectId, RigidBody as Rigid, Site, WorldView, Wrench};
 
 /// Numbers of a row: position, quaternion, velocity, angular velocity, acceleration, angular acceleration.
-const WIDTH: usize = 19;
+const WIDTHS: [usize; 6] = [3, 4, 3, 3, 3, 3];
 
 /// Which rows belong to whom: made once and kept until objects come or go.
 pub struct Layout {
@@ -50,6 +51,11 @@ impl Layout {
         self.ids == view.ids() && self.masses.len() == view.sites.len()
     }
 
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.masses.len()
+    }
+
     /// Rows of an object.
     pub fn rows(&self, id: ObjectId) -> Option<Range<usize>> {
         Some(self.objects.iter().find(|(other, ..)| *other == id)?.2.clone())
@@ -70,14 +76,87 @@ fn mass(view: &WorldView, id: ObjectId, part: usize) -> f64 {
     view.get::<ArticulatedBody>(id).and_then(of_link).unwrap_or(0.0)
 }
 
+/// An array that is written here, and a read-only view of it, of which Python gets views.
+type Column = (Py<PyArray2<f64>>, Py<PyAny>);
+
+/// The arrays of a view.
+pub struct Arrays {
+    rows: usize,
+    /// In the order of [`WIDTHS`].
+    shown: [Column; 6],
+    force: Py<PyArray2<f64>>,
+    torque: Py<PyArray2<f64>>,
+}
+
+impl Arrays {
+    /// For a number of rows.
+    pub fn new(py: Python<'_>, rows: usize) -> Result<Arrays> {
+        let zeros = |width| PyArray2::zeros(py, [rows, width], false);
+        let mut shown = Vec::with_capacity(WIDTHS.len());
+        for width in WIDTHS {
+            let array = zeros(width);
+            let view = array.call_method0("view")?;
+            view.call_method1("setflags", (false,))?;
+            shown.push((array.unbind(), view.unbind()));
+        }
+        let shown = shown.try_into().map_err(|_| Error::Internal("as many arrays as there are kinds".into()))?;
+        Ok(Arrays { rows, shown, force: zeros(3).unbind(), torque: zeros(3).unbind() })
+    }
+
+    /// Whether they may be written again: Python holds none of them, nor a view of one.
+    pub fn free(self: &Arc<Arrays>, py: Python<'_>, rows: usize) -> bool {
+        let own = |(array, view): &Column| holders(array, py) == 2 && holders(view, py) == 1;
+        let wrenches = [&self.force, &self.torque].iter().all(|array| holders(array, py) == 1);
+        self.rows == rows && Arc::strong_count(self) == 1 && wrenches && self.shown.iter().all(own)
+    }
+
+    /// Writes the sites, and zeros for what will act.
+    pub fn fill(&self, py: Python<'_>, sites: &[Site]) -> Result<()> {
+        let [position, orientation, velocity, angular_velocity, acceleration, angular_acceleration] = &self.shown;
+        copy(py, position, sites, |s| s.position().into())?;
+        copy(py, orientation, sites, |s| s.pose.rotation.coords.into())?;
+        copy(py, velocity, sites, |s| s.velocity.into())?;
+        copy(py, angular_velocity, sites, |s| s.angular_velocity.into())?;
+        copy(py, acceleration, sites, |s| s.acceleration.into())?;
+        copy(py, angular_acceleration, sites, |s| s.angular_acceleration.into())?;
+        for array in [&self.force, &self.torque] {
+            array.bind(py).try_readwrite().map_err(PyErr::from)?.as_slice_mut().map_err(PyErr::from)?.fill(0.0);
+        }
+        Ok(())
+    }
+
+    /// What a callback added, by row.
+    pub fn take(&self, py: Python<'_>, layout: &Layout, whose: &str, mut each: impl FnMut(usize, Wrench)) -> Result<()> {
+        let (force, torque) = (self.force.bind(py).try_readonly().map_err(PyErr::from)?, self.torque.bind(py).try_readonly().map_err(PyErr::from)?);
+        let (force, torque) = (force.as_slice().map_err(PyErr::from)?, torque.as_slice().map_err(PyErr::from)?);
+        for (what, numbers) in [("force", force), ("torque", torque)] {
+            if let Some(k) = numbers.iter().position(|x| !x.is_finite()) {
+                let name = layout.owner(k / 3).map_or("nothing", |(_, _, name)| name);
+                return Err(Error::value(format!("'{whose}': its {what} on '{name}' is {}; it must be finite", numbers[k])));
+            }
+        }
+        for (row, (force, torque)) in force.chunks_exact(3).zip(torque.chunks_exact(3)).enumerate() {
+            each(row, Wrench { force: Vec3::from_column_slice(force), torque: Vec3::from_column_slice(torque) });
+        }
+        Ok(())
+    }
+}
+
+/// Writes one row of each site.
+fn copy<const N: usize>(py: Python<'_>, (array, _): &Column, sites: &[Site], get: impl Fn(&Site) -> [f64; N]) -> Result<()> {
+    let mut out = array.bind(py).try_readwrite().map_err(PyErr::from)?;
+    let rows = out.as_slice_mut().map_err(PyErr::from)?.as_chunks_mut().0;
+    rows.iter_mut().zip(sites).for_each(|(row, site)| *row = get(site));
+    Ok(())
+}
+
 /// The world as a force or a behaviour sees it while it is called: a row for every rigid body and every link, in world axes.
 ///
 /// The arrays are copies of that moment and read-only, but ``force`` and ``torque``, which begin at zero and take what the callback adds. After the
 /// callback has returned the view raises ``RemovedError``.
 #[pyclass(frozen, module = "tumble")]
 pub struct View {
-    table: Py<PyArray2<f64>>,
-    wrenches: Py<PyArray2<f64>>,
+    arrays: Arc<Arrays>,
     layout: Arc<Layout>,
     moves: Vec<bool>,
     time: f64,
@@ -86,33 +165,18 @@ pub struct View {
 }
 
 impl View {
-    /// A copy of what a callback may see.
-    pub fn new(py: Python<'_>, view: &WorldView, layout: &Arc<Layout>) -> Result<View> {
-        let mut flat = Vec::with_capacity(WIDTH * view.sites.len());
-        for site in view.sites {
-            push(&mut flat, site);
-        }
-        let table = PyArray1::from_vec(py, flat).reshape([view.sites.len(), WIDTH])?;
-        table.call_method1("setflags", (false,))?;
-        let mut moves = vec![false; view.sites.len()];
+    /// Of arrays that are filled.
+    pub fn new(view: &WorldView, layout: &Arc<Layout>, arrays: &Arc<Arrays>) -> View {
+        let mut moves = vec![false; layout.len()];
         for (id, _, rows) in &layout.objects {
             moves[rows.clone()].fill(view.status(*id).is_some_and(|status| status.moves()));
         }
-        let wrenches = PyArray2::zeros(py, [view.sites.len(), 6], false).unbind();
-        Ok(View { table: table.unbind(), wrenches, layout: layout.clone(), moves, time: view.time, gravity: view.gravity, over: AtomicBool::new(false) })
+        View { arrays: arrays.clone(), layout: layout.clone(), moves, time: view.time, gravity: view.gravity, over: AtomicBool::new(false) }
     }
 
-    /// The callback has returned: what it did, by row.
-    pub fn end(&self, py: Python<'_>, whose: &str) -> Result<Vec<Wrench>> {
+    /// The callback has returned.
+    pub fn end(&self) {
         self.over.store(true, Ordering::Relaxed);
-        let flat = self.wrenches.bind(py).to_vec().unwrap_or_default();
-        if let Some(k) = flat.iter().position(|x| !x.is_finite()) {
-            let name = self.layout.owner(k / 6).map_or("nothing", |(_, _, name)| name);
-            let what = if k % 6 < 3 { "force" } else { "torque" };
-            return Err(Error::value(format!("'{whose}': its {what} on '{name}' is {}; it must be finite", flat[k])));
-        }
-        let three = |w: &[f64]| Vec3::new(w[0], w[1], w[2]);
-        Ok(flat.chunks_exact(6).map(|w| Wrench { force: three(w), torque: three(&w[3..]) }).collect())
     }
 
     fn open(&self) -> Result<()> {
@@ -122,14 +186,26 @@ impl View {
         }
     }
 
-    fn columns<'py>(&self, py: Python<'py>, of: &Py<PyArray2<f64>>, columns: Range<isize>) -> Result<Bound<'py, PyAny>> {
+    /// A view of what is shown, by its place in [`WIDTHS`].
+    fn shown<'py>(&self, py: Python<'py>, which: usize) -> Result<Bound<'py, PyAny>> {
         self.open()?;
-        let columns = PySlice::new(py, columns.start, columns.end, 1);
-        Ok(of.bind(py).get_item((PySlice::full(py), columns))?)
+        Ok(self.arrays.shown[which].1.bind(py).call_method0("view")?)
     }
 
-    fn set(&self, py: Python<'_>, columns: Range<isize>, value: &Bound<'_, PyAny>) -> Result<()> {
-        Ok(self.columns(py, &self.wrenches, columns)?.set_item(py.Ellipsis(), value)?)
+    /// A view that may be written.
+    fn open_view<'py>(&self, py: Python<'py>, array: &Py<PyArray2<f64>>) -> Result<Bound<'py, PyAny>> {
+        self.open()?;
+        Ok(array.bind(py).call_method0("view")?)
+    }
+
+    fn set(&self, py: Python<'_>, array: &Py<PyArray2<f64>>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.open()?;
+        let own = array.bind(py);
+        // `view.force += …` gives back what it was given
+        match value.cast::<PyArray2<f64>>() {
+            Ok(value) if value.data() == own.data() && value.shape() == own.shape() && value.is_c_contiguous() => Ok(()),
+            _ => Ok(own.set_item(py.Ellipsis(), value)?),
+        }
     }
 
     fn row_of(&self, body: &Bound<'_, PyAny>) -> Result<Range<usize>> {
@@ -145,14 +221,6 @@ impl View {
         let place = place_of(body)?;
         let found = self.layout.objects.iter().find(|(id, name, _)| *id == place.id && *name == place.name);
         found.map(|(.., rows)| rows.clone()).ok_or_else(|| unknown(&place.name))
-    }
-}
-
-fn push(flat: &mut Vec<f64>, site: &Site) {
-    flat.extend(site.position().iter());
-    flat.extend(site.pose.rotation.coords.iter());
-    for v in [site.velocity, site.angular_velocity, site.acceleration, site.angular_acceleration] {
-        flat.extend(v.iter());
     }
 }
 
@@ -174,37 +242,37 @@ impl View {
     /// Positions, shape (n, 3), m: of rigid bodies the centre of mass, of links the origin of their frame.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        self.columns(py, &self.table, 0..3)
+        self.shown(py, 0)
     }
 
     /// Orientations, body to world, unit quaternions (x, y, z, w), shape (n, 4).
     #[getter]
     fn orientation<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        self.columns(py, &self.table, 3..7)
+        self.shown(py, 1)
     }
 
     /// Velocities of the same points, shape (n, 3), m/s.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        self.columns(py, &self.table, 7..10)
+        self.shown(py, 2)
     }
 
     /// Angular velocities, shape (n, 3), rad/s.
     #[getter]
     fn angular_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        self.columns(py, &self.table, 10..13)
+        self.shown(py, 3)
     }
 
     /// Accelerations of the same points when forces were last evaluated, shape (n, 3), m/s².
     #[getter]
     fn acceleration<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        self.columns(py, &self.table, 13..16)
+        self.shown(py, 4)
     }
 
     /// Angular accelerations at the same time, shape (n, 3), rad/s².
     #[getter]
     fn angular_acceleration<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        self.columns(py, &self.table, 16..19)
+        self.shown(py, 5)
     }
 
     /// Masses, shape (n,), kg; 0 of static geometry.
@@ -231,23 +299,23 @@ impl View {
     /// Forces at the points that ``position`` tells, shape (n, 3), N, world axes: add to it.
     #[getter]
     fn force<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        self.columns(py, &self.wrenches, 0..3)
+        self.open_view(py, &self.arrays.force)
     }
 
     #[setter]
     fn set_force(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
-        self.set(py, 0..3, value)
+        self.set(py, &self.arrays.force, value)
     }
 
     /// Torques, shape (n, 3), N·m, world axes: add to it.
     #[getter]
     fn torque<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        self.columns(py, &self.wrenches, 3..6)
+        self.open_view(py, &self.arrays.torque)
     }
 
     #[setter]
     fn set_torque(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
-        self.set(py, 3..6, value)
+        self.set(py, &self.arrays.torque, value)
     }
 
     /// The row of a rigid body, given by name or as a handle; of an articulated body that of its part number ``part``.
@@ -273,12 +341,15 @@ impl View {
         if row >= self.moves.len() {
             return Err(Error::value(format!("row is {row}; there are {}", self.moves.len())));
         }
-        let origin = Vec3::from(some::<19>(&self.table.bind(py).get_item(row)?, "row").map(|site| [site[0], site[1], site[2]])?);
-        let own = self.wrenches.bind(py).get_item(row)?;
-        let now = numbers(&own, "force")?.data;
+        let position = self.arrays.shown[0].0.bind(py).try_readonly().map_err(PyErr::from)?;
+        let origin = Vec3::from_column_slice(&position.as_slice().map_err(PyErr::from)?[3 * row..3 * row + 3]);
         let torque = (point - origin).cross(&force);
-        let sum: Vec<f64> = now.iter().zip(force.iter().chain(torque.iter())).map(|(a, b)| a + b).collect();
-        Ok(own.set_item(py.Ellipsis(), sum)?)
+        for (array, more) in [(&self.arrays.force, force), (&self.arrays.torque, torque)] {
+            let mut all = array.bind(py).try_readwrite().map_err(PyErr::from)?;
+            let own = &mut all.as_slice_mut().map_err(PyErr::from)?[3 * row..3 * row + 3];
+            own.iter_mut().zip(&more).for_each(|(own, more)| *own += more);
+        }
+        Ok(())
     }
 
     /// Number of rows.

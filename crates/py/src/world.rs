@@ -1,29 +1,31 @@
 //! The world: made or loaded, filled, stepped, asked.
 
-use crate::articulation::{Articulation, described};
-use crate::bodies::{Bodies, by_name, handle};
-use crate::body::{Place, RigidBody};
-use crate::convert::{Numbers, numbers, path, pose, shown, vec3, vec3_or, vector};
+use crate::adding::{add, articulated, own_place, rigid};
+use crate::articulation::Articulation;
+use crate::bodies::{Bodies, by_name, handle, place_of};
+use crate::body::RigidBody;
+use crate::collect::{Anchor, anchor};
+use crate::building::{Choices, build};
+use crate::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
 use crate::errors::{Error, Result, caught};
 use crate::report::StepReport;
-use crate::robot::Robot;
 use crate::shapes::Shape;
-use crate::shared::{Inner, Shared};
+use crate::inner::Inner;
+use crate::shared::Shared;
 use crate::picture::Shot;
 use crate::rollout::Plan;
-use crate::{bodies, contacts, looks};
+use crate::{bodies, contacts, saved};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use tumble::collide::Vec3;
-use tumble::core::{ArticulatedBody, Joint, Mode, ObjectId, RigidBody as Rigid, Settings};
-use tumble::scene::{SceneFile, WorldSettings, resolve_scene};
-
-/// How long a call steps before it looks whether the user pressed Ctrl-C.
-const PATIENCE: Duration = Duration::from_millis(50);
+use tumble::core::{Mode, RigidBody as Rigid, Settings};
+use tumble::scene::{SceneFile, resolve_scene};
 
 /// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions are (x, y, z, w).
 ///
@@ -37,20 +39,13 @@ const PATIENCE: Duration = Duration::from_millis(50);
 pub struct World {
     pub shared: Arc<Shared>,
     notes: Vec<String>,
+    anchor: Py<Anchor>,
 }
 
 impl World {
-    fn build(scene: SceneFile) -> Result<World> {
-        let (world, notes) = caught(|| Ok(scene.build()?))?;
-        let mut inner = Inner::new(world, Arc::new(scene));
-        let scene = inner.scene.clone();
-        for spec in &scene.articulated {
-            let Some((id, body)) = inner.world.find(&spec.name).and_then(|id| Some((id, inner.world.get::<ArticulatedBody>(id)?))) else { continue };
-            let joints = spec.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.clone()).collect();
-            let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
-            inner.robots.insert(id, Arc::new(robot));
-        }
-        Ok(World { shared: Shared::new(inner), notes })
+    fn of(py: Python<'_>, (inner, notes): (Inner, Vec<String>)) -> Result<World> {
+        let shared = Shared::new(inner);
+        Ok(World { anchor: anchor(py, &shared)?, shared, notes })
     }
 
     fn settings<T>(&self, get: impl FnOnce(&Settings) -> T) -> Result<T> {
@@ -64,55 +59,6 @@ impl World {
             Ok(inner.world.set_settings(settings)?)
         })
     }
-
-    /// Where a body of this world is, given as a handle or by name.
-    fn own_place(&self, body: &Bound<'_, PyAny>) -> Result<Place> {
-        let place = match body.extract::<String>() {
-            Ok(name) => {
-                let found = self.shared.read(|inner| by_name(inner, &name))?;
-                Place { shared: self.shared.clone(), id: found.id, name: name.into() }
-            }
-            Err(_) => place_of(body)?,
-        };
-        match Arc::ptr_eq(&place.shared, &self.shared) {
-            true => place.status().map(|_| place),
-            false => Err(Error::value(format!("'{}' is a body of another world", place.name))),
-        }
-    }
-
-    /// Adds a body and gives its handle.
-    fn add(&self, py: Python<'_>, body: Rigid, mode: Mode, switches: [bool; 2]) -> Result<RigidBody> {
-        let [alive, collidable] = switches;
-        let place = self.shared.write(py, |inner| {
-            let body = looks::usual(body, inner.world.ids().len());
-            let id = inner.world.add_boxed(Box::new(body), mode)?;
-            inner.world.set_alive(id, alive)?;
-            inner.world.set_collidable(id, collidable)?;
-            inner.mirror.renew();
-            let name = inner.world.object(id).map_or("", |o| o.name()).into();
-            Ok(Place { shared: self.shared.clone(), id, name })
-        })?;
-        Ok(RigidBody { place })
-    }
-}
-
-/// What the words and numbers of a constructor make of settings.
-struct Choices<'a> {
-    stepper: Option<&'a str>,
-    integrator: Option<&'a str>,
-    solver: Option<&'a str>,
-    dt: Option<f64>,
-}
-
-impl Choices<'_> {
-    fn apply(&self, world: &mut WorldSettings) -> Result<()> {
-        world.dt_s = self.dt.unwrap_or(world.dt_s);
-        let told = |what: &str| { let what = what.to_string(); move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}")) };
-        world.stepper = self.stepper.map_or(Ok(world.stepper), |s| s.parse().map_err(told("stepper")))?;
-        world.integrator = self.integrator.map_or(Ok(world.integrator), |s| s.parse().map_err(told("integrator")))?;
-        world.solver = self.solver.map_or(Ok(world.solver), |s| s.parse().map_err(told("solver")))?;
-        Ok(())
-    }
 }
 
 #[pymethods]
@@ -122,7 +68,8 @@ impl World {
         contact_tolerance=1e-7, integrator_tolerance=1e-6))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
-        gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, substeps: u32, iterations: u32, contact_tolerance: f64,
+        py: Python<'_>, gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, #[pyo3(from_py_with = whole_number)] substeps: u32,
+        #[pyo3(from_py_with = whole_number)] iterations: u32, contact_tolerance: f64,
         integrator_tolerance: f64,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
@@ -131,7 +78,7 @@ impl World {
         Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }.apply(world)?;
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
-        World::build(scene)
+        World::of(py, build(scene)?)
     }
 
     /// The world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a shipped scene.
@@ -144,17 +91,18 @@ impl World {
         py: Python<'_>, path_or_name: &Bound<'_, PyAny>, dt: Option<f64>, stepper: Option<&str>, integrator: Option<&str>, solver: Option<&str>,
     ) -> Result<World> {
         let asked = path(path_or_name)?;
-        py.detach(|| {
+        let built = py.detach(|| {
             let mut scene = caught(|| Ok(resolve_scene(&asked.to_string_lossy(), &[])?.load()?))?;
             Choices { stepper, integrator, solver, dt }.apply(&mut scene.world)?;
-            World::build(scene)
-        })
+            build(scene)
+        })?;
+        World::of(py, built)
     }
 
     /// The world of a scene that is given as the text of its file.
     #[staticmethod]
     fn parse(py: Python<'_>, text: &str) -> Result<World> {
-        py.detach(|| World::build(caught(|| Ok(SceneFile::parse(text, "scene.toml")?))?))
+        World::of(py, py.detach(|| build(caught(|| Ok(SceneFile::parse(text, "scene.toml")?))?))?)
     }
 
     /// What is to be said of the files of a loaded scene, such as what was mended in a mesh: a list of sentences.
@@ -167,14 +115,14 @@ impl World {
     ///
     /// On a ``StepError`` the world is as it was before the step that failed; the steps before that stand.
     #[pyo3(signature = (n=1))]
-    fn step(&self, py: Python<'_>, n: i64) -> Result<()> {
+    fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] n: i64) -> Result<()> {
         let Ok(mut left) = u64::try_from(n) else { return Err(Error::value(format!("n is {n}; it must be at least 0"))) };
-        self.shared.work_in_parts(py, |inner| {
+        self.shared.work_in_parts(py, |inner, turn| {
             let begun = (left > 1).then(Instant::now);
             while left > 0 {
                 inner.step()?;
                 left -= 1;
-                if begun.is_some_and(|begun| begun.elapsed() > PATIENCE) {
+                if begun.is_some_and(|begun| begun.elapsed() > turn) {
                     break;
                 }
             }
@@ -237,8 +185,8 @@ impl World {
 
     /// All bodies, in the order in which they were added; by number or by name.
     #[getter]
-    fn bodies(&self) -> Bodies {
-        Bodies { shared: self.shared.clone() }
+    fn bodies(&self, py: Python<'_>) -> Result<Bodies> {
+        Bodies::new(py, self.shared.clone())
     }
 
     /// ``world[name]``: the body of that name.
@@ -274,24 +222,24 @@ impl World {
         self.shared.read(|inner| Ok(StepReport::of(&inner.world)))
     }
 
-    /// All that the next step reads, as bytes: for ``restore`` in a world of the same bodies.
+    /// All that the next step reads, as bytes: for ``restore`` in a world of the same bodies. Shapes, masses, settings and drives are not in it.
     fn save<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
-        let bytes = self.shared.read(|inner| Ok(inner.world.save()))?;
+        let bytes = self.shared.read(|inner| Ok(saved::write(inner)))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
     /// Goes back to what ``save`` gave. Bytes that are none, or of another world, are a ``SnapshotError`` and change nothing.
-    fn restore(&self, py: Python<'_>, snapshot: &[u8]) -> Result<()> {
-        self.shared.write(py, |inner| Ok(inner.world.restore(snapshot)?))
+    fn restore(&self, py: Python<'_>, snapshot: PyBackedBytes) -> Result<()> {
+        self.shared.write(py, |inner| saved::read(inner, &snapshot))
     }
 
     /// An independent copy: same state, same future.
     ///
     /// Forces and behaviours are copied by their own ``fork``.
-    fn fork(&self) -> Result<World> {
+    fn fork(&self, py: Python<'_>) -> Result<World> {
         let inner = self.shared.read(|inner| Ok(inner.fork()))?;
         inner.take_raised()?;
-        Ok(World { shared: Shared::new(inner), notes: self.notes.clone() })
+        World::of(py, (inner, self.notes.clone()))
     }
 
     /// The futures of many forks, each under forces of its own, on all cores with the interpreter let go. This world stays as it is.
@@ -302,21 +250,15 @@ impl World {
     /// (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which.
     #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
     fn rollout<'py>(
-        &self, py: Python<'py>, controls: &Bound<'py, PyAny>, articulations: Option<Vec<Bound<'py, PyAny>>>, states: Option<&Bound<'py, PyAny>>, every: usize,
-        threads: Option<usize>,
+        &self, py: Python<'py>, controls: &Bound<'py, PyAny>, articulations: Option<Vec<Bound<'py, PyAny>>>, states: Option<&Bound<'py, PyAny>>,
+        #[pyo3(from_py_with = whole_number)] every: usize, #[pyo3(from_py_with = whole_number)] threads: Option<usize>,
     ) -> Result<Bound<'py, PyArray3<f64>>> {
         if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
             return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
         }
-        let asked = articulations.map(|all| all.iter().map(|one| self.own_place(one)).collect::<Result<Vec<_>>>()).transpose()?;
+        let asked = articulations.map(|all| all.iter().map(|one| Ok(own_place(&self.shared, one)?.id)).collect::<Result<Vec<_>>>()).transpose()?;
         let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
-        let (plan, fork) = self.shared.read(|inner| {
-            let all = || bodies::body_ids(&inner.world).into_iter().filter(|id| inner.robots.contains_key(id)).collect();
-            let ids: Vec<ObjectId> = asked.map_or_else(all, |places| places.iter().map(|place| place.id).collect());
-            let freedoms = |id: ObjectId| inner.robots.get(&id).map(|robot| (id, robot.dof())).ok_or_else(|| Error::value("controls are of articulations"));
-            let driven = ids.into_iter().map(freedoms).collect::<Result<Vec<_>>>()?;
-            Ok((Plan::new(inner, driven, controls, states, every)?, inner.fork()))
-        })?;
+        let (plan, fork) = self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
         let (shape, out) = py.detach(|| {
             let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
             plan.run(fork, threads).map(|out| (shape, out))
@@ -324,15 +266,16 @@ impl World {
         Ok(PyArray1::from_vec(py, out).reshape(shape)?)
     }
 
-    /// The flat state, shape (n,): a read-only view that follows the world until bodies are added or removed, and then keeps what it showed last.
+    /// The flat state, shape (n,): a read-only view of the world's own memory, until bodies are added or removed; then it keeps what it showed last.
     ///
-    /// A rigid body has 13 numbers: position, quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Making
-    /// a view copies nothing. Setting it writes every body's numbers.
+    /// A rigid body has 13 numbers: position, quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Nothing
+    /// is copied, neither here nor by steps. While a view is held, a step holds the interpreter but for other threads' turns between two frames.
+    /// Setting it writes every body's numbers.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.shared.write(py, |inner| {
-            let Inner { world, mirror, .. } = inner;
-            Ok(mirror.view(py, world.state())?)
+            let Inner { world, shown, .. } = inner;
+            Ok(shown.view(py, world)?)
         })
     }
 
@@ -354,17 +297,11 @@ impl World {
         orientation: Option<&Bound<'_, PyAny>>, velocity: Option<&Bound<'_, PyAny>>, angular_velocity: Option<&Bound<'_, PyAny>>, restitution: f64,
         friction: f64, linear_damping: f64, angular_damping: f64, kinematic: bool, collidable: bool,
     ) -> Result<RigidBody> {
-        let solid = shape.solid.clone();
-        let body = match (mass, density) {
-            (Some(mass), None) => Rigid::with_mass(name, solid, mass)?,
-            (None, Some(density)) => Rigid::with_density(name, solid, density)?,
-            (None, None) if kinematic => Rigid::fixture(name, solid),
-            _ => return Err(Error::value(format!("body '{name}': wanted a mass or a density, and one of the two alone"))),
-        };
-        let (v, w) = (vec3_or(velocity, "velocity", Vec3::zeros())?, vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?);
-        let mut body = body.at(pose(position, orientation)? * shape.placement).moving(v, w).surface(restitution, friction);
+        let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
+        let motion = [vec3_or(velocity, "velocity", Vec3::zeros())?, vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?];
+        let mut body = rigid(name, &shape, mass, density, kinematic)?.at(pose(position, orientation)? * shape.placement).surface(restitution, friction);
         (body.linear_damping, body.angular_damping) = (linear_damping, angular_damping);
-        self.add(py, body, if kinematic { Mode::Kinematic } else { Mode::Dynamic }, [true, collidable])
+        add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
     }
 
     /// Adds geometry that never moves. position, orientation, restitution, friction: as in ``add_rigid``.
@@ -376,7 +313,7 @@ impl World {
     ) -> Result<RigidBody> {
         let pose = pose(position, orientation)? * shape.placement;
         let body = Rigid::fixture(name, shape.solid.clone()).at(pose).surface(restitution, friction);
-        self.add(py, body, Mode::Static, [true, collidable])
+        add(&self.shared, py, body, Mode::Static, collidable)
     }
 
     /// Adds an articulated body, and gives the handle of it.
@@ -388,29 +325,17 @@ impl World {
     fn add_articulation(
         &self, py: Python<'_>, articulation: &Bound<'_, PyAny>, base: Option<&Bound<'_, PyAny>>, name: Option<&str>,
     ) -> Result<Articulation> {
-        let description = described(articulation)?;
-        let description = description.get();
-        let (body, robot) = description.body(py, base.map_or(Ok(tumble::collide::Pose::identity()), base_pose)?, name)?;
-        let (robot, efforts) = (Arc::new(robot), description.efforts());
-        let place = self.shared.write(py, |inner| {
-            let id = inner.world.add(body)?;
-            inner.robots.insert(id, robot.clone());
-            efforts.map(|tau| inner.efforts.insert(id, tau));
-            inner.mirror.renew();
-            let name = inner.world.object(id).map_or("", |o| o.name()).into();
-            Ok(Place { shared: self.shared.clone(), id, name })
-        })?;
-        Ok(Articulation::placed(place, robot))
+        articulated(&self.shared, py, articulation, base, name)
     }
 
     /// Removes a body, given as a handle or by name, or a force or behaviour by name. Handles of a body raise ``RemovedError`` from then on.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         if let Ok(name) = body.extract::<String>()
-            && self.shared.write(py, |inner| inner.remove_extension(&name))?
+            && self.shared.extend(py, |inner| inner.remove_extension(&name))?
         {
             return Ok(());
         }
-        let place = self.own_place(body)?;
+        let place = own_place(&self.shared, body)?;
         place.write(py, |inner| {
             inner.world.remove(place.id)?;
             inner.forget(place.id);
@@ -421,7 +346,7 @@ impl World {
     /// Adds a force of your own: an object of a subclass of ``tumble.Force``. Its name is unique among bodies, forces and behaviours.
     fn add_force(&self, py: Python<'_>, name: &str, force: &Bound<'_, PyAny>) -> Result<()> {
         py.import("tumble._extension")?.call_method1("check_force", (force,))?;
-        self.shared.write(py, |inner| inner.add_force(name, force))
+        self.shared.extend(py, |inner| inner.add_force(name, force))
     }
 
     /// Adds a behaviour of your own, an object of a subclass of ``tumble.Behaviour``, to bodies given by name or as handles.
@@ -431,8 +356,8 @@ impl World {
             true => vec![bodies.clone()],
             false => bodies.try_iter()?.collect::<PyResult<_>>()?,
         };
-        let places = given.iter().map(|body| self.own_place(body)).collect::<Result<Vec<_>>>()?;
-        self.shared.write(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
+        let places = given.iter().map(|body| own_place(&self.shared, body)).collect::<Result<Vec<_>>>()?;
+        self.shared.extend(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
     }
 
     /// Forces of your own by name: a new dict.
@@ -456,7 +381,8 @@ impl World {
     #[pyo3(signature = (width=None, height=None, *, camera=None, facet=None, cave=None, overlays=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn render<'py>(
-        &self, py: Python<'py>, width: Option<u32>, height: Option<u32>, camera: Option<&Bound<'py, PyAny>>, facet: Option<&str>, cave: Option<&str>,
+        &self, py: Python<'py>, #[pyo3(from_py_with = whole_number)] width: Option<u32>, #[pyo3(from_py_with = whole_number)] height: Option<u32>,
+        camera: Option<&Bound<'py, PyAny>>, facet: Option<&str>, cave: Option<&str>,
         overlays: Option<&str>,
     ) -> Result<Bound<'py, PyArray3<u8>>> {
         Shot::new([width, height], camera, facet, cave, overlays)?.take(py, &self.shared)
@@ -485,65 +411,14 @@ impl World {
         Ok(slf.py().import("tumble._plots")?.call_method1("paths", (slf, seconds, bodies, along, ax))?.unbind())
     }
 
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
+    }
+
     fn __repr__(&self) -> Result<String> {
         self.shared.read(|inner| {
             let (stepper, solver) = inner.world.methods();
             Ok(format!("<tumble.World {} bodies, t = {} s, {stepper}, {solver}>", bodies::body_ids(&inner.world).len(), inner.world.time()))
         })
-    }
-}
-
-/// A pose from 3 numbers or 7.
-fn base_pose(base: &Bound<'_, PyAny>) -> Result<tumble::collide::Pose> {
-    let Numbers { shape, data } = numbers(base, "base")?;
-    match shape.as_slice() {
-        [3] => Ok(Vec3::from_column_slice(&data).into()),
-        [7] if (data[3..].iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() <= 1e-6 => {
-            Ok(tumble::collide::Pose::from_parts(Vec3::from_column_slice(&data[..3]).into(), crate::convert::unit(&data[3..])))
-        }
-        [7] => Err(Error::value("base: the quaternion (x, y, z, w) in its last four numbers must have length 1")),
-        _ => Err(Error::value(format!("base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}", shown(&shape)))),
-    }
-}
-
-/// Where a handle of any kind points.
-pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
-    if let Some(place) = body.cast::<Articulation>().ok().and_then(|body| body.get().place().cloned()) {
-        return Ok(place);
-    }
-    match body.cast::<RigidBody>() {
-        Ok(body) => Ok(body.get().place.clone()),
-        Err(_) => Err(pyo3::exceptions::PyTypeError::new_err("wanted a body: a handle or a name").into()),
-    }
-}
-
-impl Inner {
-    /// What is kept about an object that is gone.
-    fn forget(&mut self, id: ObjectId) {
-        self.robots.remove(&id);
-        self.efforts.remove(&id);
-        self.mirror.renew();
-    }
-
-    /// Writes the whole state; all or nothing.
-    pub fn write_state(&mut self, shape: &[usize], x: &[f64]) -> Result<()> {
-        let wanted = self.world.state().len();
-        if shape != [wanted] {
-            return Err(Error::value(format!("state: wanted shape ({wanted},), and got {}", shown(shape))));
-        }
-        let before = self.world.state().to_vec();
-        let mut write = |from: &[f64]| -> Result<()> {
-            let ids = self.world.ids().to_vec();
-            for id in ids {
-                let Some(span) = self.world.view().span(id).map(|span| span.x.clone()).filter(|x| !x.is_empty()) else { continue };
-                self.world.write_state_of(id, &from[span])?;
-            }
-            Ok(())
-        };
-        let outcome = write(x);
-        if outcome.is_err() {
-            write(&before)?;
-        }
-        outcome
     }
 }

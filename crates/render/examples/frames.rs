@@ -1,8 +1,9 @@
-//! Frames per second on this machine, as the table of docs/caves.md: `cargo run --release -p tumble-render --example frames`.
+//! Frames per second on this machine, as the table of docs/pictures.md: `cargo run --release -p tumble-render --example frames`.
 //!
 //! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn.
-//! The picture stays on the device, as it does in a window, and the next list is made while the device draws. Options: `--seconds S` per row (default 2), `--only WORDS` (rows that contain the words),
-//! `--quality WORDS` (instead of the two shown), `--readback` (with the way back to memory), `--stages` (where the
+//! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes about four minutes on
+//! two idle cores: a row ends after `--seconds S` (default 2), slow ones after a frame to warm up and one that counts. Other options: `--only WORDS` (rows that contain the words),
+//! `--quality WORDS` (instead of the five shown), `--readback` (with the way back to memory), `--stages` (where the
 //! time of each row goes), `--pictures FOLDER` (the last picture of each row).
 
 use nalgebra::{Point3, Vector3};
@@ -17,7 +18,7 @@ type Failure = Box<dyn std::error::Error>;
 struct Options {
     seconds: f64,
     only: String,
-    quality: Option<Quality>,
+    quality: Option<String>,
     readback: bool,
     stages: bool,
     pictures: Option<std::path::PathBuf>,
@@ -37,15 +38,22 @@ fn main() -> Result<(), Failure> {
     let adapter = renderer.adapter().to_owned();
     println!("adapter: {adapter}; {} threads", std::thread::available_parallelism().map_or(1, |n| n.get()));
     println!("\n| world | facets | quality | frames per second | ms per frame | processor ms per frame |\n|---|---|---|---|---|---|");
-    let qualities: Vec<Quality> = match &options.quality {
-        Some(quality) => vec![*quality],
-        None => ["fastest", "fastest,samples=4", "fast", "fast,samples=4", "usual"].iter().map(|words| words.parse()).collect::<Result<_, _>>()?,
+    let words: Vec<String> = match &options.quality {
+        Some(words) => vec![words.clone()],
+        None => ["fastest", "fastest,samples=4", "fast", "fast,samples=4", "usual"].map(String::from).to_vec(),
     };
+    let qualities: Vec<Quality> = words.iter().map(|words| words.parse()).collect::<Result<_, _>>()?;
+    let mut summary = Vec::new();
     let mut subjects = [billiards()?, bodies("1,000 bodies", [25, 20, 2])?, bodies("10,000 bodies", [50, 50, 4])?];
     for subject in &mut subjects {
         for facets in [1, 4, 6] {
+            let mut cells = Vec::new();
             for quality in &qualities {
-                row(&options, &mut renderer, subject, facets, [1024, 768], Stereo::Mono, quality)?;
+                cells.push(row(&options, &mut renderer, subject, facets, [1024, 768], Stereo::Mono, quality)?);
+            }
+            if cells.iter().any(Option::is_some) {
+                let shown: Vec<String> = cells.iter().map(|fps| fps.map_or(String::new(), |fps| format!("{fps:.1}"))).collect();
+                summary.push(format!("| {} | {facets} | {} |", subject.name, shown.join(" | ")));
             }
         }
     }
@@ -54,6 +62,8 @@ fn main() -> Result<(), Failure> {
             row(&options, &mut renderer, &mut subjects[2], 6, [1920, 1080], Stereo::SideBySide, quality)?;
         }
     }
+    println!("\nFrames per second:\n\n| world | facets | `{}` |\n|---|---|{}", words.join("` | `"), "---|".repeat(words.len()));
+    summary.iter().for_each(|row| println!("{row}"));
     Ok(())
 }
 
@@ -65,7 +75,7 @@ fn options() -> Result<Options, Failure> {
         match word.as_str() {
             "--seconds" => options.seconds = value()?.parse()?,
             "--only" => options.only = value()?,
-            "--quality" => options.quality = Some(value()?.parse()?),
+            "--quality" => options.quality = Some(value()?),
             "--readback" => options.readback = true,
             "--pictures" => options.pictures = Some(value()?.into()),
             "--stages" => options.stages = true,
@@ -99,11 +109,12 @@ fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failu
     Ok(Subject { name, world: scene.build()?.0, scene, camera: Some(camera) })
 }
 
-fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets: usize, size: [u32; 2], stereo: Stereo, quality: &Quality) -> Result<(), Failure> {
+/// One cell: frames per second, or none where it was not asked for.
+fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets: usize, size: [u32; 2], stereo: Stereo, quality: &Quality) -> Result<Option<f64>, Failure> {
     let shown = if stereo == Stereo::Mono { format!("{facets}") } else { format!("{facets} of {} x {} in stereo", size[0], size[1]) };
     let label = format!("{} | {shown} | {quality}", subject.name);
     if !label.contains(&options.only) {
-        return Ok(());
+        return Ok(None);
     }
     let mut drawing = Drawing::new(&subject.scene);
     let cave = (facets > 1).then(|| cave(&subject.scene, facets, size, stereo)).transpose()?;
@@ -119,15 +130,22 @@ fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets
         stages[1] += listed.elapsed();
         Ok(())
     };
+    let first = Instant::now();
     frame(renderer)?;
-    frame(renderer)?;
+    renderer.wait()?;
+    // pipelines were made in it: where frames are quick, another warms up
+    let mut warm = 1;
+    if first.elapsed().as_secs_f64() < options.seconds {
+        frame(renderer)?;
+        warm += 1;
+    }
     if let Some(folder) = &options.pictures {
         let name = label.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
         renderer.read()?.write_png(folder.join(format!("{name}.png")))?;
     }
     let (begin, spent) = (Instant::now(), processor_s());
     let mut frames = 0;
-    while frames < 3 || begin.elapsed().as_secs_f64() < options.seconds {
+    while frames < 1 || begin.elapsed().as_secs_f64() < options.seconds {
         frame(renderer)?;
         frames += 1;
     }
@@ -136,10 +154,10 @@ fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets
     let processor = 1e3 * (processor_s() - spent) / f64::from(frames);
     println!("| {label} | {:.1} | {:.1} | {processor:.0} |", 1.0 / each, 1e3 * each);
     if options.stages {
-        let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + 2);
+        let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + warm);
         println!("  list {:.2} ms, picture {:.2} ms", ms(stages[0]), ms(stages[1]));
     }
-    Ok(())
+    Ok(Some(1.0 / each))
 }
 
 fn draw(renderer: &mut Renderer, list: &DrawList, cave: Option<&CaveView>, [w, h]: [u32; 2], readback: bool) -> Result<(), RenderError> {

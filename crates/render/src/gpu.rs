@@ -29,6 +29,8 @@ pub use window::{Screen, Shown};
 
 /// Targets of several sizes are kept while they have no more pixels than this together.
 const KEPT_PIXELS: u64 = 8 << 20;
+/// Longest wait for the last work of a device that complained.
+const LAST_WORK: std::time::Duration = std::time::Duration::from_secs(2);
 
 /// A graphics device that draws into memory. Making one takes a moment; keep it for all pictures of a run.
 pub struct Renderer {
@@ -52,7 +54,8 @@ pub(crate) struct Gpu {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     adapter: String,
-    sample_masks: bool,
+    /// Where shaders cannot write which samples of a pixel they cover, among other things.
+    opengl: bool,
     complaint: Arc<Mutex<Option<String>>>,
     lost: Arc<Mutex<Option<String>>>,
 }
@@ -69,7 +72,7 @@ impl Renderer {
     /// On an adapter that was chosen.
     fn on(adapter: wgpu::Adapter) -> Result<Self, RenderError> {
         let gpu = pollster::block_on(Gpu::open(adapter))?;
-        let pipelines = Pipelines::new(&gpu.device, gpu.sample_masks);
+        let pipelines = Pipelines::new(&gpu.device, !gpu.opengl);
         let finisher = Finisher::new(&gpu);
         let textures = TextureCache::new(&gpu, &pipelines.texture_layout);
         gpu.complaint()?;
@@ -204,7 +207,7 @@ impl Renderer {
         let (size, count) = (stage.shadow_map_size, stage.shadow_views.len());
         let maps = match self.shadows.take().filter(|maps| maps.fits(size, count)) {
             Some(maps) => self.shadows.insert(maps),
-            None => self.shadows.insert(ShadowMaps::new(&self.gpu.device, size, count)),
+            None => self.shadows.insert(ShadowMaps::new(&self.gpu, size, count)),
         };
         if maps.drawn != stage.serial {
             stage.draw_shadows(&mut encoder, &self.pipelines, maps);
@@ -262,7 +265,7 @@ impl Gpu {
         let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
         let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
         limits.max_buffer_size = adapter.limits().max_buffer_size;
-        let sample_masks = info.backend != wgpu::Backend::Gl;
+        let opengl = info.backend == wgpu::Backend::Gl;
         let asked = adapter
             .request_device(&wgpu::DeviceDescriptor { label: Some("tumble"), required_limits: limits, ..Default::default() })
             .await
@@ -270,7 +273,7 @@ impl Gpu {
         let complaint = Arc::new(Mutex::new(None));
         let note = complaint.clone();
         asked.0.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
+            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| one_line(&error.to_string()));
         }));
         let lost = Arc::new(Mutex::new(None));
         let note = lost.clone();
@@ -278,25 +281,30 @@ impl Gpu {
             let why = if message.is_empty() { String::new() } else { format!(" ({message})") };
             note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("the device was lost{why}; a new renderer can be made"));
         });
-        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, sample_masks, complaint, lost })
+        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, opengl, complaint, lost })
     }
 
     /// What went wrong on the device since the last call.
     fn complaint(&self) -> Result<(), RenderError> {
         // a loss is told at the next poll
         let _ = self.device.poll(wgpu::PollType::Poll);
-        if let Some(reason) = self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone() {
-            return Err(self.failed(reason));
+        let complaint = self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if complaint.is_some() {
+            // what is lost complains at once, and tells its loss when its last work is done
+            let _ = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORK) });
         }
-        match self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            Some(reason) => Err(self.failed(reason)),
-            None => Ok(()),
-        }
+        let lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        lost.or(complaint).map_or(Ok(()), |reason| Err(self.failed(reason)))
     }
 
     pub(crate) fn failed(&self, reason: String) -> RenderError {
         RenderError::Device { adapter: self.adapter.clone(), reason }
     }
+}
+
+/// A message of many lines as one.
+fn one_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// A Vulkan adapter, else one of OpenGL. Asked one after the other, so that OpenGL's libraries are loaded only where needed.

@@ -18,8 +18,8 @@
 //! Conventions: world z up, right-handed, metres, radians; colours in the list are sRGB from 0 to 1; `f32` throughout.
 //! The same list on the same adapter gives the same bytes.
 //!
-//! Passes: one depth map per shadow-throwing light; depth of the camera's view and ambient occlusion from it; then everything in
-//! one pass with four samples per pixel: backdrop, floor, meshes, spheres, lines, translucent shells, lines on top.
+//! Passes: depth maps of lights that throw shadows; depth of the camera's view and ambient occlusion from it; then everything in one pass, usually with
+//! four samples per pixel: spheres, capsules, meshes, floor, backdrop, lines, translucent shells, lines on top.
 
 mod camera;
 mod caption;
@@ -42,7 +42,7 @@ pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Wa
 pub use gpu::{Renderer, Screen, Shown, Stage};
 pub use image::Image;
 pub use list::{
-    DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere,
+    Capsule, DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere,
     SphereStyle, UnknownQuality,
 };
 pub use material::{Material, Pattern, Shader, Texture};

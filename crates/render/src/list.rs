@@ -48,6 +48,21 @@ pub struct Sphere {
     pub casts_shadow: bool,
 }
 
+/// A capsule, drawn by ray casting like a sphere: what lies within a radius of a segment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Capsule {
+    /// Pose of its frame in the world: the middle of the segment, which lies along z.
+    pub pose: Isometry3<f32>,
+    /// Half the length of the segment in metres, 0 or more.
+    pub half_length: f32,
+    /// Radius in metres, above 0.
+    pub radius: f32,
+    /// Its surface.
+    pub material: Material,
+    /// Whether it throws a shadow.
+    pub casts_shadow: bool,
+}
+
 /// A source of light. Colours are sRGB; intensity 1 with white is a well-lit surface at perpendicular light.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
@@ -64,7 +79,8 @@ pub enum Light {
         /// Whether it throws shadows.
         casts_shadow: bool,
     },
-    /// A lamp. It throws shadows where it hangs outside the box around everything that throws them (one map), else none.
+    /// A lamp. Outside the box around everything that throws shadows one map holds them; amid it six do, and only where shadows are soft. What is nearer
+    /// to its middle than its own radius throws none.
     Point {
         /// Where, in the world.
         position: Point3<f32>,
@@ -168,11 +184,13 @@ pub struct Settings {
     pub shadows: Shadows,
     /// Samples per pixel: 1, or 4 for smooth edges.
     pub samples: u32,
+    /// Whether surfaces mirror the sky, lacquer and lamps as they should; without, light is a cheap likeness of that.
+    pub reflections: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { exposure: 1.0, shadow_map_size: 2048, occlusion_m: None, tone_map: true, shadows: Shadows::Soft, samples: 4 }
+        Settings { exposure: 1.0, shadow_map_size: 2048, occlusion_m: None, tone_map: true, shadows: Shadows::Soft, samples: 4, reflections: true }
     }
 }
 
@@ -197,6 +215,8 @@ pub struct DrawList {
     pub instances: Vec<Instance>,
     /// Spheres.
     pub spheres: Vec<Sphere>,
+    /// Capsules.
+    pub capsules: Vec<Capsule>,
     /// Debug: lines and arrows.
     pub lines: Vec<DebugLine>,
     /// Debug: points.
@@ -234,5 +254,12 @@ impl DrawList {
         self.spheres.push(Sphere { center, radius, orientation, material, casts_shadow: true });
         let last = self.spheres.len() - 1;
         &mut self.spheres[last]
+    }
+
+    /// Adds a capsule that throws a shadow.
+    pub fn add_capsule(&mut self, pose: Isometry3<f32>, half_length: f32, radius: f32, material: Material) -> &mut Capsule {
+        self.capsules.push(Capsule { pose, half_length, radius, material, casts_shadow: true });
+        let last = self.capsules.len() - 1;
+        &mut self.capsules[last]
     }
 }

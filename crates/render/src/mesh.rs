@@ -16,6 +16,9 @@ pub struct MeshData {
     pub normals: Vec<[f32; 3]>,
     /// Three vertex numbers per triangle.
     pub indices: Vec<u32>,
+    /// Per vertex the place in the texture (0 to 1 from its left and lower edge, repeated beyond) and how much of it a metre covers; empty where textures are
+    /// laid on by position.
+    pub unwrapped: Vec<[f32; 3]>,
 }
 
 impl MeshData {
@@ -31,33 +34,57 @@ impl MeshData {
         check_counts(positions.len(), triangles.len() * 3)?;
         check_finite(positions, "position")?;
         check_indices(triangles.iter().flatten().copied(), positions.len())?;
+        Ok(Self::smoothed(positions, triangles, &[], crease_rad))
+    }
+
+    /// The same with places in a texture: for every triangle those of its three corners. Vertices are split where these differ.
+    ///
+    /// # Errors
+    /// As [`MeshData::from_triangles`]; also for another number of triangles, or places that are not finite.
+    pub fn from_unwrapped(positions: &[[f32; 3]], triangles: &[[u32; 3]], places: &[[[f32; 2]; 3]], crease_rad: f32) -> Result<Self, RenderError> {
+        check_counts(positions.len(), triangles.len() * 3)?;
+        check_finite(positions, "position")?;
+        check_indices(triangles.iter().flatten().copied(), positions.len())?;
+        if places.len() != triangles.len() || places.iter().flatten().flatten().any(|x| !x.is_finite()) {
+            return Err(RenderError::BadMesh(format!("texture coordinates of {} triangles, expected finite ones of {}", places.len(), triangles.len())));
+        }
+        Ok(Self::smoothed(positions, triangles, places, crease_rad))
+    }
+
+    /// Vertices split at creases, and where places in the texture differ.
+    fn smoothed(positions: &[[f32; 3]], triangles: &[[u32; 3]], places: &[[[f32; 2]; 3]], crease_rad: f32) -> Self {
         let point = |i: u32| Vector3::from(positions[i as usize]);
-        let faces: Vec<Face> = triangles.iter().filter_map(|&t| Face::new(t, t.map(point))).collect();
+        let faces: Vec<Face> = triangles.iter().enumerate().filter_map(|(i, &t)| Face::new(t, t.map(point), places.get(i))).collect();
         let around = corners_around(&faces, positions.len());
         let mut mesh = MeshData::default();
         let cos_crease = crease_rad.clamp(0.0, PI).cos() - 1e-6;
-        let mut made: Vec<Vec<([f32; 3], u32)>> = vec![Vec::new(); positions.len()]; // vertices already split off each point
+        let mut made: Vec<Vec<u32>> = vec![Vec::new(); positions.len()]; // vertices already split off each point
         for face in &faces {
-            for &v in &face.vertices {
+            for (k, &v) in face.vertices.iter().enumerate() {
                 let sum: Vector3<f32> = around[v as usize]
                     .iter()
                     .filter(|&&(f, _)| faces[f as usize].normal.dot(&face.normal) >= cos_crease)
                     .map(|&(f, angle)| faces[f as usize].normal * angle)
                     .sum();
                 let normal: [f32; 3] = sum.try_normalize(1e-12).unwrap_or(face.normal).into();
-                let known = made[v as usize].iter().find(|(n, _)| (Vector3::from(*n) - Vector3::from(normal)).norm() < 1e-4);
-                let index = match known {
-                    Some(&(_, index)) => index,
+                let place = face.places.map(|places| [places[k][0], places[k][1], face.per_metre]);
+                let same = |&i: &u32| {
+                    let i = i as usize;
+                    (Vector3::from(mesh.normals[i]) - Vector3::from(normal)).norm() < 1e-4 && place.is_none_or(|p| mesh.unwrapped[i][..2] == p[..2])
+                };
+                let index = match made[v as usize].iter().copied().find(same) {
+                    Some(index) => index,
                     None => {
                         let index = mesh.push(positions[v as usize], normal);
-                        made[v as usize].push((normal, index));
+                        mesh.unwrapped.extend(place);
+                        made[v as usize].push(index);
                         index
                     }
                 };
                 mesh.indices.push(index);
             }
         }
-        Ok(mesh)
+        mesh
     }
 
     /// A box with the given half extents, flat faces.
@@ -168,7 +195,7 @@ impl MeshData {
     /// A square of the plane `z = 0`, normal up, from `-half_extent` to `half_extent`.
     pub fn ground_quad(half_extent: f32) -> Self {
         let h = half_extent;
-        MeshData { positions: vec![[-h, -h, 0.0], [h, -h, 0.0], [h, h, 0.0], [-h, h, 0.0]], normals: vec![[0.0, 0.0, 1.0]; 4], indices: vec![0, 1, 2, 0, 2, 3] }
+        MeshData { positions: vec![[-h, -h, 0.0], [h, -h, 0.0], [h, h, 0.0], [-h, h, 0.0]], normals: vec![[0.0, 0.0, 1.0]; 4], indices: vec![0, 1, 2, 0, 2, 3], unwrapped: Vec::new() }
     }
 
     /// The corners `(min, max)` of the smallest box around the mesh; `None` when it is empty.
@@ -189,6 +216,10 @@ impl MeshData {
         if self.normals.len() != self.positions.len() {
             return Err(RenderError::BadMesh(format!("{} normals for {} positions, expected as many", self.normals.len(), self.positions.len())));
         }
+        if !self.unwrapped.is_empty() && self.unwrapped.len() != self.positions.len() {
+            return Err(RenderError::BadMesh(format!("{} texture coordinates for {} positions, expected as many", self.unwrapped.len(), self.positions.len())));
+        }
+        check_finite(&self.unwrapped, "texture coordinate")?;
         if !self.indices.len().is_multiple_of(3) {
             return Err(RenderError::BadMesh(format!("{} indices, expected a multiple of 3", self.indices.len())));
         }
@@ -244,13 +275,19 @@ struct Face {
     vertices: [u32; 3],
     normal: Vector3<f32>,
     angles: [f32; 3],
+    places: Option<[[f32; 2]; 3]>,
+    /// Shares of the texture per metre: the root of the ratio of the areas.
+    per_metre: f32,
 }
 
 impl Face {
-    fn new(vertices: [u32; 3], [a, b, c]: [Vector3<f32>; 3]) -> Option<Face> {
-        let normal = (b - a).cross(&(c - a)).try_normalize(0.0).filter(|n| n.iter().all(|x| x.is_finite()))?;
+    fn new(vertices: [u32; 3], [a, b, c]: [Vector3<f32>; 3], places: Option<&[[f32; 2]; 3]>) -> Option<Face> {
+        let area = (b - a).cross(&(c - a));
+        let flat = places.map_or(0.0, |[p, q, r]| ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])).abs());
+        let per_metre = (flat / area.norm()).sqrt().min(1e6);
+        let normal = area.try_normalize(0.0).filter(|n| n.iter().all(|x| x.is_finite()))?;
         let angles = [(b - a).angle(&(c - a)), (a - b).angle(&(c - b)), (a - c).angle(&(b - c))];
-        Some(Face { vertices, normal, angles })
+        Some(Face { vertices, normal, angles, places: places.copied(), per_metre })
     }
 }
 

@@ -84,7 +84,7 @@ pub fn run_window<A: WindowApp>(options: &WindowOptions, app: &mut A) -> Result<
     if !sides.contains(&width) || !sides.contains(&height) || u64::from(width) * u64::from(height) > max_pixels {
         return Err(RenderError::BadSize { width, height, max_side, max_pixels }.into());
     }
-    let event_loop = EventLoop::new().map_err(|e| refused(without_place(&e.to_string())))?;
+    let event_loop = EventLoop::new().map_err(|e| refused(tried(without_place(&e.to_string()))))?;
     let mut host = Host { options, app, screen: None, next: Next::At(Instant::now()), outcome: Ok(()) };
     let ended = event_loop.run_app(&mut host);
     host.outcome?;
@@ -95,6 +95,13 @@ pub fn run_window<A: WindowApp>(options: &WindowOptions, app: &mut A) -> Result<
 fn without_place(reason: &str) -> String {
     let said = reason.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(reason, |(_, said)| said);
     said.trim_end_matches('.').to_string()
+}
+
+/// With what was tried, where something was.
+fn tried(reason: String) -> String {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(|value| format!("{name}={}", value.to_string_lossy()));
+    let tried: Vec<String> = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"].into_iter().filter_map(set).collect();
+    if tried.is_empty() { reason } else { format!("{}: {reason}", tried.join(", ")) }
 }
 
 struct Host<'a, A: WindowApp> {

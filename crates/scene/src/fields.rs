@@ -19,6 +19,9 @@ pub(crate) type Names<T> = &'static [(&'static str, T)];
 /// A value with its place in the text.
 pub(crate) type Value<'a> = Spanned<DeValue<'a>>;
 
+/// What is nearer to zero is zero: the inverse of less is no number any more.
+const LEAST: f64 = 1e-300;
+
 /// One table while it is read.
 pub(crate) struct Fields<'a> {
     /// Where problems go.
@@ -344,12 +347,13 @@ impl<'a> Fields<'a> {
 
 /// The number a value is, whole or not; not finite where the text says so or overflows.
 pub(crate) fn number_of(value: &Value<'_>) -> Option<f64> {
-    match value.get_ref() {
+    let number: Option<f64> = match value.get_ref() {
         DeValue::Float(float) => float.as_str().parse().ok(),
         DeValue::Integer(digits) if digits.radix() == 10 => digits.as_str().parse().ok(),
         DeValue::Integer(digits) => i64::from_str_radix(digits.as_str(), digits.radix()).ok().map(|n| n as f64),
         _ => None,
-    }
+    };
+    number.map(|x| if x.abs() < LEAST { 0.0 } else { x })
 }
 
 /// The Euclidean length of a vector.

@@ -1,11 +1,12 @@
 //! What can be typed.
 
 use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
+use crate::failure::Failure;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use tumble::collide::Builder;
-use tumble::render::{CalibrationPattern, DebugDraw, Quality};
-use tumble::scene::{Integrator, Solver, Stepper};
+use tumble::render::{CalibrationPattern, DebugDraw, MAX_PIXELS, MAX_SIDE, Quality};
+use tumble::scene::{Integrator, SceneFile, Solver, Stepper, resolve_scene};
 
 /// Real-time dynamics for interactive and immersive environments.
 #[derive(Parser)]
@@ -42,14 +43,13 @@ pub enum Command {
     Caves(CavesOptions),
 }
 
+/// A scene, and how it is stepped.
 #[derive(Args)]
-pub struct RunOptions {
+pub struct SceneOptions {
     /// A scene file, a folder that holds a scene.toml, or the name of a shipped scene.
-    pub scene: String,
-    /// Simulated time to run for, s (default: what the scene says).
-    #[arg(long, value_name = "S", value_parser = seconds)]
-    pub seconds: Option<f64>,
-    /// Length of a frame, s (default: what the scene says).
+    #[arg(value_name = "SCENE")]
+    pub name: String,
+    /// Length of a step, s (default: what the scene says).
     #[arg(long, value_name = "S", value_parser = frame)]
     pub dt: Option<f64>,
     /// time_stepping or backtracking.
@@ -61,6 +61,28 @@ pub struct RunOptions {
     /// verlet, symplectic_euler, explicit_euler, rk4 or dormand_prince; time_stepping is the midpoint rule whatever is chosen.
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<Integrator>,
+}
+
+impl SceneOptions {
+    /// The scene, with what the command line says instead.
+    pub fn load(&self) -> Result<SceneFile, Failure> {
+        let mut scene = resolve_scene(&self.name, &[])?.load()?;
+        let w = &mut scene.world;
+        w.dt_s = self.dt.unwrap_or(w.dt_s);
+        w.stepper = self.stepper.unwrap_or(w.stepper);
+        w.solver = self.solver.unwrap_or(w.solver);
+        w.integrator = self.integrator.unwrap_or(w.integrator);
+        Ok(scene)
+    }
+}
+
+#[derive(Args)]
+pub struct RunOptions {
+    #[command(flatten)]
+    pub scene: SceneOptions,
+    /// Simulated time to run for, s (default: what the scene says).
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
     /// Write a recording (MCAP; opens in Foxglove).
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
@@ -111,20 +133,8 @@ pub struct RunOptions {
 #[derive(Args)]
 #[command(after_help = "In the window, H shows what keys and mouse do.")]
 pub struct ViewOptions {
-    /// A scene file, a folder that holds a scene.toml, or the name of a shipped scene.
-    pub scene: String,
-    /// Length of a step, s (default: what the scene says).
-    #[arg(long, value_name = "S", value_parser = frame)]
-    pub dt: Option<f64>,
-    /// time_stepping or backtracking.
-    #[arg(long, value_name = "NAME")]
-    pub stepper: Option<Stepper>,
-    /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
-    #[arg(long, value_name = "NAME", value_parser = solver)]
-    pub solver: Option<Solver>,
-    /// verlet, symplectic_euler, explicit_euler, rk4 or dormand_prince; time_stepping is the midpoint rule whatever is chosen.
-    #[arg(long, value_name = "NAME")]
-    pub integrator: Option<Integrator>,
+    #[command(flatten)]
+    pub scene: SceneOptions,
     /// Size of the window, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
@@ -171,6 +181,9 @@ pub struct ViewOptions {
     /// Write what is shown as JSON, a line whenever the user changes something and four a second; - for stdout.
     #[arg(long, value_name = "FILE|-")]
     pub status: Option<PathBuf>,
+    /// Lose the graphics device after so many pictures, as a driver that crashes does: to see what comes then.
+    #[arg(long, value_name = "N", hide = true)]
+    pub lose_device: Option<u64>,
 }
 
 #[derive(Args)]
@@ -310,6 +323,7 @@ fn planner(text: &str) -> Result<PathBuf, String> {
 
 fn size(text: &str) -> Result<(u32, u32), String> {
     let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    let fits = |side: u32| (1..=tumble::render::MAX_SIDE).contains(&side);
-    parsed.filter(|(w, h)| fits(*w) && fits(*h)).ok_or_else(|| format!("wanted WIDTHxHEIGHT in pixels, each 1 to {}", tumble::render::MAX_SIDE))
+    let side = 1..=MAX_SIDE;
+    let fits = |(w, h): &(u32, u32)| side.contains(w) && side.contains(h) && u64::from(*w) * u64::from(*h) <= MAX_PIXELS;
+    parsed.filter(fits).ok_or_else(|| format!("wanted WIDTHxHEIGHT in pixels, each 1 to {MAX_SIDE}, together at most {MAX_PIXELS}"))
 }

@@ -18,6 +18,7 @@ mod view;
 use args::{Command, Tumble};
 use clap::Parser;
 use failure::Failure;
+use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -39,7 +40,8 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprint!("{}", failure.report());
+            // where stderr is closed or full the exit code says it
+            let _ = std::io::stderr().write_all(failure.report().as_bytes());
             ExitCode::from(failure.code())
         }
     }
@@ -54,15 +56,22 @@ fn quiet_drivers() {
     }
 }
 
-/// Who reads what is printed may have enough before the end, as `head` has: the process then ends, without a word.
+/// Who reads what is printed may have enough before the end, as `head` has: the process then ends, without a word. A stdout that fails otherwise, as a full
+/// disk does, is a failure like any other.
 fn end_with_the_reader() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         let message = panic.payload().downcast_ref::<String>();
-        if message.is_some_and(|m| m.starts_with("failed printing to stdout") && m.contains("Broken pipe")) {
-            std::process::exit(0);
+        match message.and_then(|m| m.strip_prefix("failed printing to stdout: ")) {
+            Some(why) if why.contains("Broken pipe") => std::process::exit(0),
+            Some(why) => {
+                // where stderr fails too there is nobody to tell
+                let _ = writeln!(std::io::stderr(), "Error: stdout: {why}");
+                std::process::exit(1)
+            }
+            None if message.is_some_and(|m| m.starts_with("failed printing to stderr")) => std::process::exit(1),
+            None => usual(panic),
         }
-        usual(panic);
     }));
 }
 

@@ -5,16 +5,22 @@ use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::shots::{Shots, write_png};
 use crate::summary::{State, Summary, Tally};
+use std::io::Read;
 use std::path::Path;
 use std::time::Instant;
 use tumble::core::World;
 use tumble::net::record::{Recorder, RecorderOptions};
 use tumble::net::world::{entities, poses};
-use tumble::scene::{SceneFile, resolve_scene};
+use tumble::scene::SceneFile;
+
+/// Most bytes of a saved state: a thousand times what ten thousand bodies take.
+const MOST_RESTORED: u64 = 1 << 30;
 
 /// Runs a scene.
 pub fn run(options: &RunOptions) -> Result<(), Failure> {
-    let scene = described(options)?;
+    [&options.summary, &options.picture, &options.save, &options.video].into_iter().flatten().try_for_each(|path| may_be_written(path))?;
+    let mut scene = options.scene.load()?;
+    scene.world.seconds = options.seconds.unwrap_or(scene.world.seconds);
     let (mut world, notes) = scene.build().map_err(Failure::input)?;
     notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     restore(&mut world, options)?;
@@ -34,22 +40,16 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     pictures(&world, shots, options)
 }
 
-/// The scene with what the command line says instead.
-fn described(options: &RunOptions) -> Result<SceneFile, Failure> {
-    let mut scene = resolve_scene(&options.scene, &[])?.load()?;
-    let w = &mut scene.world;
-    w.seconds = options.seconds.unwrap_or(w.seconds);
-    w.dt_s = options.dt.unwrap_or(w.dt_s);
-    w.stepper = options.stepper.unwrap_or(w.stepper);
-    w.solver = options.solver.unwrap_or(w.solver);
-    w.integrator = options.integrator.unwrap_or(w.integrator);
-    Ok(scene)
-}
-
 fn restore(world: &mut World, options: &RunOptions) -> Result<(), Failure> {
     let Some(path) = &options.restore else { return Ok(()) };
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
-    let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let mut bytes = Vec::new();
+    // what never ends is read no further
+    let read = std::fs::File::open(path).and_then(|file| file.take(MOST_RESTORED + 1).read_to_end(&mut bytes));
+    read.map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    if bytes.len() as u64 > MOST_RESTORED {
+        return Err(wrong(format!("is larger than {MOST_RESTORED} bytes, the most that a saved state may have")));
+    }
     world.restore(&bytes).map_err(|e| wrong(e.to_string()))
 }
 
@@ -121,6 +121,16 @@ fn pictures(world: &World, shots: Option<Shots>, options: &RunOptions) -> Result
         say(options, "picture", path);
     }
     Ok(())
+}
+
+/// What can be known before the run of a file that is written after it.
+fn may_be_written(path: &Path) -> Result<(), Failure> {
+    let wrong = |why: &str| Err(Failure::run(&format!("writing {}", path.display()), why));
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        Some(folder) if !folder.is_dir() => wrong(&format!("there is no folder {}", folder.display())),
+        _ if path.is_dir() => wrong("it is a folder; wanted a file"),
+        _ => Ok(()),
+    }
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {

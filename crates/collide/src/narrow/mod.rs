@@ -127,7 +127,7 @@ fn with_body(shape: &Shape, then: &mut dyn FnMut(&Body)) {
         }
         Shape::Mesh(mesh) => {
             let Some(surface) = mesh.surface() else { return };
-            let source = Source::Mesh(mesh.tree(), &surface.elements);
+            let source = Source::Mesh(&surface.elements);
             then(&Body { source, field: &surface.field, mesh: Some(&surface.field), radius })
         }
     }

@@ -99,6 +99,16 @@ impl<'a> Collector<'a> {
         self.out.push(contact);
     }
 
+    /// The least gap found.
+    pub fn least(&self) -> f64 {
+        self.out[self.start..].iter().map(|c| c.gap).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How far the two overlap as far as is known, places that no element faces included, metres; below 0 where they do not.
+    pub fn overlap(&self) -> f64 {
+        -self.spare.iter().map(|c| c.gap).fold(self.least(), f64::min)
+    }
+
     /// A deep overlap at a place that the element does not face: it counts only if nothing else overlaps.
     pub fn push_spare(&mut self, contact: Contact) {
         if contact.gap < -0.02 * self.band && self.spare.is_none_or(|s| contact.gap < s.gap) {

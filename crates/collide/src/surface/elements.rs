@@ -1,7 +1,8 @@
 //! What of a mesh is held against the other's field: points and edges, held by the balls of its sphere tree.
 //!
-//! A point is held by one leaf that covers it, an edge by one of its ends. Of each ball it is known how far what it and its children hold
-//! reaches from its centre, of each point how long its edges are: one look at the field passes over all that is further than the margin.
+//! A point is held by one leaf that covers it, an edge by one of its ends. What a leaf holds is halved into groups of a few points. Around all
+//! that a ball or a group holds there is a ball of its own, and of each point it is known how long its edges are: one look at the field passes
+//! over all that is further than the margin.
 //!
 //! **Which edges.** An edge of length `L` that turns by `θ` (the angle between its faces' normals) is left out where
 //! `θ·L/4 ≤ ε`. Where two edges cross at distance `g`, the ends of the first have at least one at distance
@@ -16,7 +17,7 @@
 //! further from the other body. The least gap is then known to the same `ε`.
 
 use crate::mesh::{edge_groups, pseudonormals};
-use crate::{SphereTree, TriMesh, Vec3};
+use crate::{Aabb, SphereTree, TriMesh, Vec3};
 use nalgebra::ComplexField;
 
 /// `ε`: how much too large the gap of two crossing edges may be, as a part of the diagonal.
@@ -52,6 +53,8 @@ pub(crate) struct Point {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Edge {
     pub ends: [Vec3; 2],
+    /// Metres.
+    pub length: f64,
     /// Names of the points at its ends.
     pub points: [u32; 2],
     /// Its own contact may be left out if an end is no further by this, metres: `ε` on a smooth surface, else 0.
@@ -71,12 +74,25 @@ pub(crate) struct Elements {
     pub edges: Vec<Edge>,
     pub normals: Vec<Vec3>,
     pub ways: Vec<Vec3>,
-    /// Per ball: where its points begin and end.
-    held: Vec<[u32; 2]>,
-    /// Per ball: how far from its centre what it and its children hold reaches, without the fine edges and with them, metres;
-    /// −∞ where that is nothing.
-    reach: Vec<[f64; 2]>,
+    /// Balls and groups, each before its parts.
+    pub groups: Vec<Group>,
 }
+
+/// What a ball of the tree, or a part of a leaf, holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Group {
+    pub center: Vec3,
+    /// How far what it and its parts hold reaches from the centre, without the fine edges and with them, metres.
+    pub reach: [f64; 2],
+    /// Range in [`Elements::points`] of what it holds; empty if it has parts.
+    pub first: u32,
+    pub last: u32,
+    /// The group that comes after all its parts.
+    pub skip: u32,
+}
+
+/// Points of a group that is not halved.
+const FEW: usize = 4;
 
 impl Elements {
     /// Also returns, per triangle, which of its edges (k to k+1) are among the elements.
@@ -90,25 +106,20 @@ impl Elements {
         for (_, point) in &mut points {
             let of = |fine: bool| (edges.partition_point(|e| (e.points[0], e.fine) < (point.index, fine)), edges.partition_point(|e| (e.points[0], e.fine) <= (point.index, fine)));
             let ((a, b), (_, c)) = (of(false), of(true));
-            let longest = |end: usize| edges[a..end].iter().map(|e| (e.ends[1] - e.ends[0]).norm()).fold(0.0, f64::max);
+            let longest = |end: usize| edges[a..end].iter().map(|e| e.length).fold(0.0, f64::max);
             (point.first_edge, point.edges, point.longest) = (a as u32, [(b - a) as u32, (c - b) as u32], [longest(b), longest(c)]);
         }
-        all.held = (0..tree.nodes().len() as u32).map(|node| [node, node + 1].map(|n| points.partition_point(|p| p.0 < n) as u32)).collect();
-        all.points = points.into_iter().map(|p| p.1).collect();
         all.edges = edges;
-        all.reach = all.reaches(tree);
+        let held: Vec<[usize; 2]> = (0..tree.nodes().len() as u32).map(|node| [node, node + 1].map(|n| points.partition_point(|p| p.0 < n))).collect();
+        let mut points: Vec<Point> = points.into_iter().map(|p| p.1).collect();
+        all.gather(tree, 0, &held, &mut points);
+        all.points = points;
         (all, searched)
     }
 
-    /// The points that ball `node` holds.
-    pub fn points_of(&self, node: usize) -> &[Point] {
-        let [a, b] = self.held[node];
-        &self.points[a as usize..b as usize]
-    }
-
-    /// How far from the centre of ball `node` its elements reach, metres; with the fine edges or without.
-    pub fn reach_of(&self, node: usize, fine: bool) -> f64 {
-        self.reach[node][usize::from(fine)]
+    /// The points that a group holds itself.
+    pub fn points_of(&self, group: &Group) -> &[Point] {
+        &self.points[group.first as usize..group.last as usize]
     }
 
     /// The edges that a point holds, with the fine ones or without.
@@ -125,20 +136,58 @@ impl Elements {
         &self.ways[point.first_way as usize..(point.first_way + point.ways) as usize]
     }
 
-    fn reaches(&self, tree: &SphereTree) -> Vec<[f64; 2]> {
-        let nodes = tree.nodes();
-        // what a ball and its children hold; children come after their parents
-        let mut below: Vec<Vec<u32>> = (0..nodes.len()).map(|n| (self.held[n][0]..self.held[n][1]).collect()).collect();
-        for n in (0..nodes.len()).rev() {
-            let more: Vec<u32> = nodes[n].child_range().flat_map(|c| below[c].iter().copied()).collect();
-            below[n].extend(more);
+    /// The group of a ball of the tree and of its children; nothing where they hold nothing. `held`: ranges in `points`, per ball.
+    fn gather(&mut self, tree: &SphereTree, node: usize, held: &[[usize; 2]], points: &mut [Point]) {
+        let mut below = Vec::new();
+        let mut stack = vec![node];
+        while let Some(n) = stack.pop() {
+            below.push(held[n]);
+            stack.extend(tree.nodes()[n].child_range());
         }
-        let reach = |n: usize, fine: bool| {
-            let from = |p: &Vec3| (p - nodes[n].center).norm() * (1.0 + 1e-12);
-            let of = |p: &Point| self.edges_of(p, fine).iter().map(|e| from(&e.ends[1])).fold(from(&p.at), f64::max);
-            below[n].iter().map(|&p| of(&self.points[p as usize])).fold(f64::NEG_INFINITY, f64::max)
-        };
-        (0..nodes.len()).map(|n| [reach(n, false), reach(n, true)]).collect()
+        let [first, last] = held[node];
+        if below.iter().all(|[a, b]| a == b) {
+            return;
+        }
+        if tree.nodes()[node].is_leaf() {
+            return self.halve(points, first, last);
+        }
+        let group = self.group(points, &below);
+        if first < last {
+            self.halve(points, first, last);
+        }
+        for child in tree.nodes()[node].child_range() {
+            self.gather(tree, child, held, points);
+        }
+        self.groups[group].skip = self.groups.len() as u32;
+    }
+
+    /// The groups of a range of points, which are put into another order.
+    fn halve(&mut self, points: &mut [Point], first: usize, last: usize) {
+        let group = self.group(points, &[[first, last]]);
+        if last - first <= FEW {
+            (self.groups[group].first, self.groups[group].last) = (first as u32, last as u32);
+        } else {
+            let range = &mut points[first..last];
+            let bounds = Aabb::around(range.iter().map(|p| p.at));
+            let axis = (bounds.max - bounds.min).imax();
+            let half = range.len() / 2;
+            range.select_nth_unstable_by(half, |a, b| a.at[axis].total_cmp(&b.at[axis]).then(a.index.cmp(&b.index)));
+            self.halve(points, first, first + half);
+            self.halve(points, first + half, last);
+        }
+        self.groups[group].skip = self.groups.len() as u32;
+    }
+
+    /// A group around ranges of points; returns its number.
+    fn group(&mut self, points: &[Point], ranges: &[[usize; 2]]) -> usize {
+        let all = &*self;
+        let held = || ranges.iter().flat_map(|[a, b]| &points[*a..*b]);
+        let ends = |fine: bool| held().flat_map(move |p| all.edges_of(p, fine).iter().map(|e| e.ends[1]).chain([p.at]));
+        let bounds = Aabb::around(ends(false));
+        let center = 0.5 * (bounds.min + bounds.max);
+        let reach = [false, true].map(|fine| ends(fine).map(|p| (p - center).norm()).fold(0.0, f64::max) * (1.0 + 1e-12));
+        self.groups.push(Group { center, reach, first: 0, last: 0, skip: 0 });
+        self.groups.len() - 1
     }
 
     /// The vertices, each with the ball that holds it.
@@ -202,7 +251,7 @@ fn gather_edges(mesh: &TriMesh, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
                 searched[u.face][k] = true;
             }
         }
-        edges.push(Edge { ends, points: [group[0].low, group[0].high], spared, fine, normals, index: index as u32 });
+        edges.push(Edge { ends, length, points: [group[0].low, group[0].high], spared, fine, normals, index: index as u32 });
     }
     (edges, searched)
 }

@@ -148,7 +148,7 @@ impl Adaptive {
         w.k.iter_mut().for_each(|k| k.resize(2 * n, 0.0));
         [&mut w.y, &mut w.error].into_iter().for_each(|v| v.resize(2 * n, 0.0));
         [&mut w.led, &mut w.velocity].into_iter().for_each(|v| v.resize(n, 0.0));
-        w.start.clone_from(motion.x);
+        motion.x.clone_into(&mut w.start);
         let (v, f) = w.k[0].split_at_mut(n);
         motion.evaluate(t, f);
         motion.velocities(v);

@@ -5,6 +5,7 @@ mod friction;
 mod islands;
 mod linkages;
 mod pivoting;
+mod redundant;
 mod residuals;
 mod scalar;
 mod soft;

@@ -25,7 +25,8 @@ use super::hold::{self, Held};
 use super::impact::{self, Candidate};
 use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection, reach};
-use crate::detect::{Reach, Touch};
+use crate::detect::Touch;
+use crate::pair::Reach;
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
 use crate::rows::RowSet;
@@ -233,7 +234,7 @@ impl Backtracking {
     fn advance(&mut self, core: &mut Core, held: &[f64], left: f64) -> Result<f64, StepError> {
         core.held.copy_from_slice(held);
         self.adaptive.path.clear();
-        let start = core.x.clone();
+        let start = core.x.to_vec();
         let floor = core.settings.dt * FLOOR;
         let tolerance = core.settings.contact_tolerance;
         let mut bracket = Bracket::new(self.watch.nearest(&self.work.touches, tolerance));
@@ -292,7 +293,7 @@ impl Backtracking {
     /// full order, and forces and accelerations of its own. Where that one has not landed, because the two differ by more than the contact
     /// tolerance, the moment is corrected; if that does not help (or `f` is not known) the dense state stays. The time taken.
     fn settle(&mut self, core: &mut Core, h: f64, bracket: &Bracket, f: f64) -> Result<f64, StepError> {
-        let (dense, tolerance, time) = (core.x.clone(), core.settings.contact_tolerance, core.time);
+        let (dense, tolerance, time) = (core.x.to_vec(), core.settings.contact_tolerance, core.time);
         let deepest = core.report.max_penetration;
         let slope = bracket.slope(h, f);
         let (from, length) = (self.adaptive.path.before(h).0, self.adaptive.path.length(h));

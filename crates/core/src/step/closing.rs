@@ -54,7 +54,7 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     let mut rows = Workspace::default();
     lay_rows(core, &mut rows, level, None)?;
     let errors: Vec<f64> = rows.targets.iter().map(|t| t.error).collect();
-    let (start, time, pinned) = (core.x.clone(), core.time, core.unpin());
+    let (start, time, pinned) = (core.x.to_vec(), core.time, core.unpin());
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
@@ -65,19 +65,19 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     let mut far = onto(core, &mut rows, level, &aim);
     if far.as_ref().is_ok_and(|far| far.is_empty()) && Piece::all(core, &mut rows).iter().any(|p| p.direct() && reach::weak(&rows, &p.rows)) {
         let mut end = Workspace::default();
-        let middle = core.x.clone();
+        let middle = core.x.to_vec();
         core.motion().coast(ahead);
         core.motion().refresh();
         core.time += ahead;
         lay_rows(core, &mut end, level, None)?;
         let aim = aims(2.0 * closer, &end);
         far = onto(core, &mut end, level, &aim);
-        core.x = middle;
+        core.x.copy_from_slice(&middle);
         core.motion().refresh();
     }
     map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
     core.time = time;
-    core.x = start;
+    core.x.copy_from_slice(&start);
     core.pin_again(pinned);
     core.motion().refresh();
     map_sides(core, &mut rows, |body, j, y| body.respond(j, y));
@@ -113,7 +113,7 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
     let least = 1e-2 * core.settings.contact_tolerance;
     lay_rows(core, probe, level, None)?;
     let mut pieces = Piece::all(core, probe);
-    let mut kept = core.x.clone();
+    let mut kept = core.x.to_vec();
     while probe.targets.len() == errors.len() && pieces.iter().any(|p| !p.done) {
         let off: Vec<f64> = probe.targets.iter().zip(errors).map(|(t, e)| t.error - e).collect();
         let mut dx = vec![0.0; core.dof];
@@ -133,7 +133,7 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
                 solve(&probe.rows, &piece.rows, &off, &mut dx, 0.1 * least);
             }
         }
-        kept.clone_from(&core.x);
+        core.x.clone_into(&mut kept);
         shift(core, &dx, 1.0);
         core.motion().refresh();
         lay_rows(core, probe, level, None)?;
@@ -150,7 +150,7 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
         return Ok(());
     }
     let pushed = pushed(work);
-    let (arrived, mut moved) = (core.x.clone(), vec![0.0; core.dof]);
+    let (arrived, mut moved) = (core.x.to_vec(), vec![0.0; core.dof]);
     let mut pieces = Piece::all(core, work);
     let mut probe = Workspace::default();
     let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
@@ -160,7 +160,7 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
         if pieces.iter().all(|p| p.done) {
             break;
         }
-        let (before, moved_before) = (core.x.clone(), moved.clone());
+        let (before, moved_before) = (core.x.to_vec(), moved.clone());
         open.newton(core, &mut probe, &pieces, &mut moved);
         refresh_at(core, start);
         open.chord(core, work, &pieces, &mut moved);
@@ -385,7 +385,8 @@ fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64)
 
 /// Sites and caches of a state that is not the present one.
 pub(super) fn refresh_at(core: &mut Core, x: &[f64]) {
-    let now = std::mem::replace(&mut core.x, x.to_vec());
+    let now = core.x.to_vec();
+    core.x.copy_from_slice(x);
     core.motion().refresh();
-    core.x = now;
+    core.x.copy_from_slice(&now);
 }

@@ -2,7 +2,8 @@
 
 use super::closing;
 use super::projection::Projection;
-use crate::detect::{Detector, Reach, Touch};
+use crate::detect::{Detector, Touch};
+use crate::pair::Reach;
 use crate::motion::coast;
 use crate::object::{Integratable, Level, RowTarget};
 use crate::row_builder::{RowBuilder, RowKind, constraints};
@@ -91,7 +92,7 @@ pub(crate) struct Moment {
 
 /// State and sites in `ahead` seconds if no momentum changes (or no velocity, of objects whose state holds velocities); caches stay at the present.
 fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
-    let start = core.x.clone();
+    let start = core.x.to_vec();
     for entry in core.table.iter() {
         let x = &mut core.x[entry.span.x.clone()];
         match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
@@ -104,7 +105,8 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
         }
     }
     core.motion().refresh();
-    let moment = Moment { x: std::mem::replace(&mut core.x, start), sites: core.sites.clone(), ahead };
+    let moment = Moment { x: core.x.to_vec(), sites: core.sites.clone(), ahead };
+    core.x.copy_from_slice(&start);
     core.motion().refresh();
     moment
 }
@@ -142,7 +144,7 @@ pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: 
         rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, kinds: &mut work.kinds, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
         owner: ObjectId::default(),
     };
-    let (x, sites, ahead) = moment.map_or((&core.x, &core.sites, 0.0), |m| (&m.x, &m.sites, m.ahead));
+    let (x, sites, ahead) = moment.map_or((&core.x[..], &core.sites, 0.0), |m| (&m.x[..], &m.sites, m.ahead));
     builder.sites = sites;
     let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
     let mut first = std::mem::take(&mut work.first);

@@ -113,13 +113,13 @@ fn closing_time(gap: f64, contact: &Contact, a: &Site, b: &Site, t: f64) -> Opti
 }
 
 /// A pose after `t` seconds of free motion.
-fn coasted(site: &Site, t: f64) -> Pose {
+pub(crate) fn coasted(site: &Site, t: f64) -> Pose {
     let position = site.position() + t * site.velocity + 0.5 * t * t * site.acceleration;
     Pose::from_parts(Translation3::from(position), turn(&site.pose.rotation, &site.angular_velocity, t))
 }
 
 /// Gives the touch the contact of the moment `t`, seen from the start: lever arms of then, and the gap that free motion closes by then.
-fn meet(touch: &mut Touch, contact: &Contact, a: &Site, b: &Site, t: f64) {
+pub(crate) fn meet(touch: &mut Touch, contact: &Contact, a: &Site, b: &Site, t: f64) {
     let moved = |s: &Site| coasted(s, t).translation.vector - s.position();
     let (move_a, move_b): (Vec3, Vec3) = (moved(a), moved(b));
     let closed = contact.normal.dot(&(move_a - move_b));

@@ -14,6 +14,7 @@ mod time_stepping;
 pub use backtracking::Backtracking;
 pub use time_stepping::TimeStepping;
 pub(crate) use contacts::Workspace;
+pub(crate) use flight::{coasted, meet as meet_at};
 
 use crate::world::{Core, StepError};
 

@@ -25,7 +25,8 @@ use super::impact::{self, Candidate};
 use super::{closing, hold, reach};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
-use crate::detect::{Reach, Touch};
+use crate::detect::Touch;
+use crate::pair::Reach;
 use crate::motion::coast;
 use crate::object::Level;
 use crate::rows::RowSet;
@@ -85,7 +86,7 @@ impl TimeStepping {
 
     /// Rate of momentum at the midpoint into `work.dp`; state and caches are left at the start.
     fn smooth_forces(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
-        self.x0.clone_from(&core.x);
+        core.x.clone_into(&mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
         let mut motion = core.motion();
@@ -93,7 +94,7 @@ impl TimeStepping {
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.take_off_coasting(&mut self.work.dp);
         core.check_finite(&self.work.dp)?;
-        let middle = core.x.clone();
+        let middle = core.x.to_vec();
         core.x.copy_from_slice(&self.x0);
         core.pin(middle);
         core.motion().refresh();

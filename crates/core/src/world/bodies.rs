@@ -77,7 +77,7 @@ impl World {
             return Err(WorldError::BadState(entry.object.name().to_string()));
         }
         self.core.x[entry.span.x.clone()].copy_from_slice(x);
-        self.core.motion().refresh();
+        self.core.motion().refresh_one(id);
         Ok(())
     }
 
@@ -156,7 +156,7 @@ impl World {
         let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
         body.unwhiten_rate(&du, &mut dp);
         body.kick(&mut core.x[entry.span.x.clone()], &dp, 1.0);
-        core.motion().refresh();
+        core.motion().refresh_one(id);
         Ok(())
     }
 
@@ -183,7 +183,7 @@ impl World {
             return Err(WorldError::BadState(entry.object.name().to_string()));
         }
         core.x[entry.span.x.clone()].copy_from_slice(&x);
-        core.motion().refresh();
+        core.motion().refresh_one(id);
         Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! The inside of a world: what the steppers work on.
 
+use super::flat::State;
 use crate::detect::{Owner, Scratch, Touch, WarmStarts};
 use crate::motion::Motion;
 use crate::settings::{Settings, StepReport};
@@ -84,7 +85,7 @@ pub struct ContactPoint {
 /// Everything of a world but its stepper.
 pub struct Core {
     pub(crate) table: Table,
-    pub(crate) x: Vec<f64>,
+    pub(crate) x: State,
     pub(crate) dof: usize,
     pub(crate) sites: Vec<Site>,
     pub(crate) owners: Vec<Owner>,
@@ -136,8 +137,8 @@ impl Core {
     }
 
     /// The state of the pinned caches.
-    pub(crate) fn pinned(&self) -> Option<&Vec<f64>> {
-        Some(&self.pinned.0).filter(|x| !x.is_empty())
+    pub(crate) fn pinned(&self) -> Option<&[f64]> {
+        Some(&self.pinned.0[..]).filter(|x| !x.is_empty())
     }
 
     /// The sites of the pinned caches; only those of what moves are there.

@@ -1,12 +1,16 @@
 //! The world: objects in, frames out (the thesis's `Engine`, §IV.B).
 
 mod bodies;
+mod checkpoint;
 mod core;
+mod flat;
 mod mirror;
 mod pull;
 mod snapshot;
 
 pub use self::core::{ContactPoint, Core, StepError};
+pub use checkpoint::Checkpoint;
+pub use flat::StateHold;
 pub use mirror::MirrorError;
 pub use pull::Pull;
 pub use snapshot::SnapshotError;
@@ -94,7 +98,7 @@ impl World {
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
         let core = Core {
-            table: Table::default(), x: Vec::new(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), held_wrenches: Vec::new(), pinned: Default::default(),
+            table: Table::default(), x: Default::default(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), held_wrenches: Vec::new(), pinned: Default::default(),
             forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
             report: StepReport::default(), next_serial: 0, sleepers: Sleepers::default(), inner_step: 0.0,
@@ -134,7 +138,7 @@ impl World {
     pub fn step(&mut self) -> Result<&StepReport, StepError> {
         let core = &mut self.core;
         core.wake_disturbed();
-        self.before.clone_from(&core.x);
+        core.x.clone_into(&mut self.before);
         let (time, warm, inner_step) = (core.time, core.warm.clone(), core.inner_step);
         let sites = if core.sleepers.groups.is_empty() { Vec::new() } else { core.sites.clone() };
         let outcome = loop {
@@ -145,7 +149,7 @@ impl World {
             if outcome.is_err() || !core.stirred() {
                 break outcome;
             }
-            core.x.clone_from(&self.before);
+            core.x.copy_from_slice(&self.before);
             core.unpin();
             core.sites.clone_from(&sites);
             (core.time, core.warm, core.inner_step) = (time, warm.clone(), inner_step);
@@ -159,7 +163,7 @@ impl World {
         core.applied.fill(Wrench::default());
         core.applied_generalized.fill(0.0);
         if let Err(error) = outcome {
-            core.x.clone_from(&self.before);
+            core.x.copy_from_slice(&self.before);
             core.unpin();
             (core.time, core.warm, core.inner_step) = (time, warm, inner_step);
             core.sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
@@ -274,12 +278,12 @@ impl World {
             v: core.dof..core.dof + dims.dof,
             site: core.sites.len()..core.sites.len() + dims.sites,
         };
-        core.x.resize(span.x.end, 0.0);
+        core.x.resize(span.x.end);
         if let Some(body) = object.integratable() {
             body.write_initial(&mut core.x[span.x.clone()]);
         }
         if core.x[span.x.clone()].iter().any(|x| !x.is_finite()) {
-            core.x.truncate(span.x.start);
+            core.x.resize(span.x.start);
             return Err(WorldError::NotFinite(name));
         }
         core.dof = span.v.end;
@@ -304,7 +308,7 @@ impl World {
         let gone = core.table.slots.remove(id).ok_or(WorldError::Stale)?;
         self.names.remove(gone.object.name());
         core.table.order.retain(|&other| other != id);
-        core.x.drain(gone.span.x.clone());
+        core.x.cut(gone.span.x.clone());
         core.sites.drain(gone.span.site.clone());
         core.owners.drain(gone.span.site.clone());
         core.applied.drain(gone.span.site.clone());
@@ -332,7 +336,7 @@ impl World {
         let c = &self.core;
         World {
             core: Core {
-                table: c.table.clone(), x: c.x.clone(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(),
+                table: c.table.clone(), x: c.x.fork(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(),
                 held: c.held.clone(), held_wrenches: c.held_wrenches.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
                 contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, sleepers: c.sleepers.clone(), inner_step: c.inner_step,

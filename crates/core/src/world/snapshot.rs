@@ -90,7 +90,7 @@ impl World {
             frame: c.frame,
             next_serial: c.next_serial,
             objects: self.inventory(),
-            x: c.x.clone(),
+            x: c.x.to_vec(),
             accelerations: c.sites.iter().map(|s| six(&s.angular_acceleration, &s.acceleration)).collect(),
             applied: c.applied.iter().map(|w| six(&w.torque, &w.force)).collect(),
             applied_generalized: c.applied_generalized.clone(),
@@ -111,7 +111,7 @@ impl World {
         let core = &mut self.core;
         (core.time, core.frame, core.next_serial, core.warm) = (saved.time, saved.frame, saved.next_serial, saved.warm);
         core.inner_step = saved.inner_step;
-        core.x = saved.x;
+        core.x.copy_from_slice(&saved.x);
         for (i, object) in saved.objects.iter().enumerate() {
             let entry = &mut core.table.slots[core.table.order[i]];
             (entry.status, entry.serial, entry.asleep) = (object.status, object.serial, object.asleep);

@@ -38,3 +38,4 @@ mod solvers;
 mod stacks;
 mod state;
 mod regressions_articulated;
+mod still;

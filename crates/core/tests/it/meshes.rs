@@ -83,7 +83,6 @@ fn a_torus_that_falls_askew_comes_to_lie_flat() {
 fn a_turned_pin_stands() {
     let profile = [(0.0, 0.0), (0.026, 0.0), (0.06, 0.11), (0.023, 0.25), (0.03, 0.34), (0.0, 0.38)];
     let mesh = TriMesh::lathe(&profile, 24).unwrap();
-    // a base of many corners has more contacts than the solver settles within its sweeps
-    falls(ContactMode::Surface, REST_ON_SPHERES, "pin", &mesh, Vec3::zeros(), 0.2, 3.0);
+    falls(ContactMode::Surface, 1e-6, "pin", &mesh, Vec3::zeros(), 0.2, 3.0);
     falls(ContactMode::Spheres, REST_ON_SPHERES, "pin", &mesh, Vec3::zeros(), 0.2, 3.0);
 }

@@ -56,6 +56,8 @@ mod bytes;
 mod chunk;
 mod container;
 mod error;
+#[cfg(feature = "live")]
+pub mod live;
 mod messages;
 mod reader;
 mod recover;

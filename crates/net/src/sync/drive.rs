@@ -128,6 +128,11 @@ impl<L: ServerLink> Server<L> {
         self.session.standing(facet)
     }
 
+    /// What was counted about those who are no facet.
+    pub fn strangers(&self) -> LinkCounters {
+        self.link.strangers()
+    }
+
     /// Notes when an input came that no facet sent, so that the picture that shows it is timed: see [`ServerSession::note_input`].
     pub fn note_input(&mut self, user: u16, sequence: u64) {
         self.session.note_input(self.now(), user, sequence);

@@ -18,6 +18,8 @@ pub struct Input {
     pub head: Option<Pose>,
     /// Wand in the cave's frame, if there is one: it points along its y axis.
     pub wand: Option<Pose>,
+    /// Left and right hand in the cave's frame, as far as they are tracked; axes as the head's.
+    pub hands: [Option<Pose>; 2],
     /// Held buttons of the wand, bit by bit; bit 0 picks and pulls.
     pub buttons: u32,
     /// Keys held, by their USB HID usage (page 7); at most [`MAX_KEYS`], the rest is left out.
@@ -29,9 +31,11 @@ impl Input {
     pub fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.sequence.to_le_bytes());
         out.extend(self.user.to_le_bytes());
-        out.extend([self.head.is_some() as u8 | (self.wand.is_some() as u8) << 1, self.keys.len().min(MAX_KEYS) as u8]);
+        let poses = [self.head, self.wand, self.hands[0], self.hands[1]];
+        let flags = (0..4).fold(0, |flags, k| flags | u8::from(poses[k].is_some()) << k);
+        out.extend([flags, self.keys.len().min(MAX_KEYS) as u8]);
         out.extend(self.buttons.to_le_bytes());
-        [self.head, self.wand].iter().flatten().for_each(|pose| put_exact_pose(out, pose));
+        poses.iter().flatten().for_each(|pose| put_exact_pose(out, pose));
         self.keys.iter().take(MAX_KEYS).for_each(|key| out.extend(key.to_le_bytes()));
     }
 
@@ -42,13 +46,13 @@ impl Input {
     pub fn read(payload: &[u8]) -> Result<Input, Fault> {
         let mut rest = Bytes(payload);
         let (sequence, user, flags, keys, buttons) = (rest.u64()?, rest.u16()?, rest.u8()?, rest.u8()?, rest.u32()?);
-        if flags > 3 || keys as usize > MAX_KEYS || user as usize >= MAX_USERS {
+        if flags > 15 || keys as usize > MAX_KEYS || user as usize >= MAX_USERS {
             return Err(Fault::Malformed("a flag that there is not, too many keys, or no such user"));
         }
         let mut pose = |bit: u8| if flags & bit != 0 { exact_pose(&mut rest).map(Some) } else { Ok(None) };
-        let (head, wand) = (pose(1)?, pose(2)?);
+        let (head, wand, hands) = (pose(1)?, pose(2)?, [pose(4)?, pose(8)?]);
         let keys = (0..keys).map(|_| rest.u16()).collect::<Result<_, _>>()?;
         rest.end()?;
-        Ok(Input { sequence, user, head, wand, buttons, keys })
+        Ok(Input { sequence, user, head, wand, hands, buttons, keys })
     }
 }

@@ -75,7 +75,7 @@ pub mod wire;
 
 pub use drive::{Facet, Server, SessionError};
 pub use facet::{FacetOptions, FacetSession, Over, Task, Waiting};
-pub use input::Input;
+pub use input::{Input, MAX_KEYS};
 pub use local::Hub;
 pub use messages::FacetCounts;
 pub use mirror::Mirror;

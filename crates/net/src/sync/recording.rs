@@ -18,7 +18,7 @@ use super::server::ServerEvent;
 use super::transport::{FacetNumber, MAX_MESSAGE_BYTES};
 use super::wire::{Bytes, Fault, HEADER_BYTES, Hash, Header, Kind, message, open};
 use crate::record::{MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read};
-use crate::world::{entities, poses};
+use crate::world::{entities, names, poses};
 use std::path::Path;
 use std::sync::Arc;
 use tumble_core::World;
@@ -78,7 +78,7 @@ impl SessionRecorder {
             return Ok(());
         }
         self.write_waiting()?;
-        let names: Vec<String> = entities_names(world);
+        let names = names(world);
         if names != self.names {
             self.recorder.set_entities(recorded.time_s, &entities(world))?;
             self.names = names;
@@ -128,13 +128,6 @@ impl SessionRecorder {
         messages.append(&mut self.notes);
         self.recorder.frame(time_s, frame, &poses, &messages)
     }
-}
-
-fn entities_names(world: &World) -> Vec<String> {
-    let parts = |id| world.view().span(id).map_or(0, |span| span.site.len());
-    let name = |id| world.object(id).map_or("", |o| o.name());
-    let several = |id, part| if parts(id) > 1 { format!("{}/{part}", name(id)) } else { name(id).to_owned() };
-    world.ids().iter().flat_map(|&id| (0..parts(id)).map(move |part| several(id, part))).collect()
 }
 
 /// One frame of a recorded session.

@@ -4,6 +4,7 @@ mod detail;
 mod overlay;
 mod surface;
 mod tree;
+mod unwrap;
 mod views;
 
 pub use overlay::{DebugDraw, UnknownOverlay};
@@ -12,13 +13,14 @@ pub use views::{NamedView, UnknownView};
 
 use crate::{Camera, DebugStyle, DrawList, Ground, Image, Light, Material, MeshData, MeshId, Pattern, RenderError, Sky, Texture};
 use nalgebra::{Isometry3, Point3, Vector3};
-use overlay::islands;
+use overlay::{islands, resting};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tumble_collide::{Pose, Shape, TriMesh, Vec3};
 use tumble_core::{Detail, Look, Visual, World};
-use tumble_scene::{LightKind, LightSpec, SceneFile};
+use tumble_scene::{LightKind, LightSpec, MeshSource, SceneFile};
+use unwrap::Unwrapped;
 
 /// Half the side of the square that stands for a half-space, metres.
 const PLANE_M: f32 = 60.0;
@@ -36,6 +38,9 @@ pub struct Drawing {
     meshes: BTreeMap<String, Arc<MeshData>>,
     edges: BTreeMap<String, Vec<[[f32; 3]; 2]>>,
     textures: BTreeMap<Arc<Path>, Arc<Image>>,
+    /// The scene's files of meshes; read when the first mesh with a texture is met.
+    mesh_files: Vec<PathBuf>,
+    unwrapped: Option<Vec<Unwrapped>>,
     base: DrawList,
     camera: Option<Camera>,
     /// How much of every object is drawn, instead of what each one says.
@@ -76,7 +81,17 @@ impl Drawing {
             near_m: c.near_m as f32,
             far_m: c.far_m as f32,
         });
-        Drawing { meshes: BTreeMap::new(), edges: BTreeMap::new(), textures: BTreeMap::new(), base, camera, detail: None }
+        let mesh_files = scene.meshes.iter().filter_map(|m| if let MeshSource::File { path, .. } = &m.source { Some(path.clone()) } else { None });
+        Drawing {
+            meshes: BTreeMap::new(),
+            edges: BTreeMap::new(),
+            textures: BTreeMap::new(),
+            mesh_files: mesh_files.collect(),
+            unwrapped: None,
+            base,
+            camera,
+            detail: None,
+        }
     }
 
     /// The world as it is now, with overlays.
@@ -86,7 +101,7 @@ impl Drawing {
     pub fn list(&mut self, world: &World, overlays: &DebugDraw) -> Result<DrawList, RenderError> {
         let mut list = self.base.clone();
         let mut placed = Placed::default();
-        let islands = overlays.islands.then(|| islands(world));
+        let tints = if overlays.resting { Some(resting(world)) } else { overlays.islands.then(|| islands(world)) };
         for &id in world.ids() {
             let Some(object) = world.object(id) else { continue };
             if !world.status(id).is_some_and(|s| s.alive) {
@@ -95,7 +110,7 @@ impl Drawing {
             for mount in object.light().map_or(&[][..], |l| l.lights()) {
                 list.lights.extend(world.site(id, mount.part).map(|site| views::carried_light(mount, &(site.pose * mount.pose))));
             }
-            let tint = islands.as_ref().and_then(|islands| islands.get(&id)).copied();
+            let tint = tints.as_ref().and_then(|tints| tints.get(&id)).copied();
             for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
                 let Some(site) = world.site(id, visual.part) else { continue };
                 self.place(&mut list, &mut placed, object.name(), visual, &(site.pose * visual.pose), tint)?;
@@ -130,14 +145,28 @@ impl Drawing {
             return Ok(());
         }
         let simple = detail == Detail::Simplified;
-        let key = if simple { format!("simple {}", key(&visual.shape)) } else { key(&visual.shape) };
+        if let Shape::Capsule { radius, half_length } = visual.shape
+            && !simple
+        {
+            list.add_capsule(pose.cast(), half_length as f32, radius as f32, material);
+            return Ok(());
+        }
+        let textured = material.texture.is_some();
+        let key = match (simple, textured) {
+            (true, _) => format!("simple {}", key(&visual.shape)),
+            (_, true) => format!("textured {}", key(&visual.shape)),
+            _ => key(&visual.shape),
+        };
         let mesh = match placed.meshes.get(&key) {
             Some(mesh) => *mesh,
             None => {
                 let data = match self.meshes.get(&key) {
                     Some(data) => data.clone(),
                     None => {
-                        let full = mesh_of(&visual.shape)?;
+                        let full = match if textured { self.unwrapped(&visual.shape) } else { None } {
+                            Some(unwrapped) => unwrapped?,
+                            None => mesh_of(&visual.shape)?,
+                        };
                         let data = if simple { detail::simplified(&full) } else { full };
                         self.meshes.entry(key.clone()).or_insert(Arc::new(data)).clone()
                     }
@@ -170,6 +199,15 @@ impl Drawing {
         }
         detail::draw_edges(list, &self.edges[&key], &pose, color);
         Ok(())
+    }
+
+    /// A mesh with the texture coordinates of its file, where it has any.
+    fn unwrapped(&mut self, shape: &Shape) -> Option<Result<MeshData, RenderError>> {
+        let Shape::Mesh(mesh) = shape else { return None };
+        let mesh = mesh.mesh();
+        let files = self.unwrapped.get_or_insert_with(|| self.mesh_files.iter().filter_map(|path| Unwrapped::load(path)).collect());
+        let places = files.iter().find_map(|file| file.places_of(&mesh.triangles))?;
+        Some(MeshData::from_unwrapped(&positions(mesh), &mesh.triangles, places, CREASE_RAD))
     }
 
     /// The texture of a look in the list, its file read when it is first met.
@@ -217,8 +255,11 @@ fn mesh_of(shape: &Shape) -> Result<MeshData, RenderError> {
 }
 
 fn triangles(mesh: &TriMesh) -> Result<MeshData, RenderError> {
-    let positions: Vec<[f32; 3]> = mesh.vertices.iter().map(|v| small(v).into()).collect();
-    MeshData::from_triangles(&positions, &mesh.triangles, CREASE_RAD)
+    MeshData::from_triangles(&positions(mesh), &mesh.triangles, CREASE_RAD)
+}
+
+fn positions(mesh: &TriMesh) -> Vec<[f32; 3]> {
+    mesh.vertices.iter().map(|v| small(v).into()).collect()
 }
 
 /// A point or vector in the renderer's precision.

@@ -25,13 +25,15 @@ pub struct DebugDraw {
     pub frames: bool,
     /// Objects that are solved together, each group in a colour of its own.
     pub islands: bool,
+    /// Objects that stand still in blue-grey, those that move in orange.
+    pub resting: bool,
     /// A level of every sphere tree, 0 for the root.
     pub tree_level: Option<u32>,
 }
 
 /// A word that names no overlay.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, tree=LEVEL or all, with commas between them")]
+#[error("no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL or all, with commas between them")]
 pub struct UnknownOverlay(String);
 
 impl FromStr for DebugDraw {
@@ -48,6 +50,7 @@ impl FromStr for DebugDraw {
                 "joints" => draw.joints = true,
                 "frames" => draw.frames = true,
                 "islands" => draw.islands = true,
+                "resting" => draw.resting = true,
                 "all" => draw = DebugDraw { contacts: true, normals: true, velocities: true, forces: true, joints: true, frames: true, ..draw },
                 other => {
                     let level = other.strip_prefix("tree=").and_then(|n| n.parse().ok());
@@ -196,6 +199,17 @@ pub(super) fn islands(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
         out.extend(group.iter().map(|&id| (id, color)));
     }
     out
+}
+
+/// An object stands still below this speed of each of its parts, m/s and rad/s.
+const STILL: f64 = 5e-3;
+
+/// Blue-grey for each moving object that stands still, orange for those that do not.
+pub(super) fn resting(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
+    let moving = world.ids().iter().copied().filter(|&id| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic));
+    let parts = |id| (0..).map_while(move |part| world.site(id, part));
+    let still = |id| parts(id).all(|site| site.velocity.norm() < STILL && site.angular_velocity.norm() < STILL);
+    moving.map(|id| (id, if still(id) { [0.32, 0.42, 0.60] } else { [0.95, 0.55, 0.15] })).collect()
 }
 
 /// 1 where the arrows of a contact are those of its `a`, -1 where they are those of its `b`: of the body that moves, or of the upper one.

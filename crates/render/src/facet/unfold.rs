@@ -29,7 +29,9 @@ pub fn unfold(cave: &Cave, most: [u32; 2]) -> ([u32; 2], Vec<Tile>) {
     let least: [f64; 2] = std::array::from_fn(|k| boxes.iter().map(|(_, (at, _))| at[k]).fold(f64::MAX, f64::min));
     let greatest: [f64; 2] = std::array::from_fn(|k| boxes.iter().map(|(_, (at, size))| at[k] + size[k]).fold(f64::MIN, f64::max));
     let extent: [f64; 2] = std::array::from_fn(|k| greatest[k] - least[k]);
-    let per_metre = (f64::from(most[0]) / extent[0]).min(f64::from(most[1]) / extent[1]);
+    // the largest at which the rounded size fits: what is unfolded into its own size is the same
+    let fitting = |k: usize| (f64::from(most[k]) + 0.499) / extent[k];
+    let per_metre = fitting(0).min(fitting(1));
     let edge = |metres: f64| (metres * per_metre).round().max(0.0) as u32;
     let whole = [0, 1].map(|k| edge(extent[k]).clamp(1, most[k].max(1)));
     let tile = |&(facet, (at, size)): &(usize, ([f64; 2], [f64; 2]))| {

@@ -2,12 +2,13 @@
 
 use crate::list::debug::Stroke;
 use crate::material::linear3;
-use crate::{Instance, Material, Part, Sphere};
+use crate::{Capsule, Instance, Material, Part, Sphere};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3};
 
-/// Numbers per mesh instance, sphere and stroke.
+/// Numbers per mesh instance, sphere, capsule and stroke.
 pub const INSTANCE_FLOATS: u64 = 24;
 pub const SPHERE_FLOATS: u64 = 20;
+pub const CAPSULE_FLOATS: u64 = 24;
 pub const STROKE_FLOATS: u64 = 16;
 
 /// A point of view in the terms of `struct View` of the shaders; computed in f64, because far scenes cancel badly.
@@ -100,13 +101,13 @@ impl Eye {
     }
 }
 
-/// A mesh instance: three rows of object to world, then the material.
-pub fn instance(x: &Instance, out: &mut Vec<f32>) {
+/// A mesh instance: three rows of object to world, then the material; of a mesh that is unwrapped the texture repeats every -1 m.
+pub fn instance(x: &Instance, unwrapped: bool, out: &mut Vec<f32>) {
     let r = x.pose.rotation.to_rotation_matrix().into_inner() * Matrix3::from_diagonal(&x.scale);
     for i in 0..3 {
         out.extend([r[(i, 0)], r[(i, 1)], r[(i, 2)], x.pose.translation.vector[i]]);
     }
-    material(&x.material, x.material.texture.map_or(0.0, |t| t.repeat_m), out);
+    material(&x.material, if unwrapped { -1.0 } else { x.material.texture.map_or(0.0, |t| t.repeat_m) }, out);
 }
 
 /// A sphere: centre and radius, turn, material.
@@ -115,6 +116,14 @@ pub fn sphere(s: &Sphere, out: &mut Vec<f32>) {
     out.extend([c.x, c.y, c.z, s.radius, q.x, q.y, q.z, q.w]);
     // a sphere wears its texture once around
     material(&s.material, 0.0, out);
+}
+
+/// A capsule: centre and radius, turn, material, half length. A texture is laid on by position.
+pub fn capsule(c: &Capsule, out: &mut Vec<f32>) {
+    let (t, q) = (c.pose.translation.vector, c.pose.rotation.coords);
+    out.extend([t.x, t.y, t.z, c.radius, q.x, q.y, q.z, q.w]);
+    material(&c.material, c.material.texture.map_or(0.0, |t| t.repeat_m), out);
+    out.extend([c.half_length, 0.0, 0.0, 0.0]);
 }
 
 /// A translucent sphere: its opacity takes the place of the roughness.

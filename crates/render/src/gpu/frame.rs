@@ -52,15 +52,19 @@ impl<'a> Frame<'a> {
 
     /// All passes but those of shadows.
     pub fn draw(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines) {
-        let occlusion = self.stage.reach > 0.0;
-        if occlusion || self.stage.variant.depth_first() {
-            let ids = self.stage.variant.depth_first().then_some(&self.targets.ids);
+        let (occlusion, variant) = (self.stage.reach > 0.0, &self.stage.variant);
+        if occlusion || variant.depth_first() {
+            let ids = variant.depth_first().then_some(&self.targets.ids);
             let mut pass = match ids {
                 Some(ids) => color_pass(encoder, "view depth", ids, None, Some(cleared(&self.targets.view_depth, wgpu::StoreOp::Store))),
                 None => depth_pass(encoder, "view depth", &self.targets.view_depth),
             };
             pass.set_bind_group(0, &self.view, &[]);
-            self.stage.draw_view_depth(&mut pass, if ids.is_some() { &pipelines.ids } else { &pipelines.depth }, self.near);
+            if variant.spheres_first() {
+                self.stage.draw_nearest_spheres(&mut pass, pipelines, self.near);
+            } else {
+                self.stage.draw_view_depth(&mut pass, if ids.is_some() { &pipelines.ids } else { &pipelines.depth }, self.near);
+            }
         }
         if occlusion {
             self.draw_occlusion(encoder, pipelines);
@@ -87,14 +91,13 @@ impl<'a> Frame<'a> {
         let t = self.targets;
         match &t.samples {
             Some((color, depth)) => color_pass(encoder, "picture", color, Some(&t.picture), Some(cleared(depth, wgpu::StoreOp::Discard))),
-            // depth is there already, and only read
-            None => color_pass(
-                encoder,
-                "picture",
-                &t.picture,
-                None,
-                Some(wgpu::RenderPassDepthStencilAttachment { view: &t.view_depth, depth_ops: None, stencil_ops: None }),
-            ),
+            None => {
+                // all depth is there already and only read, or that of the spheres is and the rest is added
+                let added = wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Discard };
+                let depth_ops = self.stage.variant.spheres_first().then_some(added);
+                let depth = wgpu::RenderPassDepthStencilAttachment { view: &t.view_depth, depth_ops, stencil_ops: None };
+                color_pass(encoder, "picture", &t.picture, None, Some(depth))
+            }
         }
     }
 }

@@ -45,7 +45,9 @@ impl MeshCache {
 
 impl MeshBuffers {
     pub(crate) fn new(gpu: &Gpu, mesh: &MeshData) -> Result<Self, RenderError> {
-        let vertices: Vec<f32> = mesh.positions.iter().zip(&mesh.normals).flat_map(|(p, n)| [p[0], p[1], p[2], n[0], n[1], n[2]]).collect();
+        let place = |i: usize| mesh.unwrapped.get(i).copied().unwrap_or_default();
+        let corners = mesh.positions.iter().zip(&mesh.normals).enumerate();
+        let vertices: Vec<f32> = corners.flat_map(|(i, (p, n))| p.iter().chain(n).copied().chain(place(i)).collect::<Vec<_>>()).collect();
         Ok(MeshBuffers {
             vertices: vertex_buffer(gpu, &vertices, "mesh vertices")?,
             indices: buffer(gpu, bytemuck::cast_slice(&mesh.indices), BufferUsages::INDEX, "mesh indices")?,

@@ -1,7 +1,7 @@
 //! Shaders, binding layouts and pipelines. Layouts and shaders are made once per device, pipelines when a picture first needs them: one for each
 //! pass, pattern and quality, so that none computes what it does not show.
 
-use super::data::{INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
+use super::data::{CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
 use crate::Shadows;
 use std::collections::BTreeMap;
 use wgpu::{BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline, ShaderModule, ShaderStages, TextureFormat, VertexFormat};
@@ -28,6 +28,7 @@ const PICTURE_WGSL: &str = concat!(
     include_str!("../shaders/surface.wgsl"),
     include_str!("../shaders/mesh.wgsl"),
     include_str!("../shaders/sphere.wgsl"),
+    include_str!("../shaders/capsule.wgsl"),
     include_str!("../shaders/line.wgsl"),
     include_str!("../shaders/sky.wgsl"),
 );
@@ -42,6 +43,7 @@ pub enum Pass {
     Ground,
     Mesh,
     Sphere,
+    Capsule,
     Shell,
     Line,
     LineOnTop,
@@ -54,16 +56,23 @@ pub struct Variant {
     shadows: u32,
     occlusion: bool,
     softbox: bool,
+    reflections: bool,
 }
 
 impl Variant {
-    pub fn new(samples: u32, shadows: Shadows, occlusion: bool, softbox: bool) -> Self {
-        Variant { samples, shadows: shadows.number(), occlusion, softbox }
+    pub fn new(samples: u32, shadows: Shadows, occlusion: bool, softbox: bool, reflections: bool) -> Self {
+        Variant { samples, shadows: shadows.number(), occlusion, softbox: softbox && reflections, reflections }
     }
 
     /// With one sample the nearest depth is drawn first, and only what is nearest is lit.
     pub fn depth_first(&self) -> bool {
         self.samples == 1
+    }
+
+    /// Without occlusion the depth of spheres alone comes first: where there is none, the shader that lights spheres is not run at all. (Software drivers
+    /// run a shader to its end where it discards, but not where a depth test before it fails.)
+    pub fn spheres_first(&self) -> bool {
+        self.depth_first() && !self.occlusion
     }
 }
 
@@ -77,10 +86,12 @@ pub struct Pipelines {
     pub occlusion_layout: BindGroupLayout,
     pub texture_layout: BindGroupLayout,
     pub shadow_sampler: wgpu::Sampler,
-    /// Floor, meshes, spheres, and spheres that the eye is near to: depth alone.
-    pub depth: [RenderPipeline; 4],
+    /// Floor, meshes, spheres, spheres that the eye is near to, and capsules: depth alone.
+    pub depth: [RenderPipeline; 5],
     /// The same, and the number of the nearest sphere.
-    pub ids: [RenderPipeline; 4],
+    pub ids: [RenderPipeline; 5],
+    /// Depth of meshes into the picture's pass.
+    pub mesh_first: RenderPipeline,
     pub occlusion: RenderPipeline,
     pub blur: RenderPipeline,
     /// For several samples per pixel, and for one.
@@ -126,6 +137,8 @@ impl Pipelines {
             let plan = Plan { vs, fs, input, color, depth: Some(depth), blend: None, samples: 1, constants: &[] };
             plan.build(device, &pixels, &depth_only)
         };
+        let picture = [Some(&view_layout), Some(&scene_layout), Some(&texture_layout)];
+        let mesh_first = Plan { vs: "vs_mesh_depth", fs: Some("fs_nothing"), input: Input::Mesh, color: Some(COLOR), depth: Some(WRITE), blend: None, samples: 1, constants: &[] };
         let (mesh, no_id) = ("vs_mesh_depth", Some("fs_no_id"));
         let whole = |fs| {
             let plan = Plan { vs: "vs_whole", fs: Some(fs), input: Input::None, color: Some(OCCLUSION), depth: None, blend: None, samples: 1, constants: &[] };
@@ -137,13 +150,16 @@ impl Pipelines {
                 depth(mesh, None, Input::Mesh, None, WRITE),
                 depth("vs_ball", Some("fs_ball_depth"), Input::Sphere, None, WRITE),
                 depth("vs_near", Some("fs_near_depth"), Input::Sphere, None, WRITE),
+                depth("vs_capsule", Some("fs_capsule_depth"), Input::Capsule, None, WRITE),
             ],
             ids: [
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
                 depth("vs_ball", Some("fs_ball_id"), Input::Sphere, Some(ID), WRITE),
                 depth("vs_near", Some("fs_near_id"), Input::Sphere, Some(ID), WRITE),
+                depth("vs_capsule", Some("fs_capsule_no_id"), Input::Capsule, Some(ID), WRITE),
             ],
+            mesh_first: mesh_first.build(device, &pixels, &picture),
             occlusion: whole("fs_occlusion"),
             blur: whole("fs_blur"),
             shadow_sampler: device.create_sampler(&wgpu::SamplerDescriptor {
@@ -180,14 +196,20 @@ impl Pipelines {
     fn make(&self, device: &Device, (pass, surface, variant): Key) -> RenderPipeline {
         let over = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         let first = variant.depth_first();
-        let (solid, behind) = if first { (TEST, TEST_BEHIND) } else { (WRITE, WRITE_BEHIND) };
+        let (solid, behind, seen) = match (first, variant.spheres_first()) {
+            (_, true) => (TEST, WRITE_BEHIND, WHERE_ANY),
+            (true, _) => (TEST, TEST_BEHIND, ALWAYS),
+            _ => (WRITE, WRITE_BEHIND, WRITE),
+        };
         let (vs, fs, input, depth, blend) = match pass {
-            // at the far plane: with depth known it is drawn only where nothing is
-            Pass::Sky => ("vs_sky", "fs_sky", Input::None, if first { TEST } else { ALWAYS }, None),
+            // at the far plane: only where nothing is
+            Pass::Sky => ("vs_sky", "fs_sky", Input::None, TEST, None),
             Pass::Ground => ("vs_mesh", "fs_ground", Input::Mesh, behind, None),
             Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
-            Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, ALWAYS, None),
-            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Sphere, WRITE, None),
+            Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, seen, None),
+            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Sphere, seen, None),
+            Pass::Capsule if variant.spheres_first() => ("vs_capsule", "fs_capsule", Input::Capsule, WRITE, None),
+            Pass::Capsule => ("vs_capsule", "fs_capsule", Input::Capsule, solid, None),
             Pass::Shell => ("vs_sphere", "fs_shell", Input::Sphere, TEST, over),
             Pass::Line => ("vs_line", "fs_line", Input::Stroke, TEST, over),
             Pass::LineOnTop => ("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
@@ -200,6 +222,7 @@ impl Pipelines {
             ("SHADOWS", f64::from(variant.shadows)),
             ("OCCLUSION", flag(variant.occlusion)),
             ("SOFTBOX", flag(variant.softbox)),
+            ("REFLECTIONS", flag(variant.reflections)),
         ];
         let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: variant.samples, constants: &constants };
         plan.build(device, &self.modules[usize::from(first)], &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)])
@@ -218,6 +241,8 @@ const WRITE: DepthUse = DepthUse { compare: CompareFunction::GreaterEqual, write
 const WRITE_BEHIND: DepthUse = DepthUse { bias: -1, ..WRITE };
 const TEST: DepthUse = DepthUse { write: false, ..WRITE };
 const TEST_BEHIND: DepthUse = DepthUse { write: false, ..WRITE_BEHIND };
+/// At the far plane: where something is.
+const WHERE_ANY: DepthUse = DepthUse { compare: CompareFunction::Less, write: false, bias: 0 };
 const ALWAYS: DepthUse = DepthUse { compare: CompareFunction::Always, write: false, bias: 0 };
 
 /// What the vertex stage reads.
@@ -226,6 +251,7 @@ enum Input {
     None,
     Mesh,
     Sphere,
+    Capsule,
     Stroke,
     /// Two whole numbers.
     Range,
@@ -246,24 +272,27 @@ impl Plan<'_> {
     fn build(&self, device: &Device, module: &ShaderModule, layouts: &[Option<&BindGroupLayout>]) -> RenderPipeline {
         let pipeline_layout =
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some(self.vs), bind_group_layouts: layouts, immediate_size: 0 });
-        let vertex = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
+        let vertex = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 8 => Float32x3];
         let rows = attributes(if self.input == Input::Mesh { 2 } else { 0 }, self.input.floats());
         let per_instance = wgpu::VertexBufferLayout { array_stride: 4 * self.input.floats(), step_mode: wgpu::VertexStepMode::Instance, attributes: &rows };
-        let per_vertex = wgpu::VertexBufferLayout { array_stride: 24, step_mode: wgpu::VertexStepMode::Vertex, attributes: &vertex };
+        let per_vertex = wgpu::VertexBufferLayout { array_stride: 36, step_mode: wgpu::VertexStepMode::Vertex, attributes: &vertex };
         let buffers = match self.input {
             Input::None => vec![],
             Input::Mesh => vec![Some(per_vertex), Some(per_instance)],
-            Input::Sphere | Input::Stroke => vec![Some(per_instance)],
+            Input::Sphere | Input::Capsule | Input::Stroke => vec![Some(per_instance)],
             Input::Range => vec![Some(wgpu::VertexBufferLayout { array_stride: 8, step_mode: wgpu::VertexStepMode::Instance, attributes: &RANGE })],
         };
-        let strip = matches!(self.input, Input::Sphere | Input::Stroke);
-        let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask: wgpu::ColorWrites::ALL })];
+        let strip = matches!(self.input, Input::Sphere | Input::Capsule | Input::Stroke);
+        let write_mask = if self.fs == Some("fs_nothing") { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
+        let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask })];
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.fs.unwrap_or(self.vs)),
             layout: Some(&pipeline_layout),
             vertex: wgpu::VertexState { module, entry_point: Some(self.vs), compilation_options: Default::default(), buffers: &buffers },
             primitive: wgpu::PrimitiveState {
                 topology: if strip { wgpu::PrimitiveTopology::TriangleStrip } else { wgpu::PrimitiveTopology::TriangleList },
+                // of the boxes around capsules the far sides are drawn
+                cull_mode: (self.input == Input::Capsule).then_some(wgpu::Face::Front),
                 ..Default::default()
             },
             depth_stencil: self.depth.map(|depth| wgpu::DepthStencilState {
@@ -294,6 +323,7 @@ impl Input {
             Input::None | Input::Range => 0,
             Input::Mesh => INSTANCE_FLOATS,
             Input::Sphere => SPHERE_FLOATS,
+            Input::Capsule => CAPSULE_FLOATS,
             Input::Stroke => STROKE_FLOATS,
         }
     }

@@ -2,15 +2,22 @@
 
 use super::data::Eye;
 use super::shadow;
+use super::targets::MAX_LAYERS;
 use crate::list::bounds::{Bounds, ball_of};
 use crate::material::linear3;
 use crate::{DrawList, Light, MAX_LIGHTS, MAX_SHADOWS};
 
-/// The views of the lights that throw shadows, with the light's number: one layer of the shadow maps each, in the list's order.
+/// The views of the lights that throw shadows, with the light's number, in the list's order: one or six layers of the shadow maps each, as many as fit.
 pub fn shadow_eyes(list: &DrawList, seen: Option<&Bounds>) -> Vec<(usize, Eye)> {
     let Some(seen) = seen else { return Vec::new() };
-    let size = list.settings.shadow_map_size;
-    list.lights.iter().enumerate().filter_map(|(i, light)| Some((i, shadow::eye_of(light, list, seen, size)?))).take(MAX_SHADOWS).collect()
+    let each = list.lights.iter().enumerate().map(|(i, light)| (i, shadow::eyes_of(light, list, seen))).filter(|(_, eyes)| !eyes.is_empty());
+    let mut out = Vec::new();
+    for (i, eyes) in each.take(MAX_SHADOWS) {
+        if out.len() + eyes.len() <= MAX_LAYERS {
+            out.extend(eyes.into_iter().map(|eye| (i, eye)));
+        }
+    }
+    out
 }
 
 /// Reach of ambient occlusion in metres; 0 for none.
@@ -24,10 +31,10 @@ pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>, part: bool) -> f3
     }
 }
 
-/// Middle x and y of the floor, and its reach.
+/// Middle x and y of the floor, its reach and its height.
 pub fn floor(list: &DrawList, seen: Option<&Bounds>) -> [f32; 4] {
     let middle = seen.map_or([0.0; 2], |b| ball_of(b).0.xy().into());
-    [middle[0], middle[1], list.ground.as_ref().map_or(1.0, |g| g.reach_m), 0.0]
+    [middle[0], middle[1], list.ground.as_ref().map_or(1.0, |g| g.reach_m), list.ground.as_ref().map_or(0.0, |g| g.height_m)]
 }
 
 /// Linear radiance that comes back from below, in units of the ambient factor: a floor returns its colour times the light that falls on it
@@ -53,13 +60,14 @@ pub fn floats(list: &DrawList, seen: Option<&Bounds>, shadows: &[(usize, Eye)]) 
     let mut out = Vec::new();
     for (i, light) in list.lights.iter().enumerate() {
         let layer = shadows.iter().position(|(of, _)| *of == i).map_or(-1.0, |layer| layer as f32);
-        push_light(light, layer, &mut out);
+        let layers = shadows.iter().filter(|(of, _)| *of == i).count();
+        push_light(light, [layer, layers as f32], &mut out);
     }
     out.resize(12 * MAX_LIGHTS, 0.0);
     for (_, eye) in shadows {
         out.extend(shadow::floats(eye, list.settings.shadow_map_size));
     }
-    out.resize(12 * MAX_LIGHTS + 40 * MAX_SHADOWS, 0.0);
+    out.resize(12 * MAX_LIGHTS + 40 * MAX_LAYERS, 0.0);
     let (sky, s) = (&list.sky, &list.settings);
     let mut color = |c: [f32; 3], w: f32| {
         let [r, g, b] = linear3(c);
@@ -76,13 +84,13 @@ pub fn floats(list: &DrawList, seen: Option<&Bounds>, shadows: &[(usize, Eye)]) 
     out
 }
 
-fn push_light(light: &Light, layer: f32, out: &mut Vec<f32>) {
+fn push_light(light: &Light, [layer, layers]: [f32; 2], out: &mut Vec<f32>) {
     let (at, kind, color, intensity, size) = match light {
         Light::Directional { direction, color, intensity, angular_radius_rad, .. } => (-direction.normalize(), 0.0, color, intensity, angular_radius_rad),
         Light::Point { position, color, intensity, radius_m, .. } => (position.coords, 1.0, color, intensity, radius_m),
     };
     let [r, g, b] = linear3(*color).map(|c| c * intensity);
-    out.extend([at.x, at.y, at.z, kind, r, g, b, *size, layer, 0.0, 0.0, 0.0]);
+    out.extend([at.x, at.y, at.z, kind, r, g, b, *size, layer, layers, 0.0, 0.0]);
 }
 
 fn flag(on: bool) -> f32 {

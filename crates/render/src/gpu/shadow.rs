@@ -1,20 +1,22 @@
-//! Where a light looks from: the tightest view that holds everything that throws shadows.
+//! Where a light looks from: the tightest view that holds everything that throws shadows, or six views around a lamp amid it.
 
 use super::data::Eye;
 use crate::camera::orthographic;
 use crate::list::bounds::{Bounds, corners_of, union};
-use crate::{DrawList, Light};
+use crate::{DrawList, Light, Shadows};
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
-/// The view of a light onto what throws shadows near the `seen` box, or `None` where it throws none: nothing is there, or the lamp hangs amidst it.
-pub fn eye_of(light: &Light, list: &DrawList, seen: &Bounds, size: u32) -> Option<Eye> {
-    if !light.casts_shadow() {
-        return None;
-    }
-    let casters = union(list.casters_near(seen).map(|c| c.2))?;
+/// The views of a light onto what throws shadows near the `seen` box: one, or six of a lamp amid it where shadows are soft, or none.
+pub fn eyes_of(light: &Light, list: &DrawList, seen: &Bounds) -> Vec<Eye> {
+    let size = list.settings.shadow_map_size;
+    let Some(casters) = union(list.casters_near(seen).map(|c| c.2)).filter(|_| light.casts_shadow()) else { return Vec::new() };
     match light {
-        Light::Directional { direction, .. } => Some(sun(direction, list, seen, &casters, size)),
-        Light::Point { position, .. } => lamp(position, &casters, size),
+        Light::Directional { direction, .. } => vec![sun(direction, list, seen, &casters, size)],
+        Light::Point { position, radius_m, .. } => match lamp(position, &casters, size) {
+            Some(eye) => vec![eye],
+            None if list.settings.shadows == Shadows::Soft => lamp_amid(position, *radius_m, &casters, size),
+            None => Vec::new(),
+        },
     }
 }
 
@@ -76,6 +78,30 @@ fn lamp(position: &Point3<f32>, casters: &Bounds, size: u32) -> Option<Eye> {
         0.0, 0.0, -1.0, 0.0,
     );
     Some(Eye::new(&view.cast(), &projection.cast(), size, size))
+}
+
+/// Wider than 90 degrees, so that filters near the edge of one side of the cube stay within its map.
+const CUBE_TANGENT: f32 = 1.25;
+
+/// Perspective views to the six sides of a cube around a lamp, +x, -x, +y, -y, +z, -z; what lies within the lamp is not seen.
+fn lamp_amid(position: &Point3<f32>, radius: f32, casters: &Bounds, size: u32) -> Vec<Eye> {
+    let far = corners_of(casters).iter().map(|p| (p - position).norm()).fold(0.0, f32::max).max(1e-3) * 1.02;
+    let near = radius.max(1e-3 * far).min(0.5 * far);
+    let t = 1.0 / CUBE_TANGENT;
+    let projection = Matrix4::new(
+        t, 0.0, 0.0, 0.0, //
+        0.0, t, 0.0, 0.0, //
+        0.0, 0.0, far / (near - far), near * far / (near - far), //
+        0.0, 0.0, -1.0, 0.0,
+    );
+    let sides = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
+    let view = |forward: Vector3<f32>| {
+        let back = -forward;
+        let along = if back.z.abs() > 0.9 { Vector3::x() } else { Vector3::z() };
+        let side = along.cross(&back);
+        view_matrix(&side, &back.cross(&side), &back, position)
+    };
+    sides.into_iter().map(|forward| Eye::new(&view(forward).cast(), &projection.cast(), size, size)).collect()
 }
 
 fn view_matrix(side: &Vector3<f32>, up: &Vector3<f32>, back: &Vector3<f32>, at: &Point3<f32>) -> Matrix4<f32> {

@@ -3,11 +3,11 @@
 use super::data::{self, Eye};
 use super::meshes::{MeshBuffers, MeshCache, uniform_buffer, vertex_buffer};
 use super::pipelines::{Key, Pass, Pipelines, Variant};
-use super::targets::ShadowMaps;
+use super::targets::{MAX_LAYERS, ShadowMaps};
 use super::{Gpu, scene};
 use crate::list::bounds::Bounds;
 use crate::list::debug::strokes;
-use crate::{DebugSphere, DrawList, Instance, MAX_SHADOWS, MeshData, MeshId, RenderError, Shadows, SphereStyle};
+use crate::{DebugSphere, DrawList, Instance, Material, MeshData, MeshId, RenderError, Shadows, SphereStyle};
 use nalgebra::Point3;
 use std::ops::Range;
 use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline, TextureView};
@@ -34,6 +34,8 @@ pub struct Stage {
     sphere_groups: Vec<Same>,
     /// First and last number of the spheres of each group.
     sphere_ranges: Buffer,
+    capsules: Buffer,
+    capsule_groups: Vec<Same>,
     strokes: [Batch; 2],
     textures: Textures,
 }
@@ -79,12 +81,13 @@ impl Stage {
         let reach = scene::occlusion_reach(list, seen, part);
         let buffers = meshes.sync(gpu, &list.meshes)?;
         let (groups, instances) = group_instances(gpu, list, &buffers)?;
-        let (sphere_groups, sphere_floats) = group_spheres(list);
+        let (sphere_groups, sphere_floats) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow), data::sphere);
+        let (capsule_groups, capsule_floats) = group_items(&list.capsules, |c| (&c.material, c.casts_shadow), data::capsule);
         let ranges: Vec<u32> = sphere_groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
         let balls: Vec<_> = list.spheres.iter().map(|s| (s.center, s.radius)).collect();
         let stage = Stage {
             serial,
-            variant: Variant::new(s.samples, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0, list.sky.softbox > 0.0),
+            variant: Variant::new(s.samples, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0, list.sky.softbox > 0.0, s.reflections),
             shadow_map_size: s.shadow_map_size,
             reach,
             shadow_views: shadows.iter().map(|(_, eye)| Ok((bind_view(gpu, pipelines, eye)?, eye.near_any(&balls)))).collect::<Result<_, RenderError>>()?,
@@ -97,6 +100,8 @@ impl Stage {
             spheres: vertex_buffer(gpu, &sphere_floats, "spheres")?,
             sphere_data: sphere_texture(gpu, if s.samples == 1 { sphere_floats } else { Vec::new() })?,
             sphere_groups,
+            capsules: vertex_buffer(gpu, &capsule_floats, "capsules")?,
+            capsule_groups,
             sphere_ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), wgpu::BufferUsages::VERTEX, "sphere groups")?,
             textures,
             strokes: [stroke_batch(gpu, list, false)?, stroke_batch(gpu, list, true)?],
@@ -111,7 +116,8 @@ impl Stage {
         let ground = self.ground.iter().map(|(_, _, (surface, _))| (Pass::Ground, *surface));
         let meshes = self.groups.iter().map(|g| (Pass::Mesh, g.same.surface));
         let spheres = self.sphere_groups.iter().map(|g| (Pass::Sphere, g.surface));
-        fixed.into_iter().chain(ground).chain(meshes).chain(spheres).map(|(pass, surface)| (pass, surface, self.variant))
+        let capsules = self.capsule_groups.iter().map(|g| (Pass::Capsule, g.surface));
+        fixed.into_iter().chain(ground).chain(meshes).chain(spheres).chain(capsules).map(|(pass, surface)| (pass, surface, self.variant))
     }
 
     /// One depth map per shadow.
@@ -123,8 +129,8 @@ impl Stage {
         }
     }
 
-    /// Depth of everything, the floor included, by pipelines for floor, meshes, spheres and near spheres.
-    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 4], near: bool) {
+    /// Depth of everything, the floor included, by pipelines for floor, meshes, spheres, near spheres and capsules.
+    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], near: bool) {
         if let Some((mesh, instance, _)) = &self.ground {
             pass.set_pipeline(&by[0]);
             draw_mesh(pass, mesh, instance, 0..1);
@@ -132,9 +138,12 @@ impl Stage {
         self.draw_depth(pass, by, near, |same| same.all.clone());
     }
 
-    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 4], near: bool, which: impl Fn(&Same) -> Range<u32>) {
-        pass.set_pipeline(&by[1]);
-        self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, which(&g.same)));
+    /// Depth and number of the nearest sphere alone.
+    pub(super) fn draw_nearest_spheres(&self, pass: &mut RenderPass, pipelines: &Pipelines, near: bool) {
+        self.draw_sphere_depth(pass, &pipelines.ids, near, |same| same.all.clone());
+    }
+
+    fn draw_sphere_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], near: bool, which: impl Fn(&Same) -> Range<u32>) {
         pass.set_vertex_buffer(0, self.spheres.slice(..));
         for pipeline in &by[2..if near { 4 } else { 3 }] {
             pass.set_pipeline(pipeline);
@@ -142,6 +151,17 @@ impl Stage {
                 pass.draw(0..4, range);
             }
         }
+    }
+
+    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], near: bool, which: impl Fn(&Same) -> Range<u32>) {
+        pass.set_pipeline(&by[1]);
+        self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, which(&g.same)));
+        if !self.capsule_groups.is_empty() {
+            pass.set_pipeline(&by[4]);
+            pass.set_vertex_buffer(0, self.capsules.slice(..));
+            self.capsule_groups.iter().map(&which).filter(|range| !range.is_empty()).for_each(|range| pass.draw(0..14, range));
+        }
+        self.draw_sphere_depth(pass, by, near, which);
     }
 
     /// Whether some sphere is so near to the eye that its outline is no circle on a plane before it.
@@ -152,9 +172,18 @@ impl Stage {
     /// Everything in colour, with the view's own shells.
     pub(super) fn draw_picture(&self, pass: &mut RenderPass, pipelines: &Pipelines, shells: &Batch) {
         let select = |pass: &mut RenderPass, which, surface| pipelines.of((which, surface, self.variant)).map(|p| pass.set_pipeline(p)).is_some();
+        self.draw_spheres(pass, &select);
         pass.set_bind_group(2, &self.textures.white, &[]);
-        if select(pass, Pass::Sky, 0) {
-            pass.draw(0..3, 0..1);
+        if self.variant.spheres_first() && !self.groups.is_empty() {
+            pass.set_pipeline(&pipelines.mesh_first);
+            self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, g.same.all.clone()));
+        }
+        for same in &self.capsule_groups {
+            pass.set_bind_group(2, self.textures.of(same.texture), &[]);
+            if select(pass, Pass::Capsule, same.surface) {
+                pass.set_vertex_buffer(0, self.capsules.slice(..));
+                pass.draw(0..14, same.all.clone());
+            }
         }
         for g in &self.groups {
             pass.set_bind_group(2, self.textures.of(g.same.texture), &[]);
@@ -162,6 +191,26 @@ impl Stage {
                 draw_mesh(pass, &g.mesh, &self.instances, g.same.all.clone());
             }
         }
+        if let Some((mesh, instance, (surface, texture))) = &self.ground
+            && select(pass, Pass::Ground, *surface)
+        {
+            pass.set_bind_group(2, self.textures.of(*texture), &[]);
+            draw_mesh(pass, mesh, instance, 0..1);
+        }
+        pass.set_bind_group(2, &self.textures.white, &[]);
+        if select(pass, Pass::Sky, 0) {
+            pass.draw(0..3, 0..1);
+        }
+        for (which, batch) in [(Pass::Line, &self.strokes[0]), (Pass::Shell, shells), (Pass::LineOnTop, &self.strokes[1])] {
+            if batch.count > 0 && select(pass, which, 0) {
+                pass.set_vertex_buffer(0, batch.buffer.slice(..));
+                pass.draw(0..4, 0..batch.count);
+            }
+        }
+    }
+
+    /// Each with its surface: by squares, or all of a surface at once where the nearest is known.
+    fn draw_spheres(&self, pass: &mut RenderPass, select: &impl Fn(&mut RenderPass, Pass, u32) -> bool) {
         for (i, same) in self.sphere_groups.iter().enumerate() {
             pass.set_bind_group(2, self.textures.of(same.texture), &[]);
             if !select(pass, Pass::Sphere, same.surface) {
@@ -173,18 +222,6 @@ impl Stage {
             } else {
                 pass.set_vertex_buffer(0, self.spheres.slice(..));
                 pass.draw(0..4, same.all.clone());
-            }
-        }
-        if let Some((mesh, instance, (surface, texture))) = &self.ground
-            && select(pass, Pass::Ground, *surface)
-        {
-            pass.set_bind_group(2, self.textures.of(*texture), &[]);
-            draw_mesh(pass, mesh, instance, 0..1);
-        }
-        for (which, batch) in [(Pass::Line, &self.strokes[0]), (Pass::Shell, shells), (Pass::LineOnTop, &self.strokes[1])] {
-            if batch.count > 0 && select(pass, which, 0) {
-                pass.set_vertex_buffer(0, batch.buffer.slice(..));
-                pass.draw(0..4, 0..batch.count);
             }
         }
     }
@@ -226,7 +263,7 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
     let kind = |i: usize| (items[i].mesh, items[i].material.surface(), items[i].material.texture.map(|t| t.id));
     order.sort_by_key(|&i| (kind(i), !items[i].casts_shadow, i));
     let mut floats = Vec::with_capacity(data::INSTANCE_FLOATS as usize * items.len());
-    order.iter().for_each(|&i| data::instance(&items[i], &mut floats));
+    order.iter().for_each(|&i| data::instance(&items[i], !list.meshes[items[i].mesh.0].unwrapped.is_empty(), &mut floats));
     let mut groups = Vec::new();
     for (same, first) in runs(&order, kind, |i| items[i].casts_shadow) {
         groups.push(Group { mesh: meshes[items[first].mesh.0].clone(), same: Same { surface: kind(first).1, texture: kind(first).2, ..same } });
@@ -234,14 +271,14 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
     Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
 }
 
-fn group_spheres(list: &DrawList) -> (Vec<Same>, Vec<f32>) {
-    let items = &list.spheres;
+/// Spheres or capsules by surface, and their numbers in that order.
+fn group_items<T>(items: &[T], kind: impl Fn(&T) -> (&Material, bool), write: impl Fn(&T, &mut Vec<f32>)) -> (Vec<Same>, Vec<f32>) {
+    let surface = |i: usize| (kind(&items[i]).0.surface(), kind(&items[i]).0.texture.map(|t| t.id));
     let mut order: Vec<usize> = (0..items.len()).collect();
-    let kind = |i: usize| (items[i].material.surface(), items[i].material.texture.map(|t| t.id));
-    order.sort_by_key(|&i| (kind(i), !items[i].casts_shadow, i));
-    let mut floats = Vec::with_capacity(data::SPHERE_FLOATS as usize * items.len());
-    order.iter().for_each(|&i| data::sphere(&items[i], &mut floats));
-    let groups = runs(&order, kind, |i| items[i].casts_shadow).map(|(same, first)| Same { surface: kind(first).0, texture: kind(first).1, ..same });
+    order.sort_by_key(|&i| (surface(i), !kind(&items[i]).1, i));
+    let mut floats = Vec::with_capacity(data::CAPSULE_FLOATS as usize * items.len());
+    order.iter().for_each(|&i| write(&items[i], &mut floats));
+    let groups = runs(&order, surface, |i| kind(&items[i]).1).map(|(same, first)| Same { surface: surface(first).0, texture: surface(first).1, ..same });
     (groups.collect(), floats)
 }
 
@@ -279,7 +316,7 @@ fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<Gr
     let mut floats = Vec::new();
     let placed =
         Instance { mesh: MeshId(0), pose: nalgebra::Isometry3::identity(), scale: nalgebra::Vector3::repeat(1.0), material: ground.material, casts_shadow: false };
-    data::instance(&placed, &mut floats);
+    data::instance(&placed, false, &mut floats);
     Ok(Some((MeshBuffers::new(gpu, &quad)?, vertex_buffer(gpu, &floats, "ground")?, (ground.material.surface(), ground.material.texture.map(|t| t.id)))))
 }
 
@@ -290,4 +327,4 @@ fn stroke_batch(gpu: &Gpu, list: &DrawList, on_top: bool) -> Result<Batch, Rende
     Batch::new(gpu, &floats, wanted.len(), "strokes")
 }
 
-const _: () = assert!(MAX_SHADOWS == 4, "the shaders' array of shadows has this length");
+const _: () = assert!(MAX_LAYERS == 12, "the shaders' array of shadows has this length");

@@ -2,7 +2,7 @@
 
 use super::Gpu;
 use super::pipelines::{COLOR, DEPTH, ID, OCCLUSION};
-use crate::{Image, MAX_SHADOWS, RenderError};
+use crate::{Image, RenderError};
 use wgpu::{Extent3d, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor};
 
 /// How long a picture may take before the device counts as hung.
@@ -55,6 +55,9 @@ impl Targets {
     }
 }
 
+/// Most shadow maps: one of a light, six of a lamp amid what throws shadows.
+pub const MAX_LAYERS: usize = 12;
+
 /// The maps of the lights that throw shadows.
 pub struct ShadowMaps {
     pub size: u32,
@@ -65,9 +68,11 @@ pub struct ShadowMaps {
 }
 
 impl ShadowMaps {
-    pub fn new(device: &wgpu::Device, size: u32, count: usize) -> Self {
-        let count = count.clamp(1, MAX_SHADOWS) as u32;
-        let maps = texture(device, "shadow maps", [size, size, count], 1, DEPTH, LOOK);
+    pub fn new(gpu: &Gpu, size: u32, count: usize) -> Self {
+        let count = count.clamp(1, MAX_LAYERS) as u32;
+        // OpenGL takes one layer for no array, and each six for a cube
+        let spare = u32::from(gpu.opengl && (count == 1 || count.is_multiple_of(6)));
+        let maps = texture(&gpu.device, "shadow maps", [size, size, count + spare], 1, DEPTH, LOOK);
         let layer = |i| TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2), base_array_layer: i, array_layer_count: Some(1), ..Default::default() };
         ShadowMaps {
             size,

@@ -97,6 +97,12 @@ impl Screen {
         self.software
     }
 
+    /// Ends the device, as a driver that crashes does: whatever is asked of it next fails.
+    #[doc(hidden)]
+    pub fn lose_device(&self) {
+        self.renderer.gpu.device.destroy();
+    }
+
     /// What draws: [`Renderer::draw`] and its like leave a picture on the device, which [`show`](Self::show) shows.
     pub fn renderer(&mut self) -> &mut Renderer {
         &mut self.renderer

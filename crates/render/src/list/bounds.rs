@@ -64,7 +64,7 @@ impl DrawList {
         median(self.items(true).map(|item| ball_of(&item.1).1))
     }
 
-    /// What throws shadows near the `seen` box: each one's corners in the world (eight; a sphere's centre alone), as points to be
+    /// What throws shadows near the `seen` box: each one's corners in the world (eight; a sphere's centre alone, both ends of a capsule's segment), as points to be
     /// transformed, with a radius around them.
     pub(crate) fn casters_near(&self, seen: &Bounds) -> impl Iterator<Item = (Corners, f32, Bounds)> {
         let (middle, radius) = ball_of(seen);
@@ -86,7 +86,12 @@ impl DrawList {
             let r = Vector3::repeat(s.radius);
             (Corners([s.center; 8], 1), (s.center - r, s.center + r), s.radius)
         });
-        instances.chain(spheres)
+        let capsules = self.capsules.iter().filter(move |c| c.casts_shadow || !casters).map(|c| {
+            let [a, b] = [-1.0, 1.0].map(|end| c.pose * Point3::new(0.0, 0.0, end * c.half_length));
+            let r = Vector3::repeat(c.radius);
+            (Corners([a, b, a, a, a, a, a, a], 2), (a.inf(&b) - r, a.sup(&b) + r), c.radius)
+        });
+        instances.chain(spheres).chain(capsules)
     }
 }
 

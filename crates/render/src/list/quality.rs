@@ -31,7 +31,7 @@ impl Shadows {
 }
 
 /// The part of [`Settings`] that trades looks for speed. As words: `usual`, `fast`, `fastest`, and behind it or alone `shadows=off|hard|soft`, `samples=1|4`,
-/// `occlusion=on|off`, `map=TEXELS`, with commas between them.
+/// `occlusion=on|off`, `reflections=on|off`, `map=TEXELS`, with commas between them.
 ///
 /// ```
 /// use tumble_render::{Quality, Shadows};
@@ -47,37 +47,40 @@ pub struct Quality {
     pub samples: u32,
     /// Whether corners and creases get less of the sky's light.
     pub occlusion: bool,
+    /// Whether surfaces mirror the sky and have lacquer.
+    pub reflections: bool,
     /// Side of a shadow map in texels, 256 to 8192.
     pub shadow_map_size: u32,
 }
 
 /// A word that names no quality.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no quality '{0}'; wanted usual, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off or map=TEXELS (256 to 8192), with commas between them")]
+#[error("no quality '{0}'; wanted usual, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), with commas between them")]
 pub struct UnknownQuality(String);
 
 impl Default for Quality {
     /// What pictures have: soft shadows, four samples, occlusion.
     fn default() -> Self {
-        Quality { shadows: Shadows::Soft, samples: 4, occlusion: true, shadow_map_size: 2048 }
+        Quality { shadows: Shadows::Soft, samples: 4, occlusion: true, reflections: true, shadow_map_size: 2048 }
     }
 }
 
 impl Quality {
     /// For many bodies on a slow device: hard shadows, one sample, no occlusion.
     pub fn fast() -> Self {
-        Quality { shadows: Shadows::Hard, samples: 1, occlusion: false, shadow_map_size: 1024 }
+        Quality { shadows: Shadows::Hard, samples: 1, occlusion: false, reflections: true, shadow_map_size: 1024 }
     }
 
-    /// As [`Quality::fast`] without shadows.
+    /// As [`Quality::fast`] without shadows and reflections.
     pub fn fastest() -> Self {
-        Quality { shadows: Shadows::Off, ..Quality::fast() }
+        Quality { shadows: Shadows::Off, reflections: false, ..Quality::fast() }
     }
 
     /// Writes it into the settings of a list. A reach of occlusion that is set stays, unless occlusion is off.
     pub fn apply(&self, settings: &mut Settings) {
         settings.shadows = self.shadows;
         settings.samples = self.samples;
+        settings.reflections = self.reflections;
         settings.shadow_map_size = self.shadow_map_size;
         if !self.occlusion {
             settings.occlusion_m = Some(0.0);
@@ -101,6 +104,8 @@ impl FromStr for Quality {
                 Some(("samples", "4")) => quality.samples = 4,
                 Some(("occlusion", "on")) => quality.occlusion = true,
                 Some(("occlusion", "off")) => quality.occlusion = false,
+                Some(("reflections", "on")) => quality.reflections = true,
+                Some(("reflections", "off")) => quality.reflections = false,
                 Some(("map", side)) => quality.shadow_map_size = side.parse().ok().filter(|n| (256..=8192).contains(n)).ok_or_else(unknown)?,
                 _ => return Err(unknown()),
             }
@@ -112,6 +117,7 @@ impl FromStr for Quality {
 impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let occlusion = if self.occlusion { "on" } else { "off" };
-        write!(f, "shadows={},samples={},occlusion={occlusion},map={}", self.shadows.name(), self.samples, self.shadow_map_size)
+        let reflections = if self.reflections { "" } else { "reflections=off," };
+        write!(f, "shadows={},samples={},occlusion={occlusion},{reflections}map={}", self.shadows.name(), self.samples, self.shadow_map_size)
     }
 }

@@ -16,7 +16,7 @@ impl Display for DrawList {
         write_camera(f, &self.camera)?;
         let (s, k) = (&self.settings, &self.sky);
         write!(f, "settings: exposure {} shadow map {} occlusion {} tone map {}", n(s.exposure), s.shadow_map_size, s.occlusion_m.map_or("auto".into(), n), s.tone_map)?;
-        writeln!(f, " shadows {} samples {}", s.shadows.name(), s.samples)?;
+        writeln!(f, " shadows {} samples {} reflections {}", s.shadows.name(), s.samples, s.reflections)?;
         writeln!(f, "sky: zenith {} horizon {} ground {} ambient {} softbox {} backdrop {}", v(&k.zenith), v(&k.horizon), v(&k.ground), n(k.ambient), n(k.softbox), k.backdrop.map_or("none".into(), |c| v(&c)))?;
         if let Some(g) = &self.ground {
             writeln!(f, "ground: height {} reach {} {}", n(g.height_m), n(g.reach_m), material(&g.material))?;
@@ -26,7 +26,8 @@ impl Display for DrawList {
         }
         for (i, mesh) in self.meshes.iter().enumerate() {
             let (lo, hi) = mesh.bounds().unwrap_or_default();
-            writeln!(f, "mesh {i}: {} vertices {} triangles from {} to {}", mesh.positions.len(), mesh.indices.len() / 3, v(&lo), v(&hi))?;
+            let unwrapped = if mesh.unwrapped.is_empty() { "" } else { " unwrapped" };
+            writeln!(f, "mesh {i}: {} vertices {} triangles from {} to {}{unwrapped}", mesh.positions.len(), mesh.indices.len() / 3, v(&lo), v(&hi))?;
         }
         for (i, image) in self.textures.iter().enumerate() {
             writeln!(f, "texture {i}: {} x {}", image.width, image.height)?;
@@ -39,6 +40,11 @@ impl Display for DrawList {
         for (i, s) in self.spheres.iter().enumerate() {
             let q = s.orientation.coords;
             writeln!(f, "sphere {i}: at {} radius {} turned {} {}{}", v(s.center.coords.as_slice()), n(s.radius), v(q.as_slice()), material(&s.material), shadow(s.casts_shadow))?;
+        }
+        for (i, c) in self.capsules.iter().enumerate() {
+            let (t, q) = (c.pose.translation.vector, c.pose.rotation.coords);
+            write!(f, "capsule {i}: at {} turned {} half length {}", v(t.as_slice()), v(q.as_slice()), n(c.half_length))?;
+            writeln!(f, " radius {} {}{}", n(c.radius), material(&c.material), shadow(c.casts_shadow))?;
         }
         for (i, l) in self.lines.iter().enumerate() {
             let kind = if l.head_m > 0.0 { "arrow" } else { "line" };

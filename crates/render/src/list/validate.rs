@@ -37,6 +37,15 @@ impl DrawList {
             at.material(&s.material)?;
             at.texture(&s.material, self.textures.len())?;
         }
+        for (i, c) in self.capsules.iter().enumerate() {
+            let at = Item("capsule", i);
+            at.finite("pose", c.pose.translation.vector.as_slice())?;
+            at.finite("pose", c.pose.rotation.coords.as_slice())?;
+            at.check(c.radius > 0.0 && c.radius.is_finite(), "radius", &c.radius, "finite and above 0")?;
+            at.check(c.half_length >= 0.0 && c.half_length.is_finite(), "half_length", &c.half_length, "finite and not negative")?;
+            at.material(&c.material)?;
+            at.texture(&c.material, self.textures.len())?;
+        }
         for (i, light) in self.lights.iter().enumerate() {
             check_light(Item("light", i), light)?;
         }
@@ -49,6 +58,7 @@ impl DrawList {
             ("meshes", self.meshes.len(), MAX_ITEMS),
             ("instances", self.instances.len(), MAX_ITEMS),
             ("spheres", self.spheres.len(), MAX_ITEMS),
+            ("capsules", self.capsules.len(), MAX_ITEMS),
             ("lines", self.lines.len(), MAX_ITEMS),
             ("points", self.points.len(), MAX_ITEMS),
             ("debug spheres", self.debug_spheres.len(), MAX_ITEMS / 64),

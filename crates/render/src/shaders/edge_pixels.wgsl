@@ -1,4 +1,4 @@
-// Edges of cast spheres where the interface cannot write a sample mask (OpenGL): whole pixels.
+// Edges of cast spheres and capsules where the interface cannot write a sample mask (OpenGL): whole pixels.
 struct SpherePixel {
     @location(0) color: vec4f,
     @builtin(frag_depth) depth: f32,
@@ -10,4 +10,8 @@ fn sphere_pixel(color: vec4f, depth: f32, mask: u32) -> SpherePixel {
 
 fn sample_mask(ball: vec4f, pixel: vec2f) -> u32 {
     return select(0u, 15u, inside(ball, pixel) >= 0.0);
+}
+
+fn capsule_mask(ball: vec4f, axis: vec4f, pixel: vec2f) -> u32 {
+    return select(0u, 15u, inside_capsule(ball, axis, pixel) >= 0.0);
 }

@@ -1,4 +1,4 @@
-// Edges of cast spheres: each sample is tested against the exact outline.
+// Edges of cast spheres and capsules: each sample is tested against the exact outline.
 struct SpherePixel {
     @location(0) color: vec4f,
     @builtin(frag_depth) depth: f32,
@@ -16,5 +16,14 @@ fn sample_mask(ball: vec4f, pixel: vec2f) -> u32 {
     if (inside(ball, pixel + vec2f(0.375, -0.125)) >= 0.0) { mask |= 2u; }
     if (inside(ball, pixel + vec2f(-0.375, 0.125)) >= 0.0) { mask |= 4u; }
     if (inside(ball, pixel + vec2f(0.125, 0.375)) >= 0.0) { mask |= 8u; }
+    return mask;
+}
+
+fn capsule_mask(ball: vec4f, axis: vec4f, pixel: vec2f) -> u32 {
+    var mask = 0u;
+    if (inside_capsule(ball, axis, pixel + vec2f(-0.125, -0.375)) >= 0.0) { mask |= 1u; }
+    if (inside_capsule(ball, axis, pixel + vec2f(0.375, -0.125)) >= 0.0) { mask |= 2u; }
+    if (inside_capsule(ball, axis, pixel + vec2f(-0.375, 0.125)) >= 0.0) { mask |= 4u; }
+    if (inside_capsule(ball, axis, pixel + vec2f(0.125, 0.375)) >= 0.0) { mask |= 8u; }
     return mask;
 }

@@ -6,7 +6,7 @@
 struct Light {
     at: vec4f,      // w = 0: direction to the light; w = 1: position
     color: vec4f,   // linear colour times intensity; w: angular radius, or radius of the lamp
-    shadow: vec4f,  // x: layer of its shadow map or -1
+    shadow: vec4f,  // x: layer of its shadow map or -1; y: 6 where there is one for each side of a cube
 };
 struct Shadow {
     clip_from_world: mat4x4f,
@@ -16,13 +16,13 @@ struct Shadow {
 };
 struct Scene {
     lights: array<Light, 8>,
-    shadows: array<Shadow, 4>,
+    shadows: array<Shadow, 12>,
     zenith: vec4f,   // w: number of lights
     horizon: vec4f,  // w: ambient factor
     ground: vec4f,   // w: softbox
     backdrop: vec4f, // w: 1 for a flat backdrop
     tone: vec4f,     // exposure, 1 for the filmic curve, unused, side of the shadow maps
-    floor: vec4f,    // middle x, y and reach of the ground
+    floor: vec4f,    // middle x, y, reach and height of the ground
     bounce: vec4f,   // radiance that comes back from below
 };
 @group(1) @binding(0) var<uniform> scene: Scene;
@@ -93,6 +93,19 @@ fn disc_point(i: u32, n: f32, turn: f32) -> vec2f {
 
 fn shadow_depth_to_s(sh: Shadow, depth: f32) -> f32 {
     return (sh.depth.y - depth * sh.depth.w) / (depth * sh.depth.z - sh.depth.x);
+}
+
+// The map that shows `p`: of six, in the order +x -x +y -y +z -z, that of the side to which it lies.
+fn shadow_layer(light: Light, p: vec3f) -> i32 {
+    var layer = i32(light.shadow.x);
+    if (light.shadow.y > 1.5) {
+        let d = p - light.at.xyz;
+        let far = abs(d);
+        if (far.x >= far.y && far.x >= far.z) { layer += select(0, 1, d.x < 0.0); }
+        else if (far.y >= far.z) { layer += select(2, 3, d.y < 0.0); }
+        else { layer += select(4, 5, d.z < 0.0); }
+    }
+    return layer;
 }
 
 // Share of the light that reaches `p`.
@@ -169,6 +182,45 @@ fn environment_term(roughness: f32, n_v: f32) -> vec2f {
     return vec2f(-1.04, 1.04) * a + r.zw;
 }
 
+// A likeness for slow devices: highlights by the approximation of Karis, 2013 ("a² / (q² 4 max(0.1, (v·h)²) (r + 1/2))", with h not normalized), the sky as a
+// gradient, no lacquer.
+fn shade_simply(s: Surface) -> vec3f {
+    let n = s.normal;
+    let v = s.to_eye;
+    let rough = max(s.base.roughness, 0.2);
+    let a2 = rough * rough * rough * rough;
+    let diffuse = s.base.color * (1.0 - s.metallic);
+    let f0 = mix(vec3f(0.04), s.base.color, s.metallic);
+    let grazing = 1.0 - clamp(dot(n, v), 0.0, 1.0);
+    let sheen = s.base.color * (s.base.sheen * grazing * grazing * grazing);
+    var out = vec3f(0.0);
+    for (var i = 0u; i < u32(scene.zenith.w); i++) {
+        let light = scene.lights[i];
+        var l = light.at.xyz;
+        var radiance = light.color.xyz;
+        if (light.at.w > 0.5) {
+            let d = light.at.xyz - s.position;
+            let near = inverseSqrt(max(dot(d, d), 1e-6));
+            l = d * near;
+            radiance *= near * near;
+        }
+        var n_l = max(dot(n, l), 0.0);
+        if (SHADOWS > 0u && light.shadow.x >= 0.0) { n_l *= light_visibility(shadow_layer(light, s.position), s.position, n, light.color.w, s.pixel); }
+        let h = l + v;
+        let h2 = dot(h, h);
+        let n_h = dot(n, h);
+        let q = n_h * n_h * (a2 - 1.0) + h2;
+        let lobe = a2 * h2 * h2 / (q * q * max(h2, 0.4) * (rough + 0.5) + 1e-6);
+        out += (diffuse + sheen + f0 * lobe) * radiance * n_l;
+    }
+    var open = 1.0;
+    if (OCCLUSION) { open = textureLoad(occlusion, vec2i(s.pixel), 0).x; }
+    let up = 2.0 * dot(n, v) * n.z - v.z;
+    let mirrored = mix(scene.bounce.xyz, mix(scene.horizon.xyz, scene.zenith.xyz, clamp(up, 0.0, 1.0)), clamp(0.5 + up, 0.0, 1.0));
+    let edge = (1.0 - rough) * grazing * grazing * grazing * grazing;
+    return out + (diffuse * sky_irradiance(n) + (f0 * (1.0 - 0.4 * rough) + edge) * mirrored) * (open * scene.horizon.w);
+}
+
 fn shade(s: Surface) -> vec3f {
     let n = s.normal;
     let v = s.to_eye;
@@ -197,7 +249,7 @@ fn shade(s: Surface) -> vec3f {
         let n_l = dot(n, l);
         if (n_l <= 0.0) { continue; }
         var visible = 1.0;
-        if (SHADOWS > 0u && light.shadow.x >= 0.0) { visible = light_visibility(i32(light.shadow.x), s.position, n, light.color.w, s.pixel); }
+        if (SHADOWS > 0u && light.shadow.x >= 0.0) { visible = light_visibility(shadow_layer(light, s.position), s.position, n, light.color.w, s.pixel); }
         if (visible <= 0.0) { continue; }
         let h = normalize(l + v);
         let v_h = max(dot(v, h), 0.0);

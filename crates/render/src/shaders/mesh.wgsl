@@ -7,11 +7,14 @@ struct MeshIn {
     @location(5) color_rough: vec4f,
     @location(6) other_metal: vec4f,
     @location(7) pattern: vec4f,
+    @location(8) place: vec3f, // in the texture, and shares of it per metre
 };
-// Taken at a point inside the triangle (centroid): at the middle of a pixel that a thin triangle only grazes they would run beyond it.
+// Taken at a point inside the triangle (centroid): at the middle of a pixel that a thin triangle only grazes they would run beyond it. There llvmpipe
+// multiplies by the w of the pixel's middle all the same, which is wrong by a share: centimetres, far from the origin, and speckled shadows on meshes
+// finer than a pixel. A one that is interpolated with the rest comes out as that share.
 struct MeshOut {
     @invariant @builtin(position) clip: vec4f,
-    @location(0) @interpolate(perspective, centroid) world: vec3f,
+    @location(0) @interpolate(perspective, centroid) offset: vec3f,
     @location(1) @interpolate(perspective, centroid) normal: vec3f,
     @location(2) @interpolate(perspective, centroid) object: vec3f,
     @location(3) @interpolate(perspective, centroid) object_normal: vec3f,
@@ -19,6 +22,9 @@ struct MeshOut {
     @location(5) @interpolate(flat) other_metal: vec4f,
     @location(6) @interpolate(flat) pattern: vec4f,
     @location(7) @interpolate(flat) side: f32,
+    @location(8) @interpolate(perspective, centroid) place: vec3f,
+    @location(9) @interpolate(flat) origin: vec3f,
+    @location(10) @interpolate(perspective, centroid) one: f32,
 };
 
 fn world_of(in: MeshIn) -> vec3f {
@@ -28,8 +34,11 @@ fn world_of(in: MeshIn) -> vec3f {
 
 @vertex fn vs_mesh(in: MeshIn) -> MeshOut {
     var out: MeshOut;
-    out.world = world_of(in);
-    out.clip = view.clip_from_world * vec4f(out.world, 1.0);
+    out.clip = view.clip_from_world * vec4f(world_of(in), 1.0);
+    // width times its inverse, so that no compiler takes it for a constant
+    out.one = view.size.x * view.size.z;
+    out.origin = vec3f(in.row_x.w, in.row_y.w, in.row_z.w);
+    out.offset = vec3f(dot(in.row_x.xyz, in.position), dot(in.row_y.xyz, in.position), dot(in.row_z.xyz, in.position));
     let cx = vec3f(in.row_x.x, in.row_y.x, in.row_z.x);
     let cy = vec3f(in.row_x.y, in.row_y.y, in.row_z.y);
     let cz = vec3f(in.row_x.z, in.row_y.z, in.row_z.z);
@@ -42,6 +51,7 @@ fn world_of(in: MeshIn) -> vec3f {
     out.other_metal = in.other_metal;
     out.pattern = in.pattern;
     out.side = side;
+    out.place = vec3f(in.place.x, 1.0 - in.place.y, in.place.z / max(length(cx), 1e-9));
     return out;
 }
 
@@ -52,11 +62,17 @@ fn world_of(in: MeshIn) -> vec3f {
 // Where the number of the nearest sphere is asked for: it is none.
 @fragment fn fs_no_id() -> @location(0) u32 { return 0u; }
 
+// Depth alone, in a pass that has a colour.
+@fragment fn fs_nothing() {}
+
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
-    let facing = select(-1.0, 1.0, front) * in.side;
-    let s = view_depth_at(in.world);
+    let world = in.origin + in.offset / in.one;
+    let s = view_depth_at(world);
     let to_eye = -normalize(ray_at(in.clip.xy).dir);
-    return pixel_color(in.world, normalize(in.normal) * facing, to_eye, in.object, normalize(in.object_normal), s, in.clip.xy,
+    var normal = normalize(in.normal) * in.side;
+    // seen from behind; triangles thinner than a pixel may be rounded over, so the normal must say so too
+    if (!front && dot(normal, to_eye) < 0.0) { normal = -normal; }
+    return pixel_color(world, normal, to_eye, in.object / in.one, normalize(in.object_normal), s, in.clip.xy, in.place / in.one,
         Look(in.color_rough, in.other_metal, in.pattern));
 }
 
@@ -64,9 +80,18 @@ fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     return vec4f(mesh_color(in, front), 1.0);
 }
 
-// The floor fades into what lies behind it.
+// The floor fades into what lies behind it. It is met by the ray through the pixel's middle, not between the corners of its triangles: these are cut where they
+// leave the view, so that their edges lie elsewhere in each picture, and a pixel across one would show another place.
 @fragment fn fs_ground(in: MeshOut, @builtin(front_facing) front: bool) -> @location(0) vec4f {
-    let away = length(in.world.xy - scene.floor.xy) / scene.floor.z;
+    var met = in;
+    let ray = ray_at(in.clip.xy);
+    let s = (scene.floor.w - ray.origin.z) / ray.dir.z;
+    if (s > 0.0 && s < 1e6) {
+        met.offset = vec3f((ray.origin + s * ray.dir).xy, scene.floor.w) - in.origin;
+        met.object = met.offset;
+        met.one = 1.0;
+    }
+    let away = length(in.origin.xy + met.offset.xy / met.one - scene.floor.xy) / scene.floor.z;
     let fade = smoothstep(0.15, 0.95, away);
-    return vec4f(mix(mesh_color(in, front), backdrop_at(normalize(ray_at(in.clip.xy).dir)), fade), 1.0);
+    return vec4f(mix(mesh_color(met, front), backdrop_at(normalize(ray_at(in.clip.xy).dir)), fade), 1.0);
 }

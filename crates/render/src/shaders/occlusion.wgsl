@@ -37,7 +37,8 @@ fn step_along(p: vec2i, d: vec2i, middle: vec3f) -> vec3f {
     if (dot(n, ray_at(at.xy).dir) > 0.0) { n = -n; }
     let r = reach.x;
     let r2 = r * r;
-    let pixels = min(r / footprint_at(s), view.grid.z);
+    // in steps of a sixteenth of an octave: taps round to pixels, and the last bits of a depth, which differ from facet to facet, must not decide to which
+    let pixels = min(exp2(floor(16.0 * log2(r / footprint_at(s))) / 16.0), view.grid.z);
     if (pixels < 1.0) { return vec4f(1.0); }
     // 16 turns in a 4 x 4 tile, averaged away by the blur
     let tile = (u32(p.x) + u32(view.grid.x)) % 4u + 4u * ((u32(p.y) + u32(view.grid.y)) % 4u);

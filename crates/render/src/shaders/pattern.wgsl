@@ -106,8 +106,8 @@ fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> v
 @group(2) @binding(0) var albedo: texture_2d<f32>;
 @group(2) @binding(1) var albedo_sampler: sampler;
 
-// The texture at a point: once around a sphere (repeat 0), else from the side that the surface faces most. The level is that of a pixel `w` wide.
-fn texture_at(p: vec3f, n: vec3f, w: f32, repeat: f32) -> vec3f {
+// The texture at a point: where the mesh says (repeat below 0), once around a sphere (0), else from the side that the surface faces most. The level is that of a pixel `w` wide.
+fn texture_at(p: vec3f, n: vec3f, place: vec3f, w: f32, repeat: f32) -> vec3f {
     let texels = vec2f(textureDimensions(albedo));
     let side = abs(n);
     var uv = vec2f(atan2(n.y, n.x) / 6.2831853 + 0.5, 0.5 - asin(clamp(n.z, -1.0, 1.0)) / 3.1415927);
@@ -118,11 +118,14 @@ fn texture_at(p: vec3f, n: vec3f, w: f32, repeat: f32) -> vec3f {
         else if (side.y > side.z) { q = vec2f(-p.x * sign(n.y), -p.z); }
         uv = q / repeat;
         across = w / repeat;
+    } else if (repeat < 0.0) {
+        uv = place.xy;
+        across = w * place.z;
     }
     return textureSampleLevel(albedo, albedo_sampler, uv, log2(max(across * max(texels.x, texels.y), 1.0))).xyz;
 }
 
-fn base_of(p: vec3f, n: vec3f, w: f32, color_rough: vec4f, other: vec3f, pattern: vec4f) -> Base {
+fn base_of(p: vec3f, n: vec3f, place: vec3f, w: f32, color_rough: vec4f, other: vec3f, pattern: vec4f) -> Base {
     var base = Base(color_rough.xyz, color_rough.w, pattern.x, 0.0);
     let size = max(pattern.zw, vec2f(1e-6));
     switch SURFACE % 100u {
@@ -169,6 +172,6 @@ fn base_of(p: vec3f, n: vec3f, w: f32, color_rough: vec4f, other: vec3f, pattern
         }
         default: {}
     }
-    if (TEXTURED) { base.color *= texture_at(p, n, w, pattern.y); }
+    if (TEXTURED) { base.color *= texture_at(p, n, place, w, pattern.y); }
     return base;
 }

@@ -103,10 +103,10 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
     let mask = sample_mask(in.ball, pixel);
     let h = hit(in.ball, pixel);
     let depth = depth_of(h.s);
-    if (mask == 0u || h.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
+    if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
     let to_eye = -normalize(ray_at(pixel).dir);
     let object_normal = unturn(in.turn, h.normal);
-    let color = pixel_color(h.position, h.normal, to_eye, object_normal * in.ball.w, object_normal, h.s, pixel,
+    let color = pixel_color(h.position, h.normal, to_eye, object_normal * in.ball.w, object_normal, h.s, pixel, vec3f(0.0),
         Look(in.color_rough, in.other_metal, in.pattern));
     return sphere_pixel(vec4f(color, 1.0), depth, mask);
 }
@@ -163,7 +163,7 @@ struct NearOut {
 fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
     let c = cross_sphere(ball, pixel);
     let depth = depth_of(c.s);
-    if (c.room < 0.0 || c.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
+    if (c.room < 0.0 || behind(c.s) || depth > 1.0 || depth < 0.0) { discard; }
     return depth;
 }
 
@@ -186,7 +186,7 @@ fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
     let h = hit(ball, at.xy);
     let to_eye = -normalize(ray_at(at.xy).dir);
     let object_normal = unturn(turn, h.normal);
-    return vec4f(pixel_color(h.position, h.normal, to_eye, object_normal * ball.w, object_normal, h.s, at.xy, look), 1.0);
+    return vec4f(pixel_color(h.position, h.normal, to_eye, object_normal * ball.w, object_normal, h.s, at.xy, vec3f(0.0), look), 1.0);
 }
 
 struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat) range: vec2u };
@@ -202,7 +202,7 @@ struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat)
     let mask = sample_mask(in.ball, pixel);
     let h = hit(in.ball, pixel);
     let depth = depth_of(h.s);
-    if (mask == 0u || h.s <= 0.0 || depth > 1.0 || depth < 0.0) { discard; }
+    if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
     let rim = 1.0 - clamp(dot(h.normal, -normalize(ray_at(pixel).dir)), 0.0, 1.0);
     let alpha = in.color_rough.w * mix(0.25, 1.0, rim * rim);
     return sphere_pixel(vec4f(in.color_rough.xyz * alpha, alpha), depth, mask);

@@ -5,3 +5,4 @@ override TEXTURED: bool = false;
 override COAT: bool = true;      // whether there is lacquer
 override SOFTBOX: bool = true;   // whether a panel hangs overhead
 override OCCLUSION: bool = true; // whether the map of occlusion was drawn
+override REFLECTIONS: bool = true; // whether surfaces mirror the sky; else light is a cheap likeness

@@ -34,6 +34,11 @@ fn depth_of(s: f32) -> f32 {
     return (view.depth.x * s + view.depth.y) / (view.depth.z * s + view.depth.w);
 }
 
+// Behind the eye; a parallel view has none.
+fn behind(s: f32) -> bool {
+    return view.lens.x > 0.5 && s <= 0.0;
+}
+
 fn view_depth_of(depth: f32) -> f32 {
     return (view.depth.y - depth * view.depth.w) / (depth * view.depth.z - view.depth.x);
 }

@@ -181,6 +181,19 @@ fn unfolded_caves_are_nets_without_overlap() {
     }
 }
 
+/// A window is made of the size that an unfolded cave has, and the cave is then unfolded into the window.
+#[test]
+fn what_is_unfolded_into_its_own_size_stays_as_it_is() {
+    for cave in tumble_scene::cave::shipped_caves() {
+        let cave = cave.read().unwrap();
+        for most in (20..400).step_by(7).map(|w| [w, 100]).chain([[1280, 720], [1920, 1080], [150, 100]]) {
+            let (size, tiles) = unfold(&cave, most);
+            assert!((0..2).all(|k| size[k] <= most[k]) && (0..2).any(|k| size[k] == most[k]), "{}: {size:?} in {most:?}", cave.file);
+            assert_eq!(unfold(&cave, size), (size, tiles), "{}: {most:?}", cave.file);
+        }
+    }
+}
+
 // Pictures.
 
 /// Things, a floor, sun and lamp shadows, occlusion, gloss: all that could depend on the facet.
@@ -233,8 +246,7 @@ fn joined(parts: &[Image]) -> Image {
     Image { width, height, rgba: rows.collect() }
 }
 
-/// What is off lies at edges, but for a few pixels (under 0.01 %) by at most 3 levels: faint lines of the floor, which are no edges here, and occlusion, which
-/// looks at whole pixels around each, where the last bits of a depth decide which.
+/// What is off lies at edges of things, whose corners are rounded to a fraction of a pixel that is not the same for each part.
 #[test]
 fn a_wall_in_parts_is_the_wall() {
     let all = 768 * 256;
@@ -255,7 +267,7 @@ fn a_wall_in_parts_is_the_wall() {
             let most = elsewhere.iter().map(|&&(x, y)| levels_apart(whole.pixel(x, y).unwrap(), parted.pixel(x, y).unwrap())).max().unwrap_or(0);
             println!("{parts} parts, occlusion {occlusion}, shadows {shadows}: {} of {all} pixels off; {} away from edges, by {most} levels", off.len(), elsewhere.len());
             assert!(off.len() * 1000 < all, "{parts} parts: {} of {all} pixels off", off.len());
-            assert!(elsewhere.len() * 10_000 < all && most <= 3, "{parts} parts: {} away from edges, by {most} levels: {elsewhere:?}", elsewhere.len());
+            assert!(elsewhere.is_empty(), "{parts} parts: {} away from edges, by {most} levels: {elsewhere:?}", elsewhere.len());
         }
         // and it would show: each part from an eye 2 cm aside of where it belongs
         let aside = joined(&(0..3).filter_map(|i| part_of_wall(&list, EYE + Vector3::x() * (0.02 * i as f64), i as f64 / 3.0, (i + 1) as f64 / 3.0, 256, 256)).collect::<Vec<_>>());

@@ -1,11 +1,13 @@
 //! Pictures of all shipped scenes, and of one cave, beside ones that were looked at and kept: one set per interface (Vulkan, OpenGL), because
-//! they differ in edges. `TUMBLE_KEEP_PICTURES=1` writes them anew (`make goldens`); then look at them before they are committed.
+//! they differ in edges. `TUMBLE_KEEP_PICTURES=1` writes them anew (`make goldens`, and `VK_ICD_FILENAMES=/none make goldens` for OpenGL); then look at them before they are committed.
 //!
 //! The measure: pictures are made 4 times smaller in linear light, which forgives a pixel's edge, and may then differ by [`MEAN_LEVELS`] on the average and by
 //! [`MOST_LEVELS`] anywhere.
 
 use crate::support::renderer;
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 use tumble_render::{CaveView, DebugDraw, Drawing, Image, Renderer};
 use tumble_scene::cave::resolve_cave;
 
@@ -15,9 +17,9 @@ const MOST_LEVELS: f64 = 24.0;
 /// Moments of a scene that are looked at, frames.
 const FRAMES: u64 = 24;
 
-fn pictures(renderer: &mut Renderer) -> Vec<(String, Image)> {
+fn pictures(renderer: &mut Renderer, only: Option<&str>) -> Vec<(String, Image)> {
     let mut out = Vec::new();
-    for shipped in tumble_scene::shipped() {
+    for shipped in tumble_scene::shipped().iter().filter(|s| only.is_none_or(|name| s.name == name)) {
         let scene = shipped.read().unwrap();
         let (mut world, _) = scene.build().unwrap();
         (0..FRAMES).for_each(|_| {
@@ -43,6 +45,46 @@ fn small(image: &Image) -> Vec<f64> {
 
 #[test]
 fn pictures_of_shipped_scenes_are_those_that_were_looked_at() {
+    compare(None);
+}
+
+/// Draws one scene where the variable says so; told by the test below.
+#[test]
+#[ignore = "a child of the test below"]
+fn child_draws_one_scene() {
+    if let Some(renderer) = renderer() {
+        println!("drawn by {}", renderer.adapter());
+        compare(Some("stack"));
+    }
+}
+
+/// Where no driver of Vulkan is found OpenGL draws, and the same to the eye.
+#[test]
+fn without_vulkan_opengl_draws() {
+    if renderer().is_none() {
+        return;
+    }
+    let none = std::env::temp_dir().join("there-is-no-driver-here.json");
+    let mut child = Command::new(std::env::current_exe().unwrap());
+    child.args(["--exact", "--ignored", "--nocapture", "goldens::child_draws_one_scene"]).env("VK_DRIVER_FILES", &none).env("VK_ICD_FILENAMES", &none);
+    let mut child = child.env_remove("TUMBLE_KEEP_PICTURES").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let begin = Instant::now();
+    while child.try_wait().unwrap().is_none() && begin.elapsed() < Duration::from_secs(300) {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let _ = child.kill(); // it has ended, or hangs
+    let output = child.wait_with_output().unwrap();
+    let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    if said.contains("SKIPPED: no graphics adapter") {
+        // past the harness, which keeps what passing tests print
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no OpenGL\n"));
+        return;
+    }
+    assert!(output.status.success() && said.contains("Gl)"), "{said}");
+}
+
+/// Compares pictures of all scenes, or of one, with those that are kept.
+fn compare(only: Option<&str>) {
     let Some(mut renderer) = renderer() else { return };
     let interface = if renderer.adapter().contains("Gl)") { "opengl" } else { "vulkan" };
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/goldens").join(interface);
@@ -53,7 +95,7 @@ fn pictures_of_shipped_scenes_are_those_that_were_looked_at() {
         return;
     }
     let mut wrong = Vec::new();
-    for (name, image) in pictures(&mut renderer) {
+    for (name, image) in pictures(&mut renderer, only) {
         let path = folder.join(format!("{name}.png"));
         if keep {
             std::fs::create_dir_all(&folder).unwrap();

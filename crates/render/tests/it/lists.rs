@@ -1,7 +1,9 @@
 //! Draw lists without a GPU: text form, checks, bounds.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use tumble_render::{DebugDraw, DebugStyle, DrawList, Drawing, Ground, Light, MAX_LIGHTS, Material, MeshData, MeshId, Pattern, RenderError};
+use tumble_render::{
+    DebugDraw, DebugStyle, DrawList, Drawing, Ground, Image, Light, MAX_LIGHTS, Material, MeshData, MeshId, Pattern, Quality, RenderError, Sky, Texture,
+};
 use tumble_scene::SceneFile;
 
 fn sample() -> DrawList {
@@ -9,6 +11,12 @@ fn sample() -> DrawList {
     let cube = list.add_mesh(MeshData::unit_box());
     list.add_instance(cube, Isometry3::translation(1.0, -0.00001, 0.5), Material::plastic([0.8, 0.3, 0.2])).casts_shadow = false;
     list.add_sphere(Point3::new(0.0, 0.0, 0.25), 0.25, UnitQuaternion::identity(), Material::billiard_ball(11));
+    list.textures.push(std::sync::Arc::new(Image { width: 2, height: 1, rgba: vec![255; 8] }));
+    let worn = Material { texture: Some(Texture { id: 0, repeat_m: 0.25 }), metallic: 1.0, ..Material::walnut() };
+    list.add_capsule(Isometry3::translation(0.0, 2.0, 1.0), 0.5, 0.125, worn).casts_shadow = false;
+    let square = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
+    let sign = list.add_mesh(MeshData::from_unwrapped(&square, &[[0, 1, 2]], &[[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]], 0.0).expect("a triangle"));
+    list.add_instance(sign, Isometry3::identity(), Material { texture: Some(Texture { id: 0, repeat_m: 1.0 }), ..Material::unlit([1.0; 3]) }).scale.z = 2.0;
     list.arrow(Point3::origin(), Vector3::z(), DebugStyle::new([1.0, 0.0, 0.0]).on_top());
     list.line(Point3::origin(), Point3::new(1.0, 2.0, 3.0), DebugStyle::new([0.0, 1.0, 0.0]));
     list.point(Point3::new(0.12345678, 0.0, 0.0), DebugStyle::new([0.0, 0.0, 1.0]).width(8.0));
@@ -17,6 +25,8 @@ fn sample() -> DrawList {
     list.lights.push(Light::sun(Vector3::new(0.0, 0.0, -1.0), 2.0));
     list.lights.push(Light::lamp(Point3::new(0.0, 0.0, 3.0), 1.0, 2.0));
     list.ground = Some(Ground::grid(0.0));
+    "fast,reflections=off,map=512".parse::<Quality>().expect("a quality").apply(&mut list.settings);
+    list.sky = Sky { backdrop: Some([0.1, 0.2, 0.3]), ..Sky::hall() };
     list
 }
 
@@ -24,14 +34,18 @@ fn sample() -> DrawList {
 fn text_form_is_stable_and_rounded() {
     let expected = "\
 camera: eye (4 -4 3) target (0 0 0) up (0 0 1) fov 0.6981 near 0.05 far 500
-settings: exposure 1 shadow map 2048 occlusion auto tone map true shadows soft samples 4
-sky: zenith (0.42 0.53 0.68) horizon (0.8 0.84 0.88) ground (0.42 0.4 0.38) ambient 1 softbox 0 backdrop none
+settings: exposure 1 shadow map 512 occlusion 0 tone map true shadows hard samples 1 reflections false
+sky: zenith (0.27 0.25 0.24) horizon (0.33 0.3 0.28) ground (0.22 0.19 0.17) ambient 2.4 softbox 5 backdrop (0.1 0.2 0.3)
 ground: height 0 reach 60 color (0.6 0.61 0.63) rough 0.9 metal 0 coat 0 pattern grid (0.46 0.47 0.49) (1 0.02)
 light 0: directional along (0 0 -1) color (1 0.97 0.92) intensity 2 radius 0.02 rad
 light 1: point at (0 0 3) color (1 0.95 0.87) intensity 4 radius 0.1
 mesh 0: 24 vertices 12 triangles from (-0.5 -0.5 -0.5) to (0.5 0.5 0.5)
+mesh 1: 3 vertices 1 triangles from (0 0 0) to (2 2 0) unwrapped
+texture 0: 2 x 1
 instance 0: mesh 0 at (1 0 0.5) turned (0 0 0 1) scale (1 1 1) color (0.8 0.3 0.2) rough 0.45 metal 0 coat 0 no shadow
+instance 1: mesh 1 at (0 0 0) turned (0 0 0 1) scale (1 1 2) color (1 1 1) rough 0.45 metal 0 coat 0 unlit texture 0 every 1
 sphere 0: at (0 0 0.25) radius 0.25 turned (0 0 0 1) color (0.82 0.08 0.07) rough 0.25 metal 0 coat 1 pattern ball (0 0 0) (11 1)
+capsule 0: at (0 2 1) turned (0 0 0 1) half length 0.5 radius 0.125 color (0.42 0.25 0.14) rough 0.5 metal 1 coat 0.2 pattern wood (0.2 0.1 0.05) (0.012 0) texture 0 every 0.25 no shadow
 arrow 0: from (0 0 0) to (0 0 1) color (1 0 0) opacity 1 width 2 on top
 line 1: from (0 0 0) to (1 2 3) color (0 1 0) opacity 1 width 2
 point 0: at (0.1235 0 0) color (0 0 1) opacity 1 width 8
@@ -218,4 +232,20 @@ fn islands_have_a_colour_each_and_joints_their_axes() {
     assert!((along.y.abs() - 1.0).abs() < 1e-6, "{along}");
     // three axes for each of the six parts that are drawn
     assert_eq!(list.lines.len() - 1, 18);
+}
+
+#[test]
+fn what_stands_still_is_told_from_what_moves() {
+    let text = "[[body]]\nname = \"ground\"\nmode = \"static\"\nshape = { type = \"half_space\" }\nvisible = false\n[[body]]\nname = \"lies\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [0, 0, 0.5]\n\
+        [[body]]\nname = \"falls\"\nmass_kg = 1\nshape = { type = \"sphere\", radius_m = 0.5 }\nposition_m = [3, 0, 50]\n\
+        [[body]]\nname = \"stands\"\nmode = \"static\"\nshape = { type = \"capsule\", radius_m = 0.5, length_m = 1 }\nposition_m = [6, 0, 1]\ncolor = \"#00ff00\"\n";
+    let scene = SceneFile::parse(text, "s.toml").unwrap_or_else(|e| panic!("{e}"));
+    let (mut world, _) = scene.build().unwrap();
+    (0..60).for_each(|_| {
+        world.step().unwrap();
+    });
+    let list = Drawing::new(&scene).list(&world, &"resting".parse().unwrap()).unwrap();
+    let [box_, ball, capsule] = [list.instances[0].material.color, list.spheres[0].material.color, list.capsules[0].material.color];
+    // blue-grey, orange, and as it is
+    assert!(box_[2] > box_[0] && ball[0] > 2.0 * ball[2] && capsule == [0.0, 1.0, 0.0], "{box_:?} {ball:?} {capsule:?}");
 }

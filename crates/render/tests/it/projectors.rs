@@ -147,6 +147,29 @@ fn flips_mirror_the_finished_picture() {
     assert_ne!(plain, across);
 }
 
+/// Mirrors are for projectors behind the screen: each eye's picture is mirrored in its own half, and stays with its eye.
+#[test]
+fn each_eye_is_mirrored_in_its_own_place() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut list = ball();
+    list.add_sphere(Point3::new(0.8, 4.0, 1.6), 0.3, nalgebra::UnitQuaternion::identity(), Material::unlit([0.2, 0.9, 0.4]));
+    let mut draw = |stereo: &str, flip: &str| {
+        let view = CaveView::new(cave(&format!("stereo = \"{stereo}\"\nflip = \"{flip}\"")), &empty_scene()).unwrap();
+        view.draw(&mut renderer, &list, &view.cave().facets[0]).unwrap()
+    };
+    for (stereo, eyes) in [("side_by_side", vec![[0, 0], [100, 0]]), ("top_bottom", vec![[0, 0], [0, 100]]), ("anaglyph", vec![[0, 0]])] {
+        let plain = draw(stereo, "none");
+        for (flip, across, upward) in [("horizontal", true, false), ("vertical", false, true), ("both", true, true)] {
+            let mirrored = draw(stereo, flip);
+            assert_ne!(plain, mirrored, "{stereo}, {flip}");
+            for (&[x0, y0], (x, y)) in eyes.iter().flat_map(|eye| (0..10_000).map(move |i| (eye, (i % 100, i / 100)))) {
+                let there = [x0 + if across { 99 - x } else { x }, y0 + if upward { 99 - y } else { y }];
+                assert_eq!(plain.pixel(x0 + x, y0 + y), mirrored.pixel(there[0], there[1]), "{stereo}, {flip}: {x} {y} of the eye at {x0} {y0}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_scene_puts_its_cave_and_scales_it() {
     // a quarter turn to the left and doubled: the cave's y is the world's -x

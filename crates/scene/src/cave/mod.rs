@@ -22,13 +22,15 @@ mod facet;
 mod parts;
 mod settings;
 mod shipped;
+mod tracker;
 
 pub use checks::{Gap, SQUARE_TOLERANCE, gaps};
 pub use error::CaveError;
 pub use facet::{Facet, Flip, Output, Stereo};
-pub use parts::{Node, Screen, User};
+pub use parts::{LAUNCH_WORDS, Node, Screen, User};
 pub use settings::{Mode, Recording, Security, Sync, Transport};
 pub use shipped::{CaveSource, ShippedCave, resolve_cave, shipped_caves};
+pub use tracker::{Axes, TRACKER_PORT, Tracker};
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -70,6 +72,8 @@ pub struct Cave {
     pub security: Option<Security>,
     /// `[recording]`.
     pub recording: Option<Recording>,
+    /// `[tracker]`.
+    pub tracker: Option<Tracker>,
 }
 
 impl Cave {
@@ -126,9 +130,10 @@ impl Cave {
         let sync = read_table(&mut f, "sync", Sync::read).unwrap_or_default();
         let security = read_table(&mut f, "security", |table| Security::read(table, folder)).flatten();
         let recording = read_table(&mut f, "recording", |table| Recording::read(table, folder)).flatten();
+        let tracker = read_table(&mut f, "tracker", |table| Tracker::read(table, &users));
         let place = f.value("sync").map_or(0..0, |value| value.span());
         f.finish();
-        let cave = Cave { file: file_name.to_owned(), description, users, screens, nodes, facets, sync, security, recording };
+        let cave = Cave { file: file_name.to_owned(), description, users, screens, nodes, facets, sync, security, recording, tracker };
         if log.count() == 0 {
             settings::check_reach(&cave, log, &place);
         }

@@ -123,9 +123,15 @@ pub struct Node {
     pub name: String,
     /// An IP address, or a host name.
     pub address: String,
-    /// UDP port on which it listens, 1 to 65535. Default 47100.
-    pub port: u16,
+    /// The command, word by word, that starts a facet there; none where that is done by hand. In its words stand [`LAUNCH_WORDS`].
+    pub launch: Vec<String>,
 }
+
+/// What may stand in braces in the words of `launch`. `{arguments}`, a word by itself, stands for all words that follow `tumble`; `{line}` for the same as one
+/// text that a shell takes.
+pub const LAUNCH_WORDS: [&str; 5] = ["address", "node", "facet", "arguments", "line"];
+/// Most words of a launch command.
+const MOST_WORDS: usize = 64;
 
 impl Node {
     pub(crate) fn read(mut f: Fields<'_>) -> Option<Node> {
@@ -133,17 +139,38 @@ impl Node {
         let address = f.text("address", "an IP address or a host name, such as \"127.0.0.1\"");
         if let Some((text, value)) = address.filter(|(text, _)| !is_address(text)) {
             let port = text.rsplit_once(':').is_some_and(|(host, port)| is_address(host) && port.parse::<u16>().is_ok());
-            f.wrong("address", value, if port { "an address without its port; that is `port`" } else { "an IP address or a host name" });
+            f.wrong("address", value, if port { "an address without a port; the server's is `port` of [sync]" } else { "an IP address or a host name" });
         }
-        let port = f.integer_or("port", 1..=65535, 47100);
+        let launch = read_launch(&mut f);
         f.finish();
-        Some(Node { name, address: address.map_or(String::new(), |(text, _)| text.to_owned()), port: port as u16 })
+        Some(Node { name, address: address.map_or(String::new(), |(text, _)| text.to_owned()), launch })
     }
 
     /// Whether it is this machine by its address: 127.x.x.x, ::1 or `localhost`.
     pub fn is_local(&self) -> bool {
         self.address == "localhost" || self.address.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
     }
+}
+
+fn read_launch(f: &mut Fields<'_>) -> Vec<String> {
+    let wanted = "the words of a command, such as [\"ssh\", \"{address}\", \"tumble {line}\"]";
+    let place = f.value("launch");
+    let words: Vec<String> = f.list("launch", MOST_WORDS, wanted).into_iter().filter_map(|item| f.as_text("launch", item)).map(str::to_owned).collect();
+    let Some(place) = place else { return words };
+    let unknown = words.iter().find_map(|word| braces(word).find(|inside| !LAUNCH_WORDS.contains(inside)));
+    if let Some(unknown) = unknown {
+        f.wrong("launch", place, format!("none but {{{}}} in braces; there is no {{{unknown}}}", LAUNCH_WORDS.join("}, {")));
+    } else if words.iter().any(|word| word.contains("{arguments}") && word != "{arguments}") {
+        f.wrong("launch", place, "{arguments} as a word by itself; within a word it is {line}");
+    } else if words.first().is_none_or(|word| word.is_empty()) || !words.iter().any(|word| word == "{arguments}" || word.contains("{line}")) {
+        f.wrong("launch", place, format!("{wanted}, with {{arguments}} or {{line}} among them"));
+    }
+    words
+}
+
+/// What stands in braces in a text.
+fn braces(text: &str) -> impl Iterator<Item = &str> {
+    text.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(inside, _)| inside))
 }
 
 /// An IP address, or a host name: letters, digits, hyphens, and dots between them.

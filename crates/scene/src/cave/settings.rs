@@ -33,6 +33,8 @@ const MODES: Names<Mode> = &[("lockstep", Mode::Lockstep), ("latest", Mode::Late
 pub struct Sync {
     /// Default `shared_memory`.
     pub transport: Transport,
+    /// UDP port at which the server listens where a node is another machine, 1 to 65535. Default 47 100.
+    pub port: u16,
     /// Default `lockstep`.
     pub mode: Mode,
     /// How long the start waits for facets, ms, 1 to 600 000. Default 10 000.
@@ -49,6 +51,7 @@ impl Default for Sync {
     fn default() -> Self {
         Sync {
             transport: Transport::SharedMemory,
+            port: 47_100,
             mode: Mode::Lockstep,
             connect_timeout_ms: 10_000,
             ready_timeout_ms: 100,
@@ -63,6 +66,7 @@ impl Sync {
         let usual = Sync::default();
         let sync = Sync {
             transport: f.choice_or("transport", TRANSPORTS, usual.transport),
+            port: f.integer_or("port", 1..=65_535, usual.port.into()) as u16,
             mode: f.choice_or("mode", MODES, usual.mode),
             connect_timeout_ms: f.integer_or("connect_timeout_ms", 1..=600_000, usual.connect_timeout_ms),
             ready_timeout_ms: f.integer_or("ready_timeout_ms", 1..=60_000, usual.ready_timeout_ms),

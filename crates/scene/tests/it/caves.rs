@@ -86,7 +86,10 @@ fn nothing_leaves_the_machine_without_a_key() {
     let cave = Cave::parse(&format!("{SMALL}{far}[sync]\ntransport = \"udp\"\n[security]\nkey_file = \"wall.key\"\n"), "walls/my.toml").unwrap();
     assert_eq!(cave.security.unwrap().key_file, std::path::Path::new("walls/wall.key"));
     let (_, message) = problem(&format!("{SMALL}[[node]]\nname = \"n\"\naddress = \"10.0.0.7:99\"\n"));
-    assert!(message.contains("an address without its port"), "{message}");
+    assert!(message.contains("an address without a port"), "{message}");
+    let (_, message) = problem(&format!("{SMALL}[[node]]\nname = \"n\"\naddress = \"127.0.0.1\"\nport = 47100\n"));
+    assert!(message.contains("unknown key `port` in node \"n\""), "nodes listen nowhere; the server does: {message}");
+    assert_eq!(Cave::parse(&format!("{SMALL}[sync]\nport = 5000\n"), "my.toml").unwrap().sync.port, 5000);
 }
 
 #[test]
@@ -258,6 +261,7 @@ fn schema_and_parser_know_the_same_keys() {
         (format!("{SMALL}[sync]\n{odd}"), "sync", "sync", vec![]),
         (format!("{SMALL}[security]\nkey_file = \"k\"\n{odd}"), "security", "security", vec!["key_file"]),
         (format!("{SMALL}[recording]\nfile = \"k\"\n{odd}"), "recording", "recording", vec!["file"]),
+        (format!("{SMALL}[tracker]\n{odd}"), "tracker", "tracker", vec![]),
     ];
     for (text, called, name, present) in tables {
         let rule = if name.is_empty() { &schema } else { &schema["$defs"][name] };

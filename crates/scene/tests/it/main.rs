@@ -3,7 +3,9 @@
 mod articulated;
 mod articulated_world;
 mod bad_input;
+mod cave_devices;
 mod caves;
+mod contacts;
 mod expansion;
 mod finding;
 mod pinocchio;

@@ -36,6 +36,18 @@ fn articulated_bodies_cut_at_every_byte() {
     (0..text.len()).filter(|&end| text.is_char_boundary(end)).for_each(|end| read(&text[..end]));
 }
 
+/// A damping of 1e-320 had an infinite compliance, and stopped the first step.
+#[test]
+fn what_is_too_small_for_an_inverse_is_zero() {
+    let with = |damping: &str| articulated().replace("damping_n_m_s_per_rad = 0.001", &format!("damping_n_m_s_per_rad = {damping}"));
+    assert_ne!(with("0"), articulated());
+    let none = SceneFile::parse(&with("0"), "crane.toml").unwrap();
+    assert_eq!(SceneFile::parse(&with("1e-320"), "crane.toml").unwrap(), none);
+    assert_ne!(SceneFile::parse(&with("1e-299"), "crane.toml").unwrap(), none);
+    let error = SceneFile::parse(&articulated().replace("mass_kg = 30", "mass_kg = 1e-310"), "crane.toml").unwrap_err();
+    assert!(error.to_string().contains("mass_kg"), "{error}");
+}
+
 #[test]
 fn deep_nesting_and_long_lines() {
     read(&"[".repeat(100_000));

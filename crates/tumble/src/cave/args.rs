@@ -56,7 +56,7 @@ pub struct ServeOptions {
     /// What carries the frames (default: what the cave says).
     #[arg(long, value_name = "NAME")]
     pub transport: Option<Carrier>,
-    /// Where to listen with --transport udp (default: 127.0.0.1 and a free port, or every address and port 47100 where the cave has machines elsewhere).
+    /// Where to listen with --transport udp (default: 127.0.0.1 and a free port, or every address and the cave's port where it has machines elsewhere).
     #[arg(long, value_name = "ADDR:PORT")]
     pub listen: Option<SocketAddr>,
     /// How long the start waits for facets, s (default: connect_timeout_ms of the cave).
@@ -71,9 +71,19 @@ pub struct ServeOptions {
     /// Write what was counted and measured (JSON).
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
-    /// The users' bodies push what they walk into: an upright capsule of 0.25 m around each.
+    /// The users' bodies push what they walk into: an upright capsule of 0.25 m around each, and two hands.
     #[arg(long)]
     pub push: bool,
+    /// Hear a tracker (OSC over UDP) at this address; the rest is as [tracker] of the cave file says.
+    #[arg(long, value_name = "ADDR:PORT")]
+    pub tracker: Option<SocketAddr>,
+    /// Show the run to viewers of Foxglove (WebSocket; whoever reaches the address sees it).
+    #[cfg(feature = "foxglove")]
+    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
+    pub foxglove: Option<SocketAddr>,
+    /// Do again what users did in a recorded run, in place of what they do now; ends with the recording.
+    #[arg(long, value_name = "FILE", conflicts_with = "tracker")]
+    pub input_from: Option<PathBuf>,
     /// Say nothing but errors.
     #[arg(long, short)]
     pub quiet: bool,

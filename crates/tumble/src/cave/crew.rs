@@ -1,15 +1,17 @@
-//! The facets of a run as processes: those of this machine are started, watched and ended; of the others it is told how to start them.
+//! The facets of a run as processes: those of this machine, and those of nodes with a launch command, are started, watched and ended; of the others it is told
+//! how to start them.
 
 use super::args::{Carrier, CaveOptions, ServeOptions};
 use super::ends::{Address, seen_from};
 use super::stage::PREVIEW;
 use crate::failure::Failure;
 use std::collections::VecDeque;
+use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tumble::net::sync::Seat;
-use tumble::scene::cave::Cave;
+use tumble::scene::cave::{Cave, Node};
 
 /// How long facets may take to end by themselves after they were told, and again after their pipe was closed.
 const GRACE: Duration = Duration::from_secs(5);
@@ -28,7 +30,8 @@ pub struct Crew {
 
 struct Member {
     name: String,
-    args: Vec<String>,
+    /// Program and arguments.
+    command: Vec<OsString>,
     child: Option<Child>,
     ended: Option<Instant>,
     /// Ended for good: closed by the user, or too often.
@@ -63,14 +66,21 @@ impl Crew {
         let mut crew = Crew { members: Vec::new(), restart: launcher.is_some_and(|l| l.restart), quiet: serve.quiet };
         for (k, seat) in seats(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
             let far = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
+            let address = far.map_or_else(|| address.clone(), |node| seen_by(node, address));
             match (launcher, far) {
-                (Some(launcher), None) => crew.members.push(Member::new(&seat.name, led(launcher, &seat.name, address))),
+                (Some(launcher), None) => {
+                    let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
+                    let words = led(launcher, &seat.name, &address).into_iter().map(OsString::from);
+                    crew.members.push(Member::new(&seat.name, std::iter::once(program.into_os_string()).chain(words).collect()));
+                }
+                (Some(launcher), Some(node)) if !node.launch.is_empty() => {
+                    let words = launch(node, &seat.name, &led(launcher, &seat.name, &address));
+                    crew.say(&format!("facet {}: starting it on {}: {}", seat.name, node.name, words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" ")));
+                    crew.members.push(Member::new(&seat.name, words.into_iter().map(OsString::from).collect()));
+                }
                 (_, node) => {
-                    let server = match (address, node) {
-                        (Address::Udp(at), Some(node)) => {
-                            let ip = seen_from(&node.address, node.port).filter(|_| at.ip().is_unspecified()).unwrap_or(at.ip());
-                            format!(" --server {}", std::net::SocketAddr::new(ip, at.port()))
-                        }
+                    let server = match &address {
+                        Address::Udp(at) if node.is_some() => format!(" --server {at}"),
                         _ => String::new(),
                     };
                     let place = node.map_or("here".to_owned(), |n| format!("on {} ({})", n.name, n.address));
@@ -147,10 +157,10 @@ impl Crew {
 
     fn spawn(&mut self, k: usize) -> Result<(), Failure> {
         let member = &mut self.members[k];
-        let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
-        let mut command = Command::new(program);
+        // never empty: the program is this one, or the first word of a launch command
+        let mut command = Command::new(&member.command[0]);
         // a group of its own: Ctrl-C is for the launcher, who ends the run in order
-        command.args(&member.args).stdin(Stdio::piped()).stdout(Stdio::null()).process_group(0);
+        command.args(&member.command[1..]).stdin(Stdio::piped()).stdout(Stdio::null()).process_group(0);
         let child = command.spawn().map_err(|e| Failure::run(&format!("starting facet {}", member.name), e))?;
         (member.child, member.ended) = (Some(child), None);
         Ok(())
@@ -173,9 +183,27 @@ impl Drop for Crew {
 }
 
 impl Member {
-    fn new(name: &str, args: Vec<String>) -> Member {
-        Member { name: name.to_owned(), args, child: None, ended: None, over: false, failed: false, restarts: VecDeque::new() }
+    fn new(name: &str, command: Vec<OsString>) -> Member {
+        Member { name: name.to_owned(), command, child: None, ended: None, over: false, failed: false, restarts: VecDeque::new() }
     }
+}
+
+/// The server's address, as a node reaches it.
+fn seen_by(node: &Node, address: &Address) -> Address {
+    match *address {
+        Address::Udp(at) if at.ip().is_unspecified() => Address::Udp((seen_from(&node.address, at.port()).unwrap_or(at.ip()), at.port()).into()),
+        _ => address.clone(),
+    }
+}
+
+/// The launch command of a node, with everything filled in. The pipe that it holds as stdin ends with the launcher, and a facet behind it ends with the pipe.
+fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
+    let line = arguments.iter().map(|a| quoted(a)).collect::<Vec<_>>().join(" ");
+    let fill = |word: &String| match word.as_str() {
+        "{arguments}" => arguments.to_vec(),
+        _ => vec![word.replace("{address}", &node.address).replace("{node}", &node.name).replace("{facet}", facet).replace("{line}", &line)],
+    };
+    node.launch.iter().flat_map(fill).collect()
 }
 
 /// What a facet is started with.

@@ -39,15 +39,20 @@ impl FacetEnd {
     pub fn open(address: &Address, facet: FacetNumber, cave: &Cave) -> Result<FacetEnd, Failure> {
         let failed = |e: LinkError| Failure::run("the connection to the server", e);
         Ok(match address {
-            Address::Memory(run) => FacetEnd::Shm(Box::new(ShmFacet::new(run, facet).map_err(failed)?)),
+            Address::Memory(run) => FacetEnd::Shm(Box::new(ShmFacet::new(run, facet).map_err(failed)?.silent_after(silence(cave)))),
             Address::Udp(server) => FacetEnd::Udp(Box::new(UdpFacet::connect(*server, facet, key(cave)?, timing(cave)).map_err(failed)?)),
         })
     }
 }
 
 /// A link is given up no sooner than a facet is dropped.
+pub fn silence(cave: &Cave) -> Duration {
+    Duration::from_millis(cave.sync.drop_timeout_ms.into())
+}
+
+/// The same for datagrams.
 pub fn timing(cave: &Cave) -> Timing {
-    let silence = Duration::from_millis(cave.sync.drop_timeout_ms.into());
+    let silence = silence(cave);
     Timing { silence, ping: (silence / 8).min(Timing::default().ping), ..Timing::default() }
 }
 

@@ -7,7 +7,7 @@ use super::log::FrameLog;
 use super::painter::{Painter, image_hash, seat_name};
 use super::signals::Signals;
 use super::stage::Setting;
-use super::window::{Parts, has_desktop};
+use super::window::{Desktop, Parts, desktop};
 use crate::failure::Failure;
 use std::io::Read;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let number = described.as_ref().map_or(0, |facet| setting.cave.facets.iter().position(|f| f.name == facet.name).unwrap_or(0)) as FacetNumber;
     let name = seat_name(described.as_ref()).to_owned();
     let draw = &options.draw;
-    let offscreen = draw.offscreen || !has_desktop() || described.as_ref().is_some_and(|f| f.output == Output::Offscreen);
+    let offscreen = draw.no_pictures || draw.offscreen || described.as_ref().is_some_and(|f| f.output == Output::Offscreen) || no_desktop(&name);
     let (mut painter, mut parts) = (None, None);
     match (draw.no_pictures, offscreen) {
         (true, _) => {}
@@ -57,6 +57,16 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     // whatever happened, the server need not find out by silence
     let _ = running.facet.leave();
     outcome.and(running.log.as_mut().map_or(Ok(()), FrameLog::finish))
+}
+
+/// Whether there is none to open a window on; one that is named and does not answer is said.
+fn no_desktop(name: &str) -> bool {
+    match desktop() {
+        Desktop::There => return false,
+        Desktop::Silent(why) => eprintln!("facet {name}: draws into memory, because the desktop does not answer ({why})"),
+        Desktop::None => {}
+    }
+    true
 }
 
 /// What the session is told, as the cave file says.

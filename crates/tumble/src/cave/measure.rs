@@ -59,6 +59,11 @@ impl Spread {
         bucket.map_or(0.0, |k| LEAST_S * RATIO.powi(k as i32 + 1)).min(self.longest.0)
     }
 
+    /// All of it, if there is anything.
+    pub fn some(&self) -> Option<Figures> {
+        (self.count > 0).then(|| self.figures())
+    }
+
     /// All of it.
     pub fn figures(&self) -> Figures {
         let (longest, max_at_frame, max_at_s) = self.longest;

@@ -10,20 +10,26 @@
 //! The launcher is the server: what it prints about the facets it knows at first hand, and a cave of four facets is five processes.
 
 pub mod args;
+mod bodies;
 mod crew;
+mod devices;
 mod ends;
 mod facet;
 mod lock;
 mod log;
 mod measure;
+mod osc;
 mod painter;
+mod played;
 mod replay;
 mod serve;
 mod signals;
 mod stage;
 mod stamp;
 mod summary;
+mod tracker;
 mod users;
+mod viewers;
 mod window;
 
 use crate::failure::Failure;
@@ -47,8 +53,9 @@ pub fn facet(options: &FacetOptions) -> Result<(), Failure> {
 /// The facets of a cave, driven from a recording.
 pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let serve = &options.cave.serve;
-    if serve.record.is_some() || serve.push || serve.dt.is_some() || serve.stepper.is_some() || serve.solver.is_some() {
-        return Err(Failure::input("a replay shows what was recorded; --record, --push, --dt, --stepper and --solver go with tumble cave"));
+    let users = serve.push || serve.tracker.is_some() || serve.input_from.is_some();
+    if serve.record.is_some() || users || serve.dt.is_some() || serve.stepper.is_some() || serve.solver.is_some() {
+        return Err(Failure::input("a replay shows what was recorded; --record, --push, --tracker, --input-from, --dt, --stepper and --solver go with tumble cave"));
     }
     serve::run(serve, Some(&options.cave), Some(&options.file))
 }

@@ -2,13 +2,15 @@
 
 use super::args::{Carrier, CaveOptions, ServeOptions};
 use super::crew::{Crew, Crewed, carrier, seats};
-use super::ends::{Address, ServerEnd, key, timing};
+use super::devices::Devices;
+use super::ends::{Address, ServerEnd, key, silence, timing};
 use super::lock::{Lock, Run};
 use super::replay::Tape;
 use super::signals::Signals;
 use super::stage::Setting;
-use super::summary::{Meter, Status, Summary, skew};
+use super::summary::{Meter, Status, Summary, refused};
 use super::users::Users;
+use super::viewers::Viewers;
 use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -17,13 +19,12 @@ use tumble::core::World;
 use tumble::net::record::RecorderOptions;
 use tumble::net::sync::shm::{ShmServer, clean_up};
 use tumble::net::sync::udp::{Entropy, UdpServer};
-use tumble::net::sync::{Pace, Seat, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder};
+use tumble::net::sync::transport::FacetNumber;
+use tumble::net::sync::{Input, Pace, Seat, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder};
 use tumble::scene::cave::{Cave, Mode};
 
 /// Between two looks at signals and processes while nothing happens.
 const TURN: Duration = Duration::from_millis(20);
-/// The port where a cave of several machines is served.
-const PORT: u16 = 47_100;
 
 /// Runs a scene in a cave, or shows a recording of one; with a launcher's options, also the facets of this machine.
 pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
@@ -45,7 +46,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     let count = seats.len() as u16;
     let failed = |e| Failure::run("the server", e);
     let end = match carrier(options, &setting.cave) {
-        Carrier::SharedMemory => ServerEnd::Shm(Box::new(ShmServer::new(&name, count).map_err(failed)?)),
+        Carrier::SharedMemory => ServerEnd::Shm(Box::new(ShmServer::new(&name, count).map_err(failed)?.silent_after(silence(&setting.cave)))),
         Carrier::Udp => {
             let server = UdpServer::bind(listen(options, &setting.cave), count, key, timing(&setting.cave)).map_err(failed)?;
             run.address = Address::Udp(server.address().map_err(failed)?);
@@ -57,8 +58,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     let shared_memory = matches!(end, ServerEnd::Shm(_));
     let server = Server::new(end, told(options, &setting, number, &seats), &setting.world);
     let mut crew = Crew::start(options, &setting.cave, launcher, &run.address)?;
-    let log_dir = launcher.and_then(|l| l.draw.frames_dir.clone().or(l.draw.log_dir.clone()));
-    let outcome = Host::new(options, setting, server, seats, &signals, (log_dir, tape)).and_then(|mut host| {
+    let outcome = Host::new(options, setting, server, seats, &signals, tape).and_then(|mut host| {
         let outcome = host.show(&mut crew);
         let ended = host.end(&mut crew);
         outcome.and(ended)
@@ -74,7 +74,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
 
 fn listen(options: &ServeOptions, cave: &Cave) -> SocketAddr {
     let far = cave.nodes.iter().any(|n| !n.is_local());
-    let usual = if far { (Ipv4Addr::UNSPECIFIED, PORT) } else { (Ipv4Addr::LOCALHOST, 0) };
+    let usual = if far { (Ipv4Addr::UNSPECIFIED, cave.sync.port) } else { (Ipv4Addr::LOCALHOST, 0) };
     options.listen.unwrap_or(usual.into())
 }
 
@@ -103,6 +103,8 @@ struct Host<'a> {
     server: Server<ServerEnd>,
     world: World,
     users: Users,
+    devices: Devices,
+    viewers: Viewers,
     recorder: Option<(SessionRecorder, PathBuf)>,
     recorded: bool,
     cave: Cave,
@@ -111,7 +113,6 @@ struct Host<'a> {
     seats: Vec<Seat>,
     meter: Meter,
     status: Status,
-    log_dir: Option<PathBuf>,
     /// What is shown, where nothing is simulated.
     tape: Option<Tape>,
     time_s: f64,
@@ -122,20 +123,21 @@ struct Host<'a> {
 
 impl<'a> Host<'a> {
     fn new(
-        options: &'a ServeOptions, setting: Setting, server: Server<ServerEnd>, seats: Vec<Seat>, signals: &'a Signals,
-        (log_dir, tape): (Option<PathBuf>, Option<Tape>),
+        options: &'a ServeOptions, setting: Setting, server: Server<ServerEnd>, seats: Vec<Seat>, signals: &'a Signals, tape: Option<Tape>,
     ) -> Result<Host<'a>, Failure> {
         let viewer = setting.viewer()?;
         let Setting { scene, cave, mut world, hash, .. } = setting;
-        let users = Users::new(viewer, &mut world, options.push)?;
+        let users = Users::new(viewer, &cave, &mut world, options.push)?;
+        let devices = Devices::open(options, &cave, hash, tape.is_none())?;
+        let viewers = Viewers::open(options)?;
         let described = cave.recording.as_ref().filter(|_| tape.is_none()).map(|r| (r.file.clone(), r.every_frames));
         let recorder = options.record.clone().map(|file| (file, 1)).or(described).map(|(file, every)| {
             let recorder = SessionRecorder::create(&file, &scene.file, hash, &world, every, RecorderOptions::default());
             recorder.map(|r| (r, file)).map_err(|e| Failure::run("recording", e))
         });
         Ok(Host {
-            options, signals, server, world, users, recorder: recorder.transpose()?, recorded: false, cave, scene: scene.file, seconds: options.seconds,
-            meter: Meter::new(seats.len()), seats, status: Status::new(options.quiet), log_dir, tape, time_s: 0.0, began: Instant::now(), behind_s: 0.0, frames: 0,
+            options, signals, server, world, users, devices, viewers, recorder: recorder.transpose()?, recorded: false, cave, scene: scene.file, seconds: options.seconds,
+            meter: Meter::new(seats.len()), seats, status: Status::new(options.quiet), tape, time_s: 0.0, began: Instant::now(), behind_s: 0.0, frames: 0,
         })
     }
 
@@ -155,7 +157,7 @@ impl<'a> Host<'a> {
             if !self.publish(frame, steps)? {
                 return Ok(());
             }
-            if last == Some(frame) || self.signals.end() {
+            if last.map_or(self.devices.over(), |last| last == frame) || self.signals.end() {
                 return Ok(());
             }
             match crew.watch(false)? {
@@ -211,6 +213,9 @@ impl<'a> Host<'a> {
     fn publish(&mut self, frame: u64, steps: u32) -> Result<bool, Failure> {
         let recorded = self.tape.as_mut().map(Tape::next).transpose()?;
         if recorded.is_none() && frame > 0 {
+            // what came since the last frame counts in this one
+            self.take_events(self.time_s);
+            self.devices.tracked().into_iter().for_each(|(from, input)| self.take_input(from, input));
             self.simulate(frame, steps)?;
         }
         let clock = Instant::now();
@@ -223,6 +228,7 @@ impl<'a> Host<'a> {
             None => {
                 self.server.frame(&self.world, &self.users.viewer).map_err(failed)?;
                 self.time_s = self.world.time();
+                self.viewers.frame(&self.world);
             }
         }
         self.meter.barrier.add(clock.elapsed().as_secs_f64(), frame, self.time_s);
@@ -233,6 +239,9 @@ impl<'a> Host<'a> {
             recorder.frame(&self.world, recorded).map_err(|e| Failure::run("recording", e))?;
             self.recorded = true;
         }
+        let session = self.server.session();
+        let played = self.devices.after(|| session.recorded(false))?;
+        played.into_iter().for_each(|(from, input)| self.take_input(from, input));
         self.take_events(self.time_s);
         self.status.at(&self.server, &self.seats, &self.meter, frame, self.time_s);
         Ok(true)
@@ -251,7 +260,8 @@ impl<'a> Host<'a> {
     }
 
     fn take_events(&mut self, time_s: f64) {
-        let events = self.server.events();
+        let mut events = self.server.events();
+        events.retain(|event| self.devices.live() || !matches!(event, ServerEvent::Input(..)));
         if let Some((recorder, _)) = &mut self.recorder {
             recorder.events(&events);
         }
@@ -272,9 +282,21 @@ impl<'a> Host<'a> {
                 eprintln!("{said}");
                 self.status.interrupted();
             }
-            if let ServerEvent::Input(_, input) = event {
-                self.users.take(input, time_s);
+            if let ServerEvent::Input(from, input) = event {
+                self.users.take(from, input, time_s);
             }
+        }
+    }
+
+    /// What a user did by another device than a facet's window.
+    fn take_input(&mut self, from: FacetNumber, input: Input) {
+        self.server.note_input(input.user, input.sequence);
+        let event = ServerEvent::Input(from, input);
+        if let Some((recorder, _)) = &mut self.recorder {
+            recorder.events(std::slice::from_ref(&event));
+        }
+        if let ServerEvent::Input(from, input) = event {
+            self.users.take(from, input, self.time_s);
         }
     }
 
@@ -300,8 +322,13 @@ impl<'a> Host<'a> {
                 simulation: self.meter.step.figures(),
                 barrier: self.meter.barrier.figures(),
                 frame: self.meter.frame.figures(),
-                skew: self.log_dir.as_ref().and_then(|folder| skew(folder, &self.seats)),
+                skew: self.meter.skew.some(),
+                input_to_picture: self.meter.input.some(),
                 replay: self.tape.as_ref().map(|tape| tape.counts),
+                input_from: self.devices.played_counts(),
+                tracker: self.devices.tracker_counts(),
+                heads_refused: self.users.heads_refused,
+                strangers: refused(&self.server.strangers()),
                 facets: self.meter.facets(&self.server, &self.seats),
             };
             if !self.options.quiet {

@@ -1,16 +1,14 @@
 //! What a run counted and measured: lines while it runs, a few at its end, and all of it as JSON.
 
 use super::ends::ServerEnd;
-use super::log::Line;
 use super::measure::{Figures, Spread};
 use super::replay::Counts;
-use super::stage::facet_folder;
+use super::{osc, played};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
-use std::path::Path;
 use std::time::{Duration, Instant};
-use tumble::net::sync::transport::{FacetNumber, Refused};
+use tumble::net::sync::transport::{FacetNumber, LinkCounters, Refused};
 use tumble::net::sync::{Seat, Server, ServerEvent, Standing};
 
 /// Between two reports.
@@ -25,9 +23,21 @@ pub struct Meter {
     pub barrier: Spread,
     /// From the beginning of one frame to the next.
     pub frame: Spread,
+    /// Between the first and the last facet to show a frame, by the server's clock.
+    pub skew: Spread,
+    /// From what a user did to the last facet that shows it.
+    pub input: Spread,
     /// By seat: from the arrival of a frame at the facet to the end of drawing it.
     draw: Vec<Spread>,
     last: Vec<(u64, f64)>,
+}
+
+/// Packets that a link refused, by reason.
+pub type Refusals = BTreeMap<&'static str, u64>;
+
+/// What a link refused.
+pub fn refused(link: &LinkCounters) -> Refusals {
+    Refused::ALL.iter().map(|&why| (why.name(), link.refused_for(why))).filter(|(_, n)| *n > 0).collect()
 }
 
 /// The whole summary. Units stand in the names.
@@ -46,10 +56,20 @@ pub struct Summary {
     pub simulation: Figures,
     pub barrier: Figures,
     pub frame: Figures,
-    /// Between the first and the last facet to show a frame, where facets of this machine wrote `frames.jsonl`.
+    /// Between the first and the last facet to show a frame, by the server's clock.
     pub skew: Option<Figures>,
+    /// From what a user did to the last facet that shows it; where users did anything.
+    pub input_to_picture: Option<Figures>,
     /// Of a replay: pictures, compared with those of the recording.
     pub replay: Option<Counts>,
+    /// Of inputs that were played.
+    pub input_from: Option<played::Counts>,
+    /// What came from a tracker.
+    pub tracker: Option<osc::Counts>,
+    /// Heads that were not followed, because an eye would be behind a screen or in it.
+    pub heads_refused: u64,
+    /// What was refused from who is no facet, by reason; reasons that never came are left out.
+    pub strangers: Refusals,
     pub facets: Vec<FacetSummary>,
 }
 
@@ -72,7 +92,7 @@ pub struct FacetSummary {
     pub bytes_in: u64,
     pub repeated: u64,
     /// What its link refused, by reason; reasons that never came are left out.
-    pub refused_packets: BTreeMap<&'static str, u64>,
+    pub refused_packets: Refusals,
 }
 
 impl Meter {
@@ -83,6 +103,12 @@ impl Meter {
 
     /// What facets answered.
     pub fn take(&mut self, event: &ServerEvent, time_s: f64) {
+        if let ServerEvent::Shown(shown) = event {
+            if shown.facets > 1 {
+                self.skew.add(shown.skew.as_secs_f64(), shown.frame, time_s);
+            }
+            shown.input.iter().for_each(|input| self.input.add(input.as_secs_f64(), shown.frame, time_s));
+        }
         let (ServerEvent::Ready(facet, frame, done, _) | ServerEvent::Presented(facet, frame, done, _)) = event else { return };
         let k = *facet as usize;
         if let (ServerEvent::Ready(..), Some(draw)) = (event, self.draw.get_mut(k)) {
@@ -98,11 +124,10 @@ impl Meter {
     pub fn facets(&self, server: &Server<ServerEnd>, seats: &[Seat]) -> Vec<FacetSummary> {
         let one = |(k, seat): (usize, &Seat)| {
             let (here, _, link) = server.counts(k as FacetNumber);
-            let refused_packets = Refused::ALL.iter().map(|&why| (why.name(), link.refused_for(why))).filter(|(_, n)| *n > 0).collect();
             FacetSummary {
                 name: seat.name.clone(), joined: here.joined, dropped: here.dropped, presented: here.presented, late: here.late, missing: here.missing,
                 duplicate: here.duplicate, stale: here.stale, torn: here.torn, refused: here.refused, mismatched: here.mismatched,
-                draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets,
+                draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets: refused(&link),
             }
         };
         seats.iter().enumerate().map(one).collect()
@@ -125,34 +150,38 @@ impl Summary {
         if let Some(skew) = &self.skew {
             text += &figures("facets showed a frame within", skew);
         }
+        if let Some(input) = &self.input_to_picture {
+            text += &figures("what users did was to be seen within", input);
+        }
         if let Some(Counts { same, different, not_compared }) = self.replay {
             text += &format!("pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n");
         }
+        if let Some(played) = &self.input_from {
+            text += &format!("{} inputs played: {} states as they were recorded, {} different\n", played.inputs, played.same, played.different);
+        }
+        if let Some(tracker) = &self.tracker {
+            text += &format!("tracker: {} messages taken in {} datagrams{}\n", tracker.taken, tracker.datagrams, reasons(", dropped", &tracker.dropped));
+        }
+        if self.heads_refused > 0 {
+            text += &format!("{} heads not followed: an eye would be behind a screen\n", self.heads_refused);
+        }
         for f in &self.facets {
             text += &format!(
-                "facet {}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times\n",
-                f.name, f.presented, f.late, f.missing, f.duplicate, f.stale, f.torn, f.mismatched, f.dropped
+                "facet {}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                f.name, f.presented, f.late, f.missing, f.duplicate, f.stale, f.torn, f.mismatched, f.dropped, reasons("; packets refused", &f.refused_packets)
             );
+        }
+        if !self.strangers.is_empty() {
+            text += &format!("from who is no facet{}\n", reasons(": packets refused", &self.strangers));
         }
         text
     }
 }
 
-/// How far apart facets of this machine showed the same frames, by their logs.
-pub fn skew(folder: &Path, seats: &[Seat]) -> Option<Figures> {
-    let mut shown: BTreeMap<u64, (u64, u64, usize, f64)> = BTreeMap::new();
-    for seat in seats {
-        let text = std::fs::read_to_string(facet_folder(folder, &seat.name).join("frames.jsonl")).ok()?;
-        for line in text.lines().filter_map(|line| serde_json::from_str::<Line>(line).ok()) {
-            let (first, last, count, _) = shown.entry(line.frame).or_insert((line.shown_unix_us, line.shown_unix_us, 0, line.time_s));
-            (*first, *last, *count) = ((*first).min(line.shown_unix_us), (*last).max(line.shown_unix_us), *count + 1);
-        }
-    }
-    let mut spread = Spread::default();
-    for (frame, (first, last, _, time_s)) in shown.iter().filter(|(_, (_, _, count, _))| *count == seats.len()) {
-        spread.add((last - first) as f64 * 1e-6, *frame, *time_s);
-    }
-    (spread.figures().count > 0).then(|| spread.figures())
+/// `; packets refused: 3 forged, 1 replayed`; nothing for nothing.
+fn reasons(what: &str, counts: &Refusals) -> String {
+    let each: Vec<String> = counts.iter().map(|(why, n)| format!("{n} {why}")).collect();
+    if each.is_empty() { String::new() } else { format!("{what}: {}", each.join(", ")) }
 }
 
 /// Lines while it runs: in place on a terminal, every few seconds elsewhere.
@@ -185,7 +214,9 @@ impl Status {
         }
         let per_s = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed.as_secs_f64();
         let mut text = if self.terminal && self.lines > 0 { format!("\x1b[{}A", self.lines) } else { String::new() };
-        text += &format!("\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms\n", per_s(frame, self.frame), 1e3 * meter.step.within(0.5));
+        let more = |what: &str, spread: &Spread| spread.some().map_or(String::new(), |f| format!(", {what} {:.2} ms", f.p50_ms));
+        let (skew, input) = (more("skew", &meter.skew), more("input to picture", &meter.input));
+        text += &format!("\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms{skew}{input}\n", per_s(frame, self.frame), 1e3 * meter.step.within(0.5));
         self.shown.resize(seats.len(), 0);
         for (k, seat) in seats.iter().enumerate() {
             let (counts, _, _) = server.counts(k as FacetNumber);

@@ -1,30 +1,35 @@
-//! The users in the world: where they look from, how keys move them, what their hands pull and their bodies push.
+//! The users in the world: where they look from, how keys and trackers move them, what their wands pull and their bodies push.
 //!
-//! Each user has at most one hand: the wand. While its first button is held, what the wand's ray meets first is pulled by a spring. A body, if asked for,
-//! is an upright capsule from the cave's floor to the head that follows the head and yields to nothing.
+//! Each user has at most one wand per device that sends its input. While its first button is held, what the wand's ray meets first is pulled by a spring.
+//! What pushes is in [`bodies`](super::bodies).
 
+use super::bodies::{Bodies, Hand};
 use crate::failure::Failure;
 use std::collections::BTreeMap;
-use tumble::collide::{Pose, Shape, Vec3};
-use tumble::core::{Mode, ObjectId, Pull, RigidBody, World, WorldError};
+use tumble::collide::{Pose, Vec3};
+use tumble::core::{ObjectId, Pull, World, WorldError};
+use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{Input, Viewer};
+use tumble::scene::cave::{Cave, Screen};
 
 /// Walking, metres of the cave per second, and turning, rad/s, while a key is held.
 const WALK_M_PER_S: f64 = 1.5;
 const TURN_RAD_PER_S: f64 = 1.0;
 /// Of the spring by which the wand pulls, rad/s.
 const PULL_RAD_PER_S: f64 = 10.0;
-/// Of a user's body, m.
-const RADIUS_M: f64 = 0.25;
 /// Input that was not renewed for so long counts no more, simulated s: who left lets go.
 const STALE_S: f64 = 1.0;
+/// An eye comes no nearer to the plane of a screen that is drawn for it, m.
+const NEAREST_M: f64 = 0.02;
 
 /// Keys by their USB HID usage.
 mod key {
     pub const A: u16 = 0x04;
     pub const D: u16 = 0x07;
     pub const E: u16 = 0x08;
+    pub const F: u16 = 0x09;
     pub const Q: u16 = 0x14;
+    pub const R: u16 = 0x15;
     pub const S: u16 = 0x16;
     pub const W: u16 = 0x1A;
     pub const RIGHT: u16 = 0x4F;
@@ -33,18 +38,28 @@ mod key {
     pub const UP: u16 = 0x52;
 }
 
+/// The keys that stretch out the left and the right hand.
+const REACH: [u16; 2] = [key::R, key::F];
+
+/// Who sent an input, and for which user.
+type Device = (FacetNumber, u16);
+
 /// All users.
 pub struct Users {
     /// As it is published.
     pub viewer: Viewer,
-    /// The newest input of each user, and when it came.
-    inputs: BTreeMap<u16, (Input, f64)>,
-    hands: BTreeMap<u16, Hand>,
-    bodies: Vec<ObjectId>,
+    /// Heads that were not followed, because an eye would be behind a screen or in it.
+    pub heads_refused: u64,
+    /// By user, the screens that are drawn for it.
+    screens: Vec<Vec<Screen>>,
+    /// The newest input of each device, and when it came.
+    inputs: BTreeMap<Device, (Input, f64)>,
+    held: BTreeMap<Device, Held>,
+    bodies: Bodies,
 }
 
 /// What a wand holds.
-struct Hand {
+struct Held {
     pull: Pull,
     /// From the wand's origin, along its ray, m.
     distance: f64,
@@ -52,52 +67,63 @@ struct Hand {
 
 impl Users {
     /// As the files place them; with bodies, if they are to push.
-    pub fn new(viewer: Viewer, world: &mut World, push: bool) -> Result<Users, Failure> {
-        let mut users = Users { viewer, inputs: BTreeMap::new(), hands: BTreeMap::new(), bodies: Vec::new() };
-        for k in 0..if push { users.viewer.users.len() } else { 0 } {
-            let (pose, half) = users.body_pose(k, users.half_length(k));
-            let shape = Shape::capsule(RADIUS_M * users.viewer.scale, half).map_err(|e| Failure::run("a user's body", e))?;
-            // not drawn: the user stands in it
-            let body = RigidBody::fixture(format!("user {k}"), shape).at(pose).drawn_as(Vec::new());
-            let id = world.add_boxed(Box::new(body), Mode::Kinematic).map_err(|e| Failure::run("a user's body", e))?;
-            users.bodies.push(id);
-        }
-        Ok(users)
+    pub fn new(viewer: Viewer, cave: &Cave, world: &mut World, push: bool) -> Result<Users, Failure> {
+        let drawn = |user: usize| cave.facets.iter().filter(|f| f.user == user).map(|f| cave.screens[f.screen].clone()).collect();
+        let screens = (0..viewer.users.len()).map(drawn).collect();
+        let bodies = if push { Bodies::add(&viewer, world)? } else { Bodies::default() };
+        Ok(Users { viewer, heads_refused: 0, screens, inputs: BTreeMap::new(), held: BTreeMap::new(), bodies })
     }
 
-    /// What a user did.
-    pub fn take(&mut self, input: Input, time_s: f64) {
+    /// What a user did, by a facet's window or another device.
+    pub fn take(&mut self, from: FacetNumber, input: Input, time_s: f64) {
         let Some(user) = self.viewer.users.get_mut(input.user as usize) else { return };
-        user.head = input.head.unwrap_or(user.head);
+        if let Some(head) = input.head {
+            let aside = 0.5 * user.interpupillary_m;
+            let eyes = [-aside, 0.0, aside].map(|x| head * nalgebra::Point3::new(x, 0.0, 0.0));
+            let screens = &self.screens[input.user as usize];
+            let seen = screens.iter().all(|screen| eyes.iter().all(|eye| screen.distance_m(eye) >= NEAREST_M));
+            if seen { user.head = head } else { self.heads_refused += 1 }
+        }
         user.input = input.sequence;
-        self.inputs.insert(input.user, (input, time_s));
+        self.inputs.insert((from, input.user), (input, time_s));
     }
 
     /// What users do to the world during the next step of `dt` seconds.
     pub fn act(&mut self, world: &mut World, dt: f64) -> Result<(), Failure> {
         let failed = |e: WorldError| Failure::run("what a user does", e);
         self.inputs.retain(|_, (_, since)| world.time() - *since < STALE_S);
-        let held: Vec<u16> = self.inputs.values().flat_map(|(input, _)| input.keys.iter().copied()).collect();
-        self.walk(&held, dt);
-        self.hands.retain(|user, _| self.inputs.get(user).is_some_and(|(input, _)| input.buttons & 1 == 1));
-        for (&user, (input, _)) in &self.inputs {
+        let keys: Vec<u16> = self.inputs.values().flat_map(|(input, _)| input.keys.iter().copied()).collect();
+        self.walk(&keys, dt);
+        self.held.retain(|device, _| self.inputs.get(device).is_some_and(|(input, _)| input.buttons & 1 == 1));
+        for (&device, (input, _)) in &self.inputs {
             let Some(wand) = input.wand.filter(|_| input.buttons & 1 == 1) else { continue };
             let (origin, direction) = (self.to_scene(&wand.translation.vector), self.viewer.cave.rotation * (wand.rotation * Vec3::y()));
-            if !self.hands.contains_key(&user)
-                && let Some(hand) = grasp(world, &origin, &direction)
+            if !self.held.contains_key(&device)
+                && let Some(held) = grasp(world, &self.bodies, &origin, &direction)
             {
-                self.hands.insert(user, hand);
+                self.held.insert(device, held);
             }
-            if let Some(hand) = self.hands.get_mut(&user) {
-                hand.pull.target = origin + direction * hand.distance;
-                world.pull(&hand.pull).map_err(failed)?;
+            if let Some(held) = self.held.get_mut(&device) {
+                held.pull.target = origin + direction * held.distance;
+                world.pull(&held.pull).map_err(failed)?;
             }
         }
-        for k in 0..self.bodies.len() {
-            let (pose, _) = self.body_pose(k, self.half_length(k));
-            world.move_to(self.bodies[k], pose).map_err(failed)?;
+        self.bodies.follow(&self.viewer, |user| self.hands(user), world, dt).map_err(failed)
+    }
+
+    /// Where a user's hands are wanted: as they are tracked, else as keys say.
+    fn hands(&self, user: usize) -> [Hand; 2] {
+        let mut hands = [Hand::Hanging; 2];
+        for (input, _) in self.inputs.values().filter(|(input, _)| input.user as usize == user) {
+            for (side, hand) in hands.iter_mut().enumerate() {
+                match input.hands[side] {
+                    Some(pose) => *hand = Hand::Tracked(pose),
+                    None if input.keys.contains(&REACH[side]) && *hand == Hand::Hanging => *hand = Hand::Stretched,
+                    None => {}
+                }
+            }
         }
-        Ok(())
+        hands
     }
 
     /// Keys move the whole cave: the users stay where they stand in it.
@@ -123,19 +149,6 @@ impl Users {
     fn to_scene(&self, point: &Vec3) -> Vec3 {
         (self.viewer.cave * nalgebra::Point3::from(point * self.viewer.scale)).coords
     }
-
-    /// Half the straight part of a user's capsule, from the floor to the head where that is high enough, m of the scene.
-    fn half_length(&self, user: usize) -> f64 {
-        let height = self.viewer.users[user].head.translation.z;
-        (0.5 * height - RADIUS_M).max(0.01) * self.viewer.scale
-    }
-
-    /// Where a user's capsule is wanted, and half its straight part.
-    fn body_pose(&self, user: usize, half: f64) -> (Pose, f64) {
-        let mut at = self.viewer.users[user].head.translation.vector;
-        at.z = half / self.viewer.scale + RADIUS_M;
-        (Pose::from_parts(self.to_scene(&at).into(), self.viewer.cave.rotation), half)
-    }
 }
 
 trait Renormalize {
@@ -149,10 +162,10 @@ impl Renormalize for Pose {
     }
 }
 
-/// Takes hold of the first thing on a ray, if it moves.
-fn grasp(world: &World, origin: &Vec3, direction: &Vec3) -> Option<Hand> {
+/// Takes hold of the first thing on a ray, if it moves. The users' own hands are not in the way.
+fn grasp(world: &World, bodies: &Bodies, origin: &Vec3, direction: &Vec3) -> Option<Held> {
     let mut first: Option<(ObjectId, usize, f64)> = None;
-    for &id in world.ids() {
+    for &id in world.ids().iter().filter(|id| !bodies.has(**id)) {
         let Some(renderable) = world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.alive)) else { continue };
         for visual in renderable.visuals() {
             let Some(site) = world.site(id, visual.part) else { continue };
@@ -167,5 +180,5 @@ fn grasp(world: &World, origin: &Vec3, direction: &Vec3) -> Option<Hand> {
     let site = world.site(id, part).filter(|_| moves)?;
     let target = origin + direction * distance;
     let point = site.pose.rotation.inverse() * (target - site.position());
-    Some(Hand { pull: Pull { id, part, point, target, frequency: PULL_RAD_PER_S }, distance })
+    Some(Held { pull: Pull { id, part, point, target, frequency: PULL_RAD_PER_S }, distance })
 }

@@ -1,6 +1,6 @@
 //! A facet in a window of its own, where its cave says; keys and mouse go to the server as a user's input.
 //!
-//! W A S D, Q E and the arrows move the cave, a body is pulled by the left button, escape ends the facet.
+//! W A S D, Q E and the arrows move the cave, R and F stretch out the left and the right hand (`--push`), a body is pulled by the left button, escape ends the facet.
 
 use super::facet::{Running, failed};
 use super::painter::{PREVIEW_PX, draw_list, seat_name};
@@ -8,6 +8,7 @@ use super::stage::{Setting, follow};
 use super::stamp;
 use crate::failure::Failure;
 use crate::view::sight::Sight;
+use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 use tumble::collide::Pose;
 use tumble::core::World;
@@ -22,9 +23,34 @@ const TURN: Duration = Duration::from_millis(8);
 /// Input that does not change is sent again after this time, since it goes stale.
 const AGAIN: Duration = Duration::from_millis(250);
 
-/// Whether there is a desktop to open windows on.
-pub fn has_desktop() -> bool {
-    ["WAYLAND_DISPLAY", "DISPLAY"].iter().any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()))
+/// What there is to open windows on.
+pub enum Desktop {
+    /// Nothing is named.
+    None,
+    /// Something is named that does not answer: what, and why.
+    Silent(String),
+    There,
+}
+
+/// Looks for it, as the window library will: Wayland where that is named, else X.
+pub fn desktop() -> Desktop {
+    let named = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let answer = match (named("WAYLAND_DISPLAY"), named("DISPLAY")) {
+        (Some(name), _) => {
+            let path = std::path::Path::new(&named("XDG_RUNTIME_DIR").unwrap_or_default()).join(&name);
+            UnixStream::connect(path).map(drop).map_err(|e| format!("WAYLAND_DISPLAY={name}: {e}"))
+        }
+        (None, Some(name)) if too_high(&name) => Err(format!("DISPLAY={name}: there is no such number")),
+        (None, Some(name)) => x11rb::connect(None).map(drop).map_err(|e| format!("DISPLAY={name}: {e}")),
+        (None, None) => return Desktop::None,
+    };
+    answer.map_or_else(Desktop::Silent, |()| Desktop::There)
+}
+
+/// Whether the number of a display has no port: that is 6000 more, and the library does not look.
+fn too_high(display: &str) -> bool {
+    let number = display.rsplit(':').next().and_then(|rest| rest.split('.').next()).and_then(|n| n.parse::<u32>().ok());
+    number.is_some_and(|n| n > 59_535)
 }
 
 /// What a facet shows itself by.
@@ -129,7 +155,7 @@ impl Window<'_> {
             return Ok(());
         }
         self.sequence += 1;
-        let input = Input { sequence: self.sequence, user: self.parts.user, head: None, wand, buttons, keys };
+        let input = Input { sequence: self.sequence, user: self.parts.user, head: None, wand, hands: [None; 2], buttons, keys };
         if self.running.facet.send_input(&input).map_err(failed)? {
             self.sent = Some((input, Instant::now()));
         }
@@ -204,7 +230,9 @@ fn usage(code: KeyCode) -> Option<u16> {
         KeyCode::KeyA => 0x04,
         KeyCode::KeyD => 0x07,
         KeyCode::KeyE | KeyCode::PageUp => 0x08,
+        KeyCode::KeyF => 0x09,
         KeyCode::KeyQ | KeyCode::PageDown => 0x14,
+        KeyCode::KeyR => 0x15,
         KeyCode::KeyS => 0x16,
         KeyCode::KeyW => 0x1A,
         KeyCode::ArrowRight => 0x4F,

@@ -9,6 +9,7 @@ mod overlays;
 mod pace;
 mod presets;
 pub mod sight;
+mod simulation;
 mod statistics;
 mod status;
 mod user;
@@ -20,7 +21,7 @@ use crate::shots::write_png;
 use sight::Sight;
 use tumble::render::{CaveView, RenderError, WindowOptions, run_window};
 use tumble::scene::cave::{Output, resolve_cave};
-use tumble::scene::{SceneFile, resolve_scene};
+use tumble::scene::SceneFile;
 use viewer::Viewer;
 
 /// Size of the window where nothing is said, pixels.
@@ -28,7 +29,7 @@ const USUAL: [u32; 2] = [1280, 720];
 
 /// Shows a scene until the window is closed.
 pub fn view(options: &ViewOptions) -> Result<(), Failure> {
-    let scene = described(options)?;
+    let scene = options.scene.load()?;
     let (world, notes) = scene.build().map_err(Failure::input)?;
     notes.iter().for_each(|note| eprintln!("{note}"));
     let sight = sight(&scene, options)?;
@@ -40,17 +41,6 @@ pub fn view(options: &ViewOptions) -> Result<(), Failure> {
         (Some(path), Some(image)) => write_png(&image, path),
         _ => Ok(()),
     }
-}
-
-/// The scene with what the command line says instead.
-fn described(options: &ViewOptions) -> Result<SceneFile, Failure> {
-    let mut scene = resolve_scene(&options.scene, &[])?.load()?;
-    let w = &mut scene.world;
-    w.dt_s = options.dt.unwrap_or(w.dt_s);
-    w.stepper = options.stepper.unwrap_or(w.stepper);
-    w.solver = options.solver.unwrap_or(w.solver);
-    w.integrator = options.integrator.unwrap_or(w.integrator);
-    Ok(scene)
 }
 
 fn sight(scene: &SceneFile, options: &ViewOptions) -> Result<Sight, Failure> {
@@ -70,7 +60,7 @@ fn sight(scene: &SceneFile, options: &ViewOptions) -> Result<Sight, Failure> {
 
 fn window(sight: &Sight, options: &ViewOptions) -> WindowOptions {
     let most = options.size.map_or(USUAL, |(w, h)| [w, h]);
-    let name = &options.scene;
+    let name = &options.scene.name;
     match sight {
         Sight::Camera => WindowOptions::new(format!("tumble: {name}"), most),
         Sight::Unfolded(view) => WindowOptions::new(format!("tumble: {name} in {}", view.cave().file), view.size_px(None, most)),

@@ -1,5 +1,7 @@
 //! Simulated time against the clock: how many steps are due, and what is given up when they take too long.
 
+use std::time::Duration;
+
 /// What of a pause between two turns counts at most, s: a window that was hidden or a machine that slept is not caught up with.
 const MOST_LATE_S: f64 = 1.0;
 /// Speeds, as powers of 2.
@@ -70,6 +72,15 @@ impl Pace {
         due
     }
 
+    /// Time of the clock until a step of `dt` seconds is due; long where none will be.
+    pub fn until(&self, dt: f64) -> Duration {
+        match (self.single > 0, self.paused) {
+            (true, _) => Duration::ZERO,
+            (false, true) => Duration::from_secs_f64(MOST_LATE_S),
+            (false, false) => Duration::from_secs_f64(((dt - self.owed_s) / self.speed()).clamp(0.0, MOST_LATE_S)),
+        }
+    }
+
     /// Steps took too long: what is still owed is given up, so that the next picture does not come later still.
     pub fn give_up(&mut self) {
         self.behind_s += self.owed_s;
@@ -107,6 +118,20 @@ mod tests {
         pace.toggle();
         assert!(!pace.paused);
         assert_eq!(steps(&mut pace, 0.01), 0, "what passed while it stood is not owed");
+    }
+
+    #[test]
+    fn the_next_step_is_due_when_the_clock_has_gone_on_by_what_is_missing() {
+        let mut pace = Pace::new(false);
+        pace.pass(0.25);
+        pace.change_speed(1);
+        // half a second is missing, at twice the speed
+        assert_eq!(pace.until(0.75), Duration::from_millis(250));
+        assert_eq!(pace.until(0.2), Duration::ZERO);
+        pace.step_once();
+        assert_eq!(pace.until(0.75), Duration::ZERO);
+        assert!(pace.take(0.75) && pace.paused);
+        assert_eq!(pace.until(0.75), Duration::from_secs(1), "nothing comes while time stands; a look a second does no harm");
     }
 
     #[test]

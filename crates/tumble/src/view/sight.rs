@@ -38,6 +38,17 @@ struct Tile {
 }
 
 impl Sight {
+    /// The body of whoever looks: an eye where the list's camera is, or the cave's user where his cave is.
+    pub fn body(&self, list: &DrawList) -> Body {
+        let (view, user) = match self {
+            Sight::Camera => return Body::Eye(list.camera),
+            Sight::Facet(view, facet) => (view, facet.user),
+            Sight::Unfolded(view) => (view, 0),
+        };
+        let user = &view.cave().users[user];
+        Body::Cave { place: *view.place(), eye_m: user.eye_m.into(), forward: user.forward.into() }
+    }
+
     /// Takes the cave to where the user is, or the list's camera to his eye.
     pub fn stand(&mut self, body: &Body, list: &mut DrawList) {
         match (self, body) {

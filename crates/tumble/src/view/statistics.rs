@@ -5,13 +5,32 @@ use std::time::{Duration, Instant};
 /// Figures are means over this time, so that they can be read.
 const OVER: Duration = Duration::from_millis(500);
 
+/// How often something was done, and how long it took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Meter {
+    count: u32,
+    seconds: f64,
+}
+
+impl Meter {
+    /// Once more.
+    pub fn add(&mut self, took: Duration) {
+        self.count += 1;
+        self.seconds += took.as_secs_f64();
+    }
+
+    /// Times per second over so many seconds, and the mean in ms; counts from zero again.
+    fn take(&mut self, over_s: f64) -> (f64, f64) {
+        let Meter { count, seconds } = std::mem::take(self);
+        (f64::from(count) / over_s, 1e3 * seconds / f64::from(count.max(1)))
+    }
+}
+
 /// What pictures and steps took.
 pub struct Statistics {
     since: Instant,
-    pictures: u32,
-    steps: u32,
-    drawing_s: f64,
-    stepping_s: f64,
+    /// Drawing pictures and handing them over.
+    pub pictures: Meter,
     /// Of the last time that was counted.
     pub shown: Figures,
 }
@@ -30,35 +49,19 @@ pub struct Figures {
 impl Statistics {
     /// From now on.
     pub fn new(now: Instant) -> Statistics {
-        Statistics { since: now, pictures: 0, steps: 0, drawing_s: 0.0, stepping_s: 0.0, shown: Figures::default() }
+        Statistics { since: now, pictures: Meter::default(), shown: Figures::default() }
     }
 
-    /// A picture that took so long to draw and hand over.
-    pub fn picture(&mut self, took: Duration) {
-        self.pictures += 1;
-        self.drawing_s += took.as_secs_f64();
-    }
-
-    /// A step.
-    pub fn step(&mut self, took: Duration) {
-        self.steps += 1;
-        self.stepping_s += took.as_secs_f64();
-    }
-
-    /// Whether there are new figures.
-    pub fn count(&mut self, now: Instant) -> bool {
+    /// Whether it is time for new figures; they are then made, with those of the steps.
+    pub fn count(&mut self, now: Instant, steps: &mut Meter) -> bool {
         let over = now - self.since;
         if over < OVER {
             return false;
         }
-        let (pictures, steps) = (f64::from(self.pictures), f64::from(self.steps));
-        self.shown = Figures {
-            pictures_per_s: pictures / over.as_secs_f64(),
-            steps_per_s: steps / over.as_secs_f64(),
-            drawing_ms: 1e3 * self.drawing_s / pictures.max(1.0),
-            step_ms: 1e3 * self.stepping_s / steps.max(1.0),
-        };
-        *self = Statistics { shown: self.shown, ..Statistics::new(now) };
+        let (pictures_per_s, drawing_ms) = self.pictures.take(over.as_secs_f64());
+        let (steps_per_s, step_ms) = steps.take(over.as_secs_f64());
+        self.shown = Figures { pictures_per_s, steps_per_s, drawing_ms, step_ms };
+        self.since = now;
         true
     }
 }

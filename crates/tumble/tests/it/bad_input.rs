@@ -110,6 +110,7 @@ fn bad_usage_is_told_apart_from_failure() {
         (&["run", "stack", "--size", "0x0"], "0x0"),
         (&["run", "stack", "--size", "99999999x99999999"], "99999999x99999999"),
         (&["run", "stack", "--size", "big"], "big"),
+        (&["run", "stack", "--size", "16384x16384"], "together at most 33554432"),
         (&["run", "stack", "--debug-draw", "ghosts"], "ghosts"),
         (&["run", "stack", "--speed", "3"], "--speed"),
         (&["run"], "SCENE"),
@@ -144,6 +145,8 @@ fn a_damaged_or_foreign_snapshot_is_bad_input() {
     let said = fail(&["run", "incline", "--seconds", "0.1", quiet, "--restore", &saved], 2);
     assert!(said.contains("another world") && said.contains("crate_1"), "{said}");
     fail(&["run", "stack", "--restore", "/nonexistent/state"], 2);
+    #[cfg(target_os = "linux")]
+    assert!(fail(&["run", "stack", "--restore", "/dev/zero"], 2).contains("larger than"), "what never ends is read to its end");
 }
 
 #[test]
@@ -155,4 +158,40 @@ fn what_cannot_be_written_is_a_failure_at_run_time() {
         let said = fail(&["run", "stack", "--seconds", "0.02", "--quiet", option, &below], 1);
         assert!(said.contains(&below), "{option}: {said}");
     }
+    // what is known is said before a run of eleven days begins
+    for option in ["--summary", "--save", "--picture", "--video"] {
+        let said = fail(&["run", "stack", "--seconds", "1e6", "--quiet", option, &text(&folder.path("."))], 1);
+        assert!(said.contains("it is a folder"), "{option}: {said}");
+        let said = fail(&["run", "stack", "--seconds", "1e6", "--quiet", option, "/nonexistent/out"], 1);
+        assert!(said.contains("there is no folder /nonexistent"), "{option}: {said}");
+    }
+}
+
+/// A full disk, by the device that Linux has for it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_a_failure_at_run_time() {
+    for option in ["--summary", "--record", "--save"] {
+        let said = fail(&["run", "stack", "--seconds", "0.02", "--quiet", option, "/dev/full"], 1);
+        assert!(said.contains("/dev/full") && said.contains("No space left"), "{option}: {said}");
+    }
+    for args in [&["run", "stack", "--seconds", "0.02"][..], &["scenes"], &["check", "stack"]] {
+        let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let out = command(args).stdout(full()).output().unwrap();
+        let said = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(1), "{args:?}: {said}");
+        assert!(said.contains("Error: stdout: No space left") && !said.contains("panicked"), "{args:?}: {said}");
+        assert!(command(args).stdout(full()).stderr(full()).output().unwrap().status.code() == Some(1), "{args:?}: nobody to tell");
+    }
+}
+
+/// Whoever reads may have enough before the end.
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    use std::io::Read;
+    let mut child = command(&["check", "stack", "billiards", "incline", "cube4"]).stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert_eq!((child.wait().unwrap().code(), said.as_str()), (Some(0), ""));
 }

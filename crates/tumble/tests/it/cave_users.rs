@@ -13,7 +13,7 @@ use tumble::net::sync::{Facet, FacetOptions, Input, Replay, Task};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A ball of 2 kg that floats at 1 m height, 2 m in front of the user, whose cave is the world's frame. Nothing else acts.
-const SCENE: &str = "description = \"A ball that floats\"
+pub const SCENE: &str = "description = \"A ball that floats\"
 [world]
 dt_s = 0.01
 gravity_m_per_s2 = [0, 0, 0]
@@ -26,7 +26,7 @@ position_m = [0, 2, 1]
 origin_m = [0, 0, 0]
 ";
 
-const CAVE: &str = "
+pub const CAVE: &str = "
 [[user]]
 name = \"u\"
 eye_m = [0, 0, 1.5]
@@ -46,9 +46,9 @@ drop_timeout_ms = 4000
 connect_timeout_ms = 60000
 ";
 
-struct Server {
+pub struct Server {
     child: Child,
-    facet: Facet<UdpFacet>,
+    pub facet: Facet<UdpFacet>,
     // what is said goes on being taken
     _stderr: BufReader<ChildStderr>,
     sequence: u64,
@@ -61,7 +61,7 @@ impl Drop for Server {
     }
 }
 
-fn place(test: &str) -> (Folder, String, String) {
+pub fn place(test: &str) -> (Folder, String, String) {
     let folder = Folder::new(test);
     let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", CAVE));
     use std::os::unix::fs::DirBuilderExt;
@@ -69,7 +69,7 @@ fn place(test: &str) -> (Folder, String, String) {
     (folder, scene, cave)
 }
 
-fn in_place(folder: &Folder, args: &[&str]) -> Command {
+pub fn in_place(folder: &Folder, args: &[&str]) -> Command {
     let mut command = command(args);
     command.env("XDG_RUNTIME_DIR", folder.path("run")).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
     command
@@ -85,7 +85,7 @@ fn scene_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
 }
 
 impl Server {
-    fn start(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> Server {
+    pub fn start(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> Server {
         let hash = scene_hash(folder, scene, cave);
         let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--fast"], args].concat()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
         let mut stderr = BufReader::new(child.stderr.take().unwrap());
@@ -102,7 +102,7 @@ impl Server {
     }
 
     /// Shows frames until one is numbered `frame` or more, and does this before each.
-    fn show_until(&mut self, frame: u64, mut doing: impl FnMut(&mut Input)) {
+    pub fn show_until(&mut self, frame: u64, mut doing: impl FnMut(&mut Input)) {
         let start = Instant::now();
         loop {
             assert!(start.elapsed() < PATIENCE, "frame {frame} did not come");
@@ -114,7 +114,7 @@ impl Server {
                 }
                 Task::Present(number) => {
                     self.sequence += 1;
-                    let mut input = Input { sequence: self.sequence, user: 0, head: None, wand: None, buttons: 0, keys: Vec::new() };
+                    let mut input = Input { sequence: self.sequence, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() };
                     doing(&mut input);
                     self.facet.send_input(&input).unwrap();
                     self.facet.presented().unwrap();
@@ -128,7 +128,36 @@ impl Server {
         }
     }
 
-    fn ball(&self) -> Vec3 {
+    /// Shows frames until something holds that comes by another way than frames do, as what a tracker says.
+    pub fn show_while(&mut self, what: &str, doing: impl Fn(), mut until: impl FnMut(&Server) -> bool) {
+        let start = Instant::now();
+        while !until(self) {
+            assert!(start.elapsed() < PATIENCE, "{what} did not come");
+            doing();
+            // more than some thousands a second are not heard
+            std::thread::sleep(Duration::from_millis(2));
+            let next = self.facet.session().shown().map_or(0, |(frame, _)| frame + 1);
+            self.show_until(next, |_| {});
+        }
+    }
+
+    /// Ends it in order; it must have had no trouble.
+    pub fn end(mut self) {
+        rustix::process::kill_process(rustix::process::Pid::from_raw(self.child.id() as i32).unwrap(), rustix::process::Signal::TERM).unwrap();
+        let start = Instant::now();
+        // it hears us leave, and ends
+        self.facet.leave().unwrap();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                break status;
+            }
+            assert!(start.elapsed() < PATIENCE, "the server does not end");
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        assert!(status.success(), "{status}");
+    }
+
+    pub fn ball(&self) -> Vec3 {
         let world = self.facet.world();
         world.site(world.find("ball").unwrap(), 0).unwrap().position()
     }

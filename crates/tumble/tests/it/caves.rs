@@ -3,20 +3,9 @@
 use crate::common::*;
 use std::process::Command;
 
-const CAVE: &str = "
-[[user]]
-name = \"u\"
-eye_m = [0, 0, 1.5]
-[[screen]]
-name = \"s\"
-lower_left_m = [-1, 2, 0.5]
-lower_right_m = [1, 2, 0.5]
-upper_left_m = [-1, 2, 2.0]
-[[facet]]
-name = \"f\"
-screen = \"s\"
-size_px = [80, 60]
-";
+fn small() -> String {
+    cave("size_px = [80, 60]")
+}
 
 /// Whether there is an adapter; said visibly where not.
 fn pictured(said: &str) -> bool {
@@ -50,11 +39,11 @@ fn shipped_caves_are_listed_and_checked() {
 #[test]
 fn a_file_is_checked_as_what_it_is() {
     let folder = Folder::new("cave-check");
-    let cave = folder.write("wall.toml", CAVE);
+    let cave = folder.write("wall.toml", small());
     assert!(succeed(&["check", &cave]).contains("a cave of 1 facet on 1 screen"));
-    let wrong = folder.write("wrong.toml", CAVE.replace("eye_m", "eye"));
+    let wrong = folder.write("wrong.toml", small().replace("eye_m", "eye"));
     let said = fail(&["check", &wrong], 2);
-    assert!(said.contains("wrong.toml:4:1") && said.contains("did you mean `eye_m`?"), "{said}");
+    assert!(said.contains("wrong.toml:3:1") && said.contains("did you mean `eye_m`?"), "{said}");
 }
 
 #[test]
@@ -68,12 +57,12 @@ fn what_is_wrong_with_a_cave_ends_with_code_2_before_anything_runs() {
     assert!(run(&["--facet", "front", "--picture", &picture]).contains("--cave FILE"));
     assert!(run(&["--cave", "cube4"]).contains("--picture FILE"));
     assert!(run(&["--cave", "cube4", "--facet", "front", "--size", "80x60", "--picture", &picture]).contains("size_px"));
-    let with = |line: &str| folder.write("a.toml", CAVE.replace("size_px = [80, 60]", &format!("size_px = [80, 60]\n{line}")));
+    let with = |line: &str| folder.write("a.toml", cave(&format!("size_px = [80, 60]\n{line}")));
     assert!(run(&["--cave", &with("warp_file = \"none.obj\""), "--picture", &picture]).contains("none.obj: the warp grid cannot be read"));
     assert!(run(&["--cave", &with("blend_file = \"none.png\""), "--picture", &picture]).contains("none.png: the blend mask cannot be read"));
     folder.write("bad.obj", "v 0 0\nv 1 x\n");
     assert!(run(&["--cave", &with("warp_file = \"bad.obj\""), "--picture", &picture]).contains("bad.obj: line 2"));
-    let empty = folder.write("b.toml", CAVE.replace("[80, 60]", "[80, 0]"));
+    let empty = folder.write("b.toml", cave("size_px = [80, 0]"));
     assert!(run(&["--cave", &empty, "--picture", &picture]).contains("from 1 to 16384"));
     assert!(!folder.path("out.png").exists());
     assert!(fail(&["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "fron", "--picture", &picture], 2).contains("did you mean `front`?"));
@@ -84,7 +73,7 @@ fn what_is_wrong_with_a_cave_ends_with_code_2_before_anything_runs() {
 fn facets_have_their_size_and_unfolded_caves_fit() {
     let folder = Folder::new("cave-pictures");
     let picture = folder.path("out.png");
-    let stereo = folder.write("a.toml", CAVE.replace("size_px", "stereo = \"side_by_side\"\nsize_px"));
+    let stereo = folder.write("a.toml", cave("stereo = \"side_by_side\"\nsize_px = [80, 60]"));
     for (cave, more, size) in [(stereo.as_str(), vec!["--facet", "f"], [160, 60]), ("cube6", vec!["--size", "200x200"], [200, 150])] {
         let out = tumble(&[&["run", "stack", "--quiet", "--seconds", "0", "--cave", cave, "--picture", &text(&picture)], &more[..]].concat());
         let said = String::from_utf8(out.stderr).unwrap();
@@ -151,4 +140,39 @@ fn a_video_gets_every_frame_and_its_failures_are_told() {
     let fails = "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\nhead -c 100 > /dev/null\necho 'Unknown encoder quux' >&2\nexit 3\n";
     let (code, said) = with_ffmpeg(&folder, Some(fails));
     assert!(code == Some(1) && said.contains("Unknown encoder quux"), "{said}");
+}
+
+/// With the real program: as many frames as were sent, and the last one is the picture of the end, as far as its compression lets it.
+#[test]
+fn a_video_plays_the_run() {
+    let out = Command::new("ffmpeg").arg("-version").output();
+    if !out.is_ok_and(|out| out.status.success()) {
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: there is no ffmpeg; on Debian: apt-get install ffmpeg\n"));
+        return;
+    }
+    let folder = Folder::new("video-real");
+    let (video, picture) = (text(&folder.path("out.mp4")), folder.path("out.png"));
+    let args = ["run", "incline", "--quiet", "--seconds", "0.2", "--size", "161x120", "--fps", "20", "--video", &video, "--picture", &text(&picture)];
+    let out = tumble(&args);
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert!(out.status.success(), "{said}");
+    if !pictured(&said) {
+        return;
+    }
+    let raw = Command::new("ffmpeg").args(["-v", "error", "-i", &video, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]).output().unwrap();
+    // sides are made even
+    let (width, height) = (162, 120);
+    assert_eq!(raw.stdout.len(), 5 * width * height * 3, "{}", String::from_utf8_lossy(&raw.stderr));
+    let last = &raw.stdout[4 * width * height * 3..];
+    let image = tumble::render::Image::read_png(&picture).unwrap();
+    let pixels = (0..120u32).flat_map(|y| (0..161u32).map(move |x| (x, y)));
+    let off: u64 = pixels.map(|(x, y)| {
+        let (seen, sent) = (&last[3 * (y as usize * width + x as usize)..], image.pixel(x, y).unwrap());
+        (0..3).map(|k| u64::from(seen[k].abs_diff(sent[k]))).sum::<u64>()
+    }).sum();
+    let mean = off as f64 / (161.0 * 120.0 * 3.0);
+    let first = &raw.stdout[..width * height * 3];
+    let moved: u64 = first.iter().zip(last).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    assert!(mean < 6.0, "off by {mean} levels on average");
+    assert!(moved as f64 / last.len() as f64 > 0.2, "nothing moves in it");
 }

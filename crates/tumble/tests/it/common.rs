@@ -85,3 +85,11 @@ pub fn json(path: &Path) -> Value {
 pub fn scene(body: &str, rest: &str) -> String {
     format!("description = \"A test\"\n[world]\nseconds = 0.1\n[[body]]\nname = \"ball\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\nmass_kg = 1.0\n{body}\n{rest}\n")
 }
+
+/// A cave of one screen, 2 m x 1.5 m and 2 m ahead, with these keys of its one facet `f`.
+pub fn cave(facet: &str) -> String {
+    format!(
+        "[[user]]\nname = \"u\"\neye_m = [0, 0, 1.5]\n[[screen]]\nname = \"s\"\nlower_left_m = [-1, 2, 0.5]\nlower_right_m = [1, 2, 0.5]\nupper_left_m = [-1, 2, 2.0]\n\
+         [[facet]]\nname = \"f\"\nscreen = \"s\"\n{facet}\n"
+    )
+}

@@ -3,9 +3,13 @@
 mod articulated_scenes;
 mod bad_input;
 mod cave_processes;
+mod cave_recordings;
+mod cave_tracker;
 mod cave_users;
+mod cave_windows;
 mod caves;
 mod common;
+mod desktop;
 mod determinism;
 mod machines;
 mod outputs;
@@ -14,3 +18,4 @@ mod repair;
 mod scenes;
 mod spheretree;
 mod view;
+mod view_windows;

@@ -25,7 +25,7 @@ const SMOOTH_PIECE: f64 = 0.06;
 /// Slopes that differ by this are the same.
 pub(super) const LEVEL: f64 = 1e-7;
 /// An edge that slopes less than this over a face lies on it.
-const LYING_EDGE: f64 = 0.15;
+pub(super) const LYING_EDGE: f64 = 0.15;
 /// Looks for the end of a flat bottom at most.
 const LOOKS: usize = 20;
 /// Looks for the minimum at most: a third of them halve what is left.
@@ -77,8 +77,10 @@ impl Pass<'_> {
         let normals: Normals = normals.iter().map(|n| self.rotation * n).collect();
         let line = Line { start, along: (end - start) / length, length, radius, normals: &normals, index, edge };
         if self.field.convex() {
-            let ends = [0.0, length].map(|s| self.look(&line, s));
-            self.search(&line, ends[0], ends[1], found);
+            let start = self.look(&line, 0.0);
+            if start.slope < LYING_EDGE {
+                self.search(&line, start, self.look(&line, length), found);
+            }
         } else {
             self.halve(&line, (0.0, None), (length, None), found);
         }
@@ -103,9 +105,14 @@ impl Pass<'_> {
             }
             return [first, last];
         }
-        let looks = [low, high].map(|(s, look)| look.unwrap_or_else(|| self.look(line, s)));
-        self.search(line, looks[0], looks[1], found);
-        looks.map(Some)
+        // one that rises steeply into the piece, from either end, has its least place there
+        let start = low.1.unwrap_or_else(|| self.look(line, low.0));
+        if start.slope >= LYING_EDGE && high.1.is_none() {
+            return [Some(start), None];
+        }
+        let end = high.1.unwrap_or_else(|| self.look(line, high.0));
+        self.search(line, start, end, found);
+        [Some(start), Some(end)]
     }
 
     fn look(&self, line: &Line, s: f64) -> Look {
@@ -204,6 +211,9 @@ impl Pass<'_> {
 
     /// The end of a part that lies on a face and begins at `look`, on the side of `outer`.
     fn end_of_face(&self, line: &Line, look: &Look, outer: Look, found: &mut Collector) {
+        if look.hit.distance.min(look.height(outer.s)) - line.radius > found.limit() {
+            return;
+        }
         let s = self.leaves(line, look, outer);
         // at the very start it is the element's own end, or another piece's
         if (s - look.s).abs() > 1e-6 * self.size {

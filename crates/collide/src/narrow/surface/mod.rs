@@ -7,8 +7,9 @@
 //! ```
 //!
 //! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
-//! search of a face we do not need, since edges and vertices of both bodies are exact.
+//! search of a face we need in deep overlaps alone ([`deep`]), since edges and vertices of both bodies are exact.
 
+mod deep;
 mod line;
 mod pass;
 mod rim;
@@ -17,13 +18,14 @@ use super::reduce::Collector;
 use crate::surface::Field;
 use crate::surface::elements::Elements;
 use crate::surface::field::MeshField;
-use crate::{Contact, Pose, SphereTree, Vec3};
+use crate::{Contact, Pose, Vec3};
+use deep::DEEP;
 use pass::Pass;
 
 /// A body as the pass sees it that takes its elements.
 pub(in crate::narrow) enum Source<'a> {
-    /// A mesh, culled by its tree.
-    Mesh(&'a SphereTree, &'a Elements),
+    /// A mesh.
+    Mesh(&'a Elements),
     /// A block's corners and edges.
     Box(Vec3),
     /// All within a radius of the segment `±half_length` on z; a ball if that is 0.
@@ -48,8 +50,17 @@ pub(in crate::narrow) fn surface(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pos
     let a_in_b = pose_b.inv_mul(pose_a);
     let size = a.radius.min(b.radius);
     let mut found = Collector::new(margin, size, out);
-    Pass::new(&a_in_b, b, size, None).run(&a.source, &mut found);
-    Pass::new(&a_in_b.inverse(), a, size, Some(&a_in_b)).run(&b.source, &mut found);
+    let b_in_a = a_in_b.inverse();
+    let (first, second) = (Pass::new(&a_in_b, b, size, None), Pass::new(&b_in_a, a, size, Some(&a_in_b)));
+    first.run(&a.source, &mut found);
+    second.run(&b.source, &mut found);
+    if found.overlap() > DEEP * size {
+        for (pass, mesh) in [(&first, a.mesh), (&second, b.mesh)] {
+            if let Some(mesh) = mesh {
+                pass.faces(mesh, &mut found);
+            }
+        }
+    }
     found.finish(pose_b);
 }
 

@@ -2,15 +2,24 @@
 
 use super::super::reduce::Collector;
 use super::{Body, Source};
-use crate::surface::elements::Elements;
+use super::line::LYING_EDGE;
+use crate::surface::elements::{Edge, Elements, Point};
 use crate::surface::field::MeshField;
 use crate::surface::{Feature, Field, Hit, OVERHANG};
-use crate::{Contact, Mat3, NormalFrom, Pose, SphereTree, Vec3};
+use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 use arrayvec::ArrayVec;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 /// Normals of an element, in the frame of the field.
 pub(super) type Normals = ArrayVec<Vec3, 12>;
+
+/// What is known of the field at a point.
+struct Seen {
+    /// At most the distance.
+    bound: f64,
+    /// The normal, where every element meets the same.
+    up: Option<Vec3>,
+}
 
 /// Slopes across an edge down to this are rounding's.
 pub(super) const ASIDE: f64 = 1e-6;
@@ -25,21 +34,25 @@ pub(super) struct Pass<'a> {
     /// In the second pass, where the field is A's: the pose of A in B.
     pub(super) second: Option<&'a Pose>,
     /// What a mesh's field says of points of a mesh, by their names: each is the end of several edges.
-    seen: [Cell<Option<(u32, Hit)>>; SEEN],
+    seen: RefCell<ArrayVec<(u32, Hit), SEEN>>,
+    /// Where in `seen` a name may be found.
+    slots: [Cell<u16>; SLOTS],
 }
 
-/// Points that are remembered.
-const SEEN: usize = 128;
+/// Points that are remembered at most; all are forgotten when there are more.
+const SEEN: usize = 192;
+/// More, so that few names share one.
+const SLOTS: usize = 1024;
 
 impl<'a> Pass<'a> {
     pub(super) fn new(pose: &'a Pose, other: &Body<'a>, size: f64, second: Option<&'a Pose>) -> Pass<'a> {
         let rotation = *pose.rotation.to_rotation_matrix().matrix();
-        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, seen: [const { Cell::new(None) }; SEEN] }
+        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, seen: RefCell::default(), slots: [const { Cell::new(0) }; SLOTS] }
     }
 
     pub(super) fn run(&self, source: &Source, found: &mut Collector) {
         match source {
-            Source::Mesh(tree, elements) => self.node(tree, elements, 0, found),
+            Source::Mesh(elements) => self.mesh(elements, found),
             Source::Box(half) => self.block(half, found),
             Source::Round { radius, half_length } => self.round(*radius, *half_length, found),
             Source::Cylinder { radius, half_length } => self.cylinder(*radius, *half_length, found),
@@ -51,33 +64,42 @@ impl<'a> Pass<'a> {
         self.rotation * local + self.pose.translation.vector
     }
 
-    fn node(&self, tree: &SphereTree, elements: &Elements, index: usize, found: &mut Collector) {
-        let ball = &tree.nodes()[index];
+    fn mesh(&self, elements: &Elements, found: &mut Collector) {
+        let fine = usize::from(self.field.bent());
+        let mut n = 0;
+        while let Some(group) = elements.groups.get(n) {
+            let bound = self.field.bound(&self.place(&group.center));
+            if bound - group.reach[fine] > found.limit() {
+                n = group.skip as usize;
+                continue;
+            }
+            for point in elements.points_of(group) {
+                self.vertex_and_edges(elements, point, bound - (point.at - group.center).norm(), found);
+            }
+            n += 1;
+        }
+    }
+
+    /// A point of a mesh and the edges that it holds; `bound` is at most the field's distance there.
+    fn vertex_and_edges(&self, elements: &Elements, point: &Point, bound: f64, found: &mut Collector) {
         let (fine, only_points) = (self.field.bent(), self.field.linear());
-        let bound = self.field.bound(&self.place(&ball.center));
-        if bound - elements.reach_of(index, fine) > found.limit() {
+        let longest = if only_points { 0.0 } else { point.longest[usize::from(fine)] };
+        if bound - longest > found.limit() {
             return;
         }
-        for point in elements.points_of(index) {
-            let longest = if only_points { 0.0 } else { point.longest[usize::from(fine)] };
-            if bound - (point.at - ball.center).norm() - longest > found.limit() {
-                continue;
-            }
-            let at = self.place(&point.at);
-            let bound = self.field.bound(&at);
-            if bound <= found.limit() {
-                let normals: Normals = elements.normals_of(point).iter().map(|n| self.rotation * n).collect();
-                self.vertex(&at, &normals, elements.ways_of(point), point.index, found);
-            }
-            if only_points || bound - longest > found.limit() {
-                continue;
-            }
-            for edge in elements.edges_of(point, fine) {
+        let at = self.place(&point.at);
+        let seen = self.vertex(&at, elements, point, found);
+        let bound = bound.max(seen.bound);
+        if only_points || bound - longest > found.limit() {
+            return;
+        }
+        // where the distance rises steeply from here an edge has nothing but its end
+        let up = seen.up.map(|up| self.rotation.tr_mul(&up));
+        let rises = |edge: &Edge| up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= LYING_EDGE * edge.length);
+        for edge in elements.edges_of(point, fine) {
+            if bound - edge.length <= found.limit() && !rises(edge) {
                 self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
             }
-        }
-        for child in ball.child_range() {
-            self.node(tree, elements, child, found);
         }
     }
 
@@ -134,21 +156,56 @@ impl<'a> Pass<'a> {
         self.point_at(at, radius, self.field.hit(at, normals, OVERHANG), ways, index, found);
     }
 
-    /// A point of a mesh, known to be in reach.
-    fn vertex(&self, at: &Vec3, normals: &[Vec3], ways: &[Vec3], index: u32, found: &mut Collector) {
-        self.point_at(at, 0.0, self.hit_of(at, Some(index), normals, OVERHANG), ways, index, found);
+    /// A point of a mesh.
+    fn vertex(&self, at: &Vec3, elements: &Elements, point: &Point, found: &mut Collector) -> Seen {
+        let turned = || -> Normals { elements.normals_of(point).iter().map(|n| self.rotation * n).collect() };
+        let (hit, seen) = match self.mesh {
+            Some(mesh) => {
+                let nearest = match self.nearest_named(mesh, at, point.index, found.limit()) {
+                    Ok(nearest) => nearest,
+                    Err(bound) => return Seen { bound, up: None },
+                };
+                // of what is closer, the elements' normals have a say
+                let up = Some(nearest.normal).filter(|_| nearest.distance > mesh.touching());
+                let seen = Seen { bound: nearest.distance, up };
+                if nearest.distance > found.limit() {
+                    return seen;
+                }
+                (mesh.hit_by(at, nearest, &turned(), OVERHANG), seen)
+            }
+            None => {
+                let seen = Seen { bound: self.field.bound(at), up: None };
+                if seen.bound > found.limit() {
+                    return seen;
+                }
+                (self.field.hit(at, &turned(), OVERHANG), seen)
+            }
+        };
+        self.point_at(at, 0.0, hit, elements.ways_of(point), point.index, found);
+        seen
     }
 
     /// What the field says of a place that may have a name.
     pub(super) fn hit_of(&self, at: &Vec3, name: Option<u32>, normals: &[Vec3], beside: f64) -> Hit {
         let (Some(mesh), Some(name)) = (self.mesh, name) else { return self.field.hit(at, normals, beside) };
-        let seen = &self.seen[name as usize % SEEN];
-        let nearest = match seen.get() {
-            Some((n, hit)) if n == name => hit,
-            _ => mesh.nearest(at),
-        };
-        seen.set(Some((name, nearest)));
+        let nearest = self.nearest_named(mesh, at, name, f64::INFINITY).unwrap_or_else(|_| mesh.nearest(at));
         mesh.hit_by(at, nearest, normals, beside)
+    }
+
+    /// What a mesh's field says of a named place, if it may be less than `limit` away; else a bound.
+    fn nearest_named(&self, mesh: &MeshField, at: &Vec3, name: u32, limit: f64) -> Result<Hit, f64> {
+        let slot = &self.slots[name as usize % SLOTS];
+        let mut seen = self.seen.borrow_mut();
+        if let Some((_, hit)) = seen.get(slot.get() as usize).filter(|s| s.0 == name) {
+            return Ok(*hit);
+        }
+        let nearest = mesh.nearest_within(at, limit)?;
+        if seen.is_full() {
+            seen.clear();
+        }
+        slot.set(seen.len() as u16);
+        seen.push((name, nearest));
+        Ok(nearest)
     }
 
     fn point_at(&self, at: &Vec3, radius: f64, hit: Hit, ways: &[Vec3], index: u32, found: &mut Collector) {

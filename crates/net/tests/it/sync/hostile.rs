@@ -29,7 +29,7 @@ fn payloads() -> Vec<Vec<u8>> {
     world.add(tumble_core::RigidBody::with_mass("guest", shape, 1.0).unwrap()).unwrap();
     let published = publisher.publish(&world, &viewer(1), 3).unwrap();
     let pose = tumble_core::collide::Pose::translation(1.0, 2.0, 3.0);
-    let input = Input { sequence: 7, user: 0, head: Some(pose), wand: Some(pose), buttons: 1, keys: vec![4, 5] };
+    let input = Input { sequence: 7, user: 0, head: Some(pose), wand: Some(pose), hands: [None, Some(pose)], buttons: 1, keys: vec![4, 5] };
     let done = Done { hash: [1; 16], image: [2; 16], took_us: 3, input_us: Some(4), heard_us: None, at_us: 5 };
     let join = Join { scene: SCENE, name: "front".into(), exact: true };
     vec![
@@ -64,7 +64,7 @@ fn parse_all(bytes: &[u8], mirror: &mut Mirror) -> bool {
 fn what_is_written_is_read_back() {
     let pose = tumble_core::collide::Pose::translation(1.0, -2.0, 3.0);
     let mut out = Vec::new();
-    let input = Input { sequence: u64::MAX, user: 3, head: None, wand: Some(pose), buttons: 5, keys: vec![1, 65535] };
+    let input = Input { sequence: u64::MAX, user: 3, head: None, wand: Some(pose), hands: [Some(pose), None], buttons: 5, keys: vec![1, 65535] };
     input.write(&mut out);
     assert_eq!(Input::read(&out), Ok(input));
     let bytes = message(&header(Kind::Input), |m| m.extend(&out));

@@ -33,7 +33,7 @@ pub fn facet(link: impl FacetLink + Send + 'static, k: u16, stop: &Arc<AtomicBoo
     std::thread::spawn(move || {
         let mut facet = Facet::new(link, FacetOptions::new(&format!("facet {k}"), SCENE, k as u64), scene());
         let mut shown = Vec::new();
-        let input = Input { sequence: 1, user: 0, head: None, wand: None, buttons: 1, keys: vec![k] };
+        let input = Input { sequence: 1, user: 0, head: None, wand: None, hands: [None; 2], buttons: 1, keys: vec![k] };
         while !stop.load(Ordering::Relaxed) {
             match facet.next(20 * Duration::from_millis(1)).unwrap() {
                 Task::Wait(_) => {}

@@ -1,68 +1,26 @@
-//! The signed distance of a mesh by an octree: each cell near the surface lists the few triangles that can be closest to
+//! The signed distance of a mesh by an [`octree`]: each cell near the surface lists the few triangles that can be closest to
 //! a point in it.
 //!
-//! ```text
-//! c, r     centre of a cell and half its diagonal        d_c   distance of c
-//! t listed   iff   dist(c, t) ≤ d_c + 2r                 (|d(p) − d(c)| ≤ |p − c| ≤ r, for each triangle and for all)
-//! d(p) ≥ d_c − |p − c|                                   signed: the bound by which elements are culled
-//! ```
-//!
-//! So distances are exact: nothing is interpolated. A cell is divided until its list is short; far from the surface it
-//! has no list, only `d_c`, and a query there asks the tree of boxes ([`MeshDistance`]).
+//! So distances are exact: nothing is interpolated. A query where there is no list asks the tree of boxes ([`MeshDistance`]).
 //!
 //! A cell also lists triangles a little further away that face another way: from an element on a ridge the closest face
 //! may be one that it cannot meet, and the next one is taken.
+
+mod builder;
+mod octree;
 
 use super::{Feature, Field, Hit, TOUCHING, facing, opposition};
 use crate::mesh::{closest_on_triangle, edge_groups, pseudonormals, shells};
 use crate::{Aabb, MeshDistance, TriMesh, Vec3};
 use arrayvec::ArrayVec;
+use octree::{Cell, Octree, Place};
 
-/// Lists up to this length are not divided.
-const SHORT: usize = 16;
-/// At the last level, or far from the surface, lists up to this length are kept.
-const LONG: usize = 96;
-/// The outermost cell reaches this far beyond the mesh, as a part of the diagonal.
-const RIM: f64 = 0.02;
 /// Triangles up to this much further than the closest are listed if they face another way, as a part of the diagonal.
 const AROUND: f64 = 0.01;
-/// Another way: cosine between the normals below this.
-const OTHER_WAY: f64 = 0.5;
-/// Cells are divided down to this half diagonal, in mean lengths of an edge.
-const FINEST: f64 = 0.6;
-/// Divisions at most.
-const DEEPEST: f64 = 9.0;
 /// Relative difference of squared distances that is rounding's.
 const SAME: f64 = 1e-11;
 /// As much of the squared distance as is along a face's normal counts as straight above the face.
 const ABOVE: f64 = 1.0 - 1e-6;
-/// Keeps a distance rounded to single precision below it.
-const BELOW: f64 = 1.0 - 2e-7;
-/// Of single precision, and more.
-const ROUNDING: f64 = 1e-7;
-/// Divisions that are passed at once on the way down.
-const TOP: usize = 4;
-/// Cells and listed triangles at most; beyond, the tree of boxes answers.
-const MOST_CELLS: usize = 1 << 20;
-const MOST_LISTED: usize = 1 << 23;
-
-/// Twelve bytes, since most of the time of a query goes by waiting for cells.
-#[derive(Clone, Copy, Debug)]
-struct Cell {
-    /// Signed distance at the centre, or a little less.
-    distance: f32,
-    /// Where its list begins if it has one; else the first of eight children, 0 if there are none.
-    link: u32,
-    /// Length of the list; 0 where there is none.
-    count: u32,
-}
-
-impl Cell {
-    fn children(&self) -> usize {
-        if self.count == 0 { self.link as usize } else { 0 }
-    }
-}
-
 /// A triangle in the list of a cell.
 #[derive(Clone, Copy, Debug)]
 struct Listed {
@@ -82,14 +40,10 @@ pub(crate) struct MeshField {
     normals: Vec<[Vec3; 7]>,
     /// Whether the edges of each triangle (k to k+1) are elements.
     searched: Vec<[bool; 3]>,
-    cells: Vec<Cell>,
+    tree: Octree,
     lists: Vec<Listed>,
-    /// A ball around each triangle, about `center`, and its radius.
+    /// A ball around each triangle, about the middle of the bounds, and its radius.
     balls: Vec<[f32; 4]>,
-    /// The cell, and its depth, at or above each of the cubes that the outermost cell makes when it is divided [`TOP`] times.
-    top: Vec<(u32, u32)>,
-    center: Vec3,
-    half: f64,
     bounds: Aabb,
     boxes: MeshDistance,
     convex: bool,
@@ -110,11 +64,6 @@ struct Closest {
     feature: usize,
 }
 
-struct Builder<'a> {
-    field: &'a mut MeshField,
-    deepest: u32,
-}
-
 impl MeshField {
     /// `searched`: which edges of each triangle are elements.
     pub fn new(mesh: &TriMesh, searched: Vec<[bool; 3]>) -> MeshField {
@@ -125,12 +74,9 @@ impl MeshField {
             corners: (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect(),
             normals: pseudonormals(mesh).into_iter().map(|n| n.map(|v| v.try_normalize(0.0).unwrap_or_default())).collect(),
             searched,
-            cells: vec![Cell { distance: 0.0, link: 0, count: 0 }],
+            tree: Octree::new(Vec3::zeros(), 1.0),
             lists: Vec::new(),
             balls: Vec::new(),
-            top: Vec::new(),
-            center: 0.5 * (bounds.min + bounds.max),
-            half: 0.5 * (bounds.max - bounds.min).max() + RIM * diagonal,
             bounds,
             boxes: MeshDistance::new(mesh),
             convex: is_convex(mesh),
@@ -138,65 +84,31 @@ impl MeshField {
             diagonal,
             around: AROUND * diagonal,
         };
-        let all: Vec<(f64, u32)> = (0..mesh.triangles.len() as u32).map(|t| (0.0, t)).collect();
-        let (center, half) = (field.center, field.half);
-        let lengths = (0..all.len()).map(|t| { let [a, b, _] = mesh.corners(t); (b - a).norm() });
-        let mean = lengths.sum::<f64>() / all.len() as f64;
-        let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
-        let mut builder = Builder { field: &mut field, deepest };
-        builder.cell(0, center, half, &all, f64::INFINITY, 0);
+        let center = 0.5 * (bounds.min + bounds.max);
         field.balls = field.corners.iter().map(|c| ball_around(c, &center, diagonal)).collect();
-        field.top = (0..1 << (3 * TOP)).map(|n| field.cell_above(n)).collect();
+        builder::build(&mut field);
         field
     }
 
-    /// The cell at or above a cube of the top.
-    fn cell_above(&self, cube: usize) -> (u32, u32) {
-        let (mut cell, mut depth) = (0, 0);
-        while depth < TOP && self.cells[cell].children() > 0 {
-            depth += 1;
-            let octant: usize = (0..3).map(|k| (cube >> (k * TOP + TOP - depth) & 1) << k).sum();
-            cell = self.cells[cell].children() + octant;
-        }
-        (cell as u32, depth as u32)
+    /// Corners of all triangles.
+    pub fn faces(&self) -> &[[Vec3; 3]] {
+        &self.corners
     }
 
-    /// The smallest cell that holds `p`, and its centre; `None` outside all.
-    fn locate(&self, p: &Vec3) -> Option<(&Cell, Vec3)> {
-        // written so that what is not a number is outside
-        let from_low = (p - self.center).add_scalar(self.half);
-        let within = from_low.iter().all(|x| *x >= 0.0 && *x <= 2.0 * self.half);
-        if !within {
-            return None;
-        }
-        const SIDE: usize = 1 << TOP;
-        let scale = SIDE as f64 / (2.0 * self.half);
-        let place: [usize; 3] = std::array::from_fn(|k| ((from_low[k] * scale) as usize).min(SIDE - 1));
-        let (index, depth) = self.top[place[0] | place[1] << TOP | place[2] << (2 * TOP)];
-        let mut cell = &self.cells[index as usize];
-        let mut half = self.half / f64::from(1_u32 << depth);
-        let mut center = Vec3::from_fn(|k, _| self.center[k] - self.half + ((place[k] >> (TOP - depth as usize)) as f64 * 2.0 + 1.0) * half);
-        while cell.children() > 0 {
-            half *= 0.5;
-            let mut octant = 0;
-            for k in 0..3 {
-                let above = p[k] >= center[k];
-                octant |= usize::from(above) << k;
-                center[k] += if above { half } else { -half };
-            }
-            cell = &self.cells[cell.children() + octant];
-        }
-        Some((cell, center))
+    /// Centre and radius of a ball around triangle `t`.
+    pub fn ball(&self, t: usize) -> (Vec3, f64) {
+        let [x, y, z, radius] = self.balls[t].map(f64::from);
+        (self.tree.center + Vec3::new(x, y, z), radius)
     }
 
     /// The closest of a cell's listed triangles; of those that share the closest point, the one that faces `p` most squarely.
     ///
     /// The list is in the order of the distance from the centre `c`: `dist(p, t) ≥ dist(c, t) − |p − c|` ends the search.
-    fn closest(&self, p: &Vec3, cell: &Cell, center: &Vec3) -> Option<Closest> {
+    fn closest(&self, p: &Vec3, place: &Place) -> Option<Closest> {
         let mut best: Option<Closest> = None;
         let (mut limit, mut reach, mut furthest) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
-        let (aside, from_center) = ((p - center).norm(), p - self.center);
-        for listed in self.list(cell) {
+        let (aside, from_center) = (place.offset.norm(), p - self.tree.center);
+        for listed in self.list(place.cell) {
             if f64::from(listed.nearer) > furthest {
                 break;
             }
@@ -228,8 +140,24 @@ impl MeshField {
 
     /// The closest part of the surface, whatever an element faces.
     pub fn nearest(&self, p: &Vec3) -> Hit {
-        let closest = self.locate(p).and_then(|(cell, center)| self.closest(p, cell, &center));
+        self.nearest_in(p, self.tree.locate(p).as_ref())
+    }
+
+    /// The same where it may be less than `limit`; else a bound.
+    pub fn nearest_within(&self, p: &Vec3, limit: f64) -> Result<Hit, f64> {
+        let place = self.tree.locate(p);
+        let bound = place.map_or_else(|| self.tree.bound(p), |place| place.bound());
+        if bound > limit { Err(bound) } else { Ok(self.nearest_in(p, place.as_ref())) }
+    }
+
+    fn nearest_in(&self, p: &Vec3, place: Option<&Place>) -> Hit {
+        let closest = place.and_then(|place| self.closest(p, place));
         self.describe(p, &closest.unwrap_or_else(|| self.closest_of(p, self.boxes.closest(p).triangle)))
+    }
+
+    /// How far beside a face a place on an edge still counts as above it, metres.
+    pub fn touching(&self) -> f64 {
+        self.touching
     }
 
     /// [`Field::hit`], told [`MeshField::nearest`].
@@ -240,7 +168,7 @@ impl MeshField {
         if clear || hit.distance > beside {
             return Hit { facing: clear, ..hit };
         }
-        let list = self.locate(p).map_or(&[][..], |(cell, _)| self.list(cell));
+        let list = self.tree.locate(p).map_or(&[][..], |place| self.list(place.cell));
         self.behind(p, normals, list, hit.distance, beside).unwrap_or(Hit { facing: faces, ..hit })
     }
 
@@ -361,10 +289,7 @@ const MOST_NEAR: usize = 512;
 
 impl Field for MeshField {
     fn bound(&self, p: &Vec3) -> f64 {
-        match self.locate(p) {
-            Some((cell, center)) => f64::from(cell.distance) - (p - center).norm(),
-            None => (p - p.zip_zip_map(&self.bounds.min, &self.bounds.max, |x, low, high| x.clamp(low, high))).norm(),
-        }
+        self.tree.bound(p)
     }
 
     fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit {
@@ -373,43 +298,6 @@ impl Field for MeshField {
 
     fn convex(&self) -> bool {
         self.convex
-    }
-}
-
-impl Builder<'_> {
-    /// `list`: the triangles that count in the parent, with their distances from its centre, which is `moved` from this one.
-    fn cell(&mut self, index: usize, center: Vec3, half: f64, list: &[(f64, u32)], moved: f64, depth: u32) {
-        let from_center = |t: u32| (closest_on_triangle(&center, &self.field.corners[t as usize]).0 - center).norm();
-        let order = |a: &&(f64, u32), b: &&(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        let reach = 3.0_f64.sqrt() * half;
-        let Some(guess) = list.iter().min_by(order) else { return };
-        // no more than this counts, and no triangle came closer than it was moved
-        let most = from_center(guess.1) + 2.0 * reach + self.field.around;
-        let mut near: Vec<(f64, u32)> = list.iter().filter(|n| n.0 - moved <= most).map(|n| (from_center(n.1), n.1)).collect();
-        let Some(&(least, first)) = near.iter().min_by(order) else { return };
-        let distance = self.field.describe(&center, &self.field.closest_of(&center, first as usize)).distance;
-        self.field.cells[index].distance = (distance - ROUNDING * (distance.abs() + self.field.diagonal)) as f32;
-        let facing_first = self.field.normals[first as usize][0];
-        let turned = |t: u32| self.field.normals[t as usize][0].dot(&facing_first) < OTHER_WAY;
-        near.retain(|&(d, t)| d <= least + 2.0 * reach || (d <= least + 2.0 * reach + self.field.around && turned(t)));
-        let full = self.field.cells.len() > MOST_CELLS || self.field.lists.len() + near.len() > MOST_LISTED;
-        let far = least > 2.0 * reach;
-        if near.len() <= SHORT || depth == self.deepest || far || full {
-            if near.len() <= LONG && !full {
-                near.sort_unstable_by(|a, b| order(&a, &b));
-                self.field.cells[index].link = self.field.lists.len() as u32;
-                self.field.cells[index].count = near.len() as u32;
-                self.field.lists.extend(near.iter().map(|n| Listed { triangle: n.1, nearer: (n.0 * BELOW) as f32 }));
-            }
-            return;
-        }
-        let children = self.field.cells.len();
-        self.field.cells[index].link = children as u32;
-        self.field.cells.extend([Cell { distance: 0.0, link: 0, count: 0 }; 8]);
-        for octant in 0..8 {
-            let side = Vec3::from_fn(|k, _| if octant >> k & 1 == 1 { 0.5 } else { -0.5 });
-            self.cell(children + octant, center + side * half, 0.5 * half, &near, 0.5 * reach, depth + 1);
-        }
     }
 }
 

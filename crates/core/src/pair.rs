@@ -1,0 +1,209 @@
+//! What is asked of the narrow phase for one pair within a step: how far to look, whether at all, and when.
+//!
+//! Queries between meshes and cylinders are dear. They are not made where the boxes around both stay apart (`apart.rs`), not made twice at the same poses within a
+//! frame, and of two meshes not with a margin as wide as fast bodies would need: those are followed.
+
+use crate::apart::{Oriented, apart};
+use crate::site::Site;
+use crate::step::coasted;
+use tumble_collide::{Aabb, Contact, ContactMode, Pose, Shape, Vec3};
+
+/// How far two sphere trees look ahead in the `spheres` mode, as a share of the smaller one's radius.
+const TREE_REACH: f64 = 0.02;
+/// How far two meshes look ahead by their surfaces, likewise: further away they are followed along free motion. A wide margin has most of both surfaces in it.
+const MESH_REACH: f64 = 0.05;
+/// Looks along free motion at most.
+const MOST_LOOKS: f64 = 16.0;
+
+/// How far apart two parts are looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reach {
+    /// As far as they come towards each other if neither is stopped: for who looks again after a stop.
+    Relative,
+    /// As far as either moves.
+    Each,
+}
+
+/// What a part may do within the horizon.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Travel {
+    /// Of its origin at its present velocity, metres.
+    way: Vec3,
+    /// What its acceleration adds, metres.
+    gain: Vec3,
+    /// Of its points around its origin, metres at most.
+    turn: f64,
+}
+
+impl Travel {
+    /// `around` are the part's greatest distances from its origin along the world's axes, metres.
+    pub fn new(site: &Site, bound: f64, around: Vec3, horizon: f64) -> Travel {
+        let (w, e) = (site.angular_velocity.abs(), around);
+        // |ω × r| by components, and as a whole
+        let sweep = Vec3::new(w.y * e.z + w.z * e.y, w.z * e.x + w.x * e.z, w.x * e.y + w.y * e.x).norm();
+        let turning = if bound.is_finite() { sweep.min(w.norm() * bound) } else { 0.0 };
+        Travel { way: horizon * site.velocity, gain: horizon * horizon * site.acceleration, turn: horizon * turning }
+    }
+
+    /// All that a box around the part may meet, `near` aside.
+    pub fn swept(&self, tight: &Aabb, near: f64) -> Aabb {
+        let grown = tight.grown(near + self.turn + self.gain.norm());
+        Aabb { min: grown.min + self.way.inf(&Vec3::zeros()), max: grown.max + self.way.sup(&Vec3::zeros()) }
+    }
+
+    /// The same along a unit direction, from the other to this one.
+    fn along(&self, n: &Vec3, other: &Travel, reach: Reach) -> f64 {
+        let turns = self.turn + other.turn + self.gain.norm() + other.gain.norm();
+        let (this, that) = (-n.dot(&self.way), n.dot(&other.way));
+        turns + match reach {
+            Reach::Relative => (this + that).max(0.0),
+            Reach::Each => this.max(0.0) + that.max(0.0),
+        }
+    }
+
+    /// By how much a gap between two parts may close, metres.
+    fn between(&self, other: &Travel, reach: Reach) -> f64 {
+        let turns = self.turn + other.turn;
+        match reach {
+            Reach::Relative => turns + (self.way - other.way).norm() + (self.gain - other.gain).norm(),
+            Reach::Each => turns + self.way.norm() + other.way.norm() + self.gain.norm() + other.gain.norm(),
+        }
+    }
+}
+
+/// Two parts that may meet, A first.
+pub(crate) struct Pair<'a> {
+    pub mode: ContactMode,
+    pub shapes: [&'a Shape; 2],
+    pub sites: [&'a Site; 2],
+    pub travel: [Travel; 2],
+    /// What counts as near, metres.
+    pub near: f64,
+    pub reach: Reach,
+}
+
+impl Pair<'_> {
+    /// Whether a mesh or cylinder takes part.
+    pub fn is_dear(&self) -> bool {
+        self.shapes.iter().any(|shape| shape.tree().is_some())
+    }
+
+    /// Whether the boxes around both cannot come near each other.
+    pub fn stays_apart(&self) -> bool {
+        let [a, b] = [0, 1].map(|k| Oriented::around(self.shapes[k], &self.sites[k].pose));
+        apart(&a, &b, |n| self.near + self.travel[0].along(n, &self.travel[1], self.reach))
+    }
+
+    /// Gaps up to this are wanted, and up to this may close.
+    fn margins(&self) -> (f64, f64) {
+        let closing = self.near + self.travel[0].between(&self.travel[1], self.reach);
+        let size = self.shapes.iter().map(|shape| shape.bounding_radius()).fold(f64::INFINITY, f64::min);
+        let margin = match (self.mode, self.shapes.map(|shape| shape.tree())) {
+            // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
+            (ContactMode::Spheres, [Some(_), Some(_)]) => closing.min(self.near + TREE_REACH * size),
+            (ContactMode::Surface, [Some(_), Some(_)]) => closing.min(self.near + MESH_REACH * size),
+            _ => closing,
+        };
+        (margin, closing)
+    }
+
+    /// The contacts at present, by feature, and 0. Of two meshes without any that are further apart than they look, those of the first look along free motion that sees some, and
+    /// its time in s: from one look to the next no gap closes by more than a look's margin. `rows` are the places of both in the site table.
+    pub fn contacts(&self, rows: [u32; 2], horizon: f64, recalled: &mut Recalled, found: &mut Vec<Contact>) -> f64 {
+        let (margin, closing) = self.margins();
+        let poses = self.sites.map(|site| site.pose);
+        found.clear();
+        if !self.is_dear() {
+            self.ask(&poses, margin, found);
+            return 0.0;
+        }
+        if !recalled.recall(rows, &poses, margin, found) {
+            self.ask(&poses, margin, found);
+        }
+        recalled.keep(rows, poses, margin, found);
+        if !found.is_empty() || self.mode == ContactMode::Spheres || margin >= closing {
+            return 0.0;
+        }
+        let looks = (closing / margin).ceil().min(MOST_LOOKS);
+        let moments = (1..=looks as u32).map(|look| horizon * f64::from(look) / looks);
+        for moment in moments {
+            self.ask(&self.sites.map(|site| coasted(site, moment)), margin, found);
+            if !found.is_empty() {
+                return moment;
+            }
+        }
+        0.0
+    }
+
+    fn ask(&self, poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) {
+        tumble_collide::contacts_in(self.mode, self.shapes[0], &poses[0], self.shapes[1], &poses[1], margin, found);
+        found.sort_by_key(|contact| contact.feature);
+    }
+}
+
+/// What dear queries of this frame gave: the last detection's, and those of the one that goes on. Pairs come in ascending order.
+#[derive(Default)]
+pub(crate) struct Recalled {
+    last: Answers,
+    now: Answers,
+    /// How far the pairs of the last detection have been passed.
+    place: usize,
+}
+
+#[derive(Default)]
+struct Answers {
+    asked: Vec<Asked>,
+    contacts: Vec<Contact>,
+}
+
+struct Asked {
+    rows: [u32; 2],
+    poses: [Pose; 2],
+    margin: f64,
+    /// Where its contacts end; they begin where those of the pair before end.
+    end: usize,
+}
+
+impl Answers {
+    fn clear(&mut self) {
+        self.asked.clear();
+        self.contacts.clear();
+    }
+}
+
+impl Recalled {
+    pub fn forget(&mut self) {
+        self.last.clear();
+    }
+
+    /// A detection begins.
+    pub fn begin(&mut self) {
+        self.now.clear();
+        self.place = 0;
+    }
+
+    /// It ends, and is the last one.
+    pub fn end(&mut self) {
+        std::mem::swap(&mut self.last, &mut self.now);
+    }
+
+    /// Writes to `found` what the last detection found for a pair, if neither side has moved since and it looked as far; whether it did.
+    fn recall(&mut self, rows: [u32; 2], poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) -> bool {
+        let asked = &self.last.asked;
+        while asked.get(self.place).is_some_and(|k| k.rows < rows) {
+            self.place += 1;
+        }
+        let Some(known) = asked.get(self.place).filter(|k| k.rows == rows && k.poses == *poses && k.margin >= margin) else { return false };
+        let start = self.place.checked_sub(1).map_or(0, |before| asked[before].end);
+        found.extend(self.last.contacts[start..known.end].iter().filter(|contact| contact.gap <= margin));
+        true
+    }
+
+    fn keep(&mut self, rows: [u32; 2], poses: [Pose; 2], margin: f64, found: &[Contact]) {
+        self.now.contacts.extend_from_slice(found);
+        self.now.asked.push(Asked { rows, poses, margin, end: self.now.contacts.len() });
+    }
+}
+
+#[cfg(test)]
+mod tests;

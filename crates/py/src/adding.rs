@@ -1,0 +1,70 @@
+//! Bodies on their way into a world.
+
+use crate::articulation::{Articulation, described};
+use crate::bodies::{by_name, place_of};
+use crate::body::{Place, RigidBody};
+use crate::convert::base_pose;
+use crate::errors::{Error, Result};
+use crate::looks;
+use crate::shapes::Shape;
+use crate::shared::Shared;
+use pyo3::prelude::*;
+use std::sync::Arc;
+use tumble::collide::Pose;
+use tumble::core::{Mode, RigidBody as Rigid};
+
+/// Where a body of this world is, given as a handle or by name.
+pub fn own_place(shared: &Arc<Shared>, body: &Bound<'_, PyAny>) -> Result<Place> {
+    let place = match body.extract::<String>() {
+        Ok(name) => {
+            let found = shared.read(|inner| by_name(inner, &name))?;
+            Place { shared: shared.clone(), id: found.id, name: name.into() }
+        }
+        Err(_) => place_of(body)?,
+    };
+    match Arc::ptr_eq(&place.shared, shared) {
+        true => place.status().map(|_| place),
+        false => Err(Error::value(format!("'{}' is a body of another world", place.name))),
+    }
+}
+
+/// A body of a mass, or of a density; what is led needs neither.
+pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>, led: bool) -> Result<Rigid> {
+    let solid = shape.solid.clone();
+    match (mass, density) {
+        (Some(mass), None) => Ok(Rigid::with_mass(name, solid, mass)?),
+        (None, Some(density)) => Ok(Rigid::with_density(name, solid, density)?),
+        (None, None) if led => Ok(Rigid::fixture(name, solid)),
+        _ => Err(Error::value(format!("body '{name}': wanted a mass or a density, and one of the two alone"))),
+    }
+}
+
+/// Adds a body and gives its handle.
+pub fn add(shared: &Arc<Shared>, py: Python<'_>, body: Rigid, mode: Mode, collidable: bool) -> Result<RigidBody> {
+    let place = shared.write(py, |inner| {
+        let body = looks::usual(body, inner.world.ids().len());
+        let id = inner.world.add_boxed(Box::new(body), mode)?;
+        inner.world.set_collidable(id, collidable)?;
+        let name = inner.world.object(id).map_or("", |o| o.name()).into();
+        Ok(Place { shared: shared.clone(), id, name })
+    })?;
+    RigidBody::new(py, place)
+}
+
+/// Adds an articulated body, a description or the path of one, and gives its handle.
+pub fn articulated(
+    shared: &Arc<Shared>, py: Python<'_>, description: &Bound<'_, PyAny>, base: Option<&Bound<'_, PyAny>>, name: Option<&str>,
+) -> Result<Articulation> {
+    let description = described(description)?;
+    let description = description.get();
+    let (body, robot) = description.body(py, base.map_or(Ok(Pose::identity()), base_pose)?, name)?;
+    let (robot, efforts) = (Arc::new(robot), description.spot.efforts());
+    let place = shared.write(py, |inner| {
+        let id = inner.world.add(body)?;
+        inner.robots.insert(id, robot.clone());
+        efforts.map(|tau| inner.efforts.insert(id, tau));
+        let name = inner.world.object(id).map_or("", |o| o.name()).into();
+        Ok(Place { shared: shared.clone(), id, name })
+    })?;
+    Articulation::placed(py, place, robot)
+}

@@ -1,0 +1,42 @@
+//! Worlds of scene files, and what stands in place of what they say.
+
+use crate::errors::{Error, Result, caught};
+use crate::inner::Inner;
+use crate::robot::Robot;
+use std::sync::Arc;
+use tumble::core::{ArticulatedBody, Joint};
+use tumble::scene::{SceneFile, WorldSettings};
+
+/// What the words and numbers of a constructor make of settings.
+pub struct Choices<'a> {
+    pub stepper: Option<&'a str>,
+    pub integrator: Option<&'a str>,
+    pub solver: Option<&'a str>,
+    pub dt: Option<f64>,
+}
+
+impl Choices<'_> {
+    /// Writes them into a scene's settings.
+    pub fn apply(&self, world: &mut WorldSettings) -> Result<()> {
+        world.dt_s = self.dt.unwrap_or(world.dt_s);
+        let told = |what: &str| { let what = what.to_string(); move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}")) };
+        world.stepper = self.stepper.map_or(Ok(world.stepper), |s| s.parse().map_err(told("stepper")))?;
+        world.integrator = self.integrator.map_or(Ok(world.integrator), |s| s.parse().map_err(told("integrator")))?;
+        world.solver = self.solver.map_or(Ok(world.solver), |s| s.parse().map_err(told("solver")))?;
+        Ok(())
+    }
+}
+
+/// The world of a scene and what is to be said of it.
+pub fn build(scene: SceneFile) -> Result<(Inner, Vec<String>)> {
+    let (world, notes) = caught(|| Ok(scene.build()?))?;
+    let mut inner = Inner::new(world, Arc::new(scene));
+    let scene = inner.scene.clone();
+    for spec in &scene.articulated {
+        let Some((id, body)) = inner.world.find(&spec.name).and_then(|id| Some((id, inner.world.get::<ArticulatedBody>(id)?))) else { continue };
+        let joints = spec.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.clone()).collect();
+        let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
+        inner.robots.insert(id, Arc::new(robot));
+    }
+    Ok((inner, notes))
+}

@@ -1,0 +1,92 @@
+//! A world and what belongs to it on Python's side: what one call at a time works on.
+
+use crate::convert::shown;
+use crate::errors::{Error, Result};
+use crate::extension::Extension;
+use crate::robot::Robot;
+use crate::state::Shown;
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tumble::core::{ObjectId, World};
+use tumble::scene::SceneFile;
+
+/// A world and what belongs to it on Python's side.
+pub struct Inner {
+    /// The world itself.
+    pub world: World,
+    /// The scene that it was made of: its camera, lights and names.
+    pub scene: Arc<SceneFile>,
+    /// The trees of articulated bodies.
+    pub robots: BTreeMap<ObjectId, Arc<Robot>>,
+    /// Generalized forces that act on articulated bodies in every frame.
+    pub efforts: BTreeMap<ObjectId, Vec<f64>>,
+    /// Forces and behaviours written in Python.
+    pub extension: Extension,
+    /// The array that Python sees the state by.
+    pub shown: Shown,
+    /// Whether a panic left it half-way.
+    pub broken: bool,
+}
+
+impl Inner {
+    /// A world of a scene.
+    pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
+        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), extension: Extension::default(), shown: Shown::default(), broken: false }
+    }
+
+    /// An independent copy, with no arrays yet.
+    pub fn fork(&self) -> Inner {
+        Inner {
+            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), extension: self.extension.fork(),
+            shown: Shown::default(), broken: false,
+        }
+    }
+
+    /// Whether an array of Python's looks into the memory that the next frame changes.
+    pub fn looked_into(&self, py: Python<'_>) -> bool {
+        self.extension.is_empty() && self.shown.alive(py)
+    }
+
+    /// One frame.
+    pub fn step(&mut self) -> Result<()> {
+        if self.extension.is_empty() { self.frame() } else { self.extended_frame() }
+    }
+
+    /// One frame of the world alone.
+    pub fn frame(&mut self) -> Result<()> {
+        for (&id, effort) in &self.efforts {
+            self.world.apply_generalized(id, effort)?;
+        }
+        self.world.step()?;
+        Ok(())
+    }
+
+    /// What is kept about an object that is gone.
+    pub fn forget(&mut self, id: ObjectId) {
+        self.robots.remove(&id);
+        self.efforts.remove(&id);
+    }
+
+    /// Writes the whole state; all or nothing.
+    pub fn write_state(&mut self, shape: &[usize], x: &[f64]) -> Result<()> {
+        let wanted = self.world.state().len();
+        if shape != [wanted] {
+            return Err(Error::value(format!("state: wanted shape ({wanted},), and got {}", shown(shape))));
+        }
+        let before = self.world.state().to_vec();
+        let mut write = |from: &[f64]| -> Result<()> {
+            let ids = self.world.ids().to_vec();
+            for id in ids {
+                let Some(span) = self.world.view().span(id).map(|span| span.x.clone()).filter(|x| !x.is_empty()) else { continue };
+                self.world.write_state_of(id, &from[span])?;
+            }
+            Ok(())
+        };
+        let outcome = write(x);
+        if outcome.is_err() {
+            write(&before)?;
+        }
+        outcome
+    }
+}

@@ -1,0 +1,88 @@
+//! Texture coordinates of OBJ files (`vt`), which the meshes of a world do not keep: read again from the file, for the renderer alone.
+//!
+//! A file belongs to a mesh where both have the same triangles, corner by corner, so a mesh that was repaired or made otherwise finds none and its texture is
+//! laid on by position.
+
+use std::path::Path;
+
+/// A larger file is not read.
+const MOST_BYTES: u64 = 256 << 20;
+
+/// Triangles of a file, and the places of their corners in a texture.
+pub(super) struct Unwrapped {
+    triangles: Vec<[u32; 3]>,
+    places: Vec<[[f32; 2]; 3]>,
+}
+
+impl Unwrapped {
+    /// Of an OBJ file; none of another one, or where a corner has no place.
+    pub fn load(path: &Path) -> Option<Unwrapped> {
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) || path.metadata().ok()?.len() > MOST_BYTES {
+            return None;
+        }
+        Unwrapped::parse(&std::fs::read_to_string(path).ok()?)
+    }
+
+    /// Polygons become fans around their first corner, as in [`tumble_collide::TriMesh::from_obj`].
+    fn parse(text: &str) -> Option<Unwrapped> {
+        let (mut vertices, mut known) = (0i64, Vec::new());
+        let mut out = Unwrapped { triangles: Vec::new(), places: Vec::new() };
+        for line in text.lines() {
+            let mut words = line.split_whitespace();
+            match words.next() {
+                Some("v") => vertices += 1,
+                Some("vt") => {
+                    let mut number = || words.next()?.parse::<f32>().ok().filter(|x| x.is_finite());
+                    known.push([number()?, number().unwrap_or(0.0)]);
+                }
+                Some("f") => {
+                    let corners: Vec<(u32, [f32; 2])> = words.take_while(|w| !w.starts_with('#')).map(|word| corner(word, vertices, &known)).collect::<Option<_>>()?;
+                    for k in 1..corners.len().saturating_sub(1) {
+                        let fan = [corners[0], corners[k], corners[k + 1]];
+                        out.triangles.push(fan.map(|c| c.0));
+                        out.places.push(fan.map(|c| c.1));
+                    }
+                }
+                _ => {}
+            }
+        }
+        (!out.triangles.is_empty()).then_some(out)
+    }
+
+    /// The places for these triangles, if they are those of the file.
+    pub fn places_of(&self, triangles: &[[u32; 3]]) -> Option<&[[[f32; 2]; 3]]> {
+        (self.triangles == triangles).then_some(&self.places)
+    }
+}
+
+/// `v/vt` or `v/vt/vn`: the vertex from 0 on, and its place.
+fn corner(word: &str, vertices: i64, known: &[[f32; 2]]) -> Option<(u32, [f32; 2])> {
+    let mut numbers = word.split('/');
+    let mut index = |count: i64| {
+        let n: i64 = numbers.next()?.parse().ok()?;
+        Some(if n < 0 { n.checked_add(count)? } else { n - 1 })
+    };
+    let vertex = u32::try_from(index(vertices)?).ok()?;
+    let place = *known.get(usize::try_from(index(known.len() as i64)?).ok()?)?;
+    Some((vertex, place))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+
+    #[test]
+    fn corners_find_their_places() {
+        for face in ["f 1/1 2/2 3/3 4/4", "f 1/1/9 2/2/9 3/3/9 4/4/9 # a square", "f -4/-4 -3/-3 -2/-2 -1/-1"] {
+            let read = Unwrapped::parse(&format!("{SQUARE}{face}\n")).unwrap();
+            let places = read.places_of(&[[0, 1, 2], [0, 2, 3]]).unwrap();
+            assert_eq!(places, [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]]);
+            assert!(read.places_of(&[[0, 1, 2], [0, 3, 2]]).is_none());
+        }
+        for face in ["f 1 2 3", "f 1//1 2//1 3//1", "f 1/1 2/2 3/5", "f 1/1 2/2 3/0", "f 1/1 2/2 0/3", ""] {
+            assert!(Unwrapped::parse(&format!("{SQUARE}{face}\n")).is_none(), "{face}");
+        }
+    }
+}

@@ -1,0 +1,121 @@
+// Capsules by ray casting inside a box that just holds them, whose far sides are drawn: so the eye may be within the box.
+//
+// A capsule is what lies within r of the segment c + u a, |u| <= h. With o the point of the ray nearest to c and D its direction of view depth 1, the ray
+// passes the segment at the least distance where u = -(c - o)·a' / a'·a' (a' = a less its part along D), clamped to the segment. It enters the
+// round wall where t² A + 2 t B + C = 0 with
+//   A = D·D - (D·a)²,  B = (o - c)·D - (D·a) ((o - c)·a),  C = |o - c|² - ((o - c)·a)² - r²,
+// and where that is beyond an end, the ball around the end.
+struct CapsuleIn {
+    @location(0) ball: vec4f, // centre, radius
+    @location(1) turn: vec4f, // quaternion x, y, z, w: object to world; the axis is z
+    @location(2) color_rough: vec4f,
+    @location(3) other_metal: vec4f,
+    @location(4) pattern: vec4f,
+    @location(5) half_length: vec4f, // x: of the segment
+};
+struct CapsuleOut {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) ball: vec4f,
+    @location(1) @interpolate(flat) turn: vec4f,
+    @location(2) @interpolate(flat) color_rough: vec4f,
+    @location(3) @interpolate(flat) other_metal: vec4f,
+    @location(4) @interpolate(flat) pattern: vec4f,
+    @location(5) @interpolate(flat) axis: vec4f, // a, h
+};
+
+fn turned(q: vec4f, v: vec3f) -> vec3f {
+    let t = 2.0 * cross(q.xyz, v);
+    return v + q.w * t + cross(q.xyz, t);
+}
+
+// Corners of the sides of a cube as a strip of triangles that face outward.
+const STRIP = array<u32, 14>(6u, 7u, 2u, 3u, 1u, 7u, 5u, 6u, 4u, 2u, 0u, 1u, 4u, 5u);
+
+@vertex fn vs_capsule(in: CapsuleIn, @builtin(vertex_index) index: u32) -> CapsuleOut {
+    var strip = STRIP;
+    let k = strip[index];
+    let corner = vec3f(select(-1.0, 1.0, (k & 1u) != 0u), select(-1.0, 1.0, (k & 2u) != 0u), select(-1.0, 1.0, (k & 4u) != 0u));
+    let r = 1.001 * in.ball.w;
+    let at = in.ball.xyz + turned(in.turn, corner * vec3f(r, r, r + in.half_length.x));
+    var clip = view.clip_from_world * vec4f(at, 1.0);
+    // far sides beyond the far plane are drawn on it
+    clip.z = max(clip.z, 0.0);
+    return CapsuleOut(clip, in.ball, in.turn, in.color_rough, in.other_metal, in.pattern, vec4f(turned(in.turn, vec3f(0.0, 0.0, 1.0)), in.half_length.x));
+}
+
+// Ray, its parameter nearest to the middle, the way from there to the middle, and the place on the segment that it passes nearest to.
+struct Passing { ray: Ray, nearest: f32, to: vec3f, u: f32, room: f32 };
+
+fn pass_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> Passing {
+    let ray = ray_at(pixel);
+    let per = 1.0 / dot(ray.dir, ray.dir);
+    let whole = ball.xyz - ray.origin;
+    let nearest = dot(whole, ray.dir) * per;
+    let to = whole - nearest * ray.dir;
+    let across = axis.xyz - dot(axis.xyz, ray.dir) * per * ray.dir;
+    let u = clamp(-dot(to, across) / max(dot(across, across), 1e-9), -axis.w, axis.w);
+    let miss = to + u * across;
+    return Passing(ray, nearest, to, u, ball.w * ball.w - dot(miss, miss));
+}
+
+fn inside_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> f32 {
+    return pass_capsule(ball, axis, pixel).room;
+}
+
+fn hit_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> Hit {
+    let p = pass_capsule(ball, axis, pixel);
+    let d = p.ray.dir;
+    let a = axis.xyz;
+    let d_a = dot(d, a);
+    let o = -p.to;
+    let o_a = dot(o, a);
+    let o_d = dot(o, d);
+    let wide = max(dot(d, d) - d_a * d_a, 1e-9);
+    let half = o_d - d_a * o_a;
+    var t = (-half - sqrt(max(half * half - wide * (dot(o, o) - o_a * o_a - ball.w * ball.w), 0.0))) / wide;
+    var u = o_a + t * d_a;
+    if (p.room <= 0.0) {
+        // at the rim the ray may just miss: the normal is that of the nearest point
+        u = p.u;
+        t = dot(p.to + u * a, d) / dot(d, d);
+    } else if (abs(u) > axis.w) {
+        u = clamp(u, -axis.w, axis.w);
+        let end = p.to + u * a;
+        let per = 1.0 / dot(d, d);
+        let near = dot(end, d) * per;
+        let miss = end - near * d;
+        t = near - sqrt(max(ball.w * ball.w - dot(miss, miss), 0.0) * per);
+    }
+    let n = normalize(t * d - p.to - u * a);
+    return Hit(p.nearest + t, ball.xyz + u * a + n * ball.w, n);
+}
+
+fn capsule_depth(in: CapsuleOut) -> f32 {
+    let p = inside_capsule(in.ball, in.axis, in.clip.xy);
+    let h = hit_capsule(in.ball, in.axis, in.clip.xy);
+    let depth = depth_of(h.s);
+    if (p < 0.0 || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
+    return depth;
+}
+
+@fragment fn fs_capsule_depth(in: CapsuleOut) -> @builtin(frag_depth) f32 {
+    return capsule_depth(in);
+}
+
+// Where the number of the nearest sphere is asked for: it is none.
+@fragment fn fs_capsule_no_id(in: CapsuleOut) -> BallPixel {
+    return BallPixel(0u, capsule_depth(in));
+}
+
+@fragment fn fs_capsule(in: CapsuleOut) -> SpherePixel {
+    let pixel = in.clip.xy;
+    let mask = capsule_mask(in.ball, in.axis, pixel);
+    let h = hit_capsule(in.ball, in.axis, pixel);
+    let depth = depth_of(h.s);
+    if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
+    let to_eye = -normalize(ray_at(pixel).dir);
+    let color = pixel_color(h.position, h.normal, to_eye, unturn(in.turn, h.position - in.ball.xyz), unturn(in.turn, h.normal), h.s, pixel, vec3f(0.0),
+        Look(in.color_rough, in.other_metal, in.pattern));
+    // a hair nearer than in the pass before, where there is one
+    return sphere_pixel(vec4f(color, 1.0), min(depth * 1.000001, 1.0), mask);
+}

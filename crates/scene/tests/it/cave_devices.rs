@@ -1,0 +1,64 @@
+//! `[tracker]` and the launch commands of nodes in cave files.
+
+use std::net::{IpAddr, Ipv4Addr};
+use tumble_scene::cave::{Axes, Cave};
+
+const SMALL: &str = "
+[[user]]
+name = \"u\"
+eye_m = [0, 0, 1.5]
+[[screen]]
+name = \"s\"
+lower_left_m = [-1, 2, 0.5]
+lower_right_m = [1, 2, 0.5]
+upper_left_m = [-1, 2, 2.0]
+[[facet]]
+name = \"f\"
+screen = \"s\"
+size_px = [800, 600]
+";
+
+fn told(text: &str) -> String {
+    Cave::parse(&format!("{SMALL}{text}"), "my.toml").expect_err("it is wrong").to_string()
+}
+
+#[test]
+fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
+    let of = |text: &str| Cave::parse(&format!("{SMALL}{text}"), "my.toml").unwrap_or_else(|e| panic!("{e}")).tracker.unwrap();
+    assert_eq!(Cave::parse(SMALL, "my.toml").unwrap().tracker, None);
+    let usual = of("[tracker]\n");
+    assert_eq!((usual.socket(), &usual.users[..], usual.axes, usual.origin_m), ("127.0.0.1:47200".parse().unwrap(), &["u".to_owned()][..], Axes::ZUp, [0.0; 3]));
+    let far = of("[tracker]\naddress = \"0.0.0.0\"\nport = 9000\nusers = [\"glasses 1\"]\nsenders = [\"10.0.0.7\"]\naxes = \"y_up\"\norigin_m = [0, 1, 0]\n");
+    assert_eq!((far.senders, far.axes, far.users), (vec![IpAddr::from(Ipv4Addr::new(10, 0, 0, 7))], Axes::YUp, vec!["glasses 1".to_owned()]));
+    let cases = [
+        ("[tracker]\naddress = \"0.0.0.0\"\n", "has no `senders`"),
+        ("[tracker]\naddress = \"here\"\n", "wanted an IP address"),
+        ("[tracker]\nport = 0\n", "a whole number from 1 to 65535"),
+        ("[tracker]\nusers = [\"a\", \"b\"]\n", "one name for each of the cave's 1 users"),
+        ("[tracker]\nusers = [\"a/b\"]\n", "without /"),
+        ("[tracker]\nsenders = [7]\n", "`senders`"),
+        ("[tracker]\naxes = \"x_up\"\n", "`y_up`"),
+        ("[tracker]\norigin_m = [0, nan, 0]\n", "finite"),
+    ];
+    for (text, said) in cases {
+        assert!(told(text).contains(said), "{text}: {}", told(text));
+    }
+}
+
+#[test]
+fn a_launch_command_names_the_arguments_and_nothing_unknown() {
+    let node = |launch: &str| format!("[[node]]\nname = \"n\"\naddress = \"127.0.0.1\"\nlaunch = {launch}\n");
+    let cave = Cave::parse(&format!("{SMALL}{}", node("[\"ssh\", \"{address}\", \"tumble {line}\"]")), "my.toml").unwrap();
+    assert_eq!(cave.nodes[0].launch, ["ssh", "{address}", "tumble {line}"]);
+    let cases = [
+        ("[]", "the words of a command"),
+        ("\"ssh\"", "the words of a command"),
+        ("[\"ssh\", \"{address}\"]", "with {arguments} or {line} among them"),
+        ("[\"ssh\", \"tumble {arguments}\"]", "{arguments} as a word by itself"),
+        ("[\"ssh\", \"{host}\", \"{arguments}\"]", "there is no {host}"),
+        ("[\"\", \"{arguments}\"]", "the words of a command"),
+    ];
+    for (launch, said) in cases {
+        assert!(told(&node(launch)).contains(said), "{launch}: {}", told(&node(launch)));
+    }
+}

@@ -1,0 +1,131 @@
+//! What of a user pushes things (`--push`): an upright capsule from the floor to the head, and two hands. They yield to nothing.
+//!
+//! ```text
+//! a step moves a body by at most  v_max · scale · dt  towards where it is wanted
+//! ```
+//!
+//! so that a tracker that jumps strikes nothing at a kilometre a second.
+
+use crate::failure::Failure;
+use tumble::collide::{Pose, Shape, Vec3};
+use tumble::core::{Mode, ObjectId, RigidBody, World, WorldError};
+use tumble::net::sync::{User, Viewer};
+
+/// Of a user's body, m.
+const RADIUS_M: f64 = 0.25;
+/// Of a hand, m.
+const HAND_RADIUS_M: f64 = 0.06;
+/// Fastest that a tracked body moves, and a hand that keys move, metres of the cave per second; walking is among the latter's.
+const MOST_M_PER_S: f64 = 10.0;
+const REACH_M_PER_S: f64 = 3.0;
+/// Beside, ahead of and below the head: a hand that hangs (within the capsule), and one that is stretched out.
+const HANGING_M: [f64; 3] = [0.15, 0.0, -0.7];
+const STRETCHED_M: [f64; 3] = [0.15, 0.7, -0.25];
+/// Left and right.
+const SIDES: [(&str, f64); 2] = [("left", -1.0), ("right", 1.0)];
+
+/// Where a hand is wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Hand {
+    #[default]
+    Hanging,
+    /// Held out, by a key.
+    Stretched,
+    /// In the cave's frame.
+    Tracked(Pose),
+}
+
+/// One user's.
+struct Limbs {
+    capsule: ObjectId,
+    hands: [ObjectId; 2],
+}
+
+/// All users' bodies; none where nobody pushes.
+#[derive(Default)]
+pub struct Bodies(Vec<Limbs>);
+
+impl Bodies {
+    /// One set for each user.
+    pub fn add(viewer: &Viewer, world: &mut World) -> Result<Bodies, Failure> {
+        let failed = |e: &dyn std::fmt::Display| Failure::run("a user's body", e);
+        let mut bodies = Bodies::default();
+        for (k, user) in viewer.users.iter().enumerate() {
+            let mut add = |name: String, shape: Shape, pose: Pose, drawn: bool| {
+                let body = RigidBody::fixture(name, shape).at(pose);
+                // the capsule is not drawn: the user stands in it
+                let body = if drawn { body } else { body.drawn_as(Vec::new()) };
+                world.add_boxed(Box::new(body), Mode::Kinematic).map_err(|e| failed(&e))
+            };
+            let capsule = Shape::capsule(RADIUS_M * viewer.scale, half_length(user) * viewer.scale).map_err(|e| failed(&e))?;
+            let capsule = add(format!("user {k}"), capsule, upright(viewer, user), false)?;
+            let mut hand = |side: usize| {
+                let ball = Shape::sphere(HAND_RADIUS_M * viewer.scale).map_err(|e| failed(&e))?;
+                add(format!("user {k} {} hand", SIDES[side].0), ball, in_scene(viewer, &wanted(user, side, Hand::Hanging)), true)
+            };
+            bodies.0.push(Limbs { capsule, hands: [hand(0)?, hand(1)?] });
+        }
+        Ok(bodies)
+    }
+
+    /// Whether an object is one of them.
+    pub fn has(&self, id: ObjectId) -> bool {
+        self.0.iter().any(|limbs| limbs.capsule == id || limbs.hands.contains(&id))
+    }
+
+    /// Takes them along for the next step of `dt` seconds; `hands` by user.
+    pub fn follow(&self, viewer: &Viewer, hands: impl Fn(usize) -> [Hand; 2], world: &mut World, dt: f64) -> Result<(), WorldError> {
+        for (k, (limbs, user)) in self.0.iter().zip(&viewer.users).enumerate() {
+            advance(world, limbs.capsule, upright(viewer, user), MOST_M_PER_S * viewer.scale * dt)?;
+            for (side, hand) in hands(k).into_iter().enumerate() {
+                let most = if matches!(hand, Hand::Tracked(_)) { MOST_M_PER_S } else { REACH_M_PER_S };
+                advance(world, limbs.hands[side], in_scene(viewer, &wanted(user, side, hand)), most * viewer.scale * dt)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn advance(world: &mut World, id: ObjectId, wanted: Pose, most: f64) -> Result<(), WorldError> {
+    let at = world.site(id, 0).ok_or(WorldError::Stale)?.position();
+    let by = wanted.translation.vector - at;
+    let to = at + by * (most / by.norm().max(most));
+    world.move_to(id, Pose::from_parts(to.into(), wanted.rotation))
+}
+
+fn in_scene(viewer: &Viewer, pose: &Pose) -> Pose {
+    let at = viewer.cave * nalgebra::Point3::from(pose.translation.vector * viewer.scale);
+    Pose::from_parts(at.coords.into(), viewer.cave.rotation * pose.rotation)
+}
+
+/// Of a hand, in the cave's frame.
+fn wanted(user: &User, side: usize, hand: Hand) -> Pose {
+    let [aside, ahead, above] = match hand {
+        Hand::Tracked(pose) => return pose,
+        Hand::Hanging => HANGING_M,
+        Hand::Stretched => STRETCHED_M,
+    };
+    let head = &user.head;
+    // a stretched hand goes where one looks; one that hangs does so whatever the head does
+    let offset = match hand {
+        Hand::Stretched => head.rotation * Vec3::new(SIDES[side].1 * aside, ahead, above),
+        _ => {
+            let right = head.rotation * Vec3::x();
+            let level = Vec3::new(right.x, right.y, 0.0);
+            level * (SIDES[side].1 * aside / level.norm().max(1e-3)) + Vec3::new(0.0, 0.0, above.max(0.1 - head.translation.z))
+        }
+    };
+    Pose::from_parts((head.translation.vector + offset).into(), head.rotation)
+}
+
+/// Half the straight part of a user's capsule, from the floor to the head where that is high enough, m of the cave.
+fn half_length(user: &User) -> f64 {
+    (0.5 * user.head.translation.z - RADIUS_M).max(0.01)
+}
+
+/// Where a user's capsule is wanted.
+fn upright(viewer: &Viewer, user: &User) -> Pose {
+    let mut at = user.head.translation.vector;
+    at.z = half_length(user) + RADIUS_M;
+    in_scene(viewer, &Pose::from_parts(at.into(), nalgebra::UnitQuaternion::identity()))
+}

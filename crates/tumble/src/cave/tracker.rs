@@ -1,0 +1,107 @@
+//! A socket that hears a tracker: a thread of its own reads it, so that a flood costs the simulation nothing, and what is newest is there when a frame begins.
+
+use super::osc::{Book, Counts, MOST_BYTES};
+use crate::failure::Failure;
+use std::io::ErrorKind;
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tumble::net::sync::Input;
+use tumble::scene::cave::{Cave, Tracker};
+
+/// Datagrams that are read in each [`SPAN`]; four times as many more are counted and dropped, and what comes beyond waits, or is dropped by the system.
+const MOST_PER_SPAN: u32 = 500;
+const SPAN: Duration = Duration::from_millis(100);
+/// The thread looks this often whether it is to end.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// A tracker that is heard.
+pub struct Heard {
+    book: Arc<Mutex<Book>>,
+    end: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    at: SocketAddr,
+}
+
+/// What is listened to: as the cave file says, at the command line's address if there is one; `None` where neither says anything.
+pub fn described(cave: &Cave, address: Option<SocketAddr>) -> Option<Tracker> {
+    let described = cave.tracker.clone();
+    let Some(address) = address else { return described };
+    let mut tracker = described.unwrap_or_else(|| Tracker::of(&cave.users));
+    (tracker.address, tracker.port) = (address.ip(), address.port());
+    Some(tracker)
+}
+
+impl Heard {
+    /// Listens.
+    pub fn open(tracker: &Tracker) -> Result<Heard, Failure> {
+        let failed = |e: std::io::Error| Failure::run(&format!("the tracker's address {}", tracker.socket()), e);
+        let socket = UdpSocket::bind(tracker.socket()).map_err(failed)?;
+        socket.set_read_timeout(Some(LOOK)).map_err(failed)?;
+        let at = socket.local_addr().map_err(failed)?;
+        let (book, end) = (Arc::new(Mutex::new(Book::new(tracker))), Arc::new(AtomicBool::new(false)));
+        let (theirs, ended) = (book.clone(), end.clone());
+        let thread = std::thread::Builder::new().name("tracker".into()).spawn(move || listen(&socket, &theirs, &ended)).map_err(failed)?;
+        Ok(Heard { book, end, thread: Some(thread), at })
+    }
+
+    /// For a person: where, and who is heard.
+    pub fn describe(&self, tracker: &Tracker) -> String {
+        let who = match &tracker.senders[..] {
+            [] if tracker.address.is_loopback() => "this machine".to_owned(),
+            [] => "EVERYBODY who reaches it; name those you mean in `senders` of [tracker]".to_owned(),
+            senders => senders.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
+        };
+        format!("tracker: OSC at {}, from {who}; users {}", self.at, tracker.users.join(", "))
+    }
+
+    /// What is new.
+    pub fn inputs(&self) -> Vec<Input> {
+        lock(&self.book).inputs()
+    }
+
+    /// What came so far.
+    pub fn counts(&self) -> Counts {
+        lock(&self.book).counts.clone()
+    }
+}
+
+impl Drop for Heard {
+    fn drop(&mut self) {
+        self.end.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn lock(book: &Mutex<Book>) -> MutexGuard<'_, Book> {
+    book.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn listen(socket: &UdpSocket, book: &Mutex<Book>, end: &AtomicBool) {
+    // one byte more than may come: so a longer one is known
+    let mut bytes = [0; MOST_BYTES + 1];
+    let (mut since, mut count) = (Instant::now(), 0);
+    while !end.load(Ordering::Relaxed) {
+        if since.elapsed() > SPAN {
+            (since, count) = (Instant::now(), 0);
+        }
+        if count >= 5 * MOST_PER_SPAN {
+            std::thread::sleep(SPAN.saturating_sub(since.elapsed()));
+            continue;
+        }
+        match socket.recv_from(&mut bytes) {
+            Ok((length, from)) => {
+                count += 1;
+                let mut book = lock(book);
+                if count <= MOST_PER_SPAN { book.take(from.ip(), &bytes[..length]) } else { book.skip() }
+            }
+            Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            // as when an answer of ours were refused; we send none, so whatever it is may pass
+            Err(_) => std::thread::sleep(LOOK),
+        }
+    }
+}

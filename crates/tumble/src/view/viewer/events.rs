@@ -1,0 +1,148 @@
+//! What keys and mouse do.
+
+use super::*;
+use crate::view::hand::Hand;
+use crate::view::sight::Ray;
+use tumble::render::winit::event::{ElementState, MouseButton, MouseScrollDelta};
+use tumble::render::winit::keyboard::PhysicalKey;
+use tumble::render::winit::window::Fullscreen;
+
+/// What dragging turns, rad per pixel.
+const TURN_RAD_PER_PX: f64 = 0.005;
+
+impl Viewer {
+    /// Something happened to the window.
+    pub(super) fn heard(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
+        match event {
+            WindowEvent::KeyboardInput { event, .. } => {
+                let down = event.state == ElementState::Pressed;
+                if let PhysicalKey::Code(code) = event.physical_key
+                    && let Some(way) = keys::way(code)
+                {
+                    if down { self.user.press(way) } else { self.user.release(way) }
+                }
+                if down && !event.repeat && let Some(command) = keys::command(&event.logical_key) {
+                    self.act(screen, command)?;
+                }
+            }
+            WindowEvent::ModifiersChanged(modifiers) => self.user.fast = modifiers.state().shift_key(),
+            WindowEvent::CursorMoved { position, .. } => self.pointed(screen, [position.x, position.y]),
+            WindowEvent::MouseInput { state, button, .. } => self.button(screen, *button, *state == ElementState::Pressed),
+            WindowEvent::MouseWheel { delta, .. } => {
+                let up = match delta {
+                    MouseScrollDelta::LineDelta(_, y) => f64::from(*y),
+                    MouseScrollDelta::PixelDelta(p) => p.y / 20.0,
+                };
+                if up != 0.0 {
+                    self.wheel(screen, up);
+                }
+            }
+            WindowEvent::Focused(true) => self.focused = true,
+            WindowEvent::Focused(false) => {
+                self.focused = false;
+                self.user.release_all();
+                self.clockwork.lock().hand = None;
+                self.pointer.turning = false;
+            }
+            WindowEvent::Resized(_) => self.stale = true,
+            WindowEvent::CloseRequested => self.take_last(screen)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn act(&mut self, screen: &mut Screen, command: Command) -> Result<(), Failure> {
+        match command {
+            Command::Pause => self.clockwork.lock().pace.toggle(),
+            Command::Step => self.clockwork.lock().pace.step_once(),
+            Command::Reset => self.clockwork.lock().reset()?,
+            Command::Faster => self.clockwork.lock().pace.change_speed(1),
+            Command::Slower => self.clockwork.lock().pace.change_speed(-1),
+            Command::NextCamera => self.go_to(1),
+            Command::LastCamera => self.go_to(-1),
+            Command::Home => {
+                self.presets.home();
+                self.go_to(0);
+            }
+            Command::Fly => self.user.flies = !self.user.flies,
+            Command::Overlay(index) => self.overlays.switch(index),
+            Command::Statistics => (self.show.any, self.show.statistics) = (true, !(self.show.any && self.show.statistics)),
+            Command::Help => (self.show.any, self.show.help) = (true, !self.show.help),
+            Command::Picture => self.save_picture(screen)?,
+            Command::Quality => {
+                let all = [Quality::default(), Quality::fast(), Quality::fastest()];
+                let next = all.iter().position(|q| Some(*q) == self.quality).map_or(0, |i| (i + 1) % all.len());
+                self.quality = Some(all[next]);
+            }
+            Command::Fullscreen => {
+                let full = screen.window().fullscreen().is_some();
+                screen.window().set_fullscreen((!full).then_some(Fullscreen::Borderless(None)));
+            }
+            Command::Quit => self.ended = true,
+        }
+        self.stale = true;
+        Ok(())
+    }
+
+    fn go_to(&mut self, by: isize) {
+        self.presets.go(by);
+        if let Some(camera) = self.presets.camera(&self.clockwork.lock().world, &self.list) {
+            self.user.look_from(&camera);
+        }
+    }
+
+    fn pointed(&mut self, screen: &Screen, at_px: [f64; 2]) {
+        let [dx, dy] = std::array::from_fn(|k| at_px[k] - self.pointer.at_px[k]);
+        self.pointer.at_px = at_px;
+        if self.pointer.turning {
+            self.presets.let_go();
+            self.user.turn(-TURN_RAD_PER_PX * dx, -TURN_RAD_PER_PX * dy);
+            self.stale = true;
+        }
+        self.move_hand(screen);
+    }
+
+    /// The line of sight below the pointer.
+    fn ray(&self, screen: &Screen) -> Option<Ray> {
+        self.sight.ray(&self.list, screen.size_px(), self.pointer.at_px)
+    }
+
+    /// The hand stays below the pointer, wherever user and pointer go.
+    pub(super) fn move_hand(&mut self, screen: &Screen) {
+        let ray = self.ray(screen);
+        if let Some(hand) = &mut self.clockwork.lock().hand {
+            ray.iter().for_each(|ray| hand.follow(ray));
+            self.stale = true;
+        }
+    }
+
+    fn button(&mut self, screen: &Screen, button: MouseButton, down: bool) {
+        match button {
+            MouseButton::Left if down => {
+                let ray = self.ray(screen);
+                let mut simulation = self.clockwork.lock();
+                simulation.hand = ray.and_then(|ray| Hand::pick(&simulation.world, &ray));
+                self.pointer.turning = simulation.hand.is_none();
+            }
+            MouseButton::Left => {
+                self.clockwork.lock().hand = None;
+                self.pointer.turning = false;
+            }
+            MouseButton::Right => self.pointer.turning = down,
+            _ => {}
+        }
+        self.stale = true;
+    }
+
+    fn wheel(&mut self, screen: &Screen, up: f64) {
+        let held = self.clockwork.lock().hand.as_mut().map(|hand| hand.reach(1.1f64.powf(-up))).is_some();
+        if !held {
+            self.pointer.wheel += up;
+            let notches = self.pointer.wheel.trunc();
+            self.pointer.wheel -= notches;
+            self.user.change_speed(notches as i32);
+        }
+        self.move_hand(screen);
+        self.stale = true;
+    }
+}

@@ -1,0 +1,277 @@
+//! The program in the window: what is shown, and when. Keys and mouse are in `events.rs`, what is told of it in `told.rs`; steps are taken on another thread
+//! ([`Clockwork`]).
+
+mod events;
+mod told;
+
+use super::keys::{self, Command};
+use super::overlays::Overlays;
+use super::pace::Pace;
+use super::presets::{Presets, distance};
+use super::sight::Sight;
+use super::simulation::{Clockwork, Simulation};
+use super::statistics::Statistics;
+use super::status::Log;
+use super::user::User;
+use crate::args::ViewOptions;
+use crate::failure::Failure;
+use crate::shots::write_png;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use tumble::core::World;
+use tumble::render::winit::event::WindowEvent;
+use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, Shown, WindowApp, caption};
+use tumble::scene::SceneFile;
+
+/// Between two status lines while nothing but time changes.
+const IDLE: Duration = Duration::from_millis(250);
+/// Between two looks at what is to be done while nothing is.
+const LOOK: Duration = Duration::from_millis(20);
+/// Pictures per second where the desktop does not say how many it shows.
+const USUAL_RATE: f64 = 60.0;
+
+/// A scene that is looked at.
+pub struct Viewer {
+    name: String,
+    clockwork: Clockwork,
+    drawing: Drawing,
+    list: DrawList,
+    sight: Sight,
+    user: User,
+    presets: Presets,
+    overlays: Overlays,
+    pointer: Pointer,
+    statistics: Statistics,
+    log: Log,
+    show: Captions,
+    limits: Limits,
+    /// `None` until it is known what draws.
+    quality: Option<Quality>,
+    shots: PathBuf,
+    picture_wanted: bool,
+    last_picture: Option<Image>,
+    /// Whether what is shown is no longer what is.
+    stale: bool,
+    /// The simulation's count of changes that the list is of.
+    drawn: u64,
+    ended: bool,
+    shown: u64,
+    /// Of the window.
+    size_px: [u32; 2],
+    focused: bool,
+    times: Times,
+}
+
+/// The mouse.
+#[derive(Default)]
+struct Pointer {
+    at_px: [f64; 2],
+    turning: bool,
+    /// Of the wheel, what is not yet a whole notch.
+    wheel: f64,
+}
+
+/// Text over the picture.
+struct Captions {
+    any: bool,
+    statistics: bool,
+    help: bool,
+}
+
+/// When the viewer ends by itself, and how often it draws.
+struct Limits {
+    pictures: Option<u64>,
+    per_second: Option<f64>,
+    /// The picture after which the device is lost.
+    device: Option<u64>,
+}
+
+/// Moments of the last turn and status line.
+struct Times {
+    turn: Instant,
+    told: Option<Instant>,
+}
+
+impl Viewer {
+    /// Of a world at time 0.
+    pub fn new(scene: &SceneFile, world: World, sight: Sight, options: &ViewOptions) -> Result<Viewer, Failure> {
+        let mut drawing = Drawing::new(scene);
+        let list = drawing.list(&world, &DebugDraw::default()).map_err(Failure::input)?;
+        let mut presets = Presets::new(&world, &list);
+        let mut user = User::new(sight.body(&list), distance(&list.camera));
+        if let Some(name) = &options.camera {
+            if !presets.find(name) {
+                return Err(Failure::input(format!("no camera `{name}`; wanted one of {}", presets.names().join(", "))));
+            }
+            presets.camera(&world, &list).iter().for_each(|camera| user.look_from(camera));
+        }
+        let now = Instant::now();
+        let last = options.seconds.map(|s| (s / world.settings().dt).round() as u64);
+        Ok(Viewer {
+            name: options.scene.name.clone(),
+            clockwork: Clockwork::new(Simulation::new(world, Pace::new(options.paused), last)),
+            drawing,
+            list,
+            sight,
+            user,
+            presets,
+            overlays: Overlays { draw: options.debug_draw.0 },
+            pointer: Pointer::default(),
+            statistics: Statistics::new(now),
+            log: Log::create(options.status.as_deref())?,
+            show: Captions { any: !options.plain, statistics: true, help: false },
+            limits: Limits { pictures: options.frames, per_second: options.fps, device: options.lose_device },
+            quality: options.quality,
+            shots: options.shots.clone(),
+            picture_wanted: options.picture.is_some(),
+            last_picture: None,
+            stale: true,
+            drawn: 0,
+            ended: false,
+            shown: 0,
+            size_px: [0; 2],
+            focused: false,
+            times: Times { turn: now, told: None },
+        })
+    }
+
+    /// After the window is closed: the last status line, and the picture of the end if it is wanted.
+    pub fn finish(&mut self) -> Result<Option<Image>, Failure> {
+        if self.log.wanted() {
+            let status = self.status();
+            self.log.tell(status, true)?;
+        }
+        match self.clockwork.lock().trouble.take() {
+            Some(trouble) => Err(Failure::run("the simulation stopped", trouble)),
+            None => Ok(self.last_picture.take()),
+        }
+    }
+
+    /// The draw list of this moment.
+    fn update_list(&mut self) -> Result<(), Failure> {
+        let simulation = self.clockwork.lock();
+        let world = &simulation.world;
+        self.list = self.drawing.list(world, &self.overlays.draw).map_err(|e| Failure::run("the picture", e))?;
+        self.drawn = simulation.changes;
+        if let Some(camera) = self.presets.followed(world, &self.list) {
+            self.user.look_from(&camera);
+        }
+        if let Some(quality) = &self.quality {
+            quality.apply(&mut self.list.settings);
+        }
+        self.sight.widen_shadows(&mut self.list);
+        self.sight.stand(self.user.body(), &mut self.list);
+        if let Some(hand) = &simulation.hand {
+            hand.draw(world, &mut self.list);
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let clock = Instant::now();
+        self.update_list()?;
+        self.sight.draw(screen, &self.list)?;
+        let lines = self.lines();
+        screen.set_caption((!lines.is_empty()).then(|| caption(&lines, if screen.size_px()[0] >= 960 { 2 } else { 1 })));
+        if screen.show()? == Shown::Yes {
+            self.stale = false;
+            self.shown += 1;
+        }
+        if self.limits.device == Some(self.shown) {
+            screen.lose_device();
+        }
+        self.statistics.pictures.add(clock.elapsed());
+        Ok(())
+    }
+
+    fn save_picture(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let frame = self.clockwork.lock().world.frame();
+        self.update_list()?;
+        let path = self.shots.join(format!("{}_{frame:06}.png", file_name(&self.name)));
+        write_png(&self.sight.picture(screen, &self.list)?, &path)?;
+        eprintln!("picture: {}", path.display());
+        Ok(())
+    }
+
+    /// The picture of the end, where one is wanted.
+    fn take_last(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        if self.picture_wanted {
+            self.update_list()?;
+            self.last_picture = Some(self.sight.picture(screen, &self.list)?);
+        }
+        Ok(())
+    }
+
+    /// Time from one picture to the next.
+    fn interval(&self, screen: &Screen) -> Duration {
+        let desktop = || Some(f64::from(screen.window().current_monitor()?.refresh_rate_millihertz()?) / 1000.0);
+        let rate = self.limits.per_second.or_else(desktop).filter(|rate| *rate >= 0.01).unwrap_or(USUAL_RATE);
+        Duration::from_secs_f64(1.0 / rate.max(0.01))
+    }
+
+    /// The clock went on: the user moves by the keys that he holds.
+    fn walk(&mut self, screen: &Screen, passed_s: f64) {
+        if self.user.moves() {
+            self.presets.let_go();
+            self.user.pass(passed_s);
+            self.sight.stand(self.user.body(), &mut self.list);
+            self.move_hand(screen);
+            self.stale = true;
+        }
+    }
+}
+
+impl WindowApp for Viewer {
+    type Error = Failure;
+
+    fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let usual = if screen.is_software() { Quality::fast() } else { Quality::default() };
+        self.quality.get_or_insert(usual);
+        // opening took its time; the simulation starts now
+        self.times.turn = Instant::now();
+        self.clockwork.start()
+    }
+
+    fn event(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
+        self.heard(screen, event)
+    }
+
+    fn turn(&mut self, screen: &mut Screen) -> Result<Next, Failure> {
+        let now = Instant::now();
+        self.size_px = screen.size_px();
+        let passed = (now - self.times.turn).as_secs_f64();
+        self.times.turn = now;
+        self.walk(screen, passed);
+        if self.clockwork.is_broken() {
+            return Err(Failure::run("the simulation", "its thread ended; what it said stands above"));
+        }
+        let (moved, over, paused, counted) = {
+            let mut simulation = self.clockwork.lock();
+            let counted = self.statistics.count(now, &mut simulation.steps);
+            (simulation.changes != self.drawn, simulation.is_over(), simulation.pace.paused, counted)
+        };
+        self.stale |= moved;
+        if counted {
+            screen.window().set_title(&self.title(screen));
+            self.stale |= self.show.any && self.show.statistics;
+        }
+        if self.stale || self.limits.pictures.is_some() {
+            self.draw(screen)?;
+        }
+        self.tell(now)?;
+        if over || self.ended || self.limits.pictures.is_some_and(|pictures| self.shown >= pictures) {
+            self.take_last(screen)?;
+            return Ok(Next::End);
+        }
+        let active = !paused || self.user.moves() || self.stale || self.limits.pictures.is_some();
+        Ok(Next::At(now + if active { self.interval(screen) } else { LOOK }))
+    }
+}
+
+/// What of a scene's name or path serves as a file's name.
+fn file_name(scene: &str) -> String {
+    let path = std::path::Path::new(scene);
+    let stem = path.file_stem().and_then(|s| s.to_str()).filter(|s| *s != "scene");
+    let folder = || path.parent().and_then(|p| p.file_name()).and_then(|s| s.to_str());
+    stem.or_else(folder).unwrap_or("scene").to_string()
+}

@@ -1,0 +1,74 @@
+//! Recordings of runs in a cave, cut anywhere.
+
+use crate::cave_users::{in_place, place};
+use crate::common::*;
+use tumble::net::record::recover;
+use tumble::net::sync::{Replay, ReplayFrame};
+
+/// Of an MCAP file: opcode, begin and end of each record. (Magic of 8 bytes, then records of an opcode, a length of 8 bytes, and so many bytes.)
+fn records(bytes: &[u8]) -> Vec<(u8, usize, usize)> {
+    let (mut at, mut out) = (8, Vec::new());
+    while at + 9 <= bytes.len() - 8 {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        out.push((bytes[at], at, at + 9 + length));
+        at += 9 + length;
+    }
+    out
+}
+
+/// Where each chunk ends, and how many frames are in it, by the index of messages behind it. The channel of states is known from the repetition at the end.
+fn chunks(bytes: &[u8]) -> Vec<(usize, usize)> {
+    let u16_at = |at: usize| u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap());
+    let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let all = records(bytes);
+    let is_state = |begin: usize| bytes[begin + 17..begin + 17 + u32_at(begin + 13)] == *b"/tumble/state";
+    let state = all.iter().rev().find(|(opcode, begin, _)| *opcode == 0x04 && is_state(*begin)).map(|(_, begin, _)| u16_at(begin + 9)).unwrap();
+    let mut chunks = Vec::new();
+    for (opcode, begin, end) in all {
+        match opcode {
+            0x06 => chunks.push((end, 0)),
+            0x07 if u16_at(begin + 9) == state => chunks.last_mut().unwrap().1 += u32_at(begin + 11) / 16,
+            _ => {}
+        }
+    }
+    chunks
+}
+
+fn frames(path: &std::path::Path) -> Vec<ReplayFrame> {
+    let mut replay = Replay::open(path).unwrap();
+    std::iter::from_fn(|| replay.next_frame().unwrap()).collect()
+}
+
+#[test]
+fn a_run_cut_at_every_structural_boundary_keeps_what_was_flushed() {
+    let (folder, scene, cave) = place("cave-cuts");
+    let file = folder.path("run.mcap");
+    let args = ["cave", &scene, "--cave", &cave, "--no-pictures", "--fast", "--seconds", "0.7", "--record", &text(&file), "--quiet"];
+    let out = in_place(&folder, &args).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let (bytes, whole) = (std::fs::read(&file).unwrap(), frames(&file));
+    let chunks = chunks(&bytes);
+    assert_eq!((whole.len(), chunks.iter().map(|(_, n)| n).sum::<usize>()), (71, 71));
+    assert!(chunks.len() > 3, "{chunks:?}");
+    let mut points: Vec<usize> = records(&bytes).into_iter().flat_map(|(_, begin, end)| [begin, begin + 1, begin + 9, (begin + end) / 2, end - 1]).collect();
+    points.sort();
+    points.dedup();
+    let (cut, mended) = (folder.path("cut.mcap"), folder.path("mended.mcap"));
+    let mut partly = 0;
+    for at in points {
+        let expected: usize = chunks.iter().filter(|(end, _)| *end <= at).map(|(_, n)| n).sum();
+        std::fs::write(&cut, &bytes[..at]).unwrap();
+        let _ = std::fs::remove_file(&mended);
+        let saved = match recover(&cut, &mended) {
+            Ok(report) => report.frames as usize,
+            // so near to its beginning it is no recording yet
+            Err(_) => 0,
+        };
+        assert_eq!(saved, expected, "cut at byte {at}");
+        if saved > 0 {
+            assert!(frames(&mended)[..] == whole[..saved], "cut at byte {at}");
+            partly += usize::from(saved < whole.len());
+        }
+    }
+    assert!(partly > 10, "{partly} cuts within the run");
+}

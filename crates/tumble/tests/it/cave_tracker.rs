@@ -1,0 +1,231 @@
+//! A tracker moves users: real datagrams, written here byte by byte as the format's specification has them (Open Sound Control 1.0). And what users did in a
+//! recorded run, done again.
+
+use crate::cave_users::{CAVE, SCENE, Server, in_place, place};
+use crate::common::*;
+use serde_json::{Value, json as value};
+use std::net::{SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
+use tumble::collide::Vec3;
+use tumble::net::sync::Replay;
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A text, ended by a zero and filled up with more to a multiple of four bytes.
+fn padded(text: &str) -> Vec<u8> {
+    let mut bytes = text.as_bytes().to_vec();
+    bytes.resize(text.len() / 4 * 4 + 4, 0);
+    bytes
+}
+
+/// A message of single-precision numbers.
+fn floats(address: &str, numbers: &[f32]) -> Vec<u8> {
+    let tags = format!(",{}", "f".repeat(numbers.len()));
+    [padded(address), padded(&tags), numbers.iter().flat_map(|x| x.to_be_bytes()).collect()].concat()
+}
+
+fn ints(address: &str, numbers: &[i32]) -> Vec<u8> {
+    let tags = format!(",{}", "i".repeat(numbers.len()));
+    [padded(address), padded(&tags), numbers.iter().flat_map(|x| x.to_be_bytes()).collect()].concat()
+}
+
+/// Messages that belong together.
+fn bundle(messages: &[Vec<u8>]) -> Vec<u8> {
+    let element = |m: &Vec<u8>| [&(m.len() as u32).to_be_bytes()[..], m].concat();
+    [padded("#bundle"), vec![0, 0, 0, 0, 0, 0, 0, 1], messages.iter().flat_map(element).collect()].concat()
+}
+
+struct Sender {
+    socket: UdpSocket,
+    to: SocketAddr,
+}
+
+impl Sender {
+    /// To a port that is free now.
+    fn new() -> Sender {
+        let free = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        Sender { socket: UdpSocket::bind("127.0.0.1:0").unwrap(), to: free }
+    }
+
+    fn send(&self, bytes: &[u8]) {
+        self.socket.send_to(bytes, self.to).unwrap();
+    }
+}
+
+#[test]
+fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
+    let (folder, scene, cave) = place("cave-tracker");
+    let (sender, summary) = (Sender::new(), folder.path("summary.json"));
+    let mut server = Server::start(&folder, &scene, &cave, &["--push", "--tracker", &sender.to.to_string(), "--summary", &text(&summary)]);
+    server.show_until(5, |_| {});
+    assert_eq!(server.facet.viewer().users[0].head.translation.vector, Vec3::new(0.0, 0.0, 1.5));
+    let hand = |server: &Server, side: &str| {
+        let world = server.facet.world();
+        world.site(world.find(&format!("user 0 {side} hand")).unwrap(), 0).unwrap().position()
+    };
+    // a quarter turn to the left about z, half a metre to the right; both hands beside the ball, in one bundle
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let head = floats("/tumble/user/u/head", &[0.5, 0.25, 1.75, 0.0, 0.0, half, half]);
+    let left = floats("/tumble/user/u/hand/left", &[-0.25, 1.5, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    let near = |a: Vec3, x: f64, y: f64, z: f64| (a - Vec3::new(x, y, z)).norm() < 1e-4;
+    // the other one hangs within the body: 0.15 m to the user's right, which is y now, and 0.7 m below the eyes; poses travel in steps of 1/65536 m
+    let both = bundle(&[head, left]);
+    server.show_while("the hand", || sender.send(&both), |s| near(hand(s, "left"), -0.25, 1.5, 1.0) && near(hand(s, "right"), 0.5, 0.4, 1.05));
+    let viewer = server.facet.viewer();
+    assert_eq!(viewer.users[0].head.translation.vector, Vec3::new(0.5, 0.25, 1.75));
+    // ahead was y, and is −x now
+    assert!((viewer.users[0].head.rotation * Vec3::y() + Vec3::x()).norm() < 1e-6);
+    assert_eq!(server.ball(), Vec3::new(0.0, 2.0, 1.0));
+    // a hand of 6 cm goes through where the ball of 20 cm was: it is pushed to at least 26 cm from the hand
+    let before = server.facet.viewer().users[0].input;
+    for step in 1..=40 {
+        let y = 1.5 + 0.0125 * f64::from(step);
+        let message = floats("/tumble/user/u/hand/left", &[0.0, y as f32, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        server.show_while("the hand", || sender.send(&message), |s| near(hand(s, "left"), 0.0, y, 1.0));
+    }
+    let (ball, left) = (server.ball(), hand(&server, "left"));
+    assert!((left - Vec3::new(0.0, 2.0, 1.0)).norm() < 1e-4 && ball.y > 2.255, "the ball is at {ball:?}, the hand at {left:?}");
+    assert!(server.facet.viewer().users[0].input > before);
+    // one of each that is wrong
+    let unit = [0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0];
+    let with = |k: usize, x: f32| {
+        let mut numbers = unit;
+        numbers[k] = x;
+        floats("/tumble/user/u/head", &numbers)
+    };
+    let wrong = [
+        with(0, f32::NAN), with(1, f32::INFINITY), with(2, 101.0), // out of range
+        with(6, 0.5), // no rotation
+        floats("/tumble/user/nobody/head", &unit), // unknown user
+        floats("/tumble/user/u/foot", &unit), floats("/tumble/u/head", &unit), floats("/", &[]), // unknown address
+        floats("/tumble/user/u/head", &unit[..6]), floats("/tumble/user/u/head", &[]), ints("/tumble/user/u/buttons", &[-1]), ints("/tumble/user/u/keys", &[4; 33]), // arguments
+        vec![0; 1537], // too long
+        vec![0; 8], b"forged".to_vec(), floats("/tumble/user/u/head", &unit)[..40].to_vec(), Vec::new(), // malformed
+        bundle(&vec![floats("/a", &[]); 65]), // 64 of an unknown address, and too many
+        with(1, 3.5), // behind the screen: taken, and not followed
+    ];
+    wrong.iter().for_each(|bytes| sender.send(bytes));
+    // heard in order: what is good comes last
+    let last = floats("/tumble/user/u/wand", &unit);
+    let seen = server.facet.viewer().users[0].input;
+    sender.send(&last);
+    server.show_while("the last message", || {}, |s| s.facet.viewer().users[0].input > seen);
+    for _ in 0..5 {
+        let next = server.facet.session().shown().unwrap().0 + 1;
+        server.show_until(next, |_| {});
+    }
+    assert_eq!(server.facet.viewer().users[0].head.translation.vector, Vec3::new(0.5, 0.25, 1.75), "nothing of it moved the head");
+    server.end();
+    let summary = json(&summary);
+    let expected = value!({
+        "out_of_range": 3, "no_rotation": 1, "unknown_user": 1, "unknown_address": 3 + 64, "arguments": 4, "too_long": 1, "malformed": 4, "too_many": 1,
+    });
+    assert_eq!(summary["tracker"]["dropped"], expected);
+    assert!(summary["heads_refused"].as_u64() >= Some(1), "{summary}");
+}
+
+#[test]
+fn keys_stretch_out_a_hand() {
+    let (folder, scene, cave) = place("cave-hands");
+    let mut server = Server::start(&folder, &scene, &cave, &["--push"]);
+    let right = |server: &Server| {
+        let world = server.facet.world();
+        world.site(world.find("user 0 right hand").unwrap(), 0).unwrap().position()
+    };
+    server.show_until(5, |_| {});
+    assert!((right(&server) - Vec3::new(0.15, 0.0, 0.8)).norm() < 1e-4);
+    // sqrt(0.7² + 0.45²) = 0.83 m at 3 m/s take 0.28 s, or 28 frames
+    server.show_until(60, |input| input.keys = vec![0x09]);
+    assert!((right(&server) - Vec3::new(0.15, 0.7, 1.25)).norm() < 1e-4, "{:?}", right(&server));
+    server.show_until(200, |_| {});
+    assert!((right(&server) - Vec3::new(0.15, 0.0, 0.8)).norm() < 1e-4, "{:?}", right(&server));
+}
+
+#[test]
+fn the_picture_follows_the_tracked_eye() {
+    if tumble::render::Renderer::new().is_err() {
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter\n"));
+        return;
+    }
+    let (folder, scene, cave) = place("cave-eye");
+    let lines = |name: &str| -> Vec<Value> {
+        let text = std::fs::read_to_string(folder.path(name).join("f").join("frames.jsonl")).unwrap_or_default();
+        text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+    };
+    // what is seen from there by the cave file
+    let moved = folder.write("moved.toml", CAVE.replace("eye_m = [0, 0, 1.5]", "eye_m = [0.5, -0.25, 1.25]"));
+    let args = |cave: &str, log: &str| ["cave", &scene, "--cave", cave, "--offscreen", "--quiet", "--log-dir", &text(&folder.path(log))].map(str::to_owned);
+    for (cave, log) in [(&cave, "before"), (&moved, "after")] {
+        let args = [&args(cave, log)[..], &["--seconds".into(), "0.02".into(), "--fast".into()]].concat();
+        assert!(in_place(&folder, &args.iter().map(String::as_str).collect::<Vec<_>>()).status().unwrap().success());
+    }
+    let (before, after) = (lines("before")[0]["image"].clone(), lines("after")[0]["image"].clone());
+    assert_ne!(before, after);
+    // and by the tracker, in a space with y up: [x, z up, −y ahead]
+    let tracked = folder.write("tracked.toml", format!("{CAVE}[tracker]\nusers = [\"glasses\"]\naxes = \"y_up\"\n"));
+    let sender = Sender::new();
+    let args = [&args(&tracked, "tracked")[..], &["--tracker".into(), sender.to.to_string()]].concat();
+    let mut run = in_place(&folder, &args.iter().map(String::as_str).collect::<Vec<_>>()).spawn().unwrap();
+    let start = Instant::now();
+    let seen = loop {
+        let lines = lines("tracked");
+        if lines.len() > 5 {
+            assert_eq!(lines[0]["image"], before);
+            sender.send(&floats("/tumble/user/glasses/head", &[0.5, 1.25, 0.25, 0.0, 0.0, 0.0, 1.0]));
+        }
+        if lines.last().is_some_and(|line| line["image"] == after) {
+            break true;
+        }
+        if start.elapsed() > PATIENCE {
+            break false;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let _ = run.kill();
+    let _ = run.wait();
+    assert!(seen, "the picture from the tracked eye did not come");
+}
+
+#[test]
+fn what_users_did_is_done_again_bit_by_bit() {
+    let (folder, scene, cave) = place("cave-again");
+    let path = |name: &str| text(&folder.path(name));
+    let sender = Sender::new();
+    // keys from a window, a wand from a tracker
+    let mut server = Server::start(&folder, &scene, &cave, &["--push", "--tracker", &sender.to.to_string(), "--record", &path("first.mcap")]);
+    server.show_until(150, |input| {
+        input.keys = vec![if input.sequence % 40 < 30 { 0x1A } else { 0x04 }];
+        let x = 0.01 * (input.sequence % 20) as f32;
+        sender.send(&bundle(&[floats("/tumble/user/u/wand", &[x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]), ints("/tumble/user/u/buttons", &[1])]));
+    });
+    let ball = server.ball();
+    assert!((ball - Vec3::new(0.0, 2.0, 1.0)).norm() > 0.05, "it was not moved: {ball:?}");
+    server.end();
+    let again = |name: &str, args: &[&str]| -> Value {
+        let (file, summary) = (path(&format!("{name}.mcap")), folder.path(&format!("{name}.json")));
+        let fixed = ["cave", &scene, "--cave", &cave, "--fast", "--no-pictures", "--input-from", &path("first.mcap"), "--record", &file, "--summary", &text(&summary)];
+        let out = in_place(&folder, &[&fixed[..], args].concat()).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        json(&summary)["input_from"].clone()
+    };
+    let frames = |name: &str| {
+        let mut replay = Replay::open(path(name)).unwrap();
+        std::iter::from_fn(|| replay.next_frame().unwrap()).map(|f| (f.recorded.frame, f.recorded.state, f.inputs)).collect::<Vec<_>>()
+    };
+    let counts = again("second", &["--push"]);
+    let (first, second) = (frames("first.mcap"), frames("second.mcap"));
+    assert!(first.len() > 150);
+    assert_eq!((&counts["same"], &counts["different"]), (&first.len().into(), &0.into()));
+    assert_eq!(counts["inputs"], first.iter().map(|(_, _, inputs)| inputs.len()).sum::<usize>());
+    // also the recordings are the same, but for what came when the first run had ended
+    let both = first.len() - 1;
+    assert!(first[..both] == second[..both] && second.len() == first.len());
+    // with another number of bodies it comes out otherwise, which is said
+    let counts = again("third", &[]);
+    assert_eq!(counts["first_different"], 0, "{counts}");
+    // another step is another matter
+    let out = in_place(&folder, &["cave", &scene, "--cave", &cave, "--fast", "--no-pictures", "--input-from", &path("first.mcap"), "--dt", "0.02"]).output().unwrap();
+    let wrong = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(2) && wrong.contains("--dt and --fps must be those of the recording"), "{wrong}");
+    assert!(SCENE.contains("dt_s = 0.01"));
+}
