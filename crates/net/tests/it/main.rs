@@ -1,6 +1,10 @@
 //! Recordings and sessions, from outside.
 
+// the fuzz targets ask for their macro by this name
+extern crate self as libfuzzer_sys;
+
 mod damage;
+mod fuzz;
 mod hostile;
 mod inputs;
 mod kill;

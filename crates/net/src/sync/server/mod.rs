@@ -121,6 +121,7 @@ pub struct SeatCounts {
 }
 
 /// Something that happened.
+#[allow(clippy::large_enum_variant)] // inputs are few, and a box would show to all who take them
 #[derive(Clone, Debug, PartialEq)]
 pub enum ServerEvent {
     /// A facet is there.

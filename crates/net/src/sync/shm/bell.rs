@@ -13,7 +13,7 @@
 //! So a message to any number of facets costs one system call here and one in each of them, and of all answers only the last one wakes the server. Nothing is
 //! lost between looking and waiting: the kernel compares before it sleeps. The counters carry no data; whoever misses a ring looks again after its time-out.
 //!
-//! The memory is one page per run, `tumble_USER_RUN.bell`. Its server removes it; what a killed server left is removed by [`clean_up`].
+//! The memory is one page per run, `tumble_USER_…_RUN.bell`. Its server removes it; what a killed server left is removed by [`clean_up`].
 
 use crate::sync::transport::LinkError;
 use iceoryx2::prelude::{FileName, SemanticString};
@@ -139,13 +139,10 @@ impl Drop for Bell {
 
 /// Removes the bells of this user's servers that are gone.
 pub fn clean_up(user: u32) {
-    let Ok(files) = std::fs::read_dir(FOLDER) else { return };
-    let prefix = prefix(user);
+    let (Ok(files), Ok(configuration)) = (std::fs::read_dir(FOLDER), configuration(user)) else { return };
     for file in files.flatten() {
-        let name = file.file_name();
-        let Some(inner) = name.to_str().and_then(|n| n.strip_prefix(&prefix)?.strip_suffix(SUFFIX)) else { continue };
-        let Ok(inner) = FileName::new(inner.as_bytes()) else { continue };
-        let Ok(configuration) = configuration(user) else { return };
+        let Ok(name) = FileName::new(file.file_name().as_encoded_bytes()) else { continue };
+        let Some(inner) = configuration.extract_name_from_file(&name) else { continue };
         let Ok(storage) = Builder::<Counters>::new(&inner).config(&configuration).has_ownership(false).open(AccessMode::Read) else { continue };
         let process = storage.get()[PROCESS].load(SeqCst);
         if process != 0 && !Path::new(&format!("/proc/{process}")).exists() {
@@ -155,13 +152,9 @@ pub fn clean_up(user: u32) {
     }
 }
 
-fn prefix(user: u32) -> String {
-    format!("tumble_{user}_")
-}
-
 fn configuration(user: u32) -> Result<Configuration<Counters>, LinkError> {
     let name = |text: &str| FileName::new(text.as_bytes()).map_err(refused);
-    Ok(Configuration::default().prefix(&name(&prefix(user))?).suffix(&name(SUFFIX)?))
+    Ok(Configuration::default().prefix(&name(&format!("tumble_{user}_"))?).suffix(&name(SUFFIX)?))
 }
 
 /// Of any run's name one that is a file's: its hash.

@@ -64,7 +64,7 @@ fn from_what_a_user_does_to_the_picture_that_shows_it() {
     let (by_facet, by_server) = (stage.world.frame() + 5, stage.world.frame() + 10);
     let sent = stage.now;
     let there = sent + stage.facets[1].clock;
-    let input = Input { sequence: by_facet, user: 0, head: None, wand: None, buttons: 0, keys: Vec::new() };
+    let input = Input { sequence: by_facet, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() };
     let facet = stage.facets[1].session.as_mut().unwrap();
     assert!(facet.send_input(there, &input));
     facet.outgoing().iter().for_each(|(_, bytes)| stage.net.send(sent, To::Server(1), bytes));
