@@ -236,7 +236,7 @@ fn islands_have_a_colour_each_and_joints_their_axes() {
 
 #[test]
 fn what_stands_still_is_told_from_what_moves() {
-    let text = "[[body]]\nname = \"ground\"\nmode = \"static\"\nshape = { type = \"half_space\" }\nvisible = false\n[[body]]\nname = \"lies\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [0, 0, 0.5]\n\
+    let text = "[world]\nsleep_after_s = 0.1\n[[body]]\nname = \"ground\"\nmode = \"static\"\nshape = { type = \"half_space\" }\nvisible = false\n[[body]]\nname = \"lies\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [0, 0, 0.5]\n\
         [[body]]\nname = \"falls\"\nmass_kg = 1\nshape = { type = \"sphere\", radius_m = 0.5 }\nposition_m = [3, 0, 50]\n\
         [[body]]\nname = \"stands\"\nmode = \"static\"\nshape = { type = \"capsule\", radius_m = 0.5, length_m = 1 }\nposition_m = [6, 0, 1]\ncolor = \"#00ff00\"\n";
     let scene = SceneFile::parse(text, "s.toml").unwrap_or_else(|e| panic!("{e}"));
@@ -246,6 +246,11 @@ fn what_stands_still_is_told_from_what_moves() {
     });
     let list = Drawing::new(&scene).list(&world, &"resting".parse().unwrap()).unwrap();
     let [box_, ball, capsule] = [list.instances[0].material.color, list.spheres[0].material.color, list.capsules[0].material.color];
+    assert!(world.asleep(world.find("lies").unwrap()));
     // blue-grey, orange, and as it is
     assert!(box_[2] > box_[0] && ball[0] > 2.0 * ball[2] && capsule == [0.0, 1.0, 0.0], "{box_:?} {ball:?} {capsule:?}");
+    world.get_mut::<tumble_core::RigidBody>(world.find("lies").unwrap()).unwrap();
+    let list = Drawing::new(&scene).list(&world, &"resting".parse().unwrap()).unwrap();
+    let awake = list.instances[0].material.color;
+    assert!(awake[1] > awake[0] && awake[0] > awake[2], "olive when woken: {awake:?}");
 }
