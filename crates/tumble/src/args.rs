@@ -110,10 +110,10 @@ pub struct RunOptions {
     /// Frames of the video, and pictures in the folder, per simulated second.
     #[arg(long, value_name = "N", default_value = "30", value_parser = pace)]
     pub fps: f64,
-    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, tree=LEVEL, all; with commas between them.
+    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL, all; with commas between them.
     #[arg(long, value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
-    /// Speed against looks: usual, fast, fastest, and shadows=off|hard|soft, samples=1|4, occlusion=on|off, map=TEXELS; with commas between them.
+    /// Speed against looks: usual, fast, fastest, and shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them.
     #[arg(long, value_name = "WHAT", default_value = "usual")]
     pub quality: tumble::render::Quality,
     /// See from this camera: scene, or the name of an object that carries one.
@@ -153,7 +153,7 @@ pub struct ViewOptions {
     /// Draw over the picture: contacts, normals, velocities, forces, tree=LEVEL, all; with commas between them.
     #[arg(long, value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
-    /// usual, fast or fastest, or parts of it: shadows=off|hard|soft, samples=1|4, occlusion=on|off, map=TEXELS; with commas between them (default: usual; fast
+    /// usual, fast or fastest, or parts of it: shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them (default: usual; fast
     /// where a software driver draws).
     #[arg(long, value_name = "WORDS")]
     pub quality: Option<Quality>,
