@@ -60,7 +60,7 @@ impl RowSolver for GaussSeidel {
                 break;
             }
             if let Some(newton) = &mut newton
-                && newton.after(sweep, sweeps - sweep, progress.change, &mut locals, rows, &momentum, du)
+                && newton.after(sweep..sweeps, progress.change, &mut locals, rows, &momentum, du)
             {
                 momentum.renew(&locals, &linkages, rows, c, lambda, du);
                 continue;

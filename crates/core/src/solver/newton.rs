@@ -26,6 +26,7 @@ use super::gauss_seidel::{Local, Momentum, Step};
 use super::one_contact::Contact;
 use crate::rows::Rows;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// `ε` as a share of the mean diagonal of `K`.
 const PROXIMAL: f64 = 1e-7;
@@ -64,9 +65,10 @@ impl Newton {
         Newton { size, due: if size <= MOST_FREEDOMS { wait } else { u32::MAX }, wait, before: None }
     }
 
-    /// After a sweep that changed row velocities by `change`, of `left` that may follow: whether the multipliers jumped, or went back from a jump that was
+    /// After the sweep `sweeps.start` that changed row velocities by `change`, of those up to `sweeps.end` that may follow: whether the multipliers jumped, or went back from a jump that was
     /// none. The velocities are then to be made anew.
-    pub fn after(&mut self, sweep: u32, left: u32, change: f64, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du: &[f64]) -> bool {
+    pub fn after(&mut self, sweeps: Range<u32>, change: f64, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du: &[f64]) -> bool {
+        let (sweep, left) = (sweeps.start, sweeps.len() as u32);
         if sweep < self.due {
             return false;
         }
