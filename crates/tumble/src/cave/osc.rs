@@ -133,7 +133,7 @@ impl Book {
             return self.drop(Dropped::TooLong);
         }
         let packet = match rosc::decoder::decode_udp(bytes) {
-            Ok((rest, packet)) if rest.is_empty() => packet,
+            Ok(([], packet)) => packet,
             _ => return self.drop(Dropped::Malformed),
         };
         let (mut waiting, mut count) = (vec![packet], 0);
