@@ -1,7 +1,7 @@
 //! Frames per second on this machine, as the table of docs/pictures.md: `cargo run --release -p tumble-render --example frames`.
 //!
 //! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn.
-//! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes about four minutes on
+//! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes some seven minutes on
 //! two idle cores: a row ends after `--seconds S` (default 2), slow ones after a frame to warm up and one that counts. Other options: `--only WORDS` (rows that contain the words),
 //! `--quality WORDS` (instead of the five shown), `--readback` (with the way back to memory), `--stages` (where the
 //! time of each row goes), `--pictures FOLDER` (the last picture of each row).
