@@ -3,7 +3,8 @@
 use crate::body::{Place, hash};
 use crate::collect::{Anchor, anchor};
 use crate::convert::{Numbers, array, numbers, path, vec3, vector};
-use crate::errors::{Error, Result, caught};
+use crate::pool;
+use crate::errors::{Error, Result};
 use crate::robot::{Robot, Rows};
 use crate::spot::{Now, Source, Spot, Which, locked, start};
 use crate::inner::Inner;
@@ -52,7 +53,7 @@ impl Articulation {
         let Spot::Free { source, now } = &self.spot else {
             return Err(Error::value(format!("'{}' is in a world already; add the description that it was made of", self.name)));
         };
-        let body = py.detach(|| source.body(&source.options))?.at(base).named(name.unwrap_or(&self.name));
+        let body = py.detach(|| pool::run(|| source.body(&source.options)))?.at(base).named(name.unwrap_or(&self.name));
         let Now { mut q, qd, .. } = locked(now).clone();
         // where a floating root is, is said from the base
         let model = body.model();
@@ -153,7 +154,7 @@ impl Articulation {
             },
             ..UrdfOptions::default()
         };
-        let read = py.detach(|| caught(|| Ok(urdf::model(&file, &options)?)))?;
+        let read = py.detach(|| pool::run(|| Ok(urdf::model(&file, &options)?)))?;
         let start = start(&ArticulatedBody::new("", read.model.clone()));
         let (q, qd) = start.split_at(read.model.positions());
         let now = Now { gravity: Vec3::new(0.0, 0.0, -9.81), q: q.to_vec(), qd: qd.to_vec(), tau: vec![0.0; qd.len()] };

@@ -7,7 +7,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyList;
-use tumble::core::ObjectId;
+use tumble::core::{ArticulatedBody, ObjectId};
 
 /// Fields of a contact: name, format, how many. All have 8 bytes, so that there is no padding.
 const FIELDS: [(&str, &str, usize); 8] = [
@@ -22,13 +22,22 @@ pub fn bytes(inner: &Inner) -> Vec<u8> {
     let contacts = inner.world.contacts();
     let mut out = Vec::with_capacity(contacts.len() * 20 * 8);
     for c in contacts {
-        let whole = [number(c.a), number(c.b), c.part_a as i64, c.part_b as i64];
+        let whole = [number(c.a), number(c.b), link(inner, c.a, c.part_a), link(inner, c.b, c.part_b)];
         whole.iter().for_each(|k| out.extend_from_slice(&k.to_le_bytes()));
         let (first, last) = (c.point.iter().chain(c.normal.iter()), c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()));
         let real = first.copied().chain([-c.gap]).chain(last.copied());
         real.for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
     }
     out
+}
+
+/// The place of the touched link in the `link_names` of its articulation; a rigid body has but one part.
+fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
+    let Some(body) = inner.world.get::<ArticulatedBody>(id) else { return part as i64 };
+    let name = body.link_of(part).map(|link| &body.model().links()[link].name);
+    let frames = body.model().frames();
+    // what is on the base is of the first link, which all others hang on
+    name.and_then(|name| frames.iter().position(|frame| frame.name == *name)).unwrap_or(0) as i64
 }
 
 /// The array of such bytes.

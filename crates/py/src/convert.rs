@@ -3,13 +3,16 @@
 use crate::errors::{Error, Result};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayDescrMethods, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyOverflowError, PyTypeError};
+use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use tumble::collide::{Mat3, Pose, Quat, Vec3};
 
 /// How far from 1 the length of a quaternion may be.
 const UNIT: f64 = 1e-6;
+
+/// Most numbers of an array: 8 GiB of them.
+const MOST: usize = 1 << 30;
 
 /// Finite numbers and the shape they came in, in C order.
 pub struct Numbers {
@@ -27,13 +30,25 @@ pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
     }
     let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = value.extract().map_err(|_| not_numbers(value, what))?;
     let shape = array.shape().to_vec();
-    let data: Vec<f64> = match array.as_slice() {
-        Ok(slice) => slice.to_vec(),
-        Err(_) => array.as_array().iter().copied().collect(),
-    };
+    let mut data = room(array.len(), what)?;
+    // what numpy calls contiguous may be column by column
+    match array.as_slice() {
+        Ok(slice) if array.is_c_contiguous() => data.extend_from_slice(slice),
+        _ => data.extend(array.as_array().iter()),
+    }
     match data.iter().position(|x| !x.is_finite()) {
         Some(k) => Err(Error::value(format!("{what}: number {k} is {}; all must be finite", data[k]))),
         None => Ok(Numbers { shape, data }),
+    }
+}
+
+/// An empty vector with room for so many numbers, where there is memory for them.
+pub fn room(len: usize, what: &str) -> Result<Vec<f64>> {
+    let mut room = Vec::new();
+    let reserved = if len <= MOST { room.try_reserve_exact(len).is_ok() } else { false };
+    match reserved {
+        true => Ok(room),
+        false => Err(PyMemoryError::new_err(format!("{what}: {len} numbers are more than there is room for (at most {MOST})")).into()),
     }
 }
 

@@ -36,8 +36,15 @@ impl Code {
     }
 
     /// For a fork of the world: what the object's own `fork` answers. What that raises is kept like what a call raises.
-    fn fork(&self) -> Code {
-        Python::attach(|py| match self.object.call_method0(py, "fork") {
+    fn fork(&self, method: &str) -> Code {
+        let fork = |py: Python<'_>| {
+            let object = self.object.call_method0(py, "fork")?;
+            match object.getattr(py, method).is_ok() && object.getattr(py, "fork").is_ok() {
+                true => Ok(object),
+                false => Err(PyErr::from(Error::value(format!("'{}': `fork` must return an object with `{method}` and `fork`", self.name)))),
+            }
+        };
+        Python::attach(|py| match fork(py) {
             Ok(object) => Code::of(&self.name, Arc::new(object)),
             Err(error) => Code { raised: Mutex::new(Some(error)), ..Code::of(&self.name, self.object.clone()) },
         })
@@ -51,15 +58,15 @@ impl Code {
         }
     }
 
-    /// Calls a method with a view; `each` gets what was added to it, by row.
-    fn call(&self, world: &WorldView, method: &str, rows: Option<&[i64]>, each: impl FnMut(usize, Wrench)) -> Result<()> {
+    /// Calls a method with a view; `each` gets what was added to it, by site.
+    fn call(&self, world: &WorldView, method: &str, rows: Option<&[i64]>, mut each: impl FnMut(usize, Wrench)) -> Result<()> {
         let layout = self.layout(world);
         Python::attach(|py| {
             let arrays = match lock(&self.arrays).take().filter(|arrays| arrays.free(py, layout.len())) {
                 Some(arrays) => arrays,
                 None => Arc::new(Arrays::new(py, layout.len())?),
             };
-            arrays.fill(py, world.sites)?;
+            arrays.fill(py, &layout.shown(world.sites))?;
             let view = Bound::new(py, View::new(world, &layout, &arrays))?;
             let object = self.object.bind(py);
             let outcome = match rows {
@@ -71,7 +78,10 @@ impl Code {
             if !outcome?.is_none() {
                 return Err(Error::value(format!("'{}': `{method}` must return None; add what it does to view.force and view.torque", self.name)));
             }
-            arrays.take(py, &layout, &self.name, each)?;
+            arrays.take(py, &layout, &self.name, |row, wrench| {
+                let (site, wrench) = layout.at_site(row, world.sites, wrench);
+                each(site, wrench);
+            })?;
             *lock(&self.arrays) = Some(arrays);
             Ok(())
         })
@@ -89,7 +99,7 @@ impl Object for PythonForce {
     }
 
     fn fork(&self) -> Box<dyn Object> {
-        Box::new(PythonForce { code: self.code.fork() })
+        Box::new(PythonForce { code: self.code.fork("apply") })
     }
 
     fn force(&self) -> Option<&dyn ForceGenerator> {
@@ -103,9 +113,9 @@ impl ForceGenerator for PythonForce {
         if lock(&self.code.raised).is_some() {
             return;
         }
-        let add = |row: usize, wrench: Wrench| {
-            out.wrenches[row].force += wrench.force;
-            out.wrenches[row].torque += wrench.torque;
+        let add = |site: usize, wrench: Wrench| {
+            out.wrenches[site].force += wrench.force;
+            out.wrenches[site].torque += wrench.torque;
         };
         if let Err(error) = self.code.call(view, "apply", None, add) {
             *lock(&self.code.raised) = Some(error.into());
@@ -136,7 +146,7 @@ impl Extension {
 
     /// For a fork of the world.
     pub fn fork(&self) -> Extension {
-        let attached = |a: &Attached| Attached { code: a.code.fork(), bodies: a.bodies.clone() };
+        let attached = |a: &Attached| Attached { code: a.code.fork("act"), bodies: a.bodies.clone() };
         Extension { forces: self.forces.clone(), behaviours: self.behaviours.iter().map(attached).collect(), before: Checkpoint::default() }
     }
 }
@@ -174,9 +184,13 @@ impl Inner {
                 continue;
             }
             let mut wrenches = Vec::new();
-            code.call(&view, "act", Some(&rows), |row, wrench| wrenches.push((row, wrench)))?;
-            for (row, wrench) in wrenches.into_iter().filter(|(_, wrench)| *wrench != Wrench::default()) {
-                let Some((id, part, _)) = layout.owner(row) else { continue };
+            code.call(&view, "act", Some(&rows), |site, wrench| wrenches.push((site, wrench)))?;
+            let mut owners = vec![None; view.sites.len()];
+            for (id, span) in view.ids().iter().filter_map(|&id| Some((id, view.span(id)?))) {
+                span.site.clone().enumerate().for_each(|(part, site)| owners[site] = Some((id, part)));
+            }
+            for (site, wrench) in wrenches.into_iter().filter(|(_, wrench)| *wrench != Wrench::default()) {
+                let Some((id, part)) = owners[site] else { continue };
                 let Some(point) = self.world.site(id, part).map(|site| site.position()) else { continue };
                 self.world.apply_force(id, part, wrench.force, &point)?;
                 self.world.apply_torque(id, part, wrench.torque)?;

@@ -14,6 +14,7 @@ mod faults;
 mod inner;
 mod looks;
 mod picture;
+mod pool;
 mod recording;
 mod report;
 mod robot;

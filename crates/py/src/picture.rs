@@ -6,10 +6,11 @@ use crate::shared::Shared;
 use nalgebra::{Point3, Vector3};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use tumble::collide::Vec3;
 use tumble::core::World;
-use tumble::render::{Camera, CaveView, DebugDraw, DrawList, Drawing, Image, Renderer};
+use tumble::render::{Camera, CaveView, DebugDraw, DrawList, Drawing, Image, RenderError, Renderer};
 use tumble::scene::cave::resolve_cave;
 use tumble::scene::{SceneFile, SceneFile as Scene};
 
@@ -20,6 +21,8 @@ const CAVE_SHADOWS: u32 = 4096;
 
 /// Made when the first picture is taken; making one takes longer than a picture.
 static RENDERER: Mutex<Option<Renderer>> = Mutex::new(None);
+/// The process that made it, or tried to; 0 for none.
+static MADE_BY: AtomicU32 = AtomicU32::new(0);
 
 /// What is asked for.
 pub struct Shot {
@@ -102,6 +105,15 @@ impl Shot {
 /// satisfies them, for as long as this takes.
 fn ready(py: Python<'_>) -> Result<()> {
     let kept = || RENDERER.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    match MADE_BY.load(Ordering::Relaxed) {
+        // a driver's threads are not there in a process that was forked: it would wait for them for ever
+        other if other != 0 && other != process => return Err(Error::Render(RenderError::Device {
+            adapter: "any adapter".into(),
+            reason: "this process was forked from one that had drawn; start it by `spawn` (multiprocessing.get_context(\"spawn\"))".into(),
+        })),
+        _ => MADE_BY.store(process, Ordering::Relaxed),
+    }
     if py.detach(|| kept().is_some()) {
         return Ok(());
     }

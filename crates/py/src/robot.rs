@@ -3,8 +3,9 @@
 //! Every argument is one row (its numbers) or a batch of rows (a leading axis); rows stand for every row of a batch. Rows are independent, so that a
 //! batch gives the same bits as its rows one by one, on any number of threads.
 
-use crate::convert::{Numbers, shown};
+use crate::convert::{Numbers, room, shown};
 use crate::errors::{Error, Result, caught};
+use crate::pool;
 use rayon::prelude::*;
 use tumble::collide::{Pose, Vec3};
 use tumble::core::articulated::{
@@ -85,24 +86,26 @@ impl Rows {
     }
 
     /// One result of `width` numbers per row; `make` gives each thread its working memory.
-    fn each<W>(&self, width: usize, make: impl Fn() -> W + Sync + Send, run: impl Fn(&mut W, usize, &mut [f64]) + Sync + Send) -> Vec<f64> {
+    fn each<W>(&self, width: usize, make: impl Fn() -> W + Sync + Send, run: impl Fn(&mut W, usize, &mut [f64]) + Sync + Send) -> Result<Vec<f64>> {
         self.chunks(width, 1, make, run)
     }
 
     /// The same by chunks of rows: `run` gets the first row and room for the results of all.
-    fn chunks<W>(&self, width: usize, rows: usize, make: impl Fn() -> W + Sync + Send, run: impl Fn(&mut W, usize, &mut [f64]) + Sync + Send) -> Vec<f64> {
-        let mut out = vec![0.0; self.count() * width];
+    fn chunks<W>(&self, width: usize, rows: usize, make: impl Fn() -> W + Sync + Send, run: impl Fn(&mut W, usize, &mut [f64]) + Sync + Send) -> Result<Vec<f64>> {
+        let numbers = self.count().saturating_mul(width);
+        let mut out = room(numbers, "the result")?;
+        out.resize(numbers, 0.0);
         let size = rows * width;
         if out.is_empty() {
-            return out;
+            return Ok(out);
         }
         if out.len() < SHARED {
             let mut work = make();
             out.chunks_mut(size).enumerate().for_each(|(k, out)| run(&mut work, k * rows, out));
         } else {
-            out.par_chunks_mut(size).enumerate().for_each_init(make, |work, (k, out)| run(work, k * rows, out));
+            pool::shared()?.install(|| out.par_chunks_mut(size).enumerate().for_each_init(make, |work, (k, out)| run(work, k * rows, out)));
         }
-        out
+        Ok(out)
     }
 }
 
@@ -139,12 +142,12 @@ impl Robot {
         let (rows, model, dof) = (&*rows, &self.model, self.dof());
         caught(|| {
             if rows.count() < LANES {
-                return Ok(rows.each(dof, || Dynamics::new(model), |d, k, qdd| {
+                return rows.each(dof, || Dynamics::new(model), |d, k, qdd| {
                     forward_dynamics(d, gravity, rows.row(0, k), rows.row(1, k), rows.row(2, k), qdd);
-                }));
+                });
             }
             let make = || (BatchDynamics::<LANES>::new(model), [self.positions(), dof, dof, dof].map(|n| vec![Lanes([0.0; LANES]); n]));
-            Ok(rows.chunks(dof, LANES, make, |(batch, [q, v, tau, qdd]), first, out| {
+            rows.chunks(dof, LANES, make, |(batch, [q, v, tau, qdd]), first, out| {
                 let last = first + out.len() / dof - 1;
                 for lane in 0..LANES {
                     // lanes behind the last row repeat it
@@ -157,7 +160,7 @@ impl Robot {
                 for (lane, out) in out.chunks_exact_mut(dof).enumerate() {
                     out.iter_mut().zip(&*qdd).for_each(|(out, x)| *out = x.0[lane]);
                 }
-            }))
+            })
         })
     }
 
@@ -167,9 +170,9 @@ impl Robot {
         let (rows, model) = (&*rows, &self.model);
         let make = || (Kinematics::new(model), InverseDynamics::new(model));
         caught(|| {
-            Ok(rows.each(self.dof(), make, |(kin, work), k, tau| {
+            rows.each(self.dof(), make, |(kin, work), k, tau| {
                 inverse_dynamics(model, (kin, work), gravity, rows.row(0, k), rows.row(1, k), rows.row(2, k), &[], tau);
-            }))
+            })
         })
     }
 
@@ -216,10 +219,10 @@ impl Robot {
         rows.settle(&self.model)?;
         let (rows, still) = (&*rows, vec![0.0; self.dof()]);
         caught(|| {
-            Ok(rows.each(width, || Kinematics::new(&self.model), |kin, k, out| {
+            rows.each(width, || Kinematics::new(&self.model), |kin, k, out| {
                 kin.refresh(&self.model, rows.row(0, k), &still);
                 run(kin, k, out);
-            }))
+            })
         })
     }
 }

@@ -1,15 +1,26 @@
 //! Many futures of one world at once: forks, each under controls of its own, on all cores.
 
 use crate::bodies::body_ids;
-use crate::convert::{Numbers, shown};
+use crate::convert::{Numbers, room, shown};
 use crate::errors::{Error, Result, caught};
 use crate::inner::Inner;
+use crate::pool;
+use pyo3::exceptions::PyRecursionError;
 use rayon::prelude::*;
+use std::cell::Cell;
 use std::sync::Mutex;
 use tumble::core::ObjectId;
 
 /// Most numbers that one call returns: 4 GiB of them.
 const MOST: usize = 1 << 29;
+
+/// Rollouts within forces within rollouts, and so on, at most: a force that rolls out the world it acts in would go on for ever.
+const DEEPEST: usize = 4;
+
+thread_local! {
+    /// How many rollouts this thread is in.
+    static DEPTH: Cell<usize> = const { Cell::new(0) };
+}
 
 /// What is asked for.
 pub struct Plan {
@@ -23,6 +34,8 @@ pub struct Plan {
     pub driven: Vec<(ObjectId, usize)>,
     /// `count · frames · width` generalized forces.
     controls: Vec<f64>,
+    /// How many rollouts it is in, with itself.
+    depth: usize,
     /// One state for all forks, one for each, or none: where the world is.
     states: Option<Numbers>,
 }
@@ -30,6 +43,10 @@ pub struct Plan {
 impl Plan {
     /// For some articulated bodies, or all. Checks shapes against each other and the world.
     pub fn new(inner: &Inner, asked: Option<Vec<ObjectId>>, controls: Numbers, states: Option<Numbers>, every: usize) -> Result<Plan> {
+        let depth = DEPTH.get() + 1;
+        if depth > DEEPEST {
+            return Err(PyRecursionError::new_err(format!("a force that rolls out a world from within a rollout, more than {DEEPEST} deep")).into());
+        }
         let all = || body_ids(&inner.world).into_iter().filter(|id| inner.robots.contains_key(id)).collect();
         let freedoms = |id: ObjectId| inner.robots.get(&id).map(|robot| (id, robot.dof())).ok_or_else(|| Error::value("controls are of articulations"));
         let driven = asked.unwrap_or_else(all).into_iter().map(freedoms).collect::<Result<Vec<_>>>()?;
@@ -55,7 +72,7 @@ impl Plan {
         if numbers.is_none_or(|n| n > MOST) {
             return Err(Error::value(format!("{count} forks of {frames} steps have more than {MOST} numbers; keep fewer with `every`")));
         }
-        Ok(Plan { count, frames, every, driven, controls: controls.data, states })
+        Ok(Plan { depth, count, frames, every, driven, controls: controls.data, states })
     }
 
     fn width(&self) -> usize {
@@ -75,31 +92,50 @@ impl Plan {
     /// once as there are threads.
     pub fn run(&self, world: Inner, threads: Option<usize>) -> Result<Vec<f64>> {
         let kept = self.frames / self.every * world.world.state().len();
-        let mut out = vec![0.0; self.count * kept];
+        let mut out = room(self.count * kept, "states")?;
+        out.resize(self.count * kept, 0.0);
         if out.is_empty() {
             return Ok(out);
         }
-        let template = Mutex::new(world);
-        let mut forks = || {
-            let each = |(fork, out): (usize, &mut [f64])| {
-                let own = template.lock().map_err(|_| Error::Broken)?.fork();
-                caught(|| self.fork(own, fork, out))
-            };
-            out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>()
-        };
-        let outcomes = match threads {
-            None => forks(),
-            Some(threads) => {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-                pool.map_err(|e| Error::Internal(e.to_string()))?.install(forks)
-            }
+        let pool = match threads {
+            None => pool::shared()?,
+            Some(threads) => pool::of(threads)?,
         };
         // the first fork that failed, whichever was first in time
-        outcomes.into_iter().collect::<Result<()>>()?;
+        match world.extension.is_empty() {
+            true => {
+                let template = Mutex::new(world);
+                let each = |(fork, out): (usize, &mut [f64])| {
+                    let own = template.lock().map_err(|_| Error::Broken)?.fork();
+                    caught(|| self.fork(own, fork, out))
+                };
+                pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>()).into_iter().collect::<Result<()>>()?;
+            }
+            // a fork runs code in Python, which may wait for the threads of the pool: none of them may wait for it
+            false => {
+                let few = 4 * pool.current_num_threads();
+                for (first, out) in out.chunks_mut(few * kept).enumerate().map(|(k, out)| (k * few, out)) {
+                    let own: Vec<Mutex<Option<Inner>>> = (0..out.len() / kept).map(|_| Mutex::new(Some(world.fork()))).collect();
+                    let each = |(k, out): (usize, &mut [f64])| {
+                        let own = own[k].lock().map_err(|_| Error::Broken)?.take().ok_or(Error::Broken)?;
+                        caught(|| self.fork(own, first + k, out))
+                    };
+                    pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>()).into_iter().collect::<Result<()>>()?;
+                }
+            }
+        }
         Ok(out)
     }
 
-    fn fork(&self, mut own: Inner, fork: usize, out: &mut [f64]) -> Result<()> {
+    fn fork(&self, own: Inner, fork: usize, out: &mut [f64]) -> Result<()> {
+        // a thread that waits may do another's work meanwhile
+        let before = DEPTH.replace(self.depth);
+        let outcome = self.go(own, fork, out);
+        DEPTH.set(before);
+        outcome
+    }
+
+    fn go(&self, mut own: Inner, fork: usize, out: &mut [f64]) -> Result<()> {
         if let Some(start) = self.start(fork) {
             own.write_state(&[start.len()], start)?;
         }

@@ -1,6 +1,7 @@
 //! Shapes: what bodies are made of. Sizes are those that one measures: full edge lengths, lengths without caps.
 
 use crate::convert::{number, numbers, path, shown, some, vec3_or};
+use crate::pool;
 use crate::errors::{Error, Result, caught};
 use nalgebra::Translation3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -159,7 +160,7 @@ impl Mesh {
         }
         let mesh = triangles(py, vertices, faces)?.scaled(scale);
         let count = mesh.triangles.len();
-        let (solid, center, _) = py.detach(|| caught(|| Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?)))?;
+        let (solid, center, _) = py.detach(|| pool::run(|| Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?)))?;
         Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh { center }))
     }
 
@@ -199,7 +200,7 @@ pub fn triangles(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bou
     let file = path(vertices)?;
     py.detach(|| {
         let bytes = std::fs::read(&file).map_err(|source| Error::File { file: file.display().to_string(), source })?;
-        let (mesh, _) = caught(|| read_solid(&file, &bytes, None).map_err(|why| Error::value(format!("{}: {why}", file.display()))))?;
+        let (mesh, _) = pool::run(|| read_solid(&file, &bytes, None).map_err(|why| Error::value(format!("{}: {why}", file.display()))))?;
         Ok(mesh)
     })
 }

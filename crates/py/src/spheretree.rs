@@ -1,6 +1,7 @@
 //! Sphere trees: built, measured, written and read. The trees and all their figures are the library's.
 
 use crate::convert::{path, whole_number};
+use crate::pool;
 use crate::errors::{Error, Result, caught};
 use crate::shapes::triangles;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -41,7 +42,7 @@ impl SphereTree {
             let Some(mesh) = &self.mesh else {
                 return Err(Error::value("the file of this tree holds no figures, and without its mesh none can be measured; build it anew"));
             };
-            let quality = py.detach(|| caught(|| Ok(self.file.tree.quality(mesh, &QualitySettings::default()))))?;
+            let quality = py.detach(|| pool::run(|| Ok(self.file.tree.quality(mesh, &QualitySettings::default()))))?;
             _ = self.quality.set(quality); // whoever came first measured the same
         }
         Ok(self.quality.get().map_or(&[], Vec::as_slice))
@@ -91,7 +92,7 @@ impl SphereTree {
         let (name, mut mesh) = (name_of(vertices, faces), triangles(py, vertices, faces)?);
         let cache = if cache { TreeCache::of_environment() } else { TreeCache::off() };
         py.detach(|| {
-            caught(|| {
+            pool::run(|| {
                 mesh.check_closed()?;
                 let CachedTree { tree, stages, .. } = Tree::build_cached(&mesh, &settings, &cache)?;
                 let file = TreeFile { name, mesh: MeshId::of(&mesh), settings, stages, quality: Vec::new(), tree };

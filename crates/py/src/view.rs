@@ -1,6 +1,6 @@
 //! What a force or a behaviour written in Python sees of the world, and where it puts what it does.
 //!
-//! The site table is copied into numpy arrays for each call: the world's own memory changes while it is stepped, and an array that a callback
+//! There is a row for each body and each link. They are copied into numpy arrays for each call: the world's own memory changes while it is stepped, and an array that a callback
 //! kept would look into it. The arrays of one call serve the next, unless Python kept any. After the call the view
 //! refuses to be asked, and what was added to its arrays is read once and then no more.
 
@@ -10,7 +10,8 @@ use crate::state::holders;
 use crate::bodies::place_of;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PySlice;
+use pyo3::types::{PySlice, PyString};
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,35 +26,103 @@ pub struct Layout {
     ids: Vec<ObjectId>,
     /// Objects with rows: their id, name and rows.
     objects: Vec<(ObjectId, Arc<str>, Range<usize>)>,
-    /// By row, kg.
-    masses: Vec<f64>,
+    /// Of each articulated body the names of its links, the fixed ones too, and their places among its rows.
+    links: Vec<(ObjectId, Vec<(String, usize)>)>,
+    rows: Vec<Row>,
+    /// How many sites the world has, and whether each of them is a row as it stands.
+    sites: usize,
+    plain: bool,
+}
+
+/// What a row shows: a rigid body, or a link at its centre of mass. Shapes on links have sites too, but no rows: they have no mass of their own.
+struct Row {
+    site: usize,
+    /// In the frame of the site, m.
+    center: Vec3,
+    /// kg.
+    mass: f64,
+    /// Not of a base.
+    may_move: bool,
+}
+
+impl Row {
+    /// From the site to the centre of mass, world axes, m.
+    fn arm(&self, sites: &[Site]) -> Vec3 {
+        sites[self.site].pose.rotation * self.center
+    }
+
+    /// The centre of mass as a site.
+    fn shown(&self, sites: &[Site]) -> Site {
+        let (mut site, arm) = (sites[self.site], self.arm(sites));
+        let spin = site.angular_velocity;
+        site.acceleration += site.angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
+        site.velocity += spin.cross(&arm);
+        site.pose.translation.vector += arm;
+        site
+    }
 }
 
 impl Layout {
     /// Of the world as it is.
     pub fn of(view: &WorldView) -> Layout {
-        let mut layout = Layout { ids: view.ids().to_vec(), objects: Vec::new(), masses: vec![0.0; view.sites.len()] };
+        let mut layout = Layout { ids: view.ids().to_vec(), objects: Vec::new(), links: Vec::new(), rows: Vec::new(), sites: view.sites.len(), plain: true };
         for &id in view.ids() {
             let (Some(span), Some(object)) = (view.span(id), view.object(id)) else { continue };
             if span.site.is_empty() {
                 continue;
             }
-            layout.objects.push((id, object.name().into(), span.site.clone()));
-            for (part, row) in span.site.clone().enumerate() {
-                layout.masses[row] = mass(view, id, part);
+            let first = layout.rows.len();
+            match view.get::<ArticulatedBody>(id) {
+                Some(body) => {
+                    let links = body.model().links();
+                    let moving = links.iter().enumerate().map(|(i, link)| (i, link.mass.center, link.mass.mass, true));
+                    let rows = moving.chain([(links.len(), Vec3::zeros(), 0.0, false)]);
+                    layout.rows.extend(rows.map(|(part, center, mass, may_move)| Row { site: span.site.start + part, center, mass, may_move }));
+                    let names = body.model().frames().iter().map(|frame| (frame.name.clone(), frame.link.unwrap_or(links.len())));
+                    layout.links.push((id, names.collect()));
+                    layout.plain = false;
+                }
+                None => {
+                    let mass = view.get::<Rigid>(id).filter(|body| !body.is_fixture()).map_or(0.0, |body| body.mass());
+                    layout.rows.extend(span.site.clone().map(|site| Row { site, center: Vec3::zeros(), mass, may_move: true }));
+                }
             }
+            layout.objects.push((id, object.name().into(), first..layout.rows.len()));
         }
         layout
     }
 
     /// Whether it still holds.
     pub fn fits(&self, view: &WorldView) -> bool {
-        self.ids == view.ids() && self.masses.len() == view.sites.len()
+        self.ids == view.ids() && self.sites == view.sites.len()
     }
 
     /// Number of rows.
     pub fn len(&self) -> usize {
-        self.masses.len()
+        self.rows.len()
+    }
+
+    /// The rows as sites.
+    pub fn shown<'a>(&self, sites: &'a [Site]) -> Cow<'a, [Site]> {
+        if self.plain { Cow::Borrowed(sites) } else { self.rows.iter().map(|row| row.shown(sites)).collect() }
+    }
+
+    /// The site that a row belongs to, and what a wrench at the row is there.
+    pub fn at_site(&self, row: usize, sites: &[Site], mut wrench: Wrench) -> (usize, Wrench) {
+        let row = &self.rows[row];
+        if !self.plain {
+            wrench.torque += row.arm(sites).cross(&wrench.force);
+        }
+        (row.site, wrench)
+    }
+
+    /// The place of a link among the rows of its body.
+    fn link(&self, id: ObjectId, link: &str) -> Result<usize> {
+        let names = self.links.iter().find(|(other, _)| *other == id).map_or(&[][..], |(_, names)| names);
+        names.iter().find(|(name, _)| name == link).map(|(_, place)| *place).ok_or_else(|| {
+            let names: Vec<&str> = names.iter().take(12).map(|(name, _)| &**name).collect();
+            Error::Name(format!("the body has no link named '{link}'; there are: {}", names.join(", ")))
+        })
     }
 
     /// Rows of an object.
@@ -66,14 +135,6 @@ impl Layout {
         let (id, name, rows) = self.objects.iter().find(|(.., rows)| rows.contains(&row))?;
         Some((*id, row - rows.start, name))
     }
-}
-
-fn mass(view: &WorldView, id: ObjectId, part: usize) -> f64 {
-    if let Some(body) = view.get::<Rigid>(id) {
-        return if body.is_fixture() { 0.0 } else { body.mass() };
-    }
-    let of_link = |body: &ArticulatedBody| Some(body.model().links().get(body.link_of(part)?)?.mass.mass);
-    view.get::<ArticulatedBody>(id).and_then(of_link).unwrap_or(0.0)
 }
 
 /// An array that is written here, and a read-only view of it, of which Python gets views.
@@ -169,7 +230,8 @@ impl View {
     pub fn new(view: &WorldView, layout: &Arc<Layout>, arrays: &Arc<Arrays>) -> View {
         let mut moves = vec![false; layout.len()];
         for (id, _, rows) in &layout.objects {
-            moves[rows.clone()].fill(view.status(*id).is_some_and(|status| status.moves()));
+            let moving = view.status(*id).is_some_and(|status| status.moves());
+            rows.clone().for_each(|row| moves[row] = moving && layout.rows[row].may_move);
         }
         View { arrays: arrays.clone(), layout: layout.clone(), moves, time: view.time, gravity: view.gravity, over: AtomicBool::new(false) }
     }
@@ -239,7 +301,7 @@ impl View {
         Ok(crate::convert::vector(py, &self.gravity))
     }
 
-    /// Positions, shape (n, 3), m: of rigid bodies the centre of mass, of links the origin of their frame.
+    /// Positions of the centres of mass, shape (n, 3), m.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.shown(py, 0)
@@ -275,11 +337,11 @@ impl View {
         self.shown(py, 5)
     }
 
-    /// Masses, shape (n,), kg; 0 of static geometry.
+    /// Masses, shape (n,), kg; 0 of static geometry and of bases.
     #[getter]
     fn mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         self.open()?;
-        Ok(crate::convert::array(py, &self.layout.masses))
+        Ok(crate::convert::array(py, &self.layout.rows.iter().map(|row| row.mass).collect::<Vec<_>>()))
     }
 
     /// Whether forces move it: neither static nor kinematic, and alive. Shape (n,), bool.
@@ -296,7 +358,7 @@ impl View {
         Ok(self.layout.objects.iter().flat_map(|(_, name, rows)| rows.clone().map(|_| name.to_string())).collect())
     }
 
-    /// Forces at the points that ``position`` tells, shape (n, 3), N, world axes: add to it.
+    /// Forces at the centres of mass, which ``position`` tells, shape (n, 3), N, world axes: add to it.
     #[getter]
     fn force<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.open_view(py, &self.arrays.force)
@@ -318,17 +380,23 @@ impl View {
         self.set(py, &self.arrays.torque, value)
     }
 
-    /// The row of a rigid body, given by name or as a handle; of an articulated body that of its part number ``part``.
-    #[pyo3(signature = (body, part=0))]
-    fn row(&self, body: &Bound<'_, PyAny>, #[pyo3(from_py_with = whole_number)] part: usize) -> Result<usize> {
+    /// The row of a rigid body, given by name or as a handle; of an articulated body that of a link, given by name, or the one of its rows with the number
+    /// ``part``. A link that is fixed to another has the row of that one.
+    #[pyo3(signature = (body, part=None))]
+    fn row(&self, body: &Bound<'_, PyAny>, part: Option<&Bound<'_, PyAny>>) -> Result<usize> {
         let rows = self.row_of(body)?;
+        let part = match (part, self.layout.owner(rows.start)) {
+            (None, _) => 0,
+            (Some(part), Some((id, ..))) if part.is_instance_of::<PyString>() => self.layout.link(id, &part.extract::<String>()?)?,
+            (Some(part), _) => whole_number(part)?,
+        };
         match part < rows.len() {
             true => Ok(rows.start + part),
-            false => Err(Error::value(format!("part is {part}; the body has {} parts", rows.len()))),
+            false => Err(Error::value(format!("part is {part}; the body has {} rows", rows.len()))),
         }
     }
 
-    /// The rows of a body as a slice: one of a rigid body, one per link of an articulated body.
+    /// The rows of a body as a slice: one of a rigid body; of an articulated body one of each moving link, parents first, and at last one of its base.
     fn rows<'py>(&self, py: Python<'py>, body: &Bound<'py, PyAny>) -> Result<Bound<'py, PySlice>> {
         let rows = self.row_of(body)?;
         Ok(PySlice::new(py, rows.start as isize, rows.end as isize, 1))

@@ -7,7 +7,8 @@ use crate::body::RigidBody;
 use crate::collect::{Anchor, anchor};
 use crate::building::{Choices, build};
 use crate::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
-use crate::errors::{Error, Result, caught};
+use crate::pool;
+use crate::errors::{Error, Result};
 use crate::report::StepReport;
 use crate::shapes::Shape;
 use crate::inner::Inner;
@@ -94,9 +95,11 @@ impl World {
     ) -> Result<World> {
         let asked = path(path_or_name)?;
         let built = py.detach(|| {
-            let mut scene = caught(|| Ok(resolve_scene(&asked.to_string_lossy(), &[])?.load()?))?;
-            Choices { stepper, integrator, solver, dt }.apply(&mut scene.world)?;
-            build(scene)
+            pool::run(|| {
+                let mut scene = resolve_scene(&asked.to_string_lossy(), &[])?.load()?;
+                Choices { stepper, integrator, solver, dt }.apply(&mut scene.world)?;
+                build(scene)
+            })
         })?;
         World::of(py, built)
     }
@@ -104,7 +107,7 @@ impl World {
     /// The world of a scene that is given as the text of its file.
     #[staticmethod]
     fn parse(py: Python<'_>, text: &str) -> Result<World> {
-        World::of(py, py.detach(|| build(caught(|| Ok(SceneFile::parse(text, "scene.toml")?))?))?)
+        World::of(py, py.detach(|| pool::run(|| build(SceneFile::parse(text, "scene.toml")?)))?)
     }
 
     /// What is to be said of the files of a loaded scene, such as what was mended in a mesh: a list of sentences.
@@ -198,7 +201,7 @@ impl World {
 
     /// The contacts of the last step: a structured array with one row each.
     ///
-    /// Fields: ``bodies`` (2,) numbers in ``world.bodies``, -1 for what is none; ``parts`` (2,) of articulated bodies; ``point`` (3,), m; ``normal`` (3,),
+    /// Fields: ``bodies`` (2,) numbers in ``world.bodies``, -1 for what is none; ``parts`` (2,) of articulated bodies the places of the links in their ``link_names``; ``point`` (3,), m; ``normal`` (3,),
     /// unit, from the second body to the first; ``depth``, m, negative while apart; ``velocity`` (3,) of the first against the second before the
     /// contact was solved, m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without impacts. World axes.
     #[getter]

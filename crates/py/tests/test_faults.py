@@ -20,6 +20,22 @@ from tumble._native import _panic
 TETRAHEDRON = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 
 
+ARM = """<robot name="arm"><link name="base"><collision><geometry><box size="0.2 0.2 0.02"/></geometry></collision></link>
+<link name="upper"><inertial><origin xyz="0 0 0.3"/><mass value="2"/><inertia ixx="0.06" iyy="0.06" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0 0 0.3"/><geometry><box size="0.05 0.05 0.6"/></geometry></collision></link>
+<link name="fore"><inertial><origin xyz="0.1 0 0.2"/><mass value="1"/><inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.05 0.05 0.4"/></geometry></collision></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/><limit lower="-1.5" upper="1.5" effort="50" velocity="5"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0 0 0.6"/><axis xyz="1 1 0"/><limit lower="-1" upper="1" effort="50" velocity="5"/></joint>
+</robot>"""
+
+
+def two_links(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM)
+    return tumble.Articulation.from_urdf(path)
+
+
 def small():
     world = tumble.World()
     world.add_static("ground", tumble.HalfSpace())
@@ -321,3 +337,149 @@ def test_one_recorder_from_two_threads_writes_every_frame(tmp_path):
             thread.join(timeout=60)
         frames = recorder.frames
     assert frames > 0 and len(tumble.read(path).times) == frames
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_arrays_are_read_in_their_own_order(tmp_path, order):
+    arm, rng = two_links(tmp_path), np.random.default_rng(1)
+    q = rng.uniform(-1, 1, (7, 2))
+    given = np.asarray(q, order=order)
+    singly = np.array([arm.link_pose("fore", row) for row in q])
+    np.testing.assert_array_equal(arm.link_pose("fore", given), singly)
+    np.testing.assert_array_equal(arm.link_pose("fore", np.repeat(q, 2, axis=0)[::2]), singly)
+    vertices, faces = (np.asarray(part, order=order) for part in TETRAHEDRON)
+    assert tumble.SphereTree.build(np.asarray(vertices, float, order=order), faces, depth=1, cache=False).levels[0][1][0] > 0.8
+
+
+def test_gravity_as_a_force_is_gravity(tmp_path):
+    class Weight(tumble.Force):
+        def apply(self, view):
+            assert len(view) == 4 and view.names == ["ball"] + 3 * ["arm"]
+            assert view.mass.tolist() == [1.0, 2.0, 1.0, 0.0] and view.moves.tolist() == [True, True, True, False]
+            assert [view.row("arm", link) for link in ("upper", "fore", "base")] == [1, 2, 3]
+            view.force[:, 2] -= 9.81 * view.mass
+
+    arm, ends = two_links(tmp_path), []
+    for gravity in (9.81, 0.0):
+        world = tumble.World(gravity=(0, 0, -gravity))
+        ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0, position=(3, 0, 1))
+        handle = world.add_articulation(arm)
+        handle.q = (0.3, -0.2)
+        if gravity == 0.0:
+            world.add_force("weight", Weight())
+        world.step(48)
+        ends.append(np.concatenate([handle.q, handle.qd, ball.position, ball.velocity]))
+    assert np.abs(ends[0] - [0.3, -0.2, 0, 0, 3, 0, 1, 0, 0, 0]).max() > 0.1
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-12)
+
+
+def test_the_link_that_is_touched_is_told(tmp_path):
+    world = tumble.World(gravity=(0, 0, 0))
+    arm = world.add_articulation(two_links(tmp_path))
+    pose = arm.link_poses()[arm.link_names.index("fore")]
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0, position=pose[:3] + (0.12, 0, 0.15), velocity=(-1, 0, 0))
+    world.step()
+    contact = world.contacts[0]
+    touched = contact["parts"][list(contact["bodies"]).index(1 - list(world.bodies).index(ball))]
+    assert arm.link_names[touched] == "fore"
+
+
+def test_a_drive_stops_at_a_limit_however_strong_it_is(tmp_path):
+    for stepper in ("time_stepping", "backtracking"):
+        for limit in ({}, {"limit": 1e6}, {"limit": 100.0}):
+            world = tumble.World(stepper=stepper, gravity=(0, 0, 0))
+            arm = world.add_articulation(two_links(tmp_path))
+            arm.set_drive("elbow", velocity=5.0, **limit)
+            world.step(240)
+            assert arm.q[1] == pytest.approx(1.0, abs=1e-4) and arm.qd[1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_damaged_ends_of_snapshots_are_refused(tmp_path):
+    world = tumble.World()
+    arm = world.add_articulation(two_links(tmp_path))
+    arm.tau = (1.0, 2.0)
+    saved = world.save()
+    for bad in (saved[:-1], saved + b"x", saved[:-1] + b"?", saved[:-5], saved + saved):
+        with pytest.raises(tumble.SnapshotError):
+            world.restore(bad)
+        assert arm.tau.tolist() == [1.0, 2.0]
+    world.restore(saved)
+
+
+def test_a_force_whose_fork_uses_all_cores_does_not_stop_a_rollout(tmp_path):
+    arm = two_links(tmp_path)
+
+    class Busy(tumble.Force):
+        def apply(self, view):
+            pass
+
+        def fork(self):
+            arm.mass_matrix(np.zeros((20000, 2)))
+            return Busy()
+
+    world, _ = small()
+    world.add_force("busy", Busy())
+    for _ in range(3):
+        assert world.rollout(np.zeros((40, 1, 0)), threads=8).shape == (40, 1, len(world.state))
+
+
+def test_what_fork_answers_must_be_a_force():
+    class Wrong(tumble.Force):
+        def apply(self, view):
+            pass
+
+        def fork(self):
+            return 3
+
+    world, _ = small()
+    world.add_force("wrong", Wrong())
+    with pytest.raises(tumble.InvalidValueError, match="'wrong': `fork` must return"):
+        world.fork().step()
+
+
+def test_a_force_that_rolls_out_its_own_world_ends():
+    class Endless(tumble.Force):
+        def __init__(self, world):
+            self.world = world
+
+        def apply(self, view):
+            self.world.rollout(np.zeros((1, 1, 0)))
+
+        def fork(self):
+            return Endless(self.world)
+
+    world, _ = small()
+    world.add_force("endless", Endless(world))
+    with pytest.raises(RecursionError):
+        world.rollout(np.zeros((1, 1, 0)))
+
+
+def test_a_forked_process_has_threads_of_its_own(tmp_path):
+    script = """
+import multiprocessing, numpy as np, tumble, sys
+arm = tumble.Articulation.from_urdf(sys.argv[1])
+work = lambda _=0: float(arm.mass_matrix(np.zeros((50000, 2))).sum())
+def child(k): return work()
+if __name__ == "__main__":
+    work()
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(child, range(4)).get(60) == 4 * [work()]
+    print("well")
+"""
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM)
+    ran = subprocess.run([sys.executable, "-c", script, path], capture_output=True, text=True, timeout=120)
+    assert ran.stdout == "well\n", ran.stderr
+
+
+def test_arrays_too_large_for_memory_are_memory_errors(tmp_path):
+    arm = two_links(tmp_path)
+    world, _ = small()
+    for call in (
+        lambda: arm.mass_matrix(np.broadcast_to(np.zeros(2), (10**10, 2))),
+        lambda: tumble.Mesh(np.broadcast_to(np.zeros(3), (10**10, 3)), [[0, 1, 2]]),
+        lambda: setattr(world, "state", np.broadcast_to(0.0, 10**11)),
+        lambda: world.rollout(np.broadcast_to(np.zeros(1), (10**6, 10**5, 1))),
+    ):
+        with pytest.raises(MemoryError):
+            call()

@@ -8,6 +8,9 @@ use crate::rows::RowSet;
 use crate::site::Span;
 use crate::view::WorldView;
 
+/// Where rows are at the acceleration level a drive ends so far before a limit, radians or metres: further than the stepper finds it in time.
+const AT_LIMIT: f64 = 1e-6;
+
 /// A freedom with its place: coordinate of its velocity, position (0 where it has none) and velocity.
 struct Place<'a> {
     index: usize,
@@ -125,6 +128,17 @@ impl RowMaker<'_, '_> {
         }
     }
 
+    /// The speed that a drive may ask for: none beyond the joint's limits, which hold whatever the drive's strength. At the end of a step it is just there.
+    fn within_limits(&self, p: &Place, target: f64) -> f64 {
+        let Some([lo, hi]) = p.freedom.limits else { return target };
+        let (down, up) = match self.level.step() {
+            // the view is that of the middle of the step
+            Some(h) => ((lo - (p.q - 0.5 * h * p.v)) / h, (hi - (p.q - 0.5 * h * p.v)) / h),
+            None => (if p.q - lo > AT_LIMIT { f64::NEG_INFINITY } else { 0.0 }, if hi - p.q > AT_LIMIT { f64::INFINITY } else { 0.0 }),
+        };
+        target.max(down.min(0.0)).min(up.max(0.0))
+    }
+
     fn drive(&mut self, p: &Place, time: f64) {
         let hard = |limit: f64| limit.is_infinite();
         match &p.freedom.drive {
@@ -139,7 +153,7 @@ impl RowMaker<'_, '_> {
             }
             Drive::Velocity { target, limit } => {
                 let set = if hard(*limit) { RowSet::Equality } else { self.bounded(*limit) };
-                self.row(RowTarget { velocity: *target, ..RowTarget::new(set, 0.0) }, &[(p.index, 1.0)]);
+                self.row(RowTarget { velocity: self.within_limits(p, *target), ..RowTarget::new(set, 0.0) }, &[(p.index, 1.0)]);
             }
             Drive::Playback { motion, limit } if hard(*limit) => {
                 let (position, velocity) = motion.at(time);

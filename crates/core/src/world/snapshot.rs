@@ -103,7 +103,10 @@ impl World {
 
     /// Puts a saved state back. The world must hold the same objects in the same order.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
-        let saved: Snapshot = postcard::from_bytes(bytes).map_err(|e| SnapshotError::Format(e.to_string()))?;
+        let (saved, rest): (Snapshot, &[u8]) = postcard::take_from_bytes(bytes).map_err(|e| SnapshotError::Format(e.to_string()))?;
+        if !rest.is_empty() {
+            return Err(SnapshotError::Format(format!("{} bytes follow its end", rest.len())));
+        }
         if saved.magic != MAGIC {
             return Err(SnapshotError::Format("the first eight bytes are not 'tumbleS3'".into()));
         }
