@@ -30,9 +30,26 @@ struct Cover {
     near: bool,
 };
 
+fn clip_row(i: u32) -> vec3f {
+    let m = view.clip_from_world;
+    return vec3f(m[0][i], m[1][i], m[2][i]);
+}
+
+// Whether a ball lies wholly to a side of the picture: the planes of the sides are w + x = 0, w - x = 0, w + y = 0 and w - y = 0.
+fn beside(middle: vec4f, radius: f32) -> bool {
+    let x = clip_row(0u);
+    let y = clip_row(1u);
+    let w = clip_row(3u);
+    let way = vec4f(middle.w) + vec4f(middle.x, -middle.x, middle.y, -middle.y);
+    let reach = vec4f(length(w + x), length(w - x), length(w + y), length(w - y));
+    return any(way < -1.001 * radius * reach);
+}
+
 fn cover(ball: vec4f, index: u32) -> Cover {
     let corner = corner_of(index);
-    let whole = Cover(vec4f(corner, 0.5, 1.0), vec2f(0.0), vec3f(0.0), true);
+    let middle = view.clip_from_world * vec4f(ball.xyz, 1.0);
+    let aside = beside(middle, ball.w);
+    let whole = Cover(select(vec4f(corner, 0.5, 1.0), NOWHERE, aside), vec2f(0.0), vec3f(0.0), !aside);
     var axis = view.dir_0.xyz;
     let r2 = ball.w * ball.w;
     var numbers = vec3f(1.0, 1.0, r2);
@@ -47,8 +64,7 @@ fn cover(ball: vec4f, index: u32) -> Cover {
     let side = normalize(cross(axis, select(vec3f(0.0, 0.0, 1.0), vec3f(1.0, 0.0, 0.0), abs(axis.z) > 0.9)));
     let up = cross(side, axis);
     // w is affine in the corner: its least value decides whether a corner lies behind the eye
-    let row = vec3f(view.clip_from_world[0].w, view.clip_from_world[1].w, view.clip_from_world[2].w);
-    let middle = view.clip_from_world * vec4f(ball.xyz, 1.0);
+    let row = clip_row(3u);
     let least = middle.w - half * (abs(dot(row, side)) + abs(dot(row, up)));
     if (view.lens.x > 0.5 && least < 1e-3 * half) {
         if (middle.w < -1.5 * half) { return Cover(NOWHERE, vec2f(0.0), numbers, false); }
