@@ -2,7 +2,7 @@
 //! pass, pattern and quality, so that none computes what it does not show.
 
 use super::data::{CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
-use crate::Shadows;
+use crate::{DrawList, Light, Settings, Shadows};
 use std::collections::BTreeMap;
 use wgpu::{BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline, ShaderModule, ShaderStages, TextureFormat, VertexFormat};
 
@@ -57,11 +57,15 @@ pub struct Variant {
     occlusion: bool,
     softbox: bool,
     reflections: bool,
+    /// Whether the only light has a direction alone: told only where light is a cheap likeness.
+    one_sun: bool,
 }
 
 impl Variant {
-    pub fn new(samples: u32, shadows: Shadows, occlusion: bool, softbox: bool, reflections: bool) -> Self {
-        Variant { samples, shadows: shadows.number(), occlusion, softbox: softbox && reflections, reflections }
+    pub fn new(list: &DrawList, shadows: Shadows, occlusion: bool) -> Self {
+        let Settings { samples, reflections, .. } = list.settings;
+        let one_sun = !reflections && matches!(list.lights[..], [Light::Directional { .. }]);
+        Variant { samples, shadows: shadows.number(), occlusion, softbox: list.sky.softbox > 0.0 && reflections, reflections, one_sun }
     }
 
     /// With one sample the nearest depth is drawn first, and only what is nearest is lit.
@@ -102,6 +106,8 @@ pub struct Pipelines {
 impl Pipelines {
     /// `sample_masks`: whether shaders can write which samples of a pixel they cover.
     pub fn new(device: &Device, sample_masks: bool) -> Self {
+        // OpenGL has no interpolation without perspective; where it is asked for w is 1, and it is the same
+        let common = if sample_masks { PICTURE_WGSL.to_owned() } else { PICTURE_WGSL.replace("@interpolate(linear)", "@interpolate(perspective)") };
         let view_layout = layout(device, "view", &[uniform(0)]);
         let scene_layout = layout(
             device,
@@ -128,8 +134,8 @@ impl Pipelines {
         let filtered = wgpu::TextureSampleType::Float { filterable: true };
         let albedo = [texture(0, filtered, wgpu::TextureViewDimension::D2), entry(1, BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
         let texture_layout = layout(device, "texture", &albedo);
-        let pixels = shader(device, "picture", &[PICTURE_WGSL, EDGE_PIXELS_WGSL].concat());
-        let samples = if sample_masks { shader(device, "picture", &[PICTURE_WGSL, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
+        let pixels = shader(device, "picture", &[&common, EDGE_PIXELS_WGSL].concat());
+        let samples = if sample_masks { shader(device, "picture", &[&common, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
         let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
         let depth_only = [Some(&view_layout)];
         let screen = [Some(&view_layout), Some(&occlusion_layout)];
@@ -204,7 +210,7 @@ impl Pipelines {
         let (vs, fs, input, depth, blend) = match pass {
             // at the far plane: only where nothing is
             Pass::Sky => ("vs_sky", "fs_sky", Input::None, TEST, None),
-            Pass::Ground => ("vs_mesh", "fs_ground", Input::Mesh, behind, None),
+            Pass::Ground => ("vs_ground", "fs_ground", Input::Mesh, behind, None),
             Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
             Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, seen, None),
             Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Sphere, seen, None),
@@ -223,6 +229,7 @@ impl Pipelines {
             ("OCCLUSION", flag(variant.occlusion)),
             ("SOFTBOX", flag(variant.softbox)),
             ("REFLECTIONS", flag(variant.reflections)),
+            ("ONE_SUN", flag(variant.one_sun)),
         ];
         let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: variant.samples, constants: &constants };
         plan.build(device, &self.modules[usize::from(first)], &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)])

@@ -87,7 +87,7 @@ impl Stage {
         let balls: Vec<_> = list.spheres.iter().map(|s| (s.center, s.radius)).collect();
         let stage = Stage {
             serial,
-            variant: Variant::new(s.samples, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0, list.sky.softbox > 0.0, s.reflections),
+            variant: Variant::new(list, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0),
             shadow_map_size: s.shadow_map_size,
             reach,
             shadow_views: shadows.iter().map(|(_, eye)| Ok((bind_view(gpu, pipelines, eye)?, eye.near_any(&balls)))).collect::<Result<_, RenderError>>()?,

@@ -182,42 +182,55 @@ fn environment_term(roughness: f32, n_v: f32) -> vec2f {
     return vec2f(-1.04, 1.04) * a + r.zw;
 }
 
-// A likeness for slow devices: highlights by the approximation of Karis, 2013 ("a² / (q² 4 max(0.1, (v·h)²) (r + 1/2))", with h not normalized), the sky as a
-// gradient, no lacquer.
+// A likeness for slow devices: highlights by the approximation of Karis, 2013 ("a² / (q² 4 max(0.1, (v·h)²) (r + 1/2))", with h = l + v not normalized, so that
+// n·h = n·l + n·v and h² = 2 + 2 l·v), the sky as a gradient, no lacquer.
+struct Simple { diffuse: vec3f, f0: vec3f, rough: f32, n_v: f32 };
+
+fn lit_simply(s: Surface, m: Simple, l: vec3f, light: Light) -> vec3f {
+    let way = dot(s.normal, l);
+    var n_l = max(way, 0.0);
+    if (SHADOWS > 0u && light.shadow.x >= 0.0) { n_l *= light_visibility(shadow_layer(light, s.position), s.position, s.normal, light.color.w, s.pixel); }
+    let r2 = m.rough * m.rough;
+    let a2 = r2 * r2;
+    let h2 = 2.0 + 2.0 * dot(l, s.to_eye);
+    let n_h = way + m.n_v;
+    let q = n_h * n_h * (a2 - 1.0) + h2;
+    let lobe = a2 * h2 * h2 / (q * q * max(h2, 0.4) * (m.rough + 0.5) + 1e-6);
+    return (m.diffuse + m.f0 * lobe) * light.color.xyz * n_l;
+}
+
 fn shade_simply(s: Surface) -> vec3f {
     let n = s.normal;
     let v = s.to_eye;
+    let n_v = dot(n, v);
     let rough = max(s.base.roughness, 0.2);
-    let a2 = rough * rough * rough * rough;
     let diffuse = s.base.color * (1.0 - s.metallic);
     let f0 = mix(vec3f(0.04), s.base.color, s.metallic);
-    let grazing = 1.0 - clamp(dot(n, v), 0.0, 1.0);
-    let sheen = s.base.color * (s.base.sheen * grazing * grazing * grazing);
+    let grazing = 1.0 - clamp(n_v, 0.0, 1.0);
+    let grazing2 = grazing * grazing;
+    let sheen = s.base.color * (s.base.sheen * grazing * grazing2);
+    let simple = Simple(diffuse + sheen, f0, rough, n_v);
     var out = vec3f(0.0);
-    for (var i = 0u; i < u32(scene.zenith.w); i++) {
-        let light = scene.lights[i];
-        var l = light.at.xyz;
-        var radiance = light.color.xyz;
-        if (light.at.w > 0.5) {
-            let d = light.at.xyz - s.position;
-            let near = inverseSqrt(max(dot(d, d), 1e-6));
-            l = d * near;
-            radiance *= near * near;
+    if (ONE_SUN) {
+        out = lit_simply(s, simple, scene.lights[0].at.xyz, scene.lights[0]);
+    } else {
+        for (var i = 0u; i < u32(scene.zenith.w); i++) {
+            var light = scene.lights[i];
+            var l = light.at.xyz;
+            if (light.at.w > 0.5) {
+                let d = light.at.xyz - s.position;
+                let near = inverseSqrt(max(dot(d, d), 1e-6));
+                l = d * near;
+                light.color = vec4f(light.color.xyz * (near * near), light.color.w);
+            }
+            out += lit_simply(s, simple, l, light);
         }
-        var n_l = max(dot(n, l), 0.0);
-        if (SHADOWS > 0u && light.shadow.x >= 0.0) { n_l *= light_visibility(shadow_layer(light, s.position), s.position, n, light.color.w, s.pixel); }
-        let h = l + v;
-        let h2 = dot(h, h);
-        let n_h = dot(n, h);
-        let q = n_h * n_h * (a2 - 1.0) + h2;
-        let lobe = a2 * h2 * h2 / (q * q * max(h2, 0.4) * (rough + 0.5) + 1e-6);
-        out += (diffuse + sheen + f0 * lobe) * radiance * n_l;
     }
     var open = 1.0;
     if (OCCLUSION) { open = textureLoad(occlusion, vec2i(s.pixel), 0).x; }
-    let up = 2.0 * dot(n, v) * n.z - v.z;
+    let up = 2.0 * n_v * n.z - v.z;
     let mirrored = mix(scene.bounce.xyz, mix(scene.horizon.xyz, scene.zenith.xyz, clamp(up, 0.0, 1.0)), clamp(0.5 + up, 0.0, 1.0));
-    let edge = (1.0 - rough) * grazing * grazing * grazing * grazing;
+    let edge = (1.0 - rough) * grazing2 * grazing2;
     return out + (diffuse * sky_irradiance(n) + (f0 * (1.0 - 0.4 * rough) + edge) * mirrored) * (open * scene.horizon.w);
 }
 
