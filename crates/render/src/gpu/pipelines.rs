@@ -1,7 +1,7 @@
 //! Shaders, binding layouts and pipelines. Layouts and shaders are made once per device, pipelines when a picture first needs them: one for each
 //! pass, pattern and quality, so that none computes what it does not show.
 
-use super::data::{CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
+use super::data::{BALL_WORDS, CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
 use crate::{DrawList, Light, Settings, Shadows};
 use std::collections::BTreeMap;
 use wgpu::{BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline, ShaderModule, ShaderStages, TextureFormat, VertexFormat};
@@ -154,15 +154,15 @@ impl Pipelines {
             depth: [
                 depth(mesh, None, Input::Mesh, None, WRITE),
                 depth(mesh, None, Input::Mesh, None, WRITE),
-                depth("vs_ball", Some("fs_ball_depth"), Input::Sphere, None, WRITE),
-                depth("vs_near", Some("fs_near_depth"), Input::Sphere, None, WRITE),
+                depth("vs_ball", Some("fs_ball_depth"), Input::Ball, None, WRITE),
+                depth("vs_near", Some("fs_near_depth"), Input::Ball, None, WRITE),
                 depth("vs_capsule", Some("fs_capsule_depth"), Input::Capsule, None, WRITE),
             ],
             ids: [
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
-                depth("vs_ball", Some("fs_ball_id"), Input::Sphere, Some(ID), WRITE),
-                depth("vs_near", Some("fs_near_id"), Input::Sphere, Some(ID), WRITE),
+                depth("vs_ball", Some("fs_ball_id"), Input::Ball, Some(ID), WRITE),
+                depth("vs_near", Some("fs_near_id"), Input::Ball, Some(ID), WRITE),
                 depth("vs_capsule", Some("fs_capsule_no_id"), Input::Capsule, Some(ID), WRITE),
             ],
             mesh_first: mesh_first.build(device, &pixels, &picture),
@@ -213,10 +213,10 @@ impl Pipelines {
             Pass::Ground => ("vs_ground", "fs_ground", Input::Mesh, behind, None),
             Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
             Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, seen, None),
-            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Sphere, seen, None),
+            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Ball, seen, None),
             Pass::Capsule if variant.spheres_first() => ("vs_capsule", "fs_capsule", Input::Capsule, WRITE, None),
             Pass::Capsule => ("vs_capsule", "fs_capsule", Input::Capsule, solid, None),
-            Pass::Shell => ("vs_sphere", "fs_shell", Input::Sphere, TEST, over),
+            Pass::Shell => ("vs_shell", "fs_shell", Input::Sphere, TEST, over),
             Pass::Line => ("vs_line", "fs_line", Input::Stroke, TEST, over),
             Pass::LineOnTop => ("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
         };
@@ -258,6 +258,8 @@ enum Input {
     None,
     Mesh,
     Sphere,
+    /// Middle, radius and number of a sphere.
+    Ball,
     Capsule,
     Stroke,
     /// Two whole numbers.
@@ -287,9 +289,10 @@ impl Plan<'_> {
             Input::None => vec![],
             Input::Mesh => vec![Some(per_vertex), Some(per_instance)],
             Input::Sphere | Input::Capsule | Input::Stroke => vec![Some(per_instance)],
+            Input::Ball => vec![Some(wgpu::VertexBufferLayout { array_stride: 4 * BALL_WORDS, step_mode: wgpu::VertexStepMode::Instance, attributes: &BALL })],
             Input::Range => vec![Some(wgpu::VertexBufferLayout { array_stride: 8, step_mode: wgpu::VertexStepMode::Instance, attributes: &RANGE })],
         };
-        let strip = matches!(self.input, Input::Sphere | Input::Capsule | Input::Stroke);
+        let strip = matches!(self.input, Input::Sphere | Input::Ball | Input::Capsule | Input::Stroke);
         let write_mask = if self.fs == Some("fs_nothing") { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
         let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask })];
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -322,12 +325,13 @@ impl Plan<'_> {
     }
 }
 
+const BALL: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![0 => Float32x4, 1 => Uint32];
 const RANGE: [wgpu::VertexAttribute; 1] = [wgpu::VertexAttribute { format: VertexFormat::Uint32x2, offset: 0, shader_location: 0 }];
 
 impl Input {
     fn floats(self) -> u64 {
         match self {
-            Input::None | Input::Range => 0,
+            Input::None | Input::Range | Input::Ball => 0,
             Input::Mesh => INSTANCE_FLOATS,
             Input::Sphere => SPHERE_FLOATS,
             Input::Capsule => CAPSULE_FLOATS,

@@ -78,9 +78,22 @@ fn cover(ball: vec4f, index: u32) -> Cover {
 // Outside the picture.
 const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
 
-@vertex fn vs_sphere(in: SphereIn, @builtin(vertex_index) index: u32) -> SphereOut {
+@vertex fn vs_shell(in: SphereIn, @builtin(vertex_index) index: u32) -> SphereOut {
     let c = cover(in.ball, index);
     return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, in.turn, in.color_rough, in.other_metal, in.pattern);
+}
+
+// A sphere that may be seen, and its number.
+struct BallIn { @location(0) ball: vec4f, @location(1) id: u32 };
+
+// A texel of the five that tell of a sphere: ball, turn, and three of its look.
+fn told(id: u32, i: u32) -> vec4f {
+    return textureLoad(sphere_data, vec2i(vec2u((id % 256u) * 5u + i, id / 256u)), 0);
+}
+
+@vertex fn vs_sphere(in: BallIn, @builtin(vertex_index) index: u32) -> SphereOut {
+    let c = cover(in.ball, index);
+    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, told(in.id, 1u), told(in.id, 2u), told(in.id, 3u), told(in.id, 4u));
 }
 
 // With d the ray's direction, of length 1, and c the way to the centre: m = c - (c·d) d is the way from the nearest point of the ray to the centre, the ray enters
@@ -140,7 +153,7 @@ struct BallOut {
     @location(1) @interpolate(flat) id: u32,
 };
 
-@vertex fn vs_ball(in: SphereIn, @builtin(vertex_index) index: u32, @builtin(instance_index) id: u32) -> BallOut {
+@vertex fn vs_ball(in: BallIn, @builtin(vertex_index) index: u32) -> BallOut {
     let c = cover(in.ball, index);
     let per_w = 1.0 / c.clip.w;
     var at = vec4f(c.plane, 0.0, sqrt(c.numbers.z));
@@ -151,7 +164,7 @@ struct BallOut {
     } else {
         at.z = -dot(in.ball.xyz - view.origin_0.xyz, view.dir_0.xyz) / dot(view.dir_0.xyz, view.dir_0.xyz);
     }
-    return BallOut(select(vec4f(c.clip.xyz * per_w, 1.0), NOWHERE, c.near), at, id);
+    return BallOut(select(vec4f(c.clip.xyz * per_w, 1.0), NOWHERE, c.near), at, in.id);
 }
 
 fn ball_depth(at: vec4f) -> f32 {
@@ -180,9 +193,9 @@ struct NearOut {
     @location(1) @interpolate(flat) id: u32,
 };
 
-@vertex fn vs_near(in: SphereIn, @builtin(vertex_index) index: u32, @builtin(instance_index) id: u32) -> NearOut {
+@vertex fn vs_near(in: BallIn, @builtin(vertex_index) index: u32) -> NearOut {
     let c = cover(in.ball, index);
-    return NearOut(select(NOWHERE, c.clip, c.near), in.ball, id);
+    return NearOut(select(NOWHERE, c.clip, c.near), in.ball, in.id);
 }
 
 fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
@@ -205,10 +218,9 @@ fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
 @fragment fn fs_sphere_seen(@builtin(position) at: vec4f, @location(0) @interpolate(flat) range: vec2u) -> @location(0) vec4f {
     let id = textureLoad(seen_id, vec2i(at.xy), 0).x - 1u;
     if (id < range.x || id >= range.y) { discard; }
-    let place = vec2i(vec2u((id % 256u) * 5u, id / 256u));
-    let ball = textureLoad(sphere_data, place, 0);
-    let turn = textureLoad(sphere_data, place + vec2i(1, 0), 0);
-    let look = Look(textureLoad(sphere_data, place + vec2i(2, 0), 0), textureLoad(sphere_data, place + vec2i(3, 0), 0), textureLoad(sphere_data, place + vec2i(4, 0), 0));
+    let ball = told(id, 0u);
+    let turn = told(id, 1u);
+    let look = Look(told(id, 2u), told(id, 3u), told(id, 4u));
     let h = hit(ball, at.xy);
     let object_normal = unturn(turn, h.normal);
     return vec4f(pixel_color(h.position, h.normal, h.to_eye, object_normal * ball.w, object_normal, h.s, at.xy, vec3f(0.0), look), 1.0);
