@@ -8,6 +8,8 @@ use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3, Vector4};
 /// Numbers per mesh instance, sphere, capsule and stroke.
 pub const INSTANCE_FLOATS: u64 = 24;
 pub const SPHERE_FLOATS: u64 = 20;
+/// Texels that tell of a sphere, of four words each.
+pub const SPHERE_TEXELS: usize = 4;
 /// Middle, radius and number.
 pub const BALL_WORDS: u64 = 5;
 pub const CAPSULE_FLOATS: u64 = 24;
@@ -164,12 +166,17 @@ pub fn instance(x: &Instance, unwrapped: bool, out: &mut Vec<f32>) {
     material(&x.material, if unwrapped { -1.0 } else { x.material.texture.map_or(0.0, |t| t.repeat_m) }, out);
 }
 
-/// A sphere: centre and radius, turn, material.
-pub fn sphere(s: &Sphere, out: &mut Vec<f32>) {
-    let (c, q) = (s.center, s.orientation.coords);
-    out.extend([c.x, c.y, c.z, s.radius, q.x, q.y, q.z, q.w]);
+/// A sphere as bits: centre and radius; colours, roughness and metal as shares of 65,535, two to a word; turn; lacquer, repeat of the texture and sizes. What all surfaces read
+/// comes first.
+pub fn sphere(s: &Sphere, out: &mut Vec<u32>) {
+    let (c, q, m) = (s.center, s.orientation.coords, &s.material);
+    let (_, other, size) = m.pattern.packed();
+    let ([r, g, b], [or, og, ob]) = (linear3(m.color), linear3(other));
+    let pair = |low: f32, high: f32| [low, high].map(|x| (x.clamp(0.0, 1.0) * 65_535.0).round() as u32).into_iter().rev().fold(0, |word, half| word << 16 | half);
+    out.extend([c.x, c.y, c.z, s.radius].map(f32::to_bits));
+    out.extend([pair(r, g), pair(b, m.roughness), pair(or, og), pair(ob, m.metallic)]);
     // a sphere wears its texture once around
-    material(&s.material, 0.0, out);
+    out.extend([q.x, q.y, q.z, q.w, m.clearcoat, 0.0, size[0], size[1]].map(f32::to_bits));
 }
 
 /// A capsule: centre and radius, turn, material, half length. A texture is laid on by position.

@@ -119,7 +119,7 @@ impl Pipelines {
                 texture(3, NUMBERS, wgpu::TextureViewDimension::D2),
                 texture(4, NUMBERS, wgpu::TextureViewDimension::D2Array),
                 texture(5, wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
-                texture(6, NUMBERS, wgpu::TextureViewDimension::D2),
+                texture(6, wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
             ],
         );
         let occlusion_layout = layout(

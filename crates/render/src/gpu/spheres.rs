@@ -12,7 +12,7 @@ use wgpu::{Buffer, BufferUsages, TextureView};
 pub struct Spheres {
     pub groups: Vec<Same>,
     balls: Vec<Ball>,
-    /// Five texels per sphere, 256 spheres per row.
+    /// Four texels per sphere, 256 spheres per row.
     pub looks: TextureView,
     /// First and last number of the spheres of each group.
     pub ranges: Buffer,
@@ -80,14 +80,14 @@ fn ball_buffer(gpu: &Gpu, balls: &[Ball], numbers: impl Iterator<Item = u32>) ->
 }
 
 fn looks(gpu: &Gpu, list: &DrawList, order: &[usize]) -> Result<TextureView, RenderError> {
-    let row = 256 * data::SPHERE_FLOATS as usize;
+    let row = 256 * 4 * data::SPHERE_TEXELS;
     let rows = order.len().div_ceil(256).max(1);
     let most = gpu.device.limits().max_texture_dimension_2d as usize;
     if rows > most {
         return Err(RenderError::TooMany { what: "spheres", count: order.len(), cap: 256 * most });
     }
-    let mut floats = Vec::with_capacity(rows * row);
-    order.iter().for_each(|&i| data::sphere(&list.spheres[i], &mut floats));
-    floats.resize(rows * row, 0.0);
-    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Float, bytemuck::cast_slice(&floats)))
+    let mut words = Vec::with_capacity(rows * row);
+    order.iter().for_each(|&i| data::sphere(&list.spheres[i], &mut words));
+    words.resize(rows * row, 0);
+    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Uint, bytemuck::cast_slice(&words)))
 }

@@ -31,7 +31,7 @@ struct Scene {
 @group(1) @binding(3) var occlusion: texture_2d<f32>;
 @group(1) @binding(4) var shadow_depths: texture_2d_array<f32>; // the same maps, to be read as numbers (OpenGL reads no depth texture)
 @group(1) @binding(5) var seen_id: texture_2d<u32>;     // number of the nearest sphere from 1 on, where that was drawn first
-@group(1) @binding(6) var sphere_data: texture_2d<f32>; // five texels per sphere, 256 spheres per row
+@group(1) @binding(6) var sphere_data: texture_2d<u32>; // four texels per sphere, 256 spheres per row
 
 struct Surface {
     position: vec3f,
@@ -78,10 +78,9 @@ fn sky_irradiance(n: vec3f) -> vec3f {
 }
 
 fn backdrop_at(dir: vec3f) -> vec3f {
-    if (scene.backdrop.w > 0.5) { return scene.backdrop.xyz; }
     let rise = clamp(dir.z, 0.0, 1.0);
     let above = mix(scene.horizon.xyz, scene.zenith.xyz, 1.0 - fall(1.0 - rise));
-    return mix(scene.ground.xyz, above, smoothstep(-0.7, 0.0, dir.z));
+    return select(mix(scene.ground.xyz, above, smoothstep(-0.7, 0.0, dir.z)), scene.backdrop.xyz, scene.backdrop.w > 0.5);
 }
 
 // The i-th of n points spread evenly over the unit disc.
@@ -300,8 +299,8 @@ fn shade(s: Surface) -> vec3f {
 // Scene light to display light.
 fn tone(c: vec3f) -> vec3f {
     let x = max(c * scene.tone.x, vec3f(0.0));
-    if (scene.tone.y < 0.5) { return min(x, vec3f(1.0)); }
     // filmic curve (the rational fit by Narkowicz, 2015, to ACES), scaled so that middle grey stays
     let y = x * 0.72;
-    return clamp((y * (2.51 * y + 0.03)) / (y * (2.43 * y + 0.59) + 0.14), vec3f(0.0), vec3f(1.0));
+    let filmic = (y * (2.51 * y + 0.03)) / (y * (2.43 * y + 0.59) + 0.14);
+    return min(select(filmic, x, scene.tone.y < 0.5), vec3f(1.0));
 }

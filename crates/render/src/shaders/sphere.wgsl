@@ -86,14 +86,24 @@ const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
 // A sphere that may be seen, and its number.
 struct BallIn { @location(0) ball: vec4f, @location(1) id: u32 };
 
-// A texel of the five that tell of a sphere: ball, turn, and three of its look.
-fn told(id: u32, i: u32) -> vec4f {
-    return textureLoad(sphere_data, vec2i(vec2u((id % 256u) * 5u + i, id / 256u)), 0);
+// A texel of the four that tell of a sphere: ball; colours, roughness and metal, two to a word; turn; the rest of its look.
+fn told(id: u32, i: u32) -> vec4u {
+    return textureLoad(sphere_data, vec2i(vec2u((id % 256u) * 4u + i, id / 256u)), 0);
+}
+
+fn look_told(id: u32) -> Look {
+    let t = told(id, 1u);
+    return Look(
+        vec4f(unpack2x16unorm(t.x), unpack2x16unorm(t.y)),
+        vec4f(unpack2x16unorm(t.z), unpack2x16unorm(t.w)),
+        bitcast<vec4f>(told(id, 3u)),
+    );
 }
 
 @vertex fn vs_sphere(in: BallIn, @builtin(vertex_index) index: u32) -> SphereOut {
     let c = cover(in.ball, index);
-    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, told(in.id, 1u), told(in.id, 2u), told(in.id, 3u), told(in.id, 4u));
+    let look = look_told(in.id);
+    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, bitcast<vec4f>(told(in.id, 2u)), look.color_rough, look.other_metal, look.pattern);
 }
 
 // With d the ray's direction, of length 1, and c the way to the centre: m = c - (c·d) d is the way from the nearest point of the ray to the centre, the ray enters
@@ -218,9 +228,9 @@ fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
 @fragment fn fs_sphere_seen(@builtin(position) at: vec4f, @location(0) @interpolate(flat) range: vec2u) -> @location(0) vec4f {
     let id = textureLoad(seen_id, vec2i(at.xy), 0).x - 1u;
     if (id < range.x || id >= range.y) { discard; }
-    let ball = told(id, 0u);
-    let turn = told(id, 1u);
-    let look = Look(told(id, 2u), told(id, 3u), told(id, 4u));
+    let ball = bitcast<vec4f>(told(id, 0u));
+    let turn = bitcast<vec4f>(told(id, 2u));
+    let look = look_told(id);
     let h = hit(ball, at.xy);
     let object_normal = unturn(turn, h.normal);
     return vec4f(pixel_color(h.position, h.normal, h.to_eye, object_normal * ball.w, object_normal, h.s, at.xy, vec3f(0.0), look), 1.0);
