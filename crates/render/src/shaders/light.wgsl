@@ -83,11 +83,11 @@ fn backdrop_at(dir: vec3f) -> vec3f {
     return select(mix(scene.ground.xyz, above, smoothstep(-0.7, 0.0, dir.z)), scene.backdrop.xyz, scene.backdrop.w > 0.5);
 }
 
-// The i-th of n points spread evenly over the unit disc.
-fn disc_point(i: u32, n: f32, turn: f32) -> vec2f {
-    let r = sqrt((f32(i) + 0.5) / n);
-    let a = f32(i) * 2.3999632 + turn;
-    return r * vec2f(cos(a), sin(a));
+// Points spread evenly over the unit disc: each is turned by the golden angle against the one before, and the i-th of n lies sqrt((i + 1/2) / n) out.
+const GOLDEN = vec2f(-0.73736886, 0.67549032);
+
+fn next_way(way: vec2f) -> vec2f {
+    return vec2f(way.x * GOLDEN.x - way.y * GOLDEN.y, way.x * GOLDEN.y + way.y * GOLDEN.x);
 }
 
 fn shadow_depth_to_s(sh: Shadow, depth: f32) -> f32 {
@@ -142,8 +142,11 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     // the empty map is at depth 0: no filter may reach below it
     var sum = 0.0;
     var count = 0.0;
+    let first = vec2f(cos(turn), sin(turn));
+    var way = first;
     for (var i = 0u; i < 16u; i++) {
-        let d = disc_point(i, 16.0, turn) * search;
+        let d = way * sqrt((f32(i) + 0.5) / 16.0) * search;
+        way = next_way(way);
         let at = vec2i(clamp((uv + d) * texels, vec2f(0.0), vec2f(texels - 1.0)));
         let z = textureLoad(shadow_depths, at, index, 0).x;
         if (z > max(depth + dot(slope, d) + bias, 1e-6)) { sum += z; count += 1.0; }
@@ -155,8 +158,10 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     let width = select(size * gap, size * gap / max(s_block, 1e-6), sh.scale.z > 0.5);
     let filter_uv = clamp(width * per_metre, smallest, search);
     var lit = 0.0;
+    way = first;
     for (var i = 0u; i < 32u; i++) {
-        let d = disc_point(i, 32.0, turn) * filter_uv;
+        let d = way * sqrt((f32(i) + 0.5) / 32.0) * filter_uv;
+        way = next_way(way);
         lit += textureSampleCompareLevel(shadow_maps, shadow_sampler, uv + d, index, clamp(depth + dot(slope, d) + bias, 1e-6, 1.0));
     }
     return lit / 32.0;
