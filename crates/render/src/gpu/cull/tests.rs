@@ -112,3 +112,40 @@ fn a_ball_is_hidden_in_the_shadow_of_a_larger_one() {
     assert!(seen(&outside, std::iter::once(0..4), &eye, 1).is_empty());
     assert_eq!(seen(&[(Point3::new(0.2, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1), [0]);
 }
+
+/// Four layers of 50 x 50 balls from in front and above, as in the example `frames`. Which have a pixel is told by rays through the middles of all pixels.
+#[test]
+fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
+    let (width, height, fov) = (1024usize, 768usize, 40f64.to_radians());
+    let at = |i: usize| [0.21 * ((i / 200) as f64 - 24.5), 0.23 * ((i / 4 % 50) as f64 - 24.5), 0.1 + 0.22 * (i % 4) as f64];
+    let balls: Vec<Ball> = (0..10_000).map(|i| (Point3::from(at(i).map(|x| x as f32)), 0.1)).collect();
+    let (from, to) = (Vector3::new(0.0, -14.175, 8.4), Vector3::new(0.0, -0.84, 0.2));
+    let ahead = (to - from).normalize();
+    let right = ahead.cross(&Vector3::z()).normalize();
+    let up = right.cross(&ahead);
+    let pixels_per_tangent = 0.5 * height as f64 / (0.5 * fov).tan();
+    let mut nearest = vec![(f64::MAX, usize::MAX); width * height];
+    for i in 0..balls.len() {
+        let c = Vector3::from(at(i)) - from;
+        let depth = c.dot(&ahead);
+        let middle = [0.5 * width as f64 + pixels_per_tangent * c.dot(&right) / depth, 0.5 * height as f64 - pixels_per_tangent * c.dot(&up) / depth];
+        let reach = 1.2 * pixels_per_tangent * 0.1 / depth + 1.0;
+        let range = |k: usize| (middle[k] - reach).max(0.0) as usize..((middle[k] + reach) as usize).min([width, height][k]);
+        for (x, y) in range(1).flat_map(|y| range(0).map(move |x| (x, y))) {
+            let ray = ahead + right * ((x as f64 + 0.5 - 0.5 * width as f64) / pixels_per_tangent) - up * ((y as f64 + 0.5 - 0.5 * height as f64) / pixels_per_tangent);
+            let half = ray.dot(&c) / ray.norm_squared();
+            let room = half * half - (c.norm_squared() - 0.01) / ray.norm_squared();
+            if room >= 0.0 && half - room.sqrt() < nearest[y * width + x].0 {
+                nearest[y * width + x] = (half - room.sqrt(), i);
+            }
+        }
+    }
+    let mut met: Vec<usize> = nearest.iter().map(|n| n.1).filter(|i| *i < balls.len()).collect();
+    met.sort_unstable();
+    met.dedup();
+    let eye = Camera::LookAt { eye: Point3::from(from.cast()), target: Point3::from(to.cast()), up: Vector3::z(), vertical_fov_rad: fov as f32, near_m: 0.05, far_m: 500.0 };
+    let lens = eye.lens(width as f32 / height as f32).unwrap();
+    let drawn = seen(&balls, std::iter::once(0..10_000), &Eye::new(&lens.view, &lens.projection, width as u32, height as u32), 1);
+    assert!(met.len() > 2500 && met.iter().all(|i| drawn.binary_search(&(*i as u32)).is_ok()), "{} balls have a pixel", met.len());
+    assert!(drawn.len() < 6700, "{} balls are drawn, {} have a pixel", drawn.len(), met.len());
+}
