@@ -2,9 +2,9 @@
 //!
 //! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn.
 //! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes less than five minutes on
-//! two idle cores: after a frame to warm up a row runs for `--seconds S` (default 1.5) and three frames, but no longer than six seconds; where the first frame alone takes half of
-//! that it is the one that counts. Other options: `--only WORDS` (rows that contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the way back to
-//! memory), `--stages` (where the time of each row goes), `--pictures FOLDER` (the last picture of each row).
+//! two idle cores: after a frame to warm up a row runs for `--seconds S` (default 1.5) and three frames, but begins none after six seconds. Other options: `--only WORDS` (rows that
+//! contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the way back to memory), `--stages` (where the time of each row goes),
+//! `--pictures FOLDER` (the last picture of each row).
 
 use nalgebra::Vector3;
 use std::time::{Duration, Instant};
@@ -145,27 +145,22 @@ fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets
         stages[1] += listed.elapsed();
         Ok(())
     };
-    let (begin, spent) = (Instant::now(), processor_s());
+    // pipelines are made in it
     frame(renderer)?;
     renderer.wait()?;
-    // pipelines were made in it, which is little beside seconds
-    let first = (begin.elapsed().as_secs_f64(), processor_s() - spent);
     if let Some(folder) = &options.pictures {
         let name = label.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
         renderer.read()?.write_png(folder.join(format!("{name}.png")))?;
     }
     let (begin, spent) = (Instant::now(), processor_s());
     let mut frames = 0;
-    while first.0 < LONGEST_S / 2.0 && begin.elapsed().as_secs_f64() < LONGEST_S && (frames < ENOUGH_FRAMES || begin.elapsed().as_secs_f64() < options.seconds) {
+    while frames < 1 || begin.elapsed().as_secs_f64() < if frames < ENOUGH_FRAMES { LONGEST_S } else { options.seconds } {
         frame(renderer)?;
         frames += 1;
     }
     renderer.wait()?;
-    let (each, processor) = match frames {
-        0 => first,
-        _ => (begin.elapsed().as_secs_f64() / f64::from(frames), (processor_s() - spent) / f64::from(frames)),
-    };
-    let processor = 1e3 * processor;
+    let each = begin.elapsed().as_secs_f64() / f64::from(frames);
+    let processor = 1e3 * (processor_s() - spent) / f64::from(frames);
     println!("| {label} | {:.1} | {:.1} | {processor:.0} |", 1.0 / each, 1e3 * each);
     if options.stages {
         let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + 1);
