@@ -1,17 +1,21 @@
 //! Frames per second on this machine, as the table of docs/pictures.md: `cargo run --release -p tumble-render --example frames`.
 //!
 //! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn.
-//! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes some seven minutes on
-//! two idle cores: a row ends after `--seconds S` (default 2), slow ones after a frame to warm up and one that counts. Other options: `--only WORDS` (rows that contain the words),
-//! `--quality WORDS` (instead of the five shown), `--readback` (with the way back to memory), `--stages` (where the
-//! time of each row goes), `--pictures FOLDER` (the last picture of each row).
+//! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes less than five minutes on
+//! two idle cores: after a frame to warm up a row runs for `--seconds S` (default 1.5) and three frames, but begins none after six seconds. Other options: `--only WORDS` (rows that
+//! contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the way back to memory), `--stages` (where the time of each row goes),
+//! `--pictures FOLDER` (the last picture of each row).
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use std::time::{Duration, Instant};
 use tumble_core::World;
-use tumble_render::{Camera, CaveView, DebugDraw, DrawList, Drawing, Quality, RenderError, Renderer};
+use tumble_render::{CaveView, DebugDraw, DrawList, Drawing, Quality, RenderError, Renderer};
 use tumble_scene::SceneFile;
 use tumble_scene::cave::{Stereo, resolve_cave};
+
+/// Frames of a row, and how long it may take, s.
+const ENOUGH_FRAMES: u32 = 3;
+const LONGEST_S: f64 = 6.0;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -24,12 +28,19 @@ struct Options {
     pictures: Option<std::path::PathBuf>,
 }
 
-/// What is drawn: a world, and the facets on which it is.
+/// What is drawn.
 struct Subject {
     name: &'static str,
     world: World,
     scene: SceneFile,
-    camera: Option<Camera>,
+    drawing: Drawing,
+}
+
+/// On what: the scene's own camera, or a cave.
+struct Facets {
+    cave: Option<CaveView>,
+    shown: String,
+    size: [u32; 2],
 }
 
 fn main() -> Result<(), Failure> {
@@ -46,20 +57,22 @@ fn main() -> Result<(), Failure> {
     let mut summary = Vec::new();
     let mut subjects = [billiards()?, bodies("1,000 bodies", [25, 20, 2])?, bodies("10,000 bodies", [50, 50, 4])?];
     for subject in &mut subjects {
-        for facets in [1, 4, 6] {
+        for count in [1, 4, 6] {
+            let facets = facets(&subject.scene, count, [1024, 768], Stereo::Mono)?;
             let mut cells = Vec::new();
             for quality in &qualities {
-                cells.push(row(&options, &mut renderer, subject, facets, [1024, 768], Stereo::Mono, quality)?);
+                cells.push(row(&options, &mut renderer, subject, &facets, quality)?);
             }
             if cells.iter().any(Option::is_some) {
                 let shown: Vec<String> = cells.iter().map(|fps| fps.map_or(String::new(), |fps| format!("{fps:.1}"))).collect();
-                summary.push(format!("| {} | {facets} | {} |", subject.name, shown.join(" | ")));
+                summary.push(format!("| {} | {count} | {} |", subject.name, shown.join(" | ")));
             }
         }
     }
     if !["Cpu", "Other"].iter().any(|kind| adapter.contains(kind)) {
+        let facets = facets(&subjects[2].scene, 6, [1920, 1080], Stereo::SideBySide)?;
         for quality in &qualities {
-            row(&options, &mut renderer, &mut subjects[2], 6, [1920, 1080], Stereo::SideBySide, quality)?;
+            row(&options, &mut renderer, &mut subjects[2], &facets, quality)?;
         }
     }
     println!("\nFrames per second:\n\n| world | facets | `{}` |\n|---|---|{}", words.join("` | `"), "---|".repeat(words.len()));
@@ -68,7 +81,7 @@ fn main() -> Result<(), Failure> {
 }
 
 fn options() -> Result<Options, Failure> {
-    let mut options = Options { seconds: 2.0, only: String::new(), quality: None, readback: false, stages: false, pictures: None };
+    let mut options = Options { seconds: 1.5, only: String::new(), quality: None, readback: false, stages: false, pictures: None };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} wants a value"));
@@ -88,64 +101,60 @@ fn options() -> Result<Options, Failure> {
 /// The table before the break, from the scene's own camera.
 fn billiards() -> Result<Subject, Failure> {
     let shipped = tumble_scene::shipped().iter().find(|s| s.name == "billiards").ok_or("billiards is not shipped")?;
-    let scene = shipped.read()?;
-    Ok(Subject { name: "`billiards`", world: scene.build()?.0, scene, camera: None })
+    subject("`billiards`", shipped.read()?)
+}
+
+fn subject(name: &'static str, scene: SceneFile) -> Result<Subject, Failure> {
+    Ok(Subject { name, world: scene.build()?.0, drawing: Drawing::new(&scene), scene })
 }
 
 /// A bed of balls of 0.1 m, `nx · ny · nz` of them, which fills the picture.
 fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failure> {
+    let wide = 0.21 * nx as f64;
     let scene = SceneFile::parse(
         &format!(
             "[ground]\n[[light]]\ntype = \"directional\"\ndirection = [0.36, 0.48, -0.8]\n[[grid]]\nname = \"ball\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\n\
              density_kg_per_m3 = 1000\ncount = [{nx}, {ny}, {nz}]\nspacing_m = [0.21, 0.23, 0.22]\nposition_m = [0, 0, {}]\ncentered = true\n\
-             colors = [\"#c0392b\", \"#2980b9\", \"#f1c40f\", \"#27ae60\", \"#8e44ad\", \"#ecf0f1\", \"#d35400\"]\nroughness = 0.3\n",
+             colors = [\"#c0392b\", \"#2980b9\", \"#f1c40f\", \"#27ae60\", \"#8e44ad\", \"#ecf0f1\", \"#d35400\"]\nroughness = 0.3\n\
+             [camera]\neye_m = [0, {}, {}]\ntarget_m = [0, {}, 0.2]\nvertical_fov_deg = 40\n",
             0.1 + 0.11 * (nz - 1) as f64,
+            // all of it is in the picture
+            -1.35 * wide,
+            0.8 * wide,
+            -0.08 * wide,
         ),
         "balls.toml",
     )?;
-    let wide = 0.21 * nx as f32;
-    // all of it is in the picture
-    let camera = Camera::look_at(Point3::new(0.0, -1.35 * wide, 0.8 * wide), Point3::new(0.0, -0.08 * wide, 0.2));
-    Ok(Subject { name, world: scene.build()?.0, scene, camera: Some(camera) })
+    subject(name, scene)
 }
 
 /// One cell: frames per second, or none where it was not asked for.
-fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets: usize, size: [u32; 2], stereo: Stereo, quality: &Quality) -> Result<Option<f64>, Failure> {
-    let shown = if stereo == Stereo::Mono { format!("{facets}") } else { format!("{facets} of {} x {} in stereo", size[0], size[1]) };
-    let label = format!("{} | {shown} | {quality}", subject.name);
+fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets: &Facets, quality: &Quality) -> Result<Option<f64>, Failure> {
+    let label = format!("{} | {} | {quality}", subject.name, facets.shown);
     if !label.contains(&options.only) {
         return Ok(None);
     }
-    let mut drawing = Drawing::new(&subject.scene);
-    let cave = (facets > 1).then(|| cave(&subject.scene, facets, size, stereo)).transpose()?;
     let mut stages = [Duration::ZERO; 2];
     let mut frame = |renderer: &mut Renderer| -> Result<(), RenderError> {
         let begin = Instant::now();
-        let mut list = drawing.list(&subject.world, &DebugDraw::default())?;
+        let mut list = subject.drawing.list(&subject.world, &DebugDraw::default())?;
         quality.apply(&mut list.settings);
-        list.camera = subject.camera.unwrap_or(list.camera);
         let listed = Instant::now();
-        draw(renderer, &list, cave.as_ref(), size, options.readback)?;
+        draw(renderer, &list, facets, options.readback)?;
         stages[0] += listed - begin;
         stages[1] += listed.elapsed();
         Ok(())
     };
-    let first = Instant::now();
+    // pipelines are made in it
     frame(renderer)?;
     renderer.wait()?;
-    // pipelines were made in it: where frames are quick, another warms up
-    let mut warm = 1;
-    if first.elapsed().as_secs_f64() < options.seconds {
-        frame(renderer)?;
-        warm += 1;
-    }
     if let Some(folder) = &options.pictures {
         let name = label.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
         renderer.read()?.write_png(folder.join(format!("{name}.png")))?;
     }
     let (begin, spent) = (Instant::now(), processor_s());
     let mut frames = 0;
-    while frames < 1 || begin.elapsed().as_secs_f64() < options.seconds {
+    while frames < 1 || begin.elapsed().as_secs_f64() < if frames < ENOUGH_FRAMES { LONGEST_S } else { options.seconds } {
         frame(renderer)?;
         frames += 1;
     }
@@ -154,15 +163,15 @@ fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets
     let processor = 1e3 * (processor_s() - spent) / f64::from(frames);
     println!("| {label} | {:.1} | {:.1} | {processor:.0} |", 1.0 / each, 1e3 * each);
     if options.stages {
-        let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + warm);
+        let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + 1);
         println!("  list {:.2} ms, picture {:.2} ms", ms(stages[0]), ms(stages[1]));
     }
     Ok(Some(1.0 / each))
 }
 
-fn draw(renderer: &mut Renderer, list: &DrawList, cave: Option<&CaveView>, [w, h]: [u32; 2], readback: bool) -> Result<(), RenderError> {
-    match cave {
-        None => renderer.draw(&list.camera, list, w, h)?,
+fn draw(renderer: &mut Renderer, list: &DrawList, facets: &Facets, readback: bool) -> Result<(), RenderError> {
+    match &facets.cave {
+        None => renderer.draw(&list.camera, list, facets.size[0], facets.size[1])?,
         Some(cave) => {
             let stage = renderer.stage(list)?;
             for facet in &cave.cave().facets {
@@ -173,20 +182,24 @@ fn draw(renderer: &mut Renderer, list: &DrawList, cave: Option<&CaveView>, [w, h
             }
         }
     }
-    if readback && cave.is_none() {
+    if readback && facets.cave.is_none() {
         renderer.read()?;
     }
     renderer.end_frame(1)
 }
 
-/// A cube around the middle of the scene.
-fn cave(scene: &SceneFile, facets: usize, size_px: [u32; 2], stereo: Stereo) -> Result<CaveView, Failure> {
-    let mut cave = resolve_cave(if facets == 4 { "cube4" } else { "cube6" })?.load()?;
-    cave.facets.iter_mut().for_each(|facet| (facet.size_px, facet.stereo) = (size_px, stereo));
+/// The scene's camera, or a cube around the middle of the scene.
+fn facets(scene: &SceneFile, count: usize, size: [u32; 2], stereo: Stereo) -> Result<Facets, Failure> {
+    let shown = if stereo == Stereo::Mono { format!("{count}") } else { format!("{count} of {} x {} in stereo", size[0], size[1]) };
+    if count == 1 {
+        return Ok(Facets { cave: None, shown, size });
+    }
+    let mut cave = resolve_cave(if count == 4 { "cube4" } else { "cube6" })?.load()?;
+    cave.facets.iter_mut().for_each(|facet| (facet.size_px, facet.stereo) = (size, stereo));
     let mut scene = scene.clone();
     let eye: Vector3<f64> = cave.users[0].eye_m.coords;
     scene.cave = Some(tumble_scene::CavePlace { origin_m: [-eye.x, -eye.y, 1.2 - eye.z], heading_deg: 0.0, scale: 1.0 });
-    Ok(CaveView::new(cave, &scene)?)
+    Ok(Facets { cave: Some(CaveView::new(cave, &scene)?), shown, size })
 }
 
 /// Processor time of this process so far, all threads, s; on a software driver it is what a frame costs however busy the machine is. 0 where

@@ -1,5 +1,6 @@
 //! The renderer: a device without a window, and the order of its passes.
 
+mod cull;
 mod data;
 mod finish;
 mod frame;
@@ -7,6 +8,7 @@ mod meshes;
 mod pipelines;
 mod scene;
 mod shadow;
+mod spheres;
 mod stage;
 mod targets;
 mod textures;
@@ -56,6 +58,8 @@ pub(crate) struct Gpu {
     adapter: String,
     /// Where shaders cannot write which samples of a pixel they cover, among other things.
     opengl: bool,
+    /// Whether spheres that nobody sees are left out beforehand: where the processor draws.
+    choosy: bool,
     complaint: Arc<Mutex<Option<String>>>,
     lost: Arc<Mutex<Option<String>>>,
 }
@@ -281,7 +285,7 @@ impl Gpu {
             let why = if message.is_empty() { String::new() } else { format!(" ({message})") };
             note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("the device was lost{why}; a new renderer can be made"));
         });
-        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, opengl, complaint, lost })
+        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, opengl, choosy: info.device_type == wgpu::DeviceType::Cpu, complaint, lost })
     }
 
     /// What went wrong on the device since the last call.

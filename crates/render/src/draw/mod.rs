@@ -43,6 +43,8 @@ pub struct Drawing {
     unwrapped: Option<Vec<Unwrapped>>,
     base: DrawList,
     camera: Option<Camera>,
+    /// As many as the last list had.
+    spheres: usize,
     /// How much of every object is drawn, instead of what each one says.
     pub detail: Option<Detail>,
 }
@@ -90,6 +92,7 @@ impl Drawing {
             unwrapped: None,
             base,
             camera,
+            spheres: 0,
             detail: None,
         }
     }
@@ -100,6 +103,7 @@ impl Drawing {
     /// [`RenderError`] where a mesh has more vertices than can be drawn.
     pub fn list(&mut self, world: &World, overlays: &DebugDraw) -> Result<DrawList, RenderError> {
         let mut list = self.base.clone();
+        list.spheres.reserve(self.spheres);
         let mut placed = Placed::default();
         let tints = if overlays.resting { Some(resting(world)) } else { overlays.islands.then(|| islands(world)) };
         for &id in world.ids() {
@@ -116,6 +120,7 @@ impl Drawing {
                 self.place(&mut list, &mut placed, object.name(), visual, &(site.pose * visual.pose), tint)?;
             }
         }
+        self.spheres = list.spheres.len();
         list.camera = self.camera.unwrap_or_else(|| list.framing_camera(Vector3::new(-0.5, 1.0, -0.5)));
         overlays.draw(world, &mut list);
         Ok(list)

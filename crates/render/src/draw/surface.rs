@@ -5,14 +5,26 @@ use tumble_core::Look;
 
 /// The material of a look. A ball's number is the one at the end of the body's name (`ball_12`); none leaves the spots blank.
 pub(super) fn of_look(look: &Look, name: &str) -> Material {
-    let property = |key: &str, usual: f64| look.properties.iter().find(|(k, _)| k == key).map_or(usual, |(_, v)| *v) as f32;
-    let second = [property("second_r", 1.0), property("second_g", 1.0), property("second_b", 1.0)];
-    let numbers = Numbers { second, scale_m: property("scale_m", 0.1), offset_m: property("offset_m", 0.0), number: number(name) };
+    let mut numbers = Numbers { second: [1.0; 3], scale_m: 0.1, offset_m: 0.0, name };
+    let mut clearcoat = 0.0;
+    // of equal names the first counts
+    for (key, value) in look.properties.iter().rev() {
+        let value = *value as f32;
+        match key.as_str() {
+            "second_r" => numbers.second[0] = value,
+            "second_g" => numbers.second[1] = value,
+            "second_b" => numbers.second[2] = value,
+            "scale_m" => numbers.scale_m = value,
+            "offset_m" => numbers.offset_m = value,
+            "clearcoat" => clearcoat = value,
+            _ => {}
+        }
+    }
     Material {
         color: look.color,
         roughness: look.roughness,
         metallic: look.metallic,
-        clearcoat: property("clearcoat", 0.0),
+        clearcoat,
         pattern: pattern(&look.shader, &numbers),
         ..Material::default()
     }
@@ -20,7 +32,7 @@ pub(super) fn of_look(look: &Look, name: &str) -> Material {
 
 /// The material of a look in a scene file.
 pub(super) fn of_spec(look: &tumble_scene::Look) -> Material {
-    let numbers = Numbers { second: look.second_color.map(|c| c as f32), scale_m: look.pattern_scale_m as f32, offset_m: look.pattern_offset_m as f32, number: 0 };
+    let numbers = Numbers { second: look.second_color.map(|c| c as f32), scale_m: look.pattern_scale_m as f32, offset_m: look.pattern_offset_m as f32, name: "" };
     Material {
         color: look.color.map(|c| c as f32),
         roughness: look.roughness as f32,
@@ -31,19 +43,19 @@ pub(super) fn of_spec(look: &tumble_scene::Look) -> Material {
     }
 }
 
-struct Numbers {
+struct Numbers<'a> {
     second: [f32; 3],
     scale_m: f32,
     offset_m: f32,
-    number: u8,
+    name: &'a str,
 }
 
 fn pattern(name: &str, n: &Numbers) -> Pattern {
     match name {
         "checker" => Pattern::Checker { other: n.second, size_m: n.scale_m },
         "grid" => Pattern::Grid { line: n.second, size_m: n.scale_m, width_m: 0.02 * n.scale_m },
-        "solid_ball" => Pattern::Ball { number: n.number, stripe: false },
-        "striped_ball" => Pattern::Ball { number: n.number, stripe: true },
+        "solid_ball" => Pattern::Ball { number: number(n.name), stripe: false },
+        "striped_ball" => Pattern::Ball { number: number(n.name), stripe: true },
         "wood" => Pattern::Wood { dark: n.second, ring_m: 0.3 * n.scale_m, board_m: n.scale_m },
         "felt" => Pattern::Felt { thread_m: 0.1 * n.scale_m },
         "rings" => Pattern::Rings { other: n.second, from_m: n.offset_m, to_m: n.offset_m + n.scale_m },

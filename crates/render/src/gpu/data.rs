@@ -3,11 +3,15 @@
 use crate::list::debug::Stroke;
 use crate::material::linear3;
 use crate::{Capsule, Instance, Material, Part, Sphere};
-use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3, Vector4};
 
 /// Numbers per mesh instance, sphere, capsule and stroke.
 pub const INSTANCE_FLOATS: u64 = 24;
 pub const SPHERE_FLOATS: u64 = 20;
+/// Texels that tell of a sphere, of four words each.
+pub const SPHERE_TEXELS: usize = 4;
+/// Middle, radius and number.
+pub const BALL_WORDS: u64 = 5;
 pub const CAPSULE_FLOATS: u64 = 24;
 pub const STROKE_FLOATS: u64 = 16;
 
@@ -18,6 +22,8 @@ pub struct Eye {
     pub perspective: bool,
     origin: [Vector3<f64>; 3],
     dir: [Vector3<f64>; 3],
+    /// The way it looks, of length 1.
+    ahead: Vector3<f64>,
     per_pixel: f64,
     per_ndc: [f64; 2],
     size: [f64; 2],
@@ -52,6 +58,7 @@ impl Eye {
             perspective,
             origin: [at - plane(o), moving_origin[0], moving_origin[1]],
             dir: [forward, moving_dir[0], moving_dir[1]],
+            ahead: -rotation.column(2).into_owned(),
             per_ndc: [ex.norm(), ey.norm()],
             per_pixel: 2.0 * ey.norm() / f64::from(height),
             size: [f64::from(width), f64::from(height)],
@@ -68,15 +75,64 @@ impl Eye {
     }
 
     /// Whether the eye is in, or near to, one of the balls, or one lies across the plane through the eye: there an outline is no ellipse before it.
-    pub fn near_any(&self, balls: &[(Point3<f32>, f32)]) -> bool {
+    pub fn near_any<'a>(&self, mut balls: impl Iterator<Item = &'a (Point3<f32>, f32)>) -> bool {
         let at: Vector3<f32> = self.origin[0].cast();
         let ahead: Vector3<f32> = self.clip_from_world.row(3).transpose().xyz().cast();
+        let sides = self.sides();
+        let beside = |c: &Point3<f32>, r: f32| sides.iter().any(|side| side.dot(&c.cast().to_homogeneous()) < -1.001 * f64::from(r));
         self.perspective
-            && balls.iter().any(|(center, radius)| {
+            && balls.any(|(center, radius)| {
                 let to = center.coords - at;
                 // a little more than the shaders' own bounds
-                to.norm_squared() < 2.1 * radius * radius || (to.dot(&ahead).abs() < 3.0 * radius && to.norm() < 1e6 * radius)
+                (to.norm_squared() < 2.1 * radius * radius || (to.dot(&ahead).abs() < 3.0 * radius && to.norm() < 1e6 * radius)) && !beside(center, *radius)
             })
+    }
+
+    /// Rows of the map from the world to `(x, y, w)`: `x / w` and `y / w` are pixels from the left and from the top.
+    pub fn pixel_rows(&self) -> [Vector4<f64>; 3] {
+        let [x, y, w] = [0, 1, 3].map(|i| self.clip_from_world.row(i).transpose());
+        [(w + x) * (0.5 * self.size[0]), (w - y) * (0.5 * self.size[1]), w]
+    }
+
+    /// Width and height, pixels.
+    pub fn size_px(&self) -> [usize; 2] {
+        self.size.map(|side| side as usize)
+    }
+
+    /// How far ahead a place lies, m.
+    pub fn view_depth(&self, place: &Vector3<f64>) -> f64 {
+        (place - self.origin[0]).dot(&self.ahead)
+    }
+
+    /// Depth as it is drawn, 1 at the near plane and 0 at the far plane; none behind the eye.
+    pub fn depth_at(&self, view_depth: f64) -> Option<f64> {
+        let [x, y, z, w] = self.depth;
+        (!self.perspective || view_depth > 0.0).then(|| (x * view_depth + y) / (z * view_depth + w))
+    }
+
+    /// Planes of the four sides of the picture, as rows whose product with a homogeneous point is its distance inside, m.
+    pub fn sides(&self) -> [Vector4<f64>; 4] {
+        let [x, y, w] = [0, 1, 3].map(|i| self.clip_from_world.row(i).transpose());
+        [w + x, w - x, w + y, w - y].map(|side| side / side.xyz().norm().max(1e-300))
+    }
+
+    /// Sine of the angle between the way it looks and the way to a place.
+    pub fn sine_beside(&self, place: &Vector3<f64>) -> f64 {
+        let to = if self.perspective { place - self.origin[0] } else { self.dir[0] };
+        let cosine = to.dot(&self.ahead) / to.norm();
+        (1.0 - cosine * cosine).max(0.0).sqrt()
+    }
+
+    /// Pixels that a metre across covers at a depth, at most.
+    pub fn pixels_per_metre(&self, view_depth: f64) -> f64 {
+        let [wide, high] = self.map_widths_per_metre();
+        let depth = if self.perspective { view_depth.max(1e-9) } else { 1.0 };
+        (wide * self.size[0]).max(high * self.size[1]) / depth
+    }
+
+    /// The largest coordinate of where it looks from.
+    pub fn reach(&self) -> f64 {
+        self.origin[0].amax()
     }
 
     /// How many picture widths and heights a metre across the view covers (at view depth 1, where perspective).
@@ -110,12 +166,17 @@ pub fn instance(x: &Instance, unwrapped: bool, out: &mut Vec<f32>) {
     material(&x.material, if unwrapped { -1.0 } else { x.material.texture.map_or(0.0, |t| t.repeat_m) }, out);
 }
 
-/// A sphere: centre and radius, turn, material.
-pub fn sphere(s: &Sphere, out: &mut Vec<f32>) {
-    let (c, q) = (s.center, s.orientation.coords);
-    out.extend([c.x, c.y, c.z, s.radius, q.x, q.y, q.z, q.w]);
+/// A sphere as bits: centre and radius; colours, roughness and metal as shares of 65,535, two to a word; turn; lacquer, repeat of the texture and sizes. What all surfaces read
+/// comes first.
+pub fn sphere(s: &Sphere, out: &mut Vec<u32>) {
+    let (c, q, m) = (s.center, s.orientation.coords, &s.material);
+    let (_, other, size) = m.pattern.packed();
+    let ([r, g, b], [or, og, ob]) = (linear3(m.color), linear3(other));
+    let pair = |low: f32, high: f32| [low, high].map(|x| (x.clamp(0.0, 1.0) * 65_535.0).round() as u32).into_iter().rev().fold(0, |word, half| word << 16 | half);
+    out.extend([c.x, c.y, c.z, s.radius].map(f32::to_bits));
+    out.extend([pair(r, g), pair(b, m.roughness), pair(or, og), pair(ob, m.metallic)]);
     // a sphere wears its texture once around
-    material(&s.material, 0.0, out);
+    out.extend([q.x, q.y, q.z, q.w, m.clearcoat, 0.0, size[0], size[1]].map(f32::to_bits));
 }
 
 /// A capsule: centre and radius, turn, material, half length. A texture is laid on by position.

@@ -2,6 +2,7 @@
 
 use super::data::Eye;
 use super::pipelines::Pipelines;
+use super::spheres::{Choice, Which};
 use super::stage::{Batch, Stage, bind_view};
 use super::targets::{ShadowMaps, Targets};
 use super::{Gpu, meshes::uniform_buffer};
@@ -17,7 +18,7 @@ pub struct Frame<'a> {
     occlusion_raw: BindGroup,
     occlusion_blur: BindGroup,
     shells: Batch,
-    near: bool,
+    choice: Choice,
 }
 
 impl<'a> Frame<'a> {
@@ -36,7 +37,7 @@ impl<'a> Frame<'a> {
             BindingResource::TextureView(&targets.occlusion),
             BindingResource::TextureView(&maps.array),
             BindingResource::TextureView(&targets.ids),
-            BindingResource::TextureView(&stage.sphere_data),
+            BindingResource::TextureView(&stage.spheres.looks),
         ];
         Ok(Frame {
             view: bind_view(gpu, pipelines, &eye)?,
@@ -44,7 +45,7 @@ impl<'a> Frame<'a> {
             occlusion_raw: bind_occlusion(&targets.white),
             occlusion_blur: bind_occlusion(&targets.occlusion_raw),
             shells: stage.shells_from(gpu, &lens.view.cast())?,
-            near: stage.near(&eye),
+            choice: stage.spheres.choose(gpu, &eye, Which::All)?,
             stage,
             targets,
         })
@@ -61,9 +62,9 @@ impl<'a> Frame<'a> {
             };
             pass.set_bind_group(0, &self.view, &[]);
             if variant.spheres_first() {
-                self.stage.draw_nearest_spheres(&mut pass, pipelines, self.near);
+                self.stage.draw_sphere_depth(&mut pass, &pipelines.ids, &self.choice);
             } else {
-                self.stage.draw_view_depth(&mut pass, if ids.is_some() { &pipelines.ids } else { &pipelines.depth }, self.near);
+                self.stage.draw_view_depth(&mut pass, if ids.is_some() { &pipelines.ids } else { &pipelines.depth }, &self.choice);
             }
         }
         if occlusion {
@@ -72,7 +73,7 @@ impl<'a> Frame<'a> {
         let mut pass = self.picture_pass(encoder);
         pass.set_bind_group(0, &self.view, &[]);
         pass.set_bind_group(1, &self.scene, &[]);
-        self.stage.draw_picture(&mut pass, pipelines, &self.shells);
+        self.stage.draw_picture(&mut pass, pipelines, &self.choice, &self.shells);
     }
 
     /// Occlusion from depth, and its blur.

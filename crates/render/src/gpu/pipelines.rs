@@ -1,8 +1,8 @@
 //! Shaders, binding layouts and pipelines. Layouts and shaders are made once per device, pipelines when a picture first needs them: one for each
 //! pass, pattern and quality, so that none computes what it does not show.
 
-use super::data::{CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
-use crate::Shadows;
+use super::data::{BALL_WORDS, CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
+use crate::{DrawList, Light, Settings, Shadows};
 use std::collections::BTreeMap;
 use wgpu::{BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline, ShaderModule, ShaderStages, TextureFormat, VertexFormat};
 
@@ -57,11 +57,15 @@ pub struct Variant {
     occlusion: bool,
     softbox: bool,
     reflections: bool,
+    /// Whether the only light has a direction alone: told only where light is a cheap likeness.
+    one_sun: bool,
 }
 
 impl Variant {
-    pub fn new(samples: u32, shadows: Shadows, occlusion: bool, softbox: bool, reflections: bool) -> Self {
-        Variant { samples, shadows: shadows.number(), occlusion, softbox: softbox && reflections, reflections }
+    pub fn new(list: &DrawList, shadows: Shadows, occlusion: bool) -> Self {
+        let Settings { samples, reflections, .. } = list.settings;
+        let one_sun = !reflections && matches!(list.lights[..], [Light::Directional { .. }]);
+        Variant { samples, shadows: shadows.number(), occlusion, softbox: list.sky.softbox > 0.0 && reflections, reflections, one_sun }
     }
 
     /// With one sample the nearest depth is drawn first, and only what is nearest is lit.
@@ -102,6 +106,8 @@ pub struct Pipelines {
 impl Pipelines {
     /// `sample_masks`: whether shaders can write which samples of a pixel they cover.
     pub fn new(device: &Device, sample_masks: bool) -> Self {
+        // OpenGL has no interpolation without perspective; where it is asked for w is 1, and it is the same
+        let common = if sample_masks { PICTURE_WGSL.to_owned() } else { PICTURE_WGSL.replace("@interpolate(linear)", "@interpolate(perspective)") };
         let view_layout = layout(device, "view", &[uniform(0)]);
         let scene_layout = layout(
             device,
@@ -113,7 +119,7 @@ impl Pipelines {
                 texture(3, NUMBERS, wgpu::TextureViewDimension::D2),
                 texture(4, NUMBERS, wgpu::TextureViewDimension::D2Array),
                 texture(5, wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
-                texture(6, NUMBERS, wgpu::TextureViewDimension::D2),
+                texture(6, wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
             ],
         );
         let occlusion_layout = layout(
@@ -128,8 +134,8 @@ impl Pipelines {
         let filtered = wgpu::TextureSampleType::Float { filterable: true };
         let albedo = [texture(0, filtered, wgpu::TextureViewDimension::D2), entry(1, BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
         let texture_layout = layout(device, "texture", &albedo);
-        let pixels = shader(device, "picture", &[PICTURE_WGSL, EDGE_PIXELS_WGSL].concat());
-        let samples = if sample_masks { shader(device, "picture", &[PICTURE_WGSL, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
+        let pixels = shader(device, "picture", &[&common, EDGE_PIXELS_WGSL].concat());
+        let samples = if sample_masks { shader(device, "picture", &[&common, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
         let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
         let depth_only = [Some(&view_layout)];
         let screen = [Some(&view_layout), Some(&occlusion_layout)];
@@ -148,15 +154,15 @@ impl Pipelines {
             depth: [
                 depth(mesh, None, Input::Mesh, None, WRITE),
                 depth(mesh, None, Input::Mesh, None, WRITE),
-                depth("vs_ball", Some("fs_ball_depth"), Input::Sphere, None, WRITE),
-                depth("vs_near", Some("fs_near_depth"), Input::Sphere, None, WRITE),
+                depth("vs_ball", Some("fs_ball_depth"), Input::Ball, None, WRITE),
+                depth("vs_near", Some("fs_near_depth"), Input::Ball, None, WRITE),
                 depth("vs_capsule", Some("fs_capsule_depth"), Input::Capsule, None, WRITE),
             ],
             ids: [
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
-                depth("vs_ball", Some("fs_ball_id"), Input::Sphere, Some(ID), WRITE),
-                depth("vs_near", Some("fs_near_id"), Input::Sphere, Some(ID), WRITE),
+                depth("vs_ball", Some("fs_ball_id"), Input::Ball, Some(ID), WRITE),
+                depth("vs_near", Some("fs_near_id"), Input::Ball, Some(ID), WRITE),
                 depth("vs_capsule", Some("fs_capsule_no_id"), Input::Capsule, Some(ID), WRITE),
             ],
             mesh_first: mesh_first.build(device, &pixels, &picture),
@@ -204,13 +210,13 @@ impl Pipelines {
         let (vs, fs, input, depth, blend) = match pass {
             // at the far plane: only where nothing is
             Pass::Sky => ("vs_sky", "fs_sky", Input::None, TEST, None),
-            Pass::Ground => ("vs_mesh", "fs_ground", Input::Mesh, behind, None),
+            Pass::Ground => ("vs_ground", "fs_ground", Input::Mesh, behind, None),
             Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
             Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, seen, None),
-            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Sphere, seen, None),
+            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Ball, seen, None),
             Pass::Capsule if variant.spheres_first() => ("vs_capsule", "fs_capsule", Input::Capsule, WRITE, None),
             Pass::Capsule => ("vs_capsule", "fs_capsule", Input::Capsule, solid, None),
-            Pass::Shell => ("vs_sphere", "fs_shell", Input::Sphere, TEST, over),
+            Pass::Shell => ("vs_shell", "fs_shell", Input::Sphere, TEST, over),
             Pass::Line => ("vs_line", "fs_line", Input::Stroke, TEST, over),
             Pass::LineOnTop => ("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
         };
@@ -223,6 +229,7 @@ impl Pipelines {
             ("OCCLUSION", flag(variant.occlusion)),
             ("SOFTBOX", flag(variant.softbox)),
             ("REFLECTIONS", flag(variant.reflections)),
+            ("ONE_SUN", flag(variant.one_sun)),
         ];
         let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: variant.samples, constants: &constants };
         plan.build(device, &self.modules[usize::from(first)], &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)])
@@ -251,6 +258,8 @@ enum Input {
     None,
     Mesh,
     Sphere,
+    /// Middle, radius and number of a sphere.
+    Ball,
     Capsule,
     Stroke,
     /// Two whole numbers.
@@ -280,9 +289,10 @@ impl Plan<'_> {
             Input::None => vec![],
             Input::Mesh => vec![Some(per_vertex), Some(per_instance)],
             Input::Sphere | Input::Capsule | Input::Stroke => vec![Some(per_instance)],
+            Input::Ball => vec![Some(wgpu::VertexBufferLayout { array_stride: 4 * BALL_WORDS, step_mode: wgpu::VertexStepMode::Instance, attributes: &BALL })],
             Input::Range => vec![Some(wgpu::VertexBufferLayout { array_stride: 8, step_mode: wgpu::VertexStepMode::Instance, attributes: &RANGE })],
         };
-        let strip = matches!(self.input, Input::Sphere | Input::Capsule | Input::Stroke);
+        let strip = matches!(self.input, Input::Sphere | Input::Ball | Input::Capsule | Input::Stroke);
         let write_mask = if self.fs == Some("fs_nothing") { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
         let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask })];
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -315,12 +325,13 @@ impl Plan<'_> {
     }
 }
 
+const BALL: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![0 => Float32x4, 1 => Uint32];
 const RANGE: [wgpu::VertexAttribute; 1] = [wgpu::VertexAttribute { format: VertexFormat::Uint32x2, offset: 0, shader_location: 0 }];
 
 impl Input {
     fn floats(self) -> u64 {
         match self {
-            Input::None | Input::Range => 0,
+            Input::None | Input::Range | Input::Ball => 0,
             Input::Mesh => INSTANCE_FLOATS,
             Input::Sphere => SPHERE_FLOATS,
             Input::Capsule => CAPSULE_FLOATS,

@@ -3,14 +3,14 @@
 use super::data::{self, Eye};
 use super::meshes::{MeshBuffers, MeshCache, uniform_buffer, vertex_buffer};
 use super::pipelines::{Key, Pass, Pipelines, Variant};
+use super::spheres::{Choice, Spheres, Which};
 use super::targets::{MAX_LAYERS, ShadowMaps};
 use super::{Gpu, scene};
 use crate::list::bounds::Bounds;
 use crate::list::debug::strokes;
 use crate::{DebugSphere, DrawList, Instance, Material, MeshData, MeshId, RenderError, Shadows, SphereStyle};
-use nalgebra::Point3;
 use std::ops::Range;
-use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline, TextureView};
+use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline};
 
 /// A list that was sent to the device, to be drawn from as many points of view as there are eyes and screens ([`crate::Renderer::stage`]).
 /// Shadows are fitted to all that is there, wherever one looks from.
@@ -19,21 +19,15 @@ pub struct Stage {
     pub(super) variant: Variant,
     pub(super) shadow_map_size: u32,
     pub(super) reach: f32,
-    /// Each with whether it is near to a sphere.
-    pub(super) shadow_views: Vec<(BindGroup, bool)>,
+    /// Each with the spheres that throw its shadows.
+    pub(super) shadow_views: Vec<(BindGroup, Choice)>,
     pub(super) scene: Buffer,
     shells: Vec<DebugSphere>,
     groups: Vec<Group>,
     instances: Buffer,
     /// With its surface and texture.
     ground: Option<(MeshBuffers, Buffer, (u32, Option<usize>))>,
-    spheres: Buffer,
-    balls: Vec<(Point3<f32>, f32)>,
-    /// The same numbers as a texture, for pictures that light each pixel once.
-    pub(super) sphere_data: TextureView,
-    sphere_groups: Vec<Same>,
-    /// First and last number of the spheres of each group.
-    sphere_ranges: Buffer,
+    pub(super) spheres: Spheres,
     capsules: Buffer,
     capsule_groups: Vec<Same>,
     strokes: [Batch; 2],
@@ -53,11 +47,11 @@ impl Textures {
 }
 
 /// Items with one surface, side by side in a buffer; those that throw shadows first.
-struct Same {
+pub(super) struct Same {
     surface: u32,
     texture: Option<usize>,
-    all: Range<u32>,
-    casters: Range<u32>,
+    pub all: Range<u32>,
+    pub casters: Range<u32>,
 }
 
 /// Instances of one mesh.
@@ -81,28 +75,24 @@ impl Stage {
         let reach = scene::occlusion_reach(list, seen, part);
         let buffers = meshes.sync(gpu, &list.meshes)?;
         let (groups, instances) = group_instances(gpu, list, &buffers)?;
-        let (sphere_groups, sphere_floats) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow), data::sphere);
-        let (capsule_groups, capsule_floats) = group_items(&list.capsules, |c| (&c.material, c.casts_shadow), data::capsule);
-        let ranges: Vec<u32> = sphere_groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
-        let balls: Vec<_> = list.spheres.iter().map(|s| (s.center, s.radius)).collect();
+        let spheres = Spheres::new(gpu, list)?;
+        let (capsule_groups, order) = group_items(&list.capsules, |c| (&c.material, c.casts_shadow));
+        let mut capsule_floats = Vec::with_capacity(data::CAPSULE_FLOATS as usize * order.len());
+        order.iter().for_each(|&i| data::capsule(&list.capsules[i], &mut capsule_floats));
         let stage = Stage {
             serial,
-            variant: Variant::new(s.samples, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0, list.sky.softbox > 0.0, s.reflections),
+            variant: Variant::new(list, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0),
             shadow_map_size: s.shadow_map_size,
             reach,
-            shadow_views: shadows.iter().map(|(_, eye)| Ok((bind_view(gpu, pipelines, eye)?, eye.near_any(&balls)))).collect::<Result<_, RenderError>>()?,
-            balls,
+            shadow_views: shadows.iter().map(|(_, eye)| Ok((bind_view(gpu, pipelines, eye)?, spheres.choose(gpu, eye, Which::Casters)?))).collect::<Result<_, RenderError>>()?,
             scene: uniform_buffer(gpu, &scene::floats(list, seen, &shadows), "scene")?,
             shells: list.debug_spheres.iter().filter(|s| s.look == SphereStyle::Shell && s.radius > 0.0).cloned().collect(),
             groups,
             instances,
             ground: ground(gpu, list, seen)?,
-            spheres: vertex_buffer(gpu, &sphere_floats, "spheres")?,
-            sphere_data: sphere_texture(gpu, if s.samples == 1 { sphere_floats } else { Vec::new() })?,
-            sphere_groups,
+            spheres,
             capsules: vertex_buffer(gpu, &capsule_floats, "capsules")?,
             capsule_groups,
-            sphere_ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), wgpu::BufferUsages::VERTEX, "sphere groups")?,
             textures,
             strokes: [stroke_batch(gpu, list, false)?, stroke_batch(gpu, list, true)?],
         };
@@ -115,45 +105,39 @@ impl Stage {
         let fixed = [(Pass::Sky, 0), (Pass::Shell, 0), (Pass::Line, 0), (Pass::LineOnTop, 0)];
         let ground = self.ground.iter().map(|(_, _, (surface, _))| (Pass::Ground, *surface));
         let meshes = self.groups.iter().map(|g| (Pass::Mesh, g.same.surface));
-        let spheres = self.sphere_groups.iter().map(|g| (Pass::Sphere, g.surface));
+        let spheres = self.spheres.groups.iter().map(|g| (Pass::Sphere, g.surface));
         let capsules = self.capsule_groups.iter().map(|g| (Pass::Capsule, g.surface));
         fixed.into_iter().chain(ground).chain(meshes).chain(spheres).chain(capsules).map(|(pass, surface)| (pass, surface, self.variant))
     }
 
     /// One depth map per shadow.
     pub(super) fn draw_shadows(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines, maps: &ShadowMaps) {
-        for ((view, near), layer) in self.shadow_views.iter().zip(&maps.layers) {
+        for ((view, choice), layer) in self.shadow_views.iter().zip(&maps.layers) {
             let mut pass = super::frame::depth_pass(encoder, "shadow", layer);
             pass.set_bind_group(0, view, &[]);
-            self.draw_depth(&mut pass, &pipelines.depth, *near, |same| same.casters.clone());
+            self.draw_depth(&mut pass, &pipelines.depth, choice, |same| same.casters.clone());
         }
     }
 
     /// Depth of everything, the floor included, by pipelines for floor, meshes, spheres, near spheres and capsules.
-    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], near: bool) {
+    pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], choice: &Choice) {
         if let Some((mesh, instance, _)) = &self.ground {
             pass.set_pipeline(&by[0]);
             draw_mesh(pass, mesh, instance, 0..1);
         }
-        self.draw_depth(pass, by, near, |same| same.all.clone());
+        self.draw_depth(pass, by, choice, |same| same.all.clone());
     }
 
-    /// Depth and number of the nearest sphere alone.
-    pub(super) fn draw_nearest_spheres(&self, pass: &mut RenderPass, pipelines: &Pipelines, near: bool) {
-        self.draw_sphere_depth(pass, &pipelines.ids, near, |same| same.all.clone());
-    }
-
-    fn draw_sphere_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], near: bool, which: impl Fn(&Same) -> Range<u32>) {
-        pass.set_vertex_buffer(0, self.spheres.slice(..));
-        for pipeline in &by[2..if near { 4 } else { 3 }] {
+    /// Depth of spheres alone, with or without the number of the nearest.
+    pub(super) fn draw_sphere_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], choice: &Choice) {
+        pass.set_vertex_buffer(0, choice.balls.slice(..));
+        for pipeline in &by[2..if choice.near { 4 } else { 3 }] {
             pass.set_pipeline(pipeline);
-            for range in self.sphere_groups.iter().map(&which).filter(|range| !range.is_empty()) {
-                pass.draw(0..4, range);
-            }
+            choice.ranges.iter().filter(|range| !range.is_empty()).for_each(|range| pass.draw(0..4, range.clone()));
         }
     }
 
-    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], near: bool, which: impl Fn(&Same) -> Range<u32>) {
+    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], choice: &Choice, which: impl Fn(&Same) -> Range<u32>) {
         pass.set_pipeline(&by[1]);
         self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, which(&g.same)));
         if !self.capsule_groups.is_empty() {
@@ -161,18 +145,13 @@ impl Stage {
             pass.set_vertex_buffer(0, self.capsules.slice(..));
             self.capsule_groups.iter().map(&which).filter(|range| !range.is_empty()).for_each(|range| pass.draw(0..14, range));
         }
-        self.draw_sphere_depth(pass, by, near, which);
-    }
-
-    /// Whether some sphere is so near to the eye that its outline is no circle on a plane before it.
-    pub(super) fn near(&self, eye: &Eye) -> bool {
-        eye.near_any(&self.balls)
+        self.draw_sphere_depth(pass, by, choice);
     }
 
     /// Everything in colour, with the view's own shells.
-    pub(super) fn draw_picture(&self, pass: &mut RenderPass, pipelines: &Pipelines, shells: &Batch) {
+    pub(super) fn draw_picture(&self, pass: &mut RenderPass, pipelines: &Pipelines, choice: &Choice, shells: &Batch) {
         let select = |pass: &mut RenderPass, which, surface| pipelines.of((which, surface, self.variant)).map(|p| pass.set_pipeline(p)).is_some();
-        self.draw_spheres(pass, &select);
+        self.draw_spheres(pass, choice, &select);
         pass.set_bind_group(2, &self.textures.white, &[]);
         if self.variant.spheres_first() && !self.groups.is_empty() {
             pass.set_pipeline(&pipelines.mesh_first);
@@ -210,18 +189,18 @@ impl Stage {
     }
 
     /// Each with its surface: by squares, or all of a surface at once where the nearest is known.
-    fn draw_spheres(&self, pass: &mut RenderPass, select: &impl Fn(&mut RenderPass, Pass, u32) -> bool) {
-        for (i, same) in self.sphere_groups.iter().enumerate() {
+    fn draw_spheres(&self, pass: &mut RenderPass, choice: &Choice, select: &impl Fn(&mut RenderPass, Pass, u32) -> bool) {
+        for (i, same) in self.spheres.groups.iter().enumerate() {
             pass.set_bind_group(2, self.textures.of(same.texture), &[]);
             if !select(pass, Pass::Sphere, same.surface) {
                 continue;
             }
             if self.variant.depth_first() {
-                pass.set_vertex_buffer(0, self.sphere_ranges.slice(..));
+                pass.set_vertex_buffer(0, self.spheres.ranges.slice(..));
                 pass.draw(0..3, i as u32..i as u32 + 1);
             } else {
-                pass.set_vertex_buffer(0, self.spheres.slice(..));
-                pass.draw(0..4, same.all.clone());
+                pass.set_vertex_buffer(0, choice.balls.slice(..));
+                pass.draw(0..4, choice.ranges[i].clone());
             }
         }
     }
@@ -271,27 +250,13 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
     Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
 }
 
-/// Spheres or capsules by surface, and their numbers in that order.
-fn group_items<T>(items: &[T], kind: impl Fn(&T) -> (&Material, bool), write: impl Fn(&T, &mut Vec<f32>)) -> (Vec<Same>, Vec<f32>) {
-    let surface = |i: usize| (kind(&items[i]).0.surface(), kind(&items[i]).0.texture.map(|t| t.id));
+/// Spheres or capsules by surface, and in which order.
+pub(super) fn group_items<T>(items: &[T], kind: impl Fn(&T) -> (&Material, bool)) -> (Vec<Same>, Vec<usize>) {
+    let kinds: Vec<_> = items.iter().map(kind).map(|(m, casts)| ((m.surface(), m.texture.map(|t| t.id)), casts)).collect();
     let mut order: Vec<usize> = (0..items.len()).collect();
-    order.sort_by_key(|&i| (surface(i), !kind(&items[i]).1, i));
-    let mut floats = Vec::with_capacity(data::CAPSULE_FLOATS as usize * items.len());
-    order.iter().for_each(|&i| write(&items[i], &mut floats));
-    let groups = runs(&order, surface, |i| kind(&items[i]).1).map(|(same, first)| Same { surface: surface(first).0, texture: surface(first).1, ..same });
-    (groups.collect(), floats)
-}
-
-/// Five texels per sphere, 256 spheres per row.
-fn sphere_texture(gpu: &Gpu, mut floats: Vec<f32>) -> Result<TextureView, RenderError> {
-    let row = 256 * data::SPHERE_FLOATS as usize;
-    let rows = floats.len().div_ceil(row).max(1);
-    let most = gpu.device.limits().max_texture_dimension_2d as usize;
-    if rows > most {
-        return Err(RenderError::TooMany { what: "spheres", count: floats.len() / data::SPHERE_FLOATS as usize, cap: 256 * most });
-    }
-    floats.resize(rows * row, 0.0);
-    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Float, bytemuck::cast_slice(&floats)))
+    order.sort_by_key(|&i| (kinds[i].0, !kinds[i].1, i));
+    let groups = runs(&order, |i| kinds[i].0, |i| kinds[i].1).map(|(same, first)| Same { surface: kinds[first].0.0, texture: kinds[first].0.1, ..same }).collect();
+    (groups, order)
 }
 
 /// Runs of one kind in an order that has those that cast first in each; with the first item of each.

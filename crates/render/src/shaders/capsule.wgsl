@@ -87,7 +87,7 @@ fn hit_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> Hit {
         t = near - sqrt(max(ball.w * ball.w - dot(miss, miss), 0.0) * per);
     }
     let n = normalize(t * d - p.to - u * a);
-    return Hit(p.nearest + t, ball.xyz + u * a + n * ball.w, n);
+    return Hit(p.nearest + t, ball.xyz + u * a + n * ball.w, n, -normalize(d));
 }
 
 fn capsule_depth(in: CapsuleOut) -> f32 {
@@ -113,8 +113,7 @@ fn capsule_depth(in: CapsuleOut) -> f32 {
     let h = hit_capsule(in.ball, in.axis, pixel);
     let depth = depth_of(h.s);
     if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
-    let to_eye = -normalize(ray_at(pixel).dir);
-    let color = pixel_color(h.position, h.normal, to_eye, unturn(in.turn, h.position - in.ball.xyz), unturn(in.turn, h.normal), h.s, pixel, vec3f(0.0),
+    let color = pixel_color(h.position, h.normal, h.to_eye, unturn(in.turn, h.position - in.ball.xyz), unturn(in.turn, h.normal), h.s, pixel, vec3f(0.0),
         Look(in.color_rough, in.other_metal, in.pattern));
     // a hair nearer than in the pass before, where there is one
     return sphere_pixel(vec4f(color, 1.0), min(depth * 1.000001, 1.0), mask);

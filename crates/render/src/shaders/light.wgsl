@@ -31,7 +31,7 @@ struct Scene {
 @group(1) @binding(3) var occlusion: texture_2d<f32>;
 @group(1) @binding(4) var shadow_depths: texture_2d_array<f32>; // the same maps, to be read as numbers (OpenGL reads no depth texture)
 @group(1) @binding(5) var seen_id: texture_2d<u32>;     // number of the nearest sphere from 1 on, where that was drawn first
-@group(1) @binding(6) var sphere_data: texture_2d<f32>; // five texels per sphere, 256 spheres per row
+@group(1) @binding(6) var sphere_data: texture_2d<u32>; // four texels per sphere, 256 spheres per row
 
 struct Surface {
     position: vec3f,
@@ -78,17 +78,16 @@ fn sky_irradiance(n: vec3f) -> vec3f {
 }
 
 fn backdrop_at(dir: vec3f) -> vec3f {
-    if (scene.backdrop.w > 0.5) { return scene.backdrop.xyz; }
     let rise = clamp(dir.z, 0.0, 1.0);
     let above = mix(scene.horizon.xyz, scene.zenith.xyz, 1.0 - fall(1.0 - rise));
-    return mix(scene.ground.xyz, above, smoothstep(-0.7, 0.0, dir.z));
+    return select(mix(scene.ground.xyz, above, smoothstep(-0.7, 0.0, dir.z)), scene.backdrop.xyz, scene.backdrop.w > 0.5);
 }
 
-// The i-th of n points spread evenly over the unit disc.
-fn disc_point(i: u32, n: f32, turn: f32) -> vec2f {
-    let r = sqrt((f32(i) + 0.5) / n);
-    let a = f32(i) * 2.3999632 + turn;
-    return r * vec2f(cos(a), sin(a));
+// Points spread evenly over the unit disc: each is turned by the golden angle against the one before, and the i-th of n lies sqrt((i + 1/2) / n) out.
+const GOLDEN = vec2f(-0.73736886, 0.67549032);
+
+fn next_way(way: vec2f) -> vec2f {
+    return vec2f(way.x * GOLDEN.x - way.y * GOLDEN.y, way.x * GOLDEN.y + way.y * GOLDEN.x);
 }
 
 fn shadow_depth_to_s(sh: Shadow, depth: f32) -> f32 {
@@ -143,8 +142,11 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     // the empty map is at depth 0: no filter may reach below it
     var sum = 0.0;
     var count = 0.0;
+    let first = vec2f(cos(turn), sin(turn));
+    var way = first;
     for (var i = 0u; i < 16u; i++) {
-        let d = disc_point(i, 16.0, turn) * search;
+        let d = way * sqrt((f32(i) + 0.5) / 16.0) * search;
+        way = next_way(way);
         let at = vec2i(clamp((uv + d) * texels, vec2f(0.0), vec2f(texels - 1.0)));
         let z = textureLoad(shadow_depths, at, index, 0).x;
         if (z > max(depth + dot(slope, d) + bias, 1e-6)) { sum += z; count += 1.0; }
@@ -156,8 +158,10 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     let width = select(size * gap, size * gap / max(s_block, 1e-6), sh.scale.z > 0.5);
     let filter_uv = clamp(width * per_metre, smallest, search);
     var lit = 0.0;
+    way = first;
     for (var i = 0u; i < 32u; i++) {
-        let d = disc_point(i, 32.0, turn) * filter_uv;
+        let d = way * sqrt((f32(i) + 0.5) / 32.0) * filter_uv;
+        way = next_way(way);
         lit += textureSampleCompareLevel(shadow_maps, shadow_sampler, uv + d, index, clamp(depth + dot(slope, d) + bias, 1e-6, 1.0));
     }
     return lit / 32.0;
@@ -182,42 +186,55 @@ fn environment_term(roughness: f32, n_v: f32) -> vec2f {
     return vec2f(-1.04, 1.04) * a + r.zw;
 }
 
-// A likeness for slow devices: highlights by the approximation of Karis, 2013 ("a² / (q² 4 max(0.1, (v·h)²) (r + 1/2))", with h not normalized), the sky as a
-// gradient, no lacquer.
+// A likeness for slow devices: highlights by the approximation of Karis, 2013 ("a² / (q² 4 max(0.1, (v·h)²) (r + 1/2))", with h = l + v not normalized, so that
+// n·h = n·l + n·v and h² = 2 + 2 l·v), the sky as a gradient, no lacquer.
+struct Simple { diffuse: vec3f, f0: vec3f, rough: f32, n_v: f32 };
+
+fn lit_simply(s: Surface, m: Simple, l: vec3f, light: Light) -> vec3f {
+    let way = dot(s.normal, l);
+    var n_l = max(way, 0.0);
+    if (SHADOWS > 0u && light.shadow.x >= 0.0) { n_l *= light_visibility(shadow_layer(light, s.position), s.position, s.normal, light.color.w, s.pixel); }
+    let r2 = m.rough * m.rough;
+    let a2 = r2 * r2;
+    let h2 = 2.0 + 2.0 * dot(l, s.to_eye);
+    let n_h = way + m.n_v;
+    let q = n_h * n_h * (a2 - 1.0) + h2;
+    let lobe = a2 * h2 * h2 / (q * q * max(h2, 0.4) * (m.rough + 0.5) + 1e-6);
+    return (m.diffuse + m.f0 * lobe) * light.color.xyz * n_l;
+}
+
 fn shade_simply(s: Surface) -> vec3f {
     let n = s.normal;
     let v = s.to_eye;
+    let n_v = dot(n, v);
     let rough = max(s.base.roughness, 0.2);
-    let a2 = rough * rough * rough * rough;
     let diffuse = s.base.color * (1.0 - s.metallic);
     let f0 = mix(vec3f(0.04), s.base.color, s.metallic);
-    let grazing = 1.0 - clamp(dot(n, v), 0.0, 1.0);
-    let sheen = s.base.color * (s.base.sheen * grazing * grazing * grazing);
+    let grazing = 1.0 - clamp(n_v, 0.0, 1.0);
+    let grazing2 = grazing * grazing;
+    let sheen = s.base.color * (s.base.sheen * grazing * grazing2);
+    let simple = Simple(diffuse + sheen, f0, rough, n_v);
     var out = vec3f(0.0);
-    for (var i = 0u; i < u32(scene.zenith.w); i++) {
-        let light = scene.lights[i];
-        var l = light.at.xyz;
-        var radiance = light.color.xyz;
-        if (light.at.w > 0.5) {
-            let d = light.at.xyz - s.position;
-            let near = inverseSqrt(max(dot(d, d), 1e-6));
-            l = d * near;
-            radiance *= near * near;
+    if (ONE_SUN) {
+        out = lit_simply(s, simple, scene.lights[0].at.xyz, scene.lights[0]);
+    } else {
+        for (var i = 0u; i < u32(scene.zenith.w); i++) {
+            var light = scene.lights[i];
+            var l = light.at.xyz;
+            if (light.at.w > 0.5) {
+                let d = light.at.xyz - s.position;
+                let near = inverseSqrt(max(dot(d, d), 1e-6));
+                l = d * near;
+                light.color = vec4f(light.color.xyz * (near * near), light.color.w);
+            }
+            out += lit_simply(s, simple, l, light);
         }
-        var n_l = max(dot(n, l), 0.0);
-        if (SHADOWS > 0u && light.shadow.x >= 0.0) { n_l *= light_visibility(shadow_layer(light, s.position), s.position, n, light.color.w, s.pixel); }
-        let h = l + v;
-        let h2 = dot(h, h);
-        let n_h = dot(n, h);
-        let q = n_h * n_h * (a2 - 1.0) + h2;
-        let lobe = a2 * h2 * h2 / (q * q * max(h2, 0.4) * (rough + 0.5) + 1e-6);
-        out += (diffuse + sheen + f0 * lobe) * radiance * n_l;
     }
     var open = 1.0;
     if (OCCLUSION) { open = textureLoad(occlusion, vec2i(s.pixel), 0).x; }
-    let up = 2.0 * dot(n, v) * n.z - v.z;
+    let up = 2.0 * n_v * n.z - v.z;
     let mirrored = mix(scene.bounce.xyz, mix(scene.horizon.xyz, scene.zenith.xyz, clamp(up, 0.0, 1.0)), clamp(0.5 + up, 0.0, 1.0));
-    let edge = (1.0 - rough) * grazing * grazing * grazing * grazing;
+    let edge = (1.0 - rough) * grazing2 * grazing2;
     return out + (diffuse * sky_irradiance(n) + (f0 * (1.0 - 0.4 * rough) + edge) * mirrored) * (open * scene.horizon.w);
 }
 
@@ -287,8 +304,8 @@ fn shade(s: Surface) -> vec3f {
 // Scene light to display light.
 fn tone(c: vec3f) -> vec3f {
     let x = max(c * scene.tone.x, vec3f(0.0));
-    if (scene.tone.y < 0.5) { return min(x, vec3f(1.0)); }
     // filmic curve (the rational fit by Narkowicz, 2015, to ACES), scaled so that middle grey stays
     let y = x * 0.72;
-    return clamp((y * (2.51 * y + 0.03)) / (y * (2.43 * y + 0.59) + 0.14), vec3f(0.0), vec3f(1.0));
+    let filmic = (y * (2.51 * y + 0.03)) / (y * (2.43 * y + 0.59) + 0.14);
+    return min(select(filmic, x, scene.tone.y < 0.5), vec3f(1.0));
 }

@@ -81,17 +81,28 @@ fn mesh_color(in: MeshOut, front: bool) -> vec3f {
 }
 
 // The floor fades into what lies behind it. It is met by the ray through the pixel's middle, not between the corners of its triangles: these are cut where they
-// leave the view, so that their edges lie elsewhere in each picture, and a pixel across one would show another place.
-@fragment fn fs_ground(in: MeshOut, @builtin(front_facing) front: bool) -> @location(0) vec4f {
-    var met = in;
+// leave the view, so that their edges lie elsewhere in each picture, and a pixel across one would show another place. A ray that misses it, by a rounded edge at the
+// horizon, sees what lies behind.
+struct GroundOut {
+    @invariant @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) color_rough: vec4f,
+    @location(1) @interpolate(flat) other_metal: vec4f,
+    @location(2) @interpolate(flat) pattern: vec4f,
+};
+
+@vertex fn vs_ground(in: MeshIn) -> GroundOut {
+    return GroundOut(view.clip_from_world * vec4f(world_of(in), 1.0), in.color_rough, in.other_metal, in.pattern);
+}
+
+@fragment fn fs_ground(in: GroundOut) -> @location(0) vec4f {
     let ray = ray_at(in.clip.xy);
     let s = (scene.floor.w - ray.origin.z) / ray.dir.z;
-    if (s > 0.0 && s < 1e6) {
-        met.offset = vec3f((ray.origin + s * ray.dir).xy, scene.floor.w) - in.origin;
-        met.object = met.offset;
-        met.one = 1.0;
-    }
-    let away = length(in.origin.xy + met.offset.xy / met.one - scene.floor.xy) / scene.floor.z;
-    let fade = smoothstep(0.15, 0.95, away);
-    return vec4f(mix(mesh_color(met, front), backdrop_at(normalize(ray_at(in.clip.xy).dir)), fade), 1.0);
+    let place = vec3f(ray.origin.xy + s * ray.dir.xy, scene.floor.w);
+    let dir = ray.dir * inverseSqrt(dot(ray.dir, ray.dir));
+    let up = vec3f(0.0, 0.0, 1.0);
+    let normal = vec3f(0.0, 0.0, select(-1.0, 1.0, dir.z < 0.0));
+    let color = pixel_color(place, normal, -dir, place, up, s, in.clip.xy, vec3f(0.0), Look(in.color_rough, in.other_metal, in.pattern));
+    let away = length(place.xy - scene.floor.xy) / scene.floor.z;
+    let fade = select(1.0, smoothstep(0.15, 0.95, away), s > 0.0 && s < 1e6);
+    return vec4f(mix(color, backdrop_at(dir), fade), 1.0);
 }

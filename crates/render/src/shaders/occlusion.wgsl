@@ -5,6 +5,8 @@
 @group(1) @binding(2) var raw: texture_2d<f32>;
 
 const TAPS = 20u;
+// Cosine and sine of the golden angle, by which each tap is turned against the one before.
+const GOLDEN = vec2f(-0.73736886, 0.67549032);
 
 @vertex fn vs_whole(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
     return vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0);
@@ -43,17 +45,19 @@ fn step_along(p: vec2i, d: vec2i, middle: vec3f) -> vec3f {
     // 16 turns in a 4 x 4 tile, averaged away by the blur
     let tile = (u32(p.x) + u32(view.grid.x)) % 4u + 4u * ((u32(p.y) + u32(view.grid.y)) % 4u);
     let turn = 6.2831853 * f32((tile * 7u) % 16u) / 16.0;
+    let least = 0.004 * r + 0.002 * footprint_at(s);
+    var way = vec2f(cos(turn), sin(turn)) * (pixels / f32(TAPS));
     var sum = 0.0;
     for (var i = 0u; i < TAPS; i++) {
-        let share = (f32(i) + 0.5) / f32(TAPS);
-        let a = f32(i) * 2.3999632 + turn;
-        let q = p + vec2i(round(vec2f(cos(a), sin(a)) * share * pixels));
-        let z = depth_at(q);
-        if (z <= 0.0) { continue; }
-        let v = point_at(q) - here;
+        let q = clamp(p + vec2i(round(way * (f32(i) + 0.5))), vec2i(0), vec2i(view.size.xy) - 1);
+        way = vec2f(way.x * GOLDEN.x - way.y * GOLDEN.y, way.x * GOLDEN.y + way.y * GOLDEN.x);
+        let z = textureLoad(depth_map, q, 0).x;
+        let ray = ray_at(vec2f(q) + 0.5);
+        let v = ray.origin + ray.dir * view_depth_of(z) - here;
         let vv = dot(v, v);
         let fall = max(r2 - vv, 0.0);
-        sum += fall * fall * fall * max((dot(v, n) - 0.004 * r - 0.002 * footprint_at(s)) / (vv + 0.01 * r2), 0.0);
+        // nothing at all lies at the far plane
+        sum += select(0.0, fall * fall * fall * max((dot(v, n) - least) / (vv + 0.01 * r2), 0.0), z > 0.0);
     }
     let open = max(0.0, 1.0 - sum * 3.0 * r / (r2 * r2 * r2 * f32(TAPS)));
     return vec4f(open);

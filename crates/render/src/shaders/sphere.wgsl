@@ -15,7 +15,7 @@ struct SphereOut {
     @location(3) @interpolate(flat) other_metal: vec4f,
     @location(4) @interpolate(flat) pattern: vec4f,
 };
-struct Hit { s: f32, position: vec3f, normal: vec3f };
+struct Hit { s: f32, position: vec3f, normal: vec3f, to_eye: vec3f };
 
 fn corner_of(index: u32) -> vec2f {
     return vec2f(select(-1.0, 1.0, (index & 1u) != 0u), select(-1.0, 1.0, (index & 2u) != 0u));
@@ -30,9 +30,26 @@ struct Cover {
     near: bool,
 };
 
+fn clip_row(i: u32) -> vec3f {
+    let m = view.clip_from_world;
+    return vec3f(m[0][i], m[1][i], m[2][i]);
+}
+
+// Whether a ball lies wholly to a side of the picture: the planes of the sides are w + x = 0, w - x = 0, w + y = 0 and w - y = 0.
+fn beside(middle: vec4f, radius: f32) -> bool {
+    let x = clip_row(0u);
+    let y = clip_row(1u);
+    let w = clip_row(3u);
+    let way = vec4f(middle.w) + vec4f(middle.x, -middle.x, middle.y, -middle.y);
+    let reach = vec4f(length(w + x), length(w - x), length(w + y), length(w - y));
+    return any(way < -1.001 * radius * reach);
+}
+
 fn cover(ball: vec4f, index: u32) -> Cover {
     let corner = corner_of(index);
-    let whole = Cover(vec4f(corner, 0.5, 1.0), vec2f(0.0), vec3f(0.0), true);
+    let middle = view.clip_from_world * vec4f(ball.xyz, 1.0);
+    let aside = beside(middle, ball.w);
+    let whole = Cover(select(vec4f(corner, 0.5, 1.0), NOWHERE, aside), vec2f(0.0), vec3f(0.0), !aside);
     var axis = view.dir_0.xyz;
     let r2 = ball.w * ball.w;
     var numbers = vec3f(1.0, 1.0, r2);
@@ -47,8 +64,7 @@ fn cover(ball: vec4f, index: u32) -> Cover {
     let side = normalize(cross(axis, select(vec3f(0.0, 0.0, 1.0), vec3f(1.0, 0.0, 0.0), abs(axis.z) > 0.9)));
     let up = cross(side, axis);
     // w is affine in the corner: its least value decides whether a corner lies behind the eye
-    let row = vec3f(view.clip_from_world[0].w, view.clip_from_world[1].w, view.clip_from_world[2].w);
-    let middle = view.clip_from_world * vec4f(ball.xyz, 1.0);
+    let row = clip_row(3u);
     let least = middle.w - half * (abs(dot(row, side)) + abs(dot(row, up)));
     if (view.lens.x > 0.5 && least < 1e-3 * half) {
         if (middle.w < -1.5 * half) { return Cover(NOWHERE, vec2f(0.0), numbers, false); }
@@ -62,23 +78,51 @@ fn cover(ball: vec4f, index: u32) -> Cover {
 // Outside the picture.
 const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
 
-@vertex fn vs_sphere(in: SphereIn, @builtin(vertex_index) index: u32) -> SphereOut {
+@vertex fn vs_shell(in: SphereIn, @builtin(vertex_index) index: u32) -> SphereOut {
     let c = cover(in.ball, index);
     return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, in.turn, in.color_rough, in.other_metal, in.pattern);
 }
 
-// With D the ray's direction of view depth 1, c the way to the centre: s0 = c·D / D·D is the depth of the nearest point of the ray, m = c - s0 D the
-// way from there, and the ray enters at s0 - sqrt((r² - m²) / D·D).
-struct Crossing { room: f32, s: f32, ray: Ray };
+// A sphere that may be seen, and its number.
+struct BallIn { @location(0) ball: vec4f, @location(1) id: u32 };
+
+// A texel of the four that tell of a sphere: ball; colours, roughness and metal, two to a word; turn; the rest of its look.
+fn told(id: u32, i: u32) -> vec4u {
+    return textureLoad(sphere_data, vec2i(vec2u((id % 256u) * 4u + i, id / 256u)), 0);
+}
+
+fn look_told(id: u32) -> Look {
+    let t = told(id, 1u);
+    return Look(
+        vec4f(unpack2x16unorm(t.x), unpack2x16unorm(t.y)),
+        vec4f(unpack2x16unorm(t.z), unpack2x16unorm(t.w)),
+        bitcast<vec4f>(told(id, 3u)),
+    );
+}
+
+@vertex fn vs_sphere(in: BallIn, @builtin(vertex_index) index: u32) -> SphereOut {
+    let c = cover(in.ball, index);
+    let look = look_told(in.id);
+    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, bitcast<vec4f>(told(in.id, 2u)), look.color_rough, look.other_metal, look.pattern);
+}
+
+// With d the ray's direction, of length 1, and c the way to the centre: m = c - (c·d) d is the way from the nearest point of the ray to the centre, the ray enters
+// q = sqrt(r² - m²) before that point, and the normal there is -(m + q d) / r.
+struct Crossing { room: f32, before: f32, miss: vec3f, dir: vec3f, per_length: f32 };
 
 fn cross_sphere(ball: vec4f, pixel: vec2f) -> Crossing {
     let ray = ray_at(pixel);
+    let per_length = inverseSqrt(dot(ray.dir, ray.dir));
+    let dir = ray.dir * per_length;
     let to = ball.xyz - ray.origin;
-    let per = 1.0 / dot(ray.dir, ray.dir);
-    let nearest = dot(to, ray.dir) * per;
-    let miss = to - nearest * ray.dir;
-    let room = ball.w * ball.w - dot(miss, miss);
-    return Crossing(room, nearest - sqrt(max(room, 0.0) * per), ray);
+    let before = dot(to, dir);
+    let miss = to - before * dir;
+    return Crossing(ball.w * ball.w - dot(miss, miss), before, miss, dir, per_length);
+}
+
+// View depth at which the ray enters; where it just misses, that of its nearest point.
+fn entry(c: Crossing) -> f32 {
+    return (c.before - sqrt(max(c.room, 0.0))) * c.per_length;
 }
 
 // Square of the radius less the square of the ray's distance from the centre.
@@ -88,9 +132,8 @@ fn inside(ball: vec4f, pixel: vec2f) -> f32 {
 
 fn hit(ball: vec4f, pixel: vec2f) -> Hit {
     let c = cross_sphere(ball, pixel);
-    // at the rim the ray may just miss: the normal is that of the nearest point
-    let n = normalize(c.ray.origin + c.s * c.ray.dir - ball.xyz);
-    return Hit(c.s, ball.xyz + n * ball.w, n);
+    let n = -(c.miss + sqrt(max(c.room, 0.0)) * c.dir) / sqrt(ball.w * ball.w - min(c.room, 0.0));
+    return Hit(entry(c), ball.xyz + n * ball.w, n, -c.dir);
 }
 
 fn unturn(q: vec4f, v: vec3f) -> vec3f {
@@ -104,48 +147,53 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
     let h = hit(in.ball, pixel);
     let depth = depth_of(h.s);
     if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
-    let to_eye = -normalize(ray_at(pixel).dir);
     let object_normal = unturn(in.turn, h.normal);
-    let color = pixel_color(h.position, h.normal, to_eye, object_normal * in.ball.w, object_normal, h.s, pixel, vec3f(0.0),
+    let color = pixel_color(h.position, h.normal, h.to_eye, object_normal * in.ball.w, object_normal, h.s, pixel, vec3f(0.0),
         Look(in.color_rough, in.other_metal, in.pattern));
     return sphere_pixel(vec4f(color, 1.0), depth, mask);
 }
 
-// Depth alone needs less: with u the place in the plane of the cover, the ray through it enters at the share
-// t = (d² - sqrt((d² - r²) (h² - u²))) / (d² + u²) of the way to the plane; in a parallel view sqrt(h² - u²) before it.
+// Depth alone needs less. With t = u / d the place in the plane of the cover as a tangent, k = r² / d² and w the view depth of that place, the ray through it
+// enters at the view depth s with 1 / s = (1 + sqrt(k - (1 - k) t²)) / (w (1 - k)). Everything in
+//     1 / s = W + sqrt(S² - T²),   W = 1 / (w (1 - k)),   S = sqrt(k) W,   T = t / (w sqrt(1 - k))
+// is affine in the picture, and depth is affine in 1 / s. In a parallel view -s = W + sqrt(S² - T²) with W = -(view depth of the centre), S = r, T = u.
 struct BallOut {
     @builtin(position) clip: vec4f,
-    @location(0) plane: vec2f,
-    @location(1) @interpolate(flat) numbers: vec3f,
-    @location(2) @interpolate(flat) middle: f32, // view depth of the centre
-    @location(3) @interpolate(flat) id: u32,
+    @location(0) @interpolate(linear) at: vec4f, // T, W, S
+    @location(1) @interpolate(flat) id: u32,
 };
 
-@vertex fn vs_ball(in: SphereIn, @builtin(vertex_index) index: u32, @builtin(instance_index) id: u32) -> BallOut {
+@vertex fn vs_ball(in: BallIn, @builtin(vertex_index) index: u32) -> BallOut {
     let c = cover(in.ball, index);
-    return BallOut(select(c.clip, NOWHERE, c.near), c.plane, c.numbers, dot(in.ball.xyz - view.origin_0.xyz, view.dir_0.xyz) / dot(view.dir_0.xyz, view.dir_0.xyz), id);
+    let per_w = 1.0 / c.clip.w;
+    var at = vec4f(c.plane, 0.0, sqrt(c.numbers.z));
+    if (view.lens.x > 0.5) {
+        let k = in.ball.w * in.ball.w / c.numbers.x;
+        let far = per_w * c.numbers.x / c.numbers.y; // 1 / (w (1 - k))
+        at = vec4f(c.plane * (per_w * inverseSqrt(c.numbers.y)), far, sqrt(k) * far);
+    } else {
+        at.z = -dot(in.ball.xyz - view.origin_0.xyz, view.dir_0.xyz) / dot(view.dir_0.xyz, view.dir_0.xyz);
+    }
+    return BallOut(select(vec4f(c.clip.xyz * per_w, 1.0), NOWHERE, c.near), at, in.id);
 }
 
-fn ball_depth(in: BallOut) -> f32 {
-    let u2 = dot(in.plane, in.plane);
-    let room = in.numbers.z - u2;
-    let root = sqrt(max(room * in.numbers.y, 0.0));
-    let share = (in.numbers.x - root) / (in.numbers.x + u2);
-    let s = select(in.middle - root, share / in.clip.w, view.lens.x > 0.5);
-    let depth = depth_of(s);
+fn ball_depth(at: vec4f) -> f32 {
+    let room = at.w * at.w - dot(at.xy, at.xy);
+    let line = select(vec2f(view.depth.y, -view.depth.x), view.depth.xy, view.lens.x > 0.5);
+    let depth = line.x + line.y * (at.z + sqrt(max(room, 0.0)));
     if (room < 0.0 || depth > 1.0 || depth < 0.0) { discard; }
     return depth;
 }
 
 @fragment fn fs_ball_depth(in: BallOut) -> @builtin(frag_depth) f32 {
-    return ball_depth(in);
+    return ball_depth(in.at);
 }
 
 struct BallPixel { @location(0) id: u32, @builtin(frag_depth) depth: f32 };
 
 // Which sphere is nearest, from 1 on.
 @fragment fn fs_ball_id(in: BallOut) -> BallPixel {
-    return BallPixel(in.id + 1u, ball_depth(in));
+    return BallPixel(in.id + 1u, ball_depth(in.at));
 }
 
 // The few that the eye is too near to, by whole pictures.
@@ -155,15 +203,16 @@ struct NearOut {
     @location(1) @interpolate(flat) id: u32,
 };
 
-@vertex fn vs_near(in: SphereIn, @builtin(vertex_index) index: u32, @builtin(instance_index) id: u32) -> NearOut {
+@vertex fn vs_near(in: BallIn, @builtin(vertex_index) index: u32) -> NearOut {
     let c = cover(in.ball, index);
-    return NearOut(select(NOWHERE, c.clip, c.near), in.ball, id);
+    return NearOut(select(NOWHERE, c.clip, c.near), in.ball, in.id);
 }
 
 fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
     let c = cross_sphere(ball, pixel);
-    let depth = depth_of(c.s);
-    if (c.room < 0.0 || behind(c.s) || depth > 1.0 || depth < 0.0) { discard; }
+    let s = entry(c);
+    let depth = depth_of(s);
+    if (c.room < 0.0 || behind(s) || depth > 1.0 || depth < 0.0) { discard; }
     return depth;
 }
 
@@ -179,14 +228,12 @@ fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
 @fragment fn fs_sphere_seen(@builtin(position) at: vec4f, @location(0) @interpolate(flat) range: vec2u) -> @location(0) vec4f {
     let id = textureLoad(seen_id, vec2i(at.xy), 0).x - 1u;
     if (id < range.x || id >= range.y) { discard; }
-    let place = vec2i(vec2u((id % 256u) * 5u, id / 256u));
-    let ball = textureLoad(sphere_data, place, 0);
-    let turn = textureLoad(sphere_data, place + vec2i(1, 0), 0);
-    let look = Look(textureLoad(sphere_data, place + vec2i(2, 0), 0), textureLoad(sphere_data, place + vec2i(3, 0), 0), textureLoad(sphere_data, place + vec2i(4, 0), 0));
+    let ball = bitcast<vec4f>(told(id, 0u));
+    let turn = bitcast<vec4f>(told(id, 2u));
+    let look = look_told(id);
     let h = hit(ball, at.xy);
-    let to_eye = -normalize(ray_at(at.xy).dir);
     let object_normal = unturn(turn, h.normal);
-    return vec4f(pixel_color(h.position, h.normal, to_eye, object_normal * ball.w, object_normal, h.s, at.xy, vec3f(0.0), look), 1.0);
+    return vec4f(pixel_color(h.position, h.normal, h.to_eye, object_normal * ball.w, object_normal, h.s, at.xy, vec3f(0.0), look), 1.0);
 }
 
 struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat) range: vec2u };
@@ -203,7 +250,7 @@ struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat)
     let h = hit(in.ball, pixel);
     let depth = depth_of(h.s);
     if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
-    let rim = 1.0 - clamp(dot(h.normal, -normalize(ray_at(pixel).dir)), 0.0, 1.0);
+    let rim = 1.0 - clamp(dot(h.normal, h.to_eye), 0.0, 1.0);
     let alpha = in.color_rough.w * mix(0.25, 1.0, rim * rim);
     return sphere_pixel(vec4f(in.color_rough.xyz * alpha, alpha), depth, mask);
 }

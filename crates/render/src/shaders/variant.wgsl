@@ -6,3 +6,4 @@ override COAT: bool = true;      // whether there is lacquer
 override SOFTBOX: bool = true;   // whether a panel hangs overhead
 override OCCLUSION: bool = true; // whether the map of occlusion was drawn
 override REFLECTIONS: bool = true; // whether surfaces mirror the sky; else light is a cheap likeness
+override ONE_SUN: bool = false; // whether there is one light, and it has a direction alone

@@ -55,6 +55,23 @@ shell 1: at (0 0 0) radius 1 color (1 1 0) opacity 0.25 width 2
     assert_eq!(sample().to_text(), expected);
 }
 
+/// Particles are small balls: of 40 none becomes triangles.
+#[test]
+fn a_flock_is_forty_cast_spheres_and_no_mesh() {
+    let scene = SceneFile::parse(
+        "[[grid]]\nname = \"boid\"\nshape = { type = \"sphere\", radius_m = 0.02 }\nmass_kg = 0.2\ncount = [5, 4, 2]\nspacing_m = [0.5, 0.5, 0.5]\nposition_m = [0, 0, 3]\ncentered = true\n",
+        "flock.toml",
+    )
+    .expect("a scene");
+    let list = Drawing::new(&scene).list(&scene.build().expect("a world").0, &DebugDraw::default()).expect("a list");
+    assert_eq!((list.spheres.len(), list.meshes.len(), list.instances.len()), (40, 0, 0));
+    // the corners of the grid, from the middle 2, 1.5 and 0.5 spacings away
+    let text = list.to_text();
+    for line in ["sphere 0: at (-1 -0.75 2.75) radius 0.02 turned (0 0 0 1)", "sphere 39: at (1 0.75 3.25) radius 0.02 turned (0 0 0 1)"] {
+        assert!(text.contains(line), "{line} in\n{text}");
+    }
+}
+
 #[test]
 fn faults_are_named() {
     sample().validate().expect("the sample is good");

@@ -1,0 +1,199 @@
+//! Which balls have a pixel in a picture, for drivers that draw on the processor: there a ball that nobody sees costs as much as any other, and finding it here costs a tenth.
+//!
+//! The outline of a ball in a picture is an ellipse (a circle in a parallel view). With rows `m_i` of the map from the world to the pixels `(x, y, w)` of a picture, `n_i` their
+//! first three numbers, `C = (c, 1)` the centre and `r` the radius, its dual conic is `q_ij = (m_i·C)(m_j·C) - r² n_i·n_j` (Hartley and Zisserman, Multiple View Geometry, §8.3); its
+//! middle is `t = (q_xw, q_yw) / q_ww` and its shape `Σ = t tᵀ - (q_xx, q_xy; q_xy, q_yy) / q_ww`: points `p` with `(p - t)ᵀ Σ⁻¹ (p - t) <= 1`.
+//!
+//! 1. Each ball writes into the cells of a coarse map that lie wholly in its outline how far its front may reach: nothing behind that is seen there.
+//! 2. A ball is hidden where all cells that its outline may touch hold less than the depth at which it begins.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `f`, `e` | the way the picture looks; the way from the ball to the eye, both of length 1 |
+//! | `begin` | view depth of the ball's nearest point, `(c - eye)·f - r` |
+//! | `end` | no point of its front lies deeper: `(c - eye)·f + r sin α`, `α` between `f` and `-e` (points of the front have a normal `n` with `n·e >= 0`) |
+//!
+//! Nothing that has a pixel is ever left out (`tests::what_is_left_out_has_no_pixel`): outlines are taken smaller where they hide and larger where they are hidden, by more than rounding.
+
+use super::data::Eye;
+use nalgebra::{Point3, Vector4};
+use std::ops::Range;
+
+/// Middle and radius, m.
+pub type Ball = (Point3<f32>, f32);
+
+/// Most cells along a side.
+const MOST_CELLS: usize = 512;
+/// Smallest side of a cell, pixels.
+const CELL_PX: usize = 2;
+
+/// Numbers, among `ranges`, of the balls that may have a pixel in what the eye sees, in their order; `samples` of a pixel say how near to its edge one is asked.
+pub fn seen(balls: &[Ball], ranges: impl Iterator<Item = Range<u32>>, eye: &Eye, samples: u32) -> Vec<u32> {
+    let picture = Picture::of(eye);
+    let mut map = Map::new(eye, samples);
+    let mut outlines = Vec::with_capacity(balls.len());
+    for number in ranges.flatten() {
+        match picture.place(&balls[number as usize]) {
+            Place::Outside => {}
+            Place::Around => outlines.push((number, None)),
+            Place::Before(outline) => {
+                map.write(&outline);
+                outlines.push((number, Some(outline)));
+            }
+        }
+    }
+    outlines.iter().filter(|(_, outline)| outline.as_ref().is_none_or(|o| !map.hides(o))).map(|(number, _)| *number).collect()
+}
+
+/// What of a point of view places balls.
+struct Picture<'a> {
+    eye: &'a Eye,
+    rows: [Vector4<f64>; 3],
+    /// `n_i·n_j` for xx, xy, yy, xw, yw, ww.
+    products: [f64; 6],
+    /// Planes of its sides: how far inside a place is, m.
+    sides: [Vector4<f64>; 4],
+}
+
+enum Place {
+    /// Without a pixel.
+    Outside,
+    /// Around the eye, or across the plane through it: no ellipse.
+    Around,
+    Before(Outline),
+}
+
+/// An ellipse in the picture, and the depths between which the front of its ball lies.
+struct Outline {
+    middle: [f64; 2],
+    /// `Σ_xx`, `Σ_xy`, `Σ_yy`, squares of pixels.
+    shape: [f64; 3],
+    begin: f64,
+    end: f64,
+    /// Pixels by which the device may draw it beside where it is.
+    error: f64,
+    /// Neither the near nor the far plane cuts it.
+    whole: bool,
+}
+
+impl Picture<'_> {
+    fn of(eye: &Eye) -> Picture<'_> {
+        let rows = eye.pixel_rows();
+        let product = |i: usize, j: usize| rows[i].xyz().dot(&rows[j].xyz());
+        Picture { eye, rows, products: [product(0, 0), product(0, 1), product(1, 1), product(0, 2), product(1, 2), product(2, 2)], sides: eye.sides() }
+    }
+
+    fn place(&self, (center, radius): &Ball) -> Place {
+        let (eye, c, r) = (self.eye, center.coords.cast::<f64>(), f64::from(*radius));
+        let depth = eye.view_depth(&c);
+        if (eye.perspective && depth + r <= 0.0) || self.sides.iter().any(|side| side.xyz().dot(&c) + side.w < -1.001 * r) {
+            return Place::Outside;
+        }
+        let [near, far] = [depth - r, depth + r].map(|s| eye.depth_at(s));
+        if far.is_some_and(|d| d > 1.0) || near.is_some_and(|d| d < 0.0) {
+            return Place::Outside;
+        }
+        let [x, y, w] = self.rows.map(|m| m.xyz().dot(&c) + m.w);
+        let [xx, xy, yy, xw, yw, ww] = self.products.map(|p| r * r * p);
+        let q = w * w - ww;
+        // where the plane through the eye touches it, or nearly
+        if w <= 0.0 || q < 0.01 * w * w {
+            return Place::Around;
+        }
+        let per = 1.0 / q;
+        let middle = [(x * w - xw) * per, (y * w - yw) * per];
+        let shape = [middle[0] * middle[0] - (x * x - xx) * per, middle[0] * middle[1] - (x * y - xy) * per, middle[1] * middle[1] - (y * y - yy) * per];
+        if !middle.iter().chain(&shape).all(|x| x.is_finite()) {
+            return Place::Around;
+        }
+        let error = 4.0 * f64::from(f32::EPSILON) * (c.amax() + eye.reach()) * eye.pixels_per_metre(depth);
+        let whole = near.is_some_and(|d| d < 1.0) && far.is_some_and(|d| d > 0.0);
+        Place::Before(Outline { middle, shape, begin: depth - r, end: depth + r * eye.sine_beside(&c), error, whole })
+    }
+}
+
+impl Outline {
+    /// Across and down, pixels.
+    fn half_sides(&self) -> [f64; 2] {
+        [self.shape[0].max(0.0).sqrt(), self.shape[2].max(0.0).sqrt()]
+    }
+
+    /// No point of its front is deeper, as depths are rounded.
+    fn surely_ends(&self) -> f32 {
+        (self.end + 1e-5 * self.end.abs() + 1e-3 * (self.end - self.begin)) as f32
+    }
+}
+
+/// For each cell a depth behind which nothing is seen in it.
+struct Map {
+    per_cell: f64,
+    cell: f64,
+    columns: usize,
+    rows: usize,
+    /// Samples lie at least so far from the edges of their pixel.
+    inset: f64,
+    depths: Vec<f32>,
+}
+
+impl Map {
+    fn new(eye: &Eye, samples: u32) -> Map {
+        let [width, height] = eye.size_px();
+        let cell = CELL_PX.max(width.max(height).div_ceil(MOST_CELLS));
+        let (columns, rows) = (width.div_ceil(cell), height.div_ceil(cell));
+        // in the middle, or 1/8 from the edge; the rest is for rounding
+        let inset = if samples == 1 { 0.4 } else { 0.1 };
+        Map { per_cell: 1.0 / cell as f64, cell: cell as f64, columns, rows, inset, depths: vec![f32::INFINITY; columns * rows] }
+    }
+
+    /// Numbers of the cells of which samples may lie between two places, and perhaps one more.
+    fn touched(&self, from: f64, to: f64, count: usize) -> Range<usize> {
+        // what is negative becomes 0
+        let first = ((from + self.inset) * self.per_cell) as usize;
+        let end = if to < self.inset { 0 } else { ((to - self.inset) * self.per_cell) as usize + 1 };
+        first.min(count)..end.clamp(first.min(count), count)
+    }
+
+    /// Numbers of the cells of which all samples lie between two places, or one less.
+    fn filled(&self, from: f64, to: f64, count: usize) -> Range<usize> {
+        let first = if from <= self.inset { 0 } else { ((from - self.inset) * self.per_cell) as usize + 1 };
+        let end = ((to + self.inset) * self.per_cell) as usize;
+        first.min(count)..end.clamp(first.min(count), count)
+    }
+
+    /// What lies behind the ball is not seen in the cells that it fills: in each row those between its edges at the row's upper and at its lower side.
+    fn write(&mut self, o: &Outline) {
+        let [across, down] = o.half_sides();
+        let margin = 0.03 + o.error;
+        if !o.whole || 2.0 * across.min(down) < self.cell || down <= margin {
+            return;
+        }
+        let depth = o.surely_ends();
+        let lean = o.shape[1] / o.shape[2];
+        let wide = (o.shape[0] - o.shape[1] * lean).max(0.0).sqrt() - margin;
+        let high = down - margin;
+        let per_high = 1.0 / high;
+        let chord = |y: f64| {
+            let dy = y - o.middle[1];
+            let half = wide * (1.0 - (dy * per_high) * (dy * per_high)).max(0.0).sqrt();
+            let middle = o.middle[0] + lean * dy;
+            (middle - half, middle + half)
+        };
+        for row in self.filled(o.middle[1] - high, o.middle[1] + high, self.rows) {
+            let upper = chord(row as f64 * self.cell + self.inset);
+            let lower = chord((row + 1) as f64 * self.cell - self.inset);
+            let columns = self.filled(upper.0.max(lower.0), upper.1.min(lower.1), self.columns);
+            self.depths[row * self.columns..][columns].iter_mut().for_each(|old| *old = old.min(depth));
+        }
+    }
+
+    fn hides(&self, o: &Outline) -> bool {
+        let [across, down] = o.half_sides().map(|half| half + 0.03 + o.error);
+        let columns = self.touched(o.middle[0] - across, o.middle[0] + across, self.columns);
+        let begin = o.begin as f32;
+        let mut rows = self.touched(o.middle[1] - down, o.middle[1] + down, self.rows);
+        rows.all(|row| self.depths[row * self.columns..][columns.clone()].iter().all(|depth| *depth < begin))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,93 @@
+//! The spheres of a stage: what they look like, and which of them a point of view asks for.
+
+use super::Gpu;
+use super::cull::{Ball, seen};
+use super::data::{self, Eye};
+use super::stage::{Same, group_items};
+use crate::{DrawList, RenderError};
+use std::ops::Range;
+use wgpu::{Buffer, BufferUsages, TextureView};
+
+/// All spheres of a list, by surface.
+pub struct Spheres {
+    pub groups: Vec<Same>,
+    balls: Vec<Ball>,
+    /// Four texels per sphere, 256 spheres per row.
+    pub looks: TextureView,
+    /// First and last number of the spheres of each group.
+    pub ranges: Buffer,
+    /// All balls, where points of view do not choose among them.
+    whole: Option<Buffer>,
+    samples: u32,
+}
+
+/// The spheres that a point of view draws.
+pub struct Choice {
+    /// Middle, radius and number of each.
+    pub balls: Buffer,
+    /// Places in it, a range for each group.
+    pub ranges: Vec<Range<u32>>,
+    /// Whether one is so near to the eye that its outline is no circle on a plane before it.
+    pub near: bool,
+}
+
+/// Which of the spheres are asked for.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Which {
+    All,
+    /// Those that throw shadows.
+    Casters,
+}
+
+impl Spheres {
+    pub(super) fn new(gpu: &Gpu, list: &DrawList) -> Result<Self, RenderError> {
+        let (groups, order) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow));
+        let balls: Vec<Ball> = order.iter().map(|&i| (list.spheres[i].center, list.spheres[i].radius)).collect();
+        let ranges: Vec<u32> = groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
+        let whole = if gpu.choosy || balls.is_empty() { None } else { Some(ball_buffer(gpu, &balls, 0..balls.len() as u32)?) };
+        Ok(Spheres {
+            looks: looks(gpu, list, &order)?,
+            ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), BufferUsages::VERTEX, "sphere groups")?,
+            samples: list.settings.samples,
+            whole,
+            groups,
+            balls,
+        })
+    }
+
+    /// What a point of view draws: all, or on drivers that draw on the processor those that it may see.
+    pub(super) fn choose(&self, gpu: &Gpu, eye: &Eye, which: Which) -> Result<Choice, RenderError> {
+        let of = |same: &Same| if which == Which::All { same.all.clone() } else { same.casters.clone() };
+        if let Some(whole) = &self.whole {
+            return Ok(Choice { balls: whole.clone(), ranges: self.groups.iter().map(of).collect(), near: eye.near_any(self.balls.iter()) });
+        }
+        let samples = if which == Which::All { self.samples } else { 1 };
+        let chosen = seen(&self.balls, self.groups.iter().map(of), eye, samples);
+        let place = |number: u32| chosen.partition_point(|&n| n < number) as u32;
+        let ranges = self.groups.iter().map(of).map(|range| place(range.start)..place(range.end)).collect();
+        let near = eye.near_any(chosen.iter().map(|&n| &self.balls[n as usize]));
+        Ok(Choice { balls: ball_buffer(gpu, &self.balls, chosen.iter().copied())?, ranges, near })
+    }
+}
+
+fn ball_buffer(gpu: &Gpu, balls: &[Ball], numbers: impl Iterator<Item = u32>) -> Result<Buffer, RenderError> {
+    let mut words: Vec<u32> = Vec::with_capacity(data::BALL_WORDS as usize * balls.len());
+    for number in numbers {
+        let (center, radius) = balls[number as usize];
+        words.extend([center.x.to_bits(), center.y.to_bits(), center.z.to_bits(), radius.to_bits(), number]);
+    }
+    super::meshes::buffer(gpu, bytemuck::cast_slice(&words), BufferUsages::VERTEX, "balls")
+}
+
+fn looks(gpu: &Gpu, list: &DrawList, order: &[usize]) -> Result<TextureView, RenderError> {
+    let row = 256 * 4 * data::SPHERE_TEXELS;
+    let rows = order.len().div_ceil(256).max(1);
+    let most = gpu.device.limits().max_texture_dimension_2d as usize;
+    if rows > most {
+        return Err(RenderError::TooMany { what: "spheres", count: order.len(), cap: 256 * most });
+    }
+    let mut words = Vec::with_capacity(rows * row);
+    order.iter().for_each(|&i| data::sphere(&list.spheres[i], &mut words));
+    words.resize(rows * row, 0);
+    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Uint, bytemuck::cast_slice(&words)))
+}
