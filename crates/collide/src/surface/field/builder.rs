@@ -111,25 +111,28 @@ impl Builder<'_> {
         let most = least + 2.0 * reach + field.around;
         let others = list.iter().filter(|n| turned(n.triangle) && may_be(n, most)).map(|n| at(n.triangle));
         near.extend(others.filter(|n| n.distance > least + 2.0 * reach && n.distance <= most));
+        let excess = self.excess(&center, half, &first);
+        let slack = excess + ROUNDING * field.diagonal;
+        let counts = |n: &Near, turned: bool| {
+            let more = if turned { field.around } else { 0.0 };
+            n.distance - least <= slack + more + half * (n.slope - first.slope).abs().sum()
+        };
+        let listed = near.iter().filter(|n| counts(n, turned(n.triangle))).count();
         let full = field.tree.cells.len() > MOST_CELLS || field.lists.len() + near.len() > MOST_LISTED;
         let away = least > FARTHEST * field.diagonal;
-        let far = least > FAR * reach && (near.len() <= LONG || away);
-        if near.len() > SHORT && depth < self.deepest && !far && !full {
+        let far = least > FAR * reach && (listed <= LONG || away);
+        if listed > SHORT && depth < self.deepest && !far && !full {
+            // one that may be another way in a child may not be in this cell
+            near.retain(|n| counts(n, takes_others));
             return self.divide(index, center, half, &near, depth);
         }
+        near.retain(|n| counts(n, turned(n.triangle)));
         let mut cell = Cell::empty();
         cell.set_distance(distance - ROUNDING * (distance.abs() + field.diagonal));
-        let excess = self.excess(&center, half, &first);
         if least > reach {
             let slope = cell.set_slope(&(first.slope * distance.signum()));
             cell.set_short(self.short(half, distance, &slope, &near, &first, excess), half);
         }
-        let slack = excess + ROUNDING * field.diagonal;
-        let counts = |n: &Near| {
-            let more = if turned(n.triangle) { field.around } else { 0.0 };
-            n.distance - least <= slack + more + half * (n.slope - first.slope).abs().sum()
-        };
-        near.retain(counts);
         if near.len() <= if away { SHORT } else { LONG } && !full {
             near.sort_unstable_by(order);
             (cell.link, cell.count) = (self.field.lists.len() as u32, near.len() as u8);
