@@ -17,8 +17,6 @@ use crate::surface::{Feature, Field, TOUCHING};
 
 /// Longer edges are searched in pieces, in radii of the smaller body.
 const SHORT: f64 = 0.06;
-/// Places along an edge whose bounds are asked for.
-const PROBES: usize = 4;
 
 impl Pass<'_> {
     /// Whether an edge may have a contact of its own.
@@ -29,9 +27,9 @@ impl Pass<'_> {
 
     fn dips(&self, mesh: &MeshField, edge: &Edge, found: &Collector) -> bool {
         let [start, end] = edge.ends.map(|p| self.place(&p));
-        let (way, part) = (end - start, 1.0 / PROBES as f64);
-        let bounds: [f64; PROBES] = std::array::from_fn(|k| mesh.bound(&(start + way * ((k as f64 + 0.5) * part))));
-        if bounds.iter().all(|b| b - 0.5 * part * edge.length > found.limit()) {
+        let way = end - start;
+        let near = |s: f64, within: f64| mesh.bound(&(start + way * s)) - within * edge.length <= found.limit();
+        if !near(0.5, 0.5) || !(near(0.25, 0.25) || near(0.75, 0.25)) {
             return false;
         }
         let normals: Normals = edge.normals.iter().map(|n| self.rotation * n).collect();

@@ -57,7 +57,7 @@ impl Cell {
     }
 
     fn kept_slope(&self) -> Vec3 {
-        Vec3::new(f64::from(self.slope[0]), f64::from(self.slope[1]), f64::from(self.slope[2])) / 127.0
+        Vec3::new(f64::from(self.slope[0]), f64::from(self.slope[1]), f64::from(self.slope[2])) * (1.0 / 127.0)
     }
 }
 
