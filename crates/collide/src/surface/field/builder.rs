@@ -39,8 +39,8 @@ const DEEPEST: f64 = 9.0;
 const BELOW: f64 = 1.0 - 2e-7;
 /// A distance that has a direction in spite of rounding, as a part of the diagonal.
 const SOME: f64 = 1e-9;
-/// Of single precision, and more.
-const ROUNDING: f64 = 1e-7;
+/// Of single precision in distances and places, and more.
+const ROUNDING: f64 = 1e-6;
 /// Cells and listed triangles at most; beyond, the tree of boxes answers.
 const MOST_CELLS: usize = 1 << 20;
 const MOST_LISTED: usize = 1 << 23;
@@ -131,7 +131,7 @@ impl Builder<'_> {
         cell.set_distance(distance - ROUNDING * (distance.abs() + field.diagonal));
         if least > reach {
             let slope = cell.set_slope(&(first.slope * distance.signum()));
-            cell.set_short(self.short(half, distance, &slope, &near, &first, excess), half);
+            cell.set_short(self.short(half, distance, &slope, &near, &first, excess));
         }
         if near.len() <= if away { SHORT } else { LONG } && !full {
             near.sort_unstable_by(order);
