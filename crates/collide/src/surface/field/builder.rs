@@ -95,11 +95,11 @@ impl Builder<'_> {
         };
         let reach = 3.0_f64.sqrt() * half;
         // convex: no triangle is closer than its tangent plane in the parent tells
-        let below = |n: &Near| n.distance + n.slope.dot(moved);
-        let Some(guess) = list.iter().min_by(|a, b| below(a).total_cmp(&below(b))) else { return };
-        let most = at(guess.triangle).distance + 2.0 * reach;
-        let may_be = |n: &Near, most: f64| below(n) <= most;
-        let mut near: Vec<Near> = list.iter().filter(|n| may_be(n, most)).map(|n| at(n.triangle)).collect();
+        let below: Vec<f64> = list.iter().map(|n| n.distance + n.slope.dot(moved)).collect();
+        let may_be = |most: f64| list.iter().zip(&below).filter(move |(_, below)| **below <= most).map(|(n, _)| n);
+        let Some(guess) = (0..list.len()).min_by(|&a, &b| below[a].total_cmp(&below[b])) else { return };
+        let most = at(list[guess].triangle).distance + 2.0 * reach;
+        let mut near: Vec<Near> = may_be(most).map(|n| at(n.triangle)).collect();
         let Some(&first) = near.iter().min_by(|a, b| order(a, b)) else { return };
         let (least, found) = (first.distance, field.closest_of(&center, first.triangle as usize));
         let distance = field.describe(&center, &found).distance;
@@ -109,7 +109,7 @@ impl Builder<'_> {
         let facing_first = field.normals[first.triangle as usize][0];
         let turned = |t: u32| takes_others && field.normals[t as usize][0].dot(&facing_first) < OTHER_WAY;
         let most = least + 2.0 * reach + field.around;
-        let others = list.iter().filter(|n| turned(n.triangle) && may_be(n, most)).map(|n| at(n.triangle));
+        let others = may_be(if takes_others { most } else { f64::NEG_INFINITY }).filter(|n| turned(n.triangle)).map(|n| at(n.triangle));
         near.extend(others.filter(|n| n.distance > least + 2.0 * reach && n.distance <= most));
         let excess = self.excess(&center, half, &first);
         let slack = excess + ROUNDING * field.diagonal;
