@@ -107,7 +107,7 @@ impl MeshField {
     fn closest(&self, p: &Vec3, place: &Place) -> Option<Closest> {
         let mut best: Option<Closest> = None;
         let (mut limit, mut reach, mut furthest) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
-        let (aside, from_center) = (f64::from(place.from_center()) + self.tree.rounding(), p - self.tree.center);
+        let (aside, from_center) = (f64::from(place.aside()) + self.tree.rounding(), p - self.tree.center);
         for listed in self.list(place.cell) {
             if f64::from(listed.nearer) > furthest {
                 break;

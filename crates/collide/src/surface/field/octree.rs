@@ -70,11 +70,11 @@ impl Place<'_> {
     fn bound(&self) -> f64 {
         let products: [f32; 4] = std::array::from_fn(|k| self.cell.plane[k] * self.offset[k]);
         let plane = (products[0] + products[1]) + (products[2] + products[3]);
-        f64::from(plane.max(self.cell.distance - self.from_center()))
+        f64::from(plane.max(self.cell.distance - self.aside()))
     }
 
     /// How far from the cell's centre it is, metres.
-    pub fn from_center(&self) -> f32 {
+    pub fn aside(&self) -> f32 {
         let squares: [f32; 4] = std::array::from_fn(|k| self.offset[k] * self.offset[k]);
         (squares[0] + squares[1] + squares[2]).sqrt()
     }
