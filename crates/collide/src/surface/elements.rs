@@ -228,7 +228,8 @@ impl Elements {
 fn gather_edges(mesh: &TriMesh, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
     let mut searched = vec![[false; 3]; mesh.triangles.len()];
     let mut edges = Vec::new();
-    let error = EDGE_ERROR * mesh.diagonal();
+    let diagonal = mesh.diagonal();
+    let error = EDGE_ERROR * diagonal;
     for (index, group) in edge_groups(mesh).iter().enumerate() {
         let ends = [group[0].low, group[0].high].map(|v| mesh.vertices[v as usize]);
         let normals = [face[group[0].face], face[group[group.len() - 1].face]];
@@ -242,7 +243,7 @@ fn gather_edges(mesh: &TriMesh, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
             continue;
         }
         let fine = group.len() == 2 && 0.25 * turn * length <= error;
-        let smooth = group.len() == 2 && turn < SMOOTH && length < SHORT * mesh.diagonal();
+        let smooth = group.len() == 2 && turn < SMOOTH && length < SHORT * diagonal;
         let spared = if smooth { error } else { 0.0 };
         for u in group.iter().filter(|_| !fine) {
             let t = mesh.triangles[u.face];

@@ -37,20 +37,25 @@ impl Ball {
 pub(super) fn around_points(points: &[Vec3]) -> Ball {
     let bounds = crate::Aabb::around(points.iter().copied());
     let mut center = 0.5 * (bounds.min + bounds.max);
-    let mut best = Ball::holding(center, points);
+    let Some((mut far, mut square)) = farthest(points, &center) else {
+        return Ball { center: Vec3::zeros(), radius: 0.0 };
+    };
+    let mut best = Ball { center, radius: square.sqrt() };
     for n in 0..STEPS {
-        let Some(far) =
-            points.iter().max_by(|p, q| (*p - center).norm_squared().total_cmp(&(*q - center).norm_squared()))
-        else {
-            return Ball { center: Vec3::zeros(), radius: 0.0 };
-        };
         center += (far - center) / (n + 2) as f64;
-        let ball = Ball::holding(center, points);
-        if ball.radius < best.radius {
-            best = ball;
+        (far, square) = farthest(points, &center).unwrap_or((far, square));
+        let radius = square.sqrt();
+        if radius < best.radius {
+            best = Ball { center, radius };
         }
     }
     best
+}
+
+/// The last of the points that are farthest from `center`, and the square of its distance.
+fn farthest(points: &[Vec3], center: &Vec3) -> Option<(Vec3, f64)> {
+    let squares = points.iter().map(|p| (*p, (p - center).norm_squared()));
+    squares.reduce(|a, b| if b.1 >= a.1 { b } else { a })
 }
 
 /// Of the balls around balls the one that reaches out of the solid least, so far as a search finds it: its centre

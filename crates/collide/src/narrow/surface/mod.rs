@@ -13,6 +13,7 @@ mod deep;
 mod line;
 mod pass;
 mod rim;
+mod smooth;
 
 use super::reduce::Collector;
 use crate::surface::Field;

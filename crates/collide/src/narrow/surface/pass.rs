@@ -97,7 +97,7 @@ impl<'a> Pass<'a> {
         let up = seen.up.map(|up| self.rotation.tr_mul(&up));
         let rises = |edge: &Edge| up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= LYING_EDGE * edge.length);
         for edge in elements.edges_of(point, fine) {
-            if bound - edge.length <= found.limit() && !rises(edge) {
+            if bound - edge.length <= found.limit() && !rises(edge) && self.may_touch(edge, found) {
                 self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
             }
         }

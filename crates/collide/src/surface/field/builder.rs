@@ -39,8 +39,8 @@ const DEEPEST: f64 = 9.0;
 const BELOW: f64 = 1.0 - 2e-7;
 /// A distance that has a direction in spite of rounding, as a part of the diagonal.
 const SOME: f64 = 1e-9;
-/// Of single precision, and more.
-const ROUNDING: f64 = 1e-7;
+/// Of single precision in distances and places, and more.
+const ROUNDING: f64 = 1e-6;
 /// Cells and listed triangles at most; beyond, the tree of boxes answers.
 const MOST_CELLS: usize = 1 << 20;
 const MOST_LISTED: usize = 1 << 23;
@@ -95,11 +95,11 @@ impl Builder<'_> {
         };
         let reach = 3.0_f64.sqrt() * half;
         // convex: no triangle is closer than its tangent plane in the parent tells
-        let below = |n: &Near| n.distance + n.slope.dot(moved);
-        let Some(guess) = list.iter().min_by(|a, b| below(a).total_cmp(&below(b))) else { return };
-        let most = at(guess.triangle).distance + 2.0 * reach;
-        let may_be = |n: &Near, most: f64| below(n) <= most;
-        let mut near: Vec<Near> = list.iter().filter(|n| may_be(n, most)).map(|n| at(n.triangle)).collect();
+        let below: Vec<f64> = list.iter().map(|n| n.distance + n.slope.dot(moved)).collect();
+        let may_be = |most: f64| list.iter().zip(&below).filter(move |(_, below)| **below <= most).map(|(n, _)| n);
+        let Some(guess) = (0..list.len()).min_by(|&a, &b| below[a].total_cmp(&below[b])) else { return };
+        let most = at(list[guess].triangle).distance + 2.0 * reach;
+        let mut near: Vec<Near> = may_be(most).map(|n| at(n.triangle)).collect();
         let Some(&first) = near.iter().min_by(|a, b| order(a, b)) else { return };
         let (least, found) = (first.distance, field.closest_of(&center, first.triangle as usize));
         let distance = field.describe(&center, &found).distance;
@@ -109,27 +109,30 @@ impl Builder<'_> {
         let facing_first = field.normals[first.triangle as usize][0];
         let turned = |t: u32| takes_others && field.normals[t as usize][0].dot(&facing_first) < OTHER_WAY;
         let most = least + 2.0 * reach + field.around;
-        let others = list.iter().filter(|n| turned(n.triangle) && may_be(n, most)).map(|n| at(n.triangle));
+        let others = may_be(if takes_others { most } else { f64::NEG_INFINITY }).filter(|n| turned(n.triangle)).map(|n| at(n.triangle));
         near.extend(others.filter(|n| n.distance > least + 2.0 * reach && n.distance <= most));
-        let full = field.tree.cells.len() > MOST_CELLS || field.lists.len() + near.len() > MOST_LISTED;
-        let away = least > FARTHEST * field.diagonal;
-        let far = least > FAR * reach && (near.len() <= LONG || away);
-        if near.len() > SHORT && depth < self.deepest && !far && !full {
-            return self.divide(index, center, half, &near, depth);
-        }
-        let mut cell = Cell::empty();
-        cell.set_distance(distance - ROUNDING * (distance.abs() + field.diagonal));
         let excess = self.excess(&center, half, &first);
-        if least > reach {
-            let slope = cell.set_slope(&(first.slope * distance.signum()));
-            cell.set_short(self.short(half, distance, &slope, &near, &first, excess), half);
-        }
         let slack = excess + ROUNDING * field.diagonal;
-        let counts = |n: &Near| {
-            let more = if turned(n.triangle) { field.around } else { 0.0 };
+        let counts = |n: &Near, turned: bool| {
+            let more = if turned { field.around } else { 0.0 };
             n.distance - least <= slack + more + half * (n.slope - first.slope).abs().sum()
         };
-        near.retain(counts);
+        let listed = near.iter().filter(|n| counts(n, turned(n.triangle))).count();
+        let full = field.tree.cells.len() > MOST_CELLS || field.lists.len() + near.len() > MOST_LISTED;
+        let away = least > FARTHEST * field.diagonal;
+        let far = least > FAR * reach && (listed <= LONG || away);
+        if listed > SHORT && depth < self.deepest && !far && !full {
+            // one that may be another way in a child may not be in this cell
+            near.retain(|n| counts(n, takes_others));
+            return self.divide(index, center, half, &near, depth);
+        }
+        near.retain(|n| counts(n, turned(n.triangle)));
+        let mut cell = Cell::empty();
+        cell.set_distance(distance - ROUNDING * (distance.abs() + field.diagonal));
+        if least > reach {
+            let slope = cell.set_slope(&(first.slope * distance.signum()));
+            cell.set_short(self.short(half, distance, &slope, &near, &first, excess));
+        }
         if near.len() <= if away { SHORT } else { LONG } && !full {
             near.sort_unstable_by(order);
             (cell.link, cell.count) = (self.field.lists.len() as u32, near.len() as u8);

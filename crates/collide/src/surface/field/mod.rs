@@ -107,7 +107,7 @@ impl MeshField {
     fn closest(&self, p: &Vec3, place: &Place) -> Option<Closest> {
         let mut best: Option<Closest> = None;
         let (mut limit, mut reach, mut furthest) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
-        let (aside, from_center) = (place.offset.norm(), p - self.tree.center);
+        let (aside, from_center) = (f64::from(place.aside()) + self.tree.rounding(), p - self.tree.center);
         for listed in self.list(place.cell) {
             if f64::from(listed.nearer) > furthest {
                 break;
@@ -146,7 +146,7 @@ impl MeshField {
     /// The same where it may be less than `limit`; else a bound.
     pub fn nearest_within(&self, p: &Vec3, limit: f64) -> Result<Hit, f64> {
         let place = self.tree.locate(p);
-        let bound = place.map_or_else(|| self.tree.bound(p), |place| place.bound());
+        let bound = place.map_or_else(|| self.tree.bound(p), |place| self.tree.bound_at(&place));
         if bound > limit { Err(bound) } else { Ok(self.nearest_in(p, place.as_ref())) }
     }
 

@@ -12,28 +12,27 @@ use crate::Vec3;
 
 /// Divisions that are passed at once on the way down, at most.
 const TOP: usize = 6;
-/// `e` is kept in parts of this many half sides.
-const MOST_SHORT: f64 = 8.0;
+/// Of single precision in a place and in a bound, in half sides of the outermost cell.
+const ROUNDING: f64 = 2e-6;
 
-/// Sixteen bytes, since most of the time of a query goes by waiting for cells.
+/// Thirty-two bytes, in single precision, since most of the time of a query goes by waiting for cells.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
 pub(super) struct Cell {
+    /// `g`, and `d_c − e` for the plane through the centre.
+    plane: [f32; 4],
     /// Signed distance at the centre, or a little less.
     distance: f32,
     /// Where its list begins if it has one; else the first of eight children, 0 if there are none.
     pub link: u32,
-    /// `g`, in parts of 127.
-    slope: [i8; 3],
     /// Length of the list; 0 where there is none.
     pub count: u8,
-    /// `e` in half sides.
-    short: f32,
 }
 
 impl Cell {
     /// One that knows nothing.
     pub fn empty() -> Cell {
-        Cell { distance: f32::NEG_INFINITY, link: 0, slope: [0; 3], count: 0, short: MOST_SHORT as f32 }
+        Cell { plane: [0.0, 0.0, 0.0, f32::NEG_INFINITY], distance: f32::NEG_INFINITY, link: 0, count: 0 }
     }
 
     pub fn children(&self) -> usize {
@@ -45,19 +44,16 @@ impl Cell {
         self.distance = distance as f32;
     }
 
-    /// Takes a slope, as near as it can be kept; returns what is kept.
+    /// Takes a slope, as it can be kept; returns what is kept.
     pub fn set_slope(&mut self, slope: &Vec3) -> Vec3 {
-        self.slope = std::array::from_fn(|k| (slope[k] * 127.0).round().clamp(-127.0, 127.0) as i8);
-        self.kept_slope()
+        let kept: [f32; 3] = std::array::from_fn(|k| slope[k] as f32);
+        self.plane[..3].copy_from_slice(&kept);
+        Vec3::from(kept.map(f64::from))
     }
 
-    /// Takes `e`, metres, in a cell of half side `half`.
-    pub fn set_short(&mut self, short: f64, half: f64) {
-        self.short = (short / half * (1.0 + 1e-6)).min(MOST_SHORT) as f32;
-    }
-
-    fn kept_slope(&self) -> Vec3 {
-        Vec3::new(f64::from(self.slope[0]), f64::from(self.slope[1]), f64::from(self.slope[2])) / 127.0
+    /// Takes `e`, metres, once the distance is known.
+    pub fn set_short(&mut self, short: f64) {
+        self.plane[3] = (f64::from(self.distance) - short) as f32;
     }
 }
 
@@ -65,20 +61,22 @@ impl Cell {
 #[derive(Clone, Copy)]
 pub(super) struct Place<'a> {
     pub cell: &'a Cell,
-    /// From the cell's centre.
-    pub offset: Vec3,
-    /// Half the cell's side.
-    half: f64,
+    /// From the cell's centre; the fourth is 1.
+    offset: [f32; 4],
 }
 
 impl Place<'_> {
-    /// At most the signed distance here.
-    pub fn bound(&self) -> f64 {
-        let plane = self.cell.kept_slope().dot(&self.offset) - f64::from(self.cell.short) * self.half;
-        let square = self.offset.norm_squared();
-        // the cone is above it
-        let below = plane < 0.0 && square < plane * plane;
-        f64::from(self.cell.distance) + if below { -square.sqrt() } else { plane }
+    /// At most the signed distance here, but for rounding.
+    fn bound(&self) -> f64 {
+        let products: [f32; 4] = std::array::from_fn(|k| self.cell.plane[k] * self.offset[k]);
+        let plane = (products[0] + products[1]) + (products[2] + products[3]);
+        f64::from(plane.max(self.cell.distance - self.aside()))
+    }
+
+    /// How far from the cell's centre it is, metres.
+    pub fn aside(&self) -> f32 {
+        let squares: [f32; 4] = std::array::from_fn(|k| self.offset[k] * self.offset[k]);
+        (squares[0] + squares[1] + squares[2]).sqrt()
     }
 }
 
@@ -91,18 +89,25 @@ pub(super) struct Octree {
     pub half: f64,
     /// How often the outermost cell is divided for `top`, and how many of the cubes that makes go into a metre.
     level: usize,
-    per_metre: f64,
+    per_metre: f32,
     /// The cell, times 16, plus its depth, at or above each of these cubes.
     top: Vec<u32>,
     /// Half the side of a cell by its depth.
-    halves: [f64; 16],
+    halves: [f32; 16],
+    /// What single precision may add to a bound, metres.
+    rounding: f64,
 }
 
 impl Octree {
     /// One cell.
     pub fn new(center: Vec3, half: f64) -> Octree {
-        let halves = std::array::from_fn(|depth| half / f64::from(1_u32 << depth));
-        Octree { cells: vec![Cell::empty()], center, half, level: 0, per_metre: 0.5 / half, top: Vec::new(), halves }
+        let halves = std::array::from_fn(|depth| (half / f64::from(1_u32 << depth)) as f32);
+        Octree { cells: vec![Cell::empty()], center, half, level: 0, per_metre: (0.5 / half) as f32, top: Vec::new(), halves, rounding: ROUNDING * half }
+    }
+
+    /// What single precision may cost, metres.
+    pub fn rounding(&self) -> f64 {
+        self.rounding
     }
 
     /// To be called once all cells are there, and divided so often at most.
@@ -136,25 +141,34 @@ impl Octree {
     pub fn bound(&self, p: &Vec3) -> f64 {
         let from_low = (p - self.center).add_scalar(self.half);
         let inside = from_low.map(|x| x.clamp(0.0, 2.0 * self.half));
-        let bound = self.descend(&inside).bound();
+        let bound = self.bound_at(&self.descend(&inside));
         let outside = (from_low - inside).norm_squared();
         if outside == 0.0 { bound } else { (outside + bound.max(0.0).powi(2)).sqrt() }
     }
 
-    /// The smallest cell around a place that lies so far from the lowest corner.
+    /// The same at a place.
+    pub fn bound_at(&self, place: &Place) -> f64 {
+        place.bound() - self.rounding
+    }
+
+    /// The smallest cell around a place that lies so far from the lowest corner. One near a face of a cell may be taken for the neighbour's; then
+    /// the offset is more than half the side by rounding.
     fn descend(&self, from_low: &Vec3) -> Place<'_> {
-        let (level, most) = (self.level, (1 << self.level) - 1);
-        let place: [usize; 3] = std::array::from_fn(|k| ((from_low[k] * self.per_metre) as i32 as usize).min(most));
-        let top = self.top[place[0] | place[1] << level | place[2] << (2 * level)];
+        let level = self.level;
+        let most = (1 << level) - 1;
+        let low = [from_low.x as f32, from_low.y as f32, from_low.z as f32, 0.0];
+        let place: [i32; 4] = std::array::from_fn(|k| ((low[k] * self.per_metre) as i32).clamp(0, most));
+        let top = self.top[(place[0] | place[1] << level | place[2] << (2 * level)) as usize];
         let (mut cell, depth) = (&self.cells[(top >> 4) as usize], (top & 15) as usize);
         let mut half = self.halves[depth];
-        let mut offset = Vec3::from_fn(|k, _| from_low[k] - ((place[k] >> (level - depth)) as f64 * 2.0 + 1.0) * half);
+        let mut offset: [f32; 4] = std::array::from_fn(|k| low[k] - ((place[k] >> (level - depth)) * 2 + 1) as f32 * half);
         while cell.children() > 0 {
             half *= 0.5;
             let octant: usize = (0..3).map(|k| usize::from(offset[k].is_sign_positive()) << k).sum();
-            offset = Vec3::from_fn(|k, _| offset[k] - half.copysign(offset[k]));
+            offset = std::array::from_fn(|k| offset[k] - half.copysign(offset[k]));
             cell = &self.cells[cell.children() + octant];
         }
-        Place { cell, offset, half }
+        offset[3] = 1.0;
+        Place { cell, offset }
     }
 }

@@ -1,0 +1,53 @@
+//! An edge of a smooth surface against a mesh's field: whether it has to be searched.
+//!
+//! Such an edge needs a contact of its own only where the distance has its least place within the edge, by more than `ε` below an end that counts
+//! ([`Edge::spared`]). Where it only leaves a face of the other, the corners of the area of contact are vertices, an edge's length away at most.
+//!
+//! ```text
+//! d(s) ≥ d(s') − |s − s'|        a few bounds along the edge, a look at none of these places
+//! d(s) ≥ both tangents           at the ends, where d is convex between them: as good as always on so short an edge
+//! ```
+
+use super::super::reduce::Collector;
+use super::line::LEVEL;
+use super::pass::{Normals, Pass};
+use crate::surface::elements::Edge;
+use crate::surface::field::MeshField;
+use crate::surface::{Feature, Field, TOUCHING};
+
+/// Longer edges are searched in pieces, in radii of the smaller body.
+const SHORT: f64 = 0.06;
+
+impl Pass<'_> {
+    /// Whether an edge may have a contact of its own.
+    pub(super) fn may_touch(&self, edge: &Edge, found: &Collector) -> bool {
+        let short = edge.spared > 0.0 && edge.length <= SHORT * self.size;
+        self.mesh.filter(|_| short).is_none_or(|mesh| self.dips(mesh, edge, found))
+    }
+
+    fn dips(&self, mesh: &MeshField, edge: &Edge, found: &Collector) -> bool {
+        let [start, end] = edge.ends.map(|p| self.place(&p));
+        let way = end - start;
+        let near = |s: f64, within: f64| mesh.bound(&(start + way * s)) - within * edge.length <= found.limit();
+        if !near(0.5, 0.5) || !(near(0.25, 0.25) || near(0.75, 0.25)) {
+            return false;
+        }
+        let normals: Normals = edge.normals.iter().map(|n| self.rotation * n).collect();
+        let low = self.hit_of(&start, Some(edge.points[0]), &normals, TOUCHING);
+        let fall = -low.normal.dot(&way);
+        if fall <= LEVEL * edge.length {
+            return false;
+        }
+        let high = self.hit_of(&end, Some(edge.points[1]), &normals, TOUCHING);
+        let rise = high.normal.dot(&way);
+        if rise <= LEVEL * edge.length {
+            return false;
+        }
+        // where the tangents meet
+        let level = (low.distance * rise + high.distance * fall - rise * fall) / (rise + fall);
+        let lower = if low.distance < high.distance { &low } else { &high };
+        let end_counts = lower.feature == Feature::Face && lower.facing;
+        let above = level > found.limit() && level <= lower.distance;
+        !(above || end_counts && lower.distance - level < edge.spared)
+    }
+}
