@@ -118,6 +118,8 @@ struct Counts {
     /// Of deep overlaps, of shallow ones.
     shallower: [u32; 2],
     turned: u32,
+    /// Near ones of which no contact that is as deep within the stated error has parry's normal.
+    elsewhere: u32,
     worst_apart: f64,
     worst_depth: f64,
 }
@@ -209,11 +211,13 @@ fn judge(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bo
             counts.invented += 1;
             label();
         }
-        if let Some(line) = line
-            && distance > 1e-3
-            && (gap - distance).abs() < ROUNDING
+        let rounding = if b.distance.is_none() { ROUNDING } else { 1e-9 };
+        let turned = |c: &Contact| line.is_some_and(|line| line.dot(&c.normal) < 1.0_f64.to_radians().cos());
+        counts.elsewhere += u32::from((1e-3..MARGIN - ERROR).contains(&distance) && found.iter().filter(|c| c.gap < distance + ERROR).all(turned));
+        if distance > 1e-3
+            && (gap - distance).abs() < rounding
             // of contacts that are all as deep, parry has one
-            && found.iter().filter(|c| c.gap < gap + ROUNDING).all(|c| line.dot(&c.normal) < 1.0_f64.to_radians().cos())
+            && found.iter().filter(|c| c.gap < gap + rounding).all(turned)
         {
             label();
             counts.turned += 1;

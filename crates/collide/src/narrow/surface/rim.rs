@@ -122,7 +122,7 @@ impl Pass<'_> {
             if short || self.field.convex() || self.flat(rim, &low, &high) {
                 return match (low.slope < 0.0, high.slope < 0.0) {
                     (true, false) => self.lowest(rim, low, high, MOST_PARTED, part, found),
-                    (falls, too) if falls == too && !self.field.convex() => self.valley(rim, [low, high], !falls, MOST_PARTED, part, found),
+                    (falls, too) if falls == too && !self.field.convex() => self.rim_valley(rim, [low, high], !falls, MOST_PARTED, part, found),
                     _ => {}
                 };
             }
@@ -145,15 +145,15 @@ impl Pass<'_> {
 
     /// The lowest place of an arc between two slopes, and of its parts beyond a ridge; `halvings` of those at most.
     fn lowest(&self, rim: &Rim, low: Look, high: Look, halvings: u32, part: &mut u64, found: &mut Collector) {
-        let Some(bottom) = self.descend(rim, low, high, part, found) else { return };
+        let Some(bottom) = self.rim_descend(rim, low, high, part, found) else { return };
         if !self.field.convex() {
-            self.valley(rim, [low, bottom], false, halvings, part, found);
-            self.valley(rim, [bottom, high], true, halvings, part, found);
+            self.rim_valley(rim, [low, bottom], false, halvings, part, found);
+            self.rim_valley(rim, [bottom, high], true, halvings, part, found);
         }
     }
 
     /// A part of an arc that rises from a lowest place, or falls to one, at both ends: further lowest places where it has a ridge.
-    fn valley(&self, rim: &Rim, [low, high]: [Look; 2], rises: bool, halvings: u32, part: &mut u64, found: &mut Collector) {
+    fn rim_valley(&self, rim: &Rim, [low, high]: [Look; 2], rises: bool, halvings: u32, part: &mut u64, found: &mut Collector) {
         let slack = VALLEY * self.size;
         let dips = low.hit.distance < high.height(rim, &low.way) - slack || high.hit.distance < low.height(rim, &high.way) - slack;
         if halvings == 0 || !dips {
@@ -164,14 +164,14 @@ impl Pass<'_> {
             true if middle.slope < -LEVEL => self.lowest(rim, middle, high, halvings - 1, part, found),
             false if middle.slope > LEVEL => self.lowest(rim, low, middle, halvings - 1, part, found),
             _ => {
-                self.valley(rim, [low, middle], rises, halvings - 1, part, found);
-                self.valley(rim, [middle, high], rises, halvings - 1, part, found);
+                self.rim_valley(rim, [low, middle], rises, halvings - 1, part, found);
+                self.rim_valley(rim, [middle, high], rises, halvings - 1, part, found);
             }
         }
     }
 
     /// The lowest place that tangents lead to, a contact if it is in reach; `None` where it cannot be.
-    fn descend(&self, rim: &Rim, mut low: Look, mut high: Look, part: &mut u64, found: &mut Collector) -> Option<Look> {
+    fn rim_descend(&self, rim: &Rim, mut low: Look, mut high: Look, part: &mut u64, found: &mut Collector) -> Option<Look> {
         let tolerance = 1e-10 * self.size;
         let mut kink = None;
         for n in 0..LOOKS {
