@@ -2,6 +2,7 @@
 
 use crate::shape::axis;
 use crate::surface::Surface;
+use crate::surface::parts::parts;
 use crate::{Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3};
 
 /// A closed mesh about its centre of mass, with its sphere tree.
@@ -9,7 +10,8 @@ use crate::{Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, Sph
 pub struct MeshShape {
     mesh: TriMesh,
     tree: SphereTree,
-    surface: Option<Surface>,
+    /// One; of shells that overlap, each; none where it collides by its balls.
+    surfaces: Vec<Surface>,
     /// At density 1.
     unit_mass: MassProperties,
     bounding_radius: f64,
@@ -56,10 +58,10 @@ impl MeshShape {
         let tree = tree_of(&mesh)?;
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
         let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);
-        // buried faces are no surface of the union: such a mesh stands for itself by its balls
+        // buried faces are no surface of the union: such a mesh goes shell by shell, or stands for itself by its balls
         let buried = report.crossing_faces > 0 || (unit_mass.mass - mesh.signed_volume()).abs() > 1e-9 * unit_mass.mass;
-        let surface = (!buried).then(|| Surface::new(&mesh, &tree));
-        Ok((MeshShape { mesh, tree, surface, unit_mass, bounding_radius, leaf_radius, report }, offset))
+        let surfaces = if buried { parts(&mesh, &tree).unwrap_or_default() } else { vec![Surface::new(&mesh, &tree)] };
+        Ok((MeshShape { mesh, tree, surfaces, unit_mass, bounding_radius, leaf_radius, report }, offset))
     }
 
     /// The surface; its centre of mass is the origin.
@@ -72,9 +74,10 @@ impl MeshShape {
         &self.tree
     }
 
-    /// Elements and field of the `surface` contact mode; `None` where shells of the mesh cross or hold each other, which then collides by its balls.
-    pub(crate) fn surface(&self) -> Option<&Surface> {
-        self.surface.as_ref()
+    /// Elements and fields of the `surface` contact mode: one, or one for each of several shells that overlap; none where the surface crosses
+    /// itself in another way, which then collides by its balls.
+    pub(crate) fn surfaces(&self) -> &[Surface] {
+        &self.surfaces
     }
 
     /// What was found and mended when the mesh was read; its notes are for the user.

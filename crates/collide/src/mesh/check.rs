@@ -151,7 +151,7 @@ impl TriMesh {
     }
 
     /// Without the vertices that no triangle uses; the others keep their order.
-    fn compacted(&self) -> TriMesh {
+    pub(crate) fn compacted(&self) -> TriMesh {
         let mut kept: Vec<u32> = self.triangles.iter().flatten().copied().collect();
         kept.sort_unstable();
         kept.dedup();

@@ -25,6 +25,16 @@ pub(super) struct Crossings {
     pub capped: bool,
 }
 
+/// Which shells (told per face) have faces that cross or touch: pairs, the lower first, a shell with itself too; `None` where they are too many to know.
+pub(crate) fn crossing_shells(mesh: &TriMesh, shell: &[u32]) -> Option<Vec<(u32, u32)>> {
+    let found = Crossings::of(mesh);
+    let of = |&(a, b): &(u32, u32)| [shell[a as usize], shell[b as usize]];
+    let mut pairs: Vec<(u32, u32)> = found.pairs.iter().map(of).map(|[a, b]| (a.min(b), a.max(b))).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    (!found.capped).then_some(pairs)
+}
+
 impl Crossings {
     /// All pairs of a mesh whose indices are in range.
     pub fn of(mesh: &TriMesh) -> Crossings {

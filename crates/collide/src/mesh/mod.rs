@@ -18,6 +18,7 @@ mod winding;
 
 pub use check::ClosedReport;
 pub(crate) use check::edge_groups;
+pub(crate) use crossing::crossing_shells;
 pub use distance::{ClosestPoint, MeshDistance};
 pub(crate) use distance::{closest_on_triangle, pseudonormals};
 pub use repair::{RepairReport, RepairSettings};

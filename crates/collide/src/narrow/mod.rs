@@ -6,6 +6,7 @@ mod capsule;
 mod clip;
 mod cylinder;
 mod half_space;
+mod parts;
 mod reduce;
 mod segment;
 mod sphere;
@@ -90,9 +91,10 @@ fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose
         (Box { half_extents }, HalfSpace) => half_space::cuboid(half_extents, pose_a, pose_b, margin, out),
         (HalfSpace, HalfSpace) => {}
         (Cylinder(c), HalfSpace) => cylinder::half_space((c.radius(), c.half_length()), pose_a, pose_b, margin, out),
-        _ if mode == ContactMode::Surface && has_surface(a) && has_surface(b) => with_body(a, &mut |a| {
-            with_body(b, &mut |b| surface::surface(a, pose_a, b, pose_b, margin, out))
+        _ if mode == ContactMode::Surface && parts_of(a) == 1 && parts_of(b) == 1 => with_body(a, 0, &mut |a| {
+            with_body(b, 0, &mut |b| surface::surface(a, pose_a, b, pose_b, margin, out))
         }),
+        _ if mode == ContactMode::Surface && parts_of(a) > 0 && parts_of(b) > 0 => parts::parts(a, pose_a, b, pose_b, margin, out),
         _ => match (a.tree(), b.tree()) {
             (Some(tree_a), Some(tree_b)) => tree::tree_tree(tree_a, pose_a, tree_b, pose_b, margin, out),
             (Some(tree_a), None) => tree::tree_primitive(tree_a, pose_a, b, pose_b, margin, out),
@@ -102,13 +104,13 @@ fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose
     }
 }
 
-/// Whether a shape can collide by its surface: all but meshes with buried faces.
-fn has_surface(shape: &Shape) -> bool {
-    !matches!(shape, Shape::Mesh(mesh) if mesh.surface().is_none())
+/// How many surfaces a shape has: several where shells of a mesh overlap, none for meshes that cross themselves in another way.
+fn parts_of(shape: &Shape) -> usize {
+    if let Shape::Mesh(mesh) = shape { mesh.surfaces().len() } else { 1 }
 }
 
-/// What the `surface` mode knows of a shape.
-fn with_body(shape: &Shape, then: &mut dyn FnMut(&Body)) {
+/// What the `surface` mode knows of a shape, or of that part of it.
+fn with_body(shape: &Shape, part: usize, then: &mut dyn FnMut(&Body)) {
     let radius = shape.bounding_radius();
     let mut go = |source: Source, field: &dyn Field| then(&Body { source, field, mesh: None, radius });
     match shape {
@@ -126,7 +128,7 @@ fn with_body(shape: &Shape, then: &mut dyn FnMut(&Body)) {
             go(Source::Cylinder { radius, half_length }, &CylinderField { radius, half_length })
         }
         Shape::Mesh(mesh) => {
-            let Some(surface) = mesh.surface() else { return };
+            let Some(surface) = mesh.surfaces().get(part) else { return };
             let source = Source::Mesh(&surface.elements);
             then(&Body { source, field: &surface.field, mesh: Some(&surface.field), radius })
         }

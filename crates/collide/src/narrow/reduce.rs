@@ -99,6 +99,11 @@ impl<'a> Collector<'a> {
         self.out.push(contact);
     }
 
+    /// Whether any that was found and kept is like this.
+    pub fn any(&self, like: impl Fn(&Contact) -> bool) -> bool {
+        self.out[self.start..].iter().any(like)
+    }
+
     /// The least gap found.
     pub fn least(&self) -> f64 {
         self.out[self.start..].iter().map(|c| c.gap).fold(f64::INFINITY, f64::min)

@@ -14,6 +14,7 @@
 
 pub(crate) mod elements;
 pub(crate) mod field;
+pub(crate) mod parts;
 pub(crate) mod primitive;
 
 use crate::{SphereTree, TriMesh, Vec3};

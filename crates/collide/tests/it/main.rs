@@ -4,6 +4,7 @@ mod against_parry;
 mod bad_meshes;
 mod broad;
 mod builders;
+mod buried;
 mod hull;
 mod medial;
 mod mesh_contacts;

@@ -201,6 +201,36 @@ fn a_cylinder_across_the_straight_lines_of_a_smooth_surface_meets_their_middle()
 }
 
 #[test]
+fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
+    // a trough z = a|x|, and a cylinder tilted by τ across it, its rim's lowest point above the bottom: at an angle θ from there the rim is at
+    // z₀ − r sin τ cos θ, so least above the sides where tan θ = ± a / sin τ, 0.4° here: both in one arc
+    let (a, r, tilt, depth) = (2e-3, 0.1, 0.3_f64, 0.2);
+    let profile = [(-0.5, 0.5 * a), (0.0, 0.0), (0.5, 0.5 * a), (0.5, -depth), (-0.5, -depth)];
+    let vertices = [-0.4, 0.4].iter().flat_map(|y| profile.map(|(x, z)| Vec3::new(x, *y, z))).collect();
+    // the triangles of either end, then two per side
+    let mut triangles = vec![[0, 4, 1], [1, 4, 3], [1, 3, 2], [5, 6, 9], [6, 8, 9], [6, 7, 8]];
+    triangles.extend((0..5_u32).flat_map(|n| [[n, (n + 1) % 5, n + 5], [(n + 1) % 5, (n + 1) % 5 + 5, n + 5]]));
+    let trough = Shape::mesh(TriMesh { vertices, triangles }, &TreeSettings::octree()).unwrap().0;
+    let cylinder = Shape::cylinder(r, 0.15).unwrap();
+    // the mesh's frame is its centre of mass
+    let Shape::Mesh(shape) = &trough else { panic!("no mesh") };
+    let bottom = shape.mesh().vertices[1] - Vec3::new(0.0, -0.4, 0.0);
+    for turn in [0.0, 0.016, 0.3] {
+        let rotation = Quat::from_scaled_axis(Vec3::x() * tilt) * Quat::from_scaled_axis(Vec3::z() * turn);
+        let lift = r * tilt.sin() + 0.15 * tilt.cos() + 1e-3;
+        let pose = Pose::from_parts((bottom + Vec3::z() * lift).into(), rotation);
+        let found = ask(&cylinder, &pose, &trough, &Pose::identity(), 2e-3);
+        let theta = (a / tilt.sin()).atan();
+        let gap = (1e-3 + r * tilt.sin() * (1.0 - theta.cos()) - a * r * theta.sin()) / a.hypot(1.0);
+        for side in [-1.0, 1.0] {
+            let normal = Vec3::new(-side * a, 0.0, 1.0).normalize();
+            let one: Vec<&Contact> = found.iter().filter(|c| (c.normal - normal).norm() < 1e-9).collect();
+            assert!(one.len() == 1 && (one[0].gap - gap).abs() < 1e-9, "{side}, turned by {turn}: {gap}, {found:?}");
+        }
+    }
+}
+
+#[test]
 fn contacts_do_not_depend_on_what_was_asked_before() {
     let shapes = [
         Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap().0,

@@ -4,7 +4,8 @@
 //! (Kelley 1960, *The cutting-plane method*): where that is above the margin, the search ends; else their meeting point
 //! is the next place to look. On flat faces a few looks are exact. Other bodies: the edge is first halved into short pieces, and those
 //! that are too far to reach the margin are dropped (`d_B` changes by at most 1 m per metre). Within a piece that is kept the function
-//! is treated as convex.
+//! is treated as convex until a look lies below the tangent of another one: there is a valley of B between them, and perhaps a second minimum,
+//! so that part is halved a few times.
 //! What comes out:
 //!
 //! - a kink, two slopes: an edge of B (or the ridge between two faces, inside) is crossed. The normal is the combination of the two that is
@@ -30,6 +31,10 @@ pub(super) const LYING_EDGE: f64 = 0.15;
 const LOOKS: usize = 20;
 /// Looks for the minimum at most: a third of them halve what is left.
 const MOST_LOOKS: usize = 90;
+/// Halvings of a part over a valley, at most.
+const MOST_PARTED: u32 = 5;
+/// How far below a tangent is no rounding, as a part of the smaller body's radius.
+const VALLEY: f64 = 1e-9;
 
 /// A straight element in the frame of the field.
 struct Line<'a> {
@@ -90,8 +95,7 @@ impl Pass<'_> {
     fn halve(&self, line: &Line, low: (f64, Option<Look>), high: (f64, Option<Look>), found: &mut Collector) -> [Option<Look>; 2] {
         let (from, to) = (low.0, high.0);
         let smooth = line.edge.is_some_and(|edge| edge.spared > 0.0);
-        let piece = if smooth { SMOOTH_PIECE } else { PIECE } * self.size;
-        if to - from > piece && to - from > 1e-3 * line.length {
+        if !self.is_one_piece(to - from, smooth) && to - from > 1e-3 * line.length {
             let middle = 0.5 * (from + to);
             let reaches = |from: f64, to: f64, found: &Collector| {
                 self.field.bound(&line.at(0.5 * (from + to))) - 0.5 * (to - from) - line.radius <= found.limit()
@@ -115,6 +119,11 @@ impl Pass<'_> {
         [Some(start), Some(end)]
     }
 
+    /// Whether the distance along so much of an edge is treated as convex.
+    pub(super) fn is_one_piece(&self, length: f64, smooth: bool) -> bool {
+        self.field.convex() || length <= if smooth { SMOOTH_PIECE } else { PIECE } * self.size
+    }
+
     fn look(&self, line: &Line, s: f64) -> Look {
         let end = if s == 0.0 { Some(0) } else if s == line.length { Some(1) } else { None };
         let name = end.and_then(|end: usize| line.edge.map(|edge| edge.points[end]));
@@ -123,19 +132,62 @@ impl Pass<'_> {
     }
 
     /// The minimum between two looks, if it is not at one of them, and where the line leaves a face that it lies on.
-    fn search(&self, line: &Line, mut low: Look, mut high: Look, found: &mut Collector) {
-        if high.slope - low.slope <= LEVEL || ends_will_do(line, &low, &high) {
+    fn search(&self, line: &Line, low: Look, high: Look, found: &mut Collector) {
+        let valley = !self.field.convex() && self.dips(&low, &high);
+        if !valley && (high.slope - low.slope <= LEVEL || ends_will_do(line, &low, &high)) {
             return;
         }
-        let mut on_face = low.lies() != high.lies();
         match (low.lies(), high.lies()) {
             (true, false) => self.end_of_face(line, &low, high, found),
             (false, true) => self.end_of_face(line, &high, low, found),
             _ => {}
         }
-        if low.slope > -LEVEL || high.slope < LEVEL {
+        self.minima(line, low, high, low.lies() != high.lies(), MOST_PARTED, found);
+    }
+
+    /// The minima between two looks; a part beyond a ridge is halved so often at most. `on_face`: the face that the line lies on is known.
+    fn minima(&self, line: &Line, low: Look, high: Look, on_face: bool, halvings: u32, found: &mut Collector) {
+        match (low.slope < -LEVEL, high.slope > LEVEL) {
+            (true, true) => {
+                let Some([to, from]) = self.descend(line, low, high, on_face, found) else { return };
+                self.valley(line, [low, to], false, halvings, found);
+                self.valley(line, [from, high], true, halvings, found);
+            }
+            (false, false) => {}
+            (_, rises) => self.valley(line, [low, high], rises, halvings, found),
+        }
+    }
+
+    /// A part that rises from a minimum, or falls to one, at both ends: further minima where a look lies below the tangent of another.
+    fn valley(&self, line: &Line, [low, high]: [Look; 2], rises: bool, halvings: u32, found: &mut Collector) {
+        let length = high.s - low.s;
+        // the distance changes by at most 1 m per metre
+        let least = 0.5 * (low.hit.distance + high.hit.distance - length) - line.radius;
+        if halvings == 0 || self.field.convex() || least > found.limit() || !self.dips(&low, &high) {
             return;
         }
+        // two faces that meet in a valley are as high as both tangents where those meet
+        let (s, _) = meeting(&low, &high);
+        let s = if halvings == MOST_PARTED && s > low.s + 0.01 * length && s < high.s - 0.01 * length { s } else { 0.5 * (low.s + high.s) };
+        let middle = self.look(line, s);
+        match rises {
+            true if middle.slope < -LEVEL => self.minima(line, middle, high, false, halvings - 1, found),
+            false if middle.slope > LEVEL => self.minima(line, low, middle, false, halvings - 1, found),
+            _ => {
+                self.valley(line, [low, middle], rises, halvings - 1, found);
+                self.valley(line, [middle, high], rises, halvings - 1, found);
+            }
+        }
+    }
+
+    /// Whether one of two looks lies below the tangent of the other: not convex between them.
+    fn dips(&self, low: &Look, high: &Look) -> bool {
+        let slack = VALLEY * self.size;
+        low.hit.distance < high.height(low.s) - slack || high.hit.distance < low.height(high.s) - slack
+    }
+
+    /// The minimum that tangents lead to between two slopes, a contact if it is in reach, and the looks next to it; `None` where it is out of reach.
+    fn descend(&self, line: &Line, mut low: Look, mut high: Look, mut on_face: bool, found: &mut Collector) -> Option<[Look; 2]> {
         let tolerance = 1e-9 * self.size;
         let limit = found.limit() + line.radius;
         for n in 0..MOST_LOOKS {
@@ -144,7 +196,7 @@ impl Pass<'_> {
             // tangents that meet above what was seen are no bound: not convex here
             let convex = level <= least + tolerance;
             if convex && level > limit {
-                return;
+                return None;
             }
             if (convex && least - level < tolerance) || high.s - low.s < tolerance {
                 break;
@@ -155,15 +207,15 @@ impl Pass<'_> {
                 _ => 0.5 * (low.s + high.s),
             };
             let look = self.look(line, s);
+            let level = look.slope.abs() <= LEVEL;
             if look.lies() && !on_face {
                 on_face = true;
                 self.face(line, &look, low, high, found);
-                if look.slope.abs() <= LEVEL {
-                    return;
-                }
+            } else if level {
+                self.bottom(line, look.s, look.hit, found);
             }
-            if look.slope.abs() <= LEVEL {
-                return self.bottom(line, look.s, look.hit, found);
+            if level {
+                return Some([look; 2]);
             }
             if look.slope < 0.0 {
                 low = look;
@@ -172,6 +224,7 @@ impl Pass<'_> {
             }
         }
         self.kink(line, &low, &high, found);
+        Some([low, high])
     }
 
     /// A minimum between two slopes.
@@ -184,9 +237,6 @@ impl Pass<'_> {
             return;
         }
         let nearest = if low.hit.distance < high.hit.distance { low } else { high };
-        if self.second.is_some() && matches!(nearest.hit.feature, Feature::Edge(_)) {
-            return; // that edge has found it
-        }
         // two faces at depth `level` meet in an edge further up
         let distance = level * (a + b) / length;
         self.bottom(line, s, Hit { distance, normal: sum / length, ..nearest.hit }, found);
@@ -194,6 +244,9 @@ impl Pass<'_> {
 
     fn bottom(&self, line: &Line, s: f64, hit: Hit, found: &mut Collector) {
         let fits = facing(line.normals, &hit.normal) && line.is_closest(&hit.normal);
+        if self.second.is_some() && matches!(hit.feature, Feature::Edge(_)) && self.is_known(&line.at(s), line.radius, &hit, found) {
+            return; // that edge has found it
+        }
         self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);
     }
 

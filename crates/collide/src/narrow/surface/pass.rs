@@ -24,6 +24,10 @@ struct Seen {
 /// Slopes across an edge down to this are rounding's.
 pub(super) const ASIDE: f64 = 1e-6;
 
+/// Contacts of two edges that differ by less are one, found from either side; as parts of the smaller body's radius.
+const SAME_DEPTH: f64 = 1e-6;
+const SAME_PLACE: f64 = 1e-3;
+
 /// The elements of one body against the field of the other.
 pub(super) struct Pass<'a> {
     pub(super) pose: &'a Pose,
@@ -93,9 +97,11 @@ impl<'a> Pass<'a> {
         if only_points || bound - longest > found.limit() {
             return;
         }
-        // where the distance rises steeply from here an edge has nothing but its end
+        // where the distance rises steeply from here an edge has nothing but its end; a long one may come near another part of the body
         let up = seen.up.map(|up| self.rotation.tr_mul(&up));
-        let rises = |edge: &Edge| up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= LYING_EDGE * edge.length);
+        let rises = |edge: &Edge| {
+            self.is_one_piece(edge.length, edge.spared > 0.0) && up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= LYING_EDGE * edge.length)
+        };
         for edge in elements.edges_of(point, fine) {
             if bound - edge.length <= found.limit() && !rises(edge) && self.may_touch(edge, found) {
                 self.edge(&edge.ends, 0.0, &edge.normals, edge.index, Some(edge), found);
@@ -226,6 +232,17 @@ impl<'a> Pass<'a> {
         if gap.is_nan() || gap > found.limit() {
             return;
         }
+        let contact = self.contact(at, radius, hit, normal_from, feature);
+        if fits {
+            found.push(contact);
+        } else {
+            found.push_spare(contact);
+        }
+    }
+
+    /// The contact of a core point of the element and what the field says there, in B's frame.
+    fn contact(&self, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64) -> Contact {
+        let gap = hit.distance - radius;
         let contact = Contact {
             point: at - hit.normal * (radius + 0.5 * gap),
             normal: hit.normal,
@@ -235,15 +252,16 @@ impl<'a> Pass<'a> {
             core_b: hit.core,
             normal_from,
         };
-        let contact = match self.second {
+        match self.second {
             None => contact,
             Some(pose) => turned(contact, pose).flipped(),
-        };
-        if fits {
-            found.push(contact);
-        } else {
-            found.push_spare(contact);
         }
+    }
+
+    /// Whether there is a contact at about this place that is as deep.
+    pub(super) fn is_known(&self, at: &Vec3, radius: f64, hit: &Hit, found: &Collector) -> bool {
+        let new = self.contact(at, radius, hit, NormalFrom::Edges, 0);
+        found.any(|c| (c.gap - new.gap).abs() < SAME_DEPTH * self.size && (c.point - new.point).norm() < SAME_PLACE * self.size)
     }
 }
 

@@ -11,6 +11,9 @@
 //! of which the higher one counts. On a circle both the lowest place of a plane and the places where two planes are level have closed forms:
 //! with `θ` from the middle of the arc and `t = tan θ/2`, `A cos θ + B sin θ = C` is `(C + A) t² − 2 B t + C − A = 0`.
 //!
+//! Of a convex body's `d` an arc has one lowest place: the higher one of two planes has no more. Where a look lies below the tangent plane of
+//! another, the body has a valley between them, and there may be a second: that part is halved until its slope tells.
+//!
 //! A rim that hardly tilts over a face rests on four fixed points instead.
 
 use super::super::reduce::Collector;
@@ -60,6 +63,10 @@ const COS_30: f64 = 0.866_025_403_784_438_6;
 const MOST_HALVED: u32 = 7;
 /// Looks within an arc at most; from the half on, every other one halves it.
 const LOOKS: usize = 40;
+/// Halvings of a part of an arc over a valley, at most.
+const MOST_PARTED: u32 = 6;
+/// How far below a tangent plane is no rounding, as a part of the smaller body's radius.
+const VALLEY: f64 = 1e-9;
 /// Sine of the tilt below which a rim rests on its fixed points.
 const TILTED: f64 = 1e-4;
 /// Sine of the tilt above which it rests on one point.
@@ -113,10 +120,11 @@ impl Pass<'_> {
         if halved > 0 {
             let (low, high) = (self.look_on(rim, from), self.look_on(rim, to));
             if short || self.field.convex() || self.flat(rim, &low, &high) {
-                if low.slope < 0.0 && high.slope >= 0.0 {
-                    self.lowest(rim, low, high, part, found);
-                }
-                return;
+                return match (low.slope < 0.0, high.slope < 0.0) {
+                    (true, false) => self.lowest(rim, low, high, MOST_PARTED, part, found),
+                    (falls, too) if falls == too && !self.field.convex() => self.rim_valley(rim, [low, high], !falls, MOST_PARTED, part, found),
+                    _ => {}
+                };
             }
         }
         self.arc(rim, from, &middle, halved + 1, part, found);
@@ -135,8 +143,35 @@ impl Pass<'_> {
         face(low) && face(high) && (low.hit.normal - high.hit.normal).norm() < 1e-9 && level.abs() < 1e-9 * self.size
     }
 
-    /// The lowest place of an arc between two slopes.
-    fn lowest(&self, rim: &Rim, mut low: Look, mut high: Look, part: &mut u64, found: &mut Collector) {
+    /// The lowest place of an arc between two slopes, and of its parts beyond a ridge; `halvings` of those at most.
+    fn lowest(&self, rim: &Rim, low: Look, high: Look, halvings: u32, part: &mut u64, found: &mut Collector) {
+        let Some(bottom) = self.rim_descend(rim, low, high, part, found) else { return };
+        if !self.field.convex() {
+            self.rim_valley(rim, [low, bottom], false, halvings, part, found);
+            self.rim_valley(rim, [bottom, high], true, halvings, part, found);
+        }
+    }
+
+    /// A part of an arc that rises from a lowest place, or falls to one, at both ends: further lowest places where it has a ridge.
+    fn rim_valley(&self, rim: &Rim, [low, high]: [Look; 2], rises: bool, halvings: u32, part: &mut u64, found: &mut Collector) {
+        let slack = VALLEY * self.size;
+        let dips = low.hit.distance < high.height(rim, &low.way) - slack || high.hit.distance < low.height(rim, &high.way) - slack;
+        if halvings == 0 || !dips {
+            return;
+        }
+        let middle = self.look_on(rim, &(low.way + high.way).normalize());
+        match rises {
+            true if middle.slope < -LEVEL => self.lowest(rim, middle, high, halvings - 1, part, found),
+            false if middle.slope > LEVEL => self.lowest(rim, low, middle, halvings - 1, part, found),
+            _ => {
+                self.rim_valley(rim, [low, middle], rises, halvings - 1, part, found);
+                self.rim_valley(rim, [middle, high], rises, halvings - 1, part, found);
+            }
+        }
+    }
+
+    /// The lowest place that tangents lead to, a contact if it is in reach; `None` where it cannot be.
+    fn rim_descend(&self, rim: &Rim, mut low: Look, mut high: Look, part: &mut u64, found: &mut Collector) -> Option<Look> {
         let tolerance = 1e-10 * self.size;
         let mut kink = None;
         for n in 0..LOOKS {
@@ -145,7 +180,7 @@ impl Pass<'_> {
             // not convex where the tangents meet above what was seen
             let convex = level <= least + tolerance;
             if convex && level > found.limit() {
-                return;
+                return None;
             }
             if (high.way - low.way).norm() * rim.radius < tolerance || (convex && least - level < tolerance) {
                 kink = Some((way, level)).filter(|_| convex);
@@ -180,13 +215,14 @@ impl Pass<'_> {
         }
         let tilt = across(&hit.normal, &rim.up).norm();
         if !hit.facing || tilt < TILTED {
-            return;
+            return Some(best);
         }
         // one that lies has its axis for a core
         let core = if tilt > LYING { rim.radius } else { 0.0 };
         let hit = Hit { distance: hit.distance + core, ..hit };
         self.push(&(rim.at(&way) + hit.normal * core), core, &hit, point_normal(&hit), rim.feature(*part), found);
         *part += 1;
+        Some(best)
     }
 }
 

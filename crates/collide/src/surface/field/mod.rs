@@ -155,6 +155,11 @@ impl MeshField {
         self.describe(p, &closest.unwrap_or_else(|| self.closest_of(p, self.boxes.closest(p).triangle)))
     }
 
+    /// Of the mesh, metres.
+    pub fn diagonal(&self) -> f64 {
+        self.diagonal
+    }
+
     /// How far beside a face a place on an edge still counts as above it, metres.
     pub fn touching(&self) -> f64 {
         self.touching
