@@ -6,7 +6,7 @@ use super::messages::FacetCounts;
 use super::publisher::PublishError;
 use super::recording::Recorded;
 use super::server::{SeatCounts, ServerEvent, ServerOptions, ServerSession, Standing};
-use super::transport::{FacetLink, FacetNumber, LinkCounters, LinkError, ServerLink};
+use super::transport::{FacetLink, FacetNumber, LinkCounters, LinkError, Message, ServerLink};
 use super::viewer::Viewer;
 use super::wire::Hash;
 use std::time::{Duration, Instant};
@@ -169,13 +169,12 @@ pub struct Facet<L> {
     link: L,
     session: FacetSession,
     start: Instant,
-    buffer: Vec<u8>,
 }
 
 impl<L: FacetLink> Facet<L> {
     /// `base`: the world as the scene file makes it.
     pub fn new(link: L, options: FacetOptions, base: World) -> Facet<L> {
-        Facet { link, session: FacetSession::new(options, base), start: Instant::now(), buffer: Vec::new() }
+        Facet { link, session: FacetSession::new(options, base), start: Instant::now() }
     }
 
     /// What to do next, after waiting for it for at most `timeout`. On [`Task::Draw`] call [`begin`](Self::begin), draw, and [`drawn`](Self::drawn); on
@@ -262,10 +261,11 @@ impl<L: FacetLink> Facet<L> {
     }
 
     fn turn(&mut self, timeout: Duration) -> Result<(), SessionError> {
-        let event = self.link.recv(timeout, &mut self.buffer)?;
+        let mut message = Message::default();
+        let event = self.link.recv(timeout, &mut message)?;
         let now = self.now();
         match event {
-            Some(event) => self.session.on_event(now, event, &self.buffer),
+            Some(event) => self.session.on_event(now, event, message),
             None => self.session.advance(now),
         }
         self.flush()

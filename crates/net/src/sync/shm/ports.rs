@@ -5,12 +5,15 @@
 //! or when a server ends.
 
 use super::bell::{self, Bell};
-use crate::sync::transport::{FacetNumber, LinkError};
+use super::wire::Words;
+use crate::sync::transport::{FacetNumber, LinkError, Message};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::{AllocationStrategy, Config, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
+use iceoryx2::sample::Sample;
 use iceoryx2::service::ipc_threadsafe::Service;
 use std::fmt::Debug;
+use std::sync::Arc;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::PathBuf;
 
@@ -21,10 +24,31 @@ pub const UP_BYTES: usize = 16 << 10;
 /// Samples that a slow reader's buffer holds.
 const BUFFER: usize = 8;
 
+/// Samples that a reader may hold while it goes on reading.
+const HELD: usize = 6;
+
+/// A sample that was received. It lies in shared memory, and nobody writes over it until it is dropped.
+pub struct Received(Sample<Service, [u8], Words>);
+
+impl Received {
+    /// Its head.
+    pub fn head(&self) -> Words {
+        *self.0.user_header()
+    }
+}
+
+impl AsRef<[u8]> for Received {
+    fn as_ref(&self) -> &[u8] {
+        self.0.payload()
+    }
+}
+
 /// The ends.
 pub struct Ports {
-    publisher: Publisher<Service, [u8], ()>,
-    subscriber: Subscriber<Service, [u8], ()>,
+    publisher: Publisher<Service, [u8], Words>,
+    subscriber: Subscriber<Service, [u8], Words>,
+    /// Held by each sample that was lent.
+    lent: Arc<()>,
     bell: Bell,
     sample: usize,
     node: Node<Service>,
@@ -38,9 +62,9 @@ impl Ports {
         // Killed processes hold their places until they are cleaned up.
         let places = 2 * usize::from(facets) + 4;
         let data = |name: &str, publishers: usize, subscribers: usize| {
-            let builder = node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>();
+            let builder = node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>();
             let builder =
-                builder.enable_safe_overflow(true).subscriber_max_buffer_size(BUFFER).history_size(0).subscriber_max_borrowed_samples(2);
+                builder.enable_safe_overflow(true).subscriber_max_buffer_size(BUFFER).history_size(0).subscriber_max_borrowed_samples(HELD);
             builder
                 .max_publishers(publishers)
                 .max_subscribers(subscribers)
@@ -54,6 +78,7 @@ impl Ports {
         let ports = Ports {
             publisher: publisher(&down, DOWN_BYTES).map_err(|why| refused(run, "down", why))?,
             subscriber: up.subscriber_builder().create().map_err(|why| refused(run, "up", why))?,
+            lent: Arc::default(),
             bell,
             sample: DOWN_BYTES,
             node,
@@ -65,11 +90,12 @@ impl Ports {
     /// Joins a run's services as a facet; `None` while there are none.
     pub fn join(run: &str) -> Result<Option<Ports>, LinkError> {
         let (node, user) = node("tumble facet")?;
-        let data = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().open().ok());
+        let data = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>().open().ok());
         let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, user)?) else { return Ok(None) };
         let ports = Ports {
             publisher: publisher(&up, UP_BYTES).map_err(|why| refused(run, "up", why))?,
             subscriber: down.subscriber_builder().create().map_err(|why| refused(run, "down", why))?,
+            lent: Arc::default(),
             bell,
             sample: UP_BYTES,
             node,
@@ -83,13 +109,11 @@ impl Ports {
         self.sample
     }
 
-    /// Publishes a sample of two parts. Nobody is woken yet.
-    pub fn publish(&self, head: &[u8], data: &[u8]) -> Result<(), LinkError> {
-        let mut sample = self.publisher.loan_slice(head.len() + data.len()).map_err(|why| failed("loan", why))?;
-        let (first, rest) = sample.payload_mut().split_at_mut(head.len());
-        first.copy_from_slice(head);
-        rest.copy_from_slice(data);
-        sample.send().map_err(|why| failed("send", why))?;
+    /// Publishes a sample. Nobody is woken yet.
+    pub fn publish(&self, head: Words, data: &[u8]) -> Result<(), LinkError> {
+        let mut sample = self.publisher.loan_slice_uninit(data.len()).map_err(|why| failed("loan", why))?;
+        *sample.user_header_mut() = head;
+        sample.write_from_slice(data).send().map_err(|why| failed("send", why))?;
         Ok(())
     }
 
@@ -106,15 +130,15 @@ impl Ports {
         &self.bell
     }
 
-    /// Hands the next sample to `take`; `false` when there is none.
-    pub fn receive(&self, take: impl FnOnce(&[u8])) -> Result<bool, LinkError> {
-        match self.subscriber.receive().map_err(|why| failed("receive", why))? {
-            Some(sample) => {
-                take(sample.payload());
-                Ok(true)
-            }
-            None => Ok(false),
-        }
+    /// The next sample, if there is one.
+    pub fn receive(&self) -> Result<Option<Received>, LinkError> {
+        Ok(self.subscriber.receive().map_err(|why| failed("receive", why))?.map(Received))
+    }
+
+    /// The message of a sample: where it lies, or a copy where the reader holds so many already that it could not go on reading.
+    pub fn lend(&self, sample: Received) -> Message {
+        // one more is held while it is looked at
+        if Arc::strong_count(&self.lent) + 1 < HELD { Message::lent(Lent { sample, _held: self.lent.clone() }) } else { sample.as_ref().to_vec().into() }
     }
 
     /// Removes what killed processes left.
@@ -124,10 +148,22 @@ impl Ports {
     }
 }
 
-type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, [u8], ()>;
+/// A sample that somebody holds.
+struct Lent {
+    sample: Received,
+    _held: Arc<()>,
+}
 
-fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Service, [u8], ()>, impl Debug> {
-    service.publisher_builder().initial_max_slice_len(bytes + super::wire::HEAD).allocation_strategy(AllocationStrategy::Static).create()
+impl AsRef<[u8]> for Lent {
+    fn as_ref(&self) -> &[u8] {
+        self.sample.as_ref()
+    }
+}
+
+type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, [u8], Words>;
+
+fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Service, [u8], Words>, impl Debug> {
+    service.publisher_builder().initial_max_slice_len(bytes).allocation_strategy(AllocationStrategy::Static).create()
 }
 
 /// A node, which removes what is stale as it begins, and the number of its user.

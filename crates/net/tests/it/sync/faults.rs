@@ -143,7 +143,7 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
         }
         let told = server.events().into_iter().find_map(|e| if let ServerEvent::Refused(1, why) = e { Some(why) } else { None }).unwrap();
         for out in server.outgoing() {
-            facet.on_event(MS, LinkEvent::Message, &out.message);
+            facet.on_event(MS, LinkEvent::Message, out.message.to_vec().into());
         }
         (told, facet.task())
     };
@@ -188,7 +188,7 @@ fn a_facet_that_draws_something_else_is_found_out() {
         if server.idle() && server.complete() {
             server.publish(now, &base, &viewer(0)).unwrap();
         }
-        server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, &out.message));
+        server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
     }
     assert!(shown > 50 && wrong > 15, "{shown} {wrong}");
     let told = server.events().iter().filter(|e| matches!(e, ServerEvent::Ready(0, frame, _, false) if frame % 3 == 0)).count();
@@ -240,7 +240,7 @@ fn a_frame_that_does_not_fit_is_asked_for_again() {
             let spoil = header.kind == wire::Kind::State && header.frame == 5 && spoilt == 0;
             let bytes = if spoil { wire::message(&header, |out| out.extend(&payload[..payload.len() - 1])) } else { out.message.to_vec() };
             spoilt += u32::from(spoil);
-            facet.on_event(now, LinkEvent::Message, &bytes);
+            facet.on_event(now, LinkEvent::Message, bytes.into());
         }
     }
     let counts = facet.counts();

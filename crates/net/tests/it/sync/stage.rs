@@ -134,7 +134,7 @@ impl Stage {
                 To::Facet(k) if self.now >= self.facets[k as usize].frozen_until => {
                     let actor = &mut self.facets[k as usize];
                     if let Some(facet) = &mut actor.session {
-                        facet.on_event(self.now + actor.clock, LinkEvent::Message, &bytes);
+                        facet.on_event(self.now + actor.clock, LinkEvent::Message, bytes.into());
                     }
                 }
                 To::Facet(_) => {}
