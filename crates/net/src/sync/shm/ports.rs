@@ -2,8 +2,9 @@
 //!
 //! Two services of samples per run, named by the run: `tumble/RUN/down` and `…/up`, and a [`Bell`]. Files lie in a folder of this user alone, objects in
 //! `/dev/shm` carry the user's number: another user's run is neither seen nor disturbed. What a killed process leaves is removed when the next node begins,
-//! or when a server ends.
+//! or when a server ends; what then still stays, the last process takes along ([`super::alive`]).
 
+use super::alive::Alive;
 use super::bell::{self, Bell};
 use super::wire::Words;
 use crate::sync::transport::{FacetNumber, LinkError, Message};
@@ -52,13 +53,13 @@ pub struct Ports {
     bell: Bell,
     sample: usize,
     node: Node<Service>,
-    user: u32,
+    alive: Alive,
 }
 
 impl Ports {
     /// Begins the services of a run, or joins those that an earlier server of it left.
     pub fn serve(run: &str, facets: FacetNumber) -> Result<Ports, LinkError> {
-        let (node, user) = node("tumble server")?;
+        let (node, alive) = node("tumble server")?;
         // Killed processes hold their places until they are cleaned up.
         let places = 2 * usize::from(facets) + 4;
         let data = |name: &str, publishers: usize, subscribers: usize| {
@@ -73,7 +74,7 @@ impl Ports {
                 .map_err(|why| refused(run, name, why))
         };
         // Before the services: who finds them finds it.
-        let bell = Bell::serve(run, user)?;
+        let bell = Bell::serve(run, alive.user())?;
         let (down, up) = (data("down", 4, places)?, data("up", places, 4)?);
         let ports = Ports {
             publisher: publisher(&down, DOWN_BYTES).map_err(|why| refused(run, "down", why))?,
@@ -82,16 +83,16 @@ impl Ports {
             bell,
             sample: DOWN_BYTES,
             node,
-            user,
+            alive,
         };
         Ok(ports)
     }
 
     /// Joins a run's services as a facet; `None` while there are none.
     pub fn join(run: &str) -> Result<Option<Ports>, LinkError> {
-        let (node, user) = node("tumble facet")?;
+        let (node, alive) = node("tumble facet")?;
         let data = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>().open().ok());
-        let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, user)?) else { return Ok(None) };
+        let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, alive.user())?) else { return Ok(None) };
         let ports = Ports {
             publisher: publisher(&up, UP_BYTES).map_err(|why| refused(run, "up", why))?,
             subscriber: down.subscriber_builder().create().map_err(|why| refused(run, "down", why))?,
@@ -99,7 +100,7 @@ impl Ports {
             bell,
             sample: UP_BYTES,
             node,
-            user,
+            alive,
         };
         Ok(Some(ports))
     }
@@ -119,7 +120,7 @@ impl Ports {
 
     /// Looks again for the bell of a run: a new server of it may have another one.
     pub fn look_for_bell(&mut self, run: &str) -> Result<(), LinkError> {
-        if let Some(bell) = Bell::join(run, self.user)? {
+        if let Some(bell) = Bell::join(run, self.alive.user())? {
             self.bell = bell;
         }
         Ok(())
@@ -144,7 +145,7 @@ impl Ports {
     /// Removes what killed processes left.
     pub fn clean_up(&self) {
         self.node.try_cleanup_dead_nodes();
-        bell::clean_up(self.user);
+        bell::clean_up(self.alive.user());
     }
 }
 
@@ -160,31 +161,44 @@ impl AsRef<[u8]> for Lent {
     }
 }
 
+impl Drop for Ports {
+    fn drop(&mut self) {
+        self.node.try_cleanup_dead_nodes();
+    }
+}
+
 type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, [u8], Words>;
 
 fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Service, [u8], Words>, impl Debug> {
     service.publisher_builder().initial_max_slice_len(bytes).allocation_strategy(AllocationStrategy::Static).create()
 }
 
-/// A node, which removes what is stale as it begins, and the number of its user.
-fn node(name: &str) -> Result<(Node<Service>, u32), LinkError> {
+/// A node, which removes what is stale as it begins, and the word that it is here.
+fn node(name: &str) -> Result<(Node<Service>, Alive), LinkError> {
     set_log_level(LogLevel::Fatal); // what goes wrong is told by our errors
     let (folder, user) = folder()?;
     let text = folder.display().to_string();
     let unusable = |why: &dyn Debug| LinkError::Other(format!("shared memory: the folder {text} cannot be used: {why:?}"));
     let mut config = Config::default();
-    config.global.prefix = FileName::new(format!("tumble_{user}_").as_bytes()).map_err(|why| unusable(&why))?;
+    // Of another folder another one: nodes that do not see each other draw from different counters.
+    let prefix = format!("tumble_{user}_{}_", &blake3::hash(text.as_bytes()).to_hex()[..8]);
+    let alive = Alive::new(&folder, &prefix, user)?;
+    config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|why| unusable(&why))?;
     config.global.set_root_path(&Path::new(text.as_bytes()).map_err(|why| unusable(&why))?);
     let name = name.try_into().map_err(|why| unusable(&why))?;
     let builder = NodeBuilder::new().name(&name).config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
     let node = builder.create::<Service>().map_err(|why| unusable(&why))?;
     bell::clean_up(user);
-    Ok((node, user))
+    Ok((node, alive))
 }
 
 /// Removes what killed processes left.
 pub fn clean_up() -> Result<(), LinkError> {
-    node("tumble clean-up").map(|(node, _)| _ = node.try_cleanup_dead_nodes())
+    let (node, alive) = node("tumble clean-up")?;
+    node.try_cleanup_dead_nodes();
+    drop(node);
+    drop(alive);
+    Ok(())
 }
 
 /// A folder of this user alone, made if need be; and the user's number.
