@@ -1,6 +1,7 @@
 //! Caves under kill -9 and SIGSTOP: who goes on, who comes back, what is left.
 
 use crate::cave_place::*;
+use crate::common::json;
 use rustix::process::Signal;
 
 #[test]

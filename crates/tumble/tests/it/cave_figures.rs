@@ -5,7 +5,7 @@ use crate::cave_users::{SCENE, Server};
 use crate::common::{Folder, json, text};
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
-use tumble::net::sync::udp::{Timing, UdpFacet};
+use tumble::net::sync::udp::UdpFacet;
 use tumble::net::sync::{Facet, Input, Task};
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -62,7 +62,7 @@ fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
     let ms = |what: &str| told[what]["p50_ms"].as_f64().unwrap();
     // an input of one frame is shown by the next, and both wait for the second facet
     let later = 1e3 * LATER.as_secs_f64();
-    assert!(ms("skew") > later - 5.0 && ms("skew") <= ms("barrier"), "{told}");
+    assert!(ms("skew") > later - 5.0 && ms("skew") <= told["barrier"]["max_ms"].as_f64().unwrap(), "{told}");
     assert!(ms("input_to_picture") > 2.0 * later - 5.0 && ms("input_to_picture") <= 1e3 * told["wall_s"].as_f64().unwrap(), "{told}");
     assert_eq!(told["facets"][1]["refused_packets"], serde_json::json!({}));
 }

@@ -3,7 +3,7 @@
 
 use crate::cave_place::in_place;
 use crate::cave_users::{SCENE, Server, one_screen, place};
-use crate::common::{Folder, json, text};
+use crate::common::{json, text};
 use serde_json::{Value, json as value};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};

@@ -1,7 +1,7 @@
 //! What users do in a cave, by a facet of the test's own: keys walk, the wand pulls, bodies push; and recordings that are shown again.
 
 use crate::cave_place::{cave_of, in_place, make_runtime};
-use crate::common::{Folder, command, json, succeed, text};
+use crate::common::{Folder, json, succeed, text};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, ChildStderr, Stdio};
