@@ -4,7 +4,7 @@
 
 Needs the package installed (`scripts/test_python.sh` leaves it in target/py-tests). What is compared takes turns of some milliseconds, in changing order, and is
 measured as processor time of the thread. Each pair of turns gives a ratio, and each round, which begins with worlds and processes anew since where memory lies
-matters too, the median of its ratios; told is the median of the rounds with the interval that holds it at 96 %. Other work on the machine changes little.
+matters too, the median of its ratios; told is the median of the rounds with the interval that holds it at 95 %. Other work on the machine changes little.
 With NAMEs only what begins with one of them is run.
 """
 
@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from math import comb
 from pathlib import Path
 from statistics import median
 
@@ -38,7 +39,10 @@ shape = { type = "sphere", radius_m = 0.1 }
 mass_kg = 1.0
 position_m = [0, 0, 0.1]
 """
-WARM, TURN, PAIRS, ROUNDS = 240, 60, 40, 12  # steps before, steps of a turn, pairs of turns in a round, rounds
+WARM = 240  # steps before
+TURN, PAIRS, ROUNDS = 60, 40, 12  # steps of a turn, pairs of turns in a round, rounds
+# Between programs: a turn so long that being woken and reading a line (some 50 µs where Python does it) is nothing, and many starts, since a program's speed differs from one to the next.
+LONG, FEW, STARTS = 300, 6, 40
 
 
 def cpu(call):
@@ -48,13 +52,13 @@ def cpu(call):
     return time.thread_time() - begun
 
 
-def paired(begin):
+def paired(begin, rounds=ROUNDS, pairs=PAIRS):
     """How much dearer the first of two kinds of turns is; ``begin`` gives both, and what ends the round. Median less 1, its interval, seconds of the other."""
     order, ratios, plain = random.Random(0), [], []
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         one, other, end = begin()
         own = []
-        for _ in range(PAIRS):
+        for _ in range(pairs):
             if order.random() < 0.5:
                 a, b = one(), other()
             else:
@@ -64,13 +68,14 @@ def paired(begin):
         end()
         ratios.append(median(own))
     ratios.sort()
-    # of 12 the third to the tenth: the median lies there with 1 - 2 * (1 + 12 + 66) / 2**12 = 0.96
-    return median(ratios), ratios[2], ratios[-3], median(plain)
+    # fewer than `out` of all lie below the median, or above it, with 2 * (1 + n + n over 2 + ...) / 2**n
+    out = max(k for k in range(1, rounds) if 2 * sum(comb(rounds, i) for i in range(k)) <= 0.05 * 2**rounds)
+    return median(ratios), ratios[out - 1], ratios[-out], median(plain)
 
 
-def told(what, found):
+def told(what, found, steps=TURN):
     ratio, low, high, turn = found
-    print(f"{what}: {100 * ratio:+.2f} % ({100 * low:+.2f} to {100 * high:+.2f}; {1e6 * turn / TURN:.1f} µs a step)")
+    print(f"{what}: {100 * ratio:+.2f} % ({100 * low:+.2f} to {100 * high:+.2f}; {1e6 * turn / steps:.1f} µs a step)")
 
 
 def grid():
@@ -133,7 +138,7 @@ class Child:
 
     def turn(self):
         begun = self.ran()
-        self.step(TURN)
+        self.step(LONG)
         return self.ran() - begun
 
     def end(self):
@@ -164,16 +169,16 @@ def against_rust():
         scene = Path(folder) / "scene.toml"
         scene.write_text(GRID)
 
-        def begin(one, other):
+        def compare(what, one, other):
             def start():
                 a, b = Child(scene, one), Child(scene, other)
                 return a.turn, b.turn, lambda: (a.end(), b.end())
 
-            return start
+            told(what, paired(start, STARTS, FEW), LONG)
 
-        told("100 bodies, a program in Python against one in Rust", paired(begin(loop, rust)))
-        told("the same, step(n) against one in Rust", paired(begin(once, rust)))
-        told("one in Rust against itself", paired(begin(rust, rust)))
+        compare("100 bodies, a program in Python against one in Rust", loop, rust)
+        compare("the same, step(n) against one in Rust", once, rust)
+        compare("one in Rust against itself", rust, rust)
 
 
 def view_held():

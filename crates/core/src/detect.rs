@@ -39,9 +39,20 @@ pub(crate) struct Touch {
 }
 
 /// Last step's impulse (or force) per contact, world axes, on A.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct WarmStarts {
     entries: Vec<(Key, [f64; 3])>,
+}
+
+impl Clone for WarmStarts {
+    fn clone(&self) -> WarmStarts {
+        WarmStarts { entries: self.entries.clone() }
+    }
+
+    /// Into the memory that is there: a world does this every frame.
+    fn clone_from(&mut self, from: &WarmStarts) {
+        self.entries.clone_from(&from.entries);
+    }
 }
 
 impl WarmStarts {
@@ -63,7 +74,9 @@ impl WarmStarts {
     pub fn replace(&mut self, entries: impl Iterator<Item = (Key, Vec3)>) {
         self.entries.clear();
         self.entries.extend(entries.map(|(k, v)| (k, [v.x, v.y, v.z])));
-        self.entries.sort_by_key(|e| e.0);
+        if !self.in_order() {
+            self.entries.sort_by_key(|e| e.0);
+        }
     }
 
     /// What was filed under `key`. `place` is where the last search ended: keys that come in order are found in a step or two.

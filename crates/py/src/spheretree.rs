@@ -1,6 +1,6 @@
 //! Sphere trees: built, measured, written and read. The trees and all their figures are the library's.
 
-use crate::convert::path;
+use crate::convert::{path, whole_number};
 use crate::errors::{Error, Result, caught};
 use crate::shapes::triangles;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -84,8 +84,8 @@ impl SphereTree {
     #[pyo3(signature = (vertices, faces=None, *, method="medial", branch=None, depth=None, error=None, cache=true))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn build(
-        py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>, method: &str, branch: Option<u32>, depth: Option<u32>,
-        error: Option<f64>, cache: bool,
+        py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>, method: &str,
+        #[pyo3(from_py_with = whole_number)] branch: Option<u32>, #[pyo3(from_py_with = whole_number)] depth: Option<u32>, error: Option<f64>, cache: bool,
     ) -> Result<SphereTree> {
         let settings = settings(method, branch, depth, error)?;
         let (name, mut mesh) = (name_of(vertices, faces), triangles(py, vertices, faces)?);

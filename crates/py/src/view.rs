@@ -4,7 +4,7 @@
 //! kept would look into it. The arrays of one call serve the next, unless Python kept any. After the call the view
 //! refuses to be asked, and what was added to its arrays is read once and then no more.
 
-use crate::convert::vec3;
+use crate::convert::{vec3, whole_number};
 use crate::errors::{Error, Result};
 use crate::state::holders;
 use crate::bodies::place_of;
@@ -320,7 +320,7 @@ impl View {
 
     /// The row of a rigid body, given by name or as a handle; of an articulated body that of its part number ``part``.
     #[pyo3(signature = (body, part=0))]
-    fn row(&self, body: &Bound<'_, PyAny>, part: usize) -> Result<usize> {
+    fn row(&self, body: &Bound<'_, PyAny>, #[pyo3(from_py_with = whole_number)] part: usize) -> Result<usize> {
         let rows = self.row_of(body)?;
         match part < rows.len() {
             true => Ok(rows.start + part),
@@ -335,7 +335,7 @@ impl View {
     }
 
     /// Adds a force, shape (3,), N, that acts on a row at a point of the world, shape (3,), m: with the torque ``(point - position) × force``.
-    fn push(&self, py: Python<'_>, row: usize, force: &Bound<'_, PyAny>, point: &Bound<'_, PyAny>) -> Result<()> {
+    fn push(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] row: usize, force: &Bound<'_, PyAny>, point: &Bound<'_, PyAny>) -> Result<()> {
         self.open()?;
         let (force, point) = (vec3(force, "force")?, vec3(point, "point")?);
         if row >= self.moves.len() {

@@ -17,6 +17,9 @@ import tumble
 from tumble._native import _panic
 
 
+TETRAHEDRON = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
 def small():
     world = tumble.World()
     world.add_static("ground", tumble.HalfSpace())
@@ -75,6 +78,8 @@ def test_a_panic_in_another_thread_reaches_that_thread():
         lambda: small()[0].step(10**30),
         lambda: small()[0].step(-(10**30)),
         lambda: tumble.World(substeps=-1),
+        lambda: tumble.SphereTree.build(*TETRAHEDRON, branch=10**30),
+        lambda: tumble.SphereTree.build(*TETRAHEDRON, depth=-1),
         lambda: tumble.World(substeps=10**9),
         lambda: tumble.World(iterations=2**40),
         lambda: small()[0].render(-1, 10),

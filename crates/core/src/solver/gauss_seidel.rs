@@ -24,7 +24,10 @@ use super::one_contact::{Contact, Symmetric};
 use super::six::Six;
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{Block, RowSet, Rows};
+use smallvec::SmallVec;
 
+/// Blocks of an island that is solved without memory from the heap: a ball on a floor, a box on it.
+const FEW: usize = 4;
 /// Sweeps with extrapolation between them.
 const ACCELERATED: u32 = 200;
 
@@ -39,7 +42,7 @@ impl RowSolver for GaussSeidel {
 
     fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome {
         let mut linkages = Linkages::new(rows, blocks);
-        let mut locals: Vec<Local> = Vec::with_capacity(blocks.len());
+        let mut locals: SmallVec<[Local; FEW]> = SmallVec::with_capacity(blocks.len());
         for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
             if !linkages.hold(rows, block) {
                 locals.push(Local::new(rows, &mut linkages, block, c, lambda));
@@ -147,14 +150,14 @@ pub(super) struct Momentum {
     /// `β` of the sweep to come.
     beta: f64,
     /// First index and end of each stretch of `du`, one after the other; neighbours are joined.
-    stretches: Vec<(u32, u32)>,
+    stretches: SmallVec<[(u32, u32); 2 * FEW]>,
     /// `du` of the sweep before, of all stretches.
-    last: Vec<f64>,
+    last: SmallVec<[f64; 32]>,
 }
 
 impl Momentum {
     fn new(locals: &[Local], linkages: &Linkages, du: &[f64]) -> Momentum {
-        let mut stretches: Vec<(u32, u32)> = linkages.stretches().collect();
+        let mut stretches: SmallVec<[(u32, u32); 2 * FEW]> = linkages.stretches().collect();
         for (i, local) in locals.iter().enumerate() {
             // the contacts of a pair follow one another: one of them is enough
             let same = |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));

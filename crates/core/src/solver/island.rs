@@ -80,7 +80,8 @@ impl Islands {
         for i in 0..self.count.len() {
             self.starts.push(self.starts[i] + self.count[i]);
         }
-        let mut next: Vec<u32> = self.starts.clone();
+        let mut next = std::mem::take(&mut self.count);
+        next.clone_from(&self.starts);
         self.blocks.clear();
         self.blocks.resize(*self.starts.last().unwrap_or(&0) as usize, 0);
         for (b, block) in rows.blocks.iter().enumerate() {
@@ -90,5 +91,6 @@ impl Islands {
             self.blocks[next[island] as usize] = b as u32;
             next[island] += 1;
         }
+        self.count = next;
     }
 }

@@ -199,7 +199,7 @@ impl Backtracking {
         } else {
             hold_forces(core, work, &mut held);
         }
-        core.publish(&work.touches, impulses(work, &work.lambda).map(|f| f * left).collect(), impulses(work, &work.lambda));
+        core.publish(&work.touches, impulses(work, &work.lambda).map(|f| f * left), impulses(work, &work.lambda));
         Ok(held)
     }
 
@@ -361,6 +361,6 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
 /// Makes the whitened velocity `after` where it was `before`, and refreshes what readers see.
 fn push_to(core: &mut Core, after: &[f64], before: &[f64]) {
     let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
-    push(core, &change);
+    push(core, &change, &mut Vec::new());
     core.motion().refresh();
 }

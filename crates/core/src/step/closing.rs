@@ -54,7 +54,7 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     let mut rows = Workspace::default();
     lay_rows(core, &mut rows, level, None)?;
     let errors: Vec<f64> = rows.targets.iter().map(|t| t.error).collect();
-    let (start, time, pinned) = (core.x.to_vec(), core.time, core.unpin());
+    let (start, time, pinned) = (core.x.to_vec(), core.time, core.lift_pin());
     core.motion().coast(ahead);
     core.motion().refresh();
     core.time += ahead;
@@ -290,7 +290,7 @@ struct Open {
 impl Open {
     /// Sites and caches are left at the present, whose rows come in `probe`. Nothing is open where they are not those of `work`.
     fn measure(core: &mut Core, work: &Workspace, probe: &mut Workspace, step: (f64, Level), kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
-        let pinned = core.unpin();
+        let pinned = core.lift_pin();
         let open = Open::measure_here(core, work, probe, step, kept, pushed);
         core.pin_again(pinned);
         open
@@ -354,7 +354,7 @@ impl Open {
         }
         unwhiten_onto(core, &dx, moved);
         shift(core, &dx, 1.0);
-        push(core, &dv);
+        push(core, &dv, &mut Vec::new());
     }
 }
 

@@ -300,15 +300,14 @@ pub(crate) fn recover(core: &Core, du: &[f64], j: &mut [f64]) {
     }
 }
 
-/// Changes the whitened velocity of the state by `du`; the momentum (or velocity) that this is.
-pub(crate) fn push(core: &mut Core, du: &[f64]) -> Vec<f64> {
-    let mut dp = vec![0.0; core.dof];
+/// Changes the whitened velocity of the state by `du`; `dp` is the momentum (or velocity) that this is.
+pub(crate) fn push(core: &mut Core, du: &[f64], dp: &mut Vec<f64>) {
+    zero(dp, core.dof);
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
         body.unwhiten_rate(&du[v.clone()], &mut dp[v.clone()]);
         body.kick(&mut core.x[entry.span.x.clone()], &dp[v], 1.0);
     }
-    dp
 }
 
 /// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy: what overlaps goes apart and takes nothing from it.
@@ -323,19 +322,21 @@ pub(crate) fn shift(core: &mut Core, u: &[f64], h: f64) {
 
 /// `v += L⁻¹·u`.
 pub(crate) fn unwhiten_onto(core: &Core, u: &[f64], v: &mut [f64]) {
+    let mut velocity = Vec::new();
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), range) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
-        let mut velocity = vec![0.0; range.len()];
+        zero(&mut velocity, range.len());
         body.unwhiten(&u[range.clone()], &mut velocity);
         v[range].iter_mut().zip(&velocity).for_each(|(v, more)| *v += more);
     }
 }
 
 fn each_displaced(core: &mut Core, u: &[f64], go: impl Fn(&dyn Integratable, &mut [f64], &[f64])) {
+    let mut velocity = Vec::new();
     for entry in core.table.iter().filter(|e| e.moves()) {
         let (Some(body), u) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
         if u.iter().any(|u| *u != 0.0) {
-            let mut velocity = vec![0.0; u.len()];
+            zero(&mut velocity, u.len());
             body.unwhiten(u, &mut velocity);
             go(body, &mut core.x[entry.span.x.clone()], &velocity);
         }

@@ -93,7 +93,7 @@ pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64
         }
     }
     shift(core, &dx, 1.0);
-    push(core, &dv);
+    push(core, &dv, &mut Vec::new());
     core.motion().refresh();
     Ok(())
 }

@@ -89,7 +89,7 @@ fn ask_limits(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64) -> R
     if !work.limits.iter().any(|limit| limit.target.is_some_and(near)) {
         return Ok(());
     }
-    let (pinned, mut ends) = (core.unpin(), Vec::new());
+    let (pinned, mut ends) = (core.lift_pin(), Vec::new());
     core.motion().refresh();
     limits(core, core.time + h, &mut ends)?;
     core.pin_again(pinned);

@@ -44,6 +44,26 @@ pub struct TimeStepping {
     candidates: Vec<Candidate>,
     /// Impact impulse per row.
     impact: Vec<f64>,
+    buffers: Buffers,
+}
+
+/// Memory of a step, kept for the next: whitened velocities, and what is made of them.
+#[derive(Default)]
+struct Buffers {
+    /// After the impacts, then at the end.
+    after: Vec<f64>,
+    /// Row velocities before the impacts, and what the forces add to them.
+    before: Vec<f64>,
+    gain: Vec<f64>,
+    change: Vec<f64>,
+    dp: Vec<f64>,
+    parabola: Vec<f64>,
+    rest: Vec<f64>,
+    mean: Vec<f64>,
+    /// Multipliers of impacts and contacts.
+    total: Vec<f64>,
+    /// Which blocks are solved.
+    keep: Vec<bool>,
 }
 
 /// Passes of the impact phase at most.
@@ -76,11 +96,12 @@ impl TimeStepping {
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
         whiten(core, &self.work.dp, h, &mut u, &mut du_force);
-        let mut after = self.impacts(core, h, &mut u, &mut du_force)?;
+        let mut after = std::mem::take(&mut self.buffers.after);
+        self.impacts(core, h, &mut u, &mut du_force, &mut after)?;
         self.look_again(core, h, &u, &after)?;
         self.contacts(core, h, &mut after, &du_force);
         self.commit(core, h, &u, &after, &du_force)?;
-        (self.work.u, self.work.du_force) = (u, du_force);
+        (self.work.u, self.work.du_force, self.buffers.after) = (u, du_force, after);
         core.finish_substep(h)
     }
 
@@ -94,27 +115,28 @@ impl TimeStepping {
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.take_off_coasting(&mut self.work.dp);
         core.check_finite(&self.work.dp)?;
-        let middle = core.x.to_vec();
+        core.pin();
         core.x.copy_from_slice(&self.x0);
-        core.pin(middle);
         core.motion().refresh();
         Ok(())
     }
 
-    /// Times the impacts that free motion meets within the step and resolves them; the whitened velocity after them, forces not yet added. Where there are
+    /// Times the impacts that free motion meets within the step and resolves them: `after` is the whitened velocity after them, forces not yet added. Where there are
     /// any, rows and whitened velocities are made anew for where they are.
-    fn impacts(&mut self, core: &mut Core, h: f64, u: &mut Vec<f64>, du_force: &mut Vec<f64>) -> Result<Vec<f64>, StepError> {
+    fn impacts(&mut self, core: &mut Core, h: f64, u: &mut Vec<f64>, du_force: &mut Vec<f64>, after: &mut Vec<f64>) -> Result<(), StepError> {
         let work = &mut self.work;
+        after.clone_from(u);
         self.share.clear();
         self.share.resize(core.dof, -1.0);
         zero(&mut self.impact, work.rows.len);
         self.candidates.clear();
         if work.touches.iter().all(|t| t.restitution <= 0.0) {
-            return Ok(u.to_vec());
+            return Ok(());
         }
-        let (mut before, mut gain, mut meets) = (Vec::new(), Vec::new(), Vec::new());
-        row_velocities(&work.rows, &work.bias, u, &mut before);
-        row_velocities(&work.rows, &vec![0.0; work.rows.len], du_force, &mut gain);
+        let (before, gain, mut meets) = (&mut self.buffers.before, &mut self.buffers.gain, Vec::new());
+        row_velocities(&work.rows, &work.bias, u, before);
+        zero(gain, work.rows.len);
+        work.rows.add_velocity(du_force, gain);
         for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
             let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], touch.contact.gap);
             let rest_speed = (-dv).max(impact::SLOWEST_BOUNCE);
@@ -127,7 +149,7 @@ impl TimeStepping {
             self.candidates.push(Candidate { takes_part: gap <= core.settings.drift_tolerance, rest_speed, restitution: touch.restitution });
         }
         if self.share.iter().all(|s| *s < 0.0) {
-            return Ok(u.to_vec());
+            return Ok(());
         }
         self.first_impacts(&meets);
         self.pin_at_impacts(core, h);
@@ -135,14 +157,15 @@ impl TimeStepping {
         build_rows(core, work, Level::Velocity { h }, 0.5 * h)?;
         whiten(core, &work.dp, h, u, du_force);
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.share[i].max(0.0) * du_force[i]).collect();
-        let mut after = at_impact.clone();
-        impact::resolve(core, work, &self.candidates, IMPACT_PASSES, &mut after, &mut self.impact);
-        Ok((0..u.len()).map(|i| u[i] + (after[i] - at_impact[i])).collect())
+        after.clone_from(&at_impact);
+        impact::resolve(core, work, &self.candidates, IMPACT_PASSES, after, &mut self.impact);
+        (0..u.len()).for_each(|i| after[i] = u[i] + (after[i] - at_impact[i]));
+        Ok(())
     }
 
     /// Pins what meets something where it does so.
     fn pin_at_impacts(&self, core: &mut Core, h: f64) {
-        let (mut x, _) = core.unpin();
+        let mut x = std::mem::take(&mut core.pinned.0);
         for entry in core.table.iter().filter(|e| !in_the_middle(e)) {
             let share = entry.span.v.clone().next().map_or(-1.0, |i| self.share[i]);
             if share >= 0.0 {
@@ -151,7 +174,7 @@ impl TimeStepping {
                 coast(entry, x, h * share);
             }
         }
-        core.pin(x);
+        core.pinned.0 = x;
         core.motion().refresh();
     }
 
@@ -162,7 +185,7 @@ impl TimeStepping {
             return Ok(());
         }
         let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
-        push(core, &change);
+        push(core, &change, &mut Vec::new());
         core.motion().refresh();
         let mut found = Vec::new();
         detect(core, h, Reach::Each, &mut found);
@@ -215,7 +238,9 @@ impl TimeStepping {
         let work = &mut self.work;
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
         row_velocities(&work.rows, &work.bias, u, &mut work.c);
-        let mut keep = vec![true; work.rows.blocks.len()];
+        let keep = &mut self.buffers.keep;
+        keep.clear();
+        keep.resize(work.rows.blocks.len(), true);
         for (i, touch) in work.touches.iter().enumerate() {
             let (row, gap) = (work.rows.blocks[i].row as usize, touch.contact.gap);
             let struck = self.impact[row] > 0.0;
@@ -241,27 +266,33 @@ impl TimeStepping {
     /// Writes the state at the end of the step.
     fn commit(&mut self, core: &mut Core, h: f64, u0: &[f64], u1: &[f64], du_force: &[f64]) -> Result<(), StepError> {
         let share = |i: usize| if self.share[i] < 0.0 { 0.5 } else { self.share[i] };
-        let change: Vec<f64> = u1.iter().zip(u0).map(|(a, b)| a - b).collect();
+        let Buffers { change, dp, parabola, rest, mean, total, .. } = &mut self.buffers;
+        let write = |out: &mut Vec<f64>, of: &dyn Fn(usize) -> f64| {
+            out.clear();
+            out.extend((0..u0.len()).map(of));
+        };
+        write(change, &|i| u1[i] - u0[i]);
         let before = |e: &Entry| e.span.v.clone().next().filter(|_| !in_the_middle(e)).map_or(0.5, share);
         for entry in core.table.iter() {
             coast(entry, &mut core.x[entry.span.x.clone()], h * before(entry));
         }
-        let dp = push(core, &change);
+        push(core, change, dp);
         for entry in core.table.iter() {
             coast(entry, &mut core.x[entry.span.x.clone()], h * (1.0 - before(entry)));
         }
-        let parabola: Vec<f64> = (0..core.dof).map(|i| (share(i) - 0.5) * du_force[i]).collect();
-        let mut rest = parabola.clone();
+        write(parabola, &|i| (share(i) - 0.5) * du_force[i]);
+        rest.clone_from(parabola);
         for i in core.table.iter().filter(|e| in_the_middle(e)).flat_map(|e| e.span.v.clone()) {
             rest[i] -= (share(i) - 0.5) * change[i];
         }
-        shift(core, &rest, h);
-        let mean: Vec<f64> = (0..core.dof).map(|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]).collect();
+        shift(core, rest, h);
+        write(mean, &|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]);
         let recovery = core.settings.recovery_speed * h;
         let least = core.settings.contact_tolerance;
-        projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean: &mean, h }, recovery, least)?;
-        let total: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
-        core.publish(&self.work.touches, impulses(&self.work, &total).collect(), impulses(&self.work, &self.work.lambda).map(|i| i / h));
+        projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean, h }, recovery, least)?;
+        total.clear();
+        total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
+        core.publish(&self.work.touches, impulses(&self.work, total), impulses(&self.work, &self.work.lambda).map(|i| i / h));
         let kept = reach::left(&self.work, |i| self.work.targets[i].error, recovery);
         closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();
@@ -270,7 +301,7 @@ impl TimeStepping {
             let passed = hold::passed(core, &mut self.probe, h)?;
             hold::hold(core, &mut self.probe, &passed, h, recovery)?;
         }
-        core.check_finite(&dp)
+        core.check_finite(dp)
     }
 }
 

@@ -98,6 +98,8 @@ pub struct Core {
     pub(crate) held_wrenches: Vec<Wrench>,
     /// Where the caches of what moves are kept, whatever state is refreshed; empty for none. And the sites there.
     pub(crate) pinned: (Vec<f64>, Vec<Site>),
+    /// Memory of what was pinned last, for the next.
+    pub(crate) unpinned: (Vec<f64>, Vec<Site>),
     pub(crate) forces: Forces,
     pub(crate) settings: Settings,
     pub(crate) time: f64,
@@ -121,14 +123,21 @@ impl Core {
         self.held_wrenches.clear();
     }
 
-    /// Keeps the caches of what moves at the state `x` until [`unpin`](Self::unpin): where in a step impulses act. From the next refresh on; sites still
+    /// Keeps the caches of what moves at the present state until [`unpin`](Self::unpin): where in a step impulses act. From the next refresh on; sites still
     /// follow the state.
-    pub(crate) fn pin(&mut self, x: Vec<f64>) {
-        self.pinned = (x, self.sites.clone());
+    pub(crate) fn pin(&mut self) {
+        self.pinned = std::mem::take(&mut self.unpinned);
+        self.x.clone_into(&mut self.pinned.0);
+        self.pinned.1.clone_from(&self.sites);
     }
 
-    /// Lets the caches follow again from the next refresh on; what was pinned, to be put back.
-    pub(crate) fn unpin(&mut self) -> (Vec<f64>, Vec<Site>) {
+    /// Lets the caches follow again from the next refresh on.
+    pub(crate) fn unpin(&mut self) {
+        self.unpinned = std::mem::take(&mut self.pinned);
+    }
+
+    /// The same for a while; what was pinned, to be put back.
+    pub(crate) fn lift_pin(&mut self) -> (Vec<f64>, Vec<Site>) {
         std::mem::take(&mut self.pinned)
     }
 
@@ -155,7 +164,7 @@ impl Core {
     }
 
     /// Shows the contacts of the sub-step and files their forces as warm starts.
-    pub(crate) fn publish(&mut self, touches: &[Touch], impulses: Vec<Vec3>, forces: impl Iterator<Item = Vec3>) {
+    pub(crate) fn publish(&mut self, touches: &[Touch], impulses: impl Iterator<Item = Vec3>, forces: impl Iterator<Item = Vec3>) {
         self.contacts.clear();
         for ((touch, impulse), force) in touches.iter().zip(impulses).zip(forces) {
             let (a, b) = (self.owners[touch.a as usize], self.owners[touch.b as usize]);
@@ -187,9 +196,9 @@ impl Core {
 
     /// Stops forces and impulses that are not numbers, and objects that cannot move.
     pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
-        let trouble = |e: &Entry| Some((e.object.name().to_string(), e.object.integratable()?.trouble()?));
-        if let Some((object, why)) = self.table.iter().filter(|e| e.moves()).find_map(trouble) {
-            return Err(StepError::Singular { object, why, time: self.time });
+        let trouble = |e: &Entry| Some(StepError::Singular { why: e.object.integratable()?.trouble()?, object: e.object.name().to_string(), time: self.time });
+        if let Some(error) = self.table.iter().filter(|e| e.moves()).find_map(trouble) {
+            return Err(error);
         }
         let accelerates = |s: &Site| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
         let fine = |e: &&Entry| dp[e.span.v.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(accelerates);

@@ -90,6 +90,7 @@ pub struct World {
     stepper: Box<dyn Stepper>,
     /// State before the frame, for when it fails.
     before: Vec<f64>,
+    warm_before: WarmStarts,
     names: BTreeMap<String, ObjectId>,
 }
 
@@ -98,12 +99,12 @@ impl World {
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
         let core = Core {
-            table: Table::default(), x: Default::default(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), held_wrenches: Vec::new(), pinned: Default::default(),
+            table: Table::default(), x: Default::default(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), held_wrenches: Vec::new(), pinned: Default::default(), unpinned: Default::default(),
             forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
             detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
             report: StepReport::default(), next_serial: 0, sleepers: Sleepers::default(), inner_step: 0.0,
         };
-        Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new(), names: BTreeMap::new() })
+        Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new(), warm_before: WarmStarts::default(), names: BTreeMap::new() })
     }
 
     /// Replaces the stepper.
@@ -139,7 +140,8 @@ impl World {
         let core = &mut self.core;
         core.wake_disturbed();
         core.x.clone_into(&mut self.before);
-        let (time, warm, inner_step) = (core.time, core.warm.clone(), core.inner_step);
+        self.warm_before.clone_from(&core.warm);
+        let (time, inner_step) = (core.time, core.inner_step);
         let sites = if core.sleepers.groups.is_empty() { Vec::new() } else { core.sites.clone() };
         let outcome = loop {
             core.report = StepReport::default();
@@ -152,7 +154,8 @@ impl World {
             core.x.copy_from_slice(&self.before);
             core.unpin();
             core.sites.clone_from(&sites);
-            (core.time, core.warm, core.inner_step) = (time, warm.clone(), inner_step);
+            (core.time, core.inner_step) = (time, inner_step);
+            core.warm.clone_from(&self.warm_before);
             core.motion().refresh();
             core.wake_stirred();
         };
@@ -165,7 +168,8 @@ impl World {
         if let Err(error) = outcome {
             core.x.copy_from_slice(&self.before);
             core.unpin();
-            (core.time, core.warm, core.inner_step) = (time, warm, inner_step);
+            (core.time, core.inner_step) = (time, inner_step);
+            core.warm.clone_from(&self.warm_before);
             core.sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
             core.motion().refresh();
             return Err(error);
@@ -336,13 +340,14 @@ impl World {
         let c = &self.core;
         World {
             core: Core {
-                table: c.table.clone(), x: c.x.fork(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(),
+                table: c.table.clone(), x: c.x.fork(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(), unpinned: Default::default(),
                 held: c.held.clone(), held_wrenches: c.held_wrenches.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
                 contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, sleepers: c.sleepers.clone(), inner_step: c.inner_step,
             },
             stepper: self.stepper.fork(),
             before: Vec::new(),
+            warm_before: WarmStarts::default(),
             names: self.names.clone(),
         }
     }
