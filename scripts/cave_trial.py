@@ -95,6 +95,11 @@ def alive(pid):
         return False
 
 
+def memory():
+    """What this user's processes have in shared memory."""
+    return {file.name for file in Path("/dev/shm").glob(f"tumble_{os.getuid()}_*")}
+
+
 def others_run():
     """Whether somebody else's run of this user goes on, whose memory is no litter."""
     named = [Path(f"/proc/{pid}/comm") for pid in os.listdir("/proc") if pid.isdigit()]
@@ -224,7 +229,7 @@ def freezes(options):
 
 def launchers(options):
     """The launcher, which is the server, is killed at random times: its facets end by themselves, and the next run begins."""
-    rng, gone, left = random.Random(options.seed), [], 0
+    rng, gone, left, before = random.Random(options.seed), [], 0, memory()
     cave = small_cave("launchers")
     for k in range(options.kills):
         folder = OUT / f"launchers_{k}"
@@ -239,9 +244,9 @@ def launchers(options):
         gone.append(time.time() - killed)
         left += len(pids) != len(FACETS)
         shutil.rmtree(folder)
-    shared = list(Path("/dev/shm").glob(f"tumble_{os.getuid()}_*")) if not others_run() else []
+    shared = memory() - before if not others_run() else set()
     print(f"launchers: {options.kills} times kill -9 of the launcher; all its facets had ended after {spread(gone)}; the next run began each time; "
-          f"left in shared memory: {[file.name for file in shared] or 'nothing'}", flush=True)
+          f"left in shared memory: {sorted(shared) or 'nothing'}", flush=True)
     return left == 0 and not shared
 
 
