@@ -95,6 +95,17 @@ def alive(pid):
         return False
 
 
+def memory():
+    """What this user's processes have in shared memory."""
+    return {file.name for file in Path("/dev/shm").glob(f"tumble_{os.getuid()}_*")}
+
+
+def others_run():
+    """Whether somebody else's run of this user goes on, whose memory is no litter."""
+    named = [Path(f"/proc/{pid}/comm") for pid in os.listdir("/proc") if pid.isdigit()]
+    return any("tumble" in path.read_text() for path in named if path.exists())
+
+
 def wait_for(ready, seconds=60):
     until = time.time() + seconds
     while not ready():
@@ -176,7 +187,7 @@ def kills(options, pictures=False):
         [code] = end(run)
     same, summary = same_states(folder), json.loads(folder.with_suffix(".json").read_text())
     wrong = sum(facet["mismatched"] + facet["torn"] for facet in summary["facets"])
-    print(f"{name}: {options.kills} times kill -9 of a facet; back after {spread(back)}, of which 200 ms are a pause; "
+    print(f"{name}: {options.kills} times kill -9 of a facet; back after {spread(back)}; "
           f"states {'the same' if same else 'DIFFERENT'}, {wrong} mismatched or torn, exit code {code}", flush=True)
     return same and wrong == 0 and code == 0 and max(back) < 1.0
 
@@ -218,7 +229,7 @@ def freezes(options):
 
 def launchers(options):
     """The launcher, which is the server, is killed at random times: its facets end by themselves, and the next run begins."""
-    rng, gone, left = random.Random(options.seed), [], 0
+    rng, gone, left, before = random.Random(options.seed), [], 0, memory()
     cave = small_cave("launchers")
     for k in range(options.kills):
         folder = OUT / f"launchers_{k}"
@@ -233,8 +244,10 @@ def launchers(options):
         gone.append(time.time() - killed)
         left += len(pids) != len(FACETS)
         shutil.rmtree(folder)
-    print(f"launchers: {options.kills} times kill -9 of the launcher; all its facets had ended after {spread(gone)}; the next run began each time", flush=True)
-    return left == 0
+    shared = memory() - before if not others_run() else set()
+    print(f"launchers: {options.kills} times kill -9 of the launcher; all its facets had ended after {spread(gone)}; the next run began each time; "
+          f"left in shared memory: {sorted(shared) or 'nothing'}", flush=True)
+    return left == 0 and not shared
 
 
 def servers(options):

@@ -44,13 +44,13 @@ fuzz_target!(|bytes: &[u8]| {
         if server.idle() && server.complete() {
             server.publish(now, &world(), &Viewer::default()).expect("a sound world");
         }
-        server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, &out.message));
+        server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
         let header = Header { kind: KINDS[*kind as usize % 13], run: (*whose as u64) & 1, join: if whose & 2 == 0 { join } else { 0 }, frame: *frame as u64, time_s: 0.0 };
         let shot = message(&header, |out| out.extend(payload));
         if whose & 4 == 0 {
             server.on_event(now, 0, LinkEvent::Message, &shot);
         } else {
-            facet.on_event(now, LinkEvent::Message, &shot);
+            facet.on_event(now, LinkEvent::Message, shot.clone().into());
         }
         assert!(server.events().len() < 100);
     }

@@ -4,7 +4,7 @@ use super::options::Options;
 use super::{Failure, clock_ns};
 use std::time::{Duration, Instant};
 use tumble_net::sync::shm::ShmFacet;
-use tumble_net::sync::transport::{Delivery, FacetLink, LinkEvent};
+use tumble_net::sync::transport::{Delivery, FacetLink, LinkEvent, Message};
 use tumble_net::sync::udp::{SharedKey, Timing, UdpFacet};
 
 /// Words of a message: what it is, and its frame.
@@ -35,7 +35,7 @@ pub fn connect(options: &Options) -> Result<Box<dyn FacetLink>, Failure> {
 /// Until the server says END or is gone, or nothing comes for 20 s.
 pub fn run(options: &Options) -> Result<(), Failure> {
     let mut link = connect(options)?;
-    let mut message = Vec::new();
+    let mut message = Message::default();
     let mut expected = 0;
     let (mut faults, mut last) = (0u64, Instant::now());
     while last.elapsed() < Duration::from_secs(20) {

@@ -32,9 +32,10 @@ pub struct Options {
     pub key: Option<PathBuf>,
     pub faults: Faults,
     pub seed: u64,
+    pub stay_awake: bool,
 }
 
-const USAGE: &str = "link_trial [--transport shm|udp] [--facets 6] [--bytes 65536] [--rate 500] [--frames 2000]
+const USAGE: &str = "link_trial [--transport shm|udp] [--facets 6] [--bytes 65536] [--rate 500] [--frames 2000] [--stay-awake yes]
   udp: [--address 127.0.0.1:7711] [--key FILE] [--loss 0.05] [--reorder 0.1] [--duplicate 0.02] [--delay-ms 1] [--jitter-ms 0] [--seed 1]
   apart: --role server | --role facet --facet K --connect ADDRESS | --role relay --listen ADDRESS --address SERVER;   shm: [--run NAME]";
 
@@ -56,6 +57,7 @@ impl Options {
             key: None,
             faults: Faults::default(),
             seed: 1,
+            stay_awake: false,
         };
         while let Some(word) = words.next() {
             let value = words.next().ok_or_else(|| format!("{word} needs a value\n{USAGE}"))?;
@@ -91,6 +93,7 @@ impl Options {
                 "--delay-ms" => o.faults.delay_s = ms()? / 1e3,
                 "--jitter-ms" => o.faults.jitter_s = ms()? / 1e3,
                 "--seed" => o.seed = value.parse()?,
+                "--stay-awake" => o.stay_awake = value == "yes",
                 _ => return Err(format!("{word} {value} is not understood\n{USAGE}").into()),
             }
         }

@@ -6,7 +6,7 @@ use super::messages::FacetCounts;
 use super::publisher::PublishError;
 use super::recording::Recorded;
 use super::server::{SeatCounts, ServerEvent, ServerOptions, ServerSession, Standing};
-use super::transport::{FacetLink, FacetNumber, LinkCounters, LinkError, ServerLink};
+use super::transport::{FacetLink, FacetNumber, LinkCounters, LinkError, Message, ServerLink};
 use super::viewer::Viewer;
 use super::wire::Hash;
 use std::time::{Duration, Instant};
@@ -25,6 +25,9 @@ pub enum SessionError {
     #[error("{} did not join within {:.1} s; start them, or look at why they end", .0.join(", "), .1.as_secs_f64())]
     Missing(Vec<String>, Duration),
 }
+
+/// A wait that is over when something comes or is due.
+const LONG: Duration = Duration::from_secs(1);
 
 /// A server and its link.
 pub struct Server<L> {
@@ -61,13 +64,46 @@ impl<L: ServerLink> Server<L> {
     /// # Errors
     /// The link's, and [`PublishError`].
     pub fn frame(&mut self, world: &World, viewer: &Viewer) -> Result<u64, SessionError> {
+        let frame = self.begin(world, viewer)?;
+        while !self.shown(LONG)? {}
+        Ok(frame)
+    }
+
+    /// Publishes the world as the next frame, and does not wait: [`shown`](Self::shown) does. Its number.
+    ///
+    /// # Errors
+    /// The link's, and [`PublishError`].
+    pub fn begin(&mut self, world: &World, viewer: &Viewer) -> Result<u64, SessionError> {
         self.turn(Duration::ZERO)?;
         let frame = self.session.publish(self.now(), world, viewer)?;
         self.flush()?;
-        while !self.session.idle() {
-            self.turn(Duration::from_millis(5))?;
-        }
         Ok(frame)
+    }
+
+    /// Publishes a frame as it was recorded, like [`begin`](Self::begin).
+    ///
+    /// # Errors
+    /// The link's.
+    pub fn begin_recorded(&mut self, recorded: &Recorded) -> Result<(), SessionError> {
+        self.turn(Duration::ZERO)?;
+        self.session.publish_recorded(self.now(), recorded);
+        self.flush()
+    }
+
+    /// Whether the frame is shown by all who are waited for, after waiting for that for at most `timeout`.
+    ///
+    /// # Errors
+    /// The link's.
+    pub fn shown(&mut self, timeout: Duration) -> Result<bool, SessionError> {
+        let until = self.now().saturating_add(timeout);
+        while !self.session.idle() {
+            let left = until.saturating_sub(self.now());
+            if left.is_zero() {
+                return Ok(false);
+            }
+            self.turn(left)?;
+        }
+        Ok(true)
     }
 
     /// Publishes a frame as it was recorded, and waits like [`frame`](Self::frame).
@@ -75,13 +111,18 @@ impl<L: ServerLink> Server<L> {
     /// # Errors
     /// The link's.
     pub fn replay(&mut self, recorded: &Recorded) -> Result<(), SessionError> {
-        self.turn(Duration::ZERO)?;
-        self.session.publish_recorded(self.now(), recorded);
-        self.flush()?;
-        while !self.session.idle() {
-            self.turn(Duration::from_millis(5))?;
-        }
+        self.begin_recorded(recorded)?;
+        while !self.shown(LONG)? {}
         Ok(())
+    }
+
+    /// A facet's process has ended: nobody waits for it any more.
+    ///
+    /// # Errors
+    /// The link's.
+    pub fn lose(&mut self, facet: FacetNumber) -> Result<(), SessionError> {
+        self.session.lose(self.now(), facet);
+        self.flush()
     }
 
     /// The session, to be asked.
@@ -96,7 +137,7 @@ impl<L: ServerLink> Server<L> {
     pub fn idle_until(&mut self, until: Duration) -> Result<(), SessionError> {
         loop {
             let left = until.saturating_sub(self.now());
-            self.turn(left.min(Duration::from_millis(5)))?;
+            self.turn(left)?;
             if left.is_zero() {
                 return Ok(());
             }
@@ -144,9 +185,10 @@ impl<L: ServerLink> Server<L> {
         (here, there, self.link.counters(facet))
     }
 
-    /// Waits for one report of the link, at most `timeout`, and does what is due.
+    /// Waits for one report of the link, at most `timeout` and until something is due, and does what is due.
     fn turn(&mut self, timeout: Duration) -> Result<(), SessionError> {
-        let event = self.link.recv(timeout, &mut self.buffer)?;
+        let due = self.session.wake().map_or(timeout, |wake| wake.saturating_sub(self.now()));
+        let event = self.link.recv(timeout.min(due), &mut self.buffer)?;
         let now = self.now();
         match event {
             Some((facet, event)) => self.session.on_event(now, facet, event, &self.buffer),
@@ -169,13 +211,12 @@ pub struct Facet<L> {
     link: L,
     session: FacetSession,
     start: Instant,
-    buffer: Vec<u8>,
 }
 
 impl<L: FacetLink> Facet<L> {
     /// `base`: the world as the scene file makes it.
     pub fn new(link: L, options: FacetOptions, base: World) -> Facet<L> {
-        Facet { link, session: FacetSession::new(options, base), start: Instant::now(), buffer: Vec::new() }
+        Facet { link, session: FacetSession::new(options, base), start: Instant::now() }
     }
 
     /// What to do next, after waiting for it for at most `timeout`. On [`Task::Draw`] call [`begin`](Self::begin), draw, and [`drawn`](Self::drawn); on
@@ -262,10 +303,11 @@ impl<L: FacetLink> Facet<L> {
     }
 
     fn turn(&mut self, timeout: Duration) -> Result<(), SessionError> {
-        let event = self.link.recv(timeout, &mut self.buffer)?;
+        let mut message = Message::default();
+        let event = self.link.recv(timeout, &mut message)?;
         let now = self.now();
         match event {
-            Some(event) => self.session.on_event(now, event, &self.buffer),
+            Some(event) => self.session.on_event(now, event, message),
             None => self.session.advance(now),
         }
         self.flush()

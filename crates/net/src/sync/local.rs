@@ -1,6 +1,6 @@
 //! The transport within one process: queues behind a lock. Nothing is lost, so it is the reference for the others.
 
-use super::transport::{Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES, ServerLink};
+use super::transport::{Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES, Message, ServerLink};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -220,7 +220,7 @@ impl FacetLink for LocalFacet {
         Ok(sent)
     }
 
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<LinkEvent>, LinkError> {
+    fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError> {
         message.clear();
         let k = self.facet as usize;
         let item = wait(&self.shared, timeout, |wires| {
@@ -229,7 +229,7 @@ impl FacetLink for LocalFacet {
             Some(item)
         });
         Ok(item.map(|item| {
-            *message = item.bytes;
+            *message = item.bytes.into();
             item.event
         }))
     }

@@ -51,6 +51,7 @@
 //! [`wire`] has the frame around all of them, [`table`] the snapshot and the state, [`messages`] and [`input`] the small ones, [`quantise`] the poses with
 //! their stated error. `docs/netsync.md` tells the whole.
 
+pub mod awake;
 mod drawn;
 mod drive;
 pub mod facet;

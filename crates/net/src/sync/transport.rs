@@ -101,11 +101,68 @@ pub trait FacetLink {
     /// Errors: this side's system refuses.
     fn send(&mut self, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError>;
     /// Waits at most `timeout` for something from the server. `message` is cleared, and filled on [`LinkEvent::Message`]. `None`: time is over.
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<LinkEvent>, LinkError>;
+    fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError>;
     /// Ends the connection; the link then looks for a server anew. `recv` reports `Closed(ByUs)` if there was one.
     fn close(&mut self);
     /// What happened on this link so far.
     fn counters(&self) -> LinkCounters;
+}
+
+/// The bytes of a message that arrived: a facet's own, or lent by the transport where they lie (shared memory), until this is dropped.
+#[derive(Default)]
+pub struct Message(Bytes);
+
+enum Bytes {
+    Own(Vec<u8>),
+    Lent(Box<dyn AsRef<[u8]> + Send>),
+}
+
+impl Message {
+    /// Shows bytes that somebody lends.
+    pub fn lent(bytes: impl AsRef<[u8]> + Send + 'static) -> Message {
+        Message(Bytes::Lent(Box::new(bytes)))
+    }
+
+    /// The bytes as one's own: copied if they are lent.
+    pub fn into_vec(self) -> Vec<u8> {
+        match self.0 {
+            Bytes::Own(bytes) => bytes,
+            Bytes::Lent(bytes) => (*bytes).as_ref().to_vec(),
+        }
+    }
+
+    /// An empty one, and the buffer that this one had, if it had one of its own.
+    pub(crate) fn clear(&mut self) -> Vec<u8> {
+        match std::mem::take(&mut self.0) {
+            Bytes::Own(mut buffer) => {
+                buffer.clear();
+                buffer
+            }
+            Bytes::Lent(_) => Vec::new(),
+        }
+    }
+}
+
+impl Default for Bytes {
+    fn default() -> Bytes {
+        Bytes::Own(Vec::new())
+    }
+}
+
+impl From<Vec<u8>> for Message {
+    fn from(bytes: Vec<u8>) -> Message {
+        Message(Bytes::Own(bytes))
+    }
+}
+
+impl std::ops::Deref for Message {
+    type Target = [u8];
+    fn deref(&self) -> &[u8] {
+        match &self.0 {
+            Bytes::Own(bytes) => bytes,
+            Bytes::Lent(bytes) => (**bytes).as_ref(),
+        }
+    }
 }
 
 /// Why something that arrived was not taken.

@@ -54,9 +54,9 @@ impl Cave {
     }
 
     fn look_in_on(&mut self, k: usize) {
-        let mut message = Vec::new();
+        let mut message = Message::default();
         if let Some(event) = self.facets[k].recv(Duration::from_millis(1), &mut message).unwrap() {
-            self.at_facet[k].push((event, message));
+            self.at_facet[k].push((event, message.into_vec()));
         }
     }
 }
@@ -170,7 +170,7 @@ fn a_server_started_again_in_the_same_run_is_found() {
 fn child_answers_until_killed() {
     let run = std::env::var(RUN).expect("only the killing test runs this");
     let mut facet = ShmFacet::new(&run, 0).unwrap();
-    let mut message = Vec::new();
+    let mut message = Message::default();
     let end = Instant::now() + Duration::from_secs(30);
     while Instant::now() < end {
         if facet.recv(Duration::from_millis(100), &mut message).unwrap() == Some(LinkEvent::Message) {

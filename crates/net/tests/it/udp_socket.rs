@@ -20,26 +20,27 @@ fn sockets_on_loopback_carry_long_and_short_messages_both_ways() {
     let mut facets = [0, 1].map(|facet| UdpFacet::connect(address, facet, key(), Timing::default()).unwrap());
     let mut stranger = UdpFacet::connect(address, 0, Some(SharedKey::new([4; 32])), Timing::default()).unwrap();
     let (wait, mut message) = (Duration::from_millis(10), Vec::new());
+    let mut lent = Message::default();
     let mut opened = 0;
     until(|| {
         opened += u8::from(server.recv(wait, &mut message).unwrap().is_some_and(|(_, event)| event == LinkEvent::Opened));
         opened == 2
     });
     for facet in &mut facets {
-        until(|| facet.recv(wait, &mut message).unwrap() == Some(LinkEvent::Opened));
+        until(|| facet.recv(wait, &mut lent).unwrap() == Some(LinkEvent::Opened));
     }
     let long: Vec<u8> = (0..2_000_000u32).map(|k| (k.wrapping_mul(k) >> 7) as u8).collect();
     assert_eq!(server.send_all(&[0, 1], Delivery::Reliable, &long).unwrap(), 2);
     for (k, facet) in facets.iter_mut().enumerate() {
-        until(|| facet.recv(wait, &mut message).unwrap() == Some(LinkEvent::Message));
-        assert!(message == long);
+        until(|| facet.recv(wait, &mut lent).unwrap() == Some(LinkEvent::Message));
+        assert!(*lent == *long);
         assert!(facet.send(Delivery::Reliable, &[k as u8 + 1]).unwrap());
         until(|| server.recv(wait, &mut message).unwrap() == Some((k as u16, LinkEvent::Message)));
         assert_eq!(message, [k as u8 + 1]);
     }
     // The other key: no answer, no connection, and the reason is counted.
     until(|| {
-        assert_eq!(stranger.recv(wait, &mut message).unwrap(), None);
+        assert_eq!(stranger.recv(wait, &mut lent).unwrap(), None);
         server.strangers().refused_for(Refused::Forged) > 0
     });
     assert_eq!((stranger.counters().bytes_in, stranger.counters().opened), (0, 0));
@@ -49,7 +50,7 @@ fn sockets_on_loopback_carry_long_and_short_messages_both_ways() {
     until(|| server.recv(wait, &mut message).unwrap() == Some((0, LinkEvent::Closed(Closed::ByPeer))));
     drop(server);
     let mut second = second;
-    until(|| second.recv(wait, &mut message).unwrap() == Some(LinkEvent::Closed(Closed::ByPeer)));
+    until(|| second.recv(wait, &mut lent).unwrap() == Some(LinkEvent::Closed(Closed::ByPeer)));
 }
 
 #[test]

@@ -1,22 +1,8 @@
 //! `[tracker]` and the launch commands of nodes in cave files.
 
 use std::net::{IpAddr, Ipv4Addr};
+use crate::caves::SMALL;
 use tumble_scene::cave::{Axes, Cave};
-
-const SMALL: &str = "
-[[user]]
-name = \"u\"
-eye_m = [0, 0, 1.5]
-[[screen]]
-name = \"s\"
-lower_left_m = [-1, 2, 0.5]
-lower_right_m = [1, 2, 0.5]
-upper_left_m = [-1, 2, 2.0]
-[[facet]]
-name = \"f\"
-screen = \"s\"
-size_px = [800, 600]
-";
 
 fn told(text: &str) -> String {
     Cave::parse(&format!("{SMALL}{text}"), "my.toml").expect_err("it is wrong").to_string()

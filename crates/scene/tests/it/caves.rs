@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use toml::de::{DeTable, DeValue};
 use tumble_scene::cave::{Cave, Flip, Output, Stereo, Transport, gaps, is_cave, resolve_cave, shipped_caves};
 
-const SMALL: &str = "
+/// A cave of one screen.
+pub const SMALL: &str = "
 [[user]]
 name = \"u\"
 eye_m = [0, 0, 1.5]

@@ -74,9 +74,13 @@ pub struct ServeOptions {
     /// The users' bodies push what they walk into: an upright capsule of 0.25 m around each, and two hands.
     #[arg(long)]
     pub push: bool,
-    /// Hear a tracker (OSC over UDP) at this address; the rest is as [tracker] of the cave file says.
+    /// Hear a tracker (OSC over UDP) at this address; the rest is as [tracker] of the cave file says. Its datagrams are not sealed: any address but this machine's own
+    /// needs senders.
     #[arg(long, value_name = "ADDR:PORT")]
     pub tracker: Option<SocketAddr>,
+    /// Whom the tracker's port listens to, in place of `senders` of the cave file.
+    #[arg(long, value_name = "IP,…", value_delimiter = ',')]
+    pub tracker_from: Vec<std::net::IpAddr>,
     /// Show the run to viewers of Foxglove (WebSocket; whoever reaches the address sees it).
     #[cfg(feature = "foxglove")]
     #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
@@ -84,6 +88,9 @@ pub struct ServeOptions {
     /// Do again what users did in a recorded run, in place of what they do now; ends with the recording.
     #[arg(long, value_name = "FILE", conflicts_with = "tracker")]
     pub input_from: Option<PathBuf>,
+    /// Keep the cores of this machine from falling asleep while the run goes on, where this user may: frames pass between processes faster, for more electricity.
+    #[arg(long)]
+    pub stay_awake: bool,
     /// Say nothing but errors.
     #[arg(long, short)]
     pub quiet: bool,

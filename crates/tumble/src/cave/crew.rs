@@ -11,6 +11,7 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tumble::net::sync::Seat;
+use tumble::net::sync::transport::FacetNumber;
 use tumble::scene::cave::{Cave, Node};
 
 /// How long facets may take to end by themselves after they were told, and again after their pipe was closed.
@@ -18,8 +19,9 @@ const GRACE: Duration = Duration::from_secs(5);
 /// Restarts of a facet within a minute, at most.
 const MOST_RESTARTS: usize = 5;
 const MINUTE: Duration = Duration::from_secs(60);
-/// Between an end and the restart.
-const PAUSE: Duration = Duration::from_millis(200);
+/// A facet that ends sooner than this after its last restart is not started again at once, but after a pause.
+const HASTE: Duration = Duration::from_secs(5);
+const PAUSE: Duration = Duration::from_secs(1);
 
 /// The facets that are started here.
 pub struct Crew {
@@ -29,6 +31,7 @@ pub struct Crew {
 }
 
 struct Member {
+    seat: FacetNumber,
     name: String,
     /// Program and arguments.
     command: Vec<OsString>,
@@ -39,6 +42,14 @@ struct Member {
     /// It ended last by a failure.
     failed: bool,
     restarts: VecDeque<Instant>,
+}
+
+/// What a look at the crew brings.
+pub struct Look {
+    /// How it stands.
+    pub crew: Crewed,
+    /// Whose processes have ended since the last look.
+    pub ended: Vec<FacetNumber>,
 }
 
 /// How the crew stands.
@@ -71,12 +82,12 @@ impl Crew {
                 (Some(launcher), None) => {
                     let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
                     let words = led(launcher, &seat.name, &address).into_iter().map(OsString::from);
-                    crew.members.push(Member::new(&seat.name, std::iter::once(program.into_os_string()).chain(words).collect()));
+                    crew.members.push(Member::new(k, &seat.name, std::iter::once(program.into_os_string()).chain(words).collect()));
                 }
                 (Some(launcher), Some(node)) if !node.launch.is_empty() => {
                     let words = launch(node, &seat.name, &led(launcher, &seat.name, &address));
                     crew.say(&format!("facet {}: starting it on {}: {}", seat.name, node.name, words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" ")));
-                    crew.members.push(Member::new(&seat.name, words.into_iter().map(OsString::from).collect()));
+                    crew.members.push(Member::new(k, &seat.name, words.into_iter().map(OsString::from).collect()));
                 }
                 (_, node) => {
                     let server = match &address {
@@ -96,11 +107,13 @@ impl Crew {
     }
 
     /// Looks whether somebody ended, and restarts if asked to. `joining`: before the first frame, where an end is a failure.
-    pub fn watch(&mut self, joining: bool) -> Result<Crewed, Failure> {
+    pub fn watch(&mut self, joining: bool) -> Result<Look, Failure> {
+        let mut ended = Vec::new();
         for k in 0..self.members.len() {
             let member = &mut self.members[k];
             if let Some(status) = member.child.as_mut().and_then(|child| child.try_wait().ok().flatten()) {
                 (member.child, member.ended) = (None, Some(Instant::now()));
+                ended.push(member.seat);
                 member.over = status.success() || !self.restart;
                 let title = format!("facet {}", member.name);
                 if joining {
@@ -110,9 +123,10 @@ impl Crew {
                 self.members[k].failed = !status.success();
             }
             let member = &mut self.members[k];
-            let due = member.ended.is_some_and(|at| at.elapsed() > PAUSE) && member.child.is_none() && !member.over;
+            member.restarts.retain(|at| at.elapsed() < MINUTE);
+            let hasty = |ended: Instant| member.restarts.back().is_some_and(|began| ended.duration_since(*began) < HASTE);
+            let due = member.ended.is_some_and(|at| !hasty(at) || at.elapsed() >= PAUSE) && member.child.is_none() && !member.over;
             if due {
-                member.restarts.retain(|at| at.elapsed() < MINUTE);
                 if member.restarts.len() >= MOST_RESTARTS {
                     member.over = true;
                     let text = format!("facet {} ended {MOST_RESTARTS} times within a minute and is not started again", member.name);
@@ -124,11 +138,12 @@ impl Crew {
             }
         }
         let all_over = !self.members.is_empty() && self.members.iter().all(|m| m.over && m.child.is_none());
-        Ok(match all_over {
+        let crew = match all_over {
             false => Crewed::Yes,
             true if self.members.iter().any(|m| m.failed) => Crewed::Lost,
             true => Crewed::Left,
-        })
+        };
+        Ok(Look { crew, ended })
     }
 
     /// After the facets were told that the run is over: waits for them, and ends who does not.
@@ -183,8 +198,8 @@ impl Drop for Crew {
 }
 
 impl Member {
-    fn new(name: &str, command: Vec<OsString>) -> Member {
-        Member { name: name.to_owned(), command, child: None, ended: None, over: false, failed: false, restarts: VecDeque::new() }
+    fn new(seat: usize, name: &str, command: Vec<OsString>) -> Member {
+        Member { seat: seat as FacetNumber, name: name.to_owned(), command, child: None, ended: None, over: false, failed: false, restarts: VecDeque::new() }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
 use tumble::net::sync::shm::{ShmFacet, ShmServer};
-use tumble::net::sync::transport::{Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, ServerLink};
+use tumble::net::sync::transport::{Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, Message, ServerLink};
 use tumble::net::sync::udp::{SharedKey, Timing, UdpFacet, UdpServer};
 use tumble::scene::cave::Cave;
 
@@ -115,7 +115,7 @@ impl FacetLink for FacetEnd {
         }
     }
 
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<LinkEvent>, LinkError> {
+    fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError> {
         match self {
             FacetEnd::Shm(link) => link.recv(timeout, message),
             FacetEnd::Udp(link) => link.recv(timeout, message),

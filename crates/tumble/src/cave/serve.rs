@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tumble::core::World;
 use tumble::net::record::RecorderOptions;
+use tumble::net::sync::awake::Awake;
 use tumble::net::sync::shm::{ShmServer, clean_up};
 use tumble::net::sync::udp::{Entropy, UdpServer};
 use tumble::net::sync::transport::FacetNumber;
@@ -58,6 +59,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     let shared_memory = matches!(end, ServerEnd::Shm(_));
     let server = Server::new(end, told(options, &setting, number, &seats), &setting.world);
     let mut crew = Crew::start(options, &setting.cave, launcher, &run.address)?;
+    let _awake = options.stay_awake.then(|| Awake::ask().inspect_err(|why| _ = say(&format!("the cores may fall asleep: {why}"))));
     let outcome = Host::new(options, setting, server, seats, &signals, tape).and_then(|mut host| {
         let outcome = host.show(&mut crew);
         let ended = host.end(&mut crew);
@@ -154,16 +156,11 @@ impl<'a> Host<'a> {
         let mut due = self.server.now();
         for frame in 0.. {
             let begin = Instant::now();
-            if !self.publish(frame, steps)? {
+            if !self.publish(frame, steps, crew)? {
                 return Ok(());
             }
-            if last.map_or(self.devices.over(), |last| last == frame) || self.signals.end() {
+            if last.map_or(self.devices.over(), |last| last == frame) || self.signals.end() || !self.look_after(crew)? {
                 return Ok(());
-            }
-            match crew.watch(false)? {
-                Crewed::Yes => {}
-                Crewed::Left => return Ok(()),
-                Crewed::Lost => return Err(Failure::run("the run", "no facet is left")),
             }
             if !self.options.fast {
                 due = self.keep_time(due, dt)?;
@@ -209,8 +206,25 @@ impl<'a> Host<'a> {
         self.tape.as_ref().and_then(Tape::frame_length).unwrap_or(simulated)
     }
 
+    /// Waits until the frame is shown. A facet whose process ends meanwhile is waited for no longer, and started again.
+    fn wait(&mut self, crew: &mut Crew) -> Result<(), Failure> {
+        while !self.server.shown(TURN).map_err(failed)? && self.look_after(crew)? && !self.signals.end() {}
+        Ok(())
+    }
+
+    /// Looks whether facets' processes have ended; `false` when all have, as their users wished.
+    fn look_after(&mut self, crew: &mut Crew) -> Result<bool, Failure> {
+        let look = crew.watch(false)?;
+        look.ended.into_iter().try_for_each(|facet| self.server.lose(facet)).map_err(failed)?;
+        match look.crew {
+            Crewed::Yes => Ok(true),
+            Crewed::Left => Ok(false),
+            Crewed::Lost => Err(Failure::run("the run", "no facet is left")),
+        }
+    }
+
     /// The next frame, to its being shown: simulated, or from the recording. `false` where that is over.
-    fn publish(&mut self, frame: u64, steps: u32) -> Result<bool, Failure> {
+    fn publish(&mut self, frame: u64, steps: u32, crew: &mut Crew) -> Result<bool, Failure> {
         let recorded = self.tape.as_mut().map(Tape::next).transpose()?;
         if recorded.is_none() && frame > 0 {
             // what came since the last frame counts in this one
@@ -222,11 +236,13 @@ impl<'a> Host<'a> {
         match recorded {
             Some(None) => return Ok(false),
             Some(Some(recorded)) => {
-                self.server.replay(&recorded).map_err(failed)?;
+                self.server.begin_recorded(&recorded).map_err(failed)?;
+                self.wait(crew)?;
                 self.time_s = recorded.time_s;
             }
             None => {
-                self.server.frame(&self.world, &self.users.viewer).map_err(failed)?;
+                self.server.begin(&self.world, &self.users.viewer).map_err(failed)?;
+                self.wait(crew)?;
                 self.time_s = self.world.time();
                 self.viewers.frame(&self.world);
             }

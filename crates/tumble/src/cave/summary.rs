@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 use tumble::net::sync::transport::{FacetNumber, LinkCounters, Refused};
-use tumble::net::sync::{Seat, Server, ServerEvent, Standing};
+use tumble::net::sync::{Seat, SeatCounts, Server, ServerEvent, Standing};
 
 /// Between two reports.
 const EVERY: Duration = Duration::from_secs(5);
@@ -77,16 +77,8 @@ pub struct Summary {
 #[derive(Serialize)]
 pub struct FacetSummary {
     pub name: String,
-    pub joined: u64,
-    pub dropped: u64,
-    pub presented: u64,
-    pub late: u64,
-    pub missing: u64,
-    pub duplicate: u64,
-    pub stale: u64,
-    pub torn: u64,
-    pub refused: u64,
-    pub mismatched: u64,
+    #[serde(flatten)]
+    pub counts: SeatCounts,
     pub draw: Figures,
     pub bytes_out: u64,
     pub bytes_in: u64,
@@ -123,10 +115,9 @@ impl Meter {
     /// All facets, as they stand.
     pub fn facets(&self, server: &Server<ServerEnd>, seats: &[Seat]) -> Vec<FacetSummary> {
         let one = |(k, seat): (usize, &Seat)| {
-            let (here, _, link) = server.counts(k as FacetNumber);
+            let (counts, _, link) = server.counts(k as FacetNumber);
             FacetSummary {
-                name: seat.name.clone(), joined: here.joined, dropped: here.dropped, presented: here.presented, late: here.late, missing: here.missing,
-                duplicate: here.duplicate, stale: here.stale, torn: here.torn, refused: here.refused, mismatched: here.mismatched,
+                name: seat.name.clone(), counts,
                 draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets: refused(&link),
             }
         };
@@ -165,10 +156,10 @@ impl Summary {
         if self.heads_refused > 0 {
             text += &format!("{} heads not followed: an eye would be behind a screen\n", self.heads_refused);
         }
-        for f in &self.facets {
+        for FacetSummary { name, counts: c, refused_packets, .. } in &self.facets {
             text += &format!(
-                "facet {}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
-                f.name, f.presented, f.late, f.missing, f.duplicate, f.stale, f.torn, f.mismatched, f.dropped, reasons("; packets refused", &f.refused_packets)
+                "facet {name}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                c.presented, c.late, c.missing, c.duplicate, c.stale, c.torn, c.mismatched, c.dropped, reasons("; packets refused", refused_packets)
             );
         }
         if !self.strangers.is_empty() {

@@ -3,7 +3,7 @@
 use super::osc::{Book, Counts, MOST_BYTES};
 use crate::failure::Failure;
 use std::io::ErrorKind;
-use std::net::{SocketAddr, UdpSocket};
+use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -25,13 +25,26 @@ pub struct Heard {
     at: SocketAddr,
 }
 
-/// What is listened to: as the cave file says, at the command line's address if there is one; `None` where neither says anything.
-pub fn described(cave: &Cave, address: Option<SocketAddr>) -> Option<Tracker> {
+/// What is listened to: as the cave file says, with the command line's address and senders if there are any; `None` where neither says anything.
+///
+/// Errors: other machines reach the address, and nobody says which of them are meant.
+pub fn described(cave: &Cave, address: Option<SocketAddr>, senders: &[IpAddr]) -> Result<Option<Tracker>, Failure> {
     let described = cave.tracker.clone();
-    let Some(address) = address else { return described };
+    if described.is_none() && address.is_none() {
+        return if senders.is_empty() { Ok(None) } else { Err(Failure::input("--tracker-from: there is no tracker; say where it is heard with --tracker")) };
+    }
     let mut tracker = described.unwrap_or_else(|| Tracker::of(&cave.users));
-    (tracker.address, tracker.port) = (address.ip(), address.port());
-    Some(tracker)
+    if let Some(address) = address {
+        (tracker.address, tracker.port) = (address.ip(), address.port());
+    }
+    if !senders.is_empty() {
+        tracker.senders = senders.to_vec();
+    }
+    if !tracker.address.is_loopback() && tracker.senders.is_empty() {
+        let why = "its datagrams are not sealed, so say who is listened to: --tracker-from IP, or senders = [\"IP\"] in [tracker] of the cave file";
+        return Err(Failure::input(format!("--tracker {}: other machines reach it; {why}", tracker.socket())));
+    }
+    Ok(Some(tracker))
 }
 
 impl Heard {
@@ -50,8 +63,7 @@ impl Heard {
     /// For a person: where, and who is heard.
     pub fn describe(&self, tracker: &Tracker) -> String {
         let who = match &tracker.senders[..] {
-            [] if tracker.address.is_loopback() => "this machine".to_owned(),
-            [] => "EVERYBODY who reaches it; name those you mean in `senders` of [tracker]".to_owned(),
+            [] => "this machine".to_owned(),
             senders => senders.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
         };
         format!("tracker: OSC at {}, from {who}; users {}", self.at, tracker.users.join(", "))

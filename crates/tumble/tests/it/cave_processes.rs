@@ -1,236 +1,8 @@
-//! `tumble cave`, `tumble serve` and `tumble facet` as processes: frames, kills, freezes, locks, and what is left behind.
+//! `tumble cave`, `tumble serve` and `tumble facet` as processes: frames, locks, refusals, ends.
 
+use crate::cave_place::*;
 use crate::common::*;
-use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
-use std::io::Read;
-use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
-
-/// Nothing here waits longer.
-const PATIENCE: Duration = Duration::from_secs(90);
-
-/// Two things that fall, without shadows.
-const SCENE: &str = "description = \"Things that fall\"
-[world]
-dt_s = 0.01
-[[body]]
-name = \"floor\"
-mode = \"static\"
-shape = { type = \"half_space\" }
-[[body]]
-name = \"ball\"
-shape = { type = \"sphere\", radius_m = 0.3 }
-mass_kg = 1.0
-position_m = [0.3, 0.6, 2.0]
-velocity_m_per_s = [1.0, 0.5, 0.0]
-[[body]]
-name = \"box\"
-shape = { type = \"box\", size_m = [0.4, 0.4, 0.4] }
-mass_kg = 1.0
-position_m = [-0.5, 1.0, 1.5]
-angular_velocity_rad_per_s = [1.0, 2.0, 3.0]
-[camera]
-eye_m = [0, -2, 1.7]
-target_m = [0, 0, 1.7]
-[[light]]
-type = \"directional\"
-direction = [0.3, 0.5, -1]
-casts_shadow = false
-";
-
-/// A room of four screens like cube4, with small pictures. A frame waits for 2 s, so that a busy machine loses none.
-fn cube() -> String {
-    let screens = [
-        ("front", "[-1.5, 1.5, 0]", "[1.5, 1.5, 0]", "[-1.5, 1.5, 3]"),
-        ("left", "[-1.5, -1.5, 0]", "[-1.5, 1.5, 0]", "[-1.5, -1.5, 3]"),
-        ("right", "[1.5, 1.5, 0]", "[1.5, -1.5, 0]", "[1.5, 1.5, 3]"),
-        ("floor", "[-1.5, -1.5, 0]", "[1.5, -1.5, 0]", "[-1.5, 1.5, 0]"),
-    ];
-    let part = |(name, a, b, c): &(&str, &str, &str, &str)| {
-        format!(
-            "[[screen]]\nname = \"{name}\"\nlower_left_m = {a}\nlower_right_m = {b}\nupper_left_m = {c}\n[[facet]]\nname = \"{name}\"\nscreen = \"{name}\"\nsize_px = [80, 80]\n"
-        )
-    };
-    let sync = "[sync]\nready_timeout_ms = 2000\ndrop_timeout_ms = 2000\nconnect_timeout_ms = 60000\n";
-    format!("[[user]]\nname = \"u\"\neye_m = [0, 0, 1.7]\n{}{sync}", screens.iter().map(part).collect::<String>())
-}
-
-/// A wall of two screens. A frame waits for 200 ms, a facet is dropped after 500.
-const WALL: &str = "
-[[user]]
-name = \"u\"
-eye_m = [0, 0, 1.5]
-[[screen]]
-name = \"l\"
-lower_left_m = [-2, 2, 0.5]
-lower_right_m = [0, 2, 0.5]
-upper_left_m = [-2, 2, 2.0]
-[[screen]]
-name = \"r\"
-lower_left_m = [0, 2, 0.5]
-lower_right_m = [2, 2, 0.5]
-upper_left_m = [0, 2, 2.0]
-[[facet]]
-name = \"l\"
-screen = \"l\"
-size_px = [80, 60]
-[[facet]]
-name = \"r\"
-screen = \"r\"
-size_px = [80, 60]
-[sync]
-ready_timeout_ms = 200
-drop_timeout_ms = 500
-connect_timeout_ms = 60000
-";
-
-/// A folder with a scene and a cave, and a place of its own for locks and sockets.
-struct Place {
-    folder: Folder,
-    scene: String,
-    cave: String,
-}
-
-impl Place {
-    fn new(test: &str, cave: &str) -> Place {
-        let folder = Folder::new(test);
-        let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave));
-        use std::os::unix::fs::DirBuilderExt;
-        std::fs::DirBuilder::new().mode(0o700).create(folder.path("run")).unwrap();
-        Place { folder, scene, cave }
-    }
-
-    fn path(&self, file: &str) -> String {
-        text(&self.folder.path(file))
-    }
-
-    /// `tumble WHAT SCENE --cave CAVE ARGS`.
-    fn command(&self, what: &str, args: &[&str]) -> Command {
-        let mut command = command(&[what, &self.scene, "--cave", &self.cave]);
-        command.args(args).env("XDG_RUNTIME_DIR", self.folder.path("run")).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-        command
-    }
-
-    fn start(&self, what: &str, args: &[&str]) -> Process {
-        let mut child = self.command(what, args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        let (said, wrong) = (reader(child.stdout.take().unwrap()), reader(child.stderr.take().unwrap()));
-        Process { child, said: Some(said), wrong: Some(wrong) }
-    }
-
-    /// Runs to its end, with success; the summary.
-    fn succeed(&self, what: &str, args: &[&str]) -> Value {
-        let summary = self.path("summary.json");
-        let (code, _, wrong) = self.start(what, &[args, &["--summary", &summary]].concat()).end();
-        assert_eq!(code, Some(0), "{wrong}");
-        json(&self.folder.path("summary.json"))
-    }
-
-    /// What facets wrote about the frames they have shown; an empty list before there is any.
-    fn log(&self, folder: &str, facet: &str) -> Vec<Value> {
-        let text = std::fs::read_to_string(self.folder.path(folder).join(facet).join("frames.jsonl")).unwrap_or_default();
-        // the last line may be on its way
-        text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
-    }
-
-    /// Waits until a facet has shown a frame beyond `frame`.
-    fn wait_for(&self, folder: &str, facet: &str, frame: u64) {
-        wait(&format!("frame {frame} of {facet}"), || self.log(folder, facet).last().is_some_and(|line| line["frame"].as_u64() > Some(frame)));
-    }
-
-    /// Locks, sockets, services: nothing may be left of them.
-    fn assert_clean(&self) {
-        fn files(folder: PathBuf) -> Vec<PathBuf> {
-            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-            entries.flat_map(|e| if e.path().is_dir() { files(e.path()) } else { vec![e.path()] }).collect()
-        }
-        let left = files(self.folder.path("run"));
-        assert!(left.is_empty(), "left behind: {left:?}");
-    }
-}
-
-/// Keeps what a pipe says.
-fn reader(mut pipe: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
-    std::thread::spawn(move || {
-        let mut bytes = Vec::new();
-        let _ = pipe.read_to_end(&mut bytes);
-        String::from_utf8_lossy(&bytes).into_owned()
-    })
-}
-
-/// A process that ends with the test.
-struct Process {
-    child: Child,
-    said: Option<std::thread::JoinHandle<String>>,
-    wrong: Option<std::thread::JoinHandle<String>>,
-}
-
-impl Process {
-    fn pid(&self) -> i32 {
-        self.child.id() as i32
-    }
-
-    /// Waits for its end: exit code, stdout, stderr.
-    fn end(mut self) -> (Option<i32>, String, String) {
-        let mut status = None;
-        wait("the end of a process", || {
-            status = self.child.try_wait().unwrap();
-            status.is_some()
-        });
-        let text = |thread: Option<std::thread::JoinHandle<String>>| thread.unwrap().join().unwrap();
-        (status.unwrap().code(), text(self.said.take()), text(self.wrong.take()))
-    }
-
-    /// Its facets, by name.
-    fn facets(&self) -> Vec<(String, i32)> {
-        let pid = self.pid();
-        let children = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap();
-        let named = |pid: &str| {
-            let line = std::fs::read(format!("/proc/{pid}/cmdline")).ok()?;
-            let words: Vec<String> = line.split(|b| *b == 0).map(|w| String::from_utf8_lossy(w).into_owned()).collect();
-            let at = words.iter().position(|w| w == "--facet")?;
-            Some((words.get(at + 1)?.clone(), pid.parse().ok()?))
-        };
-        children.split_whitespace().filter_map(named).collect()
-    }
-
-    fn facet(&self, name: &str) -> i32 {
-        self.facets().into_iter().find(|(facet, _)| facet == name).unwrap().1
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-fn signal(pid: i32, signal: Signal) {
-    kill_process(Pid::from_raw(pid).unwrap(), signal).unwrap();
-}
-
-fn alive(pid: i32) -> bool {
-    // a process that ended and was not asked for yet is none any more
-    std::fs::read_to_string(format!("/proc/{pid}/stat")).is_ok_and(|stat| !stat.rsplit(')').next().unwrap_or("").trim_start().starts_with('Z'))
-}
-
-fn wait(what: &str, mut until: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !until() {
-        assert!(start.elapsed() < PATIENCE, "{what} did not come within {PATIENCE:?}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
-fn numbers(log: &[Value]) -> Vec<u64> {
-    log.iter().map(|line| line["frame"].as_u64().unwrap()).collect()
-}
-
-fn states(log: &[Value]) -> Vec<&str> {
-    log.iter().map(|line| line["state"].as_str().unwrap()).collect()
-}
+use rustix::process::Signal;
 
 /// The number in a stamped picture: 64 squares in two rows of 32, the highest bit first.
 fn stamped(image: &tumble::render::Image) -> u64 {
@@ -319,7 +91,7 @@ fn datagrams_carry_the_same_states_as_shared_memory() {
 
 #[test]
 fn ctrl_c_ends_all_and_leaves_nothing() {
-    let place = Place::new("cave-ctrl-c", WALL);
+    let place = Place::new("cave-ctrl-c", &wall());
     let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out")]);
     place.wait_for("out", "r", 5);
     let facets = run.facets();
@@ -335,7 +107,7 @@ fn ctrl_c_ends_all_and_leaves_nothing() {
 
 #[test]
 fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
-    let place = Place::new("cave-lock", WALL);
+    let place = Place::new("cave-lock", &wall());
     let first = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out")]);
     place.wait_for("out", "r", 5);
     let (code, _, wrong) = place.start("cave", &["--no-pictures", "--seconds", "0.1"]).end();
@@ -344,7 +116,7 @@ fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
         assert!(wrong.contains(&word), "'{word}' is not said: {wrong}");
     }
     // another cave is another matter
-    let elsewhere = place.folder.write("elsewhere.toml", WALL);
+    let elsewhere = place.folder.write("elsewhere.toml", wall());
     let mut other = command(&["cave", &place.scene, "--cave", &elsewhere, "--no-pictures", "--seconds", "0.1", "--quiet"]);
     assert!(other.env("XDG_RUNTIME_DIR", place.folder.path("run")).status().unwrap().success());
     let facets = first.facets();
@@ -356,83 +128,10 @@ fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
     place.assert_clean();
 }
 
-#[test]
-fn the_wall_goes_on_without_a_killed_facet_which_comes_back() {
-    let place = Place::new("cave-kill", WALL);
-    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--restart", "--summary", &place.path("summary.json")]);
-    place.wait_for("out", "r", 5);
-    signal(run.facet("r"), Signal::KILL);
-    let killed_at = *numbers(&place.log("out", "l")).last().unwrap();
-    place.wait_for("out", "l", killed_at + 100);
-    place.wait_for("out", "r", killed_at + 100);
-    signal(run.pid(), Signal::TERM);
-    let (code, _, wrong) = run.end();
-    assert_eq!(code, Some(0), "{wrong}");
-    assert!(wrong.contains("facet r ended (killed by signal 9)"), "{wrong}");
-    let left = numbers(&place.log("out", "l"));
-    // who was not killed missed nothing
-    assert_eq!(left, (0..left.len() as u64).collect::<Vec<_>>());
-    let right = place.log("out", "r");
-    let left = place.log("out", "l");
-    right.iter().for_each(|line| assert_eq!(line["state"], left[line["frame"].as_u64().unwrap() as usize]["state"]));
-    let facets = json(&place.folder.path("summary.json"))["facets"].clone();
-    assert_eq!((&facets[0]["joined"], &facets[1]["joined"], &facets[1]["mismatched"]), (&1.into(), &2.into(), &0.into()));
-    place.assert_clean();
-}
-
-#[test]
-fn a_frozen_facet_is_dropped_and_comes_back_when_it_goes_on() {
-    let place = Place::new("cave-freeze", WALL);
-    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &place.path("summary.json")]);
-    place.wait_for("out", "r", 5);
-    let frozen = run.facet("r");
-    signal(frozen, Signal::STOP);
-    let at = *numbers(&place.log("out", "l")).last().unwrap();
-    place.wait_for("out", "l", at + 150);
-    signal(frozen, Signal::CONT);
-    place.wait_for("out", "r", at + 150);
-    signal(run.pid(), Signal::INT);
-    let (code, _, wrong) = run.end();
-    assert_eq!(code, Some(0), "{wrong}");
-    assert!(wrong.contains("facet r is late") && wrong.contains("facet r is dropped; the others go on"), "{wrong}");
-    let left = numbers(&place.log("out", "l"));
-    assert_eq!(left, (0..left.len() as u64).collect::<Vec<_>>());
-    let facets = json(&place.folder.path("summary.json"))["facets"].clone();
-    assert_eq!((&facets[0]["dropped"], &facets[1]["dropped"], &facets[1]["joined"]), (&0.into(), &1.into(), &2.into()), "{wrong}");
-    place.assert_clean();
-}
-
-#[test]
-fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
-    let place = Place::new("cave-orphans", WALL);
-    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out")]);
-    place.wait_for("out", "r", 5);
-    let facets = run.facets();
-    signal(run.pid(), Signal::KILL);
-    wait("the end of all facets", || facets.iter().all(|(_, pid)| !alive(*pid)));
-    drop(run);
-    // by hand
-    let server = place.start("serve", &["--quiet"]);
-    let l = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("hand"), "--wait", "10"]);
-    let r = place.start("facet", &["--facet", "r", "--no-pictures", "--log-dir", &place.path("hand"), "--wait", "60"]);
-    place.wait_for("hand", "r", 5);
-    place.wait_for("hand", "l", 5);
-    signal(server.pid(), Signal::KILL);
-    let (code, _, wrong) = l.end();
-    assert_eq!(code, Some(1), "{wrong}");
-    assert!(wrong.contains("facet l: has lost its server") && wrong.contains("did not come back, 10 s long"), "{wrong}");
-    // Ctrl-C while it waits is no failure
-    signal(r.pid(), Signal::INT);
-    let (code, _, wrong) = r.end();
-    assert_eq!(code, Some(0), "{wrong}");
-    // what kill -9 left is taken away by the next run
-    place.succeed("cave", &["--no-pictures", "--seconds", "0.1", "--quiet"]);
-    place.assert_clean();
-}
 
 #[test]
 fn a_facet_of_another_scene_is_refused_with_both_hashes() {
-    let place = Place::new("cave-refused", WALL);
+    let place = Place::new("cave-refused", &wall());
     let server = place.start("serve", &["--wait", "60"]);
     let other = place.folder.write("other.toml", SCENE.replace("radius_m = 0.3", "radius_m = 0.31"));
     let mut facet = command(&["facet", &other, "--cave", &place.cave, "--facet", "l", "--no-pictures", "--wait", "60"]);
@@ -448,7 +147,7 @@ fn a_facet_of_another_scene_is_refused_with_both_hashes() {
 
 #[test]
 fn who_is_missing_at_the_start_is_named() {
-    let place = Place::new("cave-missing", WALL);
+    let place = Place::new("cave-missing", &wall());
     let (code, _, wrong) = place.start("serve", &["--wait", "0.3"]).end();
     assert_eq!(code, Some(1), "{wrong}");
     assert!(wrong.contains("tumble facet") && wrong.contains("l, r did not join within 0.3 s"), "{wrong}");
@@ -466,7 +165,7 @@ fn who_is_missing_at_the_start_is_named() {
 
 #[test]
 fn an_environment_brings_lights_camera_and_what_stands_still() {
-    let place = Place::new("cave-environment", WALL);
+    let place = Place::new("cave-environment", &wall());
     let hall = "[[body]]\nname = \"column\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 1, 3] }\nposition_m = [0.3, 0.6, 1.5]\n[[body]]\nname = \"loose\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 1.0\n[camera]\neye_m = [0, -3, 2]\ntarget_m = [0, 0, 1]\n";
     let environment = place.folder.write("hall.toml", hall);
     let args = ["--no-pictures", "--seconds", "0.2", "--fast", "--environment", &environment, "--log-dir"];

@@ -1,6 +1,7 @@
 //! Recordings of runs in a cave, cut anywhere.
 
-use crate::cave_users::{in_place, place};
+use crate::cave_place::in_place;
+use crate::cave_users::place;
 use crate::common::*;
 use tumble::net::record::recover;
 use tumble::net::sync::{Replay, ReplayFrame};

@@ -1,8 +1,9 @@
 //! A tracker moves users: real datagrams, written here byte by byte as the format's specification has them (Open Sound Control 1.0). And what users did in a
 //! recorded run, done again.
 
-use crate::cave_users::{CAVE, SCENE, Server, in_place, place};
-use crate::common::*;
+use crate::cave_place::in_place;
+use crate::cave_users::{SCENE, Server, one_screen, place};
+use crate::common::{json, text};
 use serde_json::{Value, json as value};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
@@ -153,7 +154,7 @@ fn the_picture_follows_the_tracked_eye() {
         text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
     };
     // what is seen from there by the cave file
-    let moved = folder.write("moved.toml", CAVE.replace("eye_m = [0, 0, 1.5]", "eye_m = [0.5, -0.25, 1.25]"));
+    let moved = folder.write("moved.toml", one_screen().replace("eye_m = [0, 0, 1.5]", "eye_m = [0.5, -0.25, 1.25]"));
     let args = |cave: &str, log: &str| ["cave", &scene, "--cave", cave, "--offscreen", "--quiet", "--log-dir", &text(&folder.path(log))].map(str::to_owned);
     for (cave, log) in [(&cave, "before"), (&moved, "after")] {
         let args = [&args(cave, log)[..], &["--seconds".into(), "0.02".into(), "--fast".into()]].concat();
@@ -162,7 +163,7 @@ fn the_picture_follows_the_tracked_eye() {
     let (before, after) = (lines("before")[0]["image"].clone(), lines("after")[0]["image"].clone());
     assert_ne!(before, after);
     // and by the tracker, in a space with y up: [x, z up, −y ahead]
-    let tracked = folder.write("tracked.toml", format!("{CAVE}[tracker]\nusers = [\"glasses\"]\naxes = \"y_up\"\n"));
+    let tracked = folder.write("tracked.toml", format!("{}[tracker]\nusers = [\"glasses\"]\naxes = \"y_up\"\n", one_screen()));
     let sender = Sender::new();
     let args = [&args(&tracked, "tracked")[..], &["--tracker".into(), sender.to.to_string()]].concat();
     let mut run = in_place(&folder, &args.iter().map(String::as_str).collect::<Vec<_>>()).spawn().unwrap();

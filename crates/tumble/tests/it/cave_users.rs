@@ -1,9 +1,10 @@
 //! What users do in a cave, by a facet of the test's own: keys walk, the wand pulls, bodies push; and recordings that are shown again.
 
-use crate::common::*;
+use crate::cave_place::{cave_of, in_place, make_runtime};
+use crate::common::{Folder, json, succeed, text};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::process::{Child, ChildStderr, Command, Stdio};
+use std::process::{Child, ChildStderr, Stdio};
 use std::time::{Duration, Instant};
 use tumble::collide::{Pose, Vec3};
 use tumble::net::sync::udp::{Timing, UdpFacet};
@@ -26,29 +27,18 @@ position_m = [0, 2, 1]
 origin_m = [0, 0, 0]
 ";
 
-pub const CAVE: &str = "
-[[user]]
-name = \"u\"
-eye_m = [0, 0, 1.5]
-[[screen]]
-name = \"s\"
-lower_left_m = [-1, 3, 0.5]
-lower_right_m = [1, 3, 0.5]
-upper_left_m = [-1, 3, 2.0]
-[[facet]]
-name = \"f\"
-screen = \"s\"
-size_px = [80, 60]
-[sync]
-transport = \"udp\"
-ready_timeout_ms = 2000
-drop_timeout_ms = 4000
-connect_timeout_ms = 60000
-";
+/// One screen, by datagrams.
+pub fn one_screen() -> String {
+    let sync = "transport = \"udp\"\nready_timeout_ms = 2000\ndrop_timeout_ms = 4000\nconnect_timeout_ms = 60000";
+    let screen = ("f", ["[-1, 3, 0.5]", "[1, 3, 0.5]", "[-1, 3, 2.0]"]);
+    cave_of(&[screen], |_| "size_px = [80, 60]".into(), sync)
+}
 
 pub struct Server {
     child: Child,
     pub facet: Facet<UdpFacet>,
+    pub address: SocketAddr,
+    hash: [u8; 32],
     // what is said goes on being taken
     _stderr: BufReader<ChildStderr>,
     sequence: u64,
@@ -63,16 +53,9 @@ impl Drop for Server {
 
 pub fn place(test: &str) -> (Folder, String, String) {
     let folder = Folder::new(test);
-    let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", CAVE));
-    use std::os::unix::fs::DirBuilderExt;
-    std::fs::DirBuilder::new().mode(0o700).create(folder.path("run")).unwrap();
+    let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", one_screen()));
+    make_runtime(&folder);
     (folder, scene, cave)
-}
-
-pub fn in_place(folder: &Folder, args: &[&str]) -> Command {
-    let mut command = command(args);
-    command.env("XDG_RUNTIME_DIR", folder.path("run")).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-    command
 }
 
 /// The hash by which the server knows the scene: a recording has it.
@@ -82,6 +65,12 @@ fn scene_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
     let out = in_place(folder, &args).output().unwrap();
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     Replay::open(&file).unwrap().scene()
+}
+
+fn connect(address: SocketAddr, name: &str, number: u16, hash: [u8; 32], scene: &str) -> Facet<UdpFacet> {
+    let link = UdpFacet::connect(address, number, None, Timing::default()).unwrap();
+    let (world, _) = tumble::scene::SceneFile::load(scene).unwrap().build().unwrap();
+    Facet::new(link, FacetOptions::new(name, hash, 1), world)
 }
 
 impl Server {
@@ -96,9 +85,12 @@ impl Server {
                 break rest.split(',').next().unwrap().parse().unwrap();
             }
         };
-        let link = UdpFacet::connect(address, 0, None, Timing::default()).unwrap();
-        let (world, _) = tumble::scene::SceneFile::load(scene).unwrap().build().unwrap();
-        Server { child, facet: Facet::new(link, FacetOptions::new("f", hash, 1), world), _stderr: stderr, sequence: 0 }
+        Server { child, facet: connect(address, "f", 0, hash, scene), address, hash, _stderr: stderr, sequence: 0 }
+    }
+
+    /// One more facet.
+    pub fn another(&self, name: &str, number: u16, scene: &str) -> Facet<UdpFacet> {
+        connect(self.address, name, number, self.hash, scene)
     }
 
     /// Shows frames until one is numbered `frame` or more, and does this before each.

@@ -1,16 +1,12 @@
 //! A cave on a desktop: an X server of the test's own (Xvfb), a window per facet where the cave says.
 
-use crate::cave_users::in_place;
-use crate::common::*;
-use std::io::{BufRead, BufReader};
-use std::os::unix::fs::DirBuilderExt;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use crate::cave_place::{ROOM, cave_of, in_place, make_runtime, wait};
+use crate::common::{Folder, json, text};
+use crate::desktop::{Desktop, Running, skip};
+use std::process::Stdio;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{AtomEnum, ClientMessageEvent, ConnectionExt, EventMask, MapState};
 use x11rb::rust_connection::RustConnection;
-
-const PATIENCE: Duration = Duration::from_secs(90);
 
 /// A ball that turns without end.
 const SCENE: &str = "description = \"A ball that turns\"
@@ -34,67 +30,8 @@ casts_shadow = false
 
 /// Four screens of a room, in windows beside each other.
 fn cave() -> String {
-    let screens = [
-        ("front", "[-1.5, 1.5, 0]", "[1.5, 1.5, 0]", "[-1.5, 1.5, 3]"),
-        ("left", "[-1.5, -1.5, 0]", "[-1.5, 1.5, 0]", "[-1.5, -1.5, 3]"),
-        ("right", "[1.5, 1.5, 0]", "[1.5, -1.5, 0]", "[1.5, 1.5, 3]"),
-        ("floor", "[-1.5, -1.5, 0]", "[1.5, -1.5, 0]", "[-1.5, 1.5, 0]"),
-    ];
-    let part = |(k, (name, a, b, c)): (usize, &(&str, &str, &str, &str))| {
-        let place = 110 * k;
-        format!(
-            "[[screen]]\nname = \"{name}\"\nlower_left_m = {a}\nlower_right_m = {b}\nupper_left_m = {c}\n[[facet]]\nname = \"{name}\"\nscreen = \"{name}\"\nsize_px = [100, 100]\nposition_px = [{place}, 20]\n"
-        )
-    };
-    let sync = "[sync]\nready_timeout_ms = 2000\ndrop_timeout_ms = 4000\nconnect_timeout_ms = 90000\n";
-    format!("[[user]]\nname = \"u\"\neye_m = [0, 0, 1.7]\n{}{sync}", screens.iter().enumerate().map(part).collect::<String>())
-}
-
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-impl Running {
-    /// Waits for its end: the exit code.
-    fn end(&mut self) -> Option<i32> {
-        let mut status = None;
-        wait("the end", || {
-            status = self.0.try_wait().unwrap();
-            status.is_some()
-        });
-        status.unwrap().code()
-    }
-}
-
-fn wait(what: &str, mut until: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !until() {
-        assert!(start.elapsed() < PATIENCE, "{what} did not come");
-        std::thread::sleep(Duration::from_millis(30));
-    }
-}
-
-fn skip(why: &str) {
-    let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: {why}\n"));
-}
-
-/// An X server on a display that was free; `None`, said visibly, where there is none.
-fn desktop() -> Option<(Running, String)> {
-    let mut command = Command::new("Xvfb");
-    command.args(["-displayfd", "1", "-screen", "0", "600x300x24", "-nolisten", "tcp", "-noreset"]).stdout(Stdio::piped()).stderr(Stdio::null());
-    let Ok(child) = command.spawn() else {
-        skip("windows of caves are not tested: there is no Xvfb; on Debian: apt-get install xvfb");
-        return None;
-    };
-    let (mut server, mut number) = (Running(child), String::new());
-    BufReader::new(server.0.stdout.take().unwrap()).read_line(&mut number).unwrap();
-    assert!(!number.trim().is_empty(), "Xvfb did not start");
-    Some((server, format!(":{}", number.trim())))
+    let place = |k: usize| format!("size_px = [100, 100]\nposition_px = [{}, 20]", 110 * k);
+    cave_of(&ROOM, place, "ready_timeout_ms = 2000\ndrop_timeout_ms = 4000\nconnect_timeout_ms = 90000")
 }
 
 /// Title, number, and place of every window that is shown and has a title.
@@ -113,17 +50,17 @@ fn windows(server: &RustConnection, root: u32) -> Vec<(String, u32, [i16; 2], [u
 
 #[test]
 fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed() {
-    let Some((_x, display)) = desktop() else { return };
+    let Some(desktop) = Desktop::open() else { return };
     if tumble::render::Renderer::new().is_err() {
         return skip("this machine has no graphics adapter");
     }
     let folder = Folder::new("cave-windows");
-    std::fs::DirBuilder::new().mode(0o700).create(folder.path("run")).unwrap();
+    make_runtime(&folder);
     let (scene, cave, summary) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave()), folder.path("summary.json"));
     let args = ["cave", &scene, "--cave", &cave, "--quality", "fastest", "--log-dir", &text(&folder.path("out")), "--summary", &text(&summary)];
     let log = std::fs::File::create(folder.path("stderr")).unwrap();
-    let mut run = Running(in_place(&folder, &args).env("DISPLAY", &display).stderr(log).stdout(Stdio::null()).spawn().unwrap());
-    let (server, screen) = x11rb::connect(Some(&display)).unwrap();
+    let mut run = Running(in_place(&folder, &args).env("DISPLAY", &desktop.display).stderr(log).stdout(Stdio::null()).spawn().unwrap());
+    let (server, screen) = x11rb::connect(Some(&desktop.display)).unwrap();
     let root = server.setup().roots[screen].root;
     wait("the fourth window", || {
         if let Some(status) = run.0.try_wait().unwrap() {
@@ -158,7 +95,8 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
     assert_eq!(frames("right").len(), left, "the closed window goes on");
     // all closed: that is the end, and no failure
     ["front", "left", "floor"].into_iter().for_each(close);
-    assert_eq!(run.end(), Some(0), "{}", std::fs::read_to_string(folder.path("stderr")).unwrap());
+    wait("the end", || run.0.try_wait().unwrap().is_some());
+    assert_eq!(run.0.wait().unwrap().code(), Some(0), "{}", std::fs::read_to_string(folder.path("stderr")).unwrap());
     let facets = json(&summary)["facets"].clone();
     for facet in facets.as_array().unwrap() {
         assert_eq!((&facet["dropped"], &facet["torn"], &facet["mismatched"]), (&0.into(), &0.into(), &0.into()), "{facet}");
@@ -171,7 +109,7 @@ fn a_desktop_that_does_not_answer_is_said_and_drawn_for_in_memory() {
         return skip("this machine has no graphics adapter");
     }
     let folder = Folder::new("cave-no-desktop");
-    std::fs::DirBuilder::new().mode(0o700).create(folder.path("run")).unwrap();
+    make_runtime(&folder);
     let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave()));
     let args = ["cave", &scene, "--cave", &cave, "--seconds", "0.04", "--fast", "--quality", "fastest"];
     // one that nobody has here, and one that there cannot be

@@ -2,6 +2,9 @@
 
 mod articulated_scenes;
 mod bad_input;
+mod cave_faults;
+mod cave_figures;
+mod cave_place;
 mod cave_processes;
 mod cave_recordings;
 mod cave_tracker;

@@ -14,7 +14,7 @@ use super::input::Input;
 use super::messages::{Done, FacetCounts, Join, count};
 use super::mirror::Mirror;
 use super::server::Pace;
-use super::transport::{Delivery, LinkEvent};
+use super::transport::{Delivery, LinkEvent, Message};
 use super::viewer::Viewer;
 use super::wire::{HEADER_BYTES, Hash, Header, Kind, later, message};
 use std::collections::VecDeque;
@@ -98,7 +98,7 @@ enum Phase {
 /// A state that waits to be drawn.
 struct Pending {
     header: Header,
-    message: Vec<u8>,
+    message: Message,
     arrived: Duration,
 }
 
@@ -218,7 +218,7 @@ impl FacetSession {
             self.answer(Kind::Ready, frame, &done);
         }
         if let Some(Pending { header, message, .. }) = self.list.take()
-            && self.on_snapshot(now, &header, &message).is_err()
+            && self.on_snapshot(now, &header, &message[HEADER_BYTES..]).is_err()
         {
             count(&mut self.counts.refused);
         }
@@ -264,11 +264,11 @@ impl FacetSession {
         self.phase = Phase::Over(Over::Left);
     }
 
-    /// Takes what the link reports; `bytes` is the message, if it is one.
-    pub fn on_event(&mut self, now: Duration, event: LinkEvent, bytes: &[u8]) {
+    /// Takes what the link reports, and the message, if it is one: a state is kept as it came until it is drawn.
+    pub fn on_event(&mut self, now: Duration, event: LinkEvent, message: Message) {
         match event {
             LinkEvent::Opened => self.asked = None,
-            LinkEvent::Message => self.on_message(now, bytes),
+            LinkEvent::Message => self.on_message(now, message),
             LinkEvent::Closed(_) if self.phase == Phase::Live => self.lose(),
             LinkEvent::Closed(_) => {}
         }

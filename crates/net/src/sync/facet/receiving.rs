@@ -4,17 +4,18 @@ use super::super::messages::{Refusal, count};
 use super::super::mirror::Mirror;
 use super::super::server::Pace;
 use super::super::table::Snapshot;
+use super::super::transport::Message;
 use super::super::wire::{Fault, HEADER_BYTES, Header, Kind, VERSION, later, open};
 use super::{FacetSession, Over, Pending, Phase};
 use std::time::Duration;
 
 impl FacetSession {
-    pub(super) fn on_message(&mut self, now: Duration, bytes: &[u8]) {
+    pub(super) fn on_message(&mut self, now: Duration, message: Message) {
         if let Phase::Over(_) = self.phase {
             return;
         }
-        let taken = match open(bytes) {
-            Ok((header, payload)) => self.on_header(now, header, payload, bytes),
+        let taken = match open(&message).map(|(header, _)| header) {
+            Ok(header) => self.on_header(now, header, message),
             Err(Fault::Version(theirs)) if self.phase == Phase::Joining => {
                 let why = format!("the server speaks NetSync version {theirs}, this facet version {VERSION}: use the same build of tumble on both");
                 self.phase = Phase::Over(Over::Refused(why));
@@ -27,13 +28,14 @@ impl FacetSession {
         }
     }
 
-    fn on_header(&mut self, now: Duration, header: Header, payload: &[u8], bytes: &[u8]) -> Result<(), Fault> {
+    fn on_header(&mut self, now: Duration, header: Header, message: Message) -> Result<(), Fault> {
+        let payload = &message[HEADER_BYTES..]; // it was opened
         let about_us = header.join == self.join;
         let live = self.phase == Phase::Live && header.run == self.run;
         match header.kind {
             Kind::Snapshot if about_us && (live || self.phase == Phase::Joining) => {
                 if self.drawing.is_some() {
-                    self.list = Some(Pending { header, message: payload.to_vec(), arrived: now });
+                    self.list = Some(Pending { header, message, arrived: now });
                 } else {
                     self.on_snapshot(now, &header, payload)?;
                 }
@@ -42,8 +44,8 @@ impl FacetSession {
             Kind::Rejoin if about_us && self.phase == Phase::Live => self.lose(),
             Kind::Rejoin if about_us => {}
             Kind::End if live || about_us => self.phase = Phase::Over(Over::Ended),
-            Kind::State if self.phase == Phase::Joining => self.keep_early(now, header, bytes),
-            Kind::State if live => return self.on_state(now, header, payload, bytes),
+            Kind::State if self.phase == Phase::Joining => self.keep_early(now, header, message),
+            Kind::State if live => return self.on_state(now, header, message),
             Kind::Present if live => self.on_present(now, header.frame),
             Kind::Beat if live => {}
             Kind::Snapshot | Kind::Refused | Kind::Rejoin | Kind::End | Kind::State | Kind::Present | Kind::Beat => {
@@ -77,17 +79,17 @@ impl FacetSession {
         Ok(())
     }
 
-    fn on_state(&mut self, now: Duration, header: Header, payload: &[u8], bytes: &[u8]) -> Result<(), Fault> {
+    fn on_state(&mut self, now: Duration, header: Header, message: Message) -> Result<(), Fault> {
         self.heard = now;
-        if Some(Mirror::revision_of(payload)?) == self.mirror.revision() {
-            self.take_state(Pending { header, message: bytes.to_vec(), arrived: now });
+        if Some(Mirror::revision_of(&message[HEADER_BYTES..])?) == self.mirror.revision() {
+            self.take_state(Pending { header, message, arrived: now });
             return Ok(());
         }
         if self.newest.is_some_and(|newest| !later(header.frame, newest)) {
             count(&mut self.counts.stale);
             return Ok(());
         }
-        self.keep_early(now, header, bytes);
+        self.keep_early(now, header, message);
         self.resync(now);
         Ok(())
     }
@@ -100,9 +102,9 @@ impl FacetSession {
         }
     }
 
-    fn keep_early(&mut self, now: Duration, header: Header, bytes: &[u8]) {
+    fn keep_early(&mut self, now: Duration, header: Header, message: Message) {
         count(&mut self.counts.early);
-        self.early = Some(Pending { header, message: bytes.to_vec(), arrived: now });
+        self.early = Some(Pending { header, message, arrived: now });
     }
 
     fn take_state(&mut self, state: Pending) {

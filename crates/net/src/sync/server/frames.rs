@@ -107,11 +107,9 @@ impl ServerSession {
         let Some(frame) = self.frame else { return };
         match self.stage {
             Stage::Idle => {}
-            Stage::Ready(since) => {
+            Stage::Ready(_) => {
                 let all = self.waited_for().all(|p| p.ready == Some(frame));
-                let patience = |p: &Place| if p.synced { self.options.ready_after } else { self.options.first_after };
-                let over = |p: &Place| now >= since.saturating_add(patience(p));
-                if !all && !self.waited_for().filter(|p| p.ready != Some(frame)).all(over) {
+                if !all && self.patience_ends().is_none_or(|end| now < end) {
                     return;
                 }
                 self.leave_behind(frame, |p| p.ready == Some(frame), |counts| &mut counts.late);
@@ -119,8 +117,9 @@ impl ServerSession {
                 self.stage = Stage::Presented(now);
                 self.send_present(now, to, frame);
             }
-            Stage::Presented(since) => {
-                if !self.waited_for().all(|p| p.presented == Some(frame)) && now < since.saturating_add(self.options.ready_after) {
+            Stage::Presented(_) => {
+                let all = self.waited_for().all(|p| p.presented == Some(frame));
+                if !all && self.patience_ends().is_none_or(|end| now < end) {
                     return;
                 }
                 self.leave_behind(frame, |p| p.presented == Some(frame), |counts| &mut counts.missing);
@@ -130,6 +129,16 @@ impl ServerSession {
                 }
                 self.tell(ServerEvent::Finished(frame));
             }
+        }
+    }
+
+    /// When those who have not answered are waited for no longer.
+    pub(super) fn patience_ends(&self) -> Option<Duration> {
+        let patience = |p: &Place| if p.synced { self.options.ready_after } else { self.options.first_after };
+        match self.stage {
+            Stage::Idle => None,
+            Stage::Ready(since) => self.waited_for().filter(|p| p.ready != self.frame).map(|p| since.saturating_add(patience(p))).max(),
+            Stage::Presented(since) => Some(since.saturating_add(self.options.ready_after)),
         }
     }
 

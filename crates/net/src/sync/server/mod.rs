@@ -96,7 +96,7 @@ pub enum Standing {
 }
 
 /// What the server counted about one facet. Counts wrap.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct SeatCounts {
     /// Times it joined.
     pub joined: u64,
@@ -292,6 +292,15 @@ impl ServerSession {
             LinkEvent::Opened => {}
             LinkEvent::Message => self.on_message(now, facet, bytes),
             LinkEvent::Closed(why) => self.gone(facet, why == Closed::ByPeer),
+        }
+        self.advance(now);
+    }
+
+    /// A facet's process has ended: it is dropped at once, and nobody waits for it.
+    pub fn lose(&mut self, now: Duration, facet: FacetNumber) {
+        if self.standing(facet) != Standing::Absent {
+            self.gone(facet, false);
+            self.close.push(facet);
         }
         self.advance(now);
     }

@@ -33,6 +33,14 @@ impl ServerSession {
         }
     }
 
+    /// The next time at which [`advance`](Self::advance) has something to do, if nothing comes before.
+    pub fn wake(&self) -> Option<Duration> {
+        let there = self.there().map(|(_, p)| p.heard.saturating_add(self.options.drop_after));
+        let beats = self.there().map(|(_, p)| p.sent.saturating_add(self.options.drop_after / 4));
+        let again = self.options.resend_after.into_iter().flat_map(|after| self.there().map(move |(_, p)| p.sent.saturating_add(after)));
+        there.chain(beats).chain(again).chain(self.patience_ends()).min()
+    }
+
     /// Who hears nothing else hears that the server lives.
     pub(super) fn beat(&mut self, now: Duration) {
         let every = self.options.drop_after / 4;

@@ -15,6 +15,7 @@
 //!
 //! The memory is one page per run, `tumble_USER_…_RUN.bell`. Its server removes it; what a killed server left is removed by [`clean_up`].
 
+use super::alive::MEMORY;
 use crate::sync::transport::LinkError;
 use iceoryx2::prelude::{FileName, SemanticString};
 use iceoryx2_bb_concurrency::atomic::AtomicU32;
@@ -38,8 +39,6 @@ const PROCESS: usize = 3;
 const SERVERS: usize = 4;
 
 const SUFFIX: &str = ".bell";
-/// Where shared memory lies as files.
-const FOLDER: &str = "/dev/shm";
 
 /// One end of it.
 pub struct Bell {
@@ -139,7 +138,7 @@ impl Drop for Bell {
 
 /// Removes the bells of this user's servers that are gone.
 pub fn clean_up(user: u32) {
-    let (Ok(files), Ok(configuration)) = (std::fs::read_dir(FOLDER), configuration(user)) else { return };
+    let (Ok(files), Ok(configuration)) = (std::fs::read_dir(MEMORY), configuration(user)) else { return };
     for file in files.flatten() {
         let Ok(name) = FileName::new(file.file_name().as_encoded_bytes()) else { continue };
         let Some(inner) = configuration.extract_name_from_file(&name) else { continue };

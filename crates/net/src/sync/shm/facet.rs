@@ -1,10 +1,10 @@
 //! A facet's end of shared memory.
 
 use super::order::{Memory, Order};
-use super::ports::Ports;
+use super::ports::{Ports, Received};
 use super::wire::{HEAD, Head, Kind};
 use super::{ASK, PING, SILENCE, draw};
-use crate::sync::transport::{Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES};
+use crate::sync::transport::{Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Message};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -22,7 +22,7 @@ enum Stage {
 /// What waits for the user.
 enum Waiting {
     Event(LinkEvent),
-    Message(Delivery, Vec<u8>),
+    Message(Delivery, Message),
 }
 
 /// A facet's end of shared memory.
@@ -77,7 +77,7 @@ impl ShmFacet {
 
     fn tell(&mut self, head: Head, data: &[u8]) -> Result<(), LinkError> {
         let Some(ports) = &self.ports else { return Ok(()) };
-        ports.publish(&head.bytes(), data)?;
+        ports.publish(head.words(), data)?;
         let rings = !head.more;
         self.counters.bytes_out += (HEAD + data.len()) as u64;
         let now = self.start.elapsed();
@@ -93,10 +93,13 @@ impl ShmFacet {
     fn take_all(&mut self) -> Result<(), LinkError> {
         let Some(ports) = self.ports.take() else { return Ok(()) };
         let mut again = Vec::new();
-        let mut result = Ok(true);
-        while let Ok(true) = result {
-            result = ports.receive(|sample| again.extend(self.take(sample)));
-        }
+        let result = loop {
+            match ports.receive() {
+                Ok(Some(sample)) => again.extend(self.take(&ports, sample)),
+                Ok(None) => break Ok(()),
+                Err(why) => break Err(why),
+            }
+        };
         self.ports = Some(ports);
         result?;
         for head in again {
@@ -105,11 +108,11 @@ impl ShmFacet {
         Ok(())
     }
 
-    /// Takes a sample; what is asked for again comes back, because a sample is still borrowed here.
-    fn take(&mut self, sample: &[u8]) -> Option<Head> {
+    /// Takes a sample; what is asked for again comes back.
+    fn take(&mut self, ports: &Ports, sample: Received) -> Option<Head> {
         let now = self.start.elapsed();
-        let (head, data) = match Head::parse(sample) {
-            Ok(parts) => parts,
+        let head = match Head::parse(sample.head()) {
+            Ok(head) => head,
             Err(why) => {
                 self.counters.refuse(why);
                 return None;
@@ -134,11 +137,12 @@ impl ShmFacet {
         match head.kind {
             Kind::Piece => {
                 let mine = head.mask >> self.facet & 1 == 1;
-                self.counters.bytes_in += if mine { sample.len() as u64 } else { 0 };
+                self.counters.bytes_in += if mine { (HEAD + sample.as_ref().len()) as u64 } else { 0 };
                 // What is repeated for another facet says nothing to this one, even where it misses the same number.
                 let repeated_for_another = head.connection != 0 && !for_me;
                 let (waiting, superseded) = (&mut self.waiting, &mut self.counters.superseded);
                 let deliver = |delivery, message| *superseded += queue(waiting, delivery, message);
+                let data = if mine && !repeated_for_another { ports.lend(sample) } else { Message::default() };
                 if !repeated_for_another && order.take(&head, mine, data, deliver).is_err() {
                     self.end(Closed::Overrun);
                 }
@@ -208,7 +212,7 @@ impl ShmFacet {
         }
     }
 
-    fn next_event(&mut self, message: &mut Vec<u8>) -> Option<LinkEvent> {
+    fn next_event(&mut self, message: &mut Message) -> Option<LinkEvent> {
         match self.waiting.pop_front()? {
             Waiting::Event(event) => Some(event),
             Waiting::Message(_, bytes) => {
@@ -221,7 +225,7 @@ impl ShmFacet {
 }
 
 /// A newest message that still waits is replaced; how many were.
-fn queue(waiting: &mut VecDeque<Waiting>, delivery: Delivery, message: Vec<u8>) -> u64 {
+fn queue(waiting: &mut VecDeque<Waiting>, delivery: Delivery, message: Message) -> u64 {
     let before = waiting.len();
     if delivery == Delivery::Newest {
         waiting.retain(|what| !matches!(what, Waiting::Message(Delivery::Newest, _)));
@@ -251,10 +255,10 @@ impl FacetLink for ShmFacet {
         Ok(true)
     }
 
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<LinkEvent>, LinkError> {
-        message.clear();
+    fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError> {
+        let buffer = message.clear();
         if let Stage::Connected { order, .. } = &mut self.stage {
-            order.lend(std::mem::take(message));
+            order.lend(buffer);
         }
         let end = self.start.elapsed() + timeout;
         loop {

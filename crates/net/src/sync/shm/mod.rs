@@ -5,6 +5,7 @@
 //!
 //! All work is done in `recv`; there is no thread. A side that looks in only after a long picture finds its samples in the buffer, or asks for them again.
 
+mod alive;
 pub mod bell;
 pub mod facet;
 pub mod order;

@@ -4,7 +4,7 @@
 //! asks for the first few of those again, at most as many as its buffer holds, and for the next when they came: it sets the pace itself.
 
 use super::wire::Head;
-use crate::sync::transport::{Delivery, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES};
+use crate::sync::transport::{Delivery, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES, Message};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -45,7 +45,8 @@ impl Memory {
 
     /// Remembers the piece that was sent as [`next`](Self::next).
     pub fn keep(&mut self, mask: u64, newest: bool, more: bool, bytes: &[u8]) {
-        let mut data = std::mem::take(&mut self.spare);
+        // A small piece does not take a large buffer away.
+        let mut data = if self.spare.capacity() / 4 <= bytes.len() { std::mem::take(&mut self.spare) } else { Vec::new() };
         data.clear();
         data.extend_from_slice(bytes);
         self.bytes += data.len();
@@ -113,8 +114,8 @@ impl Order {
         self.next
     }
 
-    /// Takes a piece; whole messages go to `deliver`.
-    pub fn take(&mut self, head: &Head, mine: bool, data: &[u8], mut deliver: impl FnMut(Delivery, Vec<u8>)) -> Result<(), Overrun> {
+    /// Takes a piece; whole messages go to `deliver`. One that came in one piece and in order goes on as it is.
+    pub fn take(&mut self, head: &Head, mine: bool, data: Message, mut deliver: impl FnMut(Delivery, Message)) -> Result<(), Overrun> {
         let mine = mine && !head.skip;
         if head.number < self.next || self.pending.contains_key(&head.number) {
             return Ok(());
@@ -123,7 +124,7 @@ impl Order {
             if self.pending.len() >= MAX_PENDING || self.pending_bytes + data.len() > MAX_QUEUED_BYTES {
                 return Err(Overrun);
             }
-            let data = if mine { data.to_vec() } else { Vec::new() };
+            let data = if mine { data.into_vec() } else { Vec::new() };
             self.pending_bytes += data.len();
             self.pending.insert(head.number, Pending { newest: head.newest, more: head.more, mine, data });
             return Ok(());
@@ -131,7 +132,7 @@ impl Order {
         self.join(mine, head.newest, head.more, data, &mut deliver)?;
         while let Some(piece) = self.pending.remove(&self.next) {
             self.pending_bytes -= piece.data.len();
-            self.join(piece.mine, piece.newest, piece.more, &piece.data, &mut deliver)?;
+            self.join(piece.mine, piece.newest, piece.more, piece.data.into(), &mut deliver)?;
         }
         Ok(())
     }
@@ -147,11 +148,10 @@ impl Order {
         Some((self.next, until))
     }
 
-    /// A buffer to build the next message in, where there is none.
+    /// An empty buffer to build the next message in, where there is none.
     pub fn lend(&mut self, buffer: Vec<u8>) {
         if self.partial.is_empty() && self.partial.capacity() < buffer.capacity() {
             self.partial = buffer;
-            self.partial.clear();
         }
     }
 
@@ -165,8 +165,8 @@ impl Order {
         mine: bool,
         newest: bool,
         more: bool,
-        data: &[u8],
-        deliver: &mut impl FnMut(Delivery, Vec<u8>),
+        data: Message,
+        deliver: &mut impl FnMut(Delivery, Message),
     ) -> Result<(), Overrun> {
         self.next += 1;
         if !mine {
@@ -175,10 +175,14 @@ impl Order {
         if self.partial.len() + data.len() > MAX_MESSAGE_BYTES {
             return Err(Overrun);
         }
-        self.partial.extend_from_slice(data);
+        let delivery = if newest { Delivery::Newest } else { Delivery::Reliable };
+        if !more && self.partial.is_empty() {
+            deliver(delivery, data);
+            return Ok(());
+        }
+        self.partial.extend_from_slice(&data);
         if !more {
-            let delivery = if newest { Delivery::Newest } else { Delivery::Reliable };
-            deliver(delivery, std::mem::take(&mut self.partial));
+            deliver(delivery, std::mem::take(&mut self.partial).into());
         }
         Ok(())
     }
@@ -209,7 +213,7 @@ mod tests {
                 buffer.pop_front();
             }
             for (head, data) in buffer.drain(..) {
-                order.take(&head, head.mask == 1, &data, |_, message| got.push(message)).unwrap();
+                order.take(&head, head.mask == 1, data.into(), |_, message| got.push(message.into_vec())).unwrap();
             }
             if let Some((number, until)) = order.ask(Duration::from_millis(round)) {
                 let asked = Head { number, until, ..Head::new(Kind::Again, 1) };

@@ -2,15 +2,19 @@
 //!
 //! Two services of samples per run, named by the run: `tumble/RUN/down` and `…/up`, and a [`Bell`]. Files lie in a folder of this user alone, objects in
 //! `/dev/shm` carry the user's number: another user's run is neither seen nor disturbed. What a killed process leaves is removed when the next node begins,
-//! or when a server ends.
+//! or when a server ends; what then still stays, the last process takes along ([`super::alive`]).
 
+use super::alive::Alive;
 use super::bell::{self, Bell};
-use crate::sync::transport::{FacetNumber, LinkError};
+use super::wire::Words;
+use crate::sync::transport::{FacetNumber, LinkError, Message};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::{AllocationStrategy, Config, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
+use iceoryx2::sample::Sample;
 use iceoryx2::service::ipc_threadsafe::Service;
 use std::fmt::Debug;
+use std::sync::Arc;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::PathBuf;
 
@@ -21,26 +25,47 @@ pub const UP_BYTES: usize = 16 << 10;
 /// Samples that a slow reader's buffer holds.
 const BUFFER: usize = 8;
 
+/// Samples that a reader may hold while it goes on reading.
+const HELD: usize = 6;
+
+/// A sample that was received. It lies in shared memory, and nobody writes over it until it is dropped.
+pub struct Received(Sample<Service, [u8], Words>);
+
+impl Received {
+    /// Its head.
+    pub fn head(&self) -> Words {
+        *self.0.user_header()
+    }
+}
+
+impl AsRef<[u8]> for Received {
+    fn as_ref(&self) -> &[u8] {
+        self.0.payload()
+    }
+}
+
 /// The ends.
 pub struct Ports {
-    publisher: Publisher<Service, [u8], ()>,
-    subscriber: Subscriber<Service, [u8], ()>,
+    publisher: Publisher<Service, [u8], Words>,
+    subscriber: Subscriber<Service, [u8], Words>,
+    /// Held by each sample that was lent.
+    lent: Arc<()>,
     bell: Bell,
     sample: usize,
     node: Node<Service>,
-    user: u32,
+    alive: Alive,
 }
 
 impl Ports {
     /// Begins the services of a run, or joins those that an earlier server of it left.
     pub fn serve(run: &str, facets: FacetNumber) -> Result<Ports, LinkError> {
-        let (node, user) = node("tumble server")?;
+        let (node, alive) = node("tumble server")?;
         // Killed processes hold their places until they are cleaned up.
         let places = 2 * usize::from(facets) + 4;
         let data = |name: &str, publishers: usize, subscribers: usize| {
-            let builder = node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>();
+            let builder = node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>();
             let builder =
-                builder.enable_safe_overflow(true).subscriber_max_buffer_size(BUFFER).history_size(0).subscriber_max_borrowed_samples(2);
+                builder.enable_safe_overflow(true).subscriber_max_buffer_size(BUFFER).history_size(0).subscriber_max_borrowed_samples(HELD);
             builder
                 .max_publishers(publishers)
                 .max_subscribers(subscribers)
@@ -49,31 +74,33 @@ impl Ports {
                 .map_err(|why| refused(run, name, why))
         };
         // Before the services: who finds them finds it.
-        let bell = Bell::serve(run, user)?;
+        let bell = Bell::serve(run, alive.user())?;
         let (down, up) = (data("down", 4, places)?, data("up", places, 4)?);
         let ports = Ports {
             publisher: publisher(&down, DOWN_BYTES).map_err(|why| refused(run, "down", why))?,
             subscriber: up.subscriber_builder().create().map_err(|why| refused(run, "up", why))?,
+            lent: Arc::default(),
             bell,
             sample: DOWN_BYTES,
             node,
-            user,
+            alive,
         };
         Ok(ports)
     }
 
     /// Joins a run's services as a facet; `None` while there are none.
     pub fn join(run: &str) -> Result<Option<Ports>, LinkError> {
-        let (node, user) = node("tumble facet")?;
-        let data = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().open().ok());
-        let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, user)?) else { return Ok(None) };
+        let (node, alive) = node("tumble facet")?;
+        let data = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>().open().ok());
+        let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, alive.user())?) else { return Ok(None) };
         let ports = Ports {
             publisher: publisher(&up, UP_BYTES).map_err(|why| refused(run, "up", why))?,
             subscriber: down.subscriber_builder().create().map_err(|why| refused(run, "down", why))?,
+            lent: Arc::default(),
             bell,
             sample: UP_BYTES,
             node,
-            user,
+            alive,
         };
         Ok(Some(ports))
     }
@@ -83,19 +110,17 @@ impl Ports {
         self.sample
     }
 
-    /// Publishes a sample of two parts. Nobody is woken yet.
-    pub fn publish(&self, head: &[u8], data: &[u8]) -> Result<(), LinkError> {
-        let mut sample = self.publisher.loan_slice(head.len() + data.len()).map_err(|why| failed("loan", why))?;
-        let (first, rest) = sample.payload_mut().split_at_mut(head.len());
-        first.copy_from_slice(head);
-        rest.copy_from_slice(data);
-        sample.send().map_err(|why| failed("send", why))?;
+    /// Publishes a sample. Nobody is woken yet.
+    pub fn publish(&self, head: Words, data: &[u8]) -> Result<(), LinkError> {
+        let mut sample = self.publisher.loan_slice_uninit(data.len()).map_err(|why| failed("loan", why))?;
+        *sample.user_header_mut() = head;
+        sample.write_from_slice(data).send().map_err(|why| failed("send", why))?;
         Ok(())
     }
 
     /// Looks again for the bell of a run: a new server of it may have another one.
     pub fn look_for_bell(&mut self, run: &str) -> Result<(), LinkError> {
-        if let Some(bell) = Bell::join(run, self.user)? {
+        if let Some(bell) = Bell::join(run, self.alive.user())? {
             self.bell = bell;
         }
         Ok(())
@@ -106,49 +131,74 @@ impl Ports {
         &self.bell
     }
 
-    /// Hands the next sample to `take`; `false` when there is none.
-    pub fn receive(&self, take: impl FnOnce(&[u8])) -> Result<bool, LinkError> {
-        match self.subscriber.receive().map_err(|why| failed("receive", why))? {
-            Some(sample) => {
-                take(sample.payload());
-                Ok(true)
-            }
-            None => Ok(false),
-        }
+    /// The next sample, if there is one.
+    pub fn receive(&self) -> Result<Option<Received>, LinkError> {
+        Ok(self.subscriber.receive().map_err(|why| failed("receive", why))?.map(Received))
+    }
+
+    /// The message of a sample: where it lies, or a copy where the reader holds so many already that it could not go on reading.
+    pub fn lend(&self, sample: Received) -> Message {
+        // one more is held while it is looked at
+        if Arc::strong_count(&self.lent) + 1 < HELD { Message::lent(Lent { sample, _held: self.lent.clone() }) } else { sample.as_ref().to_vec().into() }
     }
 
     /// Removes what killed processes left.
     pub fn clean_up(&self) {
         self.node.try_cleanup_dead_nodes();
-        bell::clean_up(self.user);
+        bell::clean_up(self.alive.user());
     }
 }
 
-type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, [u8], ()>;
-
-fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Service, [u8], ()>, impl Debug> {
-    service.publisher_builder().initial_max_slice_len(bytes + super::wire::HEAD).allocation_strategy(AllocationStrategy::Static).create()
+/// A sample that somebody holds.
+struct Lent {
+    sample: Received,
+    _held: Arc<()>,
 }
 
-/// A node, which removes what is stale as it begins, and the number of its user.
-fn node(name: &str) -> Result<(Node<Service>, u32), LinkError> {
+impl AsRef<[u8]> for Lent {
+    fn as_ref(&self) -> &[u8] {
+        self.sample.as_ref()
+    }
+}
+
+impl Drop for Ports {
+    fn drop(&mut self) {
+        self.node.try_cleanup_dead_nodes();
+    }
+}
+
+type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, [u8], Words>;
+
+fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Service, [u8], Words>, impl Debug> {
+    service.publisher_builder().initial_max_slice_len(bytes).allocation_strategy(AllocationStrategy::Static).create()
+}
+
+/// A node, which removes what is stale as it begins, and the word that it is here.
+fn node(name: &str) -> Result<(Node<Service>, Alive), LinkError> {
     set_log_level(LogLevel::Fatal); // what goes wrong is told by our errors
     let (folder, user) = folder()?;
     let text = folder.display().to_string();
     let unusable = |why: &dyn Debug| LinkError::Other(format!("shared memory: the folder {text} cannot be used: {why:?}"));
     let mut config = Config::default();
-    config.global.prefix = FileName::new(format!("tumble_{user}_").as_bytes()).map_err(|why| unusable(&why))?;
+    // Of another folder another one: nodes that do not see each other draw from different counters.
+    let prefix = format!("tumble_{user}_{}_", &blake3::hash(text.as_bytes()).to_hex()[..8]);
+    let alive = Alive::new(&folder, &prefix, user)?;
+    config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|why| unusable(&why))?;
     config.global.set_root_path(&Path::new(text.as_bytes()).map_err(|why| unusable(&why))?);
     let name = name.try_into().map_err(|why| unusable(&why))?;
     let builder = NodeBuilder::new().name(&name).config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
     let node = builder.create::<Service>().map_err(|why| unusable(&why))?;
     bell::clean_up(user);
-    Ok((node, user))
+    Ok((node, alive))
 }
 
 /// Removes what killed processes left.
 pub fn clean_up() -> Result<(), LinkError> {
-    node("tumble clean-up").map(|(node, _)| _ = node.try_cleanup_dead_nodes())
+    let (node, alive) = node("tumble clean-up")?;
+    node.try_cleanup_dead_nodes();
+    drop(node);
+    drop(alive);
+    Ok(())
 }
 
 /// A folder of this user alone, made if need be; and the user's number.

@@ -1,7 +1,7 @@
 //! The server's end of shared memory.
 
 use super::order::{Memory, Order};
-use super::ports::Ports;
+use super::ports::{Ports, Received};
 use super::wire::{HEAD, Head, Kind};
 use super::{PING, SILENCE, draw};
 use crate::sync::transport::{
@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 /// Pieces remembered for those who missed them.
 const MEMORY: usize = 16_384;
 
-/// How long the server sleeps while it waits for the answers of several facets, before it takes those that are there.
-const GATHER: Duration = Duration::from_millis(2);
+/// How long the server sleeps while a piece is missing, before it asks for it again.
+const GAP: Duration = Duration::from_millis(2);
 
 /// A facet that is connected.
 struct Connection {
@@ -86,7 +86,7 @@ impl ShmServer {
         while let Some(chunk) = chunks.next() {
             let more = chunks.peek().is_some();
             let head = Head { newest, more, mask, number: self.memory.next(), ..Head::new(Kind::Piece, self.reign) };
-            self.ports.publish(&head.bytes(), chunk)?;
+            self.ports.publish(head.words(), chunk)?;
             if !more {
                 self.ports.bell().ring();
             }
@@ -105,24 +105,22 @@ impl ShmServer {
 
     fn tell(&mut self, head: Head) -> Result<(), LinkError> {
         self.sent = self.start.elapsed();
-        self.ports.publish(&head.bytes(), &[])?;
+        self.ports.publish(head.words(), &[])?;
         self.ports.bell().ring();
         Ok(())
     }
 
     fn take_all(&mut self) -> Result<(), LinkError> {
-        loop {
-            let mut sample = Vec::new();
-            if !self.ports.receive(|bytes| sample.extend_from_slice(&bytes[..bytes.len().min(HEAD + super::ports::UP_BYTES)]))? {
-                return Ok(());
-            }
+        while let Some(sample) = self.ports.receive()? {
             self.take(&sample)?;
         }
+        Ok(())
     }
 
-    fn take(&mut self, sample: &[u8]) -> Result<(), LinkError> {
-        let (head, data) = match Head::parse(sample) {
-            Ok(parts) => parts,
+    fn take(&mut self, sample: &Received) -> Result<(), LinkError> {
+        let data = sample.as_ref();
+        let head = match Head::parse(sample.head()) {
+            Ok(head) => head,
             Err(why) => {
                 self.strangers.refuse(why);
                 return Ok(());
@@ -133,7 +131,7 @@ impl ShmServer {
             self.strangers.refuse(Refused::Stranger);
             return Ok(());
         }
-        self.counters[facet].bytes_in += sample.len() as u64;
+        self.counters[facet].bytes_in += (HEAD + data.len()) as u64;
         if head.kind == Kind::Hello {
             return self.welcome(&head);
         }
@@ -154,7 +152,7 @@ impl ShmServer {
                 connection.taken = connection.taken.max(head.until);
                 connection.owes &= head.more;
                 let waiting = &mut self.waiting;
-                let taken = connection.order.take(&head, true, data, |delivery, message| queue(waiting, head.facet, delivery, message));
+                let taken = connection.order.take(&head, true, data.to_vec().into(), |delivery, message| queue(waiting, head.facet, delivery, message.into_vec()));
                 if taken.is_err() {
                     self.end(head.facet, Closed::Overrun);
                 }
@@ -194,7 +192,7 @@ impl ShmServer {
             let base = Head { facet: asked.facet, connection: asked.connection, ..Head::new(Kind::Piece, self.reign) };
             let head = Head { newest: kept.newest, more: kept.more, skip, mask: bit, number, ..base };
             let data = if skip { &[][..] } else { &kept.data };
-            self.ports.publish(&head.bytes(), data)?;
+            self.ports.publish(head.words(), data)?;
             let counters = &mut self.counters[usize::from(asked.facet)];
             counters.repeated += 1;
             counters.bytes_out += (HEAD + data.len()) as u64;
@@ -301,7 +299,7 @@ impl ServerLink for ShmServer {
             }
             let owed = self.connections.iter().flatten().filter(|connection| connection.owes).count() as u32;
             let gap = self.connections.iter().flatten().any(|connection| connection.order.has_gap());
-            let most = if gap || owed > 1 { GATHER } else { PING / 4 };
+            let most = if gap { GAP } else { PING / 4 };
             self.ports.bell().wait_for_answers(seen, owed, left.min(most))?;
         }
     }

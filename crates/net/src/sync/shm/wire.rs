@@ -1,22 +1,24 @@
-//! The head of every sample in shared memory, 48 bytes, little-endian; then the bytes of the message.
+//! The head of every sample in shared memory: six words of 64 bits beside the bytes of the message, so that those are copied as they are.
 //!
-//! | byte | size | what |
+//! | word | bits | what |
 //! |---|---|---|
-//! | 0 | 1 | [`Kind`] |
-//! | 1 | 1 | flags: 1 newest, 2 more of this message follows, 4 nothing for you under this number |
-//! | 2 | 2 | facet |
-//! | 4 | 4 | magic `shm1` |
-//! | 8 | 8 | the server's reign: a number that each server process draws |
-//! | 16 | 8 | the facet's connection: a number of each of its connections; 0 on a piece sent to all, its own on a piece sent again |
-//! | 24 | 8 | for whom: bit k for facet k (from the server) |
-//! | 32 | 8 | number of this piece, or the first that is asked for again |
-//! | 40 | 8 | first number that is not taken yet, or the one after the last that is asked for again |
+//! | 0 | 0 to 7 | [`Kind`] |
+//! | | 8 to 15 | flags: 1 newest, 2 more of this message follows, 4 nothing for you under this number |
+//! | | 16 to 31 | facet |
+//! | | 32 to 63 | magic `shm2` |
+//! | 1 | | the server's reign: a number that each server process draws |
+//! | 2 | | the facet's connection: a number of each of its connections; 0 on a piece sent to all, its own on a piece sent again |
+//! | 3 | | for whom: bit k for facet k (from the server) |
+//! | 4 | | number of this piece, or the first that is asked for again |
+//! | 5 | | first number that is not taken yet, or the one after the last that is asked for again |
 
 use crate::sync::transport::{FacetNumber, Refused};
 
-/// Bytes before the message.
-pub const HEAD: usize = 48;
-const MAGIC: u32 = u32::from_le_bytes(*b"shm1");
+/// A head as it lies in shared memory.
+pub type Words = [u64; 6];
+/// Its bytes.
+pub const HEAD: usize = size_of::<Words>();
+const MAGIC: u32 = u32::from_le_bytes(*b"shm2");
 
 /// What a sample is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,30 +70,21 @@ impl Head {
         Head { kind, newest: false, more: false, skip: false, facet: 0, reign, connection: 0, mask: 0, number: 0, until: 0 }
     }
 
-    /// Its bytes.
-    pub fn bytes(&self) -> [u8; HEAD] {
-        let mut out = [0; HEAD];
-        out[0] = self.kind as u8;
-        out[1] = u8::from(self.newest) | u8::from(self.more) << 1 | u8::from(self.skip) << 2;
-        out[2..4].copy_from_slice(&self.facet.to_le_bytes());
-        out[4..8].copy_from_slice(&MAGIC.to_le_bytes());
-        for (at, value) in [self.reign, self.connection, self.mask, self.number, self.until].into_iter().enumerate() {
-            out[8 + 8 * at..16 + 8 * at].copy_from_slice(&value.to_le_bytes());
-        }
-        out
+    /// As it lies in shared memory.
+    pub fn words(&self) -> Words {
+        let flags = u64::from(self.newest) | u64::from(self.more) << 1 | u64::from(self.skip) << 2;
+        let first = self.kind as u64 | flags << 8 | u64::from(self.facet) << 16 | u64::from(MAGIC) << 32;
+        [first, self.reign, self.connection, self.mask, self.number, self.until]
     }
 
-    /// The head of a sample, and what follows it.
-    pub fn parse(sample: &[u8]) -> Result<(Head, &[u8]), Refused> {
-        let (head, rest) = sample.split_first_chunk::<HEAD>().ok_or(Refused::Truncated)?;
-        let u64_at = |at: usize| head[at..at + 8].iter().rev().fold(0u64, |value, byte| value << 8 | u64::from(*byte));
-        let kind = KINDS.into_iter().find(|kind| *kind as u8 == head[0]).ok_or(Refused::Foreign)?;
-        if head[4..8] != MAGIC.to_le_bytes() || head[1] > 7 {
+    /// The head of a sample.
+    pub fn parse([first, reign, connection, mask, number, until]: Words) -> Result<Head, Refused> {
+        let [kind, flags, facet @ ..] = (first as u32).to_le_bytes();
+        let kind = KINDS.into_iter().find(|known| *known as u8 == kind).ok_or(Refused::Foreign)?;
+        if (first >> 32) as u32 != MAGIC || flags > 7 {
             return Err(Refused::Foreign);
         }
-        let flag = |bit: u8| head[1] >> bit & 1 == 1;
-        let facet = u16::from_le_bytes([head[2], head[3]]);
-        let [reign, connection, mask, number, until] = [8, 16, 24, 32, 40].map(u64_at);
-        Ok((Head { kind, newest: flag(0), more: flag(1), skip: flag(2), facet, reign, connection, mask, number, until }, rest))
+        let flag = |bit: u8| flags >> bit & 1 == 1;
+        Ok(Head { kind, newest: flag(0), more: flag(1), skip: flag(2), facet: u16::from_le_bytes(facet), reign, connection, mask, number, until })
     }
 }

@@ -7,7 +7,7 @@ use super::facet::FacetSettings;
 use super::keys::{Entropy, SharedKey};
 use super::server::ServerSettings;
 use super::{FacetMachine, Numbering, ServerMachine, Timing};
-use crate::sync::transport::{Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, ServerLink};
+use crate::sync::transport::{Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, Message, ServerLink};
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -302,10 +302,10 @@ impl FacetLink for UdpFacet {
         Ok(sent)
     }
 
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<LinkEvent>, LinkError> {
+    fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError> {
         message.clear();
         Ok(self.running.core.next_event(timeout)?.map(|(event, bytes)| {
-            *message = bytes;
+            *message = bytes.into();
             event
         }))
     }

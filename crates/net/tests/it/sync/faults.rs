@@ -59,6 +59,50 @@ fn a_facet_that_is_killed_is_dropped_and_comes_back() {
     }
 }
 
+/// Where it is known that its process has ended nobody waits for it: the wall does not stand still, and it is gone at once.
+#[test]
+fn a_facet_whose_process_ended_is_waited_for_no_longer() {
+    for (moment, seed) in (1..MOMENTS.len()).flat_map(|m| [(m, 110 + 2 * m as u64), (m, 111 + 2 * m as u64)]) {
+        let mut stage = at(moment, seed);
+        let before = shown(&stage);
+        stage.kill_facet(1);
+        let now = stage.now;
+        stage.server.as_mut().unwrap().lose(now, 1);
+        assert_eq!(stage.server.as_ref().unwrap().standing(1), Standing::Absent);
+        stage.run(160 * MS);
+        let after = shown(&stage);
+        // ten frames of 16 ms, and in a storm some that take longer
+        let least = if seed.is_multiple_of(2) { 9 } else { 6 };
+        assert!(after[0] >= before[0] + least && after[2] >= before[2] + least, "{before:?} {after:?} (moment {moment}, seed {seed})");
+        let (counts, _) = stage.server.as_ref().unwrap().counts(1);
+        assert_eq!((counts.late, counts.missing, counts.dropped), (0, 0, 1));
+        stage.start_facet(1);
+        let back = |s: &Stage| s.server.as_ref().unwrap().standing(1) == Standing::InStep;
+        assert!(stage.until(1000 * MS, back), "moment {moment}, seed {seed}");
+        stage.assert_true();
+    }
+}
+
+/// A server that sleeps until a message comes or something is due does the same, at the same times, as one that looks ten thousand times a second.
+#[test]
+fn a_server_that_sleeps_until_something_is_due_misses_nothing() {
+    for (seed, weather, resend) in [(120, Weather::CLEAR, None), (121, STORM, Some(5 * MS)), (122, STORM, Some(5 * MS))] {
+        let [awake, asleep] = [false, true].map(|sleeps| {
+            let mut stage = Stage::new(seed, weather, 3, Pace::Lockstep);
+            stage.options.resend_after = resend;
+            (stage.sleeps, stage.server) = (sleeps, Some(ServerSession::new(stage.options.clone(), &stage.base)));
+            stage.run(500 * MS);
+            stage.kill_facet(1); // late, then dropped
+            stage.run(2500 * MS);
+            stage.start_facet(1);
+            stage.run(500 * MS);
+            (stage.events, stage.facets.iter().map(|f| (f.shown.clone(), f.shown_at.clone())).collect::<Vec<_>>())
+        });
+        assert!(awake.0.iter().any(|e| matches!(e, ServerEvent::Late(1, _))) && awake.0.iter().any(|e| matches!(e, ServerEvent::Gone(1, false))));
+        assert!(awake == asleep, "seed {seed}");
+    }
+}
+
 #[test]
 fn a_facet_that_is_started_again_at_once_takes_its_old_place() {
     for (moment, seed) in (0..MOMENTS.len()).flat_map(|m| [(m, 30 + 2 * m as u64), (m, 31 + 2 * m as u64)]) {
@@ -143,7 +187,7 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
         }
         let told = server.events().into_iter().find_map(|e| if let ServerEvent::Refused(1, why) = e { Some(why) } else { None }).unwrap();
         for out in server.outgoing() {
-            facet.on_event(MS, LinkEvent::Message, &out.message);
+            facet.on_event(MS, LinkEvent::Message, out.message.to_vec().into());
         }
         (told, facet.task())
     };
@@ -188,7 +232,7 @@ fn a_facet_that_draws_something_else_is_found_out() {
         if server.idle() && server.complete() {
             server.publish(now, &base, &viewer(0)).unwrap();
         }
-        server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, &out.message));
+        server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
     }
     assert!(shown > 50 && wrong > 15, "{shown} {wrong}");
     let told = server.events().iter().filter(|e| matches!(e, ServerEvent::Ready(0, frame, _, false) if frame % 3 == 0)).count();
@@ -240,7 +284,7 @@ fn a_frame_that_does_not_fit_is_asked_for_again() {
             let spoil = header.kind == wire::Kind::State && header.frame == 5 && spoilt == 0;
             let bytes = if spoil { wire::message(&header, |out| out.extend(&payload[..payload.len() - 1])) } else { out.message.to_vec() };
             spoilt += u32::from(spoil);
-            facet.on_event(now, LinkEvent::Message, &bytes);
+            facet.on_event(now, LinkEvent::Message, bytes.into());
         }
     }
     let counts = facet.counts();

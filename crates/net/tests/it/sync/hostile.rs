@@ -167,7 +167,7 @@ fn a_session_under_fire_stays_true() {
         let bytes = message(&head, |out| out.extend(payload));
         let now = stage.now;
         stage.server.as_mut().unwrap().on_event(now, dice.below(3) as u16, LinkEvent::Message, &bytes);
-        stage.facets[dice.below(2) as usize].session.as_mut().unwrap().on_event(now, LinkEvent::Message, &bytes);
+        stage.facets[dice.below(2) as usize].session.as_mut().unwrap().on_event(now, LinkEvent::Message, bytes.clone().into());
         stage.tick();
     }
     stage.run(100 * MS);

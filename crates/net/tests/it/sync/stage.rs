@@ -64,6 +64,8 @@ pub struct Stage {
     pub expected: BTreeMap<u64, [u8; 16]>,
     pub base: World,
     pub every: Duration,
+    /// The server is woken by messages and when something is due, and not at every tick.
+    pub sleeps: bool,
     next_frame: Duration,
 }
 
@@ -79,7 +81,7 @@ impl Stage {
         let base = scene();
         let mut stage = Stage {
             now: Duration::ZERO, net: Network::new(seed, weather), world: base.fork(), server: Some(ServerSession::new(options.clone(), &base)), options,
-            facets: (0..facets).map(actor).collect(), events: Vec::new(), expected: BTreeMap::new(), base, every: 16 * MS, next_frame: Duration::ZERO,
+            facets: (0..facets).map(actor).collect(), events: Vec::new(), expected: BTreeMap::new(), base, every: 16 * MS, sleeps: false, next_frame: Duration::ZERO,
         };
         (0..facets).for_each(|k| stage.start_facet(k));
         stage
@@ -134,7 +136,7 @@ impl Stage {
                 To::Facet(k) if self.now >= self.facets[k as usize].frozen_until => {
                     let actor = &mut self.facets[k as usize];
                     if let Some(facet) = &mut actor.session {
-                        facet.on_event(self.now + actor.clock, LinkEvent::Message, &bytes);
+                        facet.on_event(self.now + actor.clock, LinkEvent::Message, bytes.into());
                     }
                 }
                 To::Facet(_) => {}
@@ -146,7 +148,9 @@ impl Stage {
 
     fn serve(&mut self) {
         let Some(server) = &mut self.server else { return };
-        server.advance(self.now);
+        if !self.sleeps || server.wake().is_some_and(|wake| self.now >= wake) {
+            server.advance(self.now);
+        }
         if server.idle() && self.now >= self.next_frame && (server.complete() || server.frame().is_some()) {
             self.world.step().unwrap();
             let viewer = viewer(self.world.frame());

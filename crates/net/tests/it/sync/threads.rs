@@ -10,7 +10,7 @@ use tumble_core::collide::Shape;
 use tumble_core::{RigidBody, World};
 use tumble_net::record::RecorderOptions;
 use tumble_net::sync::messages::Done;
-use tumble_net::sync::transport::{Closed, Delivery, FacetLink, LinkEvent, ServerLink};
+use tumble_net::sync::transport::{Closed, Delivery, FacetLink, LinkEvent, Message, ServerLink};
 use tumble_net::sync::*;
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -134,19 +134,19 @@ fn who_does_not_join_is_named() {
 /// The link's own contract: order, newest, closing, and coming back.
 #[test]
 fn the_local_link_keeps_its_contract() {
-    let (hub, mut bytes, no_time) = (Hub::new(2), Vec::new(), Duration::ZERO);
+    let (hub, mut bytes, mut lent, no_time) = (Hub::new(2), Vec::new(), Message::default(), Duration::ZERO);
     let mut server = hub.server();
     assert!(!server.send(0, Delivery::Reliable, b"x").unwrap(), "nobody is there");
     let mut facet = hub.facet(0).unwrap();
     assert_eq!(server.recv(no_time, &mut bytes).unwrap(), Some((0, LinkEvent::Opened)));
-    assert_eq!(facet.recv(no_time, &mut bytes).unwrap(), Some(LinkEvent::Opened));
+    assert_eq!(facet.recv(no_time, &mut lent).unwrap(), Some(LinkEvent::Opened));
     for k in 0..3u8 {
         assert!(server.send(0, Delivery::Reliable, &[k]).unwrap());
         assert!(server.send(0, Delivery::Newest, &[10 + k]).unwrap());
     }
     let mut got = Vec::new();
-    while facet.recv(no_time, &mut bytes).unwrap() == Some(LinkEvent::Message) {
-        got.push(bytes[0]);
+    while facet.recv(no_time, &mut lent).unwrap() == Some(LinkEvent::Message) {
+        got.push(lent[0]);
     }
     assert_eq!(got, [0, 1, 2, 12]);
     assert_eq!(server.counters(0).superseded, 2);
@@ -157,10 +157,10 @@ fn the_local_link_keeps_its_contract() {
     let mut facet = hub.facet(0).unwrap();
     assert_eq!(server.recv(no_time, &mut bytes).unwrap(), Some((0, LinkEvent::Opened)));
     server.close(0);
-    let events: Vec<_> = (0..3).map(|_| facet.recv(no_time, &mut bytes).unwrap()).collect();
+    let events: Vec<_> = (0..3).map(|_| facet.recv(no_time, &mut lent).unwrap()).collect();
     assert_eq!(events, [LinkEvent::Opened, LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened].map(Some));
     drop(server);
-    assert_eq!(facet.recv(no_time, &mut bytes).unwrap(), Some(LinkEvent::Closed(Closed::ByPeer)));
+    assert_eq!(facet.recv(no_time, &mut lent).unwrap(), Some(LinkEvent::Closed(Closed::ByPeer)));
 }
 
 /// A facet that takes nothing loses its connection and not the others': nothing waits for it.

@@ -20,11 +20,13 @@
 //! Something redundant is sent only while the balance covers it. Ordering over a fixed time rather than over a count of later packets keeps reordering
 //! from looking like loss.
 
+mod fate;
 mod stream;
 
-use super::frames::{Ack, Channel, FRAGMENT, Frame, PARITY_HEAD, Part, before};
+pub use fate::Impossible;
+
+use super::frames::{Channel, FRAGMENT, Frame, PARITY_HEAD, Part};
 use super::inbox::parity;
-use super::packet::whole;
 use crate::sync::transport::MAX_QUEUED_BYTES;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -33,10 +35,6 @@ use stream::Stream;
 
 /// Packets under way at once; half of what a socket's default buffer holds.
 const PACKETS_AHEAD: usize = 64;
-/// Packets remembered after they were given up, so that a late acknowledgement still tells the round trip.
-const REMEMBERED: usize = 512;
-const RESOLUTION: Duration = Duration::from_millis(1);
-const LONGEST_TIMEOUT: Duration = Duration::from_millis(250);
 /// Share of lost packets above which redundancy pays.
 const LOSSY: f64 = 0.005;
 /// Bytes by which the balance may run ahead or behind.
@@ -67,10 +65,6 @@ struct Sent {
 /// More waits than may.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Full;
-
-/// An acknowledgement of something that was never sent.
-#[derive(Debug, PartialEq, Eq)]
-pub struct Impossible;
 
 /// What is to be sent of one connection.
 pub struct Outbox {
@@ -183,117 +177,6 @@ impl Outbox {
         self.balance = self.balance.min(BALANCE) + bytes as i64;
     }
 
-    /// Takes an acknowledgement.
-    pub fn acknowledged(&mut self, now: Duration, ack: &Ack, next_sequence: u64) -> Result<(), Impossible> {
-        let largest = whole(ack.largest, next_sequence);
-        let complete = [Some(ack.reliable), ack.newest];
-        let possible = |(stream, done): (&Stream, Option<u32>)| done.is_none_or(|done| !before(stream.next, done));
-        if largest >= next_sequence || !self.streams.iter().zip(complete).all(possible) {
-            return Err(Impossible);
-        }
-        self.largest = self.largest.max(Some(largest));
-        self.mark(now, largest, ack.mask);
-        for (stream, done) in self.streams.iter_mut().zip(complete) {
-            done.into_iter().for_each(|done| stream.finish(done));
-        }
-        self.forget();
-        self.begin_messages();
-        Ok(())
-    }
-
-    /// When something is due without any packet arriving.
-    pub fn wake(&self) -> Option<Duration> {
-        self.sent.iter().filter(|sent| sent.fate == Fate::UnderWay).map(|sent| self.due(sent)).min()
-    }
-
-    /// Gives up the packets whose time is over.
-    pub fn tick(&mut self, now: Duration) {
-        let mut timed_out = false;
-        for k in 0..self.sent.len() {
-            if self.sent[k].fate != Fate::UnderWay || now < self.due(&self.sent[k]) {
-                continue;
-            }
-            timed_out |= self.largest.is_none_or(|largest| self.sent[k].sequence > largest);
-            self.sent[k].fate = Fate::Lost;
-            self.under_way -= 1;
-            self.loss += (1.0 - self.loss) / 128.0;
-            for p in 0..self.sent[k].pieces.len() {
-                self.lose(self.sent[k].pieces[p]);
-            }
-        }
-        self.timeouts = self.timeouts.saturating_add(u32::from(timed_out)).min(16);
-    }
-
-    fn due(&self, sent: &Sent) -> Duration {
-        if self.largest.is_some_and(|largest| sent.sequence < largest) {
-            return sent.at + self.srtt + (2 * self.var).max(RESOLUTION / 2);
-        }
-        let timeout = match self.timeouts.checked_sub(2) {
-            None => self.srtt + (4 * self.var).min(4 * RESOLUTION) + RESOLUTION,
-            Some(more) => (self.srtt + 4 * self.var + RESOLUTION) * (1 << more.min(8)),
-        };
-        sent.at + timeout.min(LONGEST_TIMEOUT)
-    }
-
-    fn mark(&mut self, now: Duration, largest: u64, mask: u128) {
-        let mut newest = None;
-        for k in 0..self.sent.len() {
-            let sent = &mut self.sent[k];
-            let taken = largest.checked_sub(sent.sequence).is_some_and(|age| age < 128 && mask >> age & 1 == 1);
-            if !taken || sent.fate == Fate::Arrived {
-                continue;
-            }
-            self.under_way -= usize::from(sent.fate == Fate::UnderWay);
-            sent.fate = Fate::Arrived;
-            newest = Some(sent.at);
-            self.loss -= self.loss / 128.0;
-            for p in 0..self.sent[k].pieces.len() {
-                self.arrive(self.sent[k].pieces[p]);
-            }
-        }
-        if let Some(at) = newest {
-            self.timeouts = 0;
-            self.measure(now.saturating_sub(at));
-        }
-    }
-
-    fn measure(&mut self, sample: Duration) {
-        if !std::mem::replace(&mut self.measured, true) {
-            (self.srtt, self.var) = (sample, sample / 2);
-            return;
-        }
-        self.var = (3 * self.var + self.srtt.abs_diff(sample)) / 4;
-        self.srtt = (7 * self.srtt + sample) / 8;
-    }
-
-    fn arrive(&mut self, piece: Piece) {
-        let Piece::Fragment(channel, message, index) = piece else { return };
-        let stream = &mut self.streams[channel as usize];
-        if let Some(outgoing) = stream.find(message) {
-            let progress = &mut outgoing.progress[usize::from(index)];
-            progress.copies = progress.copies.saturating_sub(1);
-            if !std::mem::replace(&mut progress.arrived, true) {
-                outgoing.missing -= 1;
-            }
-        }
-    }
-
-    fn lose(&mut self, piece: Piece) {
-        match piece {
-            Piece::Fragment(channel, message, index) => {
-                if let Some(outgoing) = self.streams[channel as usize].find(message) {
-                    let progress = &mut outgoing.progress[usize::from(index)];
-                    progress.copies = progress.copies.saturating_sub(1);
-                    if !progress.arrived && progress.copies == 0 {
-                        self.repairs.push_back(piece);
-                    }
-                }
-            }
-            Piece::Parity(..) => {}
-            Piece::Ping => self.ping = true,
-        }
-    }
-
     /// What to send next: repairs, then what was never sent, then redundancy.
     fn choose(&mut self, room: usize, first: bool) -> Option<Piece> {
         while let Some(&piece) = self.repairs.front() {
@@ -381,14 +264,6 @@ impl Outbox {
                 }
             }
             Piece::Ping => Frame::Ping.write(body),
-        }
-    }
-
-    /// Forgets packets from the front that nothing is expected of any more.
-    fn forget(&mut self) {
-        while self.sent.front().is_some_and(|sent| sent.fate == Fate::Arrived || (sent.fate == Fate::Lost && self.sent.len() > REMEMBERED))
-        {
-            self.sent.pop_front();
         }
     }
 

@@ -1,0 +1,61 @@
+//! Who of a user's processes is here: the last one that goes takes away what iceoryx2 leaves.
+//!
+//! All nodes of a folder draw their numbers from one counter in `/dev/shm` (`….global_mgmt`, 16 bytes), which iceoryx2 0.10 never removes, because a node that still
+//! runs would draw numbers twice. Whoever has a node holds a shared lock on a file in the folder; who gets it alone knows that there is no node.
+
+use super::bell;
+use crate::sync::transport::LinkError;
+use std::fs::{File, OpenOptions};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+const LOCK: &str = "alive.lock";
+const COUNTER: &str = ".global_mgmt";
+/// Where shared memory lies as files.
+pub const MEMORY: &str = "/dev/shm";
+
+/// Held by a process as long as it has a node, and dropped after it.
+pub struct Alive {
+    file: File,
+    path: PathBuf,
+    prefix: String,
+    user: u32,
+}
+
+impl Alive {
+    /// Says that this process is here. `prefix`: with which names in shared memory begin for this folder.
+    ///
+    /// Errors: the file cannot be made or locked.
+    pub fn new(folder: &Path, prefix: &str, user: u32) -> Result<Alive, LinkError> {
+        let path = folder.join(LOCK);
+        let io = |why| LinkError::Io { what: format!("shared memory: {}", path.display()), why };
+        loop {
+            let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).mode(0o600).open(&path).map_err(io)?;
+            file.lock_shared().map_err(io)?; // who holds it alone removes two files and lets go
+            // one of those may be this one
+            if std::fs::metadata(&path).is_ok_and(|there| file.metadata().is_ok_and(|ours| there.ino() == ours.ino())) {
+                return Ok(Alive { file, path, prefix: prefix.to_owned(), user });
+            }
+        }
+    }
+
+    /// The user's number.
+    pub fn user(&self) -> u32 {
+        self.user
+    }
+}
+
+impl Drop for Alive {
+    fn drop(&mut self) {
+        bell::clean_up(self.user);
+        if self.file.unlock().is_ok() && self.file.try_lock().is_ok() {
+            for file in std::fs::read_dir(MEMORY).into_iter().flatten().flatten() {
+                let name = file.file_name();
+                if name.to_str().is_some_and(|name| name.starts_with(&self.prefix) && name.ends_with(COUNTER)) {
+                    let _ = std::fs::remove_file(file.path());
+                }
+            }
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
