@@ -15,17 +15,14 @@ use crate::surface::elements::Edge;
 use crate::surface::field::MeshField;
 use crate::surface::{Feature, Field, TOUCHING};
 
-/// Longer edges are searched in pieces, in radii of the smaller body.
-const SHORT: f64 = 0.06;
-
 impl Pass<'_> {
     /// Whether an edge may have a contact of its own.
     pub(super) fn may_touch(&self, edge: &Edge, found: &Collector) -> bool {
-        let short = edge.spared > 0.0 && edge.length <= SHORT * self.size;
-        self.mesh.filter(|_| short).is_none_or(|mesh| self.dips(mesh, edge, found))
+        let short = edge.spared > 0.0 && self.is_one_piece(edge.length, true);
+        self.mesh.filter(|_| short).is_none_or(|mesh| self.may_dip(mesh, edge, found))
     }
 
-    fn dips(&self, mesh: &MeshField, edge: &Edge, found: &Collector) -> bool {
+    fn may_dip(&self, mesh: &MeshField, edge: &Edge, found: &Collector) -> bool {
         let [start, end] = edge.ends.map(|p| self.place(&p));
         let way = end - start;
         let near = |s: f64, within: f64| mesh.bound(&(start + way * s)) - within * edge.length <= found.limit();
