@@ -210,6 +210,20 @@ fn calibration_pictures_have_their_lines_where_a_tape_measures_them() {
     assert!("gird".parse::<CalibrationPattern>().is_err());
 }
 
+#[test]
+fn calibration_pictures_of_every_small_size_are_drawn() {
+    let mut cave = cave("");
+    // 1 x 1 to 64 x 64, and long ones that are only low or only narrow
+    let sizes = (1..=64).flat_map(|h| (1..=64).map(move |w| [w, h])).chain((1..=64).flat_map(|n| [[500, n], [n, 500]]));
+    for size in sizes {
+        cave.facets[0].size_px = size;
+        for word in ["grid", "corners", "colours", "name"] {
+            let picture = calibration_picture(&cave, &cave.facets[0], word.parse().unwrap());
+            assert_eq!(([picture.width, picture.height], picture.rgba.len() as u32), (size, 4 * size[0] * size[1]), "{word}");
+        }
+    }
+}
+
 /// A cave whose facet bends its picture by a wavy grid and darkens it towards an edge; the files are in a folder of their own.
 fn bent_cave(folder: &std::path::Path, facet: &str) -> CaveView {
     std::fs::create_dir_all(folder).unwrap();
