@@ -323,7 +323,11 @@ impl<'a> Fields<'a> {
                 let message = format!("`{key}` of {} is {}", self.what, self.log.quote(value.span()));
                 self.log.report(value.span(), message, format!("did you mean `{near}`?"));
             }
-            None => self.wrong(key, value, listed(known.iter().copied().take(20), "or")),
+            None => {
+                let mut once: Vec<&str> = Vec::new();
+                known.into_iter().for_each(|word| if !once.contains(&word) { once.push(word) });
+                self.wrong(key, value, listed(once.into_iter().take(20), "or"));
+            }
         }
     }
 

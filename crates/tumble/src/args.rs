@@ -90,7 +90,7 @@ pub struct RunOptions {
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
     /// Write a picture of the last frame (PNG).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = png)]
     pub picture: Option<PathBuf>,
     /// Size of the picture, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -150,7 +150,7 @@ pub struct ViewOptions {
     /// The camera to begin with: scene, one that a body or link carries, front, left, back, right or top.
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
-    /// Draw over the picture: contacts, normals, velocities, forces, tree=LEVEL, all; with commas between them.
+    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL, all; with commas between them.
     #[arg(long, value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
     /// usual, fast or fastest, or parts of it: shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them (default: usual; fast
@@ -173,7 +173,7 @@ pub struct ViewOptions {
     #[arg(long, value_name = "N")]
     pub frames: Option<u64>,
     /// Write what is shown at the end (PNG).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = png)]
     pub picture: Option<PathBuf>,
     /// Where the key P leaves pictures: SCENE_000123.png, by the number of the step.
     #[arg(long, value_name = "DIR", default_value = ".")]
@@ -220,7 +220,7 @@ pub struct SphereTreeOptions {
     #[arg(long, short, value_name = "FILE", visible_alias = "json")]
     pub output: Option<PathBuf>,
     /// Write a picture (PNG) of a level over the mesh.
-    #[arg(long, value_name = "FILE", conflicts_with = "urdf")]
+    #[arg(long, value_name = "FILE", conflicts_with = "urdf", value_parser = png)]
     pub picture: Option<PathBuf>,
     /// The level of the picture, the root being 0 (default: the last).
     #[arg(long, value_name = "N", requires = "picture")]
@@ -266,7 +266,7 @@ pub struct CavesOptions {
     #[arg(long, value_name = "NAME", requires = "pattern")]
     pub facet: Option<String>,
     /// Where the picture goes (PNG).
-    #[arg(long, value_name = "FILE", requires = "pattern")]
+    #[arg(long, value_name = "FILE", requires = "pattern", value_parser = png)]
     pub picture: Option<PathBuf>,
 }
 
@@ -313,6 +313,15 @@ fn share(text: &str) -> Result<f64, String> {
 /// The names are those of the JSON of a tree.
 fn method(text: &str) -> Result<Builder, String> {
     serde_json::from_value(text.into()).map_err(|e| e.to_string().replace("variant", "method").replace('`', ""))
+}
+
+/// A file for a picture: PNG is what is written, and no ending says something else.
+fn png(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension() {
+        Some(ending) if !ending.eq_ignore_ascii_case("png") => Err("pictures are written as PNG; wanted a file that ends in .png".into()),
+        _ => Ok(path),
+    }
 }
 
 fn planner(text: &str) -> Result<PathBuf, String> {

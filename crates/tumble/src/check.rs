@@ -4,8 +4,10 @@ use crate::args::CheckOptions;
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{RepairSettings, Shape, TreeSettings};
-use tumble::scene::cave::{MOST_BYTES, is_cave, resolve_cave, shipped_caves};
-use tumble::scene::{read_solid, resolve_scene, shipped, urdf};
+use tumble::net::sync::udp::SharedKey;
+use tumble::render::{Blend, DebugDraw, Drawing, RenderError, Warp};
+use tumble::scene::cave::{Cave, MOST_BYTES, is_cave, resolve_cave, shipped_caves};
+use tumble::scene::{SceneError, read_solid, resolve_scene, shipped, urdf};
 
 /// Checks every file; all are looked at, and the first failure's code is kept.
 pub fn check(options: &CheckOptions) -> Result<(), Failure> {
@@ -53,15 +55,39 @@ fn looks_like_cave(file: &str) -> bool {
 
 fn cave(name: &str) -> Result<String, Failure> {
     let cave = resolve_cave(name)?.load()?;
+    files_of(&cave)?;
     cave.notes().iter().for_each(|note| println!("{note}"));
     Ok(cave.summary())
 }
 
+/// Reads the files that a cave names, as its facets and server do.
+fn files_of(cave: &Cave) -> Result<(), Failure> {
+    for facet in &cave.facets {
+        let named = |e: RenderError| Failure::input(format!("facet \"{}\" of {}: {e}", facet.name, cave.file));
+        facet.warp_file.as_deref().map(Warp::load).transpose().map_err(named)?;
+        facet.blend_file.as_deref().map(|path| Blend::load(path, facet.size_px)).transpose().map_err(named)?;
+    }
+    let key = cave.security.as_ref().map(|security| SharedKey::read(&security.key_file)).transpose();
+    key.map(drop).map_err(|e| Failure::input(format!("[security] of {}: {e}", cave.file)))
+}
+
 fn scene(name: &str) -> Result<String, Failure> {
-    let scene = resolve_scene(name, &[])?.load()?;
+    let scene = resolve_scene(name, &[]).map_err(|error| match error {
+        SceneError::Unknown { .. } => neither(name, &error),
+        error => error.into(),
+    })?;
+    let scene = scene.load()?;
     let (world, notes) = scene.build().map_err(Failure::input)?;
+    // textures are read when a picture is made
+    Drawing::new(&scene).list(&world, &DebugDraw::default()).map_err(|e| Failure::input(format!("{}: {e}", scene.file)))?;
     notes.iter().for_each(|note| println!("{note}"));
     Ok(format!("a scene of {} bodies, {} degrees of freedom", world.ids().len(), degrees(&world)))
+}
+
+/// A name that is no scene's may be meant as a cave's.
+fn neither(name: &str, error: &SceneError) -> Failure {
+    let cave = resolve_cave(name).err().map_or(String::new(), |error| format!("; {error}"));
+    Failure::input(format!("{error}{cave}"))
 }
 
 fn degrees(world: &tumble::core::World) -> usize {

@@ -3,7 +3,7 @@
 use crate::args::RunOptions;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::shots::{Shots, write_png};
+use crate::shots::{Shots, may_be_written, write_png};
 use crate::summary::{State, Summary, Tally};
 use std::io::Read;
 use std::path::Path;
@@ -18,7 +18,9 @@ const MOST_RESTORED: u64 = 1 << 30;
 
 /// Runs a scene.
 pub fn run(options: &RunOptions) -> Result<(), Failure> {
-    [&options.summary, &options.picture, &options.save, &options.video].into_iter().flatten().try_for_each(|path| may_be_written(path))?;
+    [&options.summary, &options.picture, &options.save, &options.video].into_iter().flatten().try_for_each(|path| {
+        may_be_written(path).map_err(|why| Failure::run(&format!("writing {}", path.display()), why))
+    })?;
     let mut scene = options.scene.load()?;
     scene.world.seconds = options.seconds.unwrap_or(scene.world.seconds);
     let (mut world, notes) = scene.build().map_err(Failure::input)?;
@@ -121,16 +123,6 @@ fn pictures(world: &World, shots: Option<Shots>, options: &RunOptions) -> Result
         say(options, "picture", path);
     }
     Ok(())
-}
-
-/// What can be known before the run of a file that is written after it.
-fn may_be_written(path: &Path) -> Result<(), Failure> {
-    let wrong = |why: &str| Err(Failure::run(&format!("writing {}", path.display()), why));
-    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        Some(folder) if !folder.is_dir() => wrong(&format!("there is no folder {}", folder.display())),
-        _ if path.is_dir() => wrong("it is a folder; wanted a file"),
-        _ => Ok(()),
-    }
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {

@@ -171,3 +171,15 @@ fn frames(from: &From, options: &RunOptions) -> Result<Option<Frames>, Failure> 
 pub fn write_png(image: &Image, path: &Path) -> Result<(), Failure> {
     image.write_png(path).map_err(|e| Failure::run("the picture", e))
 }
+
+/// What can be known of a file before it is written at the end.
+///
+/// # Errors
+/// Why it cannot be written.
+pub fn may_be_written(path: &Path) -> Result<(), String> {
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        Some(folder) if !folder.is_dir() => Err(format!("there is no folder {}", folder.display())),
+        _ if path.is_dir() => Err("it is a folder; wanted a file".into()),
+        _ => Ok(()),
+    }
+}

@@ -157,7 +157,7 @@ fn caption(image: &mut Image, cave: &Cave, facet: &Facet, screen: &Screen, patte
     let large = pattern == CalibrationPattern::Name;
     let name = facet.name.to_uppercase();
     let room = if large { w * 9 / 10 } else { w / 3 };
-    let scale = (room / text_width(&name, 1).max(1)).clamp(1, h / if large { 24 } else { 60 }.max(1)).max(1);
+    let scale = (room / text_width(&name, 1).max(1)).clamp(1, (h / if large { 24 } else { 60 }).max(1));
     let small = (w / 420).clamp(1, 6);
     let [wide, high] = screen.size_m();
     let eye = match side {

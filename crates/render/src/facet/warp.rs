@@ -3,7 +3,12 @@
 //! - OBJ: `v x y [z]` is a place of the target, `vt u v` the place of the drawn picture shown there, both from 0 to 1 with the origin at the lower
 //!   left; `f a/b …` its triangles or convex polygons (`v/vt` or `v/vt/vn`; a bare `v` takes the texture corner of that number).
 //! - PFM (`PF`, three floats): a grid of places, the first row at the bottom, spread evenly over the target from edge to edge; red and green are
-//!   `u` and `v`, blue is not used. A place that is not finite or lies outside 0 to 1 stays black, with the cells around it.
+//!   `u` and `v`, blue is not used. A place that is not finite or lies outside −0.5 to 1.5 stays black, with the cells around it.
+//!
+//! Projectors throw past their screens, and grids of them reach past 0 to 1: places of the target there are cut off, and for places of the drawn picture its
+//! edge goes on. Farther than half a picture outside nothing real lies; numbers there are pixels, and are refused.
+//!
+//! Work: `Σ area of each triangle's upright box within the target ≤ 100 targets`. Grids whose triangles lie side by side have about 2.
 //!
 //! Each pixel's middle is looked up by barycentric coordinates, and the picture there is read bilinearly in linear light. Outside the grid it is black.
 
@@ -16,6 +21,11 @@ use std::path::Path;
 const MOST_BYTES: u64 = 64 << 20;
 /// Most triangles of a grid.
 const MOST_TRIANGLES: usize = 1 << 21;
+
+/// Places are within this; the picture itself is 0 to 1.
+const PLACES: std::ops::RangeInclusive<f64> = -0.5..=1.5;
+/// How often triangles may cover the target altogether, by their upright boxes.
+const MOST_COVERS: f64 = 100.0;
 
 /// A corner: place in the target, place in the drawn picture; both 0 to 1, y up.
 type Corner = ([f64; 2], [f64; 2]);
@@ -53,8 +63,8 @@ impl Warp {
             let at = |what: String| format!("line {}: {what}", number + 1);
             let mut words = line.split('#').next().unwrap_or("").split_whitespace();
             match words.next() {
-                Some("v") => places.push(pair(words).ok_or_else(|| at("wanted `v x y` with numbers from 0 to 1".into()))?),
-                Some("vt") => sources.push(pair(words).ok_or_else(|| at("wanted `vt u v` with numbers".into()))?),
+                Some("v") => places.push(pair(words).ok_or_else(|| at(wanted("v x y")))?),
+                Some("vt") => sources.push(pair(words).ok_or_else(|| at(wanted("vt u v")))?),
                 Some("f") => {
                     let corners = words.map(|word| corner(word, &places, &sources)).collect::<Result<Vec<Corner>, String>>().map_err(at)?;
                     if corners.len() < 3 {
@@ -71,7 +81,7 @@ impl Warp {
         if triangles.is_empty() {
             return Err("the warp grid has no faces; wanted lines `v x y`, `vt u v` and `f v/vt v/vt v/vt`".into());
         }
-        Ok(Warp { triangles })
+        Warp::of(triangles)
     }
 
     /// From the bytes of a PFM file.
@@ -89,7 +99,7 @@ impl Warp {
             let at = 12 * (y * w + x);
             let source = [float(at), float(at + 4)];
             let place = [x as f64 / (w - 1) as f64, y as f64 / (h - 1) as f64];
-            source.iter().all(|s| (0.0..=1.0).contains(s)).then_some((place, source))
+            source.iter().all(|s| PLACES.contains(s)).then_some((place, source))
         };
         let mut triangles = Vec::new();
         for y in 0..h - 1 {
@@ -100,7 +110,20 @@ impl Warp {
             }
         }
         if triangles.is_empty() {
-            return Err("no cell of the warp grid has all its places from 0 to 1".into());
+            return Err("no cell of the warp grid has all its places from 0 to 1 (at most -0.5 to 1.5)".into());
+        }
+        Warp::of(triangles)
+    }
+
+    /// Of triangles that lie side by side, at least nearly.
+    fn of(triangles: Vec<[Corner; 3]>) -> Result<Warp, String> {
+        let side = |t: &[Corner; 3], k: usize| {
+            let along = t.map(|(place, _)| place[k].clamp(0.0, 1.0));
+            along.iter().copied().fold(0.0, f64::max) - along.iter().copied().fold(1.0, f64::min)
+        };
+        let covers: f64 = triangles.iter().map(|t| side(t, 0) * side(t, 1)).sum();
+        if covers > MOST_COVERS {
+            return Err(format!("the triangles of the warp grid cover the picture {covers:.0} times over; wanted triangles side by side, and at most {MOST_COVERS} times"));
         }
         Ok(Warp { triangles })
     }
@@ -168,8 +191,12 @@ fn sample(image: &Image, x: f64, y: f64) -> [u8; 4] {
     [encoded(light(0)), encoded(light(1)), encoded(light(2)), 255]
 }
 
+fn wanted(line: &str) -> String {
+    format!("wanted `{line}` with numbers from 0 to 1 (shares of the picture, not pixels; at most -0.5 to 1.5)")
+}
+
 fn pair<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<[f64; 2]> {
-    let mut number = || words.next()?.parse::<f64>().ok().filter(|x| x.is_finite() && x.abs() < 1e3);
+    let mut number = || words.next()?.parse::<f64>().ok().filter(|x| PLACES.contains(x));
     Some([number()?, number()?])
 }
 

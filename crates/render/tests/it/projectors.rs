@@ -46,11 +46,44 @@ fn a_mirroring_warp_mirrors_and_a_half_leaves_the_rest_black() {
     }
 }
 
+/// A grid of 3 x 3 places whose corner lies a little outside shows the picture's edge there, as an OBJ does; one marked by -1 stays black with its cell.
+#[test]
+fn a_place_slightly_outside_blacks_out_no_cell() {
+    let image = colorful(40, 40);
+    let bent = |corner: [f32; 2]| {
+        let mut pfm = b"PF\n3 3\n-1.0\n".to_vec();
+        let mut obj = String::new();
+        for (i, (x, y)) in (0..3).flat_map(|y| (0..3).map(move |x| (x as f32 / 2.0, y as f32 / 2.0))).enumerate() {
+            let [u, v] = if i == 0 { corner } else { [x, y] };
+            [u, v, 0.0].iter().for_each(|value| pfm.extend(value.to_le_bytes()));
+            obj += &format!("v {x} {y}\nvt {} {}\n", f64::from(u), f64::from(v));
+        }
+        for [a, b, c, d] in [[1, 2, 5, 4], [2, 3, 6, 5], [4, 5, 8, 7], [5, 6, 9, 8]] {
+            obj += &format!("f {a} {b} {c} {d}\n");
+        }
+        (Warp::from_pfm(&pfm).unwrap().apply(&image), obj)
+    };
+    let (outside, obj) = bent([-0.1, -0.05]);
+    assert_eq!(outside, Warp::from_obj(obj.as_bytes()).unwrap().apply(&image));
+    assert!((0..1600).all(|i| outside.pixel(i % 40, i / 40) != Some([0, 0, 0, 255]) || image.pixel(i % 40, i / 40) == Some([0, 0, 0, 255])));
+    let (marked, _) = bent([-1.0, -1.0]);
+    let black = (0..1600).filter(|i| marked.pixel(i % 40, i / 40) == Some([0, 0, 0, 255])).count();
+    assert_eq!(black, 400, "the lower left quarter");
+}
+
 #[test]
 fn bad_warps_say_what_is_wrong_and_where() {
     let obj = |text: &str| Warp::from_obj(text.as_bytes()).unwrap_err();
     assert!(obj("v 0 0\nv 1 zero\n").starts_with("line 2: wanted `v x y`"));
     assert!(obj(&format!("{UNIT}f 1/1 2/2 9/3\n")).contains("line 9: the corner `9/3` names no `v` above it, of which there are 4"));
+    for pixels in ["v 0 0\nv 480 320\n", "v 0 0\nvt 480 320\n", "v 0 0\nv 1.6 0\n", "v 0 0\nv 0 -0.6\n"] {
+        assert!(obj(pixels).starts_with("line 2: wanted `v") && obj(pixels).contains("not pixels"), "{}", obj(pixels));
+    }
+    // one that a projector throws past its screen
+    assert!(Warp::from_obj(b"v -0.2 -0.2\nv 1.3 -0.2\nv 0.5 1.5\nvt -0.1 0\nvt 1.1 0\nvt 0.5 1.2\nf 1 2 3\n").is_ok());
+    // quads over the whole picture are two triangles with a box of one picture each: 50 are let through
+    assert!(Warp::from_obj(format!("{UNIT}{}", "f 1 2 3 4\n".repeat(50)).as_bytes()).is_ok());
+    assert!(obj(&format!("{UNIT}{}", "f 1 2 3 4\n".repeat(3000))).contains("cover the picture 6000 times over"));
     assert!(obj(&format!("{UNIT}f 1/1 2/2\n")).contains("a face of 2 corners"));
     assert!(obj("# nothing\n").contains("has no faces"));
     let pfm = |bytes: &[u8]| Warp::from_pfm(bytes).unwrap_err();
@@ -79,6 +112,13 @@ fn a_blend_takes_its_share_of_the_light() {
     assert!(error.contains("the blend mask is 3 x 1 pixels, and the facet's picture 4 x 1"), "{error}");
     assert!(Blend::load(&folder.join("none.png"), [3, 1]).is_err());
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// What caves are refused by is what the renderer can draw.
+#[test]
+fn cave_files_know_how_large_a_picture_may_be() {
+    use tumble_scene::cave::{MOST_PIXELS, MOST_SIDE_PX, RIM_PX};
+    assert_eq!((MOST_SIDE_PX, MOST_PIXELS, RIM_PX), (tumble_render::MAX_SIDE, tumble_render::MAX_PIXELS, tumble_render::RIM_PX));
 }
 
 fn cave(facet: &str) -> Cave {
@@ -208,6 +248,20 @@ fn calibration_pictures_have_their_lines_where_a_tape_measures_them() {
         assert!((0..4).all(|i| (0..i).all(|j| pictures[i] != pictures[j])));
     }
     assert!("gird".parse::<CalibrationPattern>().is_err());
+}
+
+#[test]
+fn calibration_pictures_of_every_small_size_are_drawn() {
+    let mut cave = cave("");
+    // 1 x 1 to 64 x 64, and long ones that are only low or only narrow
+    let sizes = (1..=64).flat_map(|h| (1..=64).map(move |w| [w, h])).chain((1..=64).flat_map(|n| [[500, n], [n, 500]]));
+    for size in sizes {
+        cave.facets[0].size_px = size;
+        for word in ["grid", "corners", "colours", "name"] {
+            let picture = calibration_picture(&cave, &cave.facets[0], word.parse().unwrap());
+            assert_eq!(([picture.width, picture.height], picture.rgba.len() as u32), (size, 4 * size[0] * size[1]), "{word}");
+        }
+    }
 }
 
 /// A cave whose facet bends its picture by a wavy grid and darkens it towards an edge; the files are in a folder of their own.

@@ -6,6 +6,11 @@
 //! eye in front:     (e − lower_left) · n ≥ 1 mm             for the point between the eyes, and in stereo for each eye
 //! pixels:           (w_px / h_px) / (|u| / |v|) = 1         within 1 %, else a note
 //! gap of two edges: the largest distance of the shorter edge's ends from the longer edge
+//! neighbours:       gap ≤ 0.1 of the shorter edge, sine of the angle between them ≤ 0.1
+//! overlap:          of neighbours, each edge lies within the other screen: d · o_a < 0 and d · o_b > 0,
+//!                   d from edge a to edge b, o the direction out of a screen across its edge
+//! meant to meet:    edges without a neighbour whose gap is ≤ 0.5 of the shorter edge, with a sine ≤ 0.35
+//! target:           whole_px, and size_px with a rim of 48 pixels, each side ≤ 16384 and 2²⁵ pixels together
 //! ```
 
 use nalgebra::{Point3, Vector3};
@@ -23,6 +28,18 @@ const LEAST_DISTANCE_M: f64 = 1e-3;
 const NEIGHBOUR_SHARE: f64 = 0.1;
 /// Edges that differ in direction by more than this, as a sine, are no neighbours.
 const NEIGHBOUR_SINE: f64 = 0.1;
+/// Edges without a neighbour that are nearer than this share of the shorter one were meant to meet.
+const ASTRAY_SHARE: f64 = 0.5;
+/// So were those that differ in direction by at most this, as a sine.
+const ASTRAY_SINE: f64 = 0.35;
+/// Edges overlap from here on, m: less is the rounding of the file's numbers.
+const LEAST_OVERLAP_M: f64 = 1e-6;
+/// The longest side of a picture, pixels: what graphics devices have textures of.
+pub const MOST_SIDE_PX: u32 = 16384;
+/// Most pixels of a picture, rows being filled up to multiples of 64.
+pub const MOST_PIXELS: u64 = 1 << 25;
+/// Pixels drawn beyond each edge of an eye's picture and cut off again.
+pub const RIM_PX: u32 = 48;
 /// Pixels may be out of square by this share before it is noted.
 const ASPECT_TOLERANCE: f64 = 0.01;
 
@@ -43,6 +60,19 @@ pub(crate) fn screen(screen: &Screen, f: &Fields<'_>) {
         let message = format!("{} is not square: its edges meet at {degrees:.3} degrees, {:.1} mm off in a metre", f.what, 1e3 * cosine.abs());
         f.log.report(f.span.clone(), message, "wanted a right angle at `lower_left_m`, within 1 mm in a metre");
     }
+}
+
+/// What can be drawn: both eyes in one picture, and each eye's with its rim.
+pub(crate) fn target(size_px: [u32; 2], stereo: Stereo, f: &mut Fields<'_>) {
+    let fits = |[w, h]: [u32; 2]| w <= MOST_SIDE_PX && h <= MOST_SIDE_PX && u64::from(w.next_multiple_of(64)) * u64::from(h) <= MOST_PIXELS;
+    let (whole, rimmed) = (stereo.whole_px(size_px), size_px.map(|n| n + 2 * RIM_PX));
+    let what = match (fits(whole), fits(rimmed)) {
+        (true, true) => return,
+        (false, _) if whole != size_px => format!("the picture with both eyes is {} x {} pixels", whole[0], whole[1]),
+        _ => format!("the picture with the rim of {RIM_PX} pixels that is drawn around it is {} x {} pixels", rimmed[0], rimmed[1]),
+    };
+    let place = f.value("size_px").map_or(f.span.clone(), |value| value.span());
+    f.log.report(place, format!("`size_px` of {}: {what}", f.what), format!("wanted at most {MOST_SIDE_PX} each way and {MOST_PIXELS} together; a larger wall is several facets"));
 }
 
 /// Near before far, and every eye in front of the screen.
@@ -92,9 +122,22 @@ pub(crate) fn notes(cave: &Cave) -> Vec<String> {
             notes.push(format!("screen \"{}\" has no facet: nothing is drawn on it", screen.name));
         }
     }
-    notes.extend(gaps(&cave.screens).iter().map(|gap| {
-        let name = |(screen, edge): (usize, usize)| format!("{} edge of \"{}\"", EDGES[edge], cave.screens[screen].name);
-        format!("{} and {}: {:.3} mm apart", name(gap.first), name(gap.second), 1e3 * gap.gap_m)
+    let found = gaps(&cave.screens);
+    let name = |(screen, edge): (usize, usize)| format!("{} edge of \"{}\"", EDGES[edge], cave.screens[screen].name);
+    notes.extend(found.iter().map(|gap| {
+        let mm = 1e3 * gap.gap_m;
+        let how = if gap.overlaps { format!("overlap by {mm:.3} mm") } else { format!("{mm:.3} mm apart") };
+        format!("{} and {}: {how}", name(gap.first), name(gap.second))
+    }));
+    notes.extend(astray(&cave.screens, &found).iter().map(|(first, second, gap_m, angle)| {
+        format!(
+            "screen \"{}\" has no neighbour along its {} edge: the nearest, the {}, is {:.0} mm and {:.1} degrees off",
+            cave.screens[first.0].name,
+            EDGES[first.1],
+            name(*second),
+            1e3 * gap_m,
+            angle.to_degrees()
+        )
     }));
     notes
 }
@@ -111,23 +154,65 @@ pub struct Gap {
     pub second: (usize, usize),
     /// How far apart, m: the largest distance of the shorter edge's ends from the longer edge.
     pub gap_m: f64,
+    /// Whether each edge lies within the other screen, so that the two cover the gap twice instead of leaving it dark.
+    pub overlaps: bool,
 }
 
 /// All pairs of edges of different screens that lie side by side, with how far apart they are.
 pub fn gaps(screens: &[Screen]) -> Vec<Gap> {
     let mut out = Vec::new();
-    for (i, a) in screens.iter().enumerate() {
-        for (j, b) in screens.iter().enumerate().skip(i + 1) {
-            for (k, first) in edges(a).iter().enumerate() {
-                for (l, second) in edges(b).iter().enumerate() {
-                    if let Some(gap_m) = between(first, second) {
-                        out.push(Gap { first: (i, k), second: (j, l), gap_m });
-                    }
-                }
-            }
+    for (first, second, a, b) in pairs(screens) {
+        if let Some(gap_m) = between(&a, &b, NEIGHBOUR_SHARE, NEIGHBOUR_SINE) {
+            let d = middle(&b) - middle(&a);
+            let inside = d.dot(&outward(&screens[first.0], first.1)) < -LEAST_OVERLAP_M && d.dot(&outward(&screens[second.0], second.1)) > LEAST_OVERLAP_M;
+            out.push(Gap { first, second, gap_m, overlaps: inside });
         }
     }
     out
+}
+
+/// Two edges that were meant to meet: the nearest first of each edge, the gap in m and the angle in rad.
+type Astray = ((usize, usize), (usize, usize), f64, f64);
+
+/// Edges without a neighbour that have another such edge near, each once, with the nearest.
+fn astray(screens: &[Screen], found: &[Gap]) -> Vec<Astray> {
+    let met = |edge: (usize, usize)| found.iter().any(|gap| gap.first == edge || gap.second == edge);
+    let near = |(first, second, a, b): (_, _, Edge, Edge)| {
+        let gap_m = between(&a, &b, ASTRAY_SHARE, ASTRAY_SINE).filter(|_| !met(first) && !met(second))?;
+        let (u, v) = (a[1] - a[0], b[1] - b[0]);
+        Some((first, second, gap_m, (u.cross(&v).norm() / (u.norm() * v.norm())).min(1.0).asin()))
+    };
+    let mut candidates: Vec<Astray> = pairs(screens).into_iter().filter_map(near).collect();
+    candidates.sort_by(|a, b| a.2.total_cmp(&b.2));
+    let mut out: Vec<Astray> = Vec::new();
+    for pair in candidates {
+        if !out.iter().any(|(first, second, ..)| [*first, *second].iter().any(|edge| *edge == pair.0 || *edge == pair.1)) {
+            out.push(pair);
+        }
+    }
+    out.sort_by_key(|pair| (pair.0, pair.1));
+    out
+}
+
+/// All pairs of edges of different screens, each once, in the order of the file.
+fn pairs(screens: &[Screen]) -> Vec<((usize, usize), (usize, usize), Edge, Edge)> {
+    let all: Vec<((usize, usize), Edge)> = screens.iter().enumerate().flat_map(|(i, s)| edges(s).into_iter().enumerate().map(move |(k, edge)| ((i, k), edge))).collect();
+    let mut out = Vec::new();
+    for (i, j) in (0..screens.len()).flat_map(|i| (i + 1..screens.len()).map(move |j| (i, j))) {
+        for (first, a) in &all[4 * i..4 * i + 4] {
+            out.extend(all[4 * j..4 * j + 4].iter().map(|(second, b)| (*first, *second, *a, *b)));
+        }
+    }
+    out
+}
+
+/// The direction out of a screen across one of its edges: a unit vector in its plane.
+fn outward(s: &Screen, edge: usize) -> Vector3<f64> {
+    [-s.upward(), s.across(), s.upward(), -s.across()][edge].normalize()
+}
+
+fn middle(edge: &Edge) -> Point3<f64> {
+    nalgebra::center(&edge[0], &edge[1])
 }
 
 type Edge = [Point3<f64>; 2];
@@ -138,15 +223,15 @@ fn edges(s: &Screen) -> [Edge; 4] {
     [[ll, lr], [lr, ur], [ul, ur], [ll, ul]]
 }
 
-/// The gap of two edges; `None` where they are no neighbours.
-fn between(a: &Edge, b: &Edge) -> Option<f64> {
+/// The gap of two edges; `None` where it is more than a `share` of the shorter one or their directions differ by more than a `sine`.
+fn between(a: &Edge, b: &Edge, share: f64, sine: f64) -> Option<f64> {
     let (u, v) = (a[1] - a[0], b[1] - b[0]);
-    if u.cross(&v).norm() > NEIGHBOUR_SINE * u.norm() * v.norm() {
+    if u.cross(&v).norm() > sine * u.norm() * v.norm() {
         return None;
     }
     let (short, long) = if u.norm() <= v.norm() { (a, b) } else { (b, a) };
     let gap = short.iter().map(|p| distance(p, long)).fold(0.0, f64::max);
-    (gap <= NEIGHBOUR_SHARE * (short[1] - short[0]).norm()).then_some(gap)
+    (gap <= share * (short[1] - short[0]).norm()).then_some(gap)
 }
 
 /// Distance of a point from a stretch.

@@ -89,7 +89,8 @@ pub struct Facet {
     pub node: Option<usize>,
     /// Where the picture goes. Default a window at 0, 0.
     pub output: Output,
-    /// Width and height of one eye's picture, pixels, 1 to 16384 each.
+    /// Width and height of one eye's picture, pixels, at least 1 each; at most what [`MOST_SIDE_PX`](super::MOST_SIDE_PX) and
+    /// [`MOST_PIXELS`](super::MOST_PIXELS) leave with both eyes, or with the rim of [`RIM_PX`](super::RIM_PX).
     pub size_px: [u32; 2],
     /// Nearest depth drawn, from the eye along the screen's normal, m. Default 0.05.
     pub near_m: f64,
@@ -106,9 +107,6 @@ pub struct Facet {
     /// A picture that darkens the finished one where projectors overlap: PNG.
     pub blend_file: Option<PathBuf>,
 }
-
-/// The longest side of a picture, pixels.
-const MAX_SIDE: u32 = 16384;
 
 impl Facet {
     pub(crate) fn read(mut f: Fields<'_>, users: &[User], screens: &[Screen], nodes: &[Node], folder: &Path) -> Option<Facet> {
@@ -144,6 +142,9 @@ impl Facet {
         if let (true, (Some(screen), Some(user))) = (f.log.count() == problems, parts) {
             checks::facet(&facet, screen, user, &mut f);
         }
+        if f.log.count() == problems {
+            checks::target(facet.size_px, facet.stereo, &mut f);
+        }
         f.finish();
         Some(facet)
     }
@@ -171,7 +172,7 @@ fn reference(f: &Fields<'_>, key: &str, typed: &str, value: &crate::fields::Valu
 fn size(f: &mut Fields<'_>) -> [u32; 2] {
     let Some(value) = f.required("size_px", "width and height in pixels, such as [1920, 1080]") else { return [1, 1] };
     match value.get_ref().as_array().filter(|items| items.len() == 2) {
-        Some(items) => std::array::from_fn(|k| items.get(k).map_or(1, |item| f.as_integer("size_px", item, 1..=MAX_SIDE))),
+        Some(items) => std::array::from_fn(|k| items.get(k).map_or(1, |item| f.as_integer("size_px", item, 1..=checks::MOST_SIDE_PX))),
         None => {
             f.wrong("size_px", value, "width and height in pixels, such as [1920, 1080]");
             [1, 1]

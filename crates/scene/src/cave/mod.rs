@@ -24,7 +24,7 @@ mod settings;
 mod shipped;
 mod tracker;
 
-pub use checks::{Gap, SQUARE_TOLERANCE, gaps};
+pub use checks::{Gap, MOST_PIXELS, MOST_SIDE_PX, RIM_PX, SQUARE_TOLERANCE, gaps};
 pub use error::CaveError;
 pub use facet::{Facet, Flip, Output, Stereo};
 pub use parts::{LAUNCH_WORDS, Node, Screen, User};
@@ -43,6 +43,7 @@ use crate::error::Invalid;
 use crate::fields::Fields;
 use crate::file::{parse_toml, read_table};
 use crate::log::Log;
+use crate::suggest::nearest;
 
 /// Most bytes of a cave file: 1 MiB.
 pub const MOST_BYTES: u64 = 1 << 20;
@@ -50,6 +51,8 @@ pub const MOST_BYTES: u64 = 1 << 20;
 pub const MOST_PARTS: usize = 256;
 /// Tables that a cave has and a scene has not: a file with one of them is a cave.
 const MARKS: [&str; 5] = ["user", "screen", "node", "facet", "sync"];
+/// Tables that a scene has and a cave has not.
+const SCENE_MARKS: [&str; 8] = ["world", "body", "articulated", "ground", "grid", "camera", "cave", "materials"];
 
 /// A cave as its file describes it: checked, references resolved.
 #[derive(Clone, Debug, PartialEq)]
@@ -166,10 +169,12 @@ impl Cave {
     }
 }
 
-/// Whether a text is meant as a cave: it has a table that caves have and scenes have not.
+/// Whether a text is meant as a cave: it has a table that caves have and scenes have not, or, with none of a scene's tables, one by nearly that name.
 pub fn is_cave(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text.get(..text.len().min(MOST_BYTES as usize)).unwrap_or(""));
-    MARKS.iter().any(|key| root.get_ref().get(*key).is_some())
+    let root = root.get_ref();
+    let nearly = || root.keys().any(|key| nearest(key.get_ref(), MARKS).is_some());
+    MARKS.iter().any(|key| root.get(*key).is_some()) || (!SCENE_MARKS.iter().any(|key| root.get(*key).is_some()) && nearly())
 }
 
 /// The tables `[[key]]`, each with a name that no other has.

@@ -50,6 +50,9 @@ fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
         ("a screen by another name", "screen = \"t\"", "screen = \"s\"", 12, "did you mean `s`?"),
         ("no such stereo", "size_px = [800, 600]\nstereo = \"side_by\"", "size_px = [800, 600]", 14, "did you mean `side_by_side`?"),
         ("no pixels", "size_px = [0, 600]", "size_px = [800, 600]", 13, "a whole number from 1 to 16384"),
+        ("more pixels than can be drawn", "size_px = [16384, 16384]", "size_px = [800, 600]", 13, "with the rim of 48 pixels that is drawn around it is 16480 x 16480"),
+        ("two eyes wider than can be drawn", "size_px = [9000, 100]\nstereo = \"side_by_side\"", "size_px = [800, 600]", 13, "the picture with both eyes is 18000 x 100 pixels"),
+        ("two eyes of too many pixels", "size_px = [5000, 4000]\nstereo = \"top_bottom\"", "size_px = [800, 600]", 13, "the picture with both eyes is 5000 x 8000 pixels"),
         ("one number of pixels", "size_px = [600]", "size_px = [800, 600]", 13, "width and height in pixels"),
         ("not square", "upper_left_m = [-0.9, 2, 2.0]", "upper_left_m = [-1, 2, 2.0]", 5, "is not square: its edges meet at 86.186 degrees"),
         ("no area", "upper_left_m = [-1, 2, 0.5]", "upper_left_m = [-1, 2, 2.0]", 5, "has no area: `upper_left_m`"),
@@ -66,6 +69,9 @@ fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
     }
     let (line, message) = problem(&format!("{SMALL}[[facet]]\nname = \"f\"\nscreen = \"s\"\nsize_px = [8, 6]\n"));
     assert!(line == 15 && message.contains("a second facet \"f\"; the first is at line 11"), "{line}: {message}");
+    let twice = format!("{}[[screen]]\nname = \"s\"\nlower_left_m = [5, 2, 0.5]\nlower_right_m = [7, 2, 0.5]\nupper_left_m = [5, 2, 2]\n", SMALL.replace("screen = \"s\"", "screen = \"wall\""));
+    let said = Cave::parse(&twice, "my.toml").unwrap_err().report(false);
+    assert!(said.contains("wanted `s`") && !said.contains("`s` or `s`"), "a name used twice is listed once: {said}");
     let (_, message) = problem("description = \"nothing\"\n[[user]]\nname = \"u\"\neye_m = [0, 0, 1]\n[[screen]]\nname = \"s\"\nlower_left_m = [0, 1, 0]\nlower_right_m = [1, 1, 0]\nupper_left_m = [0, 1, 1]\n");
     assert!(message.contains("has no `facet`"), "{message}");
 }
@@ -107,6 +113,41 @@ fn gaps_are_what_a_tape_measure_says() {
     assert!(wide.contains("1.250 times denser across than upward; 1000 x 750 would be square"), "{wide}");
 }
 
+/// 2^25 pixels, rows filled up to multiples of 64, and a rim of 48: 16288 + 96 = 16384 = 2^14 leaves 2^11 - 96 rows.
+#[test]
+fn the_largest_pictures_are_let_through_and_no_larger_ones() {
+    let read = |size: &str, stereo: &str| Cave::parse(&SMALL.replace("[800, 600]", &format!("{size}\nstereo = \"{stereo}\"")), "my.toml").is_ok();
+    for (size, larger, stereo) in [("[16288, 1952]", "[16289, 1952]", "mono"), ("[16288, 1952]", "[16288, 1953]", "mono"), ("[8192, 100]", "[8193, 100]", "side_by_side"), ("[4096, 4096]", "[4096, 4097]", "top_bottom"), ("[4096, 4096]", "[4097, 4096]", "side_by_side")] {
+        assert!(read(size, stereo) && !read(larger, stereo), "{size} {larger} {stereo}");
+    }
+}
+
+/// A second screen to the right of the first, which ends at x = 1 and is 1.5 m high.
+fn beside(lower_left: [f64; 3], lower_right: [f64; 3], upper_left: [f64; 3]) -> Cave {
+    let second = format!("[[screen]]\nname = \"t\"\nlower_left_m = {lower_left:?}\nlower_right_m = {lower_right:?}\nupper_left_m = {upper_left:?}\n[[facet]]\nname = \"g\"\nscreen = \"t\"\nsize_px = [800, 600]\n");
+    Cave::parse(&format!("{SMALL}{second}"), "my.toml").unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn a_badly_placed_screen_is_told_as_one_without_a_neighbour() {
+    // turned by 90 degrees, 0.4 m off to the right, and tilted by 8 degrees about the normal of its plane: 1.5 m high, its left edge leans back to y - 1.5 sin 8
+    let (sin, cos) = 8f64.to_radians().sin_cos();
+    let cave = beside([1.4, 2.0, 0.5], [1.4, 2.0 - 2.0 * cos, 0.5 - 2.0 * sin], [1.4, 2.0 - 1.5 * sin, 0.5 + 1.5 * cos]);
+    assert!(gaps(&cave.screens).is_empty());
+    // the edge's upper end is 0.4 m to the right and 1.5 sin 8 = 0.2088 m nearer: 451 mm
+    assert_eq!(cave.notes(), ["screen \"s\" has no neighbour along its right edge: the nearest, the left edge of \"t\", is 451 mm and 8.0 degrees off"]);
+    // a metre off it is another wall
+    assert!(beside([2.0, 2.0, 0.5], [2.0, 0.0, 0.5], [2.0, 2.0, 2.0]).notes().is_empty());
+}
+
+#[test]
+fn screens_that_cover_a_strip_twice_overlap() {
+    let cave = beside([0.988, 2.0, 0.5], [2.988, 2.0, 0.5], [0.988, 2.0, 2.0]);
+    assert_eq!(cave.notes(), ["right edge of \"s\" and left edge of \"t\": overlap by 12.000 mm"]);
+    let cave = beside([1.012, 2.0, 0.5], [3.012, 2.0, 0.5], [1.012, 2.0, 2.0]);
+    assert_eq!(cave.notes(), ["right edge of \"s\" and left edge of \"t\": 12.000 mm apart"]);
+}
+
 #[test]
 fn shipped_caves_are_whole_and_found_from_anywhere() {
     // screens, facets, and pairs of edges that meet: a cube's 12 edges, of which 4 and 6 faces share so many
@@ -135,6 +176,7 @@ fn shipped_caves_are_whole_and_found_from_anywhere() {
 fn caves_and_scenes_are_told_apart() {
     assert!(shipped_caves().iter().all(|cave| is_cave(cave.text)));
     assert!(!tumble_scene::shipped().iter().any(|scene| is_cave(scene.text)));
+    assert!(is_cave("[[screeen]]\nname = \"a\"\n") && !is_cave("[[screeen]]\n[world]\n"), "a table by nearly the name");
     assert!(is_cave("[[screen]]\nname = [[[\n") && !is_cave("") && !is_cave("[cave]\norigin_m = [0, 0, 0]\n"));
 }
 

@@ -17,7 +17,7 @@ mod viewer;
 
 use crate::args::ViewOptions;
 use crate::failure::Failure;
-use crate::shots::write_png;
+use crate::shots::{may_be_written, write_png};
 use sight::Sight;
 use tumble::render::{CaveView, RenderError, WindowOptions, run_window};
 use tumble::scene::cave::{Output, resolve_cave};
@@ -29,6 +29,7 @@ const USUAL: [u32; 2] = [1280, 720];
 
 /// Shows a scene until the window is closed.
 pub fn view(options: &ViewOptions) -> Result<(), Failure> {
+    pictures_may_be_written(options)?;
     let scene = options.scene.load()?;
     let (world, notes) = scene.build().map_err(Failure::input)?;
     notes.iter().for_each(|note| eprintln!("{note}"));
@@ -41,6 +42,17 @@ pub fn view(options: &ViewOptions) -> Result<(), Failure> {
         (Some(path), Some(image)) => write_png(&image, path),
         _ => Ok(()),
     }
+}
+
+/// What can be known of `--picture` and `--shots` before a window opens.
+fn pictures_may_be_written(options: &ViewOptions) -> Result<(), Failure> {
+    if let Some(path) = &options.picture {
+        may_be_written(path).map_err(|why| Failure::input(format!("--picture {}: {why}", path.display())))?;
+    }
+    if !options.shots.is_dir() {
+        return Err(Failure::input(format!("--shots {}: there is no such folder", options.shots.display())));
+    }
+    Ok(())
 }
 
 fn sight(scene: &SceneFile, options: &ViewOptions) -> Result<Sight, Failure> {

@@ -123,6 +123,11 @@ impl Clockwork {
         Ok(())
     }
 
+    /// Whether it was started.
+    pub fn runs(&self) -> bool {
+        self.thread.is_some()
+    }
+
     /// The simulation between two steps; waits for the step that is being taken.
     pub fn lock(&self) -> Held<'_> {
         self.shared.wanted.fetch_add(1, Ordering::Relaxed);

@@ -46,6 +46,37 @@ fn a_file_is_checked_as_what_it_is() {
     assert!(said.contains("wrong.toml:3:1") && said.contains("did you mean `eye_m`?"), "{said}");
 }
 
+/// What facets and server would stumble over is told by the check, with the facet's name.
+#[test]
+fn a_check_reads_the_files_that_caves_and_scenes_name() {
+    let folder = Folder::new("cave-files");
+    let with = |lines: &str| folder.write("wall.toml", cave(&format!("size_px = [80, 60]\n{lines}")));
+    for (lines, word) in [
+        ("warp_file = \"none.obj\"", "facet \"f\""),
+        ("blend_file = \"none.png\"", "none.png: the blend mask cannot be read"),
+        ("[security]\nkey_file = \"none.key\"", "none.key"),
+    ] {
+        let said = fail(&["check", &with(lines)], 2);
+        assert!(said.contains(word) && said.contains("wall.toml"), "{lines}: {said}");
+    }
+    folder.write("pixels.obj", "v 0 0\nv 480 320\n");
+    assert!(fail(&["check", &with("warp_file = \"pixels.obj\"")], 2).contains("line 2: wanted `v x y`"));
+    folder.write("damaged.png", b"\x89PNG\r\n\x1a\nand no more");
+    let look = "[[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 0.5 }\nmass_kg = 1\ntexture = \"damaged.png\"\n";
+    let said = fail(&["check", &folder.write("textured.toml", look)], 2);
+    assert!(said.contains("textured.toml") && said.contains("damaged.png: the texture is no PNG"), "{said}");
+    // neither a scene nor a cave: both are named
+    let said = fail(&["check", "cube5"], 2);
+    assert!(said.contains("no scene `cube5`") && said.contains("did you mean `cube4`?"), "{said}");
+}
+
+#[test]
+fn a_picture_with_another_ending_is_refused() {
+    for args in [&["run", "stack", "--picture", "q.jpg"][..], &["view", "stack", "--picture", "q.jpg"], &["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "front", "--picture", "q.jpg"]] {
+        assert!(fail_often(args, 2).contains("wanted a file that ends in .png"), "{args:?}");
+    }
+}
+
 #[test]
 fn what_is_wrong_with_a_cave_ends_with_code_2_before_anything_runs() {
     let folder = Folder::new("cave-wrong");

@@ -157,6 +157,41 @@ fn a_body_is_pulled_to_the_pointer() {
     assert!(turned["held"].is_null());
 }
 
+/// The first picture takes seconds where a software driver makes its pipelines; the scene begins with it.
+#[test]
+fn time_begins_with_the_first_picture() {
+    let Some(desktop) = Desktop::open() else { return };
+    let mut view = Session::spawn(&desktop, Folder::new("view-begin"), &["billiards", "--size", "64x48", "--seconds", "0.3"]);
+    let (code, said) = view.end();
+    if said.contains("no graphics adapter") {
+        return skip(&format!("this machine has no graphics adapter; {said}"));
+    }
+    assert_eq!((code, said.as_str()), (Some(0), ""));
+    let lines: Vec<Value> = std::fs::read_to_string(view.folder.path("status")).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let first = lines.iter().find(|s| s["shown"].as_u64().unwrap() > 0).unwrap();
+    assert_eq!((&first["time_s"], &first["frame"]), (&serde_json::json!(0.0), &serde_json::json!(0)));
+    assert!((lines.last().unwrap()["time_s"].as_f64().unwrap() - 0.3).abs() < 1e-9);
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_ends_no_session() {
+    let Some(desktop) = Desktop::open() else { return };
+    let folder = Folder::new("view-shots");
+    let shots = folder.path("shots");
+    std::fs::create_dir(&shots).unwrap();
+    let Some(mut view) = Session::open(&desktop, "view-shots-status", &["stack", "--size", "64x48", "--shots", &text(&shots)]) else { return };
+    view.key("space");
+    view.until("the pause", |s| s["paused"] == true);
+    // the folder goes while the window is open
+    std::fs::remove_dir(&shots).unwrap();
+    view.key("p");
+    view.key("1");
+    view.until("the overlay", |s| s["overlays"] == serde_json::json!(["contacts"]));
+    view.key("Escape");
+    let (code, said) = view.end();
+    assert!(code == Some(0) && said.lines().count() == 1 && said.contains("no picture: ") && said.contains(&text(&shots)), "{code:?} {said}");
+}
+
 #[test]
 fn without_a_desktop_there_is_one_clear_message() {
     let mut command = command(&["view", "stack"]);
@@ -171,6 +206,8 @@ fn what_cannot_be_shown_ends_with_code_2_before_a_window_opens() {
     assert!(fail(&["view", "stack", "--camera", "below"], 2).contains("scene, front, left, back, right, top"));
     assert!(fail(&["view", "stack", "--cave", "cube4", "--facet", "fron"], 2).contains("did you mean `front`?"));
     assert!(fail(&["view", "stack", "--cave", "cube4", "--facet", "front", "--size", "80x60"], 2).contains("size_px"));
+    assert!(fail(&["view", "stack", "--picture", "/nonexistent/x.png"], 2).contains("there is no folder /nonexistent"));
+    assert!(fail(&["view", "stack", "--shots", "/nonexistent/dir"], 2).contains("--shots /nonexistent/dir: there is no such folder"));
     assert!(fail(&["view", "stack", "--size", "16384x16384"], 2).contains("at most"));
     assert!(fail_often(&["view", "stack", "--size", "0x10"], 2).contains("1 to 16384"));
     assert!(fail_often(&["view", "stack", "--facet", "front"], 2).contains("--cave"));

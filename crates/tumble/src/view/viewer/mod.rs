@@ -15,7 +15,6 @@ use super::status::Log;
 use super::user::User;
 use crate::args::ViewOptions;
 use crate::failure::Failure;
-use crate::shots::write_png;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tumble::core::World;
@@ -27,6 +26,8 @@ use tumble::scene::SceneFile;
 const IDLE: Duration = Duration::from_millis(250);
 /// Between two looks at what is to be done while nothing is.
 const LOOK: Duration = Duration::from_millis(20);
+/// Time begins after so long even where the desktop shows no picture, as in a window that was opened hidden.
+const UNSEEN: Duration = Duration::from_secs(5);
 /// Pictures per second where the desktop does not say how many it shows.
 const USUAL_RATE: f64 = 60.0;
 
@@ -86,10 +87,11 @@ struct Limits {
     device: Option<u64>,
 }
 
-/// Moments of the last turn and status line.
+/// Moments of the last turn and status line, and of the opening.
 struct Times {
     turn: Instant,
     told: Option<Instant>,
+    opened: Instant,
 }
 
 impl Viewer {
@@ -131,7 +133,7 @@ impl Viewer {
             shown: 0,
             size_px: [0; 2],
             focused: false,
-            times: Times { turn: now, told: None },
+            times: Times { turn: now, told: None, opened: now },
         })
     }
 
@@ -184,12 +186,15 @@ impl Viewer {
         Ok(())
     }
 
+    /// A picture for the user. Where it cannot be written that is said, and the session goes on.
     fn save_picture(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let frame = self.clockwork.lock().world.frame();
         self.update_list()?;
         let path = self.shots.join(format!("{}_{frame:06}.png", file_name(&self.name)));
-        write_png(&self.sight.picture(screen, &self.list)?, &path)?;
-        eprintln!("picture: {}", path.display());
+        match self.sight.picture(screen, &self.list)?.write_png(&path) {
+            Ok(()) => eprintln!("picture: {}", path.display()),
+            Err(error) => eprintln!("no picture: {error}"),
+        }
         Ok(())
     }
 
@@ -207,6 +212,16 @@ impl Viewer {
         let desktop = || Some(f64::from(screen.window().current_monitor()?.refresh_rate_millihertz()?) / 1000.0);
         let rate = self.limits.per_second.or_else(desktop).filter(|rate| *rate >= 0.01).unwrap_or(USUAL_RATE);
         Duration::from_secs_f64(1.0 / rate.max(0.01))
+    }
+
+    /// Time begins when the first picture is on the screen: until then pipelines are made, and nobody would see what happens.
+    fn begin(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        if self.clockwork.runs() || (self.shown == 0 && self.times.opened.elapsed() < UNSEEN) {
+            return Ok(());
+        }
+        screen.renderer().wait()?;
+        self.times.turn = Instant::now();
+        self.clockwork.start()
     }
 
     /// The clock went on: the user moves by the keys that he holds.
@@ -227,9 +242,10 @@ impl WindowApp for Viewer {
     fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let usual = if screen.is_software() { Quality::fast() } else { Quality::default() };
         self.quality.get_or_insert(usual);
-        // opening took its time; the simulation starts now
+        // opening took its time; the simulation starts with the first picture
         self.times.turn = Instant::now();
-        self.clockwork.start()
+        self.times.opened = self.times.turn;
+        Ok(())
     }
 
     fn event(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
@@ -259,6 +275,7 @@ impl WindowApp for Viewer {
             self.draw(screen)?;
         }
         self.tell(now)?;
+        self.begin(screen)?;
         if over || self.ended || self.limits.pictures.is_some_and(|pictures| self.shown >= pictures) {
             self.take_last(screen)?;
             return Ok(Next::End);
