@@ -126,7 +126,7 @@ impl Book {
     /// A datagram; longer ones than [`MOST_BYTES`] may be cut behind that length.
     pub fn take(&mut self, from: IpAddr, bytes: &[u8]) {
         self.counts.datagrams = self.counts.datagrams.wrapping_add(1);
-        if !self.senders.is_empty() && !self.senders.contains(&from) {
+        if !self.senders.is_empty() && !self.senders.iter().any(|known| known.to_canonical() == from.to_canonical()) {
             return self.drop(Dropped::Stranger);
         }
         if bytes.len() > MOST_BYTES {
