@@ -101,6 +101,22 @@ fn a_facet_of_another_cave_is_not_let_in() {
 }
 
 #[test]
+fn a_facet_with_another_texture_of_the_same_name_is_not_let_in() {
+    let place = Place::new("cave-other-texture", &wall());
+    let picture = |value: u8| tumble::render::Image { width: 2, height: 2, rgba: vec![value; 16] }.write_png(place.folder.path("bark.png")).unwrap();
+    picture(255);
+    std::fs::write(&place.scene, SCENE.replace("radius_m = 0.3 }", "radius_m = 0.3 }\nlook = { texture = \"bark.png\" }")).unwrap();
+    let server = place.start("serve", &["--wait", "60"]);
+    wait("the server's lock", || lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory")));
+    picture(128);
+    let (code, _, wrong) = place.start("facet", &["--facet", "r", "--no-pictures"]).end();
+    assert_eq!(code, Some(2), "{wrong}");
+    assert!(wrong.contains("refuses it"), "{wrong}");
+    signal(server.pid(), Signal::INT);
+    assert_eq!(server.end().0, Some(0));
+}
+
+#[test]
 fn facets_by_hand_find_the_server_that_was_started_again() {
     for carrier in ["shared_memory", "udp"] {
         let place = Place::new(&format!("cave-again-{carrier}"), &wall());
@@ -144,6 +160,30 @@ fn a_shipped_cave_is_one_from_every_folder() {
     let wrong = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(1), "{wrong}");
     assert!(wrong.contains("a run is going on"), "{wrong}");
+    place.assert_clean();
+}
+
+#[test]
+fn a_run_of_long_paths_has_a_name_and_is_found() {
+    let place = Place::new("cave-long", &wall());
+    // of bytes that a text writes as six each
+    let deep = (0..6).fold(place.folder.path("deep"), |path, _| path.join("\u{1}".repeat(200)));
+    std::fs::create_dir_all(&deep).unwrap();
+    let (scene, cave) = (deep.join("scene.toml"), deep.join("cave.toml"));
+    std::fs::write(&scene, SCENE).unwrap();
+    std::fs::write(&cave, wall()).unwrap();
+    let start = |what: &str, more: &[&str]| {
+        let mut command = in_place(&place.folder, &[&[what, &text(&scene), "--cave", &text(&cave)], more].concat());
+        command.stdin(Stdio::null()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap()
+    };
+    let mut server = start("serve", &["--seconds", "0.3", "--quiet"]);
+    wait("the lock", || lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory")));
+    let second = start("serve", &[]).wait_with_output().unwrap();
+    let wrong = String::from_utf8_lossy(&second.stderr);
+    assert!(wrong.contains(&format!("process {}", server.id())), "{wrong}");
+    let facets = ["l", "r"].map(|f| start("facet", &["--facet", f, "--no-pictures"]));
+    facets.into_iter().for_each(|mut facet| assert!(facet.wait().unwrap().success()));
+    assert!(server.wait().unwrap().success());
     place.assert_clean();
 }
 
