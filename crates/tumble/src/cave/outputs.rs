@@ -120,16 +120,16 @@ mod tests {
         std::fs::create_dir_all(&folder).unwrap();
         let file = folder.join("run.mcap");
         std::fs::write(&file, "before").unwrap();
-        let given_up = Recording::new(file.clone()).unwrap();
+        let given_up = Recording::new(file.clone()).ok().unwrap();
         std::fs::write(given_up.begins_at(), "given up").unwrap();
         drop(given_up);
         assert_eq!(std::fs::read(&file).unwrap(), b"before");
         // through a link: the file that it leads to
         let link = folder.join("link.mcap");
         std::os::unix::fs::symlink(&file, &link).unwrap();
-        let mut begun = Recording::new(link.clone()).unwrap();
+        let mut begun = Recording::new(link.clone()).ok().unwrap();
         std::fs::write(begun.begins_at(), "now").unwrap();
-        begun.begin().unwrap();
+        assert!(begun.begin().is_ok());
         drop(begun);
         assert_eq!(std::fs::read(&file).unwrap(), b"now");
         assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink() && same(&file, &link));

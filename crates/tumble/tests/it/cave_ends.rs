@@ -105,7 +105,7 @@ fn a_facet_with_another_texture_of_the_same_name_is_not_let_in() {
     let place = Place::new("cave-other-texture", &wall());
     let picture = |value: u8| tumble::render::Image { width: 2, height: 2, rgba: vec![value; 16] }.write_png(place.folder.path("bark.png")).unwrap();
     picture(255);
-    std::fs::write(&place.scene, SCENE.replace("radius_m = 0.3 }", "radius_m = 0.3 }\nlook = { texture = \"bark.png\" }")).unwrap();
+    std::fs::write(&place.scene, SCENE.replace("radius_m = 0.3 }", "radius_m = 0.3 }\ntexture = \"bark.png\"")).unwrap();
     let server = place.start("serve", &["--wait", "60"]);
     wait("the server's lock", || lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory")));
     picture(128);
@@ -224,6 +224,32 @@ fn a_run_goes_on_when_nobody_reads_its_stderr() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
     assert_eq!(json(&place.folder.path("summary.json"))["frames"], 31);
     assert!(std::fs::read(&record).unwrap().ends_with(MAGIC));
+    place.assert_clean();
+}
+
+#[test]
+fn the_others_go_on_when_a_facet_cannot_be_started_again() {
+    let place = Place::new("cave-unstartable", &wall());
+    // a command that goes away
+    let program = place.folder.path("tumble");
+    std::fs::copy(env!("CARGO_BIN_EXE_tumble"), &program).unwrap();
+    let mut command = Command::new(&program);
+    command.args(["cave", &place.scene, "--cave", &place.cave, "--no-pictures", "--restart", "--log-dir", &place.path("out")]);
+    command.env("XDG_RUNTIME_DIR", place.folder.path("run")).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    place.wait_for("out", "r", 5);
+    std::fs::remove_file(&program).unwrap();
+    let pid = child.id() as i32;
+    let facets: Vec<i32> = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap().split_whitespace().map(|p| p.parse().unwrap()).collect();
+    let right = facets.iter().find(|pid| String::from_utf8_lossy(&std::fs::read(format!("/proc/{pid}/cmdline")).unwrap()).contains("--facet\0r\0"));
+    signal(*right.unwrap(), Signal::KILL);
+    let at = *numbers(&place.log("out", "l")).last().unwrap();
+    place.wait_for("out", "l", at + 150);
+    signal(pid, Signal::INT);
+    let out = child.wait_with_output().unwrap();
+    let wrong = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(0), "{wrong}");
+    assert!(wrong.contains("starting facet r: "), "{wrong}");
     place.assert_clean();
 }
 
