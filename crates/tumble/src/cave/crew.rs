@@ -164,12 +164,15 @@ impl Crew {
         // who has not heard it finds its pipe closed
         self.members.iter_mut().filter_map(|m| m.child.as_mut()).for_each(|child| drop(child.stdin.take()));
         self.wait(LAST_GRACE);
+        // all before any is waited for: with a driver at work each takes its time to be gone
         for member in &mut self.members {
-            let Some(mut child) = member.child.take() else { continue };
+            let Some(child) = &mut member.child else { continue };
             if let Ok(None) = child.try_wait() {
                 eprintln!("facet {}: does not end and is killed", member.name);
             }
             let _ = child.kill();
+        }
+        for mut child in self.members.iter_mut().filter_map(|m| m.child.take()) {
             let _ = child.wait();
             self.signals.ended(child.id());
         }

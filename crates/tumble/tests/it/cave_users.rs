@@ -62,13 +62,14 @@ pub fn place(test: &str) -> (Folder, String, String) {
 fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, SocketAddr, BufReader<ChildStderr>) {
     let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--fast"], args].concat()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
     let mut stderr = BufReader::new(child.stderr.take().unwrap());
-    loop {
+    let address = loop {
         let mut line = String::new();
         assert!(stderr.read_line(&mut line).unwrap() > 0, "the server ended");
         if let Some(rest) = line.strip_prefix("server: udp ") {
-            return (child, rest.split(',').next().unwrap().parse().unwrap(), stderr);
+            break rest.split(',').next().unwrap().parse().unwrap();
         }
-    }
+    };
+    (child, address, stderr)
 }
 
 /// The hash by which the server knows scene and cave: it tells a facet of another one.
