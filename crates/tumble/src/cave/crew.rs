@@ -3,6 +3,7 @@
 
 use super::args::{Carrier, CaveOptions, ServeOptions};
 use super::ends::{Address, seen_from};
+use super::signals::Signals;
 use super::stage::PREVIEW;
 use crate::failure::Failure;
 use std::collections::VecDeque;
@@ -14,8 +15,10 @@ use tumble::net::sync::Seat;
 use tumble::net::sync::transport::FacetNumber;
 use tumble::scene::cave::{Cave, Node};
 
-/// How long facets may take to end by themselves after they were told, and again after their pipe was closed.
-const GRACE: Duration = Duration::from_secs(5);
+/// How long facets may take to end by themselves after they were told: to pack the last pictures. Together with the next well below the time that signals give.
+const GRACE: Duration = Duration::from_secs(3);
+/// The same after their pipe was closed, and for those that were still starting.
+const LAST_GRACE: Duration = Duration::from_secs(1);
 /// Restarts of a facet within a minute, at most.
 const MOST_RESTARTS: usize = 5;
 const MINUTE: Duration = Duration::from_secs(60);
@@ -28,6 +31,7 @@ pub struct Crew {
     members: Vec<Member>,
     restart: bool,
     quiet: bool,
+    signals: Signals,
 }
 
 struct Member {
@@ -41,6 +45,8 @@ struct Member {
     over: bool,
     /// It ended last by a failure.
     failed: bool,
+    /// How, where it ended last by the exit code of a failure of its own; what shells and ssh tell of one that was killed is none.
+    fault: Option<String>,
     restarts: VecDeque<Instant>,
 }
 
@@ -73,8 +79,8 @@ pub fn seats(cave: &Cave, preview: bool) -> Vec<Seat> {
 
 impl Crew {
     /// Starts the facets of this machine, if there is a launcher, and says how the others are started.
-    pub fn start(serve: &ServeOptions, cave: &Cave, launcher: Option<&CaveOptions>, address: &Address) -> Result<Crew, Failure> {
-        let mut crew = Crew { members: Vec::new(), restart: launcher.is_some_and(|l| l.restart), quiet: serve.quiet };
+    pub fn start(serve: &ServeOptions, cave: &Cave, launcher: Option<&CaveOptions>, address: &Address, signals: &Signals) -> Result<Crew, Failure> {
+        let mut crew = Crew { members: Vec::new(), restart: launcher.is_some_and(|l| l.restart), quiet: serve.quiet, signals: signals.clone() };
         for (k, seat) in seats(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
             let far = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
             let address = far.map_or_else(|| address.clone(), |node| seen_by(node, address));
@@ -111,8 +117,8 @@ impl Crew {
         let mut ended = Vec::new();
         for k in 0..self.members.len() {
             let member = &mut self.members[k];
-            if let Some(status) = member.child.as_mut().and_then(|child| child.try_wait().ok().flatten()) {
-                (member.child, member.ended) = (None, Some(Instant::now()));
+            if let Some(status) = member.look(&self.signals) {
+                member.ended = Some(Instant::now());
                 ended.push(member.seat);
                 member.over = status.success() || !self.restart;
                 let title = format!("facet {}", member.name);
@@ -120,7 +126,6 @@ impl Crew {
                     return Err(Failure::run(&title, format!("ended before the start ({}); what it said stands above", told(status))));
                 }
                 self.say(&if status.success() { format!("{title} has left") } else { format!("{title} ended ({})", told(status)) });
-                self.members[k].failed = !status.success();
             }
             let member = &mut self.members[k];
             member.restarts.retain(|at| at.elapsed() < MINUTE);
@@ -134,7 +139,11 @@ impl Crew {
                     continue;
                 }
                 member.restarts.push_back(Instant::now());
-                self.spawn(k)?;
+                // the others go on without it, and it is tried again
+                if let Err(failure) = self.spawn(k) {
+                    eprint!("{}", failure.report());
+                    (self.members[k].ended, self.members[k].failed) = (Some(Instant::now()), true);
+                }
             }
         }
         let all_over = !self.members.is_empty() && self.members.iter().all(|m| m.over && m.child.is_none());
@@ -146,26 +155,41 @@ impl Crew {
         Ok(Look { crew, ended })
     }
 
-    /// After the facets were told that the run is over: waits for them, and ends who does not.
-    pub fn end(&mut self) {
-        self.wait(GRACE);
+    /// After the facets were told that the run is over: waits for them, and ends who does not. `begun`: they were there, and can have heard it.
+    ///
+    /// Errors: a facet has ended by a failure of its own, and was not started again.
+    pub fn end(&mut self, begun: bool) -> Result<(), Failure> {
+        self.wait(if begun { GRACE } else { LAST_GRACE / 2 });
+        let faults: Vec<String> = self.members.iter().filter_map(|m| Some(format!("{} ({})", m.name, m.fault.as_ref()?))).collect();
         // who has not heard it finds its pipe closed
         self.members.iter_mut().filter_map(|m| m.child.as_mut()).for_each(|child| drop(child.stdin.take()));
-        self.wait(GRACE);
+        self.wait(LAST_GRACE);
+        // all before any is waited for: with a driver at work each takes its time to be gone
         for member in &mut self.members {
-            let Some(mut child) = member.child.take() else { continue };
+            let Some(child) = &mut member.child else { continue };
             if let Ok(None) = child.try_wait() {
                 eprintln!("facet {}: does not end and is killed", member.name);
             }
             let _ = child.kill();
+        }
+        for mut child in self.members.iter_mut().filter_map(|m| m.child.take()) {
             let _ = child.wait();
+            self.signals.ended(child.id());
+        }
+        match faults.is_empty() {
+            true => Ok(()),
+            false => Err(Failure::run("the facets", format!("{} ended by a failure; what it said stands above", faults.join(", ")))),
         }
     }
 
     /// Until all have ended, at most so long.
     fn wait(&mut self, most: Duration) {
         let until = Instant::now() + most;
-        while Instant::now() < until && self.members.iter_mut().any(|m| m.child.as_mut().is_some_and(|c| matches!(c.try_wait(), Ok(None)))) {
+        while Instant::now() < until {
+            self.members.iter_mut().for_each(|m| _ = m.look(&self.signals));
+            if self.members.iter().all(|m| m.child.is_none()) {
+                return;
+            }
             std::thread::sleep(Duration::from_millis(10));
         }
     }
@@ -177,7 +201,8 @@ impl Crew {
         // a group of its own: Ctrl-C is for the launcher, who ends the run in order
         command.args(&member.command[1..]).stdin(Stdio::piped()).stdout(Stdio::null()).process_group(0);
         let child = command.spawn().map_err(|e| Failure::run(&format!("starting facet {}", member.name), e))?;
-        (member.child, member.ended) = (Some(child), None);
+        self.signals.started(child.id());
+        (member.child, member.ended, member.fault) = (Some(child), None, None);
         Ok(())
     }
 
@@ -193,13 +218,25 @@ impl Drop for Crew {
         for child in self.members.iter_mut().filter_map(|m| m.child.as_mut()) {
             let _ = child.kill();
             let _ = child.wait();
+            self.signals.ended(child.id());
         }
     }
 }
 
 impl Member {
     fn new(seat: usize, name: &str, command: Vec<OsString>) -> Member {
-        Member { seat: seat as FacetNumber, name: name.to_owned(), command, child: None, ended: None, over: false, failed: false, restarts: VecDeque::new() }
+        Member { seat: seat as FacetNumber, name: name.to_owned(), command, child: None, ended: None, over: false, failed: false, fault: None, restarts: VecDeque::new() }
+    }
+
+    /// How it ended, if it did since the last look.
+    fn look(&mut self, signals: &Signals) -> Option<ExitStatus> {
+        let child = self.child.as_mut()?;
+        let status = child.try_wait().ok().flatten()?;
+        signals.ended(child.id());
+        self.child = None;
+        self.failed = !status.success();
+        self.fault = status.code().filter(|code| matches!(code, 1 | 2)).map(|_| told(status));
+        Some(status)
     }
 }
 

@@ -1,8 +1,10 @@
 //! The two ends of whatever carries a run's frames.
 
+use super::stage::Setting;
 use crate::failure::Failure;
 use std::net::{SocketAddr, UdpSocket};
-use std::time::Duration;
+use std::path::Path;
+use std::time::{Duration, Instant};
 use tumble::net::sync::shm::{ShmFacet, ShmServer};
 use tumble::net::sync::transport::{Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, Message, ServerLink};
 use tumble::net::sync::udp::{SharedKey, Timing, UdpFacet, UdpServer};
@@ -15,10 +17,30 @@ pub enum ServerEnd {
 }
 
 /// A facet's end.
-pub enum FacetEnd {
+pub struct FacetEnd {
+    link: Link,
+    /// Where the server may be anew: a run that begins again has another name or port.
+    looking: Option<Looking>,
+}
+
+enum Link {
     Shm(Box<ShmFacet>),
     Udp(Box<UdpFacet>),
 }
+
+/// What is asked for the server's address while there is no connection.
+struct Looking {
+    /// The cave's place, by which its run is found.
+    place: String,
+    cave: Cave,
+    facet: FacetNumber,
+    address: Address,
+    connected: bool,
+    asked: Instant,
+}
+
+/// Between two looks for a server's new address.
+const ASK: Duration = Duration::from_millis(250);
 
 /// How a facet finds the server.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -31,16 +53,47 @@ pub enum Address {
 
 /// The cave's key, where it has one.
 pub fn key(cave: &Cave) -> Result<Option<SharedKey>, Failure> {
-    cave.security.as_ref().map(|s| SharedKey::read(&s.key_file)).transpose().map_err(Failure::input)
+    let read = |file: &Path| {
+        // a pipe would be waited for
+        if std::fs::metadata(file).is_ok_and(|about| !about.is_file()) {
+            return Err(Failure::input(format!("key file {}: is no regular file", file.display())));
+        }
+        SharedKey::read(file).map_err(Failure::input)
+    };
+    cave.security.as_ref().map(|s| read(&s.key_file)).transpose()
 }
 
 impl FacetEnd {
-    /// Begins to look for the server.
-    pub fn open(address: &Address, facet: FacetNumber, cave: &Cave) -> Result<FacetEnd, Failure> {
+    /// Begins to look for the server. `again`: where it is found is asked of the cave's lock whenever there is no connection; else it stays there.
+    pub fn open(address: &Address, facet: FacetNumber, setting: &Setting, again: bool) -> Result<FacetEnd, Failure> {
+        let link = Link::open(address, facet, &setting.cave)?;
+        let looking = || Looking {
+            place: setting.place.clone(), cave: setting.cave.clone(), facet, address: address.clone(), connected: false, asked: Instant::now(),
+        };
+        Ok(FacetEnd { link, looking: again.then(looking) })
+    }
+
+    /// Goes where the server is now, if that is elsewhere than it was.
+    fn look(&mut self) {
+        let Some(looking) = self.looking.as_mut().filter(|l| !l.connected && l.asked.elapsed() >= ASK) else { return };
+        looking.asked = Instant::now();
+        let Ok(Some(address)) = super::lock::find(&looking.place) else { return };
+        if address == looking.address {
+            return;
+        }
+        // what fails now is tried again, as long as the facet waits at all
+        if let Ok(link) = Link::open(&address, looking.facet, &looking.cave) {
+            (self.link, looking.address) = (link, address);
+        }
+    }
+}
+
+impl Link {
+    fn open(address: &Address, facet: FacetNumber, cave: &Cave) -> Result<Link, Failure> {
         let failed = |e: LinkError| Failure::run("the connection to the server", e);
         Ok(match address {
-            Address::Memory(run) => FacetEnd::Shm(Box::new(ShmFacet::new(run, facet).map_err(failed)?.silent_after(silence(cave)))),
-            Address::Udp(server) => FacetEnd::Udp(Box::new(UdpFacet::connect(*server, facet, key(cave)?, timing(cave)).map_err(failed)?)),
+            Address::Memory(run) => Link::Shm(Box::new(ShmFacet::new(run, facet).map_err(failed)?.silent_after(silence(cave)))),
+            Address::Udp(server) => Link::Udp(Box::new(UdpFacet::connect(*server, facet, key(cave)?, timing(cave)).map_err(failed)?)),
         })
     }
 }
@@ -109,30 +162,35 @@ impl ServerLink for ServerEnd {
 
 impl FacetLink for FacetEnd {
     fn send(&mut self, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
-        match self {
-            FacetEnd::Shm(link) => link.send(delivery, message),
-            FacetEnd::Udp(link) => link.send(delivery, message),
+        match &mut self.link {
+            Link::Shm(link) => link.send(delivery, message),
+            Link::Udp(link) => link.send(delivery, message),
         }
     }
 
     fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError> {
-        match self {
-            FacetEnd::Shm(link) => link.recv(timeout, message),
-            FacetEnd::Udp(link) => link.recv(timeout, message),
+        self.look();
+        let event = match &mut self.link {
+            Link::Shm(link) => link.recv(timeout, message),
+            Link::Udp(link) => link.recv(timeout, message),
+        }?;
+        if let (Some(looking), Some(event)) = (&mut self.looking, &event) {
+            looking.connected = !matches!(event, LinkEvent::Closed(_));
         }
+        Ok(event)
     }
 
     fn close(&mut self) {
-        match self {
-            FacetEnd::Shm(link) => link.close(),
-            FacetEnd::Udp(link) => link.close(),
+        match &mut self.link {
+            Link::Shm(link) => link.close(),
+            Link::Udp(link) => link.close(),
         }
     }
 
     fn counters(&self) -> LinkCounters {
-        match self {
-            FacetEnd::Shm(link) => link.counters(),
-            FacetEnd::Udp(link) => link.counters(),
+        match &self.link {
+            Link::Shm(link) => link.counters(),
+            Link::Udp(link) => link.counters(),
         }
     }
 }

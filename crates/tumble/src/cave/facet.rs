@@ -41,7 +41,8 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     }
     let watch = Watch { name: name.clone(), signals, leader, patience: Duration::from_secs_f64(options.wait) };
     let address = address(options, &setting, &watch)?;
-    let link = FacetEnd::open(&address, number, &setting.cave)?;
+    let again = options.server.is_none() && options.run.is_none();
+    let link = FacetEnd::open(&address, number, &setting, again)?;
     let told = told(&setting, &name)?;
     let log = match (&draw.frames_dir, &draw.log_dir) {
         (Some(folder), _) => Some(FrameLog::open(folder, &name, true, !options.led)?),
@@ -56,7 +57,8 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     };
     // whatever happened, the server need not find out by silence
     let _ = running.facet.leave();
-    outcome.and(running.log.as_mut().map_or(Ok(()), FrameLog::finish))
+    // what could not be written is why the rest went wrong
+    running.log.as_mut().map_or(Ok(()), FrameLog::finish).and(outcome)
 }
 
 /// Whether there is none to open a window on; one that is named and does not answer is said.
@@ -74,7 +76,7 @@ fn told(setting: &Setting, name: &str) -> Result<Told, Failure> {
     let seed = Entropy::system().map_err(|e| Failure::run("the facet", e))?.next_u64();
     let sync = &setting.cave.sync;
     let pace = if sync.mode == Mode::Lockstep { Pace::Lockstep } else { Pace::Latest };
-    Ok(Told { pace, drop_after: Duration::from_millis(sync.drop_timeout_ms.into()), ..Told::new(name, setting.hash, seed) })
+    Ok(Told { pace, drop_after: Duration::from_millis(sync.drop_timeout_ms.into()), ..Told::new(name, setting.joined, seed) })
 }
 
 /// Where the server is: as the command line says, or as the run that goes on here says, which is waited for.
@@ -88,8 +90,8 @@ fn address(options: &FacetOptions, setting: &Setting, watch: &Watch) -> Result<A
     let until = Instant::now() + watch.patience;
     let mut said = false;
     loop {
-        if let Some(run) = lock::find(&setting.cave)? {
-            return Ok(run.address);
+        if let Some(address) = lock::find(&setting.place)? {
+            return Ok(address);
         }
         if watch.end() {
             return Err(Failure::run(&watch.title(), "ended while it waited for a run"));
@@ -203,6 +205,7 @@ pub fn failed(error: SessionError) -> Failure {
 impl Running {
     /// What to do next, after waiting for it for at most `timeout`; `None` when the facet is to end.
     pub fn next(&mut self, timeout: Duration) -> Result<Option<Task>, Failure> {
+        self.log.as_mut().map_or(Ok(()), FrameLog::check)?;
         if self.watch.orphaned() {
             return Err(Failure::run(&self.watch.title(), "its launcher is gone"));
         }

@@ -3,6 +3,7 @@
 //! The lock is the system's, so it goes with the process however that ends. The text is for people and for facets that are started by hand.
 
 use super::ends::Address;
+use super::stage::Setting;
 use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
@@ -11,12 +12,11 @@ use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tumble::net::sync::shm::ports::folder;
-use tumble::scene::cave::Cave;
 
 /// How long a run that is to be replaced may take to end by itself, and then to be gone.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Most bytes of the text.
-const MOST: u64 = 4096;
+/// Most bytes of the text: a few paths, each as long as the system lets it be, with every byte escaped.
+const MOST: u64 = 1 << 16;
 
 /// What the file says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,14 +26,23 @@ pub struct Run {
     pub cave: String,
     /// Seconds since 1970.
     pub since_unix_s: u64,
-    pub address: Address,
+    /// When the process began, ticks since the machine did: its number may be another's later.
+    pub began: u64,
+    /// Where facets find it; not there before it can be joined.
+    pub address: Option<Address>,
 }
 
 impl Run {
     /// This process's run.
-    pub fn here(scene: &str, cave: &str, address: Address) -> Run {
+    pub fn here(scene: &str, cave: &str) -> Run {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Run { pid: std::process::id() as i32, scene: scene.into(), cave: cave.into(), since_unix_s: since.as_secs(), address }
+        let pid = std::process::id() as i32;
+        Run { pid, scene: scene.into(), cave: cave.into(), since_unix_s: since.as_secs(), began: began(pid).unwrap_or(0), address: None }
+    }
+
+    /// Whether the process that it names is the one that wrote it.
+    fn lives(&self) -> bool {
+        began(self.pid) == Some(self.began)
     }
 
     fn described(&self) -> String {
@@ -49,8 +58,8 @@ pub struct Lock {
 
 impl Lock {
     /// Takes the cave, or refuses by the name of who has it. With `replace` that run is asked to end, then killed.
-    pub fn take(cave: &Cave, run: &Run, replace: bool) -> Result<Lock, Failure> {
-        let path = path(cave)?;
+    pub fn take(setting: &Setting, run: &Run, replace: bool) -> Result<Lock, Failure> {
+        let (cave, path) = (&setting.cave, path(&setting.place)?);
         let until = Instant::now() + 2 * PATIENCE;
         let (mut asked, mut killed) = (None, false);
         loop {
@@ -59,7 +68,8 @@ impl Lock {
                 lock.write(run)?;
                 return Ok(lock);
             }
-            let other = read(&path);
+            // the text may still be an earlier run's, and its process another by now
+            let other = read(&path).filter(Run::lives);
             let name = other.as_ref().map_or("another process, which has not said yet who it is".to_owned(), Run::described);
             if !replace {
                 return Err(Failure::run("the cave", format!("a run is going on in {} already: {name}; end it first, or take its place with --replace", cave.file)));
@@ -83,6 +93,11 @@ impl Lock {
         }
     }
 
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Says which run it is.
     pub fn write(&mut self, run: &Run) -> Result<(), Failure> {
         let failed = |e: std::io::Error| Failure::run("the cave's lock", e);
@@ -99,20 +114,27 @@ impl Drop for Lock {
     }
 }
 
-/// The run that goes on in a cave on this machine, if there is one.
-pub fn find(cave: &Cave) -> Result<Option<Run>, Failure> {
-    let path = path(cave)?;
-    let Ok(file) = File::open(&path) else { return Ok(None) };
-    match file.try_lock_shared() {
-        Err(TryLockError::WouldBlock) => Ok(read(&path)),
-        _ => Ok(None),
-    }
+/// Where the run is that goes on in the cave at `place` ([`Setting::place`]) on this machine, if there is one that can be joined. Nothing is locked for it: a
+/// run that begins at this moment would take that for another.
+pub fn find(place: &str) -> Result<Option<Address>, Failure> {
+    Ok(read(&path(place)?).filter(Run::lives).and_then(|run| run.address))
 }
 
-fn path(cave: &Cave) -> Result<PathBuf, Failure> {
+/// When a process began, ticks since the machine did; `None`: there is none of this number, or it ended and is only not yet asked for.
+fn began(pid: i32) -> Option<u64> {
+    let about = std::fs::read(format!("/proc/{pid}/stat")).ok()?;
+    // the name, in brackets, may hold anything; behind it come the third field and so on, and the beginning is the 22nd
+    let behind = String::from_utf8_lossy(&about).rsplit_once(')')?.1.to_owned();
+    let fields: Vec<&str> = behind.split_whitespace().collect();
+    if matches!(fields.first(), Some(&("Z" | "X"))) {
+        return None;
+    }
+    fields.get(22 - 3)?.parse().ok()
+}
+
+fn path(place: &str) -> Result<PathBuf, Failure> {
     let (folder, _) = folder().map_err(|e| Failure::run("the cave's lock", e))?;
-    let name = Path::new(&cave.file).canonicalize().map_or_else(|_| cave.file.clone(), |path| path.display().to_string());
-    let hash = blake3::hash(name.as_bytes()).to_hex();
+    let hash = blake3::hash(place.as_bytes()).to_hex();
     Ok(folder.join(format!("cave-{}.lock", &hash[..16])))
 }
 
@@ -162,6 +184,16 @@ fn utc(unix_s: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn a_process_is_known_by_its_number_and_beginning() {
+        let mut run = super::Run::here("s", "c");
+        assert!(run.lives());
+        run.began += 1;
+        assert!(!run.lives());
+        // no process has this number
+        assert_eq!(super::began(i32::MAX), None);
+    }
+
     #[test]
     fn dates_are_those_of_the_calendar() {
         // by `date -u -d @N`

@@ -65,6 +65,11 @@ impl FrameLog {
         self.waiting.load(Ordering::Acquire) < MOST_WAITING
     }
 
+    /// What went wrong so far: a disk that is full, say.
+    pub fn check(&mut self) -> Result<(), Failure> {
+        if self.writer.as_ref().is_some_and(JoinHandle::is_finished) { self.finish() } else { Ok(()) }
+    }
+
     /// A frame that is on the screen.
     pub fn shown(&mut self, frame: u64, time_s: f64, state: &[u8; 16], hash: &[u8; 16], image: Option<Image>) -> Result<(), Failure> {
         let shown = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -83,12 +88,15 @@ impl FrameLog {
 
 /// Each picture, and behind it its line, whole.
 fn write_all(folder: &Path, mut file: File, wanted: &Receiver<(Line, Option<Image>)>, waiting: &AtomicUsize) -> Result<(), Failure> {
+    let wrong = |file: &Path, why: &dyn std::fmt::Display| Failure::run(&format!("writing {}", file.display()), why);
+    let lines = folder.join("frames.jsonl");
     while let Ok((line, image)) = wanted.recv() {
         if let Some(image) = image {
-            image.write_png(folder.join(format!("frame_{:06}.png", line.frame))).map_err(|e| Failure::run("the frames", e))?;
+            let path = folder.join(format!("frame_{:06}.png", line.frame));
+            image.write_png(&path).map_err(|e| wrong(&path, &e))?;
         }
-        let text = serde_json::to_string(&line).map_err(|e| Failure::run("the frames", e))? + "\n";
-        file.write_all(text.as_bytes()).map_err(|e| Failure::run("the frames", e))?;
+        let text = serde_json::to_string(&line).map_err(|e| wrong(&lines, &e))? + "\n";
+        file.write_all(text.as_bytes()).map_err(|e| wrong(&lines, &e))?;
         waiting.fetch_sub(1, Ordering::AcqRel);
     }
     Ok(())

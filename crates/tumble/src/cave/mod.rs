@@ -9,6 +9,20 @@
 //!
 //! The launcher is the server: what it prints about the facets it knows at first hand, and a cave of four facets is five processes.
 
+/// As the standard one, but a stderr that nobody reads any more ends no run: pictures and recordings go on without it.
+macro_rules! eprintln {
+    ($($told:tt)*) => {{
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($told)*)));
+    }};
+}
+
+/// The same without the line's end.
+macro_rules! eprint {
+    ($($told:tt)*) => {{
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!($($told)*));
+    }};
+}
+
 pub mod args;
 mod bodies;
 mod crew;
@@ -19,6 +33,7 @@ mod lock;
 mod log;
 mod measure;
 mod osc;
+mod outputs;
 mod painter;
 mod played;
 mod replay;

@@ -126,7 +126,7 @@ impl Book {
     /// A datagram; longer ones than [`MOST_BYTES`] may be cut behind that length.
     pub fn take(&mut self, from: IpAddr, bytes: &[u8]) {
         self.counts.datagrams = self.counts.datagrams.wrapping_add(1);
-        if !self.senders.is_empty() && !self.senders.contains(&from) {
+        if !self.senders.is_empty() && !self.senders.iter().any(|known| known.to_canonical() == from.to_canonical()) {
             return self.drop(Dropped::Stranger);
         }
         if bytes.len() > MOST_BYTES {
@@ -256,6 +256,9 @@ mod tests {
         assert_eq!((inputs.len(), inputs[0].user, inputs[0].sequence, inputs[0].head.unwrap().translation.z), (1, 0, 1, 1.0));
         // told once
         assert!(book.inputs().is_empty());
+        // as a socket of both kinds of addresses names the same sender
+        book.take(Ipv4Addr::LOCALHOST.to_ipv6_mapped().into(), &head());
+        assert!(book.inputs().len() == 1 && book.counts.dropped["stranger"] == 1);
     }
 
     /// A million packets: random bytes, and a good one with random changes, cuts and repeats. All of them are counted, none does what a message cannot.

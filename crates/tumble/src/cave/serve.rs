@@ -5,6 +5,7 @@ use super::crew::{Crew, Crewed, carrier, seats};
 use super::devices::Devices;
 use super::ends::{Address, ServerEnd, key, silence, timing};
 use super::lock::{Lock, Run};
+use super::outputs::{self, Recording};
 use super::replay::Tape;
 use super::signals::Signals;
 use super::stage::Setting;
@@ -13,7 +14,7 @@ use super::users::Users;
 use super::viewers::Viewers;
 use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 use tumble::core::World;
 use tumble::net::record::RecorderOptions;
@@ -37,28 +38,38 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     })?;
     let say = |what: &str| (!options.quiet).then(|| eprintln!("{what}"));
     setting.notes.iter().for_each(|note| _ = say(note));
+    outputs::check(options, &setting.cave)?;
     let tape = recording.map(|path| Tape::open(path, setting.hash)).transpose()?;
     let key = key(&setting.cave)?;
     let number = Entropy::system().map_err(|e| Failure::run("the run", e))?.next_u64();
     let name = format!("{number:016x}");
-    let mut run = Run::here(&setting.scene.file, &setting.cave.file, Address::Memory(name.clone()));
-    let mut lock = Lock::take(&setting.cave, &run, options.replace)?;
+    if signals.end() {
+        return Ok(());
+    }
+    let mut run = Run::here(&setting.scene.file, &setting.cave.file);
+    let mut lock = Lock::take(&setting, &run, options.replace)?;
+    signals.remove_at_the_end(lock.path().to_owned());
     let seats = seats(&setting.cave, launcher.is_some_and(|l| l.preview));
     let count = seats.len() as u16;
     let failed = |e| Failure::run("the server", e);
-    let end = match carrier(options, &setting.cave) {
-        Carrier::SharedMemory => ServerEnd::Shm(Box::new(ShmServer::new(&name, count).map_err(failed)?.silent_after(silence(&setting.cave)))),
+    let (end, address) = match carrier(options, &setting.cave) {
+        Carrier::SharedMemory => {
+            let server = ShmServer::new(&name, count).map_err(failed)?.silent_after(silence(&setting.cave));
+            (ServerEnd::Shm(Box::new(server)), Address::Memory(name))
+        }
         Carrier::Udp => {
             let server = UdpServer::bind(listen(options, &setting.cave), count, key, timing(&setting.cave)).map_err(failed)?;
-            run.address = Address::Udp(server.address().map_err(failed)?);
-            lock.write(&run)?;
+            let address = Address::Udp(server.address().map_err(failed)?);
             say(&format!("server: {}", server.describe()));
-            ServerEnd::Udp(Box::new(server))
+            (ServerEnd::Udp(Box::new(server)), address)
         }
     };
+    // from now on it can be joined
+    run.address = Some(address.clone());
+    lock.write(&run)?;
     let shared_memory = matches!(end, ServerEnd::Shm(_));
     let server = Server::new(end, told(options, &setting, number, &seats), &setting.world);
-    let mut crew = Crew::start(options, &setting.cave, launcher, &run.address)?;
+    let mut crew = Crew::start(options, &setting.cave, launcher, &address, &signals)?;
     let _awake = options.stay_awake.then(|| Awake::ask().inspect_err(|why| _ = say(&format!("the cores may fall asleep: {why}"))));
     let outcome = Host::new(options, setting, server, seats, &signals, tape).and_then(|mut host| {
         let outcome = host.show(&mut crew);
@@ -95,7 +106,7 @@ fn told(options: &ServeOptions, setting: &Setting, run: u64, seats: &[Seat]) -> 
         first_after: wait,
         drop_after: ms(sync.drop_timeout_ms),
         history: sync.history_frames as usize,
-        ..ServerOptions::new(run, setting.hash, seats.to_vec())
+        ..ServerOptions::new(run, setting.joined, seats.to_vec())
     }
 }
 
@@ -107,7 +118,7 @@ struct Host<'a> {
     users: Users,
     devices: Devices,
     viewers: Viewers,
-    recorder: Option<(SessionRecorder, PathBuf)>,
+    recorder: Option<(SessionRecorder, Recording)>,
     recorded: bool,
     cave: Cave,
     scene: String,
@@ -134,8 +145,9 @@ impl<'a> Host<'a> {
         let viewers = Viewers::open(options)?;
         let described = cave.recording.as_ref().filter(|_| tape.is_none()).map(|r| (r.file.clone(), r.every_frames));
         let recorder = options.record.clone().map(|file| (file, 1)).or(described).map(|(file, every)| {
-            let recorder = SessionRecorder::create(&file, &scene.file, hash, &world, every, RecorderOptions::default());
-            recorder.map(|r| (r, file)).map_err(|e| Failure::run("recording", e))
+            let recording = Recording::new(file)?;
+            let recorder = SessionRecorder::create(recording.begins_at(), &scene.file, hash, &world, every, RecorderOptions::default());
+            recorder.map(|r| (r, recording)).map_err(|e| Failure::run("recording", e))
         });
         Ok(Host {
             options, signals, server, world, users, devices, viewers, recorder: recorder.transpose()?, recorded: false, cave, scene: scene.file, seconds: options.seconds,
@@ -147,6 +159,9 @@ impl<'a> Host<'a> {
     fn show(&mut self, crew: &mut Crew) -> Result<(), Failure> {
         if !self.gather(crew)? {
             return Ok(());
+        }
+        if let Some((_, recording)) = &mut self.recorder {
+            recording.begin()?;
         }
         let step_s = self.world.settings().dt;
         let steps = ((1.0 / (self.options.fps * step_s) + 1e-9).floor() as u32).max(1);
@@ -271,7 +286,9 @@ impl<'a> Host<'a> {
             self.behind_s += late.as_secs_f64();
             return Ok(now);
         }
-        self.server.idle_until(next).map_err(failed)?;
+        while self.server.now() < next && !self.signals.end() {
+            self.server.idle_until(next.min(self.server.now() + TURN)).map_err(failed)?;
+        }
         Ok(next)
     }
 
@@ -316,15 +333,24 @@ impl<'a> Host<'a> {
         }
     }
 
-    /// Ends the run: facets, recording, summary. As much of it as can be done is.
+    /// Ends the run: recording, summary, facets. As much of it as can be done is, and what is to be kept comes first: facets may not answer.
     fn end(&mut self, crew: &mut Crew) -> Result<(), Failure> {
         let wall_s = self.began.elapsed().as_secs_f64();
         let told = self.server.end().map_err(failed);
-        crew.end();
         let recorded = match self.recorder.take() {
-            Some((recorder, path)) => recorder.finish().map(|_| Some(path)).map_err(|e| Failure::run("recording", e)),
-            None => Ok(None),
+            Some((recorder, recording)) if recording.has_begun() => recorder.finish().map(|_| Some(recording)).map_err(|e| Failure::run("recording", e)),
+            _ => Ok(None),
         };
+        let summed = self.sum_up(wall_s);
+        let crew = crew.end(self.frames > 0);
+        if let (Ok(Some(recording)), false) = (&recorded, self.options.quiet) {
+            outputs::say(&format!("recording: {}\n", recording.file().display()))?;
+        }
+        told.and(recorded.map(drop)).and(summed).and(crew)
+    }
+
+    /// What was counted and measured, to stdout and file.
+    fn sum_up(&self, wall_s: f64) -> Result<(), Failure> {
         if self.frames > 0 {
             let summary = Summary {
                 scene: self.scene.clone(),
@@ -348,18 +374,14 @@ impl<'a> Host<'a> {
                 facets: self.meter.facets(&self.server, &self.seats),
             };
             if !self.options.quiet {
-                print!("{}", summary.lines());
+                outputs::say(&summary.lines())?;
             }
             if let Some(path) = &self.options.summary {
                 let text = serde_json::to_string_pretty(&summary).map_err(|e| Failure::run("the summary", e))? + "\n";
                 std::fs::write(path, text).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))?;
             }
         }
-        told.and(recorded).map(|path| {
-            if let (Some(path), false) = (path, self.options.quiet) {
-                println!("recording: {}", path.display());
-            }
-        })
+        Ok(())
     }
 }
 

@@ -1,24 +1,37 @@
 //! Ctrl-C, SIGTERM and SIGHUP end a run in order. What does not end then, because of a frame that nobody answers, ends anyway after a while, and at
-//! once by a second signal. (Some senders send each signal twice, so one right behind the first is the same.)
+//! once by a second signal: processes that were started are killed first, and the lock is removed. (Some senders send each signal twice, so one right behind the
+//! first is the same.)
 
 use crate::failure::Failure;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use std::sync::Arc;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often the watching thread looks.
 const LOOK: Duration = Duration::from_millis(50);
 /// Signals within this time are one.
 const SAME: Duration = Duration::from_millis(500);
-/// An end in order takes no longer.
+/// An end in order takes no longer: well above what facets are given to end.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// As shells tell Ctrl-C.
 const CODE: i32 = 130;
 
 /// Whether the end was asked for.
 #[derive(Clone)]
-pub struct Signals(Arc<AtomicBool>);
+pub struct Signals {
+    asked: Arc<AtomicBool>,
+    left: Arc<Mutex<Left>>,
+}
+
+/// What an end out of order must not leave.
+#[derive(Default)]
+struct Left {
+    /// Leaders of process groups.
+    processes: Vec<u32>,
+    files: Vec<PathBuf>,
+}
 
 impl Signals {
     /// From now on.
@@ -27,18 +40,47 @@ impl Signals {
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             signal_hook::flag::register(signal, came.clone()).map_err(|e| Failure::run("signals", e))?;
         }
-        let raised = asked.clone();
-        std::thread::Builder::new().name("signals".into()).spawn(move || watch(&came, &raised)).map_err(|e| Failure::run("signals", e))?;
-        Ok(Signals(asked))
+        let left = Arc::new(Mutex::new(Left::default()));
+        let (raised, kept) = (asked.clone(), left.clone());
+        std::thread::Builder::new().name("signals".into()).spawn(move || watch(&came, &raised, &kept)).map_err(|e| Failure::run("signals", e))?;
+        Ok(Signals { asked, left })
     }
 
     /// Whether one came.
     pub fn end(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.asked.load(Ordering::Relaxed)
+    }
+
+    /// A process that leads a group was started.
+    pub fn started(&self, process: u32) {
+        lock(&self.left).processes.push(process);
+    }
+
+    /// It is gone.
+    pub fn ended(&self, process: u32) {
+        lock(&self.left).processes.retain(|other| *other != process);
+    }
+
+    /// A file that goes with this process.
+    pub fn remove_at_the_end(&self, file: PathBuf) {
+        lock(&self.left).files.push(file);
     }
 }
 
-fn watch(came: &AtomicBool, asked: &AtomicBool) {
+fn lock(left: &Mutex<Left>) -> MutexGuard<'_, Left> {
+    left.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn end(left: &Mutex<Left>) -> ! {
+    let left = lock(left);
+    for pid in left.processes.iter().filter_map(|pid| rustix::process::Pid::from_raw(*pid as i32)) {
+        let _ = rustix::process::kill_process_group(pid, rustix::process::Signal::KILL);
+    }
+    left.files.iter().for_each(|file| _ = std::fs::remove_file(file));
+    std::process::exit(CODE)
+}
+
+fn watch(came: &AtomicBool, asked: &AtomicBool, left: &Mutex<Left>) {
     let mut first: Option<Instant> = None;
     loop {
         std::thread::sleep(LOOK);
@@ -48,7 +90,7 @@ fn watch(came: &AtomicBool, asked: &AtomicBool) {
                 asked.store(true, Ordering::Relaxed);
                 first = Some(Instant::now());
             }
-            Some(since) if since.elapsed() > PATIENCE || came && since.elapsed() > SAME => std::process::exit(CODE),
+            Some(since) if since.elapsed() > PATIENCE || came && since.elapsed() > SAME => end(left),
             _ => {}
         }
     }

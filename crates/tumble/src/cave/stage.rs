@@ -8,7 +8,7 @@ use tumble::core::{Mode, World};
 use tumble::net::sync::transport::MAX_FACETS;
 use tumble::net::sync::{User, Viewer, scene_hash};
 use tumble::render::CaveView;
-use tumble::scene::cave::{Cave, resolve_cave};
+use tumble::scene::cave::{Cave, CaveSource, resolve_cave};
 use tumble::scene::{CavePlace, SceneFile, ShapeSpec, WorldSettings, resolve_scene};
 
 /// Name of the seat of the one process that draws a preview.
@@ -22,6 +22,10 @@ pub struct Setting {
     pub world: World,
     /// By which they know that they mean the same.
     pub hash: [u8; 32],
+    /// The same with the cave and the textures: what a facet must have in common with the server to be let in.
+    pub joined: [u8; 32],
+    /// The cave by its file, the same from whatever folder it was named: one run goes on in it.
+    pub place: String,
     /// What is worth saying.
     pub notes: Vec<String>,
 }
@@ -32,7 +36,12 @@ impl Setting {
     pub fn load(stage: &Stage, adapt: impl FnOnce(&mut WorldSettings)) -> Result<Setting, Failure> {
         let mut scene = resolve_scene(&stage.scene, &[])?.load()?;
         adapt(&mut scene.world);
-        let cave = resolve_cave(&stage.cave)?.load()?;
+        let source = resolve_cave(&stage.cave)?;
+        let cave = source.load()?;
+        let place = match &source {
+            CaveSource::Path(path) => path.canonicalize().unwrap_or(path.clone()).display().to_string(),
+            CaveSource::Shipped(cave) => cave.name.to_owned(),
+        };
         if cave.facets.len() > MAX_FACETS {
             return Err(Failure::input(format!("{}: a run has at most {MAX_FACETS} facets, this cave has {}", cave.file, cave.facets.len())));
         }
@@ -45,7 +54,8 @@ impl Setting {
         // everything that is drawn and stands in no body
         let seen = format!("{:?} {:?} {:?} {:?} {:?}", scene.camera, scene.cave, scene.lights, scene.sky, scene.ground);
         let hash = scene_hash(&seen, &world);
-        Ok(Setting { scene, cave, world, hash, notes })
+        let joined = joined_hash(&hash, &cave, &world);
+        Ok(Setting { scene, cave, world, hash, joined, place, notes })
     }
 
     /// The cave at its place in the scene.
@@ -59,6 +69,33 @@ impl Setting {
         let users = self.cave.users.iter().map(|user| User { head: head_of(user), interpupillary_m: user.interpupillary_m, input: 0 }).collect();
         Ok(Viewer { users, cave: pose_of(view.place()), scale: view.place().scale })
     }
+}
+
+/// The hash of a scene with what of a cave is to be seen, and the bytes of all textures; addresses, machines and windows are each machine's own.
+fn joined_hash(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    let mut put = |bytes: &[u8]| {
+        hasher.update(&(bytes.len() as u64).to_le_bytes());
+        hasher.update(bytes);
+    };
+    // a file that cannot be read is told where it is used
+    let content = |path: &Path| std::fs::read(path).map_or([0; 32], |bytes| *blake3::hash(&bytes).as_bytes());
+    put(scene);
+    put(format!("{:?} {:?} {:?}", cave.sync.mode, cave.screens, cave.users).as_bytes());
+    for f in &cave.facets {
+        put(format!("{:?} {} {} {:?} {} {} {:?} {:?}", f.name, f.screen, f.user, f.size_px, f.near_m, f.far_m, f.stereo, f.flip).as_bytes());
+        [&f.warp_file, &f.blend_file].into_iter().for_each(|file| put(&file.as_deref().map_or([0; 32], content)));
+    }
+    let visuals = world.ids().iter().filter_map(|&id| world.object(id)?.renderable()).flat_map(|r| r.visuals());
+    let textures: std::collections::BTreeSet<_> = visuals.filter_map(|visual| visual.look.texture.clone()).collect();
+    // by names of files, as the scene's hash has them: folders differ between machines
+    let mut textures: Vec<_> = textures.iter().map(|path| (path.file_name().unwrap_or_default().as_encoded_bytes(), content(path))).collect();
+    textures.sort();
+    for (name, bytes) in textures {
+        put(name);
+        put(&bytes);
+    }
+    *hasher.finalize().as_bytes()
 }
 
 /// Stands the cave and its users in the view as the viewer of a frame has them.

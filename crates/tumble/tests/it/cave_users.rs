@@ -8,7 +8,7 @@ use std::process::{Child, ChildStderr, Stdio};
 use std::time::{Duration, Instant};
 use tumble::collide::{Pose, Vec3};
 use tumble::net::sync::udp::{Timing, UdpFacet};
-use tumble::net::sync::{Facet, FacetOptions, Input, Replay, Task};
+use tumble::net::sync::{Facet, FacetOptions, Input, Over, Task};
 
 /// Nothing here waits longer.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -58,13 +58,35 @@ pub fn place(test: &str) -> (Folder, String, String) {
     (folder, scene, cave)
 }
 
-/// The hash by which the server knows the scene: a recording has it.
-fn scene_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
-    let file = text(&folder.path("hash.mcap"));
-    let args = ["cave", scene, "--cave", cave, "--no-pictures", "--fast", "--seconds", "0.05", "--record", &file, "--quiet"];
-    let out = in_place(folder, &args).output().unwrap();
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    Replay::open(&file).unwrap().scene()
+/// Starts a server that waits for its facets, and where it is.
+fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, SocketAddr, BufReader<ChildStderr>) {
+    let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--fast"], args].concat()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
+    let address = loop {
+        let mut line = String::new();
+        assert!(stderr.read_line(&mut line).unwrap() > 0, "the server ended");
+        if let Some(rest) = line.strip_prefix("server: udp ") {
+            break rest.split(',').next().unwrap().parse().unwrap();
+        }
+    };
+    (child, address, stderr)
+}
+
+/// The hash by which the server knows scene and cave: it tells a facet of another one.
+fn joined_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
+    let (mut child, address, _stderr) = serve(folder, scene, cave, &["--transport", "udp"]);
+    let mut stranger = connect(address, "f", 0, [0; 32], scene);
+    let start = Instant::now();
+    let why = loop {
+        assert!(start.elapsed() < PATIENCE, "no answer came");
+        if let Task::Over(Over::Refused(why)) = stranger.next(Duration::from_millis(20)).unwrap() {
+            break why;
+        }
+    };
+    let _ = child.kill();
+    let _ = child.wait();
+    let hash = why.split_whitespace().map(|word| word.trim_end_matches(',')).find(|word| word.len() == 64).unwrap();
+    std::array::from_fn(|k| u8::from_str_radix(&hash[2 * k..2 * k + 2], 16).unwrap())
 }
 
 fn connect(address: SocketAddr, name: &str, number: u16, hash: [u8; 32], scene: &str) -> Facet<UdpFacet> {
@@ -75,16 +97,8 @@ fn connect(address: SocketAddr, name: &str, number: u16, hash: [u8; 32], scene: 
 
 impl Server {
     pub fn start(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> Server {
-        let hash = scene_hash(folder, scene, cave);
-        let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--fast"], args].concat()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
-        let mut stderr = BufReader::new(child.stderr.take().unwrap());
-        let address: SocketAddr = loop {
-            let mut line = String::new();
-            assert!(stderr.read_line(&mut line).unwrap() > 0, "the server ended");
-            if let Some(rest) = line.strip_prefix("server: udp ") {
-                break rest.split(',').next().unwrap().parse().unwrap();
-            }
-        };
+        let hash = joined_hash(folder, scene, cave);
+        let (child, address, stderr) = serve(folder, scene, cave, args);
         Server { child, facet: connect(address, "f", 0, hash, scene), address, hash, _stderr: stderr, sequence: 0 }
     }
 
