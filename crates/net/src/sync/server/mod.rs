@@ -23,7 +23,7 @@ use super::input::Input;
 use super::messages::{Done, FacetCounts};
 use super::publisher::Publisher;
 use super::transport::{Closed, Delivery, FacetNumber, LinkEvent, MAX_FACETS};
-use super::wire::{Hash, Kind, message};
+use super::wire::{Hash, Kind};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -280,9 +280,10 @@ impl ServerSession {
 
     /// Tells all facets that the run is over.
     pub fn end(&mut self) {
-        let to = self.there().map(|(k, _)| k).collect();
-        let end = message(&self.head(Kind::End, 0, self.frame.unwrap_or(0)), |_| {});
-        self.send(to, Delivery::Reliable, Arc::new(end));
+        // by the number of its joining: who has no frame yet knows no number of the run
+        let to: Vec<(FacetNumber, u64)> = self.there().map(|(k, place)| (k, place.join)).collect();
+        let frame = self.frame.unwrap_or(0);
+        to.into_iter().for_each(|(facet, join)| self.send_to(facet, Kind::End, join, frame, |_| {}));
         (self.ended, self.stage) = (true, Stage::Idle);
     }
 
