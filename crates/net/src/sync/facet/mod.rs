@@ -4,6 +4,7 @@
 //!  joining ──SNAPSHOT, STATE──► live: draw ──► READY ──PRESENT──► show ──► PRESENTED, and again
 //!     ▲                          │
 //!     └── silent for drop_after, REJOIN, link closed          REFUSED, END: over
+//!         (each time under a new number)
 //! ```
 //!
 //! A state of a later frame stands for the PRESENT of the one that is drawn: the server would not have sent it before.
@@ -269,8 +270,11 @@ impl FacetSession {
         match event {
             LinkEvent::Opened => self.asked = None,
             LinkEvent::Message => self.on_message(now, message),
-            LinkEvent::Closed(_) if self.phase == Phase::Live => self.lose(),
-            LinkEvent::Closed(_) => {}
+            LinkEvent::Closed(_) => match self.phase {
+                Phase::Live => self.lose(),
+                Phase::Joining => self.join_anew(), // the server may have taken the old number, and takes none twice
+                Phase::Over(_) => {}
+            },
         }
         self.advance(now);
     }

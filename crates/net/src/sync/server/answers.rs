@@ -60,7 +60,8 @@ impl ServerSession {
     pub(super) fn on_join(&mut self, now: Duration, facet: FacetNumber, join: u64, wanted: Join) {
         let place = &mut self.places[facet as usize];
         if place.retired.contains(&join) {
-            return count(&mut place.counts.stale);
+            count(&mut place.counts.stale);
+            return self.send_to(facet, Kind::Rejoin, join, 0, |_| {});
         }
         if place.standing != Standing::Absent && place.join == join {
             if self.frame.is_some() {

@@ -5,7 +5,7 @@ use super::stage::*;
 use std::time::Duration;
 use tumble_net::sync::messages::Done;
 use tumble_net::sync::simulate::{To, Weather};
-use tumble_net::sync::transport::LinkEvent;
+use tumble_net::sync::transport::{Closed, LinkEvent};
 use tumble_net::sync::wire;
 use tumble_net::sync::{FacetOptions, FacetSession, Over, Pace, ServerEvent, ServerOptions, ServerSession, Standing, Task, Waiting};
 
@@ -257,6 +257,63 @@ fn good_byes_are_told_from_deaths() {
     for k in [0, 2] {
         assert_eq!(stage.facets[k].session.as_ref().unwrap().task(), Task::Over(Over::Ended));
     }
+}
+
+/// The link of facet 1 closes, as both ends report it.
+fn close_link(stage: &mut Stage, why: Closed) {
+    let now = stage.now;
+    stage.server.as_mut().unwrap().on_event(now, 1, LinkEvent::Closed(why), &[]);
+    stage.facets[1].session.as_mut().unwrap().on_event(now, LinkEvent::Closed(why), Vec::new().into());
+    stage.net.part(1, true); // what was under way is gone
+    stage.run(50 * MS);
+    stage.net.part(1, false);
+}
+
+/// Joined and without a frame, before the first one and in mid-run: the number that the server knows is used up.
+#[test]
+fn a_facet_that_loses_its_connection_before_its_first_frame_is_let_in_again() {
+    let standing = |s: &Stage| s.server.as_ref().unwrap().standing(1);
+    let in_step = |s: &Stage| s.server.as_ref().unwrap().standing(1) == Standing::InStep;
+    for seed in [140, 141] {
+        let mut stage = Stage::new(seed, if seed == 140 { Weather::CLEAR } else { STORM }, 2, Pace::Lockstep);
+        stage.net.part(0, true);
+        assert!(stage.until(500 * MS, |s| standing(s) == Standing::Following));
+        assert_eq!(task(&stage), Some(Task::Wait(Waiting::Server)));
+        close_link(&mut stage, Closed::Silent);
+        stage.run(100 * MS);
+        stage.net.part(0, false);
+        assert!(stage.until(1000 * MS, in_step), "before the first frame, seed {seed}");
+        stage.run(100 * MS);
+
+        close_link(&mut stage, Closed::Silent);
+        assert!(stage.until(500 * MS, |s| standing(s) == Standing::Following));
+        close_link(&mut stage, Closed::ByPeer);
+        assert!(stage.until(1000 * MS, in_step), "in mid-run, seed {seed}");
+        stage.assert_true();
+    }
+}
+
+/// A server that drops a joining facet, whose link does not close, tells it to join anew.
+#[test]
+fn a_number_that_is_used_up_is_answered() {
+    let mut stage = Stage::new(142, Weather::CLEAR, 2, Pace::Lockstep);
+    stage.net.part(0, true);
+    let standing = |s: &Stage| s.server.as_ref().unwrap().standing(1);
+    assert!(stage.until(500 * MS, |s| standing(s) == Standing::Following));
+    let now = stage.now;
+    stage.server.as_mut().unwrap().lose(now, 1);
+    assert!(stage.until(500 * MS, |s| standing(s) == Standing::Following));
+}
+
+/// A run that ends before its first frame ends for those who have joined, too.
+#[test]
+fn the_end_is_understood_before_the_first_frame() {
+    let mut stage = Stage::new(143, Weather::CLEAR, 2, Pace::Lockstep);
+    stage.net.part(0, true);
+    assert!(stage.until(500 * MS, |s| s.server.as_ref().unwrap().standing(1) == Standing::Following));
+    stage.server.as_mut().unwrap().end();
+    stage.run(50 * MS);
+    assert_eq!(task(&stage), Some(Task::Over(Over::Ended)));
 }
 
 /// A frame that does not fit is refused, asked for again, and shown when it comes right.
