@@ -316,6 +316,72 @@ fn the_end_is_understood_before_the_first_frame() {
     assert_eq!(task(&stage), Some(Task::Over(Over::Ended)));
 }
 
+/// Two processes of one facet, and a link that gives the connection to who came last, as shared memory and UDP do: the loser comes back at once. What each
+/// is told to do next, and how often somebody joined.
+fn rivals(now: &mut Duration, server: &mut ServerSession, facets: &mut [Option<FacetSession>], time: Duration, has: &mut usize) {
+    let end = *now + time;
+    while *now < end {
+        *now += MS;
+        for k in 0..facets.len() {
+            let Some(facet) = facets[k].as_mut().filter(|f| !matches!(f.task(), Task::Over(_))) else { continue };
+            if k != *has {
+                // who has lost the connection looks again within 20 ms, as who is new
+                if !now.as_millis().is_multiple_of(20) {
+                    continue;
+                }
+                server.on_event(*now, 0, LinkEvent::Closed(Closed::Replaced), &[]);
+                facet.on_event(*now, LinkEvent::Closed(Closed::ByPeer), Vec::new().into());
+                facet.outgoing();
+                facet.on_event(*now, LinkEvent::Opened, Vec::new().into());
+                *has = k;
+            }
+            facet.advance(*now);
+            facet.outgoing().iter().for_each(|(_, bytes)| server.on_event(*now, 0, LinkEvent::Message, bytes));
+            for out in server.outgoing() {
+                facet.on_event(*now, LinkEvent::Message, out.message.to_vec().into());
+            }
+            if facet.task() == Task::Draw && facet.begin().is_some() {
+                facet.drawn(*now, [0; 16]);
+            }
+            if let Task::Present(_) = facet.task() {
+                facet.presented(*now);
+            }
+        }
+        if server.idle() && server.complete() && now.as_millis().is_multiple_of(16) {
+            server.publish(*now, &scene(), &viewer(0)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn of_two_processes_of_one_facet_the_first_that_answers_stays() {
+    let process = |seed: u64| Some(FacetSession::new(FacetOptions::new("facet 0", SCENE, seed << 16), scene()));
+    let refused = |facet: &Option<FacetSession>| matches!(facet.as_ref().unwrap().task(), Task::Over(Over::Refused(why)) if why.contains("another process shows facet 'facet 0'"));
+    let over = |facet: &Option<FacetSession>| matches!(facet.as_ref().unwrap().task(), Task::Over(_));
+    let mut server = ServerSession::new(Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options, &scene());
+    let (mut now, mut has, mut facets) = (MS, 0, vec![process(1)]);
+    rivals(&mut now, &mut server, &mut facets, 100 * MS, &mut has);
+    facets.extend([process(2), process(3)]);
+    rivals(&mut now, &mut server, &mut facets, 400 * MS, &mut has);
+    assert_eq!([over(&facets[0]), refused(&facets[1]), refused(&facets[2])], [false, true, true]);
+    assert_eq!(server.standing(0), Standing::InStep);
+    let joined = server.counts(0).0.joined;
+    assert!(joined <= 6, "{joined}");
+    rivals(&mut now, &mut server, &mut facets, 1000 * MS, &mut has);
+    assert_eq!(server.counts(0).0.joined, joined, "there is peace");
+
+    // Killed and started again: at once. The one that was stopped meanwhile, and goes on, has lost its place for good.
+    let stopped = facets[0].take();
+    facets.push(process(4));
+    rivals(&mut now, &mut server, &mut facets, 100 * MS, &mut has);
+    assert_eq!(server.standing(0), Standing::InStep);
+    rivals(&mut now, &mut server, &mut facets, 2500 * MS, &mut has);
+    facets[0] = stopped;
+    rivals(&mut now, &mut server, &mut facets, 400 * MS, &mut has);
+    assert_eq!([refused(&facets[0]), over(&facets[3])], [true, false]);
+    assert_eq!(server.standing(0), Standing::InStep);
+}
+
 /// A frame that does not fit is refused, asked for again, and shown when it comes right.
 #[test]
 fn a_frame_that_does_not_fit_is_asked_for_again() {
