@@ -8,7 +8,7 @@ use super::lock::{Lock, Run};
 use super::replay::Tape;
 use super::signals::Signals;
 use super::stage::Setting;
-use super::summary::{Meter, Status, Summary, refused};
+use super::summary::{Meter, Status, Summary, from_strangers, refused};
 use super::users::Users;
 use super::viewers::Viewers;
 use crate::failure::Failure;
@@ -345,7 +345,7 @@ impl<'a> Host<'a> {
                 tracker: self.devices.tracker_counts(),
                 heads_refused: self.users.heads_refused,
                 strangers: refused(&self.server.strangers()),
-                facets: self.meter.facets(&self.server, &self.seats),
+                facets: self.meter.facets(&self.server, &self.seats, self.frames),
             };
             if !self.options.quiet {
                 print!("{}", summary.lines());
@@ -354,6 +354,10 @@ impl<'a> Host<'a> {
                 let text = serde_json::to_string_pretty(&summary).map_err(|e| Failure::run("the summary", e))? + "\n";
                 std::fs::write(path, text).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))?;
             }
+        }
+        if self.frames == 0 {
+            // why nobody came
+            eprint!("{}", from_strangers(&refused(&self.server.strangers())));
         }
         told.and(recorded).map(|path| {
             if let (Some(path), false) = (path, self.options.quiet) {

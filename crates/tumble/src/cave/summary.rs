@@ -79,6 +79,8 @@ pub struct FacetSummary {
     pub name: String,
     #[serde(flatten)]
     pub counts: SeatCounts,
+    /// Frames of the run that it did not show: while it was not there, was behind, or in `latest` had a newer one.
+    pub not_shown: u64,
     pub draw: Figures,
     pub bytes_out: u64,
     pub bytes_in: u64,
@@ -112,12 +114,12 @@ impl Meter {
         }
     }
 
-    /// All facets, as they stand.
-    pub fn facets(&self, server: &Server<ServerEnd>, seats: &[Seat]) -> Vec<FacetSummary> {
+    /// All facets, as they stand after so many frames.
+    pub fn facets(&self, server: &Server<ServerEnd>, seats: &[Seat], frames: u64) -> Vec<FacetSummary> {
         let one = |(k, seat): (usize, &Seat)| {
             let (counts, _, link) = server.counts(k as FacetNumber);
             FacetSummary {
-                name: seat.name.clone(), counts,
+                name: seat.name.clone(), not_shown: frames.saturating_sub(counts.presented), counts,
                 draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets: refused(&link),
             }
         };
@@ -156,17 +158,23 @@ impl Summary {
         if self.heads_refused > 0 {
             text += &format!("{} heads not followed: an eye would be behind a screen\n", self.heads_refused);
         }
-        for FacetSummary { name, counts: c, refused_packets, .. } in &self.facets {
+        for FacetSummary { name, counts: c, not_shown, refused_packets, .. } in &self.facets {
             text += &format!(
-                "facet {name}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                "facet {name}: {} shown, {not_shown} not shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
                 c.presented, c.late, c.missing, c.duplicate, c.stale, c.torn, c.mismatched, c.dropped, reasons("; packets refused", refused_packets)
             );
         }
         if !self.strangers.is_empty() {
-            text += &format!("from who is no facet{}\n", reasons(": packets refused", &self.strangers));
+            text += &from_strangers(&self.strangers);
         }
         text
     }
+}
+
+/// A line of what was refused from who is no facet; nothing for nothing.
+pub fn from_strangers(refused: &Refusals) -> String {
+    let key = if refused.contains_key(Refused::Forged.name()) { " (forged: who has another key file, or none, looks like this)" } else { "" };
+    if refused.is_empty() { String::new() } else { format!("from who is no facet{}{key}\n", reasons(": packets refused", refused)) }
 }
 
 /// `; packets refused: 3 forged, 1 replayed`; nothing for nothing.

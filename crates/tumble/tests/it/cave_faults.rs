@@ -77,3 +77,52 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
     place.succeed("cave", &["--no-pictures", "--seconds", "0.1", "--quiet"]);
     place.assert_clean();
 }
+
+/// A second process is refused; one that is started in place of a killed one is let in.
+#[test]
+fn a_facet_is_shown_by_one_process() {
+    let place = Place::new("cave-rivals", &wall());
+    let server = place.start("serve", &["--summary", &place.path("summary.json")]);
+    let [l, r] = ["l", "r"].map(|name| place.start("facet", &["--facet", name, "--no-pictures", "--log-dir", &place.path("out"), "--wait", "60"]));
+    place.wait_for("out", "r", 5);
+    let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("second"), "--wait", "60"]).end();
+    assert!(code == Some(2) && wrong.contains("another process shows facet 'l' and answers"), "{code:?}: {wrong}");
+    let at = *numbers(&place.log("out", "r")).last().unwrap();
+    place.wait_for("out", "l", at);
+    signal(l.pid(), Signal::KILL);
+    let again = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("third"), "--wait", "60"]);
+    place.wait_for("third", "l", at + 5);
+    signal(server.pid(), Signal::TERM);
+    let (code, said, wrong) = server.end();
+    assert_eq!(code, Some(0), "{wrong}");
+    for facet in [again, r] {
+        let (code, _, wrong) = facet.end();
+        assert_eq!(code, Some(0), "{wrong}");
+    }
+    let summary = json(&place.folder.path("summary.json"));
+    let (facet, frames) = (&summary["facets"][0], summary["frames"].as_u64().unwrap());
+    assert!(facet["joined"].as_u64() <= Some(5), "{facet}");
+    assert_eq!(facet["not_shown"].as_u64().unwrap() + facet["presented"].as_u64().unwrap(), frames, "{said}");
+}
+
+/// Both sides say what a wrong key looks like, though no frame was ever shown.
+#[test]
+fn a_wrong_key_is_named() {
+    use std::os::unix::fs::PermissionsExt;
+    let key = |place: &Place, digit: &str| {
+        let path = place.folder.write("cave.key", digit.repeat(64));
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600)).unwrap();
+    };
+    let place = Place::new("cave-key", &(wall() + "transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n"));
+    key(&place, "1");
+    let server = place.start("serve", &["--wait", "60", "--listen", "127.0.0.1:0"]);
+    let lock = || std::fs::read_dir(place.folder.path("run")).is_ok_and(|mut files| files.any(|_| true));
+    wait("the run", lock);
+    std::thread::sleep(std::time::Duration::from_millis(300)); // the key is read before the lock is taken, the address is written after
+    key(&place, "2");
+    let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--wait", "1"]).end();
+    assert!(code == Some(1) && wrong.contains("no server answers") && wrong.contains("another key file"), "{wrong}");
+    signal(server.pid(), Signal::TERM);
+    let (code, _, wrong) = server.end();
+    assert!(code == Some(0) && wrong.contains("forged") && wrong.contains("another key file"), "{wrong}");
+}
