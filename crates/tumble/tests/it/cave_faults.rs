@@ -116,13 +116,18 @@ fn a_wrong_key_is_named() {
     let place = Place::new("cave-key", &(wall() + "transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n"));
     key(&place, "1");
     let server = place.start("serve", &["--wait", "60", "--listen", "127.0.0.1:0"]);
-    let lock = || std::fs::read_dir(place.folder.path("run")).is_ok_and(|mut files| files.any(|_| true));
-    wait("the run", lock);
-    std::thread::sleep(std::time::Duration::from_millis(300)); // the key is read before the lock is taken, the address is written after
+    // the key is read before the lock is taken, and the lock names the address last
+    wait("the address", || lines(place.folder.path("run")).contains("127.0.0.1"));
     key(&place, "2");
     let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--wait", "1"]).end();
     assert!(code == Some(1) && wrong.contains("no server answers") && wrong.contains("another key file"), "{wrong}");
     signal(server.pid(), Signal::TERM);
     let (code, _, wrong) = server.end();
     assert!(code == Some(0) && wrong.contains("forged") && wrong.contains("another key file"), "{wrong}");
+}
+
+/// The text of all small files of a folder and of those in it.
+fn lines(folder: std::path::PathBuf) -> String {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.map(|e| if e.path().is_dir() { lines(e.path()) } else { std::fs::read_to_string(e.path()).unwrap_or_default() }).collect()
 }
