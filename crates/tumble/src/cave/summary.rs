@@ -30,6 +30,8 @@ pub struct Meter {
     /// By seat: from the arrival of a frame at the facet to the end of drawing it.
     draw: Vec<Spread>,
     last: Vec<(u64, f64)>,
+    /// By seat: the frame shown last, and how many different ones were: who joins again shows the last one again.
+    shown: Vec<(Option<u64>, u64)>,
 }
 
 /// Packets that a link refused, by reason.
@@ -92,7 +94,7 @@ pub struct FacetSummary {
 impl Meter {
     /// For so many seats.
     pub fn new(seats: usize) -> Meter {
-        Meter { draw: (0..seats).map(|_| Spread::default()).collect(), last: vec![(0, 0.0); seats], ..Meter::default() }
+        Meter { draw: (0..seats).map(|_| Spread::default()).collect(), last: vec![(0, 0.0); seats], shown: vec![(None, 0); seats], ..Meter::default() }
     }
 
     /// What facets answered.
@@ -112,6 +114,9 @@ impl Meter {
         if let Some(last) = self.last.get_mut(k) {
             last.0 = *frame;
         }
+        if let (ServerEvent::Presented(..), Some((last, different))) = (event, self.shown.get_mut(k)) {
+            *different += u64::from(last.replace(*frame) != Some(*frame));
+        }
     }
 
     /// All facets, as they stand after so many frames.
@@ -119,7 +124,7 @@ impl Meter {
         let one = |(k, seat): (usize, &Seat)| {
             let (counts, _, link) = server.counts(k as FacetNumber);
             FacetSummary {
-                name: seat.name.clone(), not_shown: frames.saturating_sub(counts.presented), counts,
+                name: seat.name.clone(), not_shown: frames.saturating_sub(self.shown[k].1), counts,
                 draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets: refused(&link),
             }
         };

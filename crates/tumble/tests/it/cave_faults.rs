@@ -101,8 +101,12 @@ fn a_facet_is_shown_by_one_process() {
     }
     let summary = json(&place.folder.path("summary.json"));
     let (facet, frames) = (&summary["facets"][0], summary["frames"].as_u64().unwrap());
-    assert!(facet["joined"].as_u64() <= Some(5), "{facet}");
-    assert_eq!(facet["not_shown"].as_u64().unwrap() + facet["presented"].as_u64().unwrap(), frames, "{said}");
+    // five if nobody took the other's connection before it could speak; without end if nobody was refused
+    assert!((3..20).contains(&facet["joined"].as_u64().unwrap()), "{facet}");
+    let logged: std::collections::BTreeSet<u64> = ["out", "second", "third"].iter().flat_map(|folder| numbers(&place.log(folder, "l"))).collect();
+    let shown = frames - facet["not_shown"].as_u64().unwrap();
+    assert!(shown >= logged.len() as u64 && shown <= facet["presented"].as_u64().unwrap() && said.contains("not shown"), "{shown}, {logged:?}: {said}");
+    assert_eq!((&summary["facets"][1]["not_shown"], summary["facets"][1]["presented"].as_u64()), (&0.into(), Some(frames)));
 }
 
 /// Both sides say what a wrong key looks like, though no frame was ever shown.
