@@ -39,8 +39,9 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
         (false, true) => painter = Some(Painter::new(&setting, described.as_ref(), draw.quality)?),
         (false, false) => parts = Some(Parts::new(&setting, described.as_ref(), draw.quality)?),
     }
-    let watch = Watch { name: name.clone(), signals, leader, patience: Duration::from_secs_f64(options.wait) };
+    let mut watch = Watch { name: name.clone(), signals, leader, patience: Duration::from_secs_f64(options.wait), sealed: false };
     let address = address(options, &setting, &watch)?;
+    watch.sealed = matches!(address, Address::Udp(_));
     let again = options.server.is_none() && options.run.is_none();
     let link = FacetEnd::open(&address, number, &setting, again)?;
     let told = told(&setting, &name)?;
@@ -114,6 +115,8 @@ struct Watch {
     signals: Signals,
     leader: Option<Arc<AtomicBool>>,
     patience: Duration,
+    /// The server answers nobody who has another key file.
+    sealed: bool,
 }
 
 impl Watch {
@@ -166,7 +169,8 @@ impl Alone {
         self.since = Some((why, since));
         if since.elapsed() > watch.patience {
             let what = if why == Waiting::Lost { "the server is lost and did not come back" } else { "no server answers" };
-            return Err(Failure::run(&watch.title(), format!("{what}, {:.0} s long", watch.patience.as_secs_f64())));
+            let key = if watch.sealed { "; a server that has another key file looks like this, too: compare them" } else { "" };
+            return Err(Failure::run(&watch.title(), format!("{what}, {:.0} s long{key}", watch.patience.as_secs_f64())));
         }
         if !self.said && (why == Waiting::Lost || since.elapsed() > MOMENT) {
             watch.say(if why == Waiting::Lost { "has lost its server, keeps the last picture and looks for it" } else { "waits for the server" });

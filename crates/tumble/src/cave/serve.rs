@@ -9,7 +9,7 @@ use super::outputs::{self, Recording};
 use super::replay::Tape;
 use super::signals::Signals;
 use super::stage::Setting;
-use super::summary::{Meter, Status, Summary, refused};
+use super::summary::{Meter, Status, Summary, from_strangers, refused};
 use super::users::Users;
 use super::viewers::Viewers;
 use crate::failure::Failure;
@@ -371,7 +371,7 @@ impl<'a> Host<'a> {
                 tracker: self.devices.tracker_counts(),
                 heads_refused: self.users.heads_refused,
                 strangers: refused(&self.server.strangers()),
-                facets: self.meter.facets(&self.server, &self.seats),
+                facets: self.meter.facets(&self.server, &self.seats, self.frames),
             };
             if !self.options.quiet {
                 outputs::say(&summary.lines())?;
@@ -380,6 +380,10 @@ impl<'a> Host<'a> {
                 let text = serde_json::to_string_pretty(&summary).map_err(|e| Failure::run("the summary", e))? + "\n";
                 std::fs::write(path, text).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))?;
             }
+        }
+        if self.frames == 0 {
+            // why nobody came
+            eprint!("{}", from_strangers(&refused(&self.server.strangers())));
         }
         Ok(())
     }

@@ -30,6 +30,8 @@ pub struct Meter {
     /// By seat: from the arrival of a frame at the facet to the end of drawing it.
     draw: Vec<Spread>,
     last: Vec<(u64, f64)>,
+    /// By seat: the frame shown last, and how many different ones were: who joins again shows the last one again.
+    shown: Vec<(Option<u64>, u64)>,
 }
 
 /// Packets that a link refused, by reason.
@@ -79,6 +81,8 @@ pub struct FacetSummary {
     pub name: String,
     #[serde(flatten)]
     pub counts: SeatCounts,
+    /// Frames of the run that it did not show: while it was not there, was behind, or in `latest` had a newer one.
+    pub not_shown: u64,
     pub draw: Figures,
     pub bytes_out: u64,
     pub bytes_in: u64,
@@ -90,7 +94,7 @@ pub struct FacetSummary {
 impl Meter {
     /// For so many seats.
     pub fn new(seats: usize) -> Meter {
-        Meter { draw: (0..seats).map(|_| Spread::default()).collect(), last: vec![(0, 0.0); seats], ..Meter::default() }
+        Meter { draw: (0..seats).map(|_| Spread::default()).collect(), last: vec![(0, 0.0); seats], shown: vec![(None, 0); seats], ..Meter::default() }
     }
 
     /// What facets answered.
@@ -110,14 +114,17 @@ impl Meter {
         if let Some(last) = self.last.get_mut(k) {
             last.0 = *frame;
         }
+        if let (ServerEvent::Presented(..), Some((last, different))) = (event, self.shown.get_mut(k)) {
+            *different += u64::from(last.replace(*frame) != Some(*frame));
+        }
     }
 
-    /// All facets, as they stand.
-    pub fn facets(&self, server: &Server<ServerEnd>, seats: &[Seat]) -> Vec<FacetSummary> {
+    /// All facets, as they stand after so many frames.
+    pub fn facets(&self, server: &Server<ServerEnd>, seats: &[Seat], frames: u64) -> Vec<FacetSummary> {
         let one = |(k, seat): (usize, &Seat)| {
             let (counts, _, link) = server.counts(k as FacetNumber);
             FacetSummary {
-                name: seat.name.clone(), counts,
+                name: seat.name.clone(), not_shown: frames.saturating_sub(self.shown[k].1), counts,
                 draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets: refused(&link),
             }
         };
@@ -156,17 +163,23 @@ impl Summary {
         if self.heads_refused > 0 {
             text += &format!("{} heads not followed: an eye would be behind a screen\n", self.heads_refused);
         }
-        for FacetSummary { name, counts: c, refused_packets, .. } in &self.facets {
+        for FacetSummary { name, counts: c, not_shown, refused_packets, .. } in &self.facets {
             text += &format!(
-                "facet {name}: {} shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                "facet {name}: {} shown, {not_shown} not shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
                 c.presented, c.late, c.missing, c.duplicate, c.stale, c.torn, c.mismatched, c.dropped, reasons("; packets refused", refused_packets)
             );
         }
         if !self.strangers.is_empty() {
-            text += &format!("from who is no facet{}\n", reasons(": packets refused", &self.strangers));
+            text += &from_strangers(&self.strangers);
         }
         text
     }
+}
+
+/// A line of what was refused from who is no facet; nothing for nothing.
+pub fn from_strangers(refused: &Refusals) -> String {
+    let key = if refused.contains_key(Refused::Forged.name()) { " (forged: who has another key file, or none, looks like this)" } else { "" };
+    if refused.is_empty() { String::new() } else { format!("from who is no facet{}{key}\n", reasons(": packets refused", refused)) }
 }
 
 /// `; packets refused: 3 forged, 1 replayed`; nothing for nothing.

@@ -80,6 +80,7 @@ fn datagrams_carry_the_same_states_as_shared_memory() {
         let summary = place.succeed("cave", &["--seconds", "0.4", "--fast", "--no-pictures", "--log-dir", &place.path(folder), "--transport", transport]);
         assert_eq!(summary["frames"], 41);
         assert_eq!(summary["transport"].as_str().unwrap().replace(' ', "_"), transport);
+        assert_eq!(summary["strangers"], serde_json::json!({}), "late packets of facets that left are no strangers'");
         place.assert_clean();
     }
     for facet in ["front", "left", "right", "floor"] {

@@ -4,6 +4,7 @@
 //!  joining ──SNAPSHOT, STATE──► live: draw ──► READY ──PRESENT──► show ──► PRESENTED, and again
 //!     ▲                          │
 //!     └── silent for drop_after, REJOIN, link closed          REFUSED, END: over
+//!         (each time under a new number)
 //! ```
 //!
 //! A state of a later frame stands for the PRESENT of the one that is drawn: the server would not have sent it before.
@@ -24,6 +25,9 @@ use tumble_core::World;
 /// Inputs remembered until a picture shows them.
 const MAX_INPUTS: usize = 256;
 
+/// The half of a joining's number that tells the process.
+const PROCESS: u64 = !0 << 32;
+
 /// What a facet is told at the start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FacetOptions {
@@ -39,7 +43,7 @@ pub struct FacetOptions {
     pub drop_after: Duration,
     /// How often it asks to be let in.
     pub join_every: Duration,
-    /// Where the numbers of its joinings begin: another one at each start of the process.
+    /// Where the numbers of its joinings begin: another one at each start of the process. The upper half of all of them tells the process.
     pub seed: u64,
 }
 
@@ -110,6 +114,8 @@ pub struct FacetSession {
     lost: bool,
     run: u64,
     join: u64,
+    /// In the upper half of the numbers of its joinings.
+    process: u64,
     asked: Option<Duration>,
     heard: Duration,
     beaten: Duration,
@@ -142,7 +148,7 @@ impl FacetSession {
     /// `base`: the world as the scene file makes it.
     pub fn new(options: FacetOptions, base: World) -> FacetSession {
         let mut session = FacetSession {
-            options, mirror: Mirror::new(base), phase: Phase::Joining, lost: false, run: 0, join: 0, asked: None, heard: Duration::ZERO,
+            process: mixed(options.seed) & PROCESS, options, mirror: Mirror::new(base), phase: Phase::Joining, lost: false, run: 0, join: 0, asked: None, heard: Duration::ZERO,
             beaten: Duration::ZERO, resynced: None, listed: None, newest: None, pending: None, early: None, list: None, drawing: None, held: None, show: false,
             told: None, inputs: VecDeque::new(), shown: None, counts: FacetCounts::default(), out: Vec::new(), close: false,
         };
@@ -269,8 +275,11 @@ impl FacetSession {
         match event {
             LinkEvent::Opened => self.asked = None,
             LinkEvent::Message => self.on_message(now, message),
-            LinkEvent::Closed(_) if self.phase == Phase::Live => self.lose(),
-            LinkEvent::Closed(_) => {}
+            LinkEvent::Closed(_) => match self.phase {
+                Phase::Live => self.lose(),
+                Phase::Joining => self.join_anew(), // the server may have taken the old number, and takes none twice
+                Phase::Over(_) => {}
+            },
         }
         self.advance(now);
     }
@@ -307,7 +316,7 @@ impl FacetSession {
 
     fn join_anew(&mut self) {
         self.options.seed = self.options.seed.wrapping_add(1);
-        (self.phase, self.run, self.join, self.asked) = (Phase::Joining, 0, mixed(self.options.seed), None);
+        (self.phase, self.run, self.join, self.asked) = (Phase::Joining, 0, self.process | mixed(self.options.seed) & !PROCESS, None);
         (self.listed, self.newest, self.resynced) = (None, None, None);
         (self.pending, self.early, self.list, self.drawing, self.held, self.show, self.shown) = (None, None, None, None, None, false, None);
         (self.told, self.inputs) = (None, VecDeque::new());

@@ -42,7 +42,7 @@ impl FacetSession {
             }
             Kind::Refused if about_us => self.phase = Phase::Over(Over::Refused(Refusal::read(payload)?.0)),
             Kind::Rejoin if about_us && self.phase == Phase::Live => self.lose(),
-            Kind::Rejoin if about_us => {}
+            Kind::Rejoin if about_us => self.join_anew(),
             Kind::End if live || about_us => self.phase = Phase::Over(Over::Ended),
             Kind::State if self.phase == Phase::Joining => self.keep_early(now, header, message),
             Kind::State if live => return self.on_state(now, header, message),

@@ -5,7 +5,7 @@ use super::super::messages::{Done, FacetCounts, Join, Refusal, count};
 use super::super::transport::FacetNumber;
 use super::super::wire::{Fault, Hash, Header, Kind, VERSION, later, open};
 use super::times::Clock;
-use super::{MAX_RETIRED, Pace, ServerEvent, ServerSession, Stage, Standing, hex};
+use super::{MAX_RETIRED, Pace, ServerEvent, ServerSession, Stage, Standing, hex, process_of};
 use std::time::Duration;
 
 impl ServerSession {
@@ -60,7 +60,8 @@ impl ServerSession {
     pub(super) fn on_join(&mut self, now: Duration, facet: FacetNumber, join: u64, wanted: Join) {
         let place = &mut self.places[facet as usize];
         if place.retired.contains(&join) {
-            return count(&mut place.counts.stale);
+            count(&mut place.counts.stale);
+            return self.send_to(facet, Kind::Rejoin, join, 0, |_| {});
         }
         if place.standing != Standing::Absent && place.join == join {
             if self.frame.is_some() {
@@ -76,6 +77,11 @@ impl ServerSession {
             return self.send_to(facet, Kind::End, join, 0, |_| {});
         }
         if let Some(why) = self.objection(facet, &wanted) {
+            return self.deny(facet, join, why);
+        }
+        let (soon, place) = (self.options.drop_after, &mut self.places[facet as usize]);
+        if !place.rivals.admit(now, process_of(join), soon) {
+            let why = format!("another process shows facet '{}' and answers: end that one first, or show another facet", place.seat.name);
             return self.deny(facet, join, why);
         }
         if self.places[facet as usize].standing != Standing::Absent {

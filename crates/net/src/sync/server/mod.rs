@@ -14,6 +14,7 @@
 
 mod answers;
 mod frames;
+mod rivals;
 mod sending;
 mod times;
 
@@ -23,10 +24,12 @@ use super::input::Input;
 use super::messages::{Done, FacetCounts};
 use super::publisher::Publisher;
 use super::transport::{Closed, Delivery, FacetNumber, LinkEvent, MAX_FACETS};
-use super::wire::{Hash, Kind, message};
+use super::wire::{Hash, Kind};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
+pub(crate) use rivals::process_of;
+use rivals::Rivals;
 use times::{Asked, Clock, Times};
 use tumble_core::World;
 
@@ -165,6 +168,7 @@ struct Place {
     standing: Standing,
     join: u64,
     retired: VecDeque<u64>,
+    rivals: Rivals,
     exact: bool,
     heard: Duration,
     sent: Duration,
@@ -221,7 +225,7 @@ impl ServerSession {
         options.seats.truncate(MAX_FACETS);
         options.history = options.history.clamp(1, 1024);
         let place = |seat: &Seat| Place {
-            seat: seat.clone(), standing: Standing::Absent, join: 0, retired: VecDeque::new(), exact: false, heard: Duration::ZERO, sent: Duration::ZERO,
+            seat: seat.clone(), standing: Standing::Absent, join: 0, retired: VecDeque::new(), rivals: Rivals::default(), exact: false, heard: Duration::ZERO, sent: Duration::ZERO,
             synced: false, ready: None, presented: None, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(), clock: Clock::default(), asked_state: None, asked_present: None,
         };
         let places = options.seats.iter().map(place).collect();
@@ -280,14 +284,16 @@ impl ServerSession {
 
     /// Tells all facets that the run is over.
     pub fn end(&mut self) {
-        let to = self.there().map(|(k, _)| k).collect();
-        let end = message(&self.head(Kind::End, 0, self.frame.unwrap_or(0)), |_| {});
-        self.send(to, Delivery::Reliable, Arc::new(end));
+        // by the number of its joining: who has no frame yet knows no number of the run
+        let to: Vec<(FacetNumber, u64)> = self.there().map(|(k, place)| (k, place.join)).collect();
+        let frame = self.frame.unwrap_or(0);
+        to.into_iter().for_each(|(facet, join)| self.send_to(facet, Kind::End, join, frame, |_| {}));
         (self.ended, self.stage) = (true, Stage::Idle);
     }
 
     /// Takes what a link reports; `bytes` is the message, if it is one.
     pub fn on_event(&mut self, now: Duration, facet: FacetNumber, event: LinkEvent, bytes: &[u8]) {
+        self.places.get_mut(facet as usize).into_iter().for_each(|place| place.rivals.link(event));
         match event {
             LinkEvent::Opened => {}
             LinkEvent::Message => self.on_message(now, facet, bytes),

@@ -143,7 +143,7 @@ impl Order {
         if self.asked.is_some_and(|(until, at)| self.next < until && now < at + PATIENCE) {
             return None;
         }
-        let until = known.min(self.next + AT_ONCE);
+        let until = known.min(self.next.saturating_add(AT_ONCE));
         self.asked = Some((until, now));
         Some((self.next, until))
     }
@@ -168,7 +168,7 @@ impl Order {
         data: Message,
         deliver: &mut impl FnMut(Delivery, Message),
     ) -> Result<(), Overrun> {
-        self.next += 1;
+        self.next = self.next.saturating_add(1); // the other side draws the numbers, and may lie
         if !mine {
             return Ok(());
         }
@@ -225,6 +225,18 @@ mod tests {
         let whole = memory.next() as usize / 3 + usize::from(memory.next() % 3 == 2);
         assert_eq!(order.next(), memory.next());
         assert!(got.len() > 300 && got == want[..whole]);
+    }
+
+    #[test]
+    fn numbers_at_the_end_of_u64_are_taken() {
+        let head = |number| Head { number, ..Head::new(Kind::Piece, 1) };
+        let (mut order, mut got) = (Order::new(u64::MAX - 2), 0);
+        order.take(&head(u64::MAX), true, vec![1].into(), |_, _| got += 1).unwrap();
+        assert_eq!(order.ask(Duration::ZERO), Some((u64::MAX - 2, u64::MAX)));
+        for number in [u64::MAX - 2, u64::MAX - 1, u64::MAX] {
+            order.take(&head(number), true, vec![1].into(), |_, _| got += 1).unwrap();
+        }
+        assert!(got >= 3 && order.next() == u64::MAX);
     }
 
     #[test]

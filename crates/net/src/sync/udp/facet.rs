@@ -26,11 +26,29 @@ pub struct FacetSettings {
 
 /// How far the connection is.
 enum Stage {
-    /// Asks for a challenge, or answers one that came; anew at the given time.
-    Looking { hello: Hello, answering: bool, next: Duration, give_up: Duration },
+    /// Asks for a challenge, or answers one that came.
+    Looking(Question),
     /// Has keys.
     Connected(Box<Session>),
 }
+
+/// Asks for a challenge, or answers one that came; anew at the given time.
+struct Question {
+    hello: Hello,
+    answering: bool,
+    next: Duration,
+    give_up: Duration,
+}
+
+/// What is done beside a session of which nothing was heard for some time.
+struct Doubt {
+    question: Question,
+    /// The session that would take its place, when the server has said something under its seal.
+    other: Option<Box<Session>>,
+}
+
+/// A session is doubted when nothing was heard for so many pings.
+const DOUBT_PINGS: u32 = 2;
 
 /// A facet's side: datagrams and time in, datagrams and events out.
 pub struct FacetMachine {
@@ -39,6 +57,7 @@ pub struct FacetMachine {
     handshake: Handshake,
     entropy: Entropy,
     stage: Stage,
+    doubt: Option<Doubt>,
     events: VecDeque<(LinkEvent, Vec<u8>)>,
     counters: LinkCounters,
 }
@@ -46,17 +65,17 @@ pub struct FacetMachine {
 impl FacetMachine {
     /// A facet that begins to look for its server.
     pub fn new(now: Duration, settings: FacetSettings, shared: SharedKey, entropy: Entropy) -> FacetMachine {
-        let mut machine = FacetMachine {
+        let mut entropy = entropy;
+        FacetMachine {
             settings,
             handshake: Handshake::new(&shared),
             shared,
+            stage: Stage::Looking(Question::new(now, &settings, &mut entropy, 0)),
+            doubt: None,
             entropy,
-            stage: Stage::Looking { hello: Hello { nonce: [0; 32], facet: 0, cookie: [0; 32] }, answering: false, next: now, give_up: now },
             events: VecDeque::new(),
             counters: LinkCounters::default(),
-        };
-        machine.look(now);
-        machine
+        }
     }
 
     /// Takes a datagram.
@@ -69,20 +88,12 @@ impl FacetMachine {
 
     /// Sends what is due by `emit`, and finds what is over.
     pub fn transmit(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
-        let server = self.settings.server;
         match &mut self.stage {
-            Stage::Looking { give_up, .. } if now >= *give_up => {
-                self.look(now);
-                self.transmit(now, emit);
-            }
-            Stage::Looking { hello, answering, next, .. } => {
-                if now >= *next {
-                    *next = now + self.settings.timing.ask;
-                    let mut datagram = Vec::new();
-                    hello.write(if *answering { Kind::Answer } else { Kind::Hello }, &self.handshake, &mut datagram);
-                    self.counters.bytes_out += datagram.len() as u64;
-                    emit(server, &datagram);
+            Stage::Looking(question) => {
+                if now >= question.give_up {
+                    *question = Question::new(now, &self.settings, &mut self.entropy, 0);
                 }
+                question.transmit(now, &self.settings, &self.handshake, &mut self.counters, emit);
             }
             Stage::Connected(session) => {
                 session.transmit(now, &mut self.counters, emit);
@@ -92,16 +103,39 @@ impl FacetMachine {
                     self.end(now, Closed::Silent);
                 } else if session.is_exhausted() {
                     self.end(now, Closed::ByUs);
+                } else {
+                    self.doubt(now, emit);
                 }
             }
         }
     }
 
+    /// Asks whether the server still knows the session, where nothing was heard for some time.
+    fn doubt(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+        let Stage::Connected(session) = &self.stage else { return };
+        let number = session.agreed.session;
+        if now < doubted_from(session, &self.settings) || self.doubt.as_ref().is_some_and(|doubt| now >= doubt.question.give_up) {
+            self.doubt = None;
+        }
+        if now < doubted_from(session, &self.settings) {
+            return;
+        }
+        let fresh = || Doubt { question: Question::new(now, &self.settings, &mut self.entropy, number), other: None };
+        let Doubt { question, other } = self.doubt.get_or_insert_with(fresh);
+        match other {
+            Some(other) => other.transmit(now, &mut self.counters, emit),
+            None => question.transmit(now, &self.settings, &self.handshake, &mut self.counters, emit),
+        }
+    }
+
     /// When [`transmit`](Self::transmit) has something to do, if nothing arrives before.
     pub fn wake(&self) -> Duration {
-        match &self.stage {
-            Stage::Looking { next, .. } => *next,
-            Stage::Connected(session) => session.wake(),
+        match (&self.stage, &self.doubt) {
+            (Stage::Looking(question), _) => question.next.min(question.give_up),
+            (Stage::Connected(session), None) => session.wake().min(doubted_from(session, &self.settings)),
+            (Stage::Connected(session), Some(Doubt { question, other })) => {
+                session.wake().min(question.give_up).min(other.as_ref().map_or(question.next, |other| other.wake()))
+            }
         }
     }
 
@@ -128,7 +162,7 @@ impl FacetMachine {
     pub fn poll(&mut self) -> Option<(LinkEvent, Vec<u8>)> {
         let event = self.events.pop_front().or_else(|| match &mut self.stage {
             Stage::Connected(session) => session.pop().map(|(_, message)| (LinkEvent::Message, message)),
-            Stage::Looking { .. } => None,
+            Stage::Looking(_) => None,
         });
         self.counters.messages_in += u64::from(matches!(event, Some((LinkEvent::Message, _))));
         event
@@ -155,56 +189,64 @@ impl FacetMachine {
         match header.kind {
             Kind::Challenge => self.take_challenge(now, datagram),
             Kind::Welcome => self.take_welcome(now, &header, datagram),
-            Kind::Unknown => self.take_unknown(now, &header, datagram),
-            Kind::Data => match &mut self.stage {
-                Stage::Connected(session) if session.agreed.session == header.session => {
-                    session.receive(now, &header, datagram, &mut self.counters)
-                }
-                _ => Err(Refused::Stale),
-            },
+            Kind::Data => self.take_data(now, &header, datagram),
             Kind::Hello | Kind::Answer => Err(Refused::Foreign),
         }
     }
 
     fn take_challenge(&mut self, now: Duration, datagram: &[u8]) -> Result<(), Refused> {
         let reply = Reply::read(datagram, &self.handshake)?;
-        match &mut self.stage {
-            Stage::Looking { hello, answering, next, .. } if hello.nonce == reply.nonce => {
-                if std::mem::replace(answering, true) {
-                    return Err(Refused::Replayed);
-                }
-                hello.cookie = reply.value;
-                *next = now;
-                Ok(())
-            }
-            _ => Err(Refused::Stale),
+        let question = self.question().filter(|question| question.hello.nonce == reply.nonce).ok_or(Refused::Stale)?;
+        if std::mem::replace(&mut question.answering, true) {
+            return Err(Refused::Replayed);
         }
+        question.hello.cookie = reply.value;
+        question.next = now;
+        Ok(())
+    }
+
+    /// What was asked and is not answered yet.
+    fn question(&mut self) -> Option<&mut Question> {
+        match (&mut self.stage, &mut self.doubt) {
+            (Stage::Looking(question), _) => Some(question),
+            (Stage::Connected(_), Some(Doubt { question, other: None })) => Some(question),
+            _ => None,
+        }
+    }
+
+    fn take_data(&mut self, now: Duration, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
+        let (Stage::Connected(session), counters) = (&mut self.stage, &mut self.counters) else { return Err(Refused::Stale) };
+        if session.agreed.session == header.session {
+            return session.receive(now, header, datagram, counters).inspect(|()| self.doubt = None);
+        }
+        let other = self.doubt.as_mut().and_then(|doubt| doubt.other.as_mut()).filter(|other| other.agreed.session == header.session);
+        other.ok_or(Refused::Stale)?.receive(now, header, datagram, counters)?;
+        // the server has the new keys, and said nothing by the old ones
+        if let Some(other) = self.doubt.take().and_then(|doubt| doubt.other) {
+            self.end(now, Closed::ByPeer);
+            self.connect(other);
+        }
+        Ok(())
+    }
+
+    fn connect(&mut self, session: Box<Session>) {
+        self.stage = Stage::Connected(session);
+        self.counters.opened += 1;
+        self.events.push_back((LinkEvent::Opened, Vec::new()));
     }
 
     fn take_welcome(&mut self, now: Duration, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
         let reply = Reply::read(datagram, &self.handshake)?;
-        let Stage::Looking { hello, answering: true, .. } = &self.stage else { return Err(Refused::Stale) };
-        if hello.nonce != reply.nonce {
-            return Err(Refused::Stale);
-        }
+        let question = self.question().filter(|question| question.answering && question.hello.nonce == reply.nonce).ok_or(Refused::Stale)?;
+        let facet_nonce = question.hello.nonce;
         let FacetSettings { facet, server, timing, numbering } = self.settings;
-        let agreed = Agreement { session: header.session, facet, facet_nonce: hello.nonce, server_nonce: reply.value };
+        let agreed = Agreement { session: header.session, facet, facet_nonce, server_nonce: reply.value };
         let mut session = Session::new(now, &self.shared, agreed, Side::Facet, server, timing, numbering);
         session.live = true;
         session.ping();
-        self.stage = Stage::Connected(Box::new(session));
-        self.counters.opened += 1;
-        self.events.push_back((LinkEvent::Opened, Vec::new()));
-        Ok(())
-    }
-
-    fn take_unknown(&mut self, now: Duration, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
-        if !self.handshake.open(datagram)?.is_empty() {
-            return Err(Refused::Oversize);
-        }
-        match &self.stage {
-            Stage::Connected(session) if session.agreed.session == header.session => self.end(now, Closed::ByPeer),
-            _ => return Err(Refused::Stale),
+        match &mut self.doubt {
+            Some(doubt) => doubt.other = Some(Box::new(session)),
+            None => self.connect(Box::new(session)),
         }
         Ok(())
     }
@@ -218,9 +260,33 @@ impl FacetMachine {
         self.look(now);
     }
 
-    /// Begins anew, with a fresh nonce. An answer that leads nowhere for a second is given up too: the server may have been started again meanwhile.
     fn look(&mut self, now: Duration) {
-        let hello = Hello { nonce: self.entropy.next_bytes(), facet: self.settings.facet, cookie: [0; 32] };
-        self.stage = Stage::Looking { hello, answering: false, next: now, give_up: now + 10 * self.settings.timing.ask };
+        self.doubt = None;
+        self.stage = Stage::Looking(Question::new(now, &self.settings, &mut self.entropy, 0));
     }
+}
+
+impl Question {
+    /// With a fresh nonce. An answer that leads nowhere for a second is given up: the server may have been started again meanwhile.
+    fn new(now: Duration, settings: &FacetSettings, entropy: &mut Entropy, doubted: u32) -> Question {
+        let hello = Hello { nonce: entropy.next_bytes(), facet: settings.facet, cookie: [0; 32], doubted };
+        Question { hello, answering: false, next: now, give_up: now + 10 * settings.timing.ask }
+    }
+
+    fn transmit(
+        &mut self, now: Duration, settings: &FacetSettings, handshake: &Handshake, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8]),
+    ) {
+        if now >= self.next {
+            self.next = now + settings.timing.ask;
+            let mut datagram = Vec::new();
+            self.hello.write(if self.answering { Kind::Answer } else { Kind::Hello }, handshake, &mut datagram);
+            counters.bytes_out += datagram.len() as u64;
+            emit(settings.server, &datagram);
+        }
+    }
+}
+
+/// When a session is doubted, if nothing comes before.
+fn doubted_from(session: &Session, settings: &FacetSettings) -> Duration {
+    session.heard() + DOUBT_PINGS * settings.timing.ping
 }

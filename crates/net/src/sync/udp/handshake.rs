@@ -12,6 +12,11 @@
 //! `cookie = BLAKE3-keyed(secret of this server's process, address ‖ nonce ‖ facet ‖ ten-second interval)`; that of the interval before is taken too.
 //! All four carry a tag by the handshake key: without the key file a machine gets no answer at all. A recorded Answer that is sent again gets the same
 //! Welcome again, or prepares a session that nobody can bring to life; it never touches a live one.
+//!
+//! A facet that hears nothing for two pings doubts its session: the server may have been started again, or have given it up. It names the session in a
+//! Hello. A server that knows it says so under that session's seal; one that does not answers as to any Hello, and a session begins beside the old one. The
+//! old one ends when the first sealed packet of the new one has come, and not by any word under the handshake key, which other servers may have too. Whatever comes of
+//! the old one before ends the doubt.
 
 use super::keys::Handshake;
 use super::packet::{self, HEADER, Header, Kind, TAG};
@@ -32,6 +37,8 @@ pub struct Hello {
     pub facet: FacetNumber,
     /// The proof; zeros in a Hello.
     pub cookie: [u8; 32],
+    /// The session that it has and doubts, because nothing came for some time; 0 where there is none.
+    pub doubted: u32,
 }
 
 /// Server: a nonce of the facet given back, and a cookie or the server's nonce.
@@ -46,7 +53,7 @@ pub struct Reply {
 impl Hello {
     /// Writes a Hello or an Answer.
     pub fn write(&self, kind: Kind, handshake: &Handshake, datagram: &mut Vec<u8>) {
-        packet::begin(datagram, Header { kind, session: 0, sequence: 0 });
+        packet::begin(datagram, Header { kind, session: self.doubted, sequence: 0 });
         datagram.extend_from_slice(&self.nonce);
         datagram.extend_from_slice(&self.facet.to_le_bytes());
         datagram.extend_from_slice(&self.cookie);
@@ -63,7 +70,7 @@ impl Hello {
         let (nonce, rest) = body.split_first_chunk().ok_or(Refused::Truncated)?;
         let (facet, rest) = rest.split_first_chunk().ok_or(Refused::Truncated)?;
         let (cookie, _) = rest.split_first_chunk().ok_or(Refused::Truncated)?;
-        Ok(Hello { nonce: *nonce, facet: FacetNumber::from_le_bytes(*facet), cookie: *cookie })
+        Ok(Hello { nonce: *nonce, facet: FacetNumber::from_le_bytes(*facet), cookie: *cookie, doubted: packet::session_of(datagram) })
     }
 }
 
@@ -88,12 +95,6 @@ impl Reply {
         let (value, _) = rest.split_first_chunk().ok_or(Refused::Truncated)?;
         Ok(Reply { nonce: *nonce, value: *value })
     }
-}
-
-/// Writes the server's word that it does not know a session: 33 bytes, less than any sealed packet has.
-pub fn write_unknown(session: u32, handshake: &Handshake, datagram: &mut Vec<u8>) {
-    packet::begin(datagram, Header { kind: Kind::Unknown, session, sequence: 0 });
-    handshake.tag(datagram);
 }
 
 /// Makes cookies and knows its own.

@@ -8,7 +8,7 @@
 //! | 2 | 1 | version, [`VERSION`] (upper four bits), and [`Kind`] (lower four) |
 //! | 3 | 2 | length of the whole datagram |
 //! | 5 | 4 | CRC-32 of all bytes but these four: tells a packet damaged on its way from a forged one |
-//! | 9 | 4 | session (0 before there is one) |
+//! | 9 | 4 | session (in a Hello: the one in doubt; 0 where there is none) |
 //! | 13 | 4 | sequence, its lower half: the number of this packet within its session and direction |
 //! | 17 | n | body: sealed in [`Kind::Data`], plain in the others |
 //! | 17 + n | 16 | tag: Poly1305 in [`Kind::Data`], keyed BLAKE3 in the others |
@@ -41,13 +41,11 @@ pub enum Kind {
     Answer = 3,
     /// Server: your session.
     Welcome = 4,
-    /// Server: I know no such session (it was started again, or gave you up).
-    Unknown = 5,
     /// Either: sealed frames.
     Data = 6,
 }
 
-const KINDS: [Kind; 6] = [Kind::Hello, Kind::Challenge, Kind::Answer, Kind::Welcome, Kind::Unknown, Kind::Data];
+const KINDS: [Kind; 5] = [Kind::Hello, Kind::Challenge, Kind::Answer, Kind::Welcome, Kind::Data];
 
 /// What the header says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +56,11 @@ pub struct Header {
     pub session: u32,
     /// Its number; as [`parse`] reads it only the lower half.
     pub sequence: u64,
+}
+
+/// The session that a header names: of a datagram that [`parse`] took.
+pub fn session_of(datagram: &[u8]) -> u32 {
+    u32_at(datagram, 9)
 }
 
 /// Reads the header; looks at nothing else. Cheap: no key, no allocation.

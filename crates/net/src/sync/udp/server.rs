@@ -1,7 +1,7 @@
 //! The server's side, without socket or clock.
 
 use super::Timing;
-use super::handshake::{Cookies, Hello, Reply, write_unknown};
+use super::handshake::{Cookies, Hello, Reply};
 use super::keys::{Agreement, Entropy, Handshake, SharedKey, Side};
 use super::packet::{self, Header, Kind};
 use super::session::{Numbering, Session};
@@ -13,6 +13,8 @@ use std::time::Duration;
 
 /// Sessions prepared and not yet live; beyond, the oldest goes.
 const MAX_PREPARED: usize = 2 * MAX_FACETS;
+/// Sessions that are over and whose late packets are known; beyond, the oldest goes.
+const MAX_OVER: usize = 2 * MAX_FACETS;
 /// Answers that wait to be sent; beyond, they are dropped and the facet asks again.
 const MAX_REPLIES: usize = 256;
 
@@ -38,6 +40,8 @@ pub struct ServerMachine {
     /// The live session of each facet.
     live: Vec<Option<u32>>,
     prepared: VecDeque<u32>,
+    /// Were live, and are over: what the facet sent before it knew is on its way.
+    over: VecDeque<Session>,
     replies: VecDeque<(SocketAddr, Vec<u8>)>,
     events: VecDeque<(FacetNumber, LinkEvent, Vec<u8>)>,
     counters: Vec<LinkCounters>,
@@ -59,6 +63,7 @@ impl ServerMachine {
             sessions: BTreeMap::new(),
             live: vec![None; facets],
             prepared: VecDeque::new(),
+            over: VecDeque::new(),
             replies: VecDeque::new(),
             events: VecDeque::new(),
             counters: vec![LinkCounters::default(); facets],
@@ -173,13 +178,7 @@ impl ServerMachine {
 
     fn take_data(&mut self, now: Duration, from: SocketAddr, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
         let Some(session) = self.sessions.get_mut(&header.session) else {
-            let mut reply = Vec::new();
-            write_unknown(header.session, &self.handshake, &mut reply);
-            // Less than it answers, so that nobody can make this server send more than he sends himself.
-            if reply.len() < datagram.len() {
-                self.reply(from, reply);
-            }
-            return Err(Refused::Stale);
+            return self.take_late(from, header, datagram);
         };
         if session.address != from {
             return Err(Refused::Stranger);
@@ -193,8 +192,19 @@ impl ServerMachine {
         taken
     }
 
+    /// A packet of a session that is not known, or over: not answered, for it proves nothing. Genuine ones that were late do no harm and are no refusal.
+    fn take_late(&mut self, from: SocketAddr, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
+        let over = self.over.iter_mut().find(|session| session.agreed.session == header.session && session.address == from);
+        over.ok_or(Refused::Stale)?.receive_late(header, datagram)
+    }
+
     fn take_hello(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) -> Result<(), Refused> {
         let hello = self.known(Hello::read(datagram, &self.handshake)?)?;
+        let known = self.sessions.get_mut(&hello.doubted).filter(|s| s.live && s.address == from && s.agreed.facet == hello.facet);
+        if let Some(session) = known {
+            session.ping();
+            return Ok(());
+        }
         let mut reply = Vec::new();
         Reply { nonce: hello.nonce, value: self.cookies.bake(now, from, &hello) }.write(Kind::Challenge, 0, &self.handshake, &mut reply);
         self.reply(from, reply);
@@ -259,6 +269,11 @@ impl ServerMachine {
                 self.events.extend(std::iter::from_fn(|| session.pop()).map(|(_, message)| (facet, LinkEvent::Message, message)));
             }
             self.events.push_back((facet, LinkEvent::Closed(why), Vec::new()));
+            session.empty();
+            if self.over.len() == MAX_OVER {
+                self.over.pop_front();
+            }
+            self.over.push_back(session);
         }
     }
 

@@ -92,11 +92,8 @@ impl Session {
 
     /// Takes a packet. Nothing of it is believed before its seal was checked, and nothing of it is taken where one frame contradicts.
     pub fn receive(&mut self, now: Duration, header: &Header, datagram: &[u8], counters: &mut LinkCounters) -> Result<(), Refused> {
-        let header = &Header { sequence: whole(header.sequence as u32, self.window.largest().unwrap_or(self.first)), ..*header };
-        self.window.check(header.sequence)?;
         let mut body = std::mem::take(&mut self.body);
-        let result = self.seal.open(header, datagram, &mut body).and_then(|()| {
-            self.window.take(header.sequence);
+        let result = self.open(header, datagram, &mut body).and_then(|()| {
             self.heard = now;
             self.live = true;
             let frames = frames::parse(&body).ok_or(Refused::Torn)?;
@@ -105,6 +102,28 @@ impl Session {
         self.body = body;
         counters.superseded += self.inbox.take_superseded();
         result
+    }
+
+    /// Looks at a packet that comes when the session is over: whether the other side sent it before it knew.
+    pub fn receive_late(&mut self, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
+        let mut body = std::mem::take(&mut self.body);
+        let result = self.open(header, datagram, &mut body);
+        self.body = body;
+        result
+    }
+
+    /// Lets go of all messages: the session is over.
+    pub fn empty(&mut self) {
+        (self.inbox, self.outbox) = (Inbox::new(0), Outbox::new(0));
+    }
+
+    /// Window and seal.
+    fn open(&mut self, header: &Header, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
+        let header = Header { sequence: whole(header.sequence as u32, self.window.largest().unwrap_or(self.first)), ..*header };
+        self.window.check(header.sequence)?;
+        self.seal.open(&header, datagram, body)?;
+        self.window.take(header.sequence);
+        Ok(())
     }
 
     fn take_frames(&mut self, now: Duration, frames: &[Frame], bytes: usize) -> Result<(), Refused> {
@@ -192,6 +211,11 @@ impl Session {
         }
         let idle = over.min(self.sent + self.timing.ping);
         [self.ack_due, self.outbox.wake()].into_iter().flatten().fold(idle, Duration::min)
+    }
+
+    /// When something was heard last.
+    pub fn heard(&self) -> Duration {
+        self.heard
     }
 
     /// Whether nothing was heard for too long.
