@@ -32,7 +32,7 @@ use tumble::scene::{SceneFile, resolve_scene};
 ///
 /// gravity: shape (3,), m/s²; dt: length of a step, s; stepper: ``"time_stepping"`` or ``"backtracking"``; integrator: ``"verlet"``,
 /// ``"symplectic_euler"``, ``"explicit_euler"``, ``"rk4"`` or ``"dormand_prince"``; solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or
-/// ``"lcp_sliding"``: the words of scene files, with their defaults. substeps: parts of each step; iterations: sweeps of the solver at most;
+/// ``"lcp_sliding"``: the words of scene files, with their defaults. integrator: acts in ``"backtracking"`` (``"time_stepping"`` has its own midpoint rule); substeps: parts of each step; iterations: sweeps of the solver at most;
 /// contact_tolerance: metres; integrator_tolerance: of ``dormand_prince``. sleep_after: seconds after which islands that have moved by less than
 /// sleep_within (metres) are left out of the steps until something touches them; None: never.
 ///

@@ -195,8 +195,8 @@ fn astray(screens: &[Screen], found: &[Gap]) -> Vec<Astray> {
 }
 
 /// All pairs of edges of different screens, each once, in the order of the file.
-fn pairs(screens: &[Screen]) -> Vec<((usize, usize), (usize, usize), Edge, Edge)> {
-    let all: Vec<((usize, usize), Edge)> = screens.iter().enumerate().flat_map(|(i, s)| edges(s).into_iter().enumerate().map(move |(k, edge)| ((i, k), edge))).collect();
+fn pairs(screens: &[Screen]) -> Vec<(Place, Place, Edge, Edge)> {
+    let all: Vec<(Place, Edge)> = screens.iter().enumerate().flat_map(|(i, s)| edges(s).into_iter().enumerate().map(move |(k, edge)| ((i, k), edge))).collect();
     let mut out = Vec::new();
     for (i, j) in (0..screens.len()).flat_map(|i| (i + 1..screens.len()).map(move |j| (i, j))) {
         for (first, a) in &all[4 * i..4 * i + 4] {
@@ -216,6 +216,9 @@ fn middle(edge: &Edge) -> Point3<f64> {
 }
 
 type Edge = [Point3<f64>; 2];
+
+/// Number of a screen, and of one of its edges.
+type Place = (usize, usize);
 
 /// The edges in the order of [`EDGES`].
 fn edges(s: &Screen) -> [Edge; 4] {
