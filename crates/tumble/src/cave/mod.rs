@@ -12,14 +12,16 @@
 /// As the standard one, but a stderr that nobody reads any more ends no run: pictures and recordings go on without it.
 macro_rules! eprintln {
     ($($told:tt)*) => {{
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($told)*)));
+        // in one piece: processes of a run share a stderr
+        let told = format!($($told)*) + "\n";
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), told.as_bytes());
     }};
 }
 
 /// The same without the line's end.
 macro_rules! eprint {
     ($($told:tt)*) => {{
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!($($told)*));
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), format!($($told)*).as_bytes());
     }};
 }
 
