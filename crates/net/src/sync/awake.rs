@@ -10,7 +10,10 @@ use std::io::Write;
 const DEVICE: &str = "/dev/cpu_dma_latency";
 
 /// As long as it lives the cores stay awake.
-pub struct Awake(#[allow(dead_code)] File);
+pub struct Awake {
+    /// Held open, no more.
+    _device: File,
+}
 
 impl Awake {
     /// Asks for it.
@@ -20,6 +23,6 @@ impl Awake {
         let io = |why| LinkError::Io { what: format!("keeping the cores awake: {DEVICE}"), why };
         let mut device = OpenOptions::new().write(true).open(DEVICE).map_err(io)?;
         device.write_all(&0i32.to_ne_bytes()).map_err(io)?;
-        Ok(Awake(device))
+        Ok(Awake { _device: device })
     }
 }
