@@ -176,6 +176,10 @@ struct Place {
     synced: bool,
     ready: Option<u64>,
     presented: Option<u64>,
+    /// While it follows: the frame that it was ready for last, and when it said so.
+    answered: Option<(u64, Duration)>,
+    /// It is drawing in time again, and is waited for from the next frame on; until it is ready for that one.
+    keeps_up: bool,
     counts: SeatCounts,
     told: FacetCounts,
     inputs: std::collections::BTreeMap<u16, u64>,
@@ -226,7 +230,7 @@ impl ServerSession {
         options.history = options.history.clamp(1, 1024);
         let place = |seat: &Seat| Place {
             seat: seat.clone(), standing: Standing::Absent, join: 0, retired: VecDeque::new(), rivals: Rivals::default(), exact: false, heard: Duration::ZERO, sent: Duration::ZERO,
-            synced: false, ready: None, presented: None, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(), clock: Clock::default(), asked_state: None, asked_present: None,
+            synced: false, ready: None, presented: None, answered: None, keeps_up: false, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(), clock: Clock::default(), asked_state: None, asked_present: None,
         };
         let places = options.seats.iter().map(place).collect();
         let stream = |exact| Stream { publisher: Publisher::new(base, exact, 0), snapshot: Arc::default(), listed: None, state: Arc::default(), hashes: VecDeque::new() };
