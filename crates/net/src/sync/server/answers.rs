@@ -145,6 +145,7 @@ impl ServerSession {
         } else {
             place.ready = Some(frame);
             if self.frame == Some(frame) && self.options.pace == Pace::Lockstep {
+                self.first_ready = self.first_ready.or((place.standing == Standing::InStep && place.seat.critical).then_some(now));
                 (place.standing, place.answered, place.keeps_up) = (Standing::InStep, None, false);
             }
             if !right {

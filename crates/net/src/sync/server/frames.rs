@@ -78,7 +78,7 @@ impl ServerSession {
     /// Sends the frame that was kept, with its list of objects if that is new.
     pub(super) fn send_frame(&mut self, now: Duration, frame: u64) {
         let first = self.frame.is_none();
-        (self.frame, self.next, self.stage) = (Some(frame), frame.wrapping_add(1), Stage::Idle);
+        (self.frame, self.next, self.stage, self.first_ready) = (Some(frame), frame.wrapping_add(1), Stage::Idle, None);
         for place in self.places.iter_mut().filter(|p| p.standing == Standing::Following && (first || p.keeps_up)) {
             place.standing = Standing::InStep;
         }
@@ -139,14 +139,20 @@ impl ServerSession {
 
     /// When those who have not answered are waited for no longer.
     pub(super) fn patience_ends(&self) -> Option<Duration> {
-        let patience = |p: &Place| match (p.synced, p.keeps_up) {
-            (false, _) => self.options.first_after,
-            (true, true) => self.options.ready_after * 2, // what it began before it was waited for comes first
-            (true, false) => self.options.ready_after,
-        };
+        let options = &self.options;
         match self.stage {
             Stage::Idle => None,
-            Stage::Ready(since) => self.waited_for().filter(|p| p.ready != self.frame).map(|p| since.saturating_add(patience(p))).max(),
+            Stage::Ready(since) => {
+                // while nobody is ready nobody is held up
+                let at_most = since.saturating_add(options.ready_after.max(options.drop_after));
+                let end = |p: &Place| match (p.synced, self.first_ready) {
+                    (false, _) => since.saturating_add(options.first_after),
+                    (true, None) => at_most,
+                    // what it began before it was waited for comes first
+                    (true, Some(first)) => first.saturating_add(options.ready_after * if p.keeps_up { 2 } else { 1 }).min(at_most),
+                };
+                self.waited_for().filter(|p| p.ready != self.frame).map(end).max()
+            }
             Stage::Presented(since) => Some(since.saturating_add(self.options.ready_after)),
         }
     }
