@@ -109,6 +109,33 @@ impl<'a> Collector<'a> {
         self.out[self.start..].iter().map(|c| c.gap).fold(f64::INFINITY, f64::min)
     }
 
+    /// The contact that has it.
+    pub fn deepest(&self) -> Option<&Contact> {
+        self.out[self.start..].iter().min_by(|x, y| x.gap.total_cmp(&y.gap))
+    }
+
+    /// Forgets what was found, and takes contacts with a gap up to another limit; returns the one before.
+    pub fn restart(&mut self, limit: f64) -> f64 {
+        self.out.truncate(self.start);
+        self.spare = None;
+        std::mem::replace(&mut self.limit, limit)
+    }
+
+    /// Changes all contacts found, and keeps those that it is said of and that are within the limit, which is set anew.
+    pub fn retain_back(&mut self, limit: f64, mut change: impl FnMut(&mut Contact) -> bool) {
+        self.limit = limit;
+        let mut kept = self.start;
+        for n in self.start..self.out.len() {
+            let mut contact = self.out[n];
+            if change(&mut contact) && contact.gap <= limit {
+                self.out[kept] = contact;
+                kept += 1;
+            }
+        }
+        self.out.truncate(kept);
+        self.spare = None;
+    }
+
     /// How far the two overlap as far as is known, places that no element faces included, metres; below 0 where they do not.
     pub fn overlap(&self) -> f64 {
         -self.spare.iter().map(|c| c.gap).fold(self.least(), f64::min)

@@ -128,6 +128,7 @@ impl Pass<'_> {
         let end = if s == 0.0 { Some(0) } else if s == line.length { Some(1) } else { None };
         let name = end.and_then(|end: usize| line.edge.map(|edge| edge.points[end]));
         let hit = self.hit_of(&line.at(s), name, line.normals, TOUCHING);
+        self.note(hit.distance - line.radius);
         Look { s, slope: hit.normal.dot(&line.along), hit }
     }
 

@@ -11,6 +11,7 @@
 
 mod deep;
 mod line;
+mod parting;
 mod pass;
 mod rim;
 mod smooth;
@@ -21,6 +22,7 @@ use crate::surface::elements::Elements;
 use crate::surface::field::MeshField;
 use crate::{Contact, Pose, Vec3};
 use deep::DEEP;
+use parting::Seen;
 use pass::Pass;
 
 /// A body as the pass sees it that takes its elements.
@@ -51,17 +53,23 @@ pub(in crate::narrow) fn surface(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pos
     let a_in_b = pose_b.inv_mul(pose_a);
     let size = a.radius.min(b.radius);
     let mut found = Collector::new(margin, size, out);
-    let b_in_a = a_in_b.inverse();
-    let (first, second) = (Pass::new(&a_in_b, b, size, None), Pass::new(&b_in_a, a, size, Some(&a_in_b)));
-    first.run(&a.source, &mut found);
-    second.run(&b.source, &mut found);
-    if found.overlap() > DEEP * size {
-        for (pass, mesh) in [(&first, a.mesh), (&second, b.mesh)] {
-            if let Some(mesh) = mesh {
-                pass.faces(mesh, &mut found);
-            }
-        }
-    }
+    let seen = elements(a, b, &a_in_b, size, &mut found);
+    parting::part(a, b, &a_in_b, size, &seen, &mut found);
     found.finish(pose_b);
 }
 
+/// The contacts of the elements of both, in B's frame.
+fn elements(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector) -> Seen {
+    let b_in_a = a_in_b.inverse();
+    let (first, second) = (Pass::new(a_in_b, b, size, None), Pass::new(&b_in_a, a, size, Some(a_in_b)));
+    first.run(&a.source, found);
+    second.run(&b.source, found);
+    if found.overlap() > DEEP * size {
+        for (pass, mesh) in [(&first, a.mesh), (&second, b.mesh)] {
+            if let Some(mesh) = mesh {
+                pass.faces(mesh, found);
+            }
+        }
+    }
+    Seen { least: first.least().min(second.least()) }
+}

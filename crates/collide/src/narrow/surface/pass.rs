@@ -41,6 +41,8 @@ pub(super) struct Pass<'a> {
     seen: RefCell<ArrayVec<(u32, Hit), SEEN>>,
     /// Where in `seen` a name may be found.
     slots: [Cell<u16>; SLOTS],
+    /// The least distance of a place looked at, less its radius.
+    least: Cell<f64>,
 }
 
 /// Points that are remembered at most; all are forgotten when there are more.
@@ -51,7 +53,7 @@ const SLOTS: usize = 1024;
 impl<'a> Pass<'a> {
     pub(super) fn new(pose: &'a Pose, other: &Body<'a>, size: f64, second: Option<&'a Pose>) -> Pass<'a> {
         let rotation = *pose.rotation.to_rotation_matrix().matrix();
-        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, seen: RefCell::default(), slots: [const { Cell::new(0) }; SLOTS] }
+        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, seen: RefCell::default(), slots: [const { Cell::new(0) }; SLOTS], least: Cell::new(f64::INFINITY) }
     }
 
     pub(super) fn run(&self, source: &Source, found: &mut Collector) {
@@ -62,6 +64,15 @@ impl<'a> Pass<'a> {
             Source::Cylinder { radius, half_length } => self.cylinder(*radius, *half_length, found),
             Source::Nothing => {}
         }
+    }
+
+    /// The least signed distance of all places looked at, whatever they face, metres.
+    pub(super) fn least(&self) -> f64 {
+        self.least.get()
+    }
+
+    pub(super) fn note(&self, distance: f64) {
+        self.least.set(self.least.get().min(distance));
     }
 
     pub(super) fn place(&self, local: &Vec3) -> Vec3 {
@@ -146,6 +157,7 @@ impl<'a> Pass<'a> {
         }
         let reach = (radius + found.limit()).max(0.0);
         mesh.minima(at, reach, &mut |name, hit| {
+            self.note(hit.distance - radius);
             let feature = (3 << 60 | u64::from(index) << 59) ^ (name & ((1 << 59) - 1)) ^ (name >> 62 << 57);
             self.push(at, radius, &hit, point_normal(&hit), feature, found);
         });
@@ -215,6 +227,7 @@ impl<'a> Pass<'a> {
     }
 
     fn point_at(&self, at: &Vec3, radius: f64, hit: Hit, ways: &[Vec3], index: u32, found: &mut Collector) {
+        self.note(hit.distance - radius);
         let down = self.rotation.tr_mul(&hit.normal);
         let closest = hit.feature == Feature::Face || ways.iter().all(|way| down.dot(way) >= -ASIDE);
         self.push_if(hit.facing && closest, at, radius, &hit, point_normal(&hit), u64::from(index), found);

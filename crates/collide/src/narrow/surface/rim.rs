@@ -133,6 +133,7 @@ impl Pass<'_> {
 
     fn look_on(&self, rim: &Rim, way: &Vec3) -> Look {
         let hit = self.field.hit(&rim.at(way), &[*way, rim.up], OVERHANG);
+        self.note(hit.distance);
         Look { way: *way, slope: hit.normal.dot(&rim.axis.cross(way)), hit }
     }
 

@@ -95,6 +95,11 @@ impl MeshField {
         &self.corners
     }
 
+    /// Outward, of triangle `t`; zero if that has no area.
+    pub fn face_normal(&self, t: usize) -> Vec3 {
+        self.normals[t][0]
+    }
+
     /// Centre and radius of a ball around triangle `t`.
     pub fn ball(&self, t: usize) -> (Vec3, f64) {
         let [x, y, z, radius] = self.balls[t].map(f64::from);
