@@ -9,6 +9,7 @@ mod hull;
 mod medial;
 mod mesh_contacts;
 mod meshes;
+mod overlaps;
 mod primitives;
 mod quality;
 mod rays;

@@ -69,7 +69,7 @@ pub(super) fn part(a: &Body, b: &Body, a_in_b: &Pose, size: f64, seen: &Seen, fo
         return;
     }
     let (way, depth) = two.least();
-    if depth > told + SAME * size {
+    if depth > SAME * size {
         two.touching(way, depth, found);
     }
 }

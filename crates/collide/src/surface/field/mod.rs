@@ -21,6 +21,8 @@ const AROUND: f64 = 0.01;
 const SAME: f64 = 1e-11;
 /// As much of the squared distance as is along a face's normal counts as straight above the face.
 const ABOVE: f64 = 1.0 - 1e-6;
+/// Faces that an element faces as squarely but for rounding.
+const SQUARE: f64 = 1e-9;
 /// A triangle in the list of a cell.
 #[derive(Clone, Copy, Debug)]
 struct Listed {
@@ -227,7 +229,9 @@ impl MeshField {
             if distance > nearest.abs() + self.around {
                 continue;
             }
-            let nearer = |b: &(f64, f64, Hit)| distance < b.0 - aside || (distance < b.0 + aside && square < b.1);
+            // of two triangles of one side, the one that has it below
+            let squarer = |b: &(f64, f64, Hit)| square < b.1 - SQUARE || (square < b.1 + SQUARE && distance < b.0);
+            let nearer = |b: &(f64, f64, Hit)| distance < b.0 - aside || (distance < b.0 + aside && squarer(b));
             if best.as_ref().is_none_or(nearer) {
                 // beyond an edge by less than counts, it is still above or below the face
                 let beside = (p - point - normal * above).norm();

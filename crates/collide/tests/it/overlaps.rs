@@ -1,0 +1,102 @@
+//! Overlaps of bodies that are aligned with each other, so that no corner of either lies deep in the other: the contacts part them, by the least
+//! translation that closed forms give.
+
+use tumble_collide::{Contact, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
+
+fn mesh(mesh: TriMesh) -> Shape {
+    Shape::mesh(mesh, &TreeSettings::octree()).unwrap().0
+}
+
+fn cube() -> Shape {
+    mesh(TriMesh::box_(Vec3::repeat(0.5)))
+}
+
+fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
+    let mut out = Vec::new();
+    contacts(a, pa, b, pb, 1e-3, &mut out);
+    let mut names: Vec<u64> = out.iter().map(|c| c.feature).collect();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), out.len(), "features are distinct: {out:?}");
+    out
+}
+
+/// The deepest contact has this depth and parts the two along this way.
+fn parts(label: &str, found: &[Contact], depth: f64, way: Vec3, slack: f64) {
+    let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).unwrap_or_else(|| panic!("{label}: no contact"));
+    assert!((deepest.gap + depth).abs() < slack && deepest.normal.dot(&way) > 1.0 - 1e-3, "{label}: {depth} along {way:?}, but {deepest:?}");
+    // none pushes it back
+    assert!(found.iter().filter(|c| c.gap < 0.0).all(|c| c.normal.dot(&way) > 0.0), "{label}: {found:?}");
+}
+
+const OVERLAPS: [f64; 10] = [1e-3, 5e-3, 0.01, 0.015, 0.02, 0.03, 0.05, 0.1, 0.3, 0.49];
+
+#[test]
+fn aligned_cubes_part_by_their_overlap() {
+    let (mesh, block) = (cube(), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
+    for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
+        for overlap in OVERLAPS {
+            for (k, shift) in [(2, Vec3::zeros()), (0, Vec3::zeros()), (2, Vec3::new(1e-9, 0.7e-9, 0.0)), (2, Vec3::new(1e-4, 1e-3, 0.0)), (2, Vec3::new(0.01, 0.007, 0.0))] {
+                let way = Vec3::ith(k, 1.0);
+                for (way, yaw) in [(way, 0.0), (-way, 0.0), (way, if k == 2 { 0.05 } else { 0.0 })] {
+                    let pose = Pose::from_parts((way * (1.0 - overlap) + shift).into(), Quat::from_scaled_axis(Vec3::z() * yaw));
+                    parts(&format!("{overlap} {shift:?} {yaw}"), &ask(a, &pose, b, &Pose::identity()), overlap, way, 1e-9);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn aligned_cylinders_part_by_their_overlap() {
+    let cylinder = Shape::cylinder(0.5, 0.5).unwrap();
+    let (block, cube) = (Shape::cuboid(Vec3::repeat(0.5)).unwrap(), cube());
+    for overlap in OVERLAPS {
+        for (name, other) in [("cylinder", &cylinder), ("block", &block), ("cube", &cube)] {
+            for (a, b) in [(&cylinder, other), (other, &cylinder)] {
+                let stacked = Pose::translation(0.0, 0.0, 1.0 - overlap);
+                parts(&format!("{overlap} stacked on {name}"), &ask(a, &stacked, b, &Pose::identity()), overlap, Vec3::z(), 1e-9);
+                let beside = Pose::translation(1.0 - overlap, 0.0, 0.0);
+                parts(&format!("{overlap} beside {name}"), &ask(a, &beside, b, &Pose::identity()), overlap, Vec3::x(), 1e-9);
+            }
+        }
+    }
+}
+
+/// Meshes of many faces: their sides are as flat, or come within a known chord of the circle.
+#[test]
+fn aligned_fine_meshes_part_by_their_overlap() {
+    let fine = mesh(TriMesh::cylinder(0.5, 0.5, 32));
+    for overlap in OVERLAPS {
+        parts("stacked", &ask(&fine, &Pose::translation(0.0, 0.0, 1.0 - overlap), &fine, &Pose::identity()), overlap, Vec3::z(), 1e-6);
+        // the corners of the two prisms are at ±0.5
+        let beside = ask(&fine, &Pose::translation(1.0 - overlap, 0.0, 0.0), &fine, &Pose::identity());
+        let deepest = beside.iter().map(|c| -c.gap).fold(0.0, f64::max);
+        let chord = 1.0 - (std::f64::consts::PI / 32.0).cos();
+        assert!(deepest > overlap - 2.0 * chord && deepest < overlap + 1e-9, "{overlap}: {beside:?}");
+        assert!(beside.iter().filter(|c| c.gap < 0.0).all(|c| c.normal.x > 0.0), "{overlap}: {beside:?}");
+    }
+}
+
+/// Where none is deeper in one way than in another, any way out will do: moved along the deepest contact by its depth they are apart.
+#[test]
+fn coincident_bodies_have_a_way_out() {
+    let turned = Quat::from_scaled_axis(Vec3::new(0.2, 0.4, 0.6));
+    for (name, shape) in [
+        ("cube", cube()),
+        ("cylinder", Shape::cylinder(0.5, 0.5).unwrap()),
+        ("ball", mesh(TriMesh::icosphere(0.5, 2))),
+        ("ring", mesh(TriMesh::torus(0.4, 0.12, 32, 16))),
+    ] {
+        for pose in [Pose::identity(), Pose::from_parts(Vec3::zeros().into(), turned)] {
+            for shift in [0.0, 1e-6, 1e-3, 0.02, 0.1] {
+                let a = Pose::from_parts((pose.translation.vector + Vec3::z() * shift).into(), pose.rotation);
+                let found = ask(&shape, &a, &shape, &pose);
+                let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).unwrap_or_else(|| panic!("{name} {shift}: no contact"));
+                let free = Pose::from_parts((a.translation.vector - deepest.normal * (deepest.gap - 1e-5)).into(), a.rotation);
+                let left = ask(&shape, &free, &shape, &pose);
+                assert!(left.iter().all(|c| c.gap > -1e-9), "{name} {shift}: moved by {} along {:?} leaves {left:?}", -deepest.gap, deepest.normal);
+            }
+        }
+    }
+}
