@@ -28,6 +28,7 @@ mod limits;
 mod mesh_boxes;
 mod meshes;
 mod out_of_reach;
+mod overlaps;
 mod paradox;
 mod pull;
 mod regressions;

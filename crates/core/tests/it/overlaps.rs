@@ -1,0 +1,124 @@
+//! Bodies that begin inside each other come apart, at a bounded speed, and stay apart.
+
+use crate::common::*;
+use tumble_core::collide::{self, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::*;
+
+fn mesh(mesh: TriMesh) -> Shape {
+    Shape::mesh(mesh, &TreeSettings::octree()).unwrap().0
+}
+
+fn mesh_cube() -> Shape {
+    mesh(TriMesh::box_(Vec3::repeat(0.5)))
+}
+
+fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
+    world.add(RigidBody::with_mass(name, shape.clone(), 1.0).unwrap().surface(0.0, 0.5).at(pose)).unwrap()
+}
+
+/// How deep two objects are in each other, metres, by their contacts.
+fn depth(world: &World, shapes: [&Shape; 2], ids: [ObjectId; 2]) -> f64 {
+    let [a, b] = ids.map(|id| world.site(id, 0).unwrap().pose);
+    let mut found = Vec::new();
+    collide::contacts(shapes[0], &a, shapes[1], &b, 0.0, &mut found);
+    found.iter().map(|c| -c.gap).fold(0.0, f64::max)
+}
+
+/// A pair floats for 2 s: apart at the end, by the referee too, and never faster than what is pushed out a second (3 m/s) allows.
+fn come_apart(label: &str, [a, b]: [&Shape; 2], off: Pose, apart: impl Fn(&Pose, &Pose) -> bool) {
+    for stepper in STEPPERS {
+        let mut world = no_gravity(world(stepper, 1.0 / 240.0));
+        let ids = [add(&mut world, "a", a, Pose::identity()), add(&mut world, "b", b, off)];
+        let mut fastest = 0.0f64;
+        for _ in 0..480 {
+            world.step().unwrap();
+            fastest = ids.iter().map(|id| velocity(&world, *id).norm()).fold(fastest, f64::max);
+        }
+        let left = depth(&world, [a, b], ids);
+        let [pa, pb] = ids.map(|id| world.site(id, 0).unwrap().pose);
+        assert!(left < 1e-3 && apart(&pa, &pb), "{stepper}, {label}: {left} m are left, {pa:?} {pb:?}");
+        assert!(fastest < 3.0, "{stepper}, {label}: {fastest} m/s");
+    }
+}
+
+/// No corner of one unit cube is inside the other by more than a millimetre, nor is its centre.
+fn cubes_are_apart(a: &Pose, b: &Pose) -> bool {
+    let inside = |from: &Pose, to: &Pose| {
+        let steps = |n: i32| 0.1 * f64::from(n) - 0.5;
+        (0..11 * 11 * 11).any(|n| {
+            let p = nalgebra::Point3::new(steps(n % 11), steps(n / 11 % 11), steps(n / 121));
+            to.inverse_transform_point(&(from * p)).coords.abs().max() < 0.5 - 1e-3
+        })
+    };
+    !inside(a, b) && !inside(b, a)
+}
+
+#[test]
+fn cubes_of_meshes_come_apart() {
+    let (cube, block) = (mesh_cube(), cube(1.0));
+    for b in [&cube, &block] {
+        for overlap in [1e-3, 0.01, 0.02, 0.05, 0.2, 0.5] {
+            for (shift, yaw) in [(Vec3::zeros(), 0.0), (Vec3::new(0.0, 0.01, 0.0), 0.0), (Vec3::new(0.0, 0.1, 0.03), 0.0), (Vec3::zeros(), 0.05)] {
+                let off = Pose::from_parts((Vec3::x() * (1.0 - overlap) + shift).into(), Quat::from_scaled_axis(Vec3::z() * yaw));
+                come_apart(&format!("{overlap} {shift:?} {yaw}"), [&cube, b], off, cubes_are_apart);
+            }
+        }
+    }
+}
+
+#[test]
+fn cylinders_come_apart() {
+    let cylinder = Shape::cylinder(0.5, 0.5).unwrap();
+    for overlap in [1e-3, 0.01, 0.05, 0.2, 0.5] {
+        for way in [Vec3::x(), Vec3::z()] {
+            let apart = |a: &Pose, b: &Pose| {
+                let off = b.translation.vector - a.translation.vector;
+                off.xy().norm() > 1.0 - 2e-3 || off.z.abs() > 1.0 - 2e-3
+            };
+            come_apart(&format!("{overlap} {way:?}"), [&cylinder; 2], Pose::from(way * (1.0 - overlap)), apart);
+        }
+    }
+}
+
+#[test]
+fn what_coincides_comes_apart() {
+    let far = |reach: f64| move |a: &Pose, b: &Pose| (b.translation.vector - a.translation.vector).norm() > reach;
+    let turned = Pose::from_parts(Vec3::zeros().into(), Quat::identity());
+    come_apart("cubes", [&mesh_cube(); 2], turned, far(0.99));
+    come_apart("cylinders", [&Shape::cylinder(0.5, 0.5).unwrap(); 2], turned, far(0.99));
+    come_apart("balls", [&mesh(TriMesh::icosphere(0.5, 2)); 2], turned, far(0.95));
+    come_apart("rings", [&mesh(TriMesh::torus(0.4, 0.12, 32, 16)); 2], turned, far(0.2));
+}
+
+#[test]
+fn ten_cubes_of_meshes_that_overlap_stand_at_the_end() {
+    for stepper in STEPPERS {
+        let (mut world, shape) = (world(stepper, 1.0 / 240.0), mesh_cube());
+        ground(&mut world, 0.0, 0.5);
+        let ids: Vec<_> = (0..10).map(|i| add(&mut world, &format!("box{i}"), &shape, Pose::translation(0.0, 0.0, 0.5 + 0.98 * i as f64))).collect();
+        (0..480).for_each(|_| {
+            world.step().unwrap();
+        });
+        for (i, id) in ids.iter().enumerate() {
+            let off = position(&world, *id) - Vec3::z() * (0.5 + i as f64);
+            assert!(off.norm() < 5e-3, "{stepper}: box {i} is off by {off:?}");
+        }
+    }
+}
+
+/// A cube that is led goes down through a free one that lies on a third: what is between gets out of the way and is not held inside.
+#[test]
+fn a_press_does_not_trap_a_cube() {
+    for stepper in STEPPERS {
+        let (mut world, shape) = (world(stepper, 1.0 / 60.0), mesh_cube());
+        let a = add(&mut world, "free", &shape, Pose::identity());
+        world.add_static(RigidBody::fixture("under", shape.clone()).at(Pose::translation(0.0, 0.0, -1.0))).unwrap();
+        let press = RigidBody::with_mass("press", shape.clone(), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 1.2)).moving(-Vec3::z(), Vec3::zeros());
+        let k = world.add_boxed(Box::new(press), Mode::Kinematic).unwrap();
+        (0..240).for_each(|_| {
+            world.step().unwrap();
+        });
+        let left = depth(&world, [&shape; 2], [a, k]);
+        assert!(left < 1e-3, "{stepper}: {left} m are left at {:?} {:?}", position(&world, a), position(&world, k));
+    }
+}
