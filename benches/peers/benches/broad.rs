@@ -3,8 +3,11 @@
 //! ```text
 //! cargo bench --bench broad                                          the curve, and all kinds of crowds at 1,000, 10,000 and 100,000
 //! cargo bench --bench broad -- --svg ../../docs/images/broad.svg     the same, and the curve as a picture
+//! cargo bench --bench broad -- --curve                               the curve alone
 //! cargo bench --bench broad -- --tumble slow 100000                  one case of tumble alone, for a profiler
 //! ```
+//!
+//! A program that takes turns with it on a core leaves its own data in the caches, and large crowds pay for that: `chrt -f 1` in front keeps the core.
 
 use tumble_peers::broad::{Cost, Follower, Kind, Sweep, Tree, follow, write_curve};
 use tumble_peers::scene::RADIUS;
@@ -23,10 +26,11 @@ fn main() {
             let cost = follow(&mut Sweep::default(), kind, n, steps(n));
             println!("{:.1} µs per step, {} pairs", cost.step, cost.pairs);
         }
+        ["--curve"] => drop(curves()),
         ["--svg", path] => std::fs::write(path, write_curve(&curves())).expect("the picture can be written"),
         _ => drop(curves()),
     }
-    if arguments.first().is_none_or(|a| a != "--tumble") {
+    if arguments.first().is_none_or(|a| a == "--svg") {
         kinds();
     }
 }
@@ -42,7 +46,18 @@ fn curves() -> [(&'static str, &'static str, Vec<(f64, f64)>); 2] {
         curves[0].2.push((n as f64, ours.step));
         curves[1].2.push((n as f64, theirs.step));
     }
+    for (name, _, points) in &curves {
+        println!("{name}: the time grows as n^{:.2}", exponent(points));
+    }
     curves
+}
+
+/// The slope of the straight line that fits best where both scales are logarithmic.
+fn exponent(points: &[(f64, f64)]) -> f64 {
+    let logarithms: Vec<(f64, f64)> = points.iter().map(|(n, time)| (n.ln(), time.ln())).collect();
+    let mean = |of: fn(&(f64, f64)) -> f64| logarithms.iter().map(of).sum::<f64>() / logarithms.len() as f64;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    logarithms.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / logarithms.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
 /// Every kind of crowd.
