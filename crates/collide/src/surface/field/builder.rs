@@ -219,3 +219,39 @@ impl<'a> Builder<'a> {
         excess + half * (slope + first.slope).abs().sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::surface::field::MeshField;
+    use crate::{TriMesh, Vec3};
+
+    /// Cells and lists, bit by bit.
+    fn bits(threads: usize) -> String {
+        let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
+        let searched = vec![[true; 3]; mesh.triangles.len()];
+        let field = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| MeshField::new(&mesh, searched));
+        format!("{:?} {:?}", field.tree.cells, field.lists)
+    }
+
+    #[test]
+    fn threads_do_not_change_a_bit() {
+        assert_eq!(bits(1), bits(5));
+    }
+
+    /// The links of cells that several threads made lead where they should: distances are those of a look at every triangle.
+    #[test]
+    fn grafted_branches_tell_the_distance() {
+        let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
+        let field = MeshField::new(&mesh, vec![[true; 3]; mesh.triangles.len()]);
+        assert!(field.tree.cells.len() > 500 && field.lists.len() > 1000, "{} {}", field.tree.cells.len(), field.lists.len());
+        for n in 0..2000_u32 {
+            let place = |step: u32, span: f64| span * (f64::from(n * step % 1999) / 999.5 - 1.0);
+            let p = Vec3::new(place(1, 1.3), place(611, 1.3), place(1301, 0.35));
+            let square = |t: usize| (crate::mesh::closest_on_triangle(&p, &mesh.corners(t)).0 - p).norm_squared();
+            let brute = (0..mesh.triangles.len()).map(square).fold(f64::INFINITY, f64::min).sqrt();
+            let found = field.nearest(&p).distance;
+            assert!((found.abs() - brute).abs() < 1e-12, "{p:?}: {found} instead of {brute}");
+            assert!(field.tree.bound(&p) <= found, "{p:?}: bound above {found}");
+        }
+    }
+}
