@@ -31,6 +31,11 @@ fn same(a: &Path, b: &Path) -> bool {
     a == b || number(a).is_some_and(|ours| Some(ours) == number(b))
 }
 
+/// Whether an open file is the one at `path`.
+fn same_file(file: &File, path: &Path) -> bool {
+    matches!((file.metadata(), std::fs::metadata(path)), (Ok(ours), Ok(there)) if ours.ino() == there.ino())
+}
+
 /// Tries it and leaves the folder as it was.
 fn writable(path: &Path) -> Result<(), Failure> {
     let there = std::fs::symlink_metadata(path).is_ok();
@@ -76,11 +81,16 @@ impl Recording {
         remove_left(&real, &begin);
         let beside = real.with_file_name(format!("{begin}{}", std::process::id()));
         let failed = |e: std::io::Error| Failure::run(&format!("recording into {}", file.display()), e);
-        let lock = OpenOptions::new().write(true).create(true).truncate(true).open(&beside).map_err(failed)?;
-        let recording = Recording { file: real, beside: Some(beside), _lock: None };
-        // a file system without locks keeps what is left
-        let locked = lock.try_lock().is_ok();
-        Ok(Recording { _lock: locked.then_some(lock), ..recording })
+        // who removes what is left may be quicker than the lock
+        for _ in 0..10 {
+            let lock = OpenOptions::new().write(true).create(true).truncate(true).open(&beside).map_err(failed)?;
+            // a file system without locks keeps what is left
+            let locked = lock.try_lock().is_ok();
+            if same_file(&lock, &beside) {
+                return Ok(Recording { file: real, beside: Some(beside), _lock: locked.then_some(lock) });
+            }
+        }
+        Err(Failure::run(&format!("recording into {}", file.display()), format!("{} is removed again and again", beside.display())))
     }
 
     /// What is opened.

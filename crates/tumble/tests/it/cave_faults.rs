@@ -201,9 +201,9 @@ fn what_a_run_shares_is_open_to_nobody_else() {
 #[test]
 fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
     let place = Place::new("cave-nowhere", &wall());
-    // longer than a part of a name may be: no name server is asked
-    let nowhere = "n".repeat(70);
-    let far = format!("transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n[[node]]\nname = \"far\"\naddress = \"{nowhere}\"\nlaunch = [\"true\"]\n");
+    // of another kind than the addresses that are listened at, and no name server is asked
+    let nowhere = "2001:db8::1";
+    let far = format!("transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n[[node]]\nname = \"far\"\naddress = \"{nowhere}\"\nlaunch = [\"true\", \"{{arguments}}\"]\n");
     let key = place.folder.write("cave.key", "1".repeat(64));
     std::fs::set_permissions(key, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
     let text = wall().replace("name = \"l\"\nscreen", "name = \"l\"\nnode = \"far\"\nscreen") + &far;
@@ -211,7 +211,7 @@ fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
     std::fs::write(&place.cave, text).unwrap();
     let (code, _, wrong) = place.start("cave", &["--no-pictures", "--wait", "5"]).end();
     assert_eq!(code, Some(2), "{wrong}");
-    assert!(wrong.contains("node far: ") && wrong.contains(&nowhere) && wrong.contains("--listen ADDR:PORT"), "{wrong}");
+    assert!(wrong.contains("node far: ") && wrong.contains(nowhere) && wrong.contains("--listen ADDR:PORT"), "{wrong}");
     place.assert_clean();
     let hasty = place.folder.write("hasty.toml", wall().replace("drop_timeout_ms = 500", "drop_timeout_ms = 2").replace("ready_timeout_ms = 200", "ready_timeout_ms = 1"));
     let wrong = fail(&["check", &hasty], 2);
