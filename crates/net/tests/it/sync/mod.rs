@@ -6,6 +6,7 @@ mod links;
 mod lockstep;
 mod mirror;
 mod places;
+mod pace;
 mod quantise;
 mod refusals;
 mod threads;
