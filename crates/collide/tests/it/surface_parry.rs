@@ -189,7 +189,7 @@ fn judge(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bo
     let found = ask(&a.ours, pa, &b.ours, pb);
     let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap));
     let gap = deepest.map_or(f64::INFINITY, |c| c.gap);
-    let label = || eprintln!("{label}: {gap} but {distance}");
+    let label = || eprintln!("{label}: {gap} but {distance}; {}", told(pa, pb));
     let inside = |x: &Body, px: &Pose, y: &Body, py: &Pose| {
         let p = x.samples.first().copied().unwrap_or_default();
         signed(y, &(py.inv_mul(px) * Point3::from(p)).coords) < 0.0
@@ -213,7 +213,11 @@ fn judge(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bo
         }
         let rounding = if b.distance.is_none() { ROUNDING } else { 1e-9 };
         let turned = |c: &Contact| line.is_some_and(|line| line.dot(&c.normal) < 1.0_f64.to_radians().cos());
-        counts.elsewhere += u32::from((1e-3..MARGIN - ERROR).contains(&distance) && found.iter().filter(|c| c.gap < distance + ERROR).all(turned));
+        if (1e-3..MARGIN - ERROR).contains(&distance) && found.iter().filter(|c| c.gap < distance + ERROR).all(turned) {
+            eprint!("elsewhere, ");
+            label();
+            counts.elsewhere += 1;
+        }
         if distance > 1e-3
             && (gap - distance).abs() < rounding
             // of contacts that are all as deep, parry has one
@@ -238,6 +242,12 @@ fn judge(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bo
         }
     }
     counts.met += u32::from(distance <= 0.0 || contained);
+}
+
+/// Two poses, to the last bit.
+fn told(pa: &Pose, pb: &Pose) -> String {
+    let of = |p: &Pose| format!("{:?} {:?}", p.translation.vector.as_slice(), p.rotation.coords.as_slice());
+    format!("{} {}", of(pa), of(pb))
 }
 
 /// Meshes on the primitive of this name; about so many poses in all, of which so many of each pair are held against brute force.
@@ -330,4 +340,49 @@ fn meshes_on_a_half_space_are_exact() {
             assert!(found.iter().all(|c| c.normal == Vec3::z()));
         }
     }
+}
+
+#[test]
+fn replay_cases() {
+    let Some(path) = std::env::var_os("TUMBLE_CASES") else { return };
+    let all = meshes();
+    let mut counts = Counts::default();
+    for line in std::fs::read_to_string(path).unwrap().lines().filter(|l| !l.starts_with("depth")) {
+        let elsewhere = line.starts_with("elsewhere, ");
+        let line = line.trim_start_matches("elsewhere, ");
+        let (label, rest) = line.split_once(':').unwrap();
+        let (pair, _) = label.split_once(", case").unwrap();
+        let (a, b) = pair.split_once(" on ").unwrap();
+        let [a, b] = [a, b].map(|n| all.iter().find(|x| x.name == n).unwrap());
+        let (_, poses) = rest.split_once(';').unwrap();
+        let f: Vec<f64> = poses.split(|c: char| " [],".contains(c)).filter(|s| !s.is_empty()).map(|s| s.parse().unwrap()).collect();
+        let pose = |f: &[f64]| Pose::from_parts(Vec3::new(f[0], f[1], f[2]).into(), Quat::new_unchecked(nalgebra::Quaternion::new(f[6], f[3], f[4], f[5])));
+        let (pa, pb) = (pose(&f[..7]), pose(&f[7..]));
+        if elsewhere {
+            let (distance, line) = apart(a, &pa, b, &pb);
+            let line = line.unwrap();
+            let (Shape::Mesh(ma), Shape::Mesh(mb)) = (&a.ours, &b.ours) else { continue };
+            let angle = |n: &Vec3| n.dot(&line).clamp(-1.0, 1.0).acos().to_degrees();
+            let all = crate::referee::closest(ma.mesh(), &pa, mb.mesh(), &pb, b.distance.as_ref().unwrap(), 4.1e-4);
+            println!("{label}: parry {distance:.6}; referee {:.6} {:?} {:.2}°, within 1°: {:?}", all[0].distance, all[0].kind, angle(&all[0].normal), all.iter().filter(|c| angle(&c.normal) < 1.0).map(|c| (c.kind, ((c.distance - distance) * 1e6).round())).take(4).collect::<Vec<_>>());
+            let mut found = ask(&a.ours, &pa, &b.ours, &pb);
+            found.sort_by(|x, y| x.gap.total_cmp(&y.gap));
+            for c in found.iter().take(4) {
+                println!("     gap +{:.0} µm, {:.2}° off, {:?}", (c.gap - distance) * 1e6, angle(&c.normal), c.normal_from);
+            }
+        } else {
+            let before = std::time::Instant::now();
+            for _ in 0..100 { ask(&a.ours, &pa, &b.ours, &pb); }
+            let t = before.elapsed().as_secs_f64() * 1e4;
+            let (x, y) = (to_parry(&pa), to_parry(&pb));
+            let before = std::time::Instant::now();
+            for _ in 0..10 { query::contact(&x, &*a.theirs, &y, &*b.theirs, 0.02).ok(); }
+            let u = before.elapsed().as_secs_f64() * 1e5;
+            let gap = ask(&a.ours, &pa, &b.ours, &pb).iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+            let truth = deepest_sample(a, &pa, b, &pb);
+            println!("{label}: {gap:.5} of {truth:.5}, {t:.1} µs, parry {u:.1}{}", if gap > truth + ERROR { " SHALLOW" } else { "" });
+            judge(label, (a, &pa), (b, &pb), true, &mut counts);
+        }
+    }
+    println!("{counts:?}");
 }

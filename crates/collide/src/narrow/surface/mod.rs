@@ -10,6 +10,7 @@
 //! search of a face we need in deep overlaps alone ([`deep`]), since edges and vertices of both bodies are exact.
 
 mod deep;
+mod deepest;
 mod line;
 mod pass;
 mod rim;
