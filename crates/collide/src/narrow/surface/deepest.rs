@@ -26,7 +26,7 @@ use crate::surface::{Field, TOUCHING};
 use crate::{Aabb, Vec3};
 
 /// What a deeper place must gain to count, in radii of the smaller body: the search may stay short of the deepest by as much.
-const GAIN: f64 = 1e-4;
+const GAIN: f64 = 4e-4;
 /// Halvings of a face at most: of one as long as the body they leave parts of a millionth of it.
 const MOST_HALVED: u32 = 40;
 
