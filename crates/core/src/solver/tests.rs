@@ -6,9 +6,11 @@ mod islands;
 mod linkages;
 mod pivoting;
 mod redundant;
+
 mod residuals;
 mod scalar;
 mod soft;
+mod stubborn;
 
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{RowSet, Rows};
