@@ -6,7 +6,6 @@ mod islands;
 mod linkages;
 mod pivoting;
 mod redundant;
-
 mod residuals;
 mod scalar;
 mod soft;
