@@ -7,9 +7,10 @@
 //! ```
 //!
 //! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
-//! search of a face we need in deep overlaps alone ([`deep`]), since edges and vertices of both bodies are exact.
+//! search of a face we need in deep overlaps alone ([`deep`], [`deepest`]), since edges and vertices of both bodies are exact.
 
 mod deep;
+mod deepest;
 mod line;
 mod pass;
 mod rim;
