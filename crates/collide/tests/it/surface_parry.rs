@@ -282,6 +282,7 @@ fn on_meshes(poses: usize, brute: usize) {
     }
     println!("meshes on meshes: {counts:?}");
     agree(&counts);
+    assert_eq!(counts.elsewhere[0], 0, "a flat face is closest, and no contact has its normal");
 }
 
 fn agree(c: &Counts) {
