@@ -20,7 +20,7 @@ pub use check::ClosedReport;
 pub(crate) use check::edge_groups;
 pub(crate) use crossing::crossing_shells;
 pub use distance::{ClosestPoint, MeshDistance};
-pub(crate) use distance::{closest_on_triangle, pseudonormals};
+pub(crate) use distance::{Descent, closest_on_triangle, pseudonormals};
 pub use repair::{RepairReport, RepairSettings};
 pub(crate) use shells::shells;
 pub use winding::WindingNumber;

@@ -13,6 +13,7 @@ mod overlaps;
 mod primitives;
 mod quality;
 mod rays;
+mod referee;
 mod rng;
 mod shared_meshes;
 mod surface;

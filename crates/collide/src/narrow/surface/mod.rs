@@ -7,9 +7,10 @@
 //! ```
 //!
 //! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
-//! search of a face we need in deep overlaps alone ([`deep`]), since edges and vertices of both bodies are exact.
+//! search of a face we need in deep overlaps alone ([`deep`], [`deepest`]), since edges and vertices of both bodies are exact.
 
 mod deep;
+mod deepest;
 mod line;
 mod parting;
 mod pass;
@@ -58,18 +59,23 @@ pub(in crate::narrow) fn surface(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pos
     found.finish(pose_b);
 }
 
-/// The contacts of the elements of both, in B's frame.
+/// The contacts of the elements of both, in B's frame; of deep overlaps that of their faces too.
 fn elements(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector) -> Seen {
     let b_in_a = a_in_b.inverse();
     let (first, second) = (Pass::new(a_in_b, b, size, None), Pass::new(&b_in_a, a, size, Some(a_in_b)));
     first.run(&a.source, found);
     second.run(&b.source, found);
     if found.overlap() > DEEP * size {
-        for (pass, mesh) in [(&first, a.mesh), (&second, b.mesh)] {
-            if let Some(mesh) = mesh {
-                pass.faces(mesh, found);
-            }
-        }
+        faces([&first, &second], [a, b], found);
     }
     Seen { least: first.least().min(second.least()) }
+}
+
+/// The deepest place of the faces of each mesh in the other body.
+fn faces(passes: [&Pass; 2], bodies: [&Body; 2], found: &mut Collector) {
+    for (pass, body) in passes.into_iter().zip(bodies) {
+        if let Some(mesh) = body.mesh {
+            pass.faces(mesh, found);
+        }
+    }
 }

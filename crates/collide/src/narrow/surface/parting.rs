@@ -16,11 +16,15 @@
 //! Bodies that are not convex have the depth of their deepest place, if the two are free when moved so far; else their hulls are parted, if much of one is in the other.
 
 use super::super::reduce::Collector;
-use super::{Body, Source, elements};
+use super::deep::DEEP;
+use super::pass::Pass;
+use super::{Body, Source, elements, faces};
+use crate::surface::TOUCHING;
 use crate::surface::elements::Elements;
 use crate::surface::field::MeshField;
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 use arrayvec::ArrayVec;
+use nalgebra::Point3;
 
 /// What the elements made of two bodies.
 pub(super) struct Seen {
@@ -49,6 +53,10 @@ const MOST_FACES: usize = 256;
 const MOST_WAYS: usize = 16;
 /// A direction must be better by this to count, so that the first of equal ones does.
 const BETTER: f64 = 1.0 - 1e-6;
+/// Points of a mesh that are asked whether they are inside, at most.
+const MOST_POINTS: usize = 128;
+/// Two are in each other if so much of one is.
+const MUCH: f64 = 0.2;
 /// Steps of the search from the best direction: from the first, radians, halved, down to the last.
 const FIRST_STEP: f64 = 0.1;
 const LAST_STEP: f64 = 1e-4;
@@ -63,6 +71,9 @@ pub(super) fn part(a: &Body, b: &Body, a_in_b: &Pose, size: f64, seen: &Seen, fo
     }
     let two = Two { a, b, pose: a_in_b, rotation: *a_in_b.rotation.to_rotation_matrix().matrix(), size };
     if !(a.field.convex() && b.field.convex()) {
+        if (missing && told < SAME * size) || (told > DEEP * size && two.share_inside() > MUCH) {
+            two.part_hollow(found);
+        }
         return;
     }
     if found.deepest().is_some_and(|c| two.overlap(&c.normal) <= LONGER * told + SAME * size) {
@@ -125,6 +136,37 @@ impl Two<'_> {
         if many(self.a) || many(self.b) { self.refine(best) } else { best }
     }
 
+    /// Two of which one is not convex: by the deepest place, or by their hulls.
+    fn part_hollow(&self, found: &mut Collector) {
+        if found.least() > -DEEP * self.size {
+            let inverse = self.pose.inverse();
+            let (first, second) = (Pass::new(self.pose, self.b, self.size, None), Pass::new(&inverse, self.a, self.size, Some(self.pose)));
+            faces([&first, &second], [self.a, self.b], found);
+        }
+        let deepest = found.deepest().copied().filter(|c| c.gap < -SAME * self.size);
+        if let Some(c) = deepest.filter(|c| self.are_free(c.normal * (CLEAR * self.size - c.gap))) {
+            self.touching(c.normal, -c.gap, found);
+        } else if self.share_inside() > MUCH {
+            let (way, depth) = self.least();
+            self.touching(way, depth, found);
+        }
+    }
+
+    /// Whether they do not overlap where A is moved by so much.
+    fn are_free(&self, shift: Vec3) -> bool {
+        let (mut out, mut moved) = (Vec::new(), *self.pose);
+        moved.translation.vector += shift;
+        let mut there = Collector::new(CLEAR * self.size, self.size, &mut out);
+        let seen = elements(self.a, self.b, &moved, self.size, &mut there);
+        seen.least > -SAME * self.size && there.least() > -SAME * self.size
+    }
+
+    /// Which share of the points of the one that has more of them there is inside the other one, or on it.
+    fn share_inside(&self) -> f64 {
+        let inverse = self.pose.inverse();
+        [(self.a, self.b, self.pose), (self.b, self.a, &inverse)].into_iter().map(|(of, within, pose)| share_inside(of, within, pose, self.size)).fold(0.0, f64::max)
+    }
+
     fn refine(&self, (mut n, mut depth): (Vec3, f64)) -> (Vec3, f64) {
         let mut step = FIRST_STEP;
         for _ in 0..MOST_STEPS {
@@ -161,6 +203,15 @@ impl Two<'_> {
             found.push(Contact { point, normal: way, gap: -depth, feature: PARTED, core_a: 0.0, core_b: 0.0, normal_from: NormalFrom::Edges });
         }
     }
+}
+
+/// Of a mesh's points; 0 of others.
+fn share_inside(of: &Body, within: &Body, pose: &Pose, size: f64) -> f64 {
+    let Source::Mesh(elements) = &of.source else { return 0.0 };
+    let every = elements.points.len().div_ceil(MOST_POINTS).max(1);
+    let inside = |p: &Vec3| within.field.hit(p, &[], TOUCHING).distance < TOUCHED * size;
+    let count = elements.points.iter().step_by(every).filter(|p| inside(&(pose * Point3::from(p.at)).coords)).count();
+    count as f64 / elements.points.len().div_ceil(every).max(1) as f64
 }
 
 /// Names the contact of two bodies that have no other.

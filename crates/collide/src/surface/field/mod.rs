@@ -7,6 +7,7 @@
 //! may be one that it cannot meet, and the next one is taken.
 
 mod builder;
+mod faces;
 mod octree;
 
 use super::{Feature, Field, Hit, TOUCHING, facing, opposition};
@@ -90,16 +91,6 @@ impl MeshField {
         field.balls = field.corners.iter().map(|c| ball_around(c, &center, diagonal)).collect();
         builder::build(&mut field);
         field
-    }
-
-    /// Corners of all triangles.
-    pub fn faces(&self) -> &[[Vec3; 3]] {
-        &self.corners
-    }
-
-    /// Outward, of triangle `t`; zero if that has no area.
-    pub fn face_normal(&self, t: usize) -> Vec3 {
-        self.normals[t][0]
     }
 
     /// Centre and radius of a ball around triangle `t`.
