@@ -33,6 +33,10 @@ const LOOKS: usize = 20;
 const MOST_LOOKS: usize = 90;
 /// Halvings of a part over a valley, at most.
 const MOST_PARTED: u32 = 5;
+/// Square of the sine between lines that are as good as parallel.
+const PARALLEL: f64 = 1e-6;
+/// A foot so near a look is no news, as a part of what is left.
+const FOOT_ASIDE: f64 = 1e-6;
 /// How far below a tangent is no rounding, as a part of the smaller body's radius.
 const VALLEY: f64 = 1e-9;
 
@@ -68,6 +72,41 @@ impl Look {
     /// The tangent at another place.
     fn height(&self, s: f64) -> f64 {
         self.hit.distance + self.slope * (s - self.s)
+    }
+
+    /// The distance from the edge or corner that is closest here, along all of the line; none from within, where it is nowhere least.
+    fn arc(&self, line: &Line) -> Option<Arc> {
+        let across = match self.hit.feature {
+            Feature::Face => return None,
+            Feature::Line(way) | Feature::Edge(way) => 1.0 - way.dot(&line.along).powi(2),
+            Feature::Point => 1.0,
+        };
+        let distance = self.hit.distance;
+        let least = distance * distance * (1.0 - self.slope * self.slope / across);
+        let fits = distance > 0.0 && across > PARALLEL && least > 0.0;
+        fits.then(|| Arc { foot: self.s - distance * self.slope / across, least, across })
+    }
+}
+
+/// The distance from a straight line or a point along another line, `√(f² + k (s − s*)²)`.
+struct Arc {
+    /// `s*`, where it is least.
+    foot: f64,
+    /// `f²`.
+    least: f64,
+    /// `k`: the square of the sine between the lines; 1 of a point.
+    across: f64,
+}
+
+impl Arc {
+    fn height(&self, s: f64) -> f64 {
+        (self.least + self.across * (s - self.foot).powi(2)).sqrt()
+    }
+
+    /// Where it rises by so much per metre.
+    fn place_of_slope(&self, slope: f64) -> Option<f64> {
+        let steepest = self.across - slope * slope;
+        (steepest > 0.0).then(|| self.foot + slope * (self.least / (self.across * steepest)).sqrt())
     }
 }
 
@@ -201,7 +240,9 @@ impl Pass<'_> {
             if (convex && least - level < tolerance) || high.s - low.s < tolerance {
                 break;
             }
+            let foot = if n % 3 < 2 { self.foot_between(line, &low, &high) } else { None };
             let s = match n % 3 {
+                _ if let Some(foot) = foot => foot,
                 0 if convex => s.clamp(low.s, high.s),
                 1 => low.s - low.slope * (high.s - low.s) / (high.slope - low.slope),
                 _ => 0.5 * (low.s + high.s),
@@ -225,6 +266,16 @@ impl Pass<'_> {
         }
         self.kink(line, &low, &high, found);
         Some([low, high])
+    }
+
+    /// The foot on the feature that is closest at the lower of two looks, or else at the other, where it lies between them.
+    fn foot_between(&self, line: &Line, low: &Look, high: &Look) -> Option<f64> {
+        if self.field.round() {
+            return None;
+        }
+        let margin = FOOT_ASIDE * (high.s - low.s);
+        let looks = if low.hit.distance < high.hit.distance { [low, high] } else { [high, low] };
+        looks.iter().filter_map(|look| Some(look.arc(line)?.foot)).find(|s| *s > low.s + margin && *s < high.s - margin)
     }
 
     /// A minimum between two slopes.
@@ -283,6 +334,9 @@ impl Pass<'_> {
             if rise < tolerance || turn.abs() <= LEVEL {
                 return outer.s;
             }
+            if let Some(s) = self.leaves_towards(line, look, &outer, tolerance) {
+                return s;
+            }
             let s = outer.s - rise / turn;
             if (s - look.s) * (outer.s - look.s) <= 0.0 || (s - outer.s) * (look.s - outer.s) <= 0.0 {
                 return look.s;
@@ -290,6 +344,17 @@ impl Pass<'_> {
             outer = self.look(line, s);
         }
         outer.s
+    }
+
+    /// The same where the feature that is closest at `outer` bounds that face: its distance touches the face's plane there.
+    fn leaves_towards(&self, line: &Line, look: &Look, outer: &Look, tolerance: f64) -> Option<f64> {
+        if self.field.round() {
+            return None;
+        }
+        let arc = outer.arc(line)?;
+        let s = arc.place_of_slope(look.slope)?;
+        let between = (s - look.s) * (outer.s - look.s) > 0.0 && (s - outer.s) * (look.s - outer.s) > 0.0;
+        (between && (arc.height(s) - look.height(s)).abs() < tolerance).then_some(s)
     }
 
     fn push_on_face(&self, line: &Line, look: &Look, s: f64, part: u64, found: &mut Collector) {

@@ -72,7 +72,6 @@ pub(super) fn build(field: &mut MeshField) {
     Builder { field, deepest }.cell(0, center, half, &all, &Vec3::zeros(), 0);
     field.tree.finish(deepest);
     field.lists.shrink_to_fit();
-    if std::env::var_os("SIZES").is_some() { eprintln!("cells {} lists {} deepest {deepest} listed cells {} top {}", field.tree.cells.len(), field.lists.len(), field.tree.cells.iter().filter(|c| c.count > 0).count(), 1 << (3 * deepest.min(6))); }
 }
 
 fn order(a: &Near, b: &Near) -> std::cmp::Ordering {
