@@ -6,6 +6,8 @@
 //! that are too far to reach the margin are dropped (`d_B` changes by at most 1 m per metre). Within a piece that is kept the function
 //! is treated as convex until a look lies below the tangent of another one: there is a valley of B between them, and perhaps a second minimum,
 //! so that part is halved a few times.
+//! Where an edge or a corner of B is closest, the distance from it alone has its least place in closed form ([`Arc`]): that is looked at next, and where
+//! the same edge or corner is closest there, it is the minimum.
 //! What comes out:
 //!
 //! - a kink, two slopes: an edge of B (or the ridge between two faces, inside) is crossed. The normal is the combination of the two that is
@@ -14,6 +16,7 @@
 //!   edge's own ends, which are points and speak for themselves.
 
 use super::super::reduce::Collector;
+use super::arc::Arc;
 use super::pass::{ASIDE, Normals, Pass};
 use crate::surface::elements::Edge;
 use crate::surface::{Feature, Hit, TOUCHING, facing};
@@ -33,8 +36,6 @@ const LOOKS: usize = 20;
 const MOST_LOOKS: usize = 90;
 /// Halvings of a part over a valley, at most.
 const MOST_PARTED: u32 = 5;
-/// Square of the sine between lines that are as good as parallel.
-const PARALLEL: f64 = 1e-6;
 /// A foot so near a look is no news, as a part of what is left.
 const FOOT_ASIDE: f64 = 1e-6;
 /// How far below a tangent is no rounding, as a part of the smaller body's radius.
@@ -74,39 +75,9 @@ impl Look {
         self.hit.distance + self.slope * (s - self.s)
     }
 
-    /// The distance from the edge or corner that is closest here, along all of the line; none from within, where it is nowhere least.
+    /// The distance from the edge or corner that is closest here.
     fn arc(&self, line: &Line) -> Option<Arc> {
-        let across = match self.hit.feature {
-            Feature::Face => return None,
-            Feature::Line(way) | Feature::Edge(way) => 1.0 - way.dot(&line.along).powi(2),
-            Feature::Point => 1.0,
-        };
-        let distance = self.hit.distance;
-        let least = distance * distance * (1.0 - self.slope * self.slope / across);
-        let fits = distance > 0.0 && across > PARALLEL && least > 0.0;
-        fits.then(|| Arc { foot: self.s - distance * self.slope / across, least, across })
-    }
-}
-
-/// The distance from a straight line or a point along another line, `√(f² + k (s − s*)²)`.
-struct Arc {
-    /// `s*`, where it is least.
-    foot: f64,
-    /// `f²`.
-    least: f64,
-    /// `k`: the square of the sine between the lines; 1 of a point.
-    across: f64,
-}
-
-impl Arc {
-    fn height(&self, s: f64) -> f64 {
-        (self.least + self.across * (s - self.foot).powi(2)).sqrt()
-    }
-
-    /// Where it rises by so much per metre.
-    fn place_of_slope(&self, slope: f64) -> Option<f64> {
-        let steepest = self.across - slope * slope;
-        (steepest > 0.0).then(|| self.foot + slope * (self.least / (self.across * steepest)).sqrt())
+        Arc::new(&self.hit, self.s, self.slope, &line.along)
     }
 }
 
@@ -325,7 +296,8 @@ impl Pass<'_> {
         }
     }
 
-    /// Where the line leaves the face that is under `look`, towards `outer`: where the tangents of the two meet.
+    /// Where the line leaves the face that is under `look`, towards `outer`: in closed form where the edge that bounds the face is closest at `outer`,
+    /// else where the tangents of the two meet.
     fn leaves(&self, line: &Line, look: &Look, mut outer: Look) -> f64 {
         let tolerance = 1e-9 * self.size;
         for _ in 0..LOOKS {

@@ -9,6 +9,7 @@
 //! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
 //! search of a face we need in deep overlaps alone ([`deep`]), since edges and vertices of both bodies are exact.
 
+mod arc;
 mod deep;
 mod line;
 mod pass;
