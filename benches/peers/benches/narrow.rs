@@ -164,7 +164,7 @@ fn touching(body: &Body, n: u64, into: f64) -> Pose {
 /// The same by steps, then halves, with parry's test of intersection, which is faster by far; and the way.
 fn approached(body: &Body, n: u64) -> (Pose, Vec3) {
     let (mut pose, way) = far(n);
-    let meet = |pose: &Pose| query::intersection_test(&to_parry(pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs).expect("two meshes");
+    let meet = |pose: &Pose| query::intersection_test(&to_parry(pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs).expect("two meshes").intersecting;
     let mut step = STEP;
     while pose.translation.vector.dot(&way) > 0.0 && !meet(&moved(&pose, &way, step)) {
         pose = moved(&pose, &way, step);
