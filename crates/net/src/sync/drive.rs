@@ -144,14 +144,18 @@ impl<L: ServerLink> Server<L> {
         }
     }
 
-    /// Tells the facets that the run is over, and gives the link a moment to carry it.
+    /// Tells the facets that the run is over, and waits until they have heard it: who draws hears it after the picture. At most a second.
     ///
     /// # Errors
     /// The link's.
     pub fn end(&mut self) -> Result<(), SessionError> {
         self.session.end();
         self.flush()?;
-        self.idle_until(self.now() + Duration::from_millis(50))
+        let until = self.now() + Duration::from_secs(1);
+        while self.session.is_anyone_there() && self.now() < until {
+            self.turn(until.saturating_sub(self.now()))?;
+        }
+        Ok(())
     }
 
     /// Since the start.

@@ -89,9 +89,15 @@ impl<'a> Session<'a> {
     }
 
     pub fn spawn(desktop: &'a Desktop, folder: Folder, args: &[&str]) -> Session<'a> {
+        Session::spawn_with(desktop, folder, args, &[])
+    }
+
+    /// With more of an environment.
+    pub fn spawn_with(desktop: &'a Desktop, folder: Folder, args: &[&str], environment: &[(&str, &str)]) -> Session<'a> {
         let (status, log) = (text(&folder.path("status")), std::fs::File::create(folder.path("stderr")).unwrap());
         let mut command = command(&[&["view"], args, &["--status", &status]].concat());
         command.env("DISPLAY", &desktop.display).env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").stderr(log);
+        command.envs(environment.iter().copied());
         let process = Running(command.spawn().unwrap());
         Session { desktop, folder, process, window: String::new() }
     }

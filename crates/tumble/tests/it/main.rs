@@ -22,4 +22,5 @@ mod repair;
 mod scenes;
 mod spheretree;
 mod view;
+mod view_drivers;
 mod view_windows;

@@ -94,19 +94,6 @@ fn windows_that_end_end_well() {
     assert!(code == Some(1) && said.contains("X "), "{code:?}: {said}");
 }
 
-/// A driver that crashes takes the device with it, in the middle of a run.
-#[test]
-fn a_device_that_is_lost_ends_the_window_with_a_message() {
-    let Some(desktop) = Desktop::open() else { return };
-    let mut view = Session::spawn(&desktop, Folder::new("view-device"), &["stack", "--size", "64x48", "--lose-device", "3"]);
-    let (code, said) = view.end();
-    if said.contains("no graphics adapter") {
-        return crate::desktop::skip(&said);
-    }
-    assert!(code == Some(1) && said.starts_with("Error: the window: the graphics device ") && said.contains("lost"), "{code:?}: {said}");
-    assert_eq!(said.lines().count(), 1, "{said}");
-}
-
 #[test]
 fn a_display_that_does_not_answer_is_named() {
     for (variable, value) in [("DISPLAY", ":987"), ("DISPLAY", "nonsense"), ("WAYLAND_DISPLAY", "wayland-987")] {

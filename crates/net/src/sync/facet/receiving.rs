@@ -43,7 +43,11 @@ impl FacetSession {
             Kind::Refused if about_us => self.phase = Phase::Over(Over::Refused(Refusal::read(payload)?.0)),
             Kind::Rejoin if about_us && self.phase == Phase::Live => self.lose(),
             Kind::Rejoin if about_us => self.join_anew(),
-            Kind::End if live || about_us => self.phase = Phase::Over(Over::Ended),
+            Kind::End if live || about_us => {
+                // so that the server knows who has heard it
+                self.send(Kind::Leave, 0, |_| {});
+                self.phase = Phase::Over(Over::Ended);
+            }
             Kind::State if self.phase == Phase::Joining => self.keep_early(now, header, message),
             Kind::State if live => return self.on_state(now, header, message),
             Kind::Present if live => self.on_present(now, header.frame),

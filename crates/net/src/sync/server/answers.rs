@@ -90,6 +90,7 @@ impl ServerSession {
         let place = &mut self.places[facet as usize];
         (place.standing, place.join, place.exact, place.heard, place.sent) = (Standing::Following, join, wanted.exact, now, now);
         (place.synced, place.ready, place.presented, place.told) = (false, None, None, FacetCounts::default());
+        (place.answered, place.keeps_up) = (None, false);
         place.inputs.clear();
         (place.clock, place.asked_state, place.asked_present) = (Clock::default(), None, None);
         count(&mut place.counts.joined);
@@ -119,7 +120,20 @@ impl ServerSession {
         self.streams[exact as usize].hashes.iter().find(|(f, _)| *f == frame).map(|(_, ours)| ours == hash)
     }
 
+    /// A facet that follows draws one frame after the other, always the newest: the time between two answers is what one takes it. Where that is well below what
+    /// a frame is waited for, it can be waited for again, also if it is slower than the frames come.
+    fn watch_pace(&mut self, now: Duration, facet: FacetNumber, frame: u64) {
+        let well_below = self.options.ready_after * 3 / 4;
+        let place = &mut self.places[facet as usize];
+        if self.options.pace != Pace::Lockstep || place.standing != Standing::Following || place.answered.is_some_and(|(last, _)| !later(frame, last)) {
+            return;
+        }
+        place.keeps_up = place.answered.is_some_and(|(_, at)| now.saturating_sub(at) < well_below);
+        place.answered = Some((frame, now));
+    }
+
     pub(super) fn on_ready(&mut self, now: Duration, facet: FacetNumber, frame: u64, done: Done) {
+        self.watch_pace(now, facet, frame);
         let place = &self.places[facet as usize];
         let right = self.check(place.exact, frame, &done.hash);
         let place = &mut self.places[facet as usize];
@@ -131,7 +145,8 @@ impl ServerSession {
         } else {
             place.ready = Some(frame);
             if self.frame == Some(frame) && self.options.pace == Pace::Lockstep {
-                place.standing = Standing::InStep;
+                self.first_ready = self.first_ready.or((place.standing == Standing::InStep && place.seat.critical).then_some(now));
+                (place.standing, place.answered, place.keeps_up) = (Standing::InStep, None, false);
             }
             if !right {
                 count(&mut place.counts.mismatched);

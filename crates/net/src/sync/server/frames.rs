@@ -78,24 +78,29 @@ impl ServerSession {
     /// Sends the frame that was kept, with its list of objects if that is new.
     pub(super) fn send_frame(&mut self, now: Duration, frame: u64) {
         let first = self.frame.is_none();
-        (self.frame, self.next, self.stage) = (Some(frame), frame.wrapping_add(1), Stage::Idle);
+        (self.frame, self.next, self.stage, self.first_ready) = (Some(frame), frame.wrapping_add(1), Stage::Idle, None);
+        for place in self.places.iter_mut().filter(|p| p.standing == Standing::Following && (first || p.keeps_up)) {
+            place.standing = Standing::InStep;
+        }
         for exact in [false, true] {
-            let to: Vec<FacetNumber> = self.there().filter(|(_, p)| p.exact == exact).map(|(k, _)| k).collect();
+            let of_stream = |(k, p): (FacetNumber, &Place)| (p.exact == exact).then_some((k, p.standing));
+            let to: Vec<(FacetNumber, Standing)> = self.there().filter_map(of_stream).collect();
             let stream = &self.streams[exact as usize];
             let (fresh, state) = (stream.listed == Some(frame), stream.state.clone());
             if fresh {
-                to.iter().for_each(|&k| self.send_snapshot(k));
+                to.iter().for_each(|&(k, _)| self.send_snapshot(k));
             }
-            if !state.is_empty() {
-                self.send(to, self.state_delivery(), state);
+            // who follows wants the newest frame, and not all that it missed before it
+            for standing in [Standing::InStep, Standing::Following] {
+                let to: Vec<FacetNumber> = to.iter().filter(|(_, s)| *s == standing).map(|(k, _)| *k).collect();
+                if !state.is_empty() && !to.is_empty() {
+                    self.send(to, self.state_delivery(standing), state.clone());
+                }
             }
         }
         for place in self.places.iter_mut().filter(|p| p.standing != Standing::Absent) {
             place.sent = now;
             ask(&mut place.asked_state, frame, now);
-            if first && place.standing == Standing::Following {
-                place.standing = Standing::InStep;
-            }
         }
         if self.options.pace == Pace::Lockstep {
             self.stage = Stage::Ready(now);
@@ -134,10 +139,20 @@ impl ServerSession {
 
     /// When those who have not answered are waited for no longer.
     pub(super) fn patience_ends(&self) -> Option<Duration> {
-        let patience = |p: &Place| if p.synced { self.options.ready_after } else { self.options.first_after };
+        let options = &self.options;
         match self.stage {
             Stage::Idle => None,
-            Stage::Ready(since) => self.waited_for().filter(|p| p.ready != self.frame).map(|p| since.saturating_add(patience(p))).max(),
+            Stage::Ready(since) => {
+                // while nobody is ready nobody is held up
+                let at_most = since.saturating_add(options.ready_after.max(options.drop_after));
+                let end = |p: &Place| match (p.synced, self.first_ready) {
+                    (false, _) => since.saturating_add(options.first_after),
+                    (true, None) => at_most,
+                    // what it began before it was waited for comes first
+                    (true, Some(first)) => first.saturating_add(options.ready_after * if p.keeps_up { 2 } else { 1 }).min(at_most),
+                };
+                self.waited_for().filter(|p| p.ready != self.frame).map(end).max()
+            }
             Stage::Presented(since) => Some(since.saturating_add(self.options.ready_after)),
         }
     }
@@ -148,6 +163,7 @@ impl ServerSession {
             let place = &mut self.places[k];
             if place.standing == Standing::InStep && !done(place) {
                 place.standing = Standing::Following;
+                (place.answered, place.keeps_up) = (None, false);
                 count(counter(&mut place.counts));
                 self.tell(ServerEvent::Late(k as FacetNumber, frame));
             }

@@ -62,7 +62,7 @@ pub struct ServerOptions {
     pub seats: Vec<Seat>,
     /// `mode`.
     pub pace: Pace,
-    /// `ready_timeout_ms`.
+    /// `ready_timeout_ms`: how long those who are ready wait for the others.
     pub ready_after: Duration,
     /// How long the first frame of who joined before it may take.
     pub first_after: Duration,
@@ -176,6 +176,10 @@ struct Place {
     synced: bool,
     ready: Option<u64>,
     presented: Option<u64>,
+    /// While it follows: the frame that it was ready for last, and when it said so.
+    answered: Option<(u64, Duration)>,
+    /// It is drawing in time again, and is waited for from the next frame on; until it is ready for that one.
+    keeps_up: bool,
     counts: SeatCounts,
     told: FacetCounts,
     inputs: std::collections::BTreeMap<u16, u64>,
@@ -212,6 +216,8 @@ pub struct ServerSession {
     next: u64,
     time_s: f64,
     stage: Stage,
+    /// When the first of those who are waited for was ready for the frame.
+    first_ready: Option<Duration>,
     out: Vec<ToFacets>,
     events: VecDeque<ServerEvent>,
     close: Vec<FacetNumber>,
@@ -226,13 +232,13 @@ impl ServerSession {
         options.history = options.history.clamp(1, 1024);
         let place = |seat: &Seat| Place {
             seat: seat.clone(), standing: Standing::Absent, join: 0, retired: VecDeque::new(), rivals: Rivals::default(), exact: false, heard: Duration::ZERO, sent: Duration::ZERO,
-            synced: false, ready: None, presented: None, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(), clock: Clock::default(), asked_state: None, asked_present: None,
+            synced: false, ready: None, presented: None, answered: None, keeps_up: false, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(), clock: Clock::default(), asked_state: None, asked_present: None,
         };
         let places = options.seats.iter().map(place).collect();
         let stream = |exact| Stream { publisher: Publisher::new(base, exact, 0), snapshot: Arc::default(), listed: None, state: Arc::default(), hashes: VecDeque::new() };
         let next = options.first_frame;
         ServerSession {
-            options, places, streams: [stream(false), stream(true)], frame: None, next, time_s: 0.0, stage: Stage::Idle, out: Vec::new(),
+            options, places, streams: [stream(false), stream(true)], frame: None, next, time_s: 0.0, stage: Stage::Idle, first_ready: None, out: Vec::new(),
             events: VecDeque::new(), close: Vec::new(), ended: false, times: Times::default(),
         }
     }
@@ -245,6 +251,11 @@ impl ServerSession {
     /// What was counted here about a facet, and what it counted itself by its last beat.
     pub fn counts(&self, facet: FacetNumber) -> (SeatCounts, FacetCounts) {
         self.places.get(facet as usize).map_or_else(Default::default, |p| (p.counts, p.told))
+    }
+
+    /// Whether any facet is there.
+    pub fn is_anyone_there(&self) -> bool {
+        self.there().next().is_some()
     }
 
     /// Whether every critical facet is there.

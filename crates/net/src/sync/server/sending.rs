@@ -61,8 +61,9 @@ impl ServerSession {
         self.places.iter().filter(|p| p.standing == Standing::InStep && p.seat.critical)
     }
 
-    pub(super) fn state_delivery(&self) -> Delivery {
-        if self.options.pace == Pace::Lockstep { Delivery::Reliable } else { Delivery::Newest }
+    pub(super) fn state_delivery(&self, standing: Standing) -> Delivery {
+        let waited_for = self.options.pace == Pace::Lockstep && standing == Standing::InStep;
+        if waited_for { Delivery::Reliable } else { Delivery::Newest }
     }
 
     pub(super) fn head(&self, kind: Kind, join: u64, frame: u64) -> Header {
@@ -89,7 +90,7 @@ impl ServerSession {
         let state = self.streams[self.places[facet as usize].exact as usize].state.clone();
         if !state.is_empty() {
             ask(&mut self.places[facet as usize].asked_state, self.frame.unwrap_or(0), now);
-            self.send(vec![facet], self.state_delivery(), state);
+            self.send(vec![facet], self.state_delivery(Standing::InStep), state);
         }
     }
 

@@ -143,7 +143,12 @@ impl ShmFacet {
                 let (waiting, superseded) = (&mut self.waiting, &mut self.counters.superseded);
                 let deliver = |delivery, message| *superseded += queue(waiting, delivery, message);
                 let data = if mine && !repeated_for_another { ports.lend(sample) } else { Message::default() };
-                if !repeated_for_another && order.take(&head, mine, data, deliver).is_err() {
+                let taken = match (repeated_for_another, head.skip) {
+                    (true, _) => Ok(()),
+                    (false, true) => order.skip(head.number, head.until, deliver),
+                    (false, false) => order.take(&head, mine, data, deliver),
+                };
+                if taken.is_err() {
                     self.end(Closed::Overrun);
                 }
             }

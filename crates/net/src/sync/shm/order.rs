@@ -1,7 +1,8 @@
 //! Reliable order over a buffer that overflows: numbers, a memory of what was sent, and asking again.
 //!
 //! A reader that is slower than its buffer loses the *oldest* samples, so the newest always arrives and shows by its number what is missing. The reader
-//! asks for the first few of those again, at most as many as its buffer holds, and for the next when they came: it sets the pace itself.
+//! asks for the first few of those again, at most as many as its buffer holds, and for the next when they came: it sets the pace itself. What is no longer wanted
+//! of those, messages of which a newer one is there, is not sent again but said to be nothing, in one sample however much it is.
 
 use super::wire::Head;
 use crate::sync::transport::{Delivery, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES, Message};
@@ -80,6 +81,48 @@ impl Memory {
         let range = head.number..until;
         (head.number >= self.first).then(|| range.filter_map(|number| Some((number, self.kept.get((number - self.first) as usize)?))))
     }
+
+    /// The same for one reader of many, whose bit of the masks is `bit`: what is for others, or older than its newest, is left out, however much that is.
+    pub fn again_to(&self, head: &Head, bit: u64) -> Option<Vec<Again<'_>>> {
+        let mut left = self.kept.iter().enumerate().skip(usize::try_from(head.number.checked_sub(self.first)?).ok()?).peekable();
+        let newest = self.newest_of(bit);
+        let wanted = |k: usize, kept: &Kept| kept.mask & bit != 0 && !(kept.newest && newest.is_some_and(|first| k < first));
+        let mut again = Vec::new();
+        while again.len() < AT_ONCE as usize
+            && let Some((k, kept)) = left.next()
+        {
+            let number = self.first + k as u64;
+            if wanted(k, kept) {
+                if number >= head.until {
+                    break;
+                }
+                again.push(Again::Piece(number, kept));
+            } else {
+                let mut until = number + 1;
+                while left.next_if(|(k, kept)| !wanted(*k, kept)).is_some() {
+                    until += 1;
+                }
+                again.push(Again::Nothing(number, until));
+            }
+        }
+        Some(again)
+    }
+
+    /// Where the last newest message of a reader begins; the pieces of a message lie together.
+    fn newest_of(&self, bit: u64) -> Option<usize> {
+        let is_of = |kept: &Kept| kept.newest && kept.mask & bit != 0;
+        let last = self.kept.iter().rposition(|kept| is_of(kept) && !kept.more)?;
+        let before = self.kept.iter().take(last).rposition(|kept| !(is_of(kept) && kept.more));
+        Some(before.map_or(0, |before| before + 1))
+    }
+}
+
+/// What a reader gets that asked for pieces again.
+pub enum Again<'a> {
+    /// The piece of this number.
+    Piece(u64, &'a Kept),
+    /// Nothing for it, from the first number to before the second.
+    Nothing(u64, u64),
 }
 
 /// A piece held out of order.
@@ -116,7 +159,6 @@ impl Order {
 
     /// Takes a piece; whole messages go to `deliver`. One that came in one piece and in order goes on as it is.
     pub fn take(&mut self, head: &Head, mine: bool, data: Message, mut deliver: impl FnMut(Delivery, Message)) -> Result<(), Overrun> {
-        let mine = mine && !head.skip;
         if head.number < self.next || self.pending.contains_key(&head.number) {
             return Ok(());
         }
@@ -130,11 +172,28 @@ impl Order {
             return Ok(());
         }
         self.join(mine, head.newest, head.more, data, &mut deliver)?;
+        self.join_held(&mut deliver)
+    }
+
+    fn join_held(&mut self, deliver: &mut impl FnMut(Delivery, Message)) -> Result<(), Overrun> {
         while let Some(piece) = self.pending.remove(&self.next) {
             self.pending_bytes -= piece.data.len();
-            self.join(piece.mine, piece.newest, piece.more, piece.data.into(), &mut deliver)?;
+            self.join(piece.mine, piece.newest, piece.more, piece.data.into(), deliver)?;
         }
         Ok(())
+    }
+
+    /// There is nothing for this side from one number to before another: a message that was begun goes no further.
+    pub fn skip(&mut self, from: u64, until: u64, mut deliver: impl FnMut(Delivery, Message)) -> Result<(), Overrun> {
+        if from > self.next || until <= self.next {
+            return Ok(());
+        }
+        self.partial.clear();
+        self.next = until;
+        let held = self.pending.split_off(&until);
+        let left_out = std::mem::replace(&mut self.pending, held);
+        self.pending_bytes -= left_out.values().map(|piece| piece.data.len()).sum::<usize>();
+        self.join_held(&mut deliver)
     }
 
     /// What to ask for now, if anything: first and the one after the last.
@@ -225,6 +284,38 @@ mod tests {
         let whole = memory.next() as usize / 3 + usize::from(memory.next() % 3 == 2);
         assert_eq!(order.next(), memory.next());
         assert!(got.len() > 300 && got == want[..whole]);
+    }
+
+    /// A reader that slept through many newest messages of two pieces, among which two were for others and one was reliable, gets the reliable one and the newest, at once.
+    #[test]
+    fn what_a_newer_message_replaces_is_not_sent_again() {
+        let mut memory = Memory::default();
+        for message in 0..1000u64 {
+            let reliable = message == 400;
+            for more in [true, false] {
+                memory.keep(if message % 500 == 7 { 2 } else { 1 }, !reliable, more, &message.to_le_bytes());
+            }
+        }
+        // it has the first half of the first message; nothing after that came but the very last piece
+        let (mut order, mut got) = (Order::new(0), Vec::new());
+        let head = |number, kept: &Kept| Head { number, mask: kept.mask, newest: kept.newest, more: kept.more, ..Head::new(Kind::Piece, 1) };
+        let kept = |number: u64| memory.kept.get(number as usize).unwrap();
+        for number in [0, 1999] {
+            order.take(&head(number, kept(number)), true, kept(number).data.clone().into(), |_, message| got.push(message.into_vec())).unwrap();
+        }
+        let mut rounds = 0;
+        while let Some((number, until)) = order.ask(PATIENCE * 2 * rounds) {
+            rounds += 1;
+            for again in memory.again_to(&Head { number, until, ..Head::new(Kind::Again, 1) }, 1).unwrap() {
+                match again {
+                    Again::Piece(number, kept) => order.take(&head(number, kept), true, kept.data.clone().into(), |_, message| got.push(message.into_vec())).unwrap(),
+                    Again::Nothing(from, until) => order.skip(from, until, |_, message| got.push(message.into_vec())).unwrap(),
+                }
+            }
+            assert!(rounds < 4, "asked again and again");
+        }
+        let twice = |message: u64| [message.to_le_bytes(), message.to_le_bytes()].concat();
+        assert_eq!((got, order.next(), order.pending_bytes), (vec![twice(400), twice(999)], 2000, 0));
     }
 
     #[test]

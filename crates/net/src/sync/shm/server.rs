@@ -1,6 +1,6 @@
 //! The server's end of shared memory.
 
-use super::order::{Memory, Order};
+use super::order::{Again, Memory, Order};
 use super::ports::{Ports, Received};
 use super::wire::{HEAD, Head, Kind};
 use super::{PING, SILENCE, draw};
@@ -180,21 +180,22 @@ impl ShmServer {
         self.tell(Head { facet: hello.facet, connection: hello.connection, number, ..Head::new(Kind::Welcome, self.reign) })
     }
 
-    /// Sends again what a slow facet missed; of the rest, that there is nothing.
+    /// Sends again what a slow facet missed and still wants; of the rest, that there is nothing.
     fn send_again(&mut self, asked: &Head) -> Result<(), LinkError> {
-        let Some(pieces) = self.memory.again(asked) else {
+        let bit = 1 << asked.facet;
+        let Some(again) = self.memory.again_to(asked, bit) else {
             self.end(asked.facet, Closed::Overrun);
             return Ok(());
         };
-        let bit = 1 << asked.facet;
-        for (number, kept) in pieces {
-            let skip = kept.mask & bit == 0;
-            let base = Head { facet: asked.facet, connection: asked.connection, ..Head::new(Kind::Piece, self.reign) };
-            let head = Head { newest: kept.newest, more: kept.more, skip, mask: bit, number, ..base };
-            let data = if skip { &[][..] } else { &kept.data };
+        let base = Head { facet: asked.facet, connection: asked.connection, mask: bit, ..Head::new(Kind::Piece, self.reign) };
+        let counters = &mut self.counters[usize::from(asked.facet)];
+        for again in again {
+            let (head, data) = match again {
+                Again::Piece(number, kept) => (Head { newest: kept.newest, more: kept.more, number, ..base }, &kept.data[..]),
+                Again::Nothing(number, until) => (Head { skip: true, number, until, ..base }, &[][..]),
+            };
             self.ports.publish(head.words(), data)?;
-            let counters = &mut self.counters[usize::from(asked.facet)];
-            counters.repeated += 1;
+            counters.repeated += u64::from(!head.skip);
             counters.bytes_out += (HEAD + data.len()) as u64;
         }
         self.ports.bell().ring();

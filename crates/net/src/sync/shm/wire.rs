@@ -3,14 +3,14 @@
 //! | word | bits | what |
 //! |---|---|---|
 //! | 0 | 0 to 7 | [`Kind`] |
-//! | | 8 to 15 | flags: 1 newest, 2 more of this message follows, 4 nothing for you under this number |
+//! | | 8 to 15 | flags: 1 newest, 2 more of this message follows, 4 nothing for you under these numbers |
 //! | | 16 to 31 | facet |
-//! | | 32 to 63 | magic `shm2` |
+//! | | 32 to 63 | magic `shm3` |
 //! | 1 | | the server's reign: a number that each server process draws |
 //! | 2 | | the facet's connection: a number of each of its connections; 0 on a piece sent to all, its own on a piece sent again |
 //! | 3 | | for whom: bit k for facet k (from the server) |
 //! | 4 | | number of this piece, or the first that is asked for again |
-//! | 5 | | first number that is not taken yet, or the one after the last that is asked for again |
+//! | 5 | | first number that is not taken yet, or the one after the last that is asked for again, or after the last under which there is nothing |
 
 use crate::sync::transport::{FacetNumber, Refused};
 
@@ -18,7 +18,7 @@ use crate::sync::transport::{FacetNumber, Refused};
 pub type Words = [u64; 6];
 /// Its bytes.
 pub const HEAD: usize = size_of::<Words>();
-const MAGIC: u32 = u32::from_le_bytes(*b"shm2");
+const MAGIC: u32 = u32::from_le_bytes(*b"shm3");
 
 /// What a sample is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub struct Head {
     pub newest: bool,
     /// More of this message follows.
     pub more: bool,
-    /// Nothing for you under this number.
+    /// Nothing for you from `number` to before `until`.
     pub skip: bool,
     /// From or to which facet.
     pub facet: FacetNumber,
@@ -60,7 +60,7 @@ pub struct Head {
     pub mask: u64,
     /// Number of the piece.
     pub number: u64,
-    /// What is taken.
+    /// What is taken; in a head with `skip` and in one that asks again, the end.
     pub until: u64,
 }
 

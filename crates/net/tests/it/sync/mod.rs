@@ -5,6 +5,7 @@ mod hostile;
 mod links;
 mod lockstep;
 mod mirror;
+mod pace;
 mod quantise;
 mod threads;
 mod times;

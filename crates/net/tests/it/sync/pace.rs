@@ -1,0 +1,105 @@
+//! Facets that draw slower than frames come.
+
+use super::lockstep::STORM;
+use super::stage::*;
+use std::time::Duration;
+use tumble_net::sync::simulate::Weather;
+use tumble_net::sync::{Pace, Standing};
+
+/// Frames come every 16 ms; each facet draws so long.
+fn wall(seed: u64, weather: Weather, takes: Duration) -> Stage {
+    let mut stage = Stage::new(seed, weather, 3, Pace::Lockstep);
+    stage.facets.iter_mut().for_each(|facet| facet.takes = takes);
+    assert!(stage.until(Duration::from_secs(2), |s| s.facets.iter().all(|f| f.shown.len() >= 5)));
+    stage
+}
+
+/// How often each was waited for in vain, for its drawing or its showing.
+fn late(stage: &Stage) -> Vec<u64> {
+    (0..3).map(|k| stage.server.as_ref().unwrap().counts(k).0).map(|counts| counts.late + counts.missing).collect()
+}
+
+fn in_step(stage: &Stage) -> bool {
+    (0..3).all(|k| stage.server.as_ref().unwrap().standing(k) == Standing::InStep)
+}
+
+/// From here on all show the same frames, one after the other, each as long as the slowest draws, and nobody is late.
+fn assert_steady(stage: &mut Stage, takes: Duration, storm: bool, what: &str) {
+    let (before, shown) = (late(stage), stage.facets[0].shown.len());
+    stage.run(1000 * MS);
+    let numbers: Vec<u64> = stage.numbers(0).split_off(shown);
+    // in a storm what is lost is sent again after 5 ms
+    let least = 1000 / (takes.as_millis() as usize + if storm { 25 } else { 10 });
+    assert!(numbers.len() >= least && numbers.windows(2).all(|w| w[1] == w[0] + 1), "{what}: {numbers:?}");
+    assert_eq!(before, late(stage), "{what}");
+    for k in 1..3 {
+        let theirs = stage.numbers(k);
+        assert!(numbers[..numbers.len() - 1].iter().all(|frame| theirs.contains(frame)), "{what}: {numbers:?} {theirs:?}");
+    }
+    stage.assert_true();
+}
+
+/// While they are out of step the server goes on with the first, and frames come faster than they draw.
+#[test]
+fn slow_facets_that_stumbled_are_in_step_again() {
+    for (seed, weather) in [(1, Weather::CLEAR), (2, STORM)] {
+        for takes in [30 * MS, 60 * MS, 70 * MS] {
+            let mut stage = wall(seed, weather, takes);
+            stage.facets[0].takes = 2 * MS;
+            let until = stage.now + 250 * MS;
+            stage.facets[1..].iter_mut().for_each(|facet| facet.frozen_until = until);
+            stage.run(250 * MS);
+            assert!(late(&stage)[0] == 0 && late(&stage)[1..].iter().any(|late| *late > 0), "{:?}", late(&stage));
+            let what = format!("{takes:?}, seed {seed}");
+            assert!(stage.until(1000 * MS, in_step), "{what}: {:?}", late(&stage));
+            stage.run(300 * MS);
+            assert_steady(&mut stage, takes, seed == 2, &what);
+        }
+    }
+}
+
+/// Nobody is ready, so nobody is held up: all are waited for.
+#[test]
+fn where_all_stumble_nobody_is_late() {
+    for (seed, weather, takes) in [(5, Weather::CLEAR, 20 * MS), (6, STORM, 20 * MS), (7, Weather::CLEAR, 150 * MS)] {
+        let mut stage = wall(seed, weather, takes);
+        let until = stage.now + 400 * MS;
+        stage.facets.iter_mut().for_each(|facet| facet.frozen_until = until);
+        stage.run(500 * MS);
+        assert!(in_step(&stage) && late(&stage) == [0; 3], "seed {seed}: {:?}", late(&stage));
+        assert_steady(&mut stage, takes, seed == 6, &format!("seed {seed}"));
+    }
+}
+
+/// All that were there are gone: the server goes on without them after `drop_after`, and not later.
+#[test]
+fn a_wall_that_is_gone_holds_the_server_up_for_a_while_only() {
+    let mut stage = wall(8, Weather::CLEAR, 2 * MS);
+    (0..3).for_each(|k| stage.kill_facet(k));
+    let frames = |stage: &Stage| stage.server.as_ref().unwrap().frame().unwrap();
+    let before = frames(&stage);
+    stage.run(1900 * MS);
+    assert!(frames(&stage) <= before + 1, "it waits");
+    stage.run(400 * MS);
+    assert!(frames(&stage) >= before + 10, "it goes on");
+}
+
+/// Who draws too long for the others is waited for once, not again and again.
+#[test]
+fn a_facet_that_is_too_slow_holds_the_wall_up_once() {
+    for (seed, weather) in [(3, Weather::CLEAR), (4, STORM)] {
+        let mut stage = wall(seed, weather, 2 * MS);
+        stage.facets[1].takes = 90 * MS; // below the 100 ms of `ready_after`, above three quarters of them
+        stage.facets[1].frozen_until = stage.now + 250 * MS;
+        stage.run(1000 * MS);
+        let before = stage.facets[0].shown.len();
+        stage.run(3000 * MS);
+        let frames = stage.facets[0].shown.len() - before;
+        assert!(frames >= if seed == 3 { 180 } else { 110 }, "{frames} frames in 3 s");
+        assert_eq!(late(&stage), [0, 1, 0]);
+        // it goes on showing what is newest, and in order
+        let numbers = stage.numbers(1);
+        assert!(numbers.is_sorted_by(|a, b| a < b) && numbers.len() > 30, "{numbers:?}");
+        stage.assert_true();
+    }
+}
