@@ -253,10 +253,10 @@ fn contacts_do_not_depend_on_what_was_asked_before() {
     assert_eq!(forwards, backwards);
 }
 
-/// A bar goes through a block, both meshes of two triangles a side. No vertex and no edge of either is as deep as the places inside faces are.
+/// A bar goes through a block that has a dent, both meshes. No vertex and no edge of either is as deep as the places inside faces are.
 #[test]
 fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
-    let (block, bar) = (mesh_box(1.0, 1.0, 1.0), mesh_box(3.0, 0.7, 0.4));
+    let (block, bar) = (dented_block(), mesh_box(3.0, 0.7, 0.4));
     // the bar's wide faces are at z = ±0.4, 0.6 below the block's; the bar's edges are 0.3 below y = ±1; the block's own faces are 0.4 deep in the bar
     let straight = Pose::identity();
     // moved by 0.1 up: one wide face comes to z = 0.5, the other to z = −0.3, 0.7 below the block's lower side
@@ -268,5 +268,33 @@ fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
             // to 4e-4 of the smaller radius, and never deeper
             assert!(least >= -depth - 1e-12 && least < -depth + 4e-4 * 3.0_f64.sqrt(), "{least} but {depth}");
         }
+    }
+}
+
+/// A cube of edge 2 about its centre of mass, less a pyramid of 0.01 in one side, which moves that by 6e-5 (the deepest places are beside it in z).
+fn dented_block() -> Shape {
+    let mut mesh = TriMesh::box_(Vec3::repeat(1.0));
+    let at = |mesh: &TriMesh, v: u32| mesh.vertices[v as usize];
+    let side: Vec<[u32; 3]> = mesh.triangles.iter().copied().filter(|t| t.iter().all(|&v| at(&mesh, v).y > 0.0)).collect();
+    mesh.triangles.retain(|t| !side.contains(t));
+    let middle = mesh.vertices.len() as u32;
+    mesh.vertices.push(Vec3::new(0.0, 0.99, 0.0));
+    // the rim of the side: edges that only one of its triangles has
+    let edges: Vec<[u32; 2]> = side.iter().flat_map(|t| (0..3).map(|k| [t[k], t[(k + 1) % 3]])).collect();
+    let rim = edges.iter().filter(|[a, b]| !edges.contains(&[*b, *a]));
+    mesh.triangles.extend(rim.map(|[a, b]| [*a, *b, middle]));
+    Shape::mesh(mesh, &TreeSettings::octree()).unwrap().0
+}
+
+/// The same bar and a block without a dent, both convex: the least way out is over the block's upper side, `1 + 0.4`, or `1 + 0.3` for the raised one.
+#[test]
+fn convex_meshes_through_each_other_have_the_depth_of_the_least_translation() {
+    let (block, bar) = (mesh_box(1.0, 1.0, 1.0), mesh_box(3.0, 0.7, 0.4));
+    for (rise, depth) in [(0.0, 1.4), (0.1, 1.3)] {
+        let found = ask(&bar, &Pose::translation(0.0, 0.0, rise), &block, &Pose::identity(), 1e-3);
+        let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+        assert!((least + depth).abs() < 1e-9 && found.iter().all(|c| c.normal.z.abs() > 1.0 - 1e-9), "{least} but {depth}: {found:?}");
+        assert!(rise == 0.0 || found.iter().all(|c| c.normal.z > 0.0), "{found:?}");
+        assert!(spread(&found).x > 1.9 && spread(&found).y > 1.3, "{found:?}");
     }
 }

@@ -17,7 +17,7 @@
 
 use super::super::reduce::Collector;
 use super::deep::DEEP;
-use super::pass::Pass;
+use super::pass::{Memory, Pass};
 use super::{Body, Source, elements, faces};
 use crate::surface::TOUCHING;
 use crate::surface::elements::Elements;
@@ -140,7 +140,9 @@ impl Two<'_> {
     fn part_hollow(&self, found: &mut Collector) {
         if found.least() > -DEEP * self.size {
             let inverse = self.pose.inverse();
-            let (first, second) = (Pass::new(self.pose, self.b, self.size, None), Pass::new(&inverse, self.a, self.size, Some(self.pose)));
+            let memories = [Memory::new(), Memory::new()];
+            let first = Pass::new(self.pose, self.b, self.size, None, &memories[0]);
+            let second = Pass::new(&inverse, self.a, self.size, Some(self.pose), &memories[1]);
             faces([&first, &second], [self.a, self.b], found);
         }
         let deepest = found.deepest().copied().filter(|c| c.gap < -SAME * self.size);
