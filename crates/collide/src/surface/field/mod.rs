@@ -24,6 +24,8 @@ const SAME: f64 = 1e-11;
 const ABOVE: f64 = 1.0 - 1e-6;
 /// Faces that an element faces as squarely but for rounding.
 const SQUARE: f64 = 1e-9;
+/// Sides of a convex solid that each bound asks.
+const MOST_SIDES: usize = 16;
 /// A triangle in the list of a cell.
 #[derive(Clone, Copy, Debug)]
 struct Listed {
@@ -50,6 +52,8 @@ pub(crate) struct MeshField {
     bounds: Aabb,
     boxes: MeshDistance,
     convex: bool,
+    /// Of a convex solid of few sides: their outward normals and how far they are from the origin. Below these a bound is better than a cell's.
+    sides: ArrayVec<(Vec3, f64), MOST_SIDES>,
     touching: f64,
     diagonal: f64,
     /// How much further than the closest face another one may be that is taken instead.
@@ -81,6 +85,7 @@ impl MeshField {
             bounds,
             boxes: MeshDistance::new(mesh),
             convex: is_convex(mesh),
+            sides: ArrayVec::new(),
             touching: TOUCHING * diagonal,
             diagonal,
             around: AROUND * diagonal,
@@ -88,7 +93,28 @@ impl MeshField {
         let center = 0.5 * (bounds.min + bounds.max);
         field.balls = field.corners.iter().map(|c| ball_around(c, &center, diagonal)).collect();
         builder::build(&mut field);
+        field.sides = field.few_sides();
         field
+    }
+
+    /// The planes of a convex solid's sides; none where it is not convex or they are many.
+    fn few_sides(&self) -> ArrayVec<(Vec3, f64), MOST_SIDES> {
+        let mut sides = ArrayVec::new();
+        for (corners, normals) in self.corners.iter().zip(&self.normals) {
+            // as high as its highest corner, so that rounding leaves none outside
+            let side = (normals[0], corners.iter().map(|c| normals[0].dot(c)).fold(f64::NEG_INFINITY, f64::max));
+            let known = |s: &(Vec3, f64)| (s.0 - side.0).norm() < 1e-12 && (s.1 - side.1).abs() < 1e-12 * self.diagonal;
+            if !self.convex || !(sides.iter().any(known) || sides.try_push(side).is_ok()) {
+                return ArrayVec::new();
+            }
+        }
+        sides
+    }
+
+    /// At most the signed distance at `p`, told what the octree says: a convex solid is below all its sides.
+    fn below_sides(&self, p: &Vec3, bound: f64) -> f64 {
+        let slack = 1e-11 * self.diagonal;
+        self.sides.iter().map(|(n, height)| n.dot(p) - height - slack).fold(bound, f64::max)
     }
 
     /// Centre and radius of a ball around triangle `t`.
@@ -141,7 +167,7 @@ impl MeshField {
     /// The same where it may be less than `limit`; else a bound.
     pub fn nearest_within(&self, p: &Vec3, limit: f64) -> Result<Hit, f64> {
         let place = self.tree.locate(p);
-        let bound = place.map_or_else(|| self.tree.bound(p), |place| self.tree.bound_at(&place));
+        let bound = self.below_sides(p, place.map_or_else(|| self.tree.bound(p), |place| self.tree.bound_at(&place)));
         if bound > limit { Err(bound) } else { Ok(self.nearest_in(p, place.as_ref())) }
     }
 
@@ -295,7 +321,7 @@ const MOST_NEAR: usize = 512;
 
 impl Field for MeshField {
     fn bound(&self, p: &Vec3) -> f64 {
-        self.tree.bound(p)
+        self.below_sides(p, self.tree.bound(p))
     }
 
     fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit {
