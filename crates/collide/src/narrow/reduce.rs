@@ -164,7 +164,7 @@ impl<'a> Collector<'a> {
     }
 
     fn reduce(&mut self) {
-        let slack = SLACK * self.band;
+        let (slack, resting) = (SLACK * self.band, RESTING * self.band);
         let found = &mut self.out[self.start..];
         // `found[..kept]` are kept, `found[rest..]` are in no cluster yet
         let (mut kept, mut rest) = (0, 0);
@@ -173,7 +173,7 @@ impl<'a> Collector<'a> {
                 break;
             }
             let end = rest + gather_cluster(&mut found[rest..]);
-            let count = keep_hull(&mut found[rest..end], slack);
+            let count = keep_hull(&mut found[rest..end], slack, resting);
             for n in 0..count {
                 found.swap(kept + n, rest + n);
             }
@@ -204,18 +204,27 @@ fn gather_cluster(found: &mut [Contact]) -> usize {
 /// Moves to the front the deepest contact of a cluster (its first) and its support points; returns how many.
 ///
 /// Of contacts that support within `slack` of one another, the one with the least feature is kept, so that the choice lasts.
-fn keep_hull(cluster: &mut [Contact], slack: f64) -> usize {
-    let normal = cluster[0].normal;
+///
+/// Where the two touch (the deepest gap is less than `resting`), finer tilts follow. A base that is flat but for rounding rests on places that are deeper than others by
+/// a micrometre; were one left out it would sink, become the deepest and be kept while another one is not, and so on without end.
+fn keep_hull(cluster: &mut [Contact], slack: f64, resting: f64) -> usize {
+    let (normal, deepest) = (cluster[0].normal, cluster[0].gap);
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let v = normal.cross(&u);
     let mut kept = 1;
-    for (tilt, n) in SUPPORTS {
+    let mut keep = |tilt: f64, n: usize, slack: f64| {
         let (x, y) = DIRECTIONS[n];
         let way = (u * x + v * y) * tilt;
         let support = best_named(cluster, slack, |c| way.dot(&c.point) - c.gap);
         if support >= kept {
             cluster.swap(kept, support);
             kept += 1;
+        }
+    };
+    SUPPORTS.iter().for_each(|&(tilt, n)| keep(tilt, n, slack));
+    if deepest.abs() < resting {
+        for finer in FINER {
+            (0..DIRECTIONS.len()).for_each(|n| keep(finer * SUPPORTS[0].0, n, finer * slack));
         }
     }
     kept
@@ -236,6 +245,10 @@ const SLACK: f64 = 2e-4;
 /// again.
 const SUPPORTS: [(f64, usize); 8] =
     [(0.02, 0), (0.02, 1), (0.02, 2), (0.02, 3), (0.02, 4), (0.15, 0), (0.15, 2), (0.15, 3)];
+/// Gaps up to this are those of bodies that touch, in bands ([`BAND`]): 1e-3 of the smaller body's radius.
+const RESTING: f64 = 2e-2;
+/// Parts of the tilt that are looked for then: down to 6e-7.
+const FINER: [f64; 5] = [0.125, 0.016, 2e-3, 2.5e-4, 3e-5];
 /// Corners of a regular pentagon.
 const DIRECTIONS: [(f64, f64); 5] = [
     (1.0, 0.0),
