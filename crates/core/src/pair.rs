@@ -1,7 +1,8 @@
 //! What is asked of the narrow phase for one pair within a step: how far to look, whether at all, and when.
 //!
 //! Queries between meshes and cylinders are dear. They are not made where the boxes around both stay apart (`apart.rs`), not made twice at the same poses within a
-//! frame, and of two meshes not with a margin as wide as fast bodies would need: those are followed.
+//! frame, and of two meshes of many vertices not with a margin as wide as fast bodies would need: those are
+//! followed.
 
 use crate::apart::{Oriented, apart};
 use crate::site::Site;
@@ -12,6 +13,8 @@ use tumble_collide::{Aabb, Contact, ContactMode, Pose, Shape, Vec3};
 const TREE_REACH: f64 = 0.02;
 /// How far two meshes look ahead by their surfaces, likewise: further away they are followed along free motion. A wide margin has most of both surfaces in it.
 const MESH_REACH: f64 = 0.05;
+/// Vertices of a mesh that others look as far for as for a block.
+const SIMPLE: usize = 64;
 /// Looks along free motion, unless they come near and do not touch: then twice as many.
 const MOST_LOOKS: f64 = 16.0;
 
@@ -101,10 +104,15 @@ impl Pair<'_> {
         let margin = match (self.mode, self.shapes.map(|shape| shape.tree())) {
             // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
             (ContactMode::Spheres, [Some(_), Some(_)]) => closing.min(self.near + TREE_REACH * size),
-            (ContactMode::Surface, [Some(_), Some(_)]) => closing.min(self.near + MESH_REACH * size),
+            (ContactMode::Surface, [Some(_), Some(_)]) if !self.has_simple_mesh() => closing.min(self.near + MESH_REACH * size),
             _ => closing,
         };
         (margin, closing)
+    }
+
+    /// Whether one is a mesh of few vertices: against it a wide margin is cheap, as against a block.
+    fn has_simple_mesh(&self) -> bool {
+        self.shapes.iter().any(|shape| matches!(shape, Shape::Mesh(mesh) if mesh.mesh().vertices.len() <= SIMPLE))
     }
 
     /// The contacts at present, by feature, and 0. Of two meshes without any that are further apart than they look, those of where free motion brings them near, and when in

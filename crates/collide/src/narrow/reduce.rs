@@ -164,7 +164,7 @@ impl<'a> Collector<'a> {
     }
 
     fn reduce(&mut self) {
-        let (slack, resting) = (SLACK * self.band, RESTING * self.band);
+        let (slack, resting, far) = (SLACK * self.band, RESTING * self.band, self.limit > FAR * self.band);
         let found = &mut self.out[self.start..];
         // `found[..kept]` are kept, `found[rest..]` are in no cluster yet
         let (mut kept, mut rest) = (0, 0);
@@ -173,7 +173,7 @@ impl<'a> Collector<'a> {
                 break;
             }
             let end = rest + gather_cluster(&mut found[rest..]);
-            let count = keep_hull(&mut found[rest..end], slack, resting);
+            let count = keep_hull(&mut found[rest..end], slack, resting, far);
             for n in 0..count {
                 found.swap(kept + n, rest + n);
             }
@@ -205,9 +205,10 @@ fn gather_cluster(found: &mut [Contact]) -> usize {
 ///
 /// Of contacts that support within `slack` of one another, the one with the least feature is kept, so that the choice lasts.
 ///
-/// Where the two touch (the deepest gap is less than `resting`), finer tilts follow. A base that is flat but for rounding rests on places that are deeper than others by
-/// a micrometre; were one left out it would sink, become the deepest and be kept while another one is not, and so on without end.
-fn keep_hull(cluster: &mut [Contact], slack: f64, resting: f64) -> usize {
+/// Where contacts are looked for `far` away, wider tilts follow. Where the two touch (the deepest gap is less than `resting`), finer ones do: a base that is
+/// flat but for rounding rests on places that are deeper than others by a micrometre; were one left out it would sink, become the deepest and be kept while
+/// another one is not, and so on without end.
+fn keep_hull(cluster: &mut [Contact], slack: f64, resting: f64, far: bool) -> usize {
     let (normal, deepest) = (cluster[0].normal, cluster[0].gap);
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let v = normal.cross(&u);
@@ -222,6 +223,9 @@ fn keep_hull(cluster: &mut [Contact], slack: f64, resting: f64) -> usize {
         }
     };
     SUPPORTS.iter().for_each(|&(tilt, n)| keep(tilt, n, slack));
+    if far {
+        WIDER.iter().for_each(|&tilt| (0..DIRECTIONS.len()).for_each(|n| keep(tilt, n, slack)));
+    }
     if deepest.abs() < resting {
         for finer in FINER {
             (0..DIRECTIONS.len()).for_each(|n| keep(finer * SUPPORTS[0].0, n, finer * slack));
@@ -249,6 +253,10 @@ const SUPPORTS: [(f64, usize); 8] =
 const RESTING: f64 = 2e-2;
 /// Parts of the tilt that are looked for then: down to 6e-7.
 const FINER: [f64; 5] = [0.125, 0.016, 2e-3, 2.5e-4, 3e-5];
+/// Contacts looked for so far away, in bands, are those of fast bodies: 15 % of the smaller one's radius.
+const FAR: f64 = 3.0;
+/// Tilts for those: what strikes with one corner may swing onto any other in the same step.
+const WIDER: [f64; 2] = [0.5, 2.0];
 /// Corners of a regular pentagon.
 const DIRECTIONS: [(f64, f64); 5] = [
     (1.0, 0.0),

@@ -122,3 +122,27 @@ fn a_press_does_not_trap_a_cube() {
         assert!(left < 1e-3, "{stepper}: {left} m are left at {:?} {:?}", position(&world, a), position(&world, k));
     }
 }
+
+/// Cubes, as meshes, are shot at a plate of 2 mm, a mesh too: at 500 m/s and 240 Hz they go two metres a step. None comes out on the other side.
+#[test]
+fn fast_cubes_do_not_go_through_a_thin_plate() {
+    let (cube, plate) = (mesh_cube(), mesh(TriMesh::box_(Vec3::new(3.0, 3.0, 1e-3))));
+    let mut seed = 1_u64;
+    for speed in [100.0, 200.0, 500.0] {
+        for case in 0..15 {
+            let turn = Vec3::from_fn(|_, _| {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (seed >> 11) as f64 / (1_u64 << 52) as f64 * 3.0 - 3.0
+            });
+            let mut world = no_gravity(world("time_stepping", 1.0 / 240.0));
+            world.add_static(RigidBody::fixture("plate", plate.clone())).unwrap();
+            let body = RigidBody::with_mass("cube", cube.clone(), 1.0).unwrap().at(Pose::new(Vec3::new(0.1, 0.07, 3.0), turn));
+            let id = world.add(body.moving(Vec3::z() * -speed, Vec3::zeros())).unwrap();
+            for _ in 0..(6.0 / speed * 240.0) as usize + 3 {
+                world.step().unwrap();
+            }
+            let at = position(&world, id);
+            assert!(at.z > 0.0, "{speed} m/s, case {case}: at {at:?}");
+        }
+    }
+}
