@@ -13,7 +13,8 @@
 //! Directions tried: normals of faces and products of edges (the separating axes; all of them where they are few), axes and centres. Where surfaces are
 //! bent or have very many faces, a search from the best of them follows. Any of them parts the two: only how far is more than the least.
 //!
-//! Bodies that are not convex have the depth of their deepest place, if the two are free when moved so far; else their hulls are parted, if much of one is in the other.
+//! Bodies that are not convex have the depth of their deepest place, if the two are free when moved so far; else their hulls are parted, if much of one is
+//! in the other.
 
 use super::super::reduce::Collector;
 use super::deep::DEEP;
@@ -166,7 +167,8 @@ impl Two<'_> {
     /// Which share of the points of the one that has more of them there is inside the other one, or on it.
     fn share_inside(&self) -> f64 {
         let inverse = self.pose.inverse();
-        [(self.a, self.b, self.pose), (self.b, self.a, &inverse)].into_iter().map(|(of, within, pose)| share_inside(of, within, pose, self.size)).fold(0.0, f64::max)
+        let [first, second] = [(self.a, self.b, self.pose), (self.b, self.a, &inverse)].map(|(of, within, pose)| share_inside(of, within, pose, self.size));
+        first.max(second)
     }
 
     fn refine(&self, (mut n, mut depth): (Vec3, f64)) -> (Vec3, f64) {

@@ -222,6 +222,7 @@ impl<'a> Builder<'a> {
 
 #[cfg(test)]
 mod tests {
+    use crate::surface::Field;
     use crate::surface::field::MeshField;
     use crate::{TriMesh, Vec3};
 
@@ -252,6 +253,23 @@ mod tests {
             let found = field.nearest(&p).distance;
             assert!((found.abs() - brute).abs() < 1e-12, "{p:?}: {found} instead of {brute}");
             assert!(field.tree.bound(&p) <= found, "{p:?}: bound above {found}");
+        }
+    }
+
+    /// Above, below and beside a large slab of twelve triangles the bound is the distance itself; past its edges no more.
+    #[test]
+    fn the_bound_of_a_slab_is_its_distance() {
+        let half = Vec3::new(1.5, 1.5, 0.1);
+        let field = MeshField::new(&TriMesh::box_(half), vec![[true; 3]; 12]);
+        for n in 0..2000_u32 {
+            let place = |step: u32, span: f64| span * (f64::from(n * step % 1999) / 999.5 - 1.0);
+            let p = Vec3::new(place(1, 1.9), place(611, 1.9), place(1301, 0.5));
+            let out = p.abs() - half;
+            let truth = out.sup(&Vec3::zeros()).norm() + out.max().min(0.0);
+            let bound = Field::bound(&field, &p);
+            assert!(bound <= truth, "{p:?}: bound {bound} above {truth}");
+            let straight = out.iter().filter(|x| **x > 0.0).count() < 2;
+            assert!(!straight || bound > truth - 1e-9, "{p:?}: bound {bound} below {truth}");
         }
     }
 }
