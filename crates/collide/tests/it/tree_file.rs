@@ -65,7 +65,7 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
         ("\"r\":4", "\"r\":null", "invalid type: null"),
         ("[-2,0,0]", "[-2e11,0,0]", "ball 1 of level 2: its centre has the coordinate -200000000000; wanted at most 1e10 m"),
         ("[-2,0,0]", "[-2,0]", "invalid length 2"),
-        ("[-2,0,0]", "[-5,0,0]", "ball 3 sticks out of its parent 2 by 3e0 m"),
+        ("[-2,0,0]", "[-5,0,0]", "ball 1 of level 2: it sticks out of its parent, ball 1 of level 1, by 3e0 m"),
         ("\"r\":4,\"out\":1", "\"r\":4,\"out\":-1", "outward error `out` is -1"),
         ("\"parent\":-1", "\"parent\":0", "ball 0 of level 0: its parent is 0; the root has none"),
         ("\"r\":3,\"out\":1,\"parent\":0", "\"r\":3,\"out\":1,\"parent\":1", "ball 1 of level 1: its parent is 1; wanted 0 to 0"),
