@@ -8,7 +8,7 @@
 //! ```
 //!
 //! `s` the signed distance of the centre, negative inside. [`Covering::refine`] divides the ball of the greatest need into two: at the middle of its pieces, across
-//! each of their principal axes, and the two balls of the way that comes out best choose their pieces anew and are fitted again. Either half has no greater need than the whole,
+//! their principal and some other axes, and the two balls of the way that comes out best choose their pieces anew and are fitted again. Either half has no greater need than the whole,
 //! as the old ball would do for both. So the greatest need never rises with the number of balls. [`Covering::suggest`] takes centres from elsewhere, such as a
 //! tree's, where they do better.
 
@@ -23,8 +23,11 @@ use rayon::prelude::*;
 const FIRST: usize = 4000;
 /// Pieces in all.
 const MOST: usize = 4_000_000;
-/// A ball of fewer pieces has them halved before it is divided.
-const FEWEST: usize = 48;
+/// A ball of fewer pieces has them halved before it is divided; all together have as many times the balls before centres from elsewhere are looked at.
+const FEWEST: usize = 160;
+/// Pieces of a ball that is to be divided are halved until none is longer than this part of its radius, or they are so many.
+const FINE: f64 = 0.15;
+const MOST_OF_ONE: usize = 4000;
 /// Pieces smaller than this part of the diagonal are not halved.
 const SMALL: f64 = 1e-9;
 /// Rounds of fitting anew.
@@ -102,6 +105,13 @@ impl Covering {
         if centers.is_empty() {
             return false;
         }
+        while self.pieces.len() < FEWEST * centers.len() {
+            let before = self.pieces.len();
+            (0..self.balls.len()).for_each(|k| _ = self.halve_pieces(k, FINE * self.balls[k].ball.radius / 4.0));
+            if self.pieces.len() == before {
+                break;
+            }
+        }
         let all: Vec<u32> = (0..self.pieces.len() as u32).collect();
         let mut best = self.fitted(&all, centers);
         for _ in 1..ROUNDS {
@@ -172,18 +182,20 @@ impl Covering {
 
     fn divided(&mut self, worst: usize) -> Option<[Own; 2]> {
         while self.balls[worst].pieces.len() < FEWEST {
-            self.halve_pieces(worst)?;
+            self.halve_pieces(worst, self.small)?;
         }
+        // long ones would be held by both halves
+        let fine = FINE * self.balls[worst].ball.radius;
+        while self.balls[worst].pieces.len() < MOST_OF_ONE && self.halve_pieces(worst, fine).is_some() {}
         let (pieces, old) = (&self.balls[worst].pieces, self.balls[worst].ball.center);
         let middles: Vec<Vec3> = pieces.iter().map(|n| self.pieces[*n as usize].iter().sum::<Vec3>() / 3.0).collect();
         let mean = middles.iter().sum::<Vec3>() / middles.len() as f64;
         let covariance: Mat3 = middles.iter().map(|m| (m - mean) * (m - mean).transpose()).sum();
-        let axes = SymmetricEigen::new(covariance).eigenvectors;
-        let across = |k: usize| {
-            let (one, other): (Vec<_>, Vec<_>) = pieces.iter().zip(&middles).partition(|(_, m)| (*m - mean).dot(&axes.column(k)) < 0.0);
+        let across = |axis: &Vec3| {
+            let (one, other): (Vec<_>, Vec<_>) = pieces.iter().zip(&middles).partition(|(_, m)| (*m - mean).dot(axis) < 0.0);
             [one, other].map(|half| half.into_iter().map(|(n, _)| *n).collect::<Vec<u32>>())
         };
-        let ways: Vec<[Vec<u32>; 2]> = (0..3).map(across).filter(|[one, other]| !one.is_empty() && !other.is_empty()).collect();
+        let ways: Vec<[Vec<u32>; 2]> = directions(&covariance).iter().map(across).filter(|[one, other]| !one.is_empty() && !other.is_empty()).collect();
         // the old ball does for either half, so that neither needs more
         let fit = |halves: [Vec<u32>; 2]| self.refitted(halves.map(|half| self.own(half, &[old])));
         ways.into_par_iter().map(fit).collect::<Vec<_>>().into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
@@ -202,15 +214,15 @@ impl Covering {
         pair
     }
 
-    /// `None` where they are as small, or as many, as they may be.
-    fn halve_pieces(&mut self, ball: usize) -> Option<()> {
-        if self.pieces.len() + FEWEST > MOST {
+    /// Halves the pieces of a ball that are larger; `None` where none is, or they are as many as they may be.
+    fn halve_pieces(&mut self, ball: usize, larger: f64) -> Option<()> {
+        if self.pieces.len() + self.balls[ball].pieces.len() > MOST {
             return None;
         }
         let mut new = Vec::new();
         for n in &self.balls[ball].pieces {
             let (size, [one, other]) = halved(&self.pieces[*n as usize]);
-            if size > self.small {
+            if size > larger.max(self.small) {
                 self.pieces[*n as usize] = one;
                 new.push(self.pieces.len() as u32);
                 self.pieces.push(other);
@@ -220,6 +232,13 @@ impl Covering {
         self.balls[ball].pieces.extend(new);
         some.then_some(())
     }
+}
+
+/// The principal axes, those half-way between two of them (of equal ones any are principal axes, as the diagonals of a square), and the axes of the mesh.
+fn directions(covariance: &Mat3) -> Vec<Vec3> {
+    let axes = SymmetricEigen::new(*covariance).eigenvectors;
+    let [u, v, w] = [0, 1, 2].map(|k| axes.column(k).into_owned());
+    vec![u, v, w, u + v, u - v, v + w, v - w, w + u, w - u, Vec3::x(), Vec3::y(), Vec3::z()]
 }
 
 fn worst(balls: &[Own]) -> f64 {
