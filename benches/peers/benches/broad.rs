@@ -1,17 +1,20 @@
-//! CPU time per step of the broad phase, tumble beside parry's bounding volume hierarchy in one run.
+//! CPU time per step of the broad phase in one run: tumble, parry's bounding volume hierarchy, and a plain pass over what has to be read.
 //!
 //! ```text
 //! cargo bench --bench broad                                          the curve, and all kinds of crowds at 1,000, 10,000 and 100,000
-//! cargo bench --bench broad -- --svg ../../docs/images/broad.svg     the same, and the curve as a picture
+//! cargo bench --bench broad -- --svg ../../docs/images/broad.svg     the curve alone, as a picture too
+//! cargo bench --bench broad -- --curve                               the curve alone
 //! cargo bench --bench broad -- --tumble slow 100000                  one case of tumble alone, for a profiler
 //! ```
+//!
+//! A program that takes turns with it on a core leaves its own data in the caches, and large crowds pay for that: `chrt -f 1` in front keeps the core.
 
-use tumble_peers::broad::{Cost, Follower, Kind, Sweep, Tree, follow, write_curve};
+use tumble_peers::broad::{Cost, Follower, Kind, Plain, Sweep, Tree, follow, write_curve};
 use tumble_peers::scene::RADIUS;
 
 /// Share of a box's smallest extent by which both make boxes fat.
 const ROOM: f64 = 0.1;
-/// Rounds of which the median counts; the two take turns.
+/// Rounds of which the median counts; they take turns.
 const ROUNDS: usize = 3;
 
 fn main() {
@@ -23,26 +26,41 @@ fn main() {
             let cost = follow(&mut Sweep::default(), kind, n, steps(n));
             println!("{:.1} µs per step, {} pairs", cost.step, cost.pairs);
         }
+        ["--curve"] => drop(curves()),
         ["--svg", path] => std::fs::write(path, write_curve(&curves())).expect("the picture can be written"),
         _ => drop(curves()),
     }
-    if arguments.first().is_none_or(|a| a != "--tumble") {
+    if arguments.is_empty() {
         kinds();
     }
 }
 
 /// Slow crowds of growing size.
-fn curves() -> [(&'static str, &'static str, Vec<(f64, f64)>); 2] {
+fn curves() -> [(&'static str, &'static str, Vec<(f64, f64)>); 3] {
     println!("CPU µs per step, boxes in a cube of constant density that move by 1 % of their radius per step; medians of {ROUNDS} rounds.\n");
-    println!("| boxes | tumble | per box, ns | parry | ratio | pairs |\n|---|---|---|---|---|---|");
-    let mut curves = [("tumble", "#1060c0", Vec::new()), ("parry (Rapier)", "#c05010", Vec::new())];
+    println!("| boxes | tumble | per box, ns | fastest tenth, ns | parry | ratio | plain pass | pairs |\n|---|---|---|---|---|---|---|---|");
+    let mut curves = [("tumble", "#1060c0", Vec::new()), ("parry (Rapier)", "#c05010", Vec::new()), ("a plain pass", "#808080", Vec::new())];
     for n in [1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000] {
-        let [ours, theirs] = both(Kind::Slow, n);
-        println!("| {n} | {:.1} | {:.1} | {:.1} | {:.2} | {} |", ours.step, 1e3 * ours.step / n as f64, theirs.step, ours.step / theirs.step, ours.pairs);
-        curves[0].2.push((n as f64, ours.step));
-        curves[1].2.push((n as f64, theirs.step));
+        let [ours, theirs, plain] = all(Kind::Slow, n);
+        let per_box = [ours.step, ours.tenth].map(|time| 1e3 * time / n as f64);
+        let ratio = ours.step / theirs.step;
+        println!("| {n} | {:.1} | {:.1} | {:.1} | {:.1} | {ratio:.2} | {:.1} | {} |", ours.step, per_box[0], per_box[1], theirs.step, plain.step, ours.pairs);
+        for (curve, cost) in curves.iter_mut().zip([ours, theirs, plain]) {
+            curve.2.push((n as f64, cost.step));
+        }
+    }
+    for (name, _, points) in &curves {
+        println!("{name}: the time grows as n^{:.2}", exponent(points));
     }
     curves
+}
+
+/// The slope of the straight line that fits best where both scales are logarithmic.
+fn exponent(points: &[(f64, f64)]) -> f64 {
+    let logarithms: Vec<(f64, f64)> = points.iter().map(|(n, time)| (n.ln(), time.ln())).collect();
+    let mean = |of: fn(&(f64, f64)) -> f64| logarithms.iter().map(of).sum::<f64>() / logarithms.len() as f64;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    logarithms.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / logarithms.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
 /// Every kind of crowd.
@@ -50,18 +68,22 @@ fn kinds() {
     println!("\nCPU µs per step, tumble (parry).\n\n| crowd | 1,000 | 10,000 | 100,000 |\n|---|---|---|---|");
     for (kind, name) in Kind::ALL {
         let cell = |n: usize| {
-            let [ours, theirs] = both(kind, n);
+            let [ours, theirs, _] = all(kind, n);
             format!("{:.0} ({:.0})", ours.step, theirs.step)
         };
         println!("| {name} | {} | {} | {} |", cell(1000), cell(10_000), cell(100_000));
     }
 }
 
-fn both(kind: Kind, n: usize) -> [Cost; 2] {
-    let mut costs = [Vec::new(), Vec::new()];
+/// Costs of tumble, parry and the plain pass.
+fn all(kind: Kind, n: usize) -> [Cost; 3] {
+    let margin = ROOM * 2.0 * RADIUS;
+    let mut costs = [Vec::new(), Vec::new(), Vec::new()];
     for _ in 0..ROUNDS {
-        costs[0].push(follow(&mut Sweep::default(), kind, n, steps(n)));
-        costs[1].push(follow(&mut Tree::new(ROOM * 2.0 * RADIUS) as &mut dyn Follower, kind, n, steps(n)));
+        let followers: [Box<dyn Follower>; 3] = [Box::new(Sweep::default()), Box::new(Tree::new(margin)), Box::new(Plain::new(margin))];
+        for (costs, mut follower) in costs.iter_mut().zip(followers) {
+            costs.push(follow(follower.as_mut(), kind, n, steps(n)));
+        }
     }
     costs.map(|mut c| {
         c.sort_by(|a, b| a.step.total_cmp(&b.step));
@@ -71,5 +93,5 @@ fn both(kind: Kind, n: usize) -> [Cost; 2] {
 
 /// So many that the clock's ticks do not show.
 fn steps(n: usize) -> usize {
-    (1_000_000 / n).clamp(60, 500)
+    (2_000_000 / n).clamp(60, 1000)
 }

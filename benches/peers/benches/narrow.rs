@@ -7,6 +7,9 @@
 //!
 //! Two tori, and two bunnies where the public meshes are (`TUMBLE_MESHES`, or a `shared/meshes` above), each 0.1 m in diagonal. They are turned at
 //! random and brought together until they touch, then 1 mm apart, or 1 mm (1 % of the diagonal) into each other. Margin 1 mm.
+//!
+//! In the first rows a pose is asked for again and again, so that all it needs is in near memory and every branch is foretold. In the rows `changing` each
+//! query has another of 256 poses, turned at random: the mean over all.
 
 use rapier3d_f64::parry::math::{Pose as ParryPose, Rotation, Vector};
 use rapier3d_f64::parry::query;
@@ -21,6 +24,11 @@ use tumble_peers::clock::Clock;
 const MARGIN: f64 = 1e-3;
 /// Poses per row, of which the median counts.
 const POSES: u64 = 5;
+/// Poses of a row in which they change.
+const CHANGING: u64 = 256;
+/// Steps in which a body comes near, metres; in the end it touches to this by two to the power of this.
+const STEP: f64 = 2e-3;
+const HALVINGS: u32 = 24;
 /// Seconds of CPU that one figure takes, about.
 const PATIENCE: f64 = 0.15;
 
@@ -45,6 +53,10 @@ fn main() {
         for (pose, into) in [("1 mm apart", -MARGIN), ("touching", 0.0), ("1 % overlap", MARGIN)] {
             row(body, pose, into);
         }
+        let ways: Vec<(Pose, Vec3)> = (0..CHANGING).map(|n| approached(body, n)).collect();
+        for (pose, into) in [("1 mm apart, changing", -MARGIN), ("touching, changing", 0.0), ("1 % overlap, changing", MARGIN)] {
+            changing(body, pose, &ways.iter().map(|(pose, way)| moved(pose, way, into)).collect::<Vec<_>>());
+        }
     }
 }
 
@@ -56,6 +68,25 @@ fn row(body: &Body, name: &str, into: f64) {
     });
     let cells: String = medians.iter().map(|(median, worst)| format!(" {median:.0} ({worst:.0}) |")).collect();
     println!("| two of {} | {name} |{cells} {:.1} |", body.name, medians[2].0 / medians[0].0);
+}
+
+/// A row of queries that never see a pose twice in a row.
+fn changing(body: &Body, name: &str, poses: &[Pose]) {
+    let (fixed, theirs): (_, Vec<ParryPose>) = (ParryPose::IDENTITY, poses.iter().map(to_parry).collect());
+    let mut found = Vec::new();
+    let mut by = |mode| {
+        time(|| {
+            for pose in poses {
+                found.clear();
+                contacts_in(mode, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
+                black_box(&found);
+            }
+        }) / poses.len() as f64
+    };
+    let (surface, spheres) = (by(ContactMode::Surface), by(ContactMode::Spheres));
+    let mesh = &body.theirs;
+    let contact = time(|| theirs.iter().for_each(|pose| { black_box(query::contact(pose, mesh, &fixed, mesh, MARGIN)).ok(); })) / poses.len() as f64;
+    println!("| two of {} | {name} | {surface:.0} | {spheres:.0} | {contact:.0} | | {:.1} |", body.name, contact / surface);
 }
 
 /// µs of all queries of one pose.
@@ -99,8 +130,8 @@ fn time(mut call: impl FnMut()) -> f64 {
     1e6 * runs[1] / times as f64
 }
 
-/// The `n`th pose of the first body where it touches the second, moved `into` it, metres.
-fn touching(body: &Body, n: u64, into: f64) -> Pose {
+/// The `n`th pose of the first body far away, and the way from the second to it.
+fn far(n: u64) -> (Pose, Vec3) {
     let mut state = n.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d;
     let mut random = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -109,17 +140,43 @@ fn touching(body: &Body, n: u64, into: f64) -> Pose {
     let turn = Quat::from_scaled_axis(Vec3::new(random() - 0.5, random() - 0.5, random() - 0.5) * TAU);
     let (z, around) = (2.0 * random() - 1.0, TAU * random());
     let way = Vec3::new((1.0 - z * z).sqrt() * around.cos(), (1.0 - z * z).sqrt() * around.sin(), z);
-    let mut pose = Pose::from_parts((way * 0.3).into(), turn);
+    (Pose::from_parts((way * 0.3).into(), turn), way)
+}
+
+fn moved(pose: &Pose, way: &Vec3, into: f64) -> Pose {
+    Pose::from_parts((pose.translation.vector - way * into).into(), pose.rotation)
+}
+
+/// The `n`th pose of the first body where it touches the second, moved `into` it, metres.
+fn touching(body: &Body, n: u64, into: f64) -> Pose {
+    let (mut pose, way) = far(n);
     // parry's distance says how far the way is free
     for _ in 0..20 {
         let free = query::distance(&to_parry(&pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs).expect("two meshes").distance;
-        pose.translation.vector -= way * free;
+        pose = moved(&pose, &way, free);
         if free < 1e-7 {
             break;
         }
     }
-    pose.translation.vector -= way * into;
-    pose
+    moved(&pose, &way, into)
+}
+
+/// The same by steps, then halves, with parry's test of intersection, which is faster by far; and the way.
+fn approached(body: &Body, n: u64) -> (Pose, Vec3) {
+    let (mut pose, way) = far(n);
+    let meet = |pose: &Pose| query::intersection_test(&to_parry(pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs).expect("two meshes").intersecting;
+    let mut step = STEP;
+    while pose.translation.vector.dot(&way) > 0.0 && !meet(&moved(&pose, &way, step)) {
+        pose = moved(&pose, &way, step);
+    }
+    for _ in 0..HALVINGS {
+        step *= 0.5;
+        let next = moved(&pose, &way, step);
+        if !meet(&next) {
+            pose = next;
+        }
+    }
+    (pose, way)
 }
 
 fn alone(body: &Body, rounds: usize) {

@@ -40,7 +40,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             let mesh_name = file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
             let reference = REFERENCE.iter().find(|r| r.0 == mesh_name && r.1 == depth);
             let beside = reference.map_or("| | |".into(), |(_, _, worst, mean, nesting, cpu)| {
-                format!("{:.2} / {:.2} | {:.2} | {cpu} |", 100.0 * worst, 100.0 * mean, 100.0 * nesting)
+                let nesting = if nesting.is_nan() { String::new() } else { format!("{:.2}", 100.0 * nesting) };
+                format!("{:.2} / {:.2} | {nesting} | {cpu} |", 100.0 * worst, 100.0 * mean)
             });
             println!(
                 "| {mesh_name} | {name} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {} | {:.3} | {taken:.2} | {beside}",

@@ -78,6 +78,27 @@ impl MeshDistance {
         self.search_within(0, p, radius * radius, each);
     }
 
+    /// Goes down the tree of boxes where `to` hopes to find something, where most of it first.
+    pub(crate) fn descend(&self, to: &mut impl Descent) {
+        self.enter(0, to);
+    }
+
+    fn enter(&self, node: usize, to: &mut impl Descent) {
+        let here = &self.tree.nodes[node];
+        if here.count > 0 {
+            return here.range().for_each(|n| to.face(self.ids[n] as usize));
+        }
+        let mut children = [node + 1, here.second as usize].map(|c| (to.most(&self.tree.nodes[c].bounds), c));
+        if children[1].0 > children[0].0 {
+            children.swap(0, 1);
+        }
+        for (most, child) in children {
+            if most > to.wanted() {
+                self.enter(child, to);
+            }
+        }
+    }
+
     fn search_within(&self, node: usize, p: &Vec3, square: f64, each: &mut dyn FnMut(usize, Vec3, usize)) {
         let here = &self.tree.nodes[node];
         let near = box_distance_squared(&here.bounds, p) <= square;
@@ -126,6 +147,16 @@ impl MeshDistance {
             }
         }
     }
+}
+
+/// A search for the most of something among the triangles of a mesh.
+pub(crate) trait Descent {
+    /// No less than what any triangle in a box has.
+    fn most(&self, bounds: &Aabb) -> f64;
+    /// What has no more than this is passed over.
+    fn wanted(&self) -> f64;
+    /// A triangle that may have more.
+    fn face(&mut self, t: usize);
 }
 
 /// Normals that tell no side are zero.

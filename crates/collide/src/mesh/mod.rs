@@ -26,7 +26,7 @@ pub(crate) use crossing::crossing_shells;
 pub use distance::{ClosestPoint, MeshDistance};
 pub use polygon::FaceCutter;
 pub use text::{obj_lines, text_of};
-pub(crate) use distance::{closest_on_triangle, pseudonormals};
+pub(crate) use distance::{Descent, closest_on_triangle, pseudonormals};
 pub use repair::{RepairReport, RepairSettings};
 pub(crate) use shells::shells;
 pub use winding::WindingNumber;

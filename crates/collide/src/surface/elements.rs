@@ -74,25 +74,47 @@ pub(crate) struct Elements {
     pub edges: Vec<Edge>,
     pub normals: Vec<Vec3>,
     pub ways: Vec<Vec3>,
-    /// Balls and groups, each before its parts.
+    /// Balls and groups; the first holds all, the parts of each are side by side.
     pub groups: Vec<Group>,
 }
 
-/// What a ball of the tree, or a part of a leaf, holds.
+/// What a ball of the tree, or a part of a leaf, holds. Thirty-two bytes: with poses that change most of the time goes by waiting for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(32))]
 pub(crate) struct Group {
-    pub center: Vec3,
-    /// How far what it and its parts hold reaches from the centre, without the fine edges and with them, metres.
-    pub reach: [f64; 2],
-    /// Range in [`Elements::points`] of what it holds; empty if it has parts.
-    pub first: u32,
-    pub last: u32,
-    /// The group that comes after all its parts.
-    pub skip: u32,
+    center: [f32; 3],
+    /// How far what it and its parts hold reaches from the centre, without the fine edges and with them, metres; rounded up.
+    reach: [f32; 2],
+    /// Where its parts begin in [`Elements::groups`], or what it holds in [`Elements::points`].
+    first: u32,
+    count: u32,
+    /// Whether it has parts.
+    parted: bool,
+}
+
+impl Group {
+    pub fn center(&self) -> Vec3 {
+        Vec3::from(self.center.map(f64::from))
+    }
+
+    /// From the centre, with the fine edges or without, metres.
+    pub fn reach(&self, fine: bool) -> f64 {
+        f64::from(self.reach[usize::from(fine)])
+    }
+}
+
+/// A group on the way to [`Group`]: each before its parts, all that it holds up to `end`.
+struct Halved {
+    group: Group,
+    end: usize,
 }
 
 /// Points of a group that is not halved.
 const FEW: usize = 4;
+/// Parts of a group: as many as are looked at side by side, unless a ball of the tree has more children.
+pub(crate) const PARTS: usize = 8;
+/// Rounds up to single precision.
+const ABOVE: f64 = 1.0 + 1e-6;
 
 impl Elements {
     /// Also returns, per triangle, which of its edges (k to k+1) are among the elements.
@@ -112,14 +134,23 @@ impl Elements {
         all.edges = edges;
         let held: Vec<[usize; 2]> = (0..tree.nodes().len() as u32).map(|node| [node, node + 1].map(|n| points.partition_point(|p| p.0 < n))).collect();
         let mut points: Vec<Point> = points.into_iter().map(|p| p.1).collect();
-        all.gather(tree, 0, &held, &mut points);
+        let mut halved = Vec::new();
+        all.gather(tree, 0, &held, &mut points, &mut halved);
         all.points = points;
+        if let Some(first) = halved.first() {
+            all.groups.push(first.group);
+            all.file(&halved, 0, 0);
+        }
         (all, searched)
     }
 
-    /// The points that a group holds itself.
+    /// The points that a group holds itself; none where it has parts.
     pub fn points_of(&self, group: &Group) -> &[Point] {
-        &self.points[group.first as usize..group.last as usize]
+        if group.parted { &[] } else { &self.points[group.first as usize..][..group.count as usize] }
+    }
+
+    pub fn parts_of(&self, group: &Group) -> &[Group] {
+        if group.parted { &self.groups[group.first as usize..][..group.count as usize] } else { &[] }
     }
 
     /// The edges that a point holds, with the fine ones or without.
@@ -137,7 +168,7 @@ impl Elements {
     }
 
     /// The group of a ball of the tree and of its children; nothing where they hold nothing. `held`: ranges in `points`, per ball.
-    fn gather(&mut self, tree: &SphereTree, node: usize, held: &[[usize; 2]], points: &mut [Point]) {
+    fn gather(&mut self, tree: &SphereTree, node: usize, held: &[[usize; 2]], points: &mut [Point], out: &mut Vec<Halved>) {
         let mut below = Vec::new();
         let mut stack = vec![node];
         while let Some(n) = stack.pop() {
@@ -149,45 +180,62 @@ impl Elements {
             return;
         }
         if tree.nodes()[node].is_leaf() {
-            return self.halve(points, first, last);
+            return self.halve(points, first, last, out);
         }
-        let group = self.group(points, &below);
+        let group = self.group(points, &below, out);
         if first < last {
-            self.halve(points, first, last);
+            self.halve(points, first, last, out);
         }
         for child in tree.nodes()[node].child_range() {
-            self.gather(tree, child, held, points);
+            self.gather(tree, child, held, points, out);
         }
-        self.groups[group].skip = self.groups.len() as u32;
+        out[group].end = out.len();
     }
 
     /// The groups of a range of points, which are put into another order.
-    fn halve(&mut self, points: &mut [Point], first: usize, last: usize) {
-        let group = self.group(points, &[[first, last]]);
+    fn halve(&mut self, points: &mut [Point], first: usize, last: usize, out: &mut Vec<Halved>) {
+        let group = self.group(points, &[[first, last]], out);
         if last - first <= FEW {
-            (self.groups[group].first, self.groups[group].last) = (first as u32, last as u32);
+            let held = &mut out[group].group;
+            (held.first, held.count, held.parted) = (first as u32, (last - first) as u32, false);
         } else {
             let range = &mut points[first..last];
             let bounds = Aabb::around(range.iter().map(|p| p.at));
             let axis = (bounds.max - bounds.min).imax();
             let half = range.len() / 2;
             range.select_nth_unstable_by(half, |a, b| a.at[axis].total_cmp(&b.at[axis]).then(a.index.cmp(&b.index)));
-            self.halve(points, first, first + half);
-            self.halve(points, first + half, last);
+            self.halve(points, first, first + half, out);
+            self.halve(points, first + half, last, out);
         }
-        self.groups[group].skip = self.groups.len() as u32;
+        out[group].end = out.len();
     }
 
     /// A group around ranges of points; returns its number.
-    fn group(&mut self, points: &[Point], ranges: &[[usize; 2]]) -> usize {
+    fn group(&mut self, points: &[Point], ranges: &[[usize; 2]], out: &mut Vec<Halved>) -> usize {
         let all = &*self;
         let held = || ranges.iter().flat_map(|[a, b]| &points[*a..*b]);
         let ends = |fine: bool| held().flat_map(move |p| all.edges_of(p, fine).iter().map(|e| e.ends[1]).chain([p.at]));
         let bounds = Aabb::around(ends(false));
-        let center = 0.5 * (bounds.min + bounds.max);
-        let reach = [false, true].map(|fine| ends(fine).map(|p| (p - center).norm()).fold(0.0, f64::max) * (1.0 + 1e-12));
-        self.groups.push(Group { center, reach, first: 0, last: 0, skip: 0 });
-        self.groups.len() - 1
+        let middle = 0.5 * (bounds.min + bounds.max);
+        let center: [f32; 3] = std::array::from_fn(|k| middle[k] as f32);
+        let from = Vec3::from(center.map(f64::from));
+        let reach = [false, true].map(|fine| (ends(fine).map(|p| (p - from).norm()).fold(0.0, f64::max) * ABOVE) as f32);
+        out.push(Halved { group: Group { center, reach, first: 0, count: 0, parted: true }, end: 0 });
+        out.len() - 1
+    }
+
+    /// Files the parts of a group side by side, then theirs; those of a few parts are taken for its own.
+    fn file(&mut self, halved: &[Halved], from: usize, to: usize) {
+        if !halved[from].group.parted {
+            return;
+        }
+        let parts = parts_of(halved, from);
+        let first = self.groups.len();
+        (self.groups[to].first, self.groups[to].count) = (first as u32, parts.len() as u32);
+        self.groups.extend(parts.iter().map(|&n| halved[n].group));
+        for (n, &part) in parts.iter().enumerate() {
+            self.file(halved, part, first + n);
+        }
     }
 
     /// The vertices, each with the ball that holds it.
@@ -221,6 +269,23 @@ impl Elements {
             points.push((holder(tree, &at), point));
         }
         points
+    }
+}
+
+/// The parts of a group, or in the place of one its own, the widest first, as long as there are few.
+fn parts_of(halved: &[Halved], group: usize) -> Vec<usize> {
+    let direct = |group: usize| -> Vec<usize> {
+        std::iter::successors(Some(group + 1), |n| Some(halved[*n].end).filter(|n| *n < halved[group].end)).collect()
+    };
+    let mut parts = direct(group);
+    loop {
+        let wider = |n: &usize| parts.iter().filter(|m| halved[**m].group.parted).all(|m| halved[*m].group.reach[0] <= halved[parts[*n]].group.reach[0]);
+        let Some(widest) = (0..parts.len()).filter(|n| halved[parts[*n]].group.parted).find(wider) else { return parts };
+        let own = direct(parts[widest]);
+        if parts.len() + own.len() - 1 > PARTS {
+            return parts;
+        }
+        parts.splice(widest..=widest, own);
     }
 }
 

@@ -9,7 +9,7 @@
 //!
 //! Two triangle surfaces are closest at a vertex of one or at an edge of each; if they cross, an edge of one goes
 //! through a face of the other. So vertices and edges of both bodies find every contact, and no point inside a face
-//! needs to be sampled. An edge is searched for the least `d_B` along it (`narrow/surface.rs`). Of a finely
+//! needs to be sampled. An edge is searched for the least `d_B` along it (`narrow/surface/line.rs`). Of a finely
 //! triangulated smooth surface only vertices are tested: see [`elements::Elements`] for the error that this leaves.
 
 pub(crate) mod elements;

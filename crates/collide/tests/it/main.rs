@@ -12,6 +12,7 @@ mod meshes;
 mod primitives;
 mod quality;
 mod rays;
+mod referee;
 mod rng;
 mod shared_meshes;
 mod surface;

@@ -252,3 +252,21 @@ fn contacts_do_not_depend_on_what_was_asked_before() {
     assert!(forwards.iter().filter(|found| !found.is_empty()).count() > 100);
     assert_eq!(forwards, backwards);
 }
+
+/// A bar goes through a block, both meshes of two triangles a side. No vertex and no edge of either is as deep as the places inside faces are.
+#[test]
+fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
+    let (block, bar) = (mesh_box(1.0, 1.0, 1.0), mesh_box(3.0, 0.7, 0.4));
+    // the bar's wide faces are at z = ±0.4, 0.6 below the block's; the bar's edges are 0.3 below y = ±1; the block's own faces are 0.4 deep in the bar
+    let straight = Pose::identity();
+    // moved by 0.1 up: one wide face comes to z = 0.5, the other to z = −0.3, 0.7 below the block's lower side
+    let raised = Pose::translation(0.0, 0.0, 0.1);
+    for (pose, depth) in [(straight, 0.6), (raised, 0.7)] {
+        for (a, pa, b, pb) in [(&block, Pose::identity(), &bar, pose), (&bar, pose, &block, Pose::identity())] {
+            let found = ask(a, &pa, b, &pb, 1e-3);
+            let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+            // to 4e-4 of the smaller radius, and never deeper
+            assert!(least >= -depth - 1e-12 && least < -depth + 4e-4 * 3.0_f64.sqrt(), "{least} but {depth}");
+        }
+    }
+}

@@ -16,11 +16,13 @@
 //! (O'Donoghue and Candès, *Adaptive restart for accelerated gradient schemes*, 2015). Plain sweeps carry a load down a stack one
 //! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. With friction the problem is not convex and the
 //! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. What is slow even so (nearly redundant contacts, high mass ratios) is
-//! finished by Newton's method where an island is small (`newton.rs`); elsewhere the residual says how far.
+//! finished by Newton's method where an island is small (`newton.rs`); elsewhere the residual says how far. Plain sweeps can go in circles too; those that
+//! get nowhere go on by shorter steps (`pace.rs`).
 
 use super::linkage::{Linkages, Reach};
 use super::newton::Newton;
 use super::one_contact::{Contact, Symmetric};
+use super::pace::Pace;
 use super::six::Six;
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{Block, RowSet, Rows};
@@ -53,15 +55,17 @@ impl RowSolver for GaussSeidel {
         let mut momentum = Momentum::new(&locals, &linkages, du);
         let mut newton = linkages.is_empty().then(|| Newton::new(&momentum));
         let mut outcome = Outcome { iterations: sweeps, converged: false, ray: false };
+        let mut pace = Pace::new(ACCELERATED);
         for sweep in 1..=sweeps {
             let mut progress = Progress::default();
             for local in &mut locals {
-                local.relax(momentum.beta, rows, &linkages, du, &mut progress);
+                local.relax(momentum.beta, pace.share, rows, &linkages, du, &mut progress);
             }
             if progress.change <= accuracy.tolerance {
                 outcome = Outcome { iterations: sweep, converged: true, ray: false };
                 break;
             }
+            pace.note(sweep, progress.change);
             if let Some(newton) = &mut newton
                 && newton.after(sweep..sweeps, progress.change, &mut locals, rows, &momentum, du)
             {
@@ -280,9 +284,9 @@ impl<'a> Local<'a> {
         Local { block, c: numbers(c), lambda: start, last: start, step, reach, six }
     }
 
-    /// Extrapolates the multipliers of this block and solves it with the others held.
+    /// Extrapolates the multipliers of this block, solves it with the others held, and goes this share of the way there.
     #[inline(always)]
-    fn relax(&mut self, beta: f64, rows: &Rows, linkages: &Linkages, du: &mut [f64], progress: &mut Progress) {
+    fn relax(&mut self, beta: f64, share: f64, rows: &Rows, linkages: &Linkages, du: &mut [f64], progress: &mut Progress) {
         match &self.step {
             Step::Dead => {}
             Step::Scalar(scalar) => {
@@ -291,12 +295,13 @@ impl<'a> Local<'a> {
                     Some(sides) => sides.velocity(0),
                     None => rows.row_velocity(self.block, 0, du),
                 };
-                let delta = scalar.change(self.lambda[0], self.c[0], velocity);
-                if delta != 0.0 {
+                let full = scalar.change(self.lambda[0], self.c[0], velocity);
+                if full != 0.0 {
+                    let delta = share * full;
                     let next = clamp(self.lambda[0] + delta, scalar.lo, scalar.hi);
                     self.lambda[0] = next;
                     progress.against -= delta * (next - self.last[0]);
-                    progress.note((delta * scalar.k).abs());
+                    progress.note((full * scalar.k).abs());
                     match self.six {
                         Some(six) => six.push(rows, [delta], du),
                         None => self.push(rows, linkages, &[delta], du),
@@ -315,14 +320,18 @@ impl<'a> Local<'a> {
                     }
                     None => [0, 1, 2].map(|k| self.c[k] + rows.row_velocity(self.block, k, du)),
                 };
-                let (next, delta) = contact.solve(self.lambda, w);
+                let (mut next, mut delta) = contact.solve(self.lambda, w);
                 if delta != [0.0; 3] {
-                    self.lambda = next;
-                    let last = &self.last;
-                    progress.against -= delta[0] * (next[0] - last[0]) + delta[1] * (next[1] - last[1]) + delta[2] * (next[2] - last[2]);
                     progress.note((delta[0] * contact.k.m00).abs());
                     progress.note((delta[1] * contact.k.m11).abs());
                     progress.note((delta[2] * contact.k.m22).abs());
+                    if share < 1.0 {
+                        delta = delta.map(|x| share * x);
+                        next = [0, 1, 2].map(|k| self.lambda[k] + delta[k]);
+                    }
+                    self.lambda = next;
+                    let last = &self.last;
+                    progress.against -= delta[0] * (next[0] - last[0]) + delta[1] * (next[1] - last[1]) + delta[2] * (next[2] - last[2]);
                     match self.six {
                         Some(six) => six.push(rows, delta, du),
                         None => self.push(rows, linkages, &delta, du),

@@ -10,6 +10,7 @@ mod lemke;
 mod linkage;
 mod newton;
 mod one_contact;
+mod pace;
 mod residual;
 mod six;
 #[cfg(test)]

@@ -21,6 +21,11 @@
 //! ```text
 //! (1 + Σ Y G Yᵀ) δu = Σ Y a
 //! ```
+//!
+//! Where contacts conflict, the jump goes far along what is redundant: of two contacts close to each other one is to carry all, or two that stick on one body
+//! are asked for accelerations that no rigid body has, and one has to slide. All conditions together have no answer then, and the jump overshoots.
+//! So after one that was none a *cut* jump follows: as far as the first multiplier comes to its bound, `λ + α δλ` with the greatest `α ≤ 1` for which no
+//! normal changes sign and none that sticks leaves its cone. With that one at its bound the next jump has other conditions.
 
 use super::gauss_seidel::{Local, Momentum, Step};
 use super::one_contact::Contact;
@@ -36,8 +41,16 @@ const MOST_FREEDOMS: usize = 120;
 const FIRST: u32 = 10;
 /// Sweeps after a jump before it is judged.
 const TRIAL: u32 = 3;
+/// The same after a cut jump, which turns friction by much.
+const LONG_TRIAL: u32 = 10;
+/// How far friction of a contact that slides may turn in a cut jump, radians, about.
+const TURN: f64 = 0.5;
 /// A jump after which sweeps change more than this share of what they did before is not followed by another at once.
 const WORTH: f64 = 0.8;
+/// A cut jump only moves on to other conditions: sweeps may change this many times as much after it.
+const LEEWAY: f64 = 10.0;
+/// A contact is inside its cone by more than this share of the square of its bound.
+const INSIDE: f64 = 1e-9;
 /// From this sweep on a jump that was none doubles the wait for the next.
 const LATE: u32 = 200;
 
@@ -49,6 +62,8 @@ pub(super) struct Newton {
     wait: u32,
     /// Multipliers and change per sweep before a jump on trial.
     before: Option<(Vec<[f64; 3]>, f64)>,
+    /// Whether the next jump, or the one on trial, is cut.
+    cut: bool,
 }
 
 /// `δλ = a − G·δw` of one block.
@@ -62,7 +77,7 @@ impl Newton {
     pub fn new(momentum: &Momentum) -> Newton {
         let size = momentum.size();
         let wait = FIRST + size as u32 / 2;
-        Newton { size, due: if size <= MOST_FREEDOMS { wait } else { u32::MAX }, wait, before: None }
+        Newton { size, due: if size <= MOST_FREEDOMS { wait } else { u32::MAX }, wait, before: None, cut: false }
     }
 
     /// After the sweep `sweeps.start` that changed row velocities by `change`, of those up to `sweeps.end` that may follow: whether the multipliers jumped, or went back from a jump that was
@@ -75,20 +90,22 @@ impl Newton {
         if let Some((lambda, before)) = self.before.take()
             && (change.is_nan() || change > WORTH * before)
         {
-            let worse = change.is_nan() || change >= before;
+            let worse = change.is_nan() || change >= before * if self.cut { LEEWAY } else { 1.0 };
             if worse {
                 locals.iter_mut().zip(lambda).for_each(|(local, lambda)| local.lambda = lambda);
-                self.wait *= if sweep > LATE { 2 } else { 1 };
+                self.wait *= if sweep > LATE && self.cut { 2 } else { 1 };
+                self.cut = !self.cut;
             }
-            self.due = sweep + self.wait;
+            self.due = sweep + if worse && self.cut { 1 } else { self.wait };
             return worse;
         }
-        if left <= TRIAL {
+        let trial = if self.cut { LONG_TRIAL } else { TRIAL };
+        if left <= trial {
             return false;
         }
         let lambda = locals.iter().map(|local| local.lambda).collect();
-        self.due = sweep + TRIAL;
-        if jump(self.size, locals, rows, momentum, du) {
+        self.due = sweep + trial;
+        if jump(self.size, self.cut, locals, rows, momentum, du) {
             self.before = Some((lambda, change));
             return true;
         }
@@ -97,8 +114,9 @@ impl Newton {
     }
 }
 
-/// One jump of all multipliers, back within their bounds; whether the system could be solved. `du` is that of the multipliers.
-fn jump(size: usize, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du: &[f64]) -> bool {
+/// One jump of all multipliers, back within their bounds, or cut where the first of them comes to its bound; whether the system could be solved. `du` is
+/// that of the multipliers.
+fn jump(size: usize, cut: bool, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du: &[f64]) -> bool {
     let Some(epsilon) = proximal(locals) else { return false };
     let mut matrix = DMatrix::identity(size, size);
     let mut right = DVector::zeros(size);
@@ -109,19 +127,47 @@ fn jump(size: usize, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du:
     if !matrix.lu().solve_mut(&mut right) || !right.iter().all(|x| x.is_finite()) {
         return false;
     }
-    for (local, answer) in locals.iter_mut().zip(&answers) {
-        let n = local.block.set.rows();
-        let mut velocity = [0.0; 3];
-        for side in local.block.sides() {
-            let change = &right.as_slice()[momentum.place(side.u)..][..side.dof as usize];
-            (0..n).for_each(|k| velocity[k] += crate::rows::dot(rows.response(side, k), change));
-        }
-        for k in 0..n {
-            local.lambda[k] += answer.a[k] - (0..n).map(|j| answer.g[k][j] * velocity[j]).sum::<f64>();
-        }
+    let changes: Vec<[f64; 3]> = locals.iter().zip(&answers).map(|(local, answer)| change_of(local, answer, rows, momentum, right.as_slice())).collect();
+    let share = if cut { locals.iter().zip(&changes).map(|(local, change)| room(local, change)).fold(1.0, f64::min) } else { 1.0 };
+    for (local, change) in locals.iter_mut().zip(&changes) {
+        (0..3).for_each(|k| local.lambda[k] += share * change[k]);
         local.bound();
     }
     true
+}
+
+/// `δλ` of one block.
+fn change_of(local: &Local, answer: &Answer, rows: &Rows, momentum: &Momentum, du: &[f64]) -> [f64; 3] {
+    let n = local.block.set.rows();
+    let mut velocity = [0.0; 3];
+    for side in local.block.sides() {
+        let change = &du[momentum.place(side.u)..][..side.dof as usize];
+        (0..n).for_each(|k| velocity[k] += crate::rows::dot(rows.response(side, k), change));
+    }
+    let mut change = [0.0; 3];
+    for k in 0..n {
+        change[k] = answer.a[k] - (0..n).map(|j| answer.g[k][j] * velocity[j]).sum::<f64>();
+    }
+    change
+}
+
+/// How much of a change a contact's multipliers can take until the normal is 0, or until they leave the cone if they are inside.
+fn room(local: &Local, change: &[f64; 3]) -> f64 {
+    let (Step::Contact(contact), [n, x, y]) = (&local.step, local.lambda) else { return 1.0 };
+    let lifts = if n > 0.0 && change[0] < -n { -n / change[0] } else { 1.0 };
+    // |λ_t + α δ_t|² = μ² (λ_n + α δ_n)²
+    let square = contact.mu * contact.mu;
+    let inside = square * n * n - x * x - y * y;
+    if inside <= INSIDE * square * n * n {
+        let (turn, most) = ((change[1] * change[1] + change[2] * change[2]).sqrt(), TURN * contact.mu * n);
+        return lifts.min(if turn > most && most > 0.0 { most / turn } else { 1.0 });
+    }
+    let a = change[1] * change[1] + change[2] * change[2] - square * change[0] * change[0];
+    let half = x * change[1] + y * change[2] - square * n * change[0];
+    // the least root above 0 of a α² + 2 half α − inside, written so that nothing cancels
+    let root = (half * half + a * inside).max(0.0).sqrt();
+    let slides = if half + root > 0.0 { inside / (half + root) } else { 1.0 };
+    lifts.min(slides)
 }
 
 /// `ε`; `None` where nothing responds.

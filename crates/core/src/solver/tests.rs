@@ -9,6 +9,7 @@ mod redundant;
 mod residuals;
 mod scalar;
 mod soft;
+mod stubborn;
 
 use super::{Accuracy, Outcome, RowSolver};
 use crate::rows::{RowSet, Rows};

@@ -1,8 +1,14 @@
 //! The fuzz targets of `fuzz/` for NetSync and datagrams, without a fuzzer: on their seeds, and on seeds that were cut, joined and flipped.
 
-use crate::udp::frames;
+use crate::udp::frames as count;
 use std::path::Path;
+use tumble_net::sync::messages::{Done, FacetCounts, Join};
+use tumble_net::sync::recording::take_apart;
+use tumble_net::sync::shm::wire::Head;
+use tumble_net::sync::table::Snapshot;
+use tumble_net::sync::udp::frames;
 use tumble_net::sync::udp::network::Random;
+use tumble_net::sync::{Input, Viewer, wire};
 
 /// What a target's macro makes here: a function of its bytes.
 #[macro_export]
@@ -28,6 +34,24 @@ targets! {
     netsync_recording "../../../../fuzz/fuzz_targets/netsync_recording.rs"
     udp_packet "../../../../fuzz/fuzz_targets/udp_packet.rs"
     udp_session "../../../../fuzz/fuzz_targets/udp_session.rs"
+}
+
+/// A seed that is refused at its first bytes, as one of an older version is, leads nowhere.
+#[test]
+fn seeds_are_of_the_versions_of_today() {
+    let seed = |name: &str| std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds").join(name)).unwrap();
+    assert!(wire::open(&seed("netsync_frame/message")).is_ok());
+    assert!(Snapshot::parse(&seed("netsync_frame/snapshot")).is_ok() && Viewer::read(&seed("netsync_frame/viewer")).is_ok());
+    assert!(Join::read(&seed("netsync_frame/join")).is_ok() && Input::read(&seed("netsync_frame/input")).is_ok());
+    assert!(Done::read(&seed("netsync_frame/done")).is_ok() && FacetCounts::read(&seed("netsync_frame/counts")).is_ok());
+    assert!(Snapshot::parse(&seed("netsync_mirror/snapshot")).is_ok() && Snapshot::parse(&seed("netsync_mirror/snapshot_guests")).is_ok());
+    assert!(take_apart(&seed("netsync_recording/frame")).is_ok());
+    for name in ["ack", "close", "fragment", "newest", "parity"] {
+        assert!(frames::parse(&seed(&format!("udp_packet/{name}"))).is_some_and(|frames| !frames.is_empty()), "{name}");
+    }
+    let bytes = seed("udp_packet/shm");
+    let words: Vec<u64> = bytes.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap())).collect();
+    assert!(Head::parse(words[..6].try_into().unwrap()).is_ok());
 }
 
 fn seeds(name: &str) -> Vec<Vec<u8>> {
@@ -63,7 +87,7 @@ fn no_target_panics_on_its_seeds_or_on_what_is_made_of_them_full_length() {
         let (seeds, mut random) = (seeds(name), Random::new(name.len() as u64));
         assert!(!seeds.is_empty());
         seeds.iter().for_each(|seed| target(seed));
-        for _ in 0..frames(2_000, 200_000) {
+        for _ in 0..count(2_000, 200_000) {
             target(&changed(&seeds, &mut random));
         }
     }

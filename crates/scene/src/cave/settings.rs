@@ -41,7 +41,7 @@ pub struct Sync {
     pub connect_timeout_ms: u32,
     /// How long a frame waits for a facet, ms, 1 to 60 000. Default 100.
     pub ready_timeout_ms: u32,
-    /// A facet not heard of for so long is dropped, and may come back, ms, 1 to 600 000. Default 2000.
+    /// A facet not heard of for so long is dropped, and may come back, ms, 100 to 600 000: who lives is heard every 50 ms. Default 2000.
     pub drop_timeout_ms: u32,
     /// Frames kept for who missed some, 1 to 1024. Default 8.
     pub history_frames: u32,
@@ -70,7 +70,7 @@ impl Sync {
             mode: f.choice_or("mode", MODES, usual.mode),
             connect_timeout_ms: f.integer_or("connect_timeout_ms", 1..=600_000, usual.connect_timeout_ms),
             ready_timeout_ms: f.integer_or("ready_timeout_ms", 1..=60_000, usual.ready_timeout_ms),
-            drop_timeout_ms: f.integer_or("drop_timeout_ms", 1..=600_000, usual.drop_timeout_ms),
+            drop_timeout_ms: f.integer_or("drop_timeout_ms", 100..=600_000, usual.drop_timeout_ms),
             history_frames: f.integer_or("history_frames", 1..=1024, usual.history_frames),
         };
         if sync.drop_timeout_ms < sync.ready_timeout_ms {

@@ -83,21 +83,26 @@ impl Crew {
         let mut crew = Crew { members: Vec::new(), restart: launcher.is_some_and(|l| l.restart), quiet: serve.quiet, signals: signals.clone() };
         for (k, seat) in seats(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
             let far = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
-            let address = far.map_or_else(|| address.clone(), |node| seen_by(node, address));
+            let seen = far.map_or_else(|| Some(address.clone()), |node| seen_by(node, address));
             match (launcher, far) {
+                (Some(_), Some(node)) if seen.is_none() && !node.launch.is_empty() => {
+                    let why = format!("{} cannot be reached from here, so the address at which its facets would find this machine is not known; name it with --listen ADDR:PORT", node.address);
+                    return Err(Failure::input(format!("node {}: {why}", node.name)));
+                }
                 (Some(launcher), None) => {
                     let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
-                    let words = led(launcher, &seat.name, &address).into_iter().map(OsString::from);
+                    let words = led(launcher, &seat.name, address).into_iter().map(OsString::from);
                     crew.members.push(Member::new(k, &seat.name, std::iter::once(program.into_os_string()).chain(words).collect()));
                 }
                 (Some(launcher), Some(node)) if !node.launch.is_empty() => {
-                    let words = launch(node, &seat.name, &led(launcher, &seat.name, &address));
+                    let words = launch(node, &seat.name, &led(launcher, &seat.name, seen.as_ref().unwrap_or(address)));
                     crew.say(&format!("facet {}: starting it on {}: {}", seat.name, node.name, words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" ")));
                     crew.members.push(Member::new(k, &seat.name, words.into_iter().map(OsString::from).collect()));
                 }
                 (_, node) => {
-                    let server = match &address {
-                        Address::Udp(at) if node.is_some() => format!(" --server {at}"),
+                    let server = match (&seen, address) {
+                        (Some(Address::Udp(at)), _) if node.is_some() => format!(" --server {at}"),
+                        (None, Address::Udp(at)) => format!(" --server ADDR:{} with this machine's address as that one sees it", at.port()),
                         _ => String::new(),
                     };
                     let place = node.map_or("here".to_owned(), |n| format!("on {} ({})", n.name, n.address));
@@ -240,11 +245,11 @@ impl Member {
     }
 }
 
-/// The server's address, as a node reaches it.
-fn seen_by(node: &Node, address: &Address) -> Address {
+/// The server's address, as a node reaches it; `None` where there is no way to the node.
+fn seen_by(node: &Node, address: &Address) -> Option<Address> {
     match *address {
-        Address::Udp(at) if at.ip().is_unspecified() => Address::Udp((seen_from(&node.address, at.port()).unwrap_or(at.ip()), at.port()).into()),
-        _ => address.clone(),
+        Address::Udp(at) if at.ip().is_unspecified() => seen_from(&node.address, at.port()).map(|ip| Address::Udp((ip, at.port()).into())),
+        _ => Some(address.clone()),
     }
 }
 

@@ -62,6 +62,11 @@ impl Devices {
         self.tracker.as_ref().map(Heard::counts)
     }
 
+    /// Whether the inputs of a recording made of the scene what they made of it then.
+    pub fn verdict(&self) -> Result<(), Failure> {
+        self.played.as_ref().map_or(Ok(()), Played::verdict)
+    }
+
     /// What came of playing inputs.
     pub fn played_counts(&self) -> Option<played::Counts> {
         self.played.as_ref().map(|p| p.counts)

@@ -3,7 +3,7 @@
 use super::args::{Carrier, ServeOptions};
 use super::crew::carrier;
 use crate::failure::Failure;
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -31,6 +31,11 @@ fn same(a: &Path, b: &Path) -> bool {
     a == b || number(a).is_some_and(|ours| Some(ours) == number(b))
 }
 
+/// Whether an open file is the one at `path`.
+fn same_file(file: &File, path: &Path) -> bool {
+    matches!((file.metadata(), std::fs::metadata(path)), (Ok(ours), Ok(there)) if ours.ino() == there.ino())
+}
+
 /// Tries it and leaves the folder as it was.
 fn writable(path: &Path) -> Result<(), Failure> {
     let there = std::fs::symlink_metadata(path).is_ok();
@@ -54,10 +59,11 @@ pub fn say(text: &str) -> Result<(), Failure> {
 }
 
 /// Where a run is recorded: into a file beside the one that is wanted, which takes its place when the run begins. So a start at which nobody joins costs no
-/// earlier recording.
+/// earlier recording. Its process holds a lock on it; one that nobody holds is left from a start that was killed, and goes with the next recording.
 pub struct Recording {
     file: PathBuf,
     beside: Option<PathBuf>,
+    _lock: Option<File>,
 }
 
 impl Recording {
@@ -68,11 +74,23 @@ impl Recording {
         if about.as_ref().is_some_and(|about| about.is_dir()) {
             return Err(Failure::input(format!("{}: cannot be recorded into: it is a folder", file.display())));
         }
-        let beside = about.is_none_or(|about| about.is_file()).then(|| {
-            let name = real.file_name().unwrap_or_default().to_string_lossy();
-            real.with_file_name(format!(".{:.200}.{}", name, std::process::id()))
-        });
-        Ok(Recording { file: if beside.is_some() { real } else { file }, beside })
+        if about.is_some_and(|about| !about.is_file()) {
+            return Ok(Recording { file, beside: None, _lock: None });
+        }
+        let begin = format!(".{:.200}.", real.file_name().unwrap_or_default().to_string_lossy());
+        remove_left(&real, &begin);
+        let beside = real.with_file_name(format!("{begin}{}", std::process::id()));
+        let failed = |e: std::io::Error| Failure::run(&format!("recording into {}", file.display()), e);
+        // who removes what is left may be quicker than the lock
+        for _ in 0..10 {
+            let lock = OpenOptions::new().write(true).create(true).truncate(true).open(&beside).map_err(failed)?;
+            // a file system without locks keeps what is left
+            let locked = lock.try_lock().is_ok();
+            if same_file(&lock, &beside) {
+                return Ok(Recording { file: real, beside: Some(beside), _lock: locked.then_some(lock) });
+            }
+        }
+        Err(Failure::run(&format!("recording into {}", file.display()), format!("{} is removed again and again", beside.display())))
     }
 
     /// What is opened.
@@ -99,6 +117,18 @@ impl Recording {
     /// Where it lies.
     pub fn file(&self) -> &Path {
         &self.file
+    }
+}
+
+/// Removes what starts that were killed left beside `real`: names that begin so and end with a process's number, and are nobody's.
+fn remove_left(real: &Path, begin: &str) {
+    let number = |name: &str| name.strip_prefix(begin).is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|e| e.file_name().to_str().is_some_and(number) && e.file_type().is_ok_and(|kind| kind.is_file())) {
+        if OpenOptions::new().write(true).open(entry.path()).is_ok_and(|left| left.try_lock().is_ok()) {
+            let _ = std::fs::remove_file(entry.path());
+        }
     }
 }
 
@@ -132,6 +162,14 @@ mod tests {
         assert!(begun.begin().is_ok());
         drop(begun);
         assert_eq!(std::fs::read(&file).unwrap(), b"now");
+        // what killed starts left goes, and nothing else
+        let [left, held, other] = [".run.mcap.1", ".run.mcap.2", ".run.mcap.notes"].map(|name| folder.join(name));
+        [&left, &held, &other].into_iter().for_each(|path| std::fs::write(path, "begun").unwrap());
+        let holder = File::open(&held).unwrap();
+        holder.lock().unwrap();
+        drop(Recording::new(file.clone()));
+        assert_eq!([&left, &held, &other].map(|path| path.exists()), [false, true, true]);
+        [&held, &other].into_iter().for_each(|path| std::fs::remove_file(path).unwrap());
         assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink() && same(&file, &link));
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
         std::fs::remove_dir_all(&folder).unwrap();

@@ -70,10 +70,20 @@ impl Played {
             self.counts.different += 1;
             if self.counts.first_different.is_none() {
                 self.counts.first_different = Some(ours.0);
-                eprintln!("frame {} comes out otherwise than recorded; scene, --push, --stepper and --solver must be those of the recording", ours.0);
+                eprintln!("frame {} comes out otherwise than recorded", ours.0);
             }
         }
         self.counts.inputs += then.inputs.len() as u64;
         Ok(then.inputs)
+    }
+
+    /// Whether all frames came out as recorded.
+    pub fn verdict(&self) -> Result<(), Failure> {
+        let Counts { same, different, first_different: Some(first), .. } = self.counts else { return Ok(()) };
+        let why = format!(
+            "{different} of {} frames came out otherwise than recorded, the first is frame {first}; scene, environment, cave, --push, --stepper and --solver must be those of the recording",
+            same + different
+        );
+        Err(Failure::run(&format!("--input-from {}", self.path.display()), why))
     }
 }

@@ -146,6 +146,9 @@ impl<'a> Host<'a> {
         let described = cave.recording.as_ref().filter(|_| tape.is_none()).map(|r| (r.file.clone(), r.every_frames));
         let recorder = options.record.clone().map(|file| (file, 1)).or(described).map(|(file, every)| {
             let recording = Recording::new(file)?;
+            if !recording.has_begun() {
+                signals.remove_at_the_end(recording.begins_at().to_owned());
+            }
             let recorder = SessionRecorder::create(recording.begins_at(), &scene.file, hash, &world, every, RecorderOptions::default());
             recorder.map(|r| (r, recording)).map_err(|e| Failure::run("recording", e))
         });
@@ -346,7 +349,7 @@ impl<'a> Host<'a> {
         if let (Ok(Some(recording)), false) = (&recorded, self.options.quiet) {
             outputs::say(&format!("recording: {}\n", recording.file().display()))?;
         }
-        told.and(recorded.map(drop)).and(summed).and(crew)
+        told.and(recorded.map(drop)).and(summed).and(crew).and(self.devices.verdict())
     }
 
     /// What was counted and measured, to stdout and file.

@@ -1,8 +1,11 @@
 //! Caves under kill -9 and SIGSTOP: who goes on, who comes back, what is left.
 
 use crate::cave_place::*;
-use crate::common::json;
+use crate::common::{fail, json, text};
 use rustix::process::Signal;
+use std::os::unix::fs::MetadataExt;
+use std::process::Command;
+use std::time::Duration;
 
 #[test]
 fn the_wall_goes_on_without_a_killed_facet_which_comes_back() {
@@ -81,8 +84,18 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
 /// A second process is refused; one that is started in place of a killed one is let in.
 #[test]
 fn a_facet_is_shown_by_one_process() {
-    let place = Place::new("cave-rivals", &wall());
-    let server = place.start("serve", &["--summary", &place.path("summary.json")]);
+    rivals("shared_memory", 3..20);
+}
+
+/// The same by datagrams, where who comes last has the connection first.
+#[test]
+fn a_facet_is_shown_by_one_process_over_udp() {
+    rivals("udp", 3..20);
+}
+
+fn rivals(carrier: &str, joins: std::ops::Range<u64>) {
+    let place = Place::new(&format!("cave-rivals-{carrier}"), &wall());
+    let server = place.start("serve", &["--transport", carrier, "--summary", &place.path("summary.json")]);
     let [l, r] = ["l", "r"].map(|name| place.start("facet", &["--facet", name, "--no-pictures", "--log-dir", &place.path("out"), "--wait", "60"]));
     place.wait_for("out", "r", 5);
     let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("second"), "--wait", "60"]).end();
@@ -102,11 +115,107 @@ fn a_facet_is_shown_by_one_process() {
     let summary = json(&place.folder.path("summary.json"));
     let (facet, frames) = (&summary["facets"][0], summary["frames"].as_u64().unwrap());
     // five if nobody took the other's connection before it could speak; without end if nobody was refused
-    assert!((3..20).contains(&facet["joined"].as_u64().unwrap()), "{facet}");
+    assert!(joins.contains(&facet["joined"].as_u64().unwrap()), "{facet}");
     let logged: std::collections::BTreeSet<u64> = ["out", "second", "third"].iter().flat_map(|folder| numbers(&place.log(folder, "l"))).collect();
     let shown = frames - facet["not_shown"].as_u64().unwrap();
     assert!(shown >= logged.len() as u64 && shown <= facet["presented"].as_u64().unwrap() && said.contains("not shown"), "{shown}, {logged:?}: {said}");
     assert_eq!((&summary["facets"][1]["not_shown"], summary["facets"][1]["presented"].as_u64()), (&0.into(), Some(frames)));
+}
+
+/// A second Ctrl-C ends what a facet that does not answer holds up, and so does its process.
+#[test]
+fn a_second_signal_ends_a_run_at_once() {
+    let place = Place::new("cave-forced", &wall());
+    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out")]);
+    place.wait_for("out", "r", 5);
+    let facets = run.facets();
+    signal(run.facet("r"), Signal::STOP);
+    signal(run.pid(), Signal::INT);
+    // right behind the first it would be the same one; in order it would take 3 s to give the facet up
+    std::thread::sleep(Duration::from_millis(800));
+    signal(run.pid(), Signal::INT);
+    let (code, said, wrong) = run.end();
+    assert_eq!(code, Some(130), "{said}{wrong}");
+    assert!(!wrong.contains("does not end and is killed"), "{wrong}");
+    wait("the end of all facets", || facets.iter().all(|(_, pid)| !alive(*pid)));
+    // the cave is free, and the next run takes away what is left
+    let locks = std::fs::read_dir(place.folder.path("run")).unwrap().flatten().flat_map(|folder| std::fs::read_dir(folder.path()).unwrap().flatten());
+    let locks: Vec<_> = locks.map(|file| file.file_name()).filter(|name| name.to_str().unwrap().starts_with("cave-")).collect();
+    assert!(locks.is_empty(), "{locks:?}");
+    place.succeed("cave", &["--no-pictures", "--seconds", "0.1", "--quiet"]);
+    place.assert_clean();
+}
+
+/// Kill -9 leaves the file that was begun; the next recording of that name takes it away.
+#[test]
+fn what_a_killed_start_has_recorded_goes_with_the_next_recording() {
+    let place = Place::new("cave-killed-start", &wall());
+    let record = place.path("run.mcap");
+    let hidden = || std::fs::read_dir(place.folder.path("")).unwrap().flatten().filter(|e| e.file_name().as_encoded_bytes().starts_with(b".run.mcap.")).count();
+    let start = || {
+        let run = place.start("serve", &["--record", &record, "--wait", "60"]);
+        wait("the recording", || hidden() == 1);
+        run
+    };
+    let run = start();
+    signal(run.pid(), Signal::KILL);
+    let _ = run.end();
+    assert_eq!(hidden(), 1);
+    place.succeed("cave", &["--no-pictures", "--fast", "--seconds", "0.1", "--record", &record]);
+    assert_eq!(hidden(), 0);
+    place.assert_clean();
+}
+
+/// Others could cut it to nothing, which ends every process that reads it. (The counter that iceoryx2 makes for all users was such a file.)
+#[test]
+fn what_a_run_shares_is_open_to_nobody_else() {
+    let place = Place::new("cave-private", &wall());
+    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &place.path("summary.json")]);
+    place.wait_for("out", "r", 5);
+    let folder = std::fs::read_dir(place.folder.path("run")).unwrap().flatten().map(|e| e.path()).find(|path| path.is_dir()).unwrap();
+    let about = std::fs::metadata(&folder).unwrap();
+    assert_eq!(about.mode() & 0o777, 0o700);
+    let prefix = format!("tumble_{}_{}_", about.uid(), &blake3::hash(text(&folder).as_bytes()).to_hex()[..8]);
+    let ours = |name: &str| name.starts_with(&prefix) || name.starts_with(&format!("tumble_{}_", about.uid())) && name.ends_with(".bell");
+    let files: Vec<_> = std::fs::read_dir("/dev/shm").unwrap().flatten().filter(|file| file.file_name().to_str().is_some_and(ours)).map(|file| file.path()).collect();
+    // samples and services in both directions, connections of two facets, a bell
+    assert!(files.len() >= 10, "{files:?}");
+    for file in &files {
+        // those of other tests may be gone by now, and one that is being made is less open still
+        assert!(std::fs::metadata(file).map_or(0, |about| about.mode()) & 0o077 == 0, "{}", file.display());
+    }
+    if about.uid() == 0 {
+        for file in &files {
+            let cut = Command::new("setpriv").args(["--reuid", "65534", "--regid", "65534", "--clear-groups", "truncate", "-s", "0", "-c"]).arg(file).output();
+            assert!(cut.is_ok_and(|cut| !cut.status.success()) || !file.exists(), "{}", file.display());
+        }
+        let at = *numbers(&place.log("out", "r")).last().unwrap();
+        place.wait_for("out", "r", at + 5);
+    }
+    signal(run.pid(), Signal::INT);
+    let (code, _, wrong) = run.end();
+    assert_eq!(code, Some(0), "{wrong}");
+    place.assert_clean();
+}
+
+#[test]
+fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
+    let place = Place::new("cave-nowhere", &wall());
+    // of another kind than the addresses that are listened at, and no name server is asked
+    let nowhere = "2001:db8::1";
+    let far = format!("transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n[[node]]\nname = \"far\"\naddress = \"{nowhere}\"\nlaunch = [\"true\", \"{{arguments}}\"]\n");
+    let key = place.folder.write("cave.key", "1".repeat(64));
+    std::fs::set_permissions(key, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
+    let text = wall().replace("name = \"l\"\nscreen", "name = \"l\"\nnode = \"far\"\nscreen") + &far;
+    assert!(text.contains("node = \"far\""));
+    std::fs::write(&place.cave, text).unwrap();
+    let (code, _, wrong) = place.start("cave", &["--no-pictures", "--wait", "5"]).end();
+    assert_eq!(code, Some(2), "{wrong}");
+    assert!(wrong.contains("node far: ") && wrong.contains(nowhere) && wrong.contains("--listen ADDR:PORT"), "{wrong}");
+    place.assert_clean();
+    let hasty = place.folder.write("hasty.toml", wall().replace("drop_timeout_ms = 500", "drop_timeout_ms = 2").replace("ready_timeout_ms = 200", "ready_timeout_ms = 1"));
+    let wrong = fail(&["check", &hasty], 2);
+    assert!(wrong.contains("drop_timeout_ms") && wrong.contains("100"), "{wrong}");
 }
 
 /// Both sides say what a wrong key looks like, though no frame was ever shown.

@@ -202,18 +202,18 @@ fn what_users_did_is_done_again_bit_by_bit() {
     let ball = server.ball();
     assert!((ball - Vec3::new(0.0, 2.0, 1.0)).norm() > 0.05, "it was not moved: {ball:?}");
     server.end();
-    let again = |name: &str, args: &[&str]| -> Value {
+    let again = |name: &str, args: &[&str]| -> (Value, Option<i32>, String) {
         let (file, summary) = (path(&format!("{name}.mcap")), folder.path(&format!("{name}.json")));
         let fixed = ["cave", &scene, "--cave", &cave, "--fast", "--no-pictures", "--input-from", &path("first.mcap"), "--record", &file, "--summary", &text(&summary)];
         let out = in_place(&folder, &[&fixed[..], args].concat()).output().unwrap();
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-        json(&summary)["input_from"].clone()
+        (json(&summary)["input_from"].clone(), out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
     };
     let frames = |name: &str| {
         let mut replay = Replay::open(path(name)).unwrap();
         std::iter::from_fn(|| replay.next_frame().unwrap()).map(|f| (f.recorded.frame, f.recorded.state, f.inputs)).collect::<Vec<_>>()
     };
-    let counts = again("second", &["--push"]);
+    let (counts, code, wrong) = again("second", &["--push"]);
+    assert_eq!(code, Some(0), "{wrong}");
     let (first, second) = (frames("first.mcap"), frames("second.mcap"));
     assert!(first.len() > 150);
     assert_eq!((&counts["same"], &counts["different"]), (&first.len().into(), &0.into()));
@@ -221,9 +221,10 @@ fn what_users_did_is_done_again_bit_by_bit() {
     // also the recordings are the same, but for what came when the first run had ended
     let both = first.len() - 1;
     assert!(first[..both] == second[..both] && second.len() == first.len());
-    // with another number of bodies it comes out otherwise, which is said
-    let counts = again("third", &[]);
-    assert_eq!(counts["first_different"], 0, "{counts}");
+    // with another number of bodies it comes out otherwise, which is a failure
+    let (counts, code, wrong) = again("third", &[]);
+    assert_eq!((&counts["first_different"], code), (&0.into(), Some(1)), "{counts}");
+    assert!(wrong.contains(&format!("{} of {} frames came out otherwise", counts["different"], first.len())), "{wrong}");
     // another step is another matter
     let out = in_place(&folder, &["cave", &scene, "--cave", &cave, "--fast", "--no-pictures", "--input-from", &path("first.mcap"), "--dt", "0.02"]).output().unwrap();
     let wrong = String::from_utf8_lossy(&out.stderr);

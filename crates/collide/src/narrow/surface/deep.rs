@@ -26,8 +26,11 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 impl Pass<'_> {
     /// One contact at the deepest point of the mesh's faces, where that is deeper than what was found.
     pub(super) fn faces(&self, mesh: &MeshField, found: &mut Collector) {
+        if let Some(other) = self.mesh {
+            return self.deepest(mesh, other, found);
+        }
         let rounded = self.field.round() && !self.field.bent();
-        if self.mesh.is_some() || self.field.linear() || rounded || !self.field.convex() {
+        if self.field.linear() || rounded || !self.field.convex() {
             return;
         }
         let gain = GAIN * self.size;

@@ -6,6 +6,8 @@
 //! that are too far to reach the margin are dropped (`d_B` changes by at most 1 m per metre). Within a piece that is kept the function
 //! is treated as convex until a look lies below the tangent of another one: there is a valley of B between them, and perhaps a second minimum,
 //! so that part is halved a few times.
+//! Where an edge or a corner of B is closest, the distance from it alone has its least place in closed form ([`Arc`]): that is looked at next, and where
+//! the same edge or corner is closest there, it is the minimum.
 //! What comes out:
 //!
 //! - a kink, two slopes: an edge of B (or the ridge between two faces, inside) is crossed. The normal is the combination of the two that is
@@ -14,6 +16,7 @@
 //!   edge's own ends, which are points and speak for themselves.
 
 use super::super::reduce::Collector;
+use super::arc::Arc;
 use super::pass::{ASIDE, Normals, Pass};
 use crate::surface::elements::Edge;
 use crate::surface::{Feature, Hit, TOUCHING, facing};
@@ -33,6 +36,8 @@ const LOOKS: usize = 20;
 const MOST_LOOKS: usize = 90;
 /// Halvings of a part over a valley, at most.
 const MOST_PARTED: u32 = 5;
+/// A foot so near a look is no news, as a part of what is left.
+const FOOT_ASIDE: f64 = 1e-6;
 /// How far below a tangent is no rounding, as a part of the smaller body's radius.
 const VALLEY: f64 = 1e-9;
 
@@ -68,6 +73,11 @@ impl Look {
     /// The tangent at another place.
     fn height(&self, s: f64) -> f64 {
         self.hit.distance + self.slope * (s - self.s)
+    }
+
+    /// The distance from the edge or corner that is closest here.
+    fn arc(&self, line: &Line) -> Option<Arc> {
+        Arc::new(&self.hit, self.s, self.slope, &line.along)
     }
 }
 
@@ -201,7 +211,9 @@ impl Pass<'_> {
             if (convex && least - level < tolerance) || high.s - low.s < tolerance {
                 break;
             }
+            let foot = if n % 3 < 2 { self.foot_between(line, &low, &high) } else { None };
             let s = match n % 3 {
+                _ if let Some(foot) = foot => foot,
                 0 if convex => s.clamp(low.s, high.s),
                 1 => low.s - low.slope * (high.s - low.s) / (high.slope - low.slope),
                 _ => 0.5 * (low.s + high.s),
@@ -225,6 +237,16 @@ impl Pass<'_> {
         }
         self.kink(line, &low, &high, found);
         Some([low, high])
+    }
+
+    /// The foot on the feature that is closest at the lower of two looks, or else at the other, where it lies between them.
+    fn foot_between(&self, line: &Line, low: &Look, high: &Look) -> Option<f64> {
+        if self.field.round() {
+            return None;
+        }
+        let margin = FOOT_ASIDE * (high.s - low.s);
+        let looks = if low.hit.distance < high.hit.distance { [low, high] } else { [high, low] };
+        looks.iter().filter_map(|look| Some(look.arc(line)?.foot)).find(|s| *s > low.s + margin && *s < high.s - margin)
     }
 
     /// A minimum between two slopes.
@@ -274,7 +296,8 @@ impl Pass<'_> {
         }
     }
 
-    /// Where the line leaves the face that is under `look`, towards `outer`: where the tangents of the two meet.
+    /// Where the line leaves the face that is under `look`, towards `outer`: in closed form where the edge that bounds the face is closest at `outer`,
+    /// else where the tangents of the two meet.
     fn leaves(&self, line: &Line, look: &Look, mut outer: Look) -> f64 {
         let tolerance = 1e-9 * self.size;
         for _ in 0..LOOKS {
@@ -283,6 +306,9 @@ impl Pass<'_> {
             if rise < tolerance || turn.abs() <= LEVEL {
                 return outer.s;
             }
+            if let Some(s) = self.leaves_towards(line, look, &outer, tolerance) {
+                return s;
+            }
             let s = outer.s - rise / turn;
             if (s - look.s) * (outer.s - look.s) <= 0.0 || (s - outer.s) * (look.s - outer.s) <= 0.0 {
                 return look.s;
@@ -290,6 +316,17 @@ impl Pass<'_> {
             outer = self.look(line, s);
         }
         outer.s
+    }
+
+    /// The same where the feature that is closest at `outer` bounds that face: its distance touches the face's plane there.
+    fn leaves_towards(&self, line: &Line, look: &Look, outer: &Look, tolerance: f64) -> Option<f64> {
+        if self.field.round() {
+            return None;
+        }
+        let arc = outer.arc(line)?;
+        let s = arc.place_of_slope(look.slope)?;
+        let between = (s - look.s) * (outer.s - look.s) > 0.0 && (s - outer.s) * (look.s - outer.s) > 0.0;
+        (between && (arc.height(s) - look.height(s)).abs() < tolerance).then_some(s)
     }
 
     fn push_on_face(&self, line: &Line, look: &Look, s: f64, part: u64, found: &mut Collector) {

@@ -7,9 +7,11 @@
 //! ```
 //!
 //! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
-//! search of a face we need in deep overlaps alone ([`deep`]), since edges and vertices of both bodies are exact.
+//! search of a face we need in deep overlaps alone ([`deep`], [`deepest`]), since edges and vertices of both bodies are exact.
 
+mod arc;
 mod deep;
+mod deepest;
 mod line;
 mod pass;
 mod rim;
@@ -21,7 +23,7 @@ use crate::surface::elements::Elements;
 use crate::surface::field::MeshField;
 use crate::{Contact, Pose, Vec3};
 use deep::DEEP;
-use pass::Pass;
+use pass::{Memory, Pass};
 
 /// A body as the pass sees it that takes its elements.
 pub(in crate::narrow) enum Source<'a> {
@@ -52,7 +54,10 @@ pub(in crate::narrow) fn surface(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pos
     let size = a.radius.min(b.radius);
     let mut found = Collector::new(margin, size, out);
     let b_in_a = a_in_b.inverse();
-    let (first, second) = (Pass::new(&a_in_b, b, size, None), Pass::new(&b_in_a, a, size, Some(&a_in_b)));
+    let memory_first = Memory::new();
+    let memory_second = Memory::new();
+    let first = Pass::new(&a_in_b, b, size, None, &memory_first);
+    let second = Pass::new(&b_in_a, a, size, Some(&a_in_b), &memory_second);
     first.run(&a.source, &mut found);
     second.run(&b.source, &mut found);
     if found.overlap() > DEEP * size {

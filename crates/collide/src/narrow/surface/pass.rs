@@ -3,7 +3,7 @@
 use super::super::reduce::Collector;
 use super::{Body, Source};
 use super::line::LYING_EDGE;
-use crate::surface::elements::{Edge, Elements, Point};
+use crate::surface::elements::{Edge, Elements, Group, PARTS, Point};
 use crate::surface::field::MeshField;
 use crate::surface::{Feature, Field, Hit, OVERHANG};
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
@@ -37,10 +37,22 @@ pub(super) struct Pass<'a> {
     pub(super) size: f64,
     /// In the second pass, where the field is A's: the pose of A in B.
     pub(super) second: Option<&'a Pose>,
-    /// What a mesh's field says of points of a mesh, by their names: each is the end of several edges.
+    memory: &'a Memory,
+}
+
+/// What a mesh's field says of points of a mesh, by their names: each is the end of several edges.
+pub(super) struct Memory {
     seen: RefCell<ArrayVec<(u32, Hit), SEEN>>,
     /// Where in `seen` a name may be found.
     slots: [Cell<u16>; SLOTS],
+}
+
+impl Memory {
+    /// Of nothing; inlined, so that it is not moved.
+    #[inline(always)]
+    pub(super) const fn new() -> Memory {
+        Memory { seen: RefCell::new(ArrayVec::new_const()), slots: [const { Cell::new(0) }; SLOTS] }
+    }
 }
 
 /// Points that are remembered at most; all are forgotten when there are more.
@@ -49,9 +61,9 @@ const SEEN: usize = 192;
 const SLOTS: usize = 1024;
 
 impl<'a> Pass<'a> {
-    pub(super) fn new(pose: &'a Pose, other: &Body<'a>, size: f64, second: Option<&'a Pose>) -> Pass<'a> {
+    pub(super) fn new(pose: &'a Pose, other: &Body<'a>, size: f64, second: Option<&'a Pose>, memory: &'a Memory) -> Pass<'a> {
         let rotation = *pose.rotation.to_rotation_matrix().matrix();
-        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, seen: RefCell::default(), slots: [const { Cell::new(0) }; SLOTS] }
+        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, memory }
     }
 
     pub(super) fn run(&self, source: &Source, found: &mut Collector) {
@@ -69,19 +81,32 @@ impl<'a> Pass<'a> {
     }
 
     fn mesh(&self, elements: &Elements, found: &mut Collector) {
-        let fine = usize::from(self.field.bent());
-        let mut n = 0;
-        while let Some(group) = elements.groups.get(n) {
-            let bound = self.field.bound(&self.place(&group.center));
-            if bound - group.reach[fine] > found.limit() {
-                n = group.skip as usize;
-                continue;
-            }
-            for point in elements.points_of(group) {
-                self.vertex_and_edges(elements, point, bound - (point.at - group.center).norm(), found);
-            }
-            n += 1;
+        let Some(all) = elements.groups.first() else { return };
+        let bound = self.field.bound(&self.place(&all.center()));
+        if bound - all.reach(self.field.bent()) <= found.limit() {
+            self.group(elements, all, bound, found);
         }
+    }
+
+    /// A group that may be in reach; `bound` is at most the field's distance at its centre.
+    ///
+    /// All parts are asked for before any is opened: so the memory that each waits for is waited for once.
+    fn group(&self, elements: &Elements, group: &Group, bound: f64, found: &mut Collector) {
+        for parts in elements.parts_of(group).chunks(PARTS) {
+            let bounds: ArrayVec<f64, PARTS> = parts.iter().map(|part| self.bound(&self.place(&part.center()))).collect();
+            for (part, bound) in parts.iter().zip(bounds) {
+                if bound - part.reach(self.field.bent()) <= found.limit() {
+                    self.group(elements, part, bound, found);
+                }
+            }
+        }
+        for point in elements.points_of(group) {
+            self.vertex_and_edges(elements, point, bound - (point.at - group.center()).norm(), found);
+        }
+    }
+
+    fn bound(&self, at: &Vec3) -> f64 {
+        self.mesh.map_or_else(|| self.field.bound(at), |mesh| mesh.bound(at))
     }
 
     /// A point of a mesh and the edges that it holds; `bound` is at most the field's distance there.
@@ -200,8 +225,8 @@ impl<'a> Pass<'a> {
 
     /// What a mesh's field says of a named place, if it may be less than `limit` away; else a bound.
     fn nearest_named(&self, mesh: &MeshField, at: &Vec3, name: u32, limit: f64) -> Result<Hit, f64> {
-        let slot = &self.slots[name as usize % SLOTS];
-        let mut seen = self.seen.borrow_mut();
+        let slot = &self.memory.slots[name as usize % SLOTS];
+        let mut seen = self.memory.seen.borrow_mut();
         if let Some((_, hit)) = seen.get(slot.get() as usize).filter(|s| s.0 == name) {
             return Ok(*hit);
         }

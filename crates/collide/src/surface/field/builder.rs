@@ -18,6 +18,7 @@ use super::octree::{Cell, Octree};
 use super::{Listed, MeshField};
 use crate::Vec3;
 use crate::mesh::closest_on_triangle;
+use rayon::prelude::*;
 
 /// Lists up to this length are not divided.
 const SHORT: usize = 16;
@@ -41,9 +42,11 @@ const BELOW: f64 = 1.0 - 2e-7;
 const SOME: f64 = 1e-9;
 /// Of single precision in distances and places, and more.
 const ROUNDING: f64 = 1e-6;
-/// Cells and listed triangles at most; beyond, the tree of boxes answers.
-const MOST_CELLS: usize = 1 << 20;
-const MOST_LISTED: usize = 1 << 23;
+/// Cells and listed triangles of a branch at most; beyond, the tree of boxes answers.
+const MOST_CELLS: usize = 1 << 16;
+const MOST_LISTED: usize = 1 << 19;
+/// Cells above this depth have their children made by several threads, each a branch of its own.
+const BRANCHES: u32 = 2;
 
 /// A triangle that may count in a cell.
 #[derive(Clone, Copy)]
@@ -55,9 +58,20 @@ struct Near {
     slope: Vec3,
 }
 
-pub(super) struct Builder<'a> {
-    field: &'a mut MeshField,
+/// A cell and all below it: the first of `cells`, whose links are indices in here.
+struct Branch {
+    cells: Vec<Cell>,
+    lists: Vec<Listed>,
+}
+
+/// Makes a branch.
+struct Builder<'a> {
+    field: &'a MeshField,
     deepest: u32,
+    branch: Branch,
+    /// Working memory.
+    below: Vec<f64>,
+    spare: Vec<Vec<Near>>,
 }
 
 /// Fills `field.tree` and `field.lists`.
@@ -69,24 +83,44 @@ pub(super) fn build(field: &mut MeshField) {
     let mean = lengths / field.corners.len() as f64;
     let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
     let all: Vec<Near> = (0..field.corners.len() as u32).map(|triangle| Near { distance: 0.0, triangle, slope: Vec3::zeros() }).collect();
-    Builder { field, deepest }.cell(0, center, half, &all, &Vec3::zeros(), 0);
+    let branch = Builder::branch(field, deepest, center, half, &all, &Vec3::zeros(), 0);
+    (field.tree.cells, field.lists) = (branch.cells, branch.lists);
     field.tree.finish(deepest);
     field.lists.shrink_to_fit();
+}
+
+impl Branch {
+    /// Puts a branch in the place of a cell.
+    fn graft(&mut self, place: usize, mut branch: Branch) {
+        let (cells, lists) = (self.cells.len() as u32 - 1, self.lists.len() as u32);
+        branch.cells.iter_mut().for_each(|cell| cell.shift(cells, lists));
+        self.cells[place] = branch.cells[0];
+        self.cells.extend_from_slice(&branch.cells[1..]);
+        self.lists.append(&mut branch.lists);
+    }
 }
 
 fn order(a: &Near, b: &Near) -> std::cmp::Ordering {
     a.distance.total_cmp(&b.distance).then(a.triangle.cmp(&b.triangle))
 }
 
-/// Offsets of the corners of a cube from its centre.
-fn corners(half: f64) -> impl Iterator<Item = Vec3> {
-    (0..8).map(move |octant| Vec3::from_fn(|k, _| if octant >> k & 1 == 1 { half } else { -half }))
+/// Offset of a corner of a cube from its centre.
+fn corner(octant: usize, half: f64) -> Vec3 {
+    Vec3::from_fn(|k, _| if octant >> k & 1 == 1 { half } else { -half })
 }
 
-impl Builder<'_> {
-    /// `list`: the triangles that count in the parent, with their distances from its centre, from which this one is `moved`.
+impl<'a> Builder<'a> {
+    /// The branch of a cell. `list`: the triangles that count in the parent, with their distances from its centre, from which this one is `moved`.
+    fn branch(field: &'a MeshField, deepest: u32, center: Vec3, half: f64, list: &[Near], moved: &Vec3, depth: u32) -> Branch {
+        let branch = Branch { cells: vec![Cell::empty()], lists: Vec::new() };
+        let mut builder = Builder { field, deepest, branch, below: Vec::new(), spare: Vec::new() };
+        builder.cell(0, center, half, list, moved, depth);
+        builder.branch
+    }
+
+    /// Fills a cell of the branch.
     fn cell(&mut self, index: usize, center: Vec3, half: f64, list: &[Near], moved: &Vec3, depth: u32) {
-        let field = &*self.field;
+        let field = self.field;
         let at = |triangle: u32| {
             let from = center - closest_on_triangle(&center, &field.corners[triangle as usize]).0;
             let distance = from.norm();
@@ -95,11 +129,14 @@ impl Builder<'_> {
         };
         let reach = 3.0_f64.sqrt() * half;
         // convex: no triangle is closer than its tangent plane in the parent tells
-        let below: Vec<f64> = list.iter().map(|n| n.distance + n.slope.dot(moved)).collect();
-        let may_be = |most: f64| list.iter().zip(&below).filter(move |(_, below)| **below <= most).map(|(n, _)| n);
+        self.below.clear();
+        self.below.extend(list.iter().map(|n| n.distance + n.slope.dot(moved)));
+        let below = &self.below;
+        let may_be = |most: f64| list.iter().zip(below).filter(move |(_, below)| **below <= most).map(|(n, _)| n);
         let Some(guess) = (0..list.len()).min_by(|&a, &b| below[a].total_cmp(&below[b])) else { return };
         let most = at(list[guess].triangle).distance + 2.0 * reach;
-        let mut near: Vec<Near> = may_be(most).map(|n| at(n.triangle)).collect();
+        let mut near = self.spare.pop().unwrap_or_default();
+        may_be(most).for_each(|n| near.push(at(n.triangle)));
         let Some(&first) = near.iter().min_by(|a, b| order(a, b)) else { return };
         let (least, found) = (first.distance, field.closest_of(&center, first.triangle as usize));
         let distance = field.describe(&center, &found).distance;
@@ -118,35 +155,47 @@ impl Builder<'_> {
             n.distance - least <= slack + more + half * (n.slope - first.slope).abs().sum()
         };
         let listed = near.iter().filter(|n| counts(n, turned(n.triangle))).count();
-        let full = field.tree.cells.len() > MOST_CELLS || field.lists.len() + near.len() > MOST_LISTED;
+        let full = self.branch.cells.len() > MOST_CELLS || self.branch.lists.len() + near.len() > MOST_LISTED;
         let away = least > FARTHEST * field.diagonal;
         let far = least > FAR * reach && (listed <= LONG || away);
         if listed > SHORT && depth < self.deepest && !far && !full {
             // one that may be another way in a child may not be in this cell
             near.retain(|n| counts(n, takes_others));
-            return self.divide(index, center, half, &near, depth);
+            self.divide(index, center, half, &near, depth);
+        } else {
+            near.retain(|n| counts(n, turned(n.triangle)));
+            let mut cell = Cell::empty();
+            cell.set_distance(distance - ROUNDING * (distance.abs() + field.diagonal));
+            if least > reach {
+                let slope = cell.set_slope(&(first.slope * distance.signum()));
+                cell.set_short(self.short(half, distance, &slope, &near, &first, excess));
+            }
+            if near.len() <= if away { SHORT } else { LONG } && !full {
+                near.sort_unstable_by(order);
+                (cell.link, cell.count) = (self.branch.lists.len() as u32, near.len() as u8);
+                self.branch.lists.extend(near.iter().map(|n| Listed { triangle: n.triangle, nearer: (n.distance * BELOW) as f32 }));
+            }
+            self.branch.cells[index] = cell;
         }
-        near.retain(|n| counts(n, turned(n.triangle)));
-        let mut cell = Cell::empty();
-        cell.set_distance(distance - ROUNDING * (distance.abs() + field.diagonal));
-        if least > reach {
-            let slope = cell.set_slope(&(first.slope * distance.signum()));
-            cell.set_short(self.short(half, distance, &slope, &near, &first, excess));
-        }
-        if near.len() <= if away { SHORT } else { LONG } && !full {
-            near.sort_unstable_by(order);
-            (cell.link, cell.count) = (self.field.lists.len() as u32, near.len() as u8);
-            self.field.lists.extend(near.iter().map(|n| Listed { triangle: n.triangle, nearer: (n.distance * BELOW) as f32 }));
-        }
-        self.field.tree.cells[index] = cell;
+        near.clear();
+        self.spare.push(near);
     }
 
     fn divide(&mut self, index: usize, center: Vec3, half: f64, near: &[Near], depth: u32) {
-        let children = self.field.tree.cells.len();
-        self.field.tree.cells[index].link = children as u32;
-        self.field.tree.cells.extend([Cell::empty(); 8]);
-        for (octant, offset) in corners(0.5 * half).enumerate() {
-            self.cell(children + octant, center + offset, 0.5 * half, near, &offset, depth + 1);
+        let children = self.branch.cells.len();
+        self.branch.cells[index].link = children as u32;
+        self.branch.cells.extend([Cell::empty(); 8]);
+        let half = 0.5 * half;
+        let offsets: [Vec3; 8] = std::array::from_fn(|octant| corner(octant, half));
+        if depth < BRANCHES {
+            let (field, deepest) = (self.field, self.deepest);
+            let branches: Vec<Branch> =
+                offsets.par_iter().map(|offset| Builder::branch(field, deepest, center + offset, half, near, offset, depth + 1)).collect();
+            branches.into_iter().enumerate().for_each(|(octant, branch)| self.branch.graft(children + octant, branch));
+        } else {
+            for (octant, offset) in offsets.iter().enumerate() {
+                self.cell(children + octant, center + offset, half, near, offset, depth + 1);
+            }
         }
     }
 
@@ -157,7 +206,7 @@ impl Builder<'_> {
             let corner = center + offset;
             (closest_on_triangle(&corner, triangle).0 - corner).norm() - n.distance - slope.dot(&offset)
         };
-        corners(half).map(of).fold(0.0, f64::max)
+        (0..8).map(|octant| of(corner(octant, half))).fold(0.0, f64::max)
     }
 
     /// `e`: how far the distance falls short of the plane through `(c, distance)` with this slope, at most, metres; in a cell that holds
@@ -168,5 +217,41 @@ impl Builder<'_> {
             return near.iter().map(of).fold(0.0, f64::max);
         }
         excess + half * (slope + first.slope).abs().sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::surface::field::MeshField;
+    use crate::{TriMesh, Vec3};
+
+    /// Cells and lists, bit by bit.
+    fn bits(threads: usize) -> String {
+        let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
+        let searched = vec![[true; 3]; mesh.triangles.len()];
+        let field = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| MeshField::new(&mesh, searched));
+        format!("{:?} {:?}", field.tree.cells, field.lists)
+    }
+
+    #[test]
+    fn threads_do_not_change_a_bit() {
+        assert_eq!(bits(1), bits(5));
+    }
+
+    /// The links of cells that several threads made lead where they should: distances are those of a look at every triangle.
+    #[test]
+    fn grafted_branches_tell_the_distance() {
+        let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
+        let field = MeshField::new(&mesh, vec![[true; 3]; mesh.triangles.len()]);
+        assert!(field.tree.cells.len() > 500 && field.lists.len() > 1000, "{} {}", field.tree.cells.len(), field.lists.len());
+        for n in 0..2000_u32 {
+            let place = |step: u32, span: f64| span * (f64::from(n * step % 1999) / 999.5 - 1.0);
+            let p = Vec3::new(place(1, 1.3), place(611, 1.3), place(1301, 0.35));
+            let square = |t: usize| (crate::mesh::closest_on_triangle(&p, &mesh.corners(t)).0 - p).norm_squared();
+            let brute = (0..mesh.triangles.len()).map(square).fold(f64::INFINITY, f64::min).sqrt();
+            let found = field.nearest(&p).distance;
+            assert!((found.abs() - brute).abs() < 1e-12, "{p:?}: {found} instead of {brute}");
+            assert!(field.tree.bound(&p) <= found, "{p:?}: bound above {found}");
+        }
     }
 }

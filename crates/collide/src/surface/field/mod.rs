@@ -7,6 +7,7 @@
 //! may be one that it cannot meet, and the next one is taken.
 
 mod builder;
+mod faces;
 mod octree;
 
 use super::{Feature, Field, Hit, TOUCHING, facing, opposition};
@@ -57,8 +58,6 @@ pub(crate) struct MeshField {
 #[derive(Clone, Copy)]
 struct Closest {
     square: f64,
-    /// Square of the distance from its plane.
-    above: f64,
     point: Vec3,
     triangle: usize,
     feature: usize,
@@ -90,11 +89,6 @@ impl MeshField {
         field
     }
 
-    /// Corners of all triangles.
-    pub fn faces(&self) -> &[[Vec3; 3]] {
-        &self.corners
-    }
-
     /// Centre and radius of a ball around triangle `t`.
     pub fn ball(&self, t: usize) -> (Vec3, f64) {
         let [x, y, z, radius] = self.balls[t].map(f64::from);
@@ -122,10 +116,9 @@ impl MeshField {
             if square > limit {
                 continue;
             }
-            let above = self.normals[t][0].dot(&(p - self.corners[t][0])).powi(2);
-            let better = |b: &Closest| square < b.square * (1.0 - SAME) || (square <= b.square * (1.0 + SAME) && above > b.above);
+            let better = |b: &Closest| square < b.square * (1.0 - SAME) || (square <= b.square * (1.0 + SAME) && self.above(p, t) > self.above(p, b.triangle));
             if best.as_ref().is_none_or(better) {
-                best = Some(Closest { square, above, point, triangle: t, feature });
+                best = Some(Closest { square, point, triangle: t, feature });
                 limit = square * (1.0 + SAME);
                 reach = limit.sqrt();
                 furthest = reach + aside;
@@ -179,8 +172,12 @@ impl MeshField {
 
     fn closest_of(&self, p: &Vec3, triangle: usize) -> Closest {
         let (point, feature) = closest_on_triangle(p, &self.corners[triangle]);
-        let above = self.normals[triangle][0].dot(&(p - self.corners[triangle][0])).powi(2);
-        Closest { square: (p - point).norm_squared(), above, point, triangle, feature }
+        Closest { square: (p - point).norm_squared(), point, triangle, feature }
+    }
+
+    /// Square of the distance from a triangle's plane.
+    fn above(&self, p: &Vec3, triangle: usize) -> f64 {
+        self.normals[triangle][0].dot(&(p - self.corners[triangle][0])).powi(2)
     }
 
     /// What a triangle's closest point makes of `p`.
@@ -188,7 +185,7 @@ impl MeshField {
         let (face, normal) = (self.normals[found.triangle][0], self.normals[found.triangle][found.feature]);
         let (offset, length) = (p - found.point, found.square.sqrt());
         let sign = if normal.dot(&offset) < 0.0 { -1.0 } else { 1.0 };
-        let flat = found.feature == 0 || normal.dot(&face) > 1.0 - 1e-9 || (found.above > ABOVE * found.square && length > self.touching);
+        let flat = found.feature == 0 || normal.dot(&face) > 1.0 - 1e-9 || (length > self.touching && self.above(p, found.triangle) > ABOVE * found.square);
         let normal = match flat {
             true => face,
             false if length > self.touching => offset * (sign / length),

@@ -39,6 +39,15 @@ impl Cell {
         if self.count == 0 { self.link as usize } else { 0 }
     }
 
+    /// Takes it that other cells and lists were put before those that it refers to.
+    pub fn shift(&mut self, cells: u32, lists: u32) {
+        match (self.count, self.link) {
+            (0, 0) => {}
+            (0, _) => self.link += cells,
+            _ => self.link += lists,
+        }
+    }
+
     /// Takes `d_c`, which may be rounded down by the caller.
     pub fn set_distance(&mut self, distance: f64) {
         self.distance = distance as f32;

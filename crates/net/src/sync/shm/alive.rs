@@ -1,6 +1,6 @@
 //! Who of a user's processes is here: the last one that goes takes away what iceoryx2 leaves.
 //!
-//! All nodes of a folder draw their numbers from one counter in `/dev/shm` (`….global_mgmt`, 16 bytes), which iceoryx2 0.10 never removes, because a node that still
+//! All nodes of a folder draw their numbers from one counter in it (`….global_mgmt`, 16 bytes), which iceoryx2 0.10 never removes, because a node that still
 //! runs would draw numbers twice. Whoever has a node holds a shared lock on a file in the folder; who gets it alone knows that there is no node.
 
 use super::bell;
@@ -11,22 +11,19 @@ use std::path::{Path, PathBuf};
 
 const LOCK: &str = "alive.lock";
 const COUNTER: &str = ".global_mgmt";
-/// Where shared memory lies as files.
-pub const MEMORY: &str = "/dev/shm";
 
 /// Held by a process as long as it has a node, and dropped after it.
 pub struct Alive {
     file: File,
     path: PathBuf,
-    prefix: String,
     user: u32,
 }
 
 impl Alive {
-    /// Says that this process is here. `prefix`: with which names in shared memory begin for this folder.
+    /// Says that this process is here.
     ///
     /// Errors: the file cannot be made or locked.
-    pub fn new(folder: &Path, prefix: &str, user: u32) -> Result<Alive, LinkError> {
+    pub fn new(folder: &Path, user: u32) -> Result<Alive, LinkError> {
         let path = folder.join(LOCK);
         let io = |why| LinkError::Io { what: format!("shared memory: {}", path.display()), why };
         loop {
@@ -34,7 +31,7 @@ impl Alive {
             file.lock_shared().map_err(io)?; // who holds it alone removes two files and lets go
             // one of those may be this one
             if std::fs::metadata(&path).is_ok_and(|there| file.metadata().is_ok_and(|ours| there.ino() == ours.ino())) {
-                return Ok(Alive { file, path, prefix: prefix.to_owned(), user });
+                return Ok(Alive { file, path, user });
             }
         }
     }
@@ -49,11 +46,9 @@ impl Drop for Alive {
     fn drop(&mut self) {
         bell::clean_up(self.user);
         if self.file.unlock().is_ok() && self.file.try_lock().is_ok() {
-            for file in std::fs::read_dir(MEMORY).into_iter().flatten().flatten() {
-                let name = file.file_name();
-                if name.to_str().is_some_and(|name| name.starts_with(&self.prefix) && name.ends_with(COUNTER)) {
-                    let _ = std::fs::remove_file(file.path());
-                }
+            let folder = self.path.parent().and_then(|folder| std::fs::read_dir(folder).ok());
+            for file in folder.into_iter().flatten().flatten().filter(|file| file.file_name().as_encoded_bytes().ends_with(COUNTER.as_bytes())) {
+                let _ = std::fs::remove_file(file.path());
             }
             let _ = std::fs::remove_file(&self.path);
         }

@@ -13,9 +13,9 @@
 //! So a message to any number of facets costs one system call here and one in each of them, and of all answers only the last one wakes the server. Nothing is
 //! lost between looking and waiting: the kernel compares before it sleeps. The counters carry no data; whoever misses a ring looks again after its time-out.
 //!
-//! The memory is one page per run, `tumble_USER_…_RUN.bell`. Its server removes it; what a killed server left is removed by [`clean_up`].
+//! The memory is one page per run, `tumble_USER_…_RUN.bell`. Its server holds a lock on it as long as it lives and removes it at its end; one on which nobody
+//! holds a lock is what a killed server left, and [`clean_up`] removes it. (A process's number would not tell: it may be another's, or of another container.)
 
-use super::alive::MEMORY;
 use crate::sync::transport::LinkError;
 use iceoryx2::prelude::{FileName, SemanticString};
 use iceoryx2_bb_concurrency::atomic::AtomicU32;
@@ -25,26 +25,32 @@ use iceoryx2_cal::dynamic_storage::{DynamicStorage, DynamicStorageBuilder};
 use iceoryx2_cal::named_concept::{NamedConceptBuilder, NamedConceptConfiguration};
 use rustix::io::Errno;
 use rustix::thread::futex;
+use std::ffi::OsStr;
 use std::fmt::Debug;
-use std::path::Path;
+use std::fs::{File, Metadata, OpenOptions};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::SeqCst;
 use std::time::Duration;
 
-/// Rung to the facets; answers to the server; answers at which it wants to be woken; number of its process; servers so far.
-type Counters = [AtomicU32; 5];
+/// Rung to the facets; answers to the server; answers at which it wants to be woken; servers so far.
+type Counters = [AtomicU32; 4];
 const RUNG: usize = 0;
 const ANSWERS: usize = 1;
 const WANTED: usize = 2;
-const PROCESS: usize = 3;
-const SERVERS: usize = 4;
+const SERVERS: usize = 3;
 
 const SUFFIX: &str = ".bell";
+/// Times that a bell is made, at most, before it is given up.
+const TRIES: usize = 100;
+/// Where shared memory lies as files.
+const MEMORY: &str = "/dev/shm";
 
 /// One end of it.
 pub struct Bell {
     memory: Storage<Counters>,
-    /// Which server of the run this is; `None` for a facet.
-    server: Option<u32>,
+    /// Which server of the run this is, and the lock that it holds; `None` for a facet.
+    server: Option<(u32, File)>,
 }
 
 impl Bell {
@@ -52,24 +58,39 @@ impl Bell {
     ///
     /// Errors: the system refuses.
     pub fn serve(run: &str, user: u32) -> Result<Bell, LinkError> {
-        let name = file_name(run)?;
-        let mut fresh = |value: &mut std::mem::MaybeUninit<Counters>, _: &mut _| {
-            value.write(Default::default());
-            true
-        };
-        let builder = Builder::<Counters>::new(&name).config(&configuration(user)?).has_ownership(true).timeout(Duration::from_secs(1));
-        let storage = builder.initializer(&mut fresh).open_or_create().map_err(refused)?;
-        storage.acquire_ownership();
-        let server = storage.get()[SERVERS].fetch_add(1, SeqCst).wrapping_add(1);
-        storage.get()[PROCESS].store(std::process::id(), SeqCst);
-        Ok(Bell { memory: storage, server: Some(server) })
+        let (name, configuration) = (file_name(run)?, configuration(user)?);
+        let path = file(&name, &configuration);
+        for _ in 0..TRIES {
+            if path.symlink_metadata().is_ok() && ours(&path).is_none() {
+                break;
+            }
+            let mut fresh = |value: &mut std::mem::MaybeUninit<Counters>, _: &mut _| {
+                value.write(Default::default());
+                true
+            };
+            let builder = Builder::<Counters>::new(&name).config(&configuration).has_ownership(false).timeout(Duration::from_secs(1));
+            let storage = builder.initializer(&mut fresh).open_or_create().map_err(refused)?;
+            // who cleans up may have been quicker than the lock: then there is another one to make
+            let Some(lock) = ours(&path).filter(|lock| lock.try_lock_shared().is_ok()) else { continue };
+            if ours(&path).is_some_and(|there| same(&there, &lock)) {
+                let server = storage.get()[SERVERS].fetch_add(1, SeqCst).wrapping_add(1);
+                storage.acquire_ownership();
+                return Ok(Bell { memory: storage, server: Some((server, lock)) });
+            }
+        }
+        Err(LinkError::Other(format!("shared memory: {} must be a file of this user with mode 600; remove it", path.display())))
     }
 
     /// A facet's; `None` while there is no server.
     ///
     /// Errors: the run's name is too long.
     pub fn join(run: &str, user: u32) -> Result<Option<Bell>, LinkError> {
-        Ok(Builder::<Counters>::new(&file_name(run)?).config(&configuration(user)?).has_ownership(false).open(AccessMode::ReadWrite).ok().map(|memory| Bell { memory, server: None }))
+        let (name, configuration) = (file_name(run)?, configuration(user)?);
+        if ours(&file(&name, &configuration)).is_none() {
+            return Ok(None);
+        }
+        let memory = Builder::<Counters>::new(&name).config(&configuration).has_ownership(false).open(AccessMode::ReadWrite);
+        Ok(memory.ok().map(|memory| Bell { memory, server: None }))
     }
 
     /// To all facets.
@@ -130,7 +151,7 @@ impl Bell {
 impl Drop for Bell {
     /// The file goes with its server, unless another one has taken over.
     fn drop(&mut self) {
-        if self.server.is_some_and(|server| self.counter(SERVERS).load(SeqCst) != server) {
+        if self.server.as_ref().is_some_and(|(server, _)| self.counter(SERVERS).load(SeqCst) != *server) {
             self.memory.release_ownership();
         }
     }
@@ -139,16 +160,33 @@ impl Drop for Bell {
 /// Removes the bells of this user's servers that are gone.
 pub fn clean_up(user: u32) {
     let (Ok(files), Ok(configuration)) = (std::fs::read_dir(MEMORY), configuration(user)) else { return };
-    for file in files.flatten() {
-        let Ok(name) = FileName::new(file.file_name().as_encoded_bytes()) else { continue };
-        let Some(inner) = configuration.extract_name_from_file(&name) else { continue };
-        let Ok(storage) = Builder::<Counters>::new(&inner).config(&configuration).has_ownership(false).open(AccessMode::Read) else { continue };
-        let process = storage.get()[PROCESS].load(SeqCst);
-        if process != 0 && !Path::new(&format!("/proc/{process}")).exists() {
-            // Another process may have been quicker.
+    let is_bell = |name: &OsStr| FileName::new(name.as_encoded_bytes()).is_ok_and(|name| configuration.extract_name_from_file(&name).is_some());
+    for file in files.flatten().filter(|file| is_bell(&file.file_name())) {
+        // a server that is about to lock it finds it gone, and makes another one
+        if let Some(left) = ours(&file.path())
+            && left.try_lock().is_ok()
+            && ours(&file.path()).is_some_and(|there| same(&there, &left))
+        {
             let _ = std::fs::remove_file(file.path());
         }
     }
+}
+
+/// Where the memory of that name lies.
+fn file(name: &FileName, configuration: &Configuration<Counters>) -> PathBuf {
+    Path::new(MEMORY).join(String::from_utf8_lossy(configuration.path_for(name).file_name().as_bytes()).as_ref())
+}
+
+/// A file of this user that nobody else may open: others could cut it to nothing, which ends whoever reads it.
+fn ours(path: &Path) -> Option<File> {
+    let mine = |about: Metadata| about.is_file() && about.uid() == rustix::process::geteuid().as_raw() && about.mode() & 0o077 == 0;
+    std::fs::symlink_metadata(path).ok().filter(|about| mine(about.clone()))?;
+    // to be written: one that is being made can not be read yet
+    OpenOptions::new().write(true).open(path).ok().filter(|file| file.metadata().is_ok_and(mine))
+}
+
+fn same(a: &File, b: &File) -> bool {
+    matches!((a.metadata(), b.metadata()), (Ok(a), Ok(b)) if a.ino() == b.ino())
 }
 
 fn configuration(user: u32) -> Result<Configuration<Counters>, LinkError> {
@@ -208,22 +246,42 @@ mod tests {
     #[test]
     fn a_bell_goes_with_its_server_and_is_cleaned_up_after_a_killed_one() {
         let there = |run: &str| Bell::join(run, NOBODY).unwrap().is_some();
-        let [alive, dead] = ["alive", "dead"].map(|name| format!("bell-{}-{name}", std::process::id()));
+        let [alive, dead, young] = ["alive", "dead", "young"].map(|name| format!("bell-{}-{name}", std::process::id()));
         let server = Bell::serve(&alive, NOBODY).unwrap();
-        let mut child = std::process::Command::new("true").spawn().unwrap();
-        child.wait().unwrap();
+        // as kill -9 leaves it: the file stays, the lock is the system's
         let killed = Bell::serve(&dead, NOBODY).unwrap();
-        killed.counter(PROCESS).store(child.id(), SeqCst);
         killed.memory.release_ownership();
         drop(killed);
-        assert!(there(&alive) && there(&dead));
+        // and before it was locked at all
+        let barely = file_name(&young).unwrap();
+        let mut fresh = |value: &mut std::mem::MaybeUninit<Counters>, _: &mut _| {
+            value.write(Default::default());
+            true
+        };
+        let builder = Builder::<Counters>::new(&barely).config(&configuration(NOBODY).unwrap()).has_ownership(false);
+        drop(builder.initializer(&mut fresh).create().unwrap());
+        assert!(there(&alive) && there(&dead) && there(&young));
         clean_up(NOBODY);
-        assert!(there(&alive) && !there(&dead));
+        assert!(there(&alive) && !there(&dead) && !there(&young));
         // one that took over keeps it when the first goes
         let second = Bell::serve(&alive, NOBODY).unwrap();
         drop(server);
         assert!(there(&alive));
         drop(second);
         assert!(!there(&alive));
+    }
+
+    /// Another user may make a file of that name first; what it holds is then not looked at.
+    #[test]
+    fn a_bell_that_others_may_open_is_not_touched() {
+        let run = format!("bell-{}-open", std::process::id());
+        let path = file(&file_name(&run).unwrap(), &configuration(NOBODY).unwrap());
+        std::fs::write(&path, "not a bell").unwrap();
+        std::fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o666)).unwrap();
+        assert!(Bell::join(&run, NOBODY).unwrap().is_none());
+        assert!(Bell::serve(&run, NOBODY).err().unwrap().to_string().contains("mode 600; remove it"));
+        clean_up(NOBODY);
+        assert_eq!(std::fs::read(&path).unwrap(), b"not a bell");
+        std::fs::remove_file(&path).unwrap();
     }
 }

@@ -11,6 +11,7 @@ pub mod facet;
 pub mod order;
 pub mod ports;
 pub mod server;
+mod service;
 pub mod wire;
 
 pub use facet::ShmFacet;

@@ -1,18 +1,18 @@
 //! The ends of iceoryx2 that one process holds, the bell, and where its files lie.
 //!
 //! Two services of samples per run, named by the run: `tumble/RUN/down` and `…/up`, and a [`Bell`]. Files lie in a folder of this user alone, objects in
-//! `/dev/shm` carry the user's number: another user's run is neither seen nor disturbed. What a killed process leaves is removed when the next node begins,
+//! `/dev/shm` carry the user's number and have mode 600: another user's run is neither seen nor disturbed. What a killed process leaves is removed when the next node begins,
 //! or when a server ends; what then still stays, the last process takes along ([`super::alive`]).
 
 use super::alive::Alive;
 use super::bell::{self, Bell};
+use super::service::Private;
 use super::wire::Words;
 use crate::sync::transport::{FacetNumber, LinkError, Message};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::{AllocationStrategy, Config, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
 use iceoryx2::sample::Sample;
-use iceoryx2::service::ipc_threadsafe::Service;
 use std::fmt::Debug;
 use std::sync::Arc;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
@@ -29,7 +29,7 @@ const BUFFER: usize = 8;
 const HELD: usize = 6;
 
 /// A sample that was received. It lies in shared memory, and nobody writes over it until it is dropped.
-pub struct Received(Sample<Service, [u8], Words>);
+pub struct Received(Sample<Private, [u8], Words>);
 
 impl Received {
     /// Its head.
@@ -46,13 +46,13 @@ impl AsRef<[u8]> for Received {
 
 /// The ends.
 pub struct Ports {
-    publisher: Publisher<Service, [u8], Words>,
-    subscriber: Subscriber<Service, [u8], Words>,
+    publisher: Publisher<Private, [u8], Words>,
+    subscriber: Subscriber<Private, [u8], Words>,
     /// Held by each sample that was lent.
     lent: Arc<()>,
     bell: Bell,
     sample: usize,
-    node: Node<Service>,
+    node: Node<Private>,
     alive: Alive,
 }
 
@@ -167,14 +167,14 @@ impl Drop for Ports {
     }
 }
 
-type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, [u8], Words>;
+type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Private, [u8], Words>;
 
-fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Service, [u8], Words>, impl Debug> {
+fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Private, [u8], Words>, impl Debug> {
     service.publisher_builder().initial_max_slice_len(bytes).allocation_strategy(AllocationStrategy::Static).create()
 }
 
 /// A node, which removes what is stale as it begins, and the word that it is here.
-fn node(name: &str) -> Result<(Node<Service>, Alive), LinkError> {
+fn node(name: &str) -> Result<(Node<Private>, Alive), LinkError> {
     set_log_level(LogLevel::Fatal); // what goes wrong is told by our errors
     let (folder, user) = folder()?;
     let text = folder.display().to_string();
@@ -182,12 +182,12 @@ fn node(name: &str) -> Result<(Node<Service>, Alive), LinkError> {
     let mut config = Config::default();
     // Of another folder another one: nodes that do not see each other draw from different counters.
     let prefix = format!("tumble_{user}_{}_", &blake3::hash(text.as_bytes()).to_hex()[..8]);
-    let alive = Alive::new(&folder, &prefix, user)?;
+    let alive = Alive::new(&folder, user)?;
     config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|why| unusable(&why))?;
     config.global.set_root_path(&Path::new(text.as_bytes()).map_err(|why| unusable(&why))?);
     let name = name.try_into().map_err(|why| unusable(&why))?;
     let builder = NodeBuilder::new().name(&name).config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
-    let node = builder.create::<Service>().map_err(|why| unusable(&why))?;
+    let node = builder.create::<Private>().map_err(|why| unusable(&why))?;
     bell::clean_up(user);
     Ok((node, alive))
 }

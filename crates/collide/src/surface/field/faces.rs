@@ -1,0 +1,29 @@
+//! What searches over a mesh's faces ask of its field.
+
+use super::MeshField;
+use crate::Vec3;
+use crate::mesh::{Descent, closest_on_triangle};
+
+impl MeshField {
+    /// Corners of all triangles.
+    pub fn faces(&self) -> &[[Vec3; 3]] {
+        &self.corners
+    }
+
+    /// Signed distance of `p` and the closest triangle.
+    pub fn closest_face(&self, p: &Vec3) -> (f64, usize) {
+        let listed = self.tree.locate(p).and_then(|place| self.closest(p, &place));
+        let closest = listed.unwrap_or_else(|| self.closest_of(p, self.boxes.closest(p).triangle));
+        (self.describe(p, &closest).distance, closest.triangle)
+    }
+
+    /// Distance of `p` from triangle `t`.
+    pub fn distance_from_face(&self, t: usize, p: &Vec3) -> f64 {
+        (p - closest_on_triangle(p, &self.corners[t]).0).norm()
+    }
+
+    /// Goes down the tree of boxes around the triangles.
+    pub fn faces_by_boxes(&self, to: &mut impl Descent) {
+        self.boxes.descend(to);
+    }
+}

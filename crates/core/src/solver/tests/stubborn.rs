@@ -1,0 +1,58 @@
+//! Contacts with friction that sweeps alone do not solve: they conflict, or sweeps go in circles.
+
+use super::{Bodies, UP, all, distance};
+use crate::rows::{RowSet, Rows};
+use crate::solver::{Accuracy, GaussSeidel, RowSolver, residual};
+
+/// A block on two feet, one closer to its centre, that are asked for accelerations which differ along the line between them: no force gives that, so the
+/// feet are braced against each other until the one that carries less slides.
+#[test]
+fn of_two_feet_that_conflict_the_one_that_carries_less_slides() {
+    let (mu, near, far) = (0.5, 0.3, 0.5);
+    let mut bodies = Bodies::cubes(vec![1.0], 1.0);
+    for x in [-far, near] {
+        bodies.push(RowSet::Cone { mu }, [None, Some((0, [x, 0.0, -0.5]))], UP);
+    }
+    for conflict in [1e-2, 1e-4, 1e-6] {
+        let c = [-9.81, -conflict, 0.0, -9.81, 0.0, 0.0];
+        let (mut lambda, mut du) = (vec![0.0; 6], vec![0.0; 6]);
+        let accuracy = Accuracy { sweeps: 2000, relaxations: 1_000_000, tolerance: 1e-9 };
+        let outcome = GaussSeidel.solve(&bodies.rows, &all(&bodies.rows), &c, &mut lambda, &mut du, accuracy);
+        // levers, and Coulomb at the foot that slides
+        let (light, heavy) = (9.81 * near / (near + far), 9.81 * far / (near + far));
+        let slides = [light, mu * light, 0.0, heavy, -mu * light, 0.0];
+        assert!(outcome.converged && distance(&lambda, &slides) < 1e-7, "{conflict}: {outcome:?} {lambda:?} but {slides:?}");
+    }
+}
+
+/// Each of the recorded problems is solved to its own tolerance; the residual is computed by other code.
+#[test]
+fn recorded_problems_are_solved() {
+    let text = include_str!("stubborn.txt");
+    let mut count = 0;
+    for problem in text.split("problem ").skip(1) {
+        let numbers = |line: &str| -> Vec<f64> { line.split(' ').skip(1).map(|x| x.parse().unwrap()).collect() };
+        let mut lines = problem.lines();
+        let head: Vec<f64> = lines.next().unwrap().split(' ').map(|x| x.parse().unwrap()).collect();
+        let (mut rows, mut c, mut lambda) = (Rows::default(), Vec::new(), Vec::new());
+        rows.clear(200);
+        for line in lines {
+            let x = numbers(line);
+            if line.starts_with("cone") {
+                rows.push_block(RowSet::Cone { mu: x[0] });
+                c.extend(&x[1..4]);
+                lambda.extend(&x[4..7]);
+            } else {
+                rows.side(x[0] as usize, x[1] as usize).unwrap().copy_from_slice(&x[2..]);
+            }
+        }
+        let blocks = all(&rows);
+        let mut du = vec![0.0; 200];
+        let accuracy = Accuracy { sweeps: head[0] as u32, relaxations: head[1] as u32, tolerance: head[2] };
+        let outcome = GaussSeidel.solve(&rows, &blocks, &c, &mut lambda, &mut du, accuracy);
+        let left = residual(&rows, &blocks, &c, &lambda, &du);
+        assert!(outcome.converged && left < 20.0 * accuracy.tolerance, "{} contacts: {outcome:?}, {left} of {}", blocks.len(), accuracy.tolerance);
+        count += 1;
+    }
+    assert_eq!(count, 5);
+}

@@ -1,0 +1,105 @@
+//! What is not accepted: another scene, name or version, another picture, a frame that does not fit.
+
+use super::stage::*;
+use tumble_net::sync::messages::Done;
+use tumble_net::sync::simulate::Weather;
+use tumble_net::sync::transport::LinkEvent;
+use tumble_net::sync::wire;
+use tumble_net::sync::{FacetOptions, FacetSession, Over, Pace, ServerEvent, ServerOptions, ServerSession, Task};
+
+#[test]
+fn other_scenes_names_and_versions_are_refused_by_name() {
+    let refusal = |options: FacetOptions, spoil: fn(&mut Vec<u8>)| {
+        let mut facet = FacetSession::new(options, scene());
+        let mut server = ServerSession::new(Stage::new(1, Weather::CLEAR, 2, Pace::Lockstep).options, &scene());
+        facet.advance(MS);
+        for (_, mut bytes) in facet.outgoing() {
+            spoil(&mut bytes);
+            server.on_event(MS, 1, LinkEvent::Message, &bytes);
+        }
+        let told = server.events().into_iter().find_map(|e| if let ServerEvent::Refused(1, why) = e { Some(why) } else { None }).unwrap();
+        for out in server.outgoing() {
+            facet.on_event(MS, LinkEvent::Message, out.message.to_vec().into());
+        }
+        (told, facet.task())
+    };
+    let over = |why: &str| Task::Over(Over::Refused(why.to_owned()));
+    let (told, task) = refusal(FacetOptions::new("facet 1", [8; 32], 1), |_| {});
+    assert!(told.contains(&"07".repeat(32)) && told.contains(&"08".repeat(32)) && told.contains("facet 1"), "{told}");
+    assert_eq!(task, over(&told));
+    let (told, task) = refusal(FacetOptions::new("left", SCENE, 1), |_| {});
+    assert!(told.contains("'facet 1'") && told.contains("'left'"), "{told}");
+    assert_eq!(task, over(&told));
+    let (told, _) = refusal(FacetOptions::new("facet 1", SCENE, 1), |bytes| bytes[76] = 9);
+    assert!(told.contains("version 2") && told.contains("version 9"), "{told}");
+}
+
+/// A facet that draws something else than was sent is found out by its hash, and the wall goes on.
+#[test]
+fn a_facet_that_draws_something_else_is_found_out() {
+    let base = scene();
+    let mut server = ServerSession::new(Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options, &base);
+    let mut facet = FacetSession::new(FacetOptions::new("facet 0", SCENE, 1), scene());
+    let (mut wrong, mut shown) = (0, 0);
+    for k in 1..400u32 {
+        let now = k * MS;
+        facet.advance(now);
+        if facet.task() == Task::Draw && facet.begin().is_some() {
+            facet.drawn(now, [0; 16]);
+        }
+        if let Task::Present(_) = facet.task() {
+            facet.presented(now);
+            shown += 1;
+        }
+        for (_, mut bytes) in facet.outgoing() {
+            let (header, payload) = wire::open(&bytes).unwrap();
+            if header.kind == wire::Kind::Ready && header.frame.is_multiple_of(3) {
+                let mut done = Done::read(payload).unwrap();
+                done.hash[5] ^= 1;
+                bytes = wire::message(&header, |out| done.write(out));
+                wrong += 1;
+            }
+            server.on_event(now, 0, LinkEvent::Message, &bytes);
+        }
+        if server.idle() && server.complete() {
+            server.publish(now, &base, &viewer(0)).unwrap();
+        }
+        server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
+    }
+    assert!(shown > 50 && wrong > 15, "{shown} {wrong}");
+    let told = server.events().iter().filter(|e| matches!(e, ServerEvent::Ready(0, frame, _, false) if frame % 3 == 0)).count();
+    assert_eq!((server.counts(0).0.mismatched, told), (wrong, wrong as usize));
+}
+
+/// A frame that does not fit is refused, asked for again, and shown when it comes right.
+#[test]
+fn a_frame_that_does_not_fit_is_asked_for_again() {
+    let base = scene();
+    let mut server = ServerSession::new(ServerOptions { resend_after: None, ..Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options }, &base);
+    let mut facet = FacetSession::new(FacetOptions::new("facet 0", SCENE, 1), scene());
+    let mut spoilt = 0;
+    for k in 1..100u32 {
+        let now = k * MS;
+        facet.advance(now);
+        if facet.task() == Task::Draw && facet.begin().is_some() {
+            facet.drawn(now, [0; 16]);
+        }
+        if let Task::Present(_) = facet.task() {
+            facet.presented(now);
+        }
+        facet.outgoing().iter().for_each(|(_, bytes)| server.on_event(now, 0, LinkEvent::Message, bytes));
+        if server.idle() && server.complete() {
+            server.publish(now, &base, &viewer(0)).unwrap();
+        }
+        for out in server.outgoing() {
+            let (header, payload) = wire::open(&out.message).unwrap();
+            let spoil = header.kind == wire::Kind::State && header.frame == 5 && spoilt == 0;
+            let bytes = if spoil { wire::message(&header, |out| out.extend(&payload[..payload.len() - 1])) } else { out.message.to_vec() };
+            spoilt += u32::from(spoil);
+            facet.on_event(now, LinkEvent::Message, bytes.into());
+        }
+    }
+    let counts = facet.counts();
+    assert_eq!((spoilt, counts.refused, counts.missing, server.counts(0).0.late), (1, 1, 0, 0));
+    assert!(counts.shown > 20, "{counts:?}");
+}
