@@ -24,10 +24,12 @@ const FIRST: usize = 4000;
 /// Pieces in all.
 const MOST: usize = 4_000_000;
 /// A ball of fewer pieces has them halved before it is divided; all together have as many times the balls before centres from elsewhere are looked at.
-const FEWEST: usize = 160;
+const FEWEST: usize = 100;
 /// Pieces of a ball that is to be divided are halved until none is longer than this part of its radius, or they are so many.
-const FINE: f64 = 0.15;
-const MOST_OF_ONE: usize = 4000;
+const FINE: f64 = 0.2;
+const MOST_OF_ONE: usize = 2000;
+/// Ways of dividing whose balls are fitted, the most promising by boxes.
+const FITTED: usize = 2;
 /// Pieces smaller than this part of the diagonal are not halved.
 const SMALL: f64 = 1e-9;
 /// Rounds of fitting anew.
@@ -196,9 +198,21 @@ impl Covering {
             [one, other].map(|half| half.into_iter().map(|(n, _)| *n).collect::<Vec<u32>>())
         };
         let ways: Vec<[Vec<u32>; 2]> = directions(&covariance).iter().map(across).filter(|[one, other]| !one.is_empty() && !other.is_empty()).collect();
+        let mut ranked: Vec<(f64, [Vec<u32>; 2])> = ways.into_iter().map(|halves| (self.rough(&halves[0]).max(self.rough(&halves[1])), halves)).collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ranked.truncate(FITTED);
         // the old ball does for either half, so that neither needs more
-        let fit = |halves: [Vec<u32>; 2]| self.refitted(halves.map(|half| self.own(half, &[old])));
-        ways.into_par_iter().map(fit).collect::<Vec<_>>().into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
+        let fit = |(_, halves): (f64, [Vec<u32>; 2])| self.refitted(halves.map(|half| self.own(half, &[old])));
+        ranked.into_par_iter().map(fit).collect::<Vec<_>>().into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
+    }
+
+    /// What the ball about the middle of the box around pieces needs, metres.
+    fn rough(&self, pieces: &[u32]) -> f64 {
+        let points = || pieces.iter().flat_map(|n| self.pieces[*n as usize]);
+        let bounds = crate::Aabb::around(points());
+        let middle = 0.5 * (bounds.min + bounds.max);
+        let square = points().map(|p| (p - middle).norm_squared()).fold(0.0, f64::max);
+        square.sqrt() + self.distance.closest(&middle).signed_distance
     }
 
     /// The two choose their pieces anew, while that helps.

@@ -127,7 +127,7 @@ fn assert_covered(link: &LinkSpheres) {
 fn no_point_of_the_collision_surface_is_bare_with_any_number_of_spheres() {
     let folder = Folder::new("covered", ROBOT);
     let mut last = f64::INFINITY;
-    for most in [3, 64, 300, 1000] {
+    for most in [3, 64, 300] {
         let robot = folder.spherize(&options(most)).unwrap();
         assert_eq!(robot.links.iter().map(|l| (l.name.as_str(), l.shapes)).collect::<Vec<_>>(), [("arm", 3), ("tip", 3)]);
         for link in &robot.links {
