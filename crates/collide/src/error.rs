@@ -46,6 +46,32 @@ pub enum MeshError {
     /// No triangle at all.
     #[error("the mesh has no triangles; at least 4 are needed to close a solid")]
     Empty,
+    /// A mesh whose size says that its unit is wrong, if it is not a point.
+    #[error("the mesh is {diagonal:e} m across, but must be at least 1e-30 m; is the unit right?")]
+    TooSmall {
+        /// Diagonal of its bounding box, metres.
+        diagonal: f64,
+    },
+    /// Only faces without area.
+    #[error("none of the {faces} triangles has an area; at least 4 are needed to close a solid")]
+    Flat {
+        /// How many there are.
+        faces: usize,
+    },
+    /// A concave face, or all of them together, with more corners than can be cut into triangles in a reasonable time.
+    #[error("a concave face of {corners} corners; at most {most}, and fewer where there are many such faces, are cut into triangles: cut it before")]
+    Concave {
+        /// How many it has.
+        corners: usize,
+        /// How many one may have.
+        most: usize,
+    },
+    /// What is no PLY file.
+    #[error("no PLY that can be read: {what}")]
+    Ply {
+        /// What was found and where, and what would be right.
+        what: String,
+    },
     /// A vertex that is NaN or infinite.
     #[error("vertex {vertex} is ({x}, {y}, {z}), but coordinates must be finite")]
     NotFinite {

@@ -3,7 +3,7 @@
 //! - [`Shape`]: what a body's part is made of; its [`Aabb`], volume and [`MassProperties`].
 //! - [`contacts`]: the narrow phase, one small file per family of pairs; what it says is a [`Contact`].
 //! - [`BroadPhase`]: which pairs are worth asking about.
-//! - [`TriMesh`]: triangle meshes, read from OBJ and STL, checked, generated, integrated.
+//! - [`TriMesh`]: triangle meshes, read from OBJ, PLY and STL, checked, generated, integrated.
 //! - [`SphereTree`]: nested balls around a mesh, by which it collides.
 //!
 //! What holds throughout: no velocity and no time here; the same input gives the same bits; nothing that comes from a
@@ -36,12 +36,12 @@ pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
 pub use contact::{Contact, ContactMode, NormalFrom};
 pub use error::{MeshError, ShapeError};
 pub use mass::MassProperties;
-pub use mesh::{ClosedReport, ClosestPoint, MeshDistance, RepairReport, RepairSettings, TriMesh, WindingNumber};
+pub use mesh::{ClosedReport, ClosestPoint, FaceCutter, MeshDistance, RepairReport, RepairSettings, TriMesh, WindingNumber, obj_lines, text_of};
 pub use narrow::{contacts, contacts_in};
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
 pub use tree::{
-    Builder, CachedTree, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree, StageCount, TreeCache, TreeFile, TreeFileError,
+    Builder, CachedTree, Covering, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree, StageCount, TreeCache, TreeFile, TreeFileError,
     TreeSettings, grow_to_cover,
 };

@@ -146,8 +146,8 @@ impl ArticulatedSpec {
         };
         let file = place.folder.join(path);
         let robot = match place.files.iter().find(|(name, _)| *name == path) {
-            Some((_, text)) => crate::urdf::read_text(text, &file, &options, true),
-            None => crate::urdf::read_file(&file, &options, true),
+            Some((_, text)) => crate::urdf::read_text(text, &file, &options, crate::urdf::Wanted::Body),
+            None => crate::urdf::read_file(&file, &options, crate::urdf::Wanted::Body),
         };
         match robot {
             Ok(robot) => {

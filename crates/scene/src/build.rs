@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
-use tumble_collide::{Pose, RepairSettings, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
+use tumble_collide::{Pose, RepairSettings, Shape, TreeCache, TreeSettings, TriMesh, Vec3, text_of};
 use tumble_core::solver::{self, Accuracy};
 use tumble_core::{ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, RigidBody, Settings, Sleep, Visual, World, WorldError, stepper_by_name};
 
@@ -259,7 +259,7 @@ impl SceneFile {
     }
 }
 
-/// Reads OBJ, STL or COLLADA by the file's extension, and makes sure that it is a closed solid
+/// Reads OBJ, STL, PLY or COLLADA by the file's extension, and makes sure that it is a closed solid
 /// ([`TriMesh::check_closed`]), which is repaired where `repair` says how ([`TriMesh::repair`]). Also returns a sentence
 /// for each thing that was mended or that a user should know. The error names the first triangle that is wrong, and in
 /// an OBJ its line; the caller adds the file's name.
@@ -277,7 +277,7 @@ fn make_solid(mesh: &mut TriMesh, lines: &[usize], repair: Option<&RepairSetting
     notes.map_err(|e| e.at_line(lines).to_string())
 }
 
-/// Reads OBJ, STL or COLLADA by the file's extension.
+/// Reads OBJ, STL, PLY or COLLADA by the file's extension.
 pub fn read_triangles(path: &std::path::Path, bytes: &[u8]) -> Result<TriMesh, String> {
     Ok(read_with_lines(path, bytes)?.0)
 }
@@ -287,15 +287,16 @@ fn read_with_lines(path: &std::path::Path, bytes: &[u8]) -> Result<(TriMesh, Vec
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     match extension.as_str() {
         "stl" => Ok((TriMesh::from_stl(bytes).map_err(|e| e.to_string())?, Vec::new())),
+        "ply" => Ok((TriMesh::from_ply(bytes).map_err(|e| e.to_string())?, Vec::new())),
         "obj" => {
-            let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is not UTF-8; an OBJ file is text", e.valid_up_to()))?;
-            TriMesh::from_obj_with_lines(text).map_err(|e| e.to_string())
+            let text = text_of(bytes).map_err(|at| format!("byte {at} of the file is 0; an OBJ file is text"))?;
+            TriMesh::from_obj_with_lines(&text).map_err(|e| e.to_string())
         }
         "dae" => {
             let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is not UTF-8; a COLLADA file is text", e.valid_up_to()))?;
             Ok((collada::read(text)?, Vec::new()))
         }
-        other => Err(format!("the extension is '{other}'; meshes are read from .obj, .stl and .dae")),
+        other => Err(format!("the extension is '{other}'; meshes are read from .obj, .stl, .ply and .dae")),
     }
 }
 

@@ -13,7 +13,7 @@ use std::rc::Rc;
 
 use nalgebra::{Matrix4, Rotation3, Unit};
 use roxmltree::{Document, Node, ParsingOptions};
-use tumble_core::collide::{TriMesh, Vec3};
+use tumble_core::collide::{FaceCutter, TriMesh, Vec3};
 
 /// Most nodes of a document.
 const MOST_NODES: u32 = 20_000_000;
@@ -146,7 +146,7 @@ impl<'a, 'd> Reader<'a, 'd> {
     }
 
     fn geometry(&self, geometry: Node<'a, 'd>) -> Result<Geometry, String> {
-        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        let (mut vertices, mut triangles, mut cutter) = (Vec::new(), Vec::new(), FaceCutter::default());
         let Some(mesh) = child(geometry, "mesh") else { return Ok((vertices, triangles)) };
         for primitive in mesh.children().filter(Node::is_element) {
             let kind = primitive.tag_name().name();
@@ -155,12 +155,20 @@ impl<'a, 'd> Reader<'a, 'd> {
             }
             let Some((offset, stride, points)) = self.inputs(primitive)? else { continue };
             let first = vertices.len() as u32;
+            let polygons = ["polylist", "polygons"].contains(&kind);
             for (start, len, list) in faces(primitive, stride)? {
                 let corner = |k: usize| -> Result<u32, String> {
                     let index = list[(start + k) * stride + offset];
                     let known = (index as usize) < points.len();
                     if known { Ok(first + index) } else { Err(fault(primitive, format_args!("points at vertex {index} of {}", points.len()))) }
                 };
+                if polygons && len > 3 {
+                    let corners = (0..len).map(corner).collect::<Result<Vec<u32>, String>>()?;
+                    let places: Vec<Vec3> = corners.iter().map(|c| points[(c - first) as usize]).collect();
+                    let cut = cutter.cut(&places).map_err(|why| fault(primitive, format_args!("has {why}")))?;
+                    triangles.extend(cut.iter().map(|t| t.map(|k| corners[k])));
+                    continue;
+                }
                 for k in 2..len {
                     triangles.push(match kind {
                         "tristrips" if k % 2 == 1 => [corner(k - 1)?, corner(k - 2)?, corner(k)?],

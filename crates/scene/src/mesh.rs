@@ -27,7 +27,7 @@ pub struct MeshSpec {
 /// have the origin that is said here.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshSource {
-    /// An OBJ, STL or COLLADA file that was there when the scene was read.
+    /// An OBJ, STL, PLY or COLLADA file that was there when the scene was read.
     File {
         /// The path, with the folder of the scene in front.
         path: PathBuf,
@@ -171,13 +171,13 @@ fn read_torus(f: &mut Fields<'_>) -> MeshSource {
     MeshSource::Torus { radius_m, tube_radius_m, segments, tube_segments }
 }
 
-/// The path of a mesh's file: an OBJ or STL that exists.
+/// The path of a mesh's file: an OBJ, STL, PLY or COLLADA that exists.
 fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
-    let (text, value) = f.text("file", "the path of an .obj, .stl or .dae file")?;
+    let (text, value) = f.text("file", "the path of an .obj, .stl, .ply or .dae file")?;
     let path = folder.join(text);
-    let known = path.extension().is_some_and(|e| ["obj", "stl", "dae"].iter().any(|known| e.eq_ignore_ascii_case(known)));
+    let known = path.extension().is_some_and(|e| ["obj", "stl", "ply", "dae"].iter().any(|known| e.eq_ignore_ascii_case(known)));
     if !known {
-        f.wrong("file", value, "the path of an .obj, .stl or .dae file");
+        f.wrong("file", value, "the path of an .obj, .stl, .ply or .dae file");
         return None;
     }
     if !path.is_file() {

@@ -3,9 +3,10 @@
 use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
 use crate::failure::Failure;
 use clap::{Args, Parser, Subcommand};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tumble::collide::Builder;
 use tumble::render::{CalibrationPattern, DebugDraw, MAX_PIXELS, MAX_SIDE, Quality};
+use tumble::scene::urdf::MissingMeshes;
 use tumble::scene::{Integrator, SceneFile, Solver, Stepper, resolve_scene};
 
 /// Real-time dynamics for interactive and immersive environments.
@@ -188,7 +189,7 @@ pub struct ViewOptions {
 
 #[derive(Args)]
 pub struct CheckOptions {
-    /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf robots; .obj and .stl meshes.
+    /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf robots; .obj, .stl and .ply meshes.
     #[arg(required = true)]
     pub files: Vec<String>,
     /// Repair meshes that are no solids: holes, fins, inner walls, debris. What was done is told; the file stays as it is.
@@ -197,20 +198,25 @@ pub struct CheckOptions {
 }
 
 #[derive(Args)]
+#[command(
+    override_usage = "tumble spheretree [OPTIONS] MESH\n       tumble spheretree [OPTIONS] --urdf ROBOT",
+    after_help = "Exit codes: 0 success, 1 failure while running, such as a full disk, 2 bad usage or input."
+)]
 pub struct SphereTreeOptions {
-    /// A closed mesh: .obj, .stl or .dae.
-    #[arg(required_unless_present = "urdf", conflicts_with = "urdf")]
+    /// A closed mesh: .obj, .stl, .ply or .dae.
+    #[arg(conflicts_with = "urdf")]
     pub mesh: Option<PathBuf>,
-    /// How trees are built.
+    /// How trees are built: medial (adaptive medial axis, the tightest; default), hubbard (medial axis of fixed samples), grid (cubes of a grid) or octree (the fastest).
     #[arg(long, value_name = "NAME", value_parser = method)]
     pub method: Option<Builder>,
-    /// Greatest number of children of a ball, 2 to 64.
+    /// Greatest number of children of a ball, 2 to 64 (default 8; an octree has 8).
     #[arg(long, value_name = "N")]
     pub branch: Option<u32>,
-    /// Greatest number of subdivisions, 1 to 9.
+    /// Greatest number of subdivisions, 1 to 9 (default 3; of an octree 7).
     #[arg(long, value_name = "N")]
     pub depth: Option<u32>,
-    /// Balls that reach at most this far outside are not divided further: a share of the mesh's diagonal, 0.0001 to 1.
+    /// Balls that reach at most this far outside are not divided further: a share of the mesh's diagonal, 0.0001 to 1 (default 0.0001; of an octree 0.01, which its leaves
+    /// are all grown to; with --urdf 0.001).
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub error: Option<f64>,
     /// Close holes and drop what dangles before building; what was done is said.
@@ -232,7 +238,7 @@ pub struct SphereTreeOptions {
     #[arg(long, value_name = "WxH", default_value = "960x720", value_parser = size)]
     pub size: (u32, u32),
     /// Keep built trees in this folder (default: $TUMBLE_CACHE, else the user's cache folder).
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = folder)]
     pub cache: Option<PathBuf>,
     /// Build even if the tree was built before, and keep nothing.
     #[arg(long, conflicts_with = "cache")]
@@ -240,7 +246,13 @@ pub struct SphereTreeOptions {
     /// Replace the collision geometry of every link of this robot by spheres.
     #[arg(long, value_name = "ROBOT")]
     pub urdf: Option<PathBuf>,
-    /// Most spheres per link; a link gets fewer where fewer are as good (default 32).
+    /// Where a package of package://NAME/... is; may be given several times. Others are looked for in the folders above the URDF.
+    #[arg(long = "package", value_name = "NAME=DIR", requires = "urdf", value_parser = package)]
+    pub packages: Vec<(String, PathBuf)>,
+    /// What to do where a collision mesh is not there: error, or skip it with a note.
+    #[arg(long, value_name = "error|skip", requires = "urdf", default_value = "error", value_parser = missing)]
+    pub missing_meshes: MissingMeshes,
+    /// Most spheres per link, at least one per collision element; a link gets fewer where all reach out less than --error (default 32, or 10000 with --error).
     #[arg(long, value_name = "N", requires = "urdf", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub spheres: Option<u32>,
     /// Also write the spheres for motion planners: yaml (cuRobo) or json (foam, VAMP) beside the output, or a file that ends in .yml or .json.
@@ -313,6 +325,23 @@ fn share(text: &str) -> Result<f64, String> {
 /// The names are those of the JSON of a tree.
 fn method(text: &str) -> Result<Builder, String> {
     serde_json::from_value(text.into()).map_err(|e| e.to_string().replace("variant", "method").replace('`', ""))
+}
+
+fn folder(text: &str) -> Result<PathBuf, String> {
+    if text.trim().is_empty() { Err("wanted the name of a folder".into()) } else { Ok(PathBuf::from(text)) }
+}
+
+fn package(text: &str) -> Result<(String, PathBuf), String> {
+    let (name, folder) = text.split_once('=').filter(|(name, folder)| !name.is_empty() && !folder.is_empty()).ok_or("wanted NAME=DIR")?;
+    if Path::new(folder).is_dir() { Ok((name.into(), folder.into())) } else { Err(format!("there is no folder {folder}")) }
+}
+
+fn missing(text: &str) -> Result<MissingMeshes, String> {
+    match text {
+        "error" => Ok(MissingMeshes::Error),
+        "skip" => Ok(MissingMeshes::Skip),
+        _ => Err("wanted error or skip".into()),
+    }
 }
 
 /// A file for a picture: PNG is what is written, and no ending says something else.

@@ -28,7 +28,7 @@ pub fn check(options: &CheckOptions) -> Result<(), Failure> {
 fn one(file: &str, repair: bool) -> Result<String, Failure> {
     let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     match extension.as_str() {
-        "obj" | "stl" => mesh(Path::new(file), repair),
+        "obj" | "stl" | "ply" | "dae" => mesh(Path::new(file), repair),
         "urdf" => robot(Path::new(file)),
         _ if looks_like_cave(file) => cave(file),
         _ => scene(file),

@@ -18,3 +18,4 @@ pub use tumble_render as render;
 pub use tumble_scene as scene;
 
 pub mod table;
+pub mod whole;

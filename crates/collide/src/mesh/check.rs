@@ -97,7 +97,7 @@ impl TriMesh {
         report.degenerate_faces = mesh.drop_degenerate(drop_collinear, &mut face_of);
         report.duplicate_faces = mesh.drop_duplicates(&mut face_of);
         if mesh.triangles.is_empty() {
-            return Err(MeshError::Empty);
+            return Err(MeshError::Flat { faces: self.triangles.len() });
         }
         if unbalanced(&edge_groups(&mesh)).next().is_some() {
             report.flipped_faces = mesh.unify_winding();

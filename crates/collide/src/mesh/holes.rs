@@ -8,17 +8,18 @@
 //! W(i, k) = min over m of  max-and-sum( W(i, m), W(m, k), weight of triangle (i, m, k) )
 //! ```
 //!
-//! Longer rims: projected onto the plane across their area vector and clipped ear by ear, the ear of the best shape
-//! first; a rim that crosses itself there is filled all the same.
+//! Longer rims are clipped ear by ear ([`super::ears`]); a rim that crosses itself there is filled all the same.
 //!
 //! Sources: Barequet and Sharir, *Filling gaps in the boundary of a polyhedron* (1995), for the programme; Liepa,
 //! *Filling holes in meshes* (2003), for the weight.
 
+use super::ears::clipped;
 use crate::Vec3;
-use std::collections::BinaryHeap;
 
 /// Rims of up to so many edges are filled by weight: time grows as the cube.
 const BY_WEIGHT: usize = 200;
+/// Corners of longer rims that are looked at before the one of the best shape is taken all the same.
+const TRIES: usize = 64;
 /// Edges times the square of the limit, over all rims of a mesh: many rims are kept from taking long.
 const MOST_WORK: f64 = 1.5e9;
 /// The fold of a triangle that has no area, worse than any other.
@@ -29,7 +30,7 @@ const IMPOSSIBLE: f64 = 8.0;
 /// Fills a rim with triangles of indices into it. `normals[n]` is that of the face at the edge from point n to n+1,
 /// unit length or zero. The triangles go round as the points do.
 pub(super) fn fill(points: &[Vec3], normals: &[Vec3], by_weight_up_to: usize) -> Vec<[usize; 3]> {
-    if points.len() <= by_weight_up_to { by_weight(points, normals) } else { by_ears(points) }
+    if points.len() <= by_weight_up_to { by_weight(points, normals) } else { clipped(points, TRIES, &mut { u64::MAX }) }
 }
 
 /// The longest rim to be filled by weight where all rims of the mesh together have so many edges.
@@ -111,110 +112,4 @@ fn normal_and_area(a: &Vec3, b: &Vec3, c: &Vec3) -> (Option<Vec3>, f64) {
     let area = n.norm();
     let flat = area <= 1e-12 * u.norm_squared().max(v.norm_squared());
     (if flat { None } else { Some(n / area) }, area)
-}
-
-fn by_ears(points: &[Vec3]) -> Vec<[usize; 3]> {
-    let mut ears = Ears::new(points);
-    let mut triangles = Vec::with_capacity(points.len() - 2);
-    for _ in 3..points.len() {
-        triangles.push(ears.clip());
-    }
-    let last = ears.heap.iter().map(|e| e.1).find(|&j| ears.left[j]).unwrap_or(0);
-    triangles.push([ears.before[last], last, ears.after[last]]);
-    triangles
-}
-
-/// A polygon in the plane, whose points that are left form a ring.
-struct Ears {
-    flat: Vec<[f64; 2]>,
-    before: Vec<usize>,
-    after: Vec<usize>,
-    left: Vec<bool>,
-    /// Shape (as ordered bits), point, and how often that point's ear had changed: stale entries are passed over.
-    heap: BinaryHeap<(i64, usize, u32)>,
-    changes: Vec<u32>,
-}
-
-/// Ears that are looked at before the one of the best shape is taken all the same.
-const MOST_TRIES: usize = 64;
-
-impl Ears {
-    fn new(points: &[Vec3]) -> Ears {
-        let n = points.len();
-        let spanned = (1..n - 1).map(|k| (points[k] - points[0]).cross(&(points[k + 1] - points[0])));
-        let normal = spanned.sum::<Vec3>().try_normalize(0.0).unwrap_or_else(Vec3::z);
-        let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
-        let v = normal.cross(&u);
-        let mut ears = Ears {
-            flat: points.iter().map(|p| [p.dot(&u), p.dot(&v)]).collect(),
-            before: (0..n).map(|k| (k + n - 1) % n).collect(),
-            after: (0..n).map(|k| (k + 1) % n).collect(),
-            left: vec![true; n],
-            heap: BinaryHeap::new(),
-            changes: vec![0; n],
-        };
-        (0..n).for_each(|j| ears.push(j));
-        ears
-    }
-
-    fn push(&mut self, j: usize) {
-        let shape = self.shape(j).to_bits() as i64;
-        // ordered as the numbers are, as in `f64::total_cmp`
-        let ordered = shape ^ (((shape >> 63) as u64) >> 1) as i64;
-        self.heap.push((ordered, j, self.changes[j]));
-    }
-
-    fn turn(&self, a: usize, b: usize, c: usize) -> f64 {
-        let ([ax, ay], [bx, by], [cx, cy]) = (self.flat[a], self.flat[b], self.flat[c]);
-        (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    }
-
-    /// Twice the area over the square of the longest side; negative for a corner that turns the wrong way.
-    fn shape(&self, j: usize) -> f64 {
-        let (i, k) = (self.before[j], self.after[j]);
-        let square = |a: usize, b: usize| (0..2).map(|n| (self.flat[a][n] - self.flat[b][n]).powi(2)).sum::<f64>();
-        let longest = square(i, j).max(square(j, k)).max(square(k, i));
-        if longest > 0.0 { self.turn(i, j, k) / longest } else { 0.0 }
-    }
-
-    /// Whether no other point lies in the ear.
-    fn free(&self, j: usize) -> bool {
-        let (i, k) = (self.before[j], self.after[j]);
-        let mut p = self.after[k];
-        while p != i {
-            if self.turn(i, j, p) >= 0.0 && self.turn(j, k, p) >= 0.0 && self.turn(k, i, p) >= 0.0 {
-                return false;
-            }
-            p = self.after[p];
-        }
-        self.shape(j) > 0.0
-    }
-
-    fn clip(&mut self) -> [usize; 3] {
-        let mut passed = Vec::new();
-        let mut chosen = None;
-        while let Some(entry) = self.heap.pop() {
-            let (_, j, change) = entry;
-            if !self.left[j] || change != self.changes[j] {
-                continue;
-            }
-            passed.push(entry);
-            if self.free(j) {
-                chosen = Some(j);
-            }
-            if chosen.is_some() || passed.len() == MOST_TRIES {
-                break;
-            }
-        }
-        let j = chosen.unwrap_or_else(|| passed.first().map_or(0, |e| e.1));
-        self.heap.extend(passed.into_iter().filter(|e| e.1 != j));
-        let (i, k) = (self.before[j], self.after[j]);
-        self.left[j] = false;
-        (self.after[i], self.before[k]) = (k, i);
-        for n in [i, k] {
-            self.changes[n] += 1;
-            self.push(n);
-        }
-        [i, j, k]
-    }
 }

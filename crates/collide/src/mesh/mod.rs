@@ -4,15 +4,19 @@ mod boxes;
 mod check;
 mod crossing;
 mod distance;
+mod ears;
 mod generate;
 mod holes;
 mod hull;
 mod integrals;
 mod obj;
 mod pairing;
+mod ply;
+mod polygon;
 mod repair;
 mod shells;
 mod stl;
+mod text;
 mod union;
 mod winding;
 
@@ -20,6 +24,8 @@ pub use check::ClosedReport;
 pub(crate) use check::edge_groups;
 pub(crate) use crossing::crossing_shells;
 pub use distance::{ClosestPoint, MeshDistance};
+pub use polygon::FaceCutter;
+pub use text::{obj_lines, text_of};
 pub(crate) use distance::{Descent, closest_on_triangle, pseudonormals};
 pub use repair::{RepairReport, RepairSettings};
 pub(crate) use shells::shells;
@@ -29,6 +35,8 @@ use crate::{Aabb, MeshError, Vec3};
 
 /// Coordinates up to this are taken, metres: their products stay within what floating point can hold.
 const FARTHEST: f64 = 1e9;
+/// Meshes whose bounding box has a diagonal of at least this are taken, metres: for the same reason.
+const SMALLEST: f64 = 1e-30;
 
 /// A surface made of triangles, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -72,7 +80,7 @@ impl TriMesh {
         self
     }
 
-    /// Refuses an empty mesh, vertices that are not finite or beyond 1e9 m, and indices out of range, naming the
+    /// Refuses an empty mesh, vertices that are not finite or beyond 1e9 m, a mesh smaller than 1e-30 m, and indices out of range, naming the
     /// first offender (numbers count from 1, as in an OBJ file).
     pub fn check_data(&self) -> Result<(), MeshError> {
         if self.triangles.is_empty() {
@@ -91,6 +99,7 @@ impl TriMesh {
                 return Err(MeshError::IndexOutOfRange { face: n + 1, index: i64::from(v) + 1, count });
             }
         }
-        Ok(())
+        let diagonal = self.diagonal();
+        if diagonal < SMALLEST { Err(MeshError::TooSmall { diagonal }) } else { Ok(()) }
     }
 }

@@ -1,9 +1,11 @@
 //! Wavefront OBJ, the geometry only: `v` and `f` lines. Everything else is passed over.
 //!
 //! Faces may be written `v`, `v/vt`, `v//vn` or `v/vt/vn`; a negative index counts back from the last vertex read;
-//! a polygon becomes a fan around its first corner.
+//! a polygon is cut into triangles ([`FaceCutter`]).
 
 use super::TriMesh;
+use super::polygon::FaceCutter;
+use super::text::obj_lines;
 use crate::{MeshError, Vec3};
 
 impl TriMesh {
@@ -17,26 +19,36 @@ impl TriMesh {
     pub fn from_obj_with_lines(text: &str) -> Result<(TriMesh, Vec<usize>), MeshError> {
         let mut mesh = TriMesh::default();
         let mut faces = Vec::new();
-        for (n, line) in text.lines().enumerate() {
+        for (number, line) in obj_lines(text) {
             let mut words = line.split_whitespace();
             match words.next() {
                 Some("v") => {
-                    let number = mesh.vertices.len() + 1;
-                    mesh.vertices.push(vertex(words, n + 1, number)?);
+                    let vertex = vertex(words, number, mesh.vertices.len() + 1)?;
+                    mesh.vertices.push(vertex);
                 }
-                Some("f") => {
-                    let corners = face(words, n + 1, mesh.vertices.len())?;
-                    faces.push((n + 1, corners));
-                }
+                Some("f") => faces.push((number, face(words, number, mesh.vertices.len())?)),
                 _ => {}
             }
         }
         let mut lines = Vec::new();
+        let mut cutter = FaceCutter::default();
         for (number, (line, corners)) in faces.iter().enumerate() {
-            push_fan(&mut mesh, corners, *line, number + 1)?;
+            mesh.push_face(corners, number + 1, &mut cutter).map_err(|error| MeshError::At { line: *line, error: Box::new(error) })?;
             lines.resize(mesh.triangles.len(), *line);
         }
         if mesh.triangles.is_empty() { Err(MeshError::Empty) } else { Ok((mesh, lines)) }
+    }
+
+    /// Adds the triangles of a face; corners are numbers of vertices from 1, as is `face`, the number that errors name.
+    pub(super) fn push_face(&mut self, corners: &[i64], face: usize, cutter: &mut FaceCutter) -> Result<(), MeshError> {
+        let count = self.vertices.len();
+        if let Some(&index) = corners.iter().find(|&&c| c < 1 || c > count as i64 || c > i64::from(u32::MAX)) {
+            return Err(MeshError::IndexOutOfRange { face, index, count });
+        }
+        let points: Vec<Vec3> = corners.iter().map(|c| self.vertices[*c as usize - 1]).collect();
+        let triangles = cutter.cut(&points)?;
+        self.triangles.extend(triangles.iter().map(|t| t.map(|k| (corners[k] - 1) as u32)));
+        Ok(())
     }
 }
 
@@ -74,14 +86,4 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, line: usize, so_far: usize) ->
         });
     }
     Ok(corners)
-}
-
-fn push_fan(mesh: &mut TriMesh, corners: &[i64], line: usize, face: usize) -> Result<(), MeshError> {
-    let count = mesh.vertices.len();
-    if let Some(&index) = corners.iter().find(|&&c| c < 1 || c > count as i64 || c > i64::from(u32::MAX)) {
-        return Err(MeshError::At { line, error: Box::new(MeshError::IndexOutOfRange { face, index, count }) });
-    }
-    let index = |k: usize| (corners[k] - 1) as u32;
-    mesh.triangles.extend((1..corners.len() - 1).map(|k| [index(0), index(k), index(k + 1)]));
-    Ok(())
 }

@@ -118,7 +118,7 @@ impl TriMesh {
                 return Ok(RepairReport { closed, ..report });
             }
             // nothing is missing there that could be added
-            Err(refused @ (MeshError::Empty | MeshError::NoVolume { .. })) => return Err(refused),
+            Err(refused @ (MeshError::Empty | MeshError::Flat { .. } | MeshError::NoVolume { .. })) => return Err(refused),
             Err(refused) => refused,
         };
         match mesh.closed_up(settings, &mut report) {

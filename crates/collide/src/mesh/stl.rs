@@ -1,6 +1,7 @@
 //! STL, text and binary. The format has no shared vertices, so equal positions are welded (exact comparison).
 
 use super::TriMesh;
+use super::text::numbered;
 use crate::{MeshError, Vec3};
 
 /// 80 bytes of title, then the count.
@@ -43,7 +44,8 @@ fn binary_count(bytes: &[u8]) -> Option<usize> {
 
 fn looks_like_text(bytes: &[u8]) -> bool {
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(1024)]);
-    head.trim_start().starts_with("solid") && (head.contains("facet") || head.contains("endsolid"))
+    let head = head.trim_start_matches('\u{feff}').trim_start().to_ascii_lowercase();
+    head.starts_with("solid") && (head.contains("facet") || head.contains("endsolid"))
 }
 
 fn read_binary(bytes: &[u8]) -> Vec<Vec3> {
@@ -54,18 +56,20 @@ fn read_binary(bytes: &[u8]) -> Vec<Vec3> {
 
 fn read_text(text: &str) -> Result<Vec<Vec3>, MeshError> {
     let mut soup = Vec::new();
-    for (n, line) in text.lines().enumerate() {
-        let mut words = line.split_whitespace();
+    let mut last = 1;
+    for (line, words) in numbered(text) {
+        let mut words = words.split_whitespace();
         match words.next() {
-            Some("vertex") => soup.push(text_vertex(words, n + 1)?),
-            Some("endfacet") if soup.len() % 3 != 0 => {
-                return Err(MeshError::Syntax { line: n + 1, what: "a facet that does not have 3 vertices".into() });
+            Some(word) if word.eq_ignore_ascii_case("vertex") => soup.push(text_vertex(words, line)?),
+            Some(word) if word.eq_ignore_ascii_case("endfacet") && soup.len() % 3 != 0 => {
+                return Err(MeshError::Syntax { line, what: "a facet that does not have 3 vertices".into() });
             }
-            _ => {}
+            Some(_) => last = line,
+            None => {}
         }
     }
     if soup.len() % 3 != 0 {
-        let line = text.lines().count();
+        let line = last;
         return Err(MeshError::Syntax { line, what: "the file ends within a facet".into() });
     }
     Ok(soup)

@@ -28,6 +28,11 @@ use std::f64::consts::PI;
 const FAR: f64 = 2.0;
 /// A sum farther than this from an integer is taken again, exactly.
 const DOUBT: f64 = 0.2;
+/// A point lies in a triangle's plane where the box that its three corners span, seen from there, is smaller than this part of the product of its edges.
+const WITHIN: f64 = 1e-14;
+
+/// How a triangle is seen from a point.
+type Angle = fn(&Vec3, &[Vec3; 3]) -> f64;
 
 /// A mesh made ready for winding numbers.
 #[derive(Clone, Debug)]
@@ -75,17 +80,21 @@ impl WindingNumber {
 
     /// Whether `p` is inside the solid around which the surface goes at least once.
     pub fn contains(&self, p: &Vec3) -> bool {
-        self.at(p) > 0.5
+        self.sum_in_doubt(p, &[], seen_from_within) > 0.5
     }
 
     /// Without some triangles, through which `p` passes.
     pub(super) fn without(&self, p: &Vec3, skipped: &[u32]) -> f64 {
-        let near = self.sum(p, skipped, 1.0);
-        // what is skipped may stand for halves
-        if (2.0 * near - (2.0 * near).round()).abs() <= DOUBT { near } else { self.sum(p, skipped, f64::INFINITY) }
+        self.sum_in_doubt(p, skipped, solid_angle)
     }
 
-    fn sum(&self, p: &Vec3, skipped: &[u32], caution: f64) -> f64 {
+    fn sum_in_doubt(&self, p: &Vec3, skipped: &[u32], angle: Angle) -> f64 {
+        let near = self.sum(p, skipped, 1.0, angle);
+        // what is skipped may stand for halves
+        if (2.0 * near - (2.0 * near).round()).abs() <= DOUBT { near } else { self.sum(p, skipped, f64::INFINITY, angle) }
+    }
+
+    fn sum(&self, p: &Vec3, skipped: &[u32], caution: f64, angle: Angle) -> f64 {
         let mut sum = 0.0;
         let mut open = [0_u32; 64];
         let mut depth = 1;
@@ -99,7 +108,7 @@ impl WindingNumber {
                 sum += group.angle(&r, square);
             } else if node.count > 0 {
                 let kept = node.range().filter(|&k| !skipped.contains(&self.tree.ids[k]));
-                sum += kept.map(|k| solid_angle(p, &self.corners[k])).sum::<f64>();
+                sum += kept.map(|k| angle(p, &self.corners[k])).sum::<f64>();
             } else {
                 open[depth] = node.second;
                 open[depth + 1] = n as u32 + 1;
@@ -139,6 +148,14 @@ fn ends(tree: &BoxTree) -> Vec<usize> {
         ends[n] = if node.count > 0 { node.range().end } else { ends[node.second as usize] };
     }
     ends
+}
+
+/// [`solid_angle`], and 0 from a point within the triangle: the middle of what is seen from its two sides, so that faces that lie on each other back to back
+/// count as none.
+fn seen_from_within(p: &Vec3, corners: &[Vec3; 3]) -> f64 {
+    let [a, b, c] = corners.map(|x| x - p);
+    let flat = a.dot(&b.cross(&c)).abs() <= WITHIN * a.norm() * b.norm() * c.norm();
+    if flat { 0.0 } else { solid_angle(p, corners) }
 }
 
 /// Of a triangle seen from `p`, steradians; positive where its winding is clockwise seen from there, so that a closed

@@ -61,12 +61,12 @@ impl TreeCache {
         TreeCache { folder: Some(folder.into()), most_bytes: MOST_IN_ALL }
     }
 
-    /// As the environment says: in the folder `$TUMBLE_CACHE`, or none if that is `off`; else in `tumble/trees` of `$XDG_CACHE_HOME` or
+    /// As the environment says: in the folder `$TUMBLE_CACHE`, or none if that is `off` in any case; where it is empty or blank, in `tumble/trees` of `$XDG_CACHE_HOME` or
     /// `~/.cache`; none where there is no home.
     pub fn of_environment() -> TreeCache {
-        let path = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+        let path = |name: &str| std::env::var_os(name).filter(|value| !value.to_string_lossy().trim().is_empty()).map(PathBuf::from);
         match path("TUMBLE_CACHE") {
-            Some(word) if word.as_os_str() == "off" => TreeCache::off(),
+            Some(word) if word.to_string_lossy().trim().eq_ignore_ascii_case("off") => TreeCache::off(),
             Some(folder) => TreeCache::at(folder),
             None => {
                 // a relative path there is to be passed over, says the XDG specification
@@ -154,7 +154,8 @@ impl<'a> Entry<'a> {
         let told = |why: String| format!("the cached tree {} is built anew: {why}", path.display());
         let file = match fs::File::open(&path) {
             Ok(file) => file,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            // a file where the folder should be holds no tree, and is told when one is to be kept
+            Err(error) if matches!(error.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) => return Ok(None),
             Err(error) => return Err(told(error.to_string())),
         };
         let mut text = String::new();

@@ -12,6 +12,9 @@
 //! ```
 //!
 //! Every level stands for the solid by itself: a leaf above the last level is repeated in each level below, as the only child of itself.
+//! `format`, `version` and `levels` must be there, and of a ball `c`, `r` and, but for the root, `parent`. Without `out` a ball reaches `2 r` outside, the most that one that meets
+//! the solid can; without `mesh` lengths are over the diagonal of the box around the leaves; without `settings` those of the usual method stand.
+//!
 //! Numbers are written with as many digits as give the same bits back. What is read is checked as if it came from an enemy: sizes are
 //! capped, numbers finite, parents there and in order, children inside their parents.
 
@@ -29,6 +32,8 @@ const MOST_BALLS: usize = 1 << 23;
 const MOST_LEVELS: usize = 64;
 /// Centres up to this from the origin and radii up to this are read, metres.
 const FARTHEST: f64 = 1e10;
+/// A ball sticks out of its parent if by more than this part of the parent's radius, as in [`SphereTree::check_nesting`].
+const STICKS_OUT: f64 = 1e-12;
 const FORMAT: &str = "tumble sphere tree";
 /// The version of the format that is written and read.
 const VERSION: u32 = 1;
@@ -86,7 +91,7 @@ pub enum TreeFileError {
     #[error("there are {count} {what}; wanted {wanted}")]
     Count {
         /// Of what.
-        what: &'static str,
+        what: String,
         /// As found.
         count: usize,
         /// What would be right.
@@ -112,11 +117,16 @@ pub enum TreeFileError {
 struct Text {
     format: String,
     version: u32,
+    #[serde(default)]
     name: String,
+    #[serde(default = "metres")]
     units: String,
-    mesh: MeshId,
+    mesh: Option<MeshId>,
+    #[serde(default)]
     settings: TreeSettings,
+    #[serde(default)]
     stages: Vec<StageCount>,
+    #[serde(default)]
     quality: Vec<LevelQuality>,
     levels: Vec<Vec<TextBall>>,
 }
@@ -126,9 +136,20 @@ struct Text {
 struct TextBall {
     c: [f64; 3],
     r: f64,
-    out: f64,
+    out: Option<f64>,
     #[serde(default = "no_parent")]
     parent: i64,
+}
+
+impl TextBall {
+    /// A ball that meets the solid reaches no further out of it than it is wide.
+    fn out(&self) -> f64 {
+        self.out.unwrap_or(2.0 * self.r)
+    }
+}
+
+fn metres() -> String {
+    "m".into()
 }
 
 fn no_parent() -> i64 {
@@ -191,7 +212,15 @@ impl TreeFile {
         }
         let tree = read_levels(&text.levels)?;
         tree.check_nesting().map_err(|e| TreeFileError::Tree(e.to_string()))?;
-        Ok(TreeFile { name: text.name, mesh: text.mesh, settings: text.settings, stages: text.stages, quality: text.quality, tree })
+        let (rows, levels) = (text.quality.len(), tree.levels() as usize);
+        if rows != 0 && rows != levels {
+            return Err(TreeFileError::Count { what: "rows of `quality`".into(), count: rows, wanted: format!("one for each of the {levels} levels, or none") });
+        }
+        let mesh = text.mesh.unwrap_or_else(|| MeshId { blake3: String::new(), triangles: 0, diagonal: (tree.bounds().max - tree.bounds().min).norm() });
+        if !(mesh.diagonal > 0.0 && mesh.diagonal <= FARTHEST) {
+            return Err(TreeFileError::Tree(format!("`diagonal` of `mesh` is {}; wanted above 0, at most {FARTHEST:e} m", mesh.diagonal)));
+        }
+        Ok(TreeFile { name: text.name, mesh, settings: text.settings, stages: text.stages, quality: text.quality, tree })
     }
 }
 
@@ -205,12 +234,15 @@ fn lines(items: impl Iterator<Item = String>) -> String {
 }
 
 fn read_levels(levels: &[Vec<TextBall>]) -> Result<SphereTree, TreeFileError> {
-    let count = |what, count, wanted: String| Err(TreeFileError::Count { what, count, wanted });
+    let count = |what: &str, count, wanted: String| Err(TreeFileError::Count { what: what.into(), count, wanted });
     if levels.is_empty() || levels.len() > MOST_LEVELS {
         return count("levels", levels.len(), format!("1 to {MOST_LEVELS}"));
     }
     if levels[0].len() != 1 {
         return count("balls in level 0", levels[0].len(), "1, the root".into());
+    }
+    if let Some(empty) = levels.iter().position(Vec::is_empty) {
+        return count(&format!("balls in level {empty}"), 0, "at least 1: each level stands for the whole solid".into());
     }
     let balls = levels.iter().map(Vec::len).sum();
     if balls > MOST_BALLS {
@@ -231,7 +263,7 @@ fn read_level(number: usize, level: &[TextBall], above: &[(usize, bool)], nodes:
         let wrong = |what: String| TreeFileError::Ball { level: number, ball: n, what };
         let node = read_ball(number, ball).map_err(wrong)?;
         let parent = read_parent(number, n, level, above.len()).map_err(wrong)?;
-        let Some((parent, carried)) = parent.map(|p| above[p]) else {
+        let Some((number_above, (parent, carried))) = parent.map(|p| (p, above[p])) else {
             placed.push((nodes.len(), false));
             nodes.push(node);
             continue;
@@ -244,6 +276,10 @@ fn read_level(number: usize, level: &[TextBall], above: &[(usize, bool)], nodes:
         } else if carried {
             return Err(wrong("its parent repeats the ball above it, as only a leaf is".into()));
         } else {
+            let excess = (node.center - of.center).norm() + node.radius - of.radius;
+            if excess > STICKS_OUT * of.radius {
+                return Err(wrong(format!("it sticks out of its parent, ball {number_above} of level {}, by {excess:e} m", number - 1)));
+            }
             let index = nodes.len();
             let of = &mut nodes[parent];
             of.first_child = if of.children == 0 { index as u32 } else { of.first_child };
@@ -261,12 +297,12 @@ fn read_ball(number: usize, ball: &TextBall) -> Result<SphereNode, String> {
     if let Some(bad) = ball.c.iter().find(|x| x.is_nan() || x.abs() > FARTHEST) {
         return Err(format!("its centre has the coordinate {bad}; wanted at most {FARTHEST:e} m"));
     }
-    for (what, value) in [("radius `r`", ball.r), ("outward error `out`", ball.out)] {
+    for (what, value) in [("radius `r`", ball.r), ("outward error `out`", ball.out())] {
         if !(0.0..=FARTHEST).contains(&value) {
             return Err(format!("its {what} is {value}; wanted 0 to {FARTHEST:e} m"));
         }
     }
-    Ok(SphereNode { center: Vec3::new(x, y, z), radius: ball.r, outward: ball.out, first_child: 0, children: 0, level: number as u32 })
+    Ok(SphereNode { center: Vec3::new(x, y, z), radius: ball.r, outward: ball.out(), first_child: 0, children: 0, level: number as u32 })
 }
 
 /// The parent's index in the level above; `None` for the root. Parents must not fall along a level, so that siblings are neighbours.

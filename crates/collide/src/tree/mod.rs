@@ -14,6 +14,7 @@ mod ball;
 mod builder;
 mod cache;
 mod close;
+mod covering;
 mod cut;
 mod enclose;
 mod file;
@@ -30,6 +31,7 @@ mod verify;
 
 pub use builder::{Progress, StageCount};
 pub use cache::{CachedTree, TreeCache};
+pub use covering::Covering;
 pub use cut::grow_to_cover;
 pub use file::{MeshId, TreeFile, TreeFileError};
 pub use levels::LevelBall;

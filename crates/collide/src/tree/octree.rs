@@ -6,7 +6,7 @@
 //! ball is good enough is a leaf; others are divided.
 //!
 //! With `even`, each leaf is then grown until it reaches `target` outwards, no more and no less: the leaves' outer
-//! points lie on one offset surface, and a flat face stays flat.
+//! points lie on one offset surface, and a flat face stays flat. A tree of one ball is left as it is.
 //!
 //! Departs from the classic octree tree (balls around cells) in all of that; it keeps its robustness: any triangles
 //! will do.
@@ -66,7 +66,8 @@ impl Context<'_> {
         let (mut ball, outward) = self.tight_ball(&pieces);
         if outward <= self.target || depth == self.depth || self.leaves > MOST_LEAVES {
             self.leaves += 1;
-            if self.even {
+            // a root that is the only leaf has no neighbours to be even with
+            if self.even && depth > 0 {
                 ball.radius += (self.target - outward).max(0.0);
             }
             return Cell::Leaf(ball);

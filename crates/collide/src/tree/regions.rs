@@ -16,6 +16,8 @@ const POINTS_EACH: f64 = 40.0;
 const POINTS: (f64, f64) = (4000.0, 24_000.0);
 /// A region of fewer points is a leaf. With the number of points it bounds the number of leaves.
 const FEWEST: usize = 4;
+/// Balls of a smaller radius, as a part of the diagonal, are none.
+const TINY: f64 = 1e-9;
 /// Greatest number of rounds of [`refitted`].
 const REFITS: usize = 6;
 /// Evaluations of the search for a part's centre.
@@ -91,7 +93,7 @@ pub(super) fn cover_of(job: &Job) -> CoverPoints {
 /// Builds down to the settings' depth. `divide` parts a region (places in the cover, at least [`FEWEST`]) into at most
 /// `branch` parts; a region that it cannot part stays a leaf.
 pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> Vec<Part> + Sync)) -> Built {
-    let enough = job.settings.error * job.mesh.diagonal();
+    let (enough, tiny) = (job.settings.error * job.mesh.diagonal(), TINY * job.mesh.diagonal());
     let all: Vec<u32> = (0..cover.points.len() as u32).collect();
     let mut leaves = vec![Part::of(all, None, &cover.points, job.distance)];
     let (mut parents, mut stages) = (Vec::new(), Vec::new());
@@ -99,8 +101,10 @@ pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> 
         let divided: Vec<Vec<Part>> = leaves
             .into_par_iter()
             .map(|part| {
-                let parts = if part.outward > enough && part.points.len() >= FEWEST { divide(&part.points) } else { Vec::new() };
-                if parts.is_empty() { vec![part] } else { parts }
+                let mut parts = if part.outward > enough && part.points.len() >= FEWEST { divide(&part.points) } else { Vec::new() };
+                // points at one place make no ball; closing has others hold them
+                parts.retain(|p| p.ball.radius > tiny);
+                if parts.len() < 2 { vec![part] } else { parts }
             })
             .collect();
         let of: Vec<usize> = divided.iter().enumerate().flat_map(|(n, parts)| parts.iter().map(move |_| n)).collect();

@@ -3,7 +3,7 @@
 
 use crate::rng::Rng;
 use crate::shared_meshes::text;
-use tumble_collide::{Builder, MeshDistance, SphereTree, TreeSettings, TriMesh, Vec3};
+use tumble_collide::{Builder, Covering, MeshDistance, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover};
 
 const BUILDERS: [Builder; 2] = [Builder::Grid, Builder::Hubbard];
 
@@ -145,5 +145,60 @@ fn branching_of_two_and_of_many() {
             check("torus", &mesh, &tree, &settings);
             assert!(tree.leaves().count() > branch as usize, "{builder:?} {branch}");
         }
+    }
+}
+
+/// The ball around a unit cube has the radius √3/2 and reaches `(√3/2 − 1/2)/√3 = 21.13 %` of the diagonal outside.
+#[test]
+fn a_ball_that_is_good_enough_is_neither_divided_nor_grown() {
+    let cube = TriMesh::box_(Vec3::repeat(0.5));
+    let bound = 0.5 - 0.5 / 3.0_f64.sqrt();
+    for builder in [Builder::Octree, Builder::Medial, Builder::Hubbard, Builder::Grid] {
+        for error in [0.24, 0.5, 1.0] {
+            let usual = if builder == Builder::Octree { TreeSettings::octree() } else { TreeSettings::default() };
+            let tree = SphereTree::build(&cube, &TreeSettings { builder, error, depth: 2, ..usual }).unwrap();
+            assert_eq!(tree.nodes().len(), 1, "{builder:?} {error}");
+            let outward = tree.outward_error() / cube.diagonal();
+            assert!(outward >= bound - 1e-9 && outward < bound + 0.02, "{builder:?} {error}: {outward}");
+        }
+    }
+}
+
+#[test]
+fn no_ball_is_a_point() {
+    for builder in BUILDERS {
+        for mesh in [TriMesh::box_(Vec3::new(0.5, 0.4, 0.3)), TriMesh::torus(1.0, 0.3, 24, 12)] {
+            let tree = SphereTree::build(&mesh, &TreeSettings { builder, ..TreeSettings::default() }).unwrap();
+            let least = tree.nodes().iter().map(|n| n.radius).fold(f64::INFINITY, f64::min);
+            assert!(least > 1e-6 * mesh.diagonal(), "{builder:?}: {least:e}");
+        }
+    }
+}
+
+#[test]
+fn a_covering_covers_and_never_reaches_further_with_more_balls() {
+    let bowl = {
+        let mut ball = TriMesh::uv_sphere(0.2, 16, 12);
+        ball.triangles.retain(|t| t.iter().all(|&v| ball.vertices[v as usize].z < 1e-9));
+        ball
+    };
+    let hull = bowl.convex_hull().unwrap();
+    let plate = TriMesh::box_(Vec3::new(0.5, 0.5, 0.05));
+    for (given, solid) in [(&plate, &plate), (&bowl, &hull)] {
+        let mut covering = Covering::new(given, solid);
+        let mut last = f64::INFINITY;
+        for count in 1..40 {
+            assert_eq!(covering.count(), count);
+            assert!(covering.worst() <= last, "{count}: {} after {last}", covering.worst());
+            last = covering.worst();
+            // by the other proof: nothing has to grow but by rounding
+            let mut balls: Vec<(Vec3, f64)> = covering.balls().map(|(c, r, _)| (c, r * (1.0 + 1e-9))).collect();
+            if count == 13 {
+                let grown = grow_to_cover(&mut balls, given);
+                assert!(grown <= 2e-5 * given.diagonal(), "{count}: {grown}");
+            }
+            assert!(covering.refine());
+        }
+        assert!(last < 0.12 * solid.diagonal(), "{last}");
     }
 }

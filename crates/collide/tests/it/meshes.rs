@@ -3,7 +3,7 @@
 use crate::rng::Rng;
 use crate::shared_meshes::text;
 use std::f64::consts::PI;
-use tumble_collide::{ClosedReport, Mat3, MeshDistance, MeshError, Pose, Quat, Shape, TriMesh, Vec3};
+use tumble_collide::{ClosedReport, Mat3, MeshDistance, MeshError, Pose, Quat, Shape, SphereTree, TreeSettings, TriMesh, Vec3, text_of};
 
 fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
     assert!((found - expected).abs() <= relative * expected.abs(), "{what}: {found} instead of {expected}");
@@ -275,4 +275,196 @@ fn errors_number_faces_as_the_user_sees_them() {
     let MeshError::Open { edges: 3, holes: 1, from, to, face, .. } = error else { panic!("{error}") };
     let corners = mesh.triangles[face - 1];
     assert!(corners.contains(&(from - 1)) && corners.contains(&(to - 1)), "{error}");
+}
+
+/// A prism of height 1 over a polygon, its faces as polygons, and the polygon's area by the shoelace formula.
+fn prism(outline: &[[f64; 2]]) -> (String, f64) {
+    let n = outline.len();
+    let vertices: String = [0.0, 1.0].iter().flat_map(|z| outline.iter().map(move |[x, y]| format!("v {x} {y} {z}\n"))).collect();
+    let (bottom, top): (String, String) = ((1..=n).rev().map(|k| format!(" {k}")).collect(), (n + 1..=2 * n).map(|k| format!(" {k}")).collect());
+    let sides: String = (0..n).map(|k| (k + 1, (k + 1) % n + 1)).map(|(a, b)| format!("f {a} {b} {} {}\n", b + n, a + n)).collect();
+    let area: f64 = (0..n).map(|k| (outline[k], outline[(k + 1) % n])).map(|(p, q)| 0.5 * (p[0] * q[1] - q[0] * p[1])).sum();
+    (format!("{vertices}f{bottom}\nf{top}\n{sides}"), area)
+}
+
+/// The outlines, each begun at every one of its corners: a fan is right from some of them at best.
+fn concave() -> Vec<Vec<[f64; 2]>> {
+    let star = (0..20).map(|k| (f64::from(k) * PI / 10.0, if k % 2 == 1 { 1.0 } else { 0.3 })).map(|(a, r)| [r * a.cos(), r * a.sin()]).collect();
+    let comb = (0..9).flat_map(|k| [[f64::from(2 * k), 0.2 + f64::from(k % 2)], [f64::from(2 * k) + 0.5, 3.0]]).rev().chain([[0.0, 0.0], [17.0, 0.0]]).collect();
+    let outlines: [Vec<[f64; 2]>; 5] = [
+        vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]],
+        vec![[4.0, 0.0], [0.0, 2.0], [1.0, 0.0], [0.0, -2.0]],
+        // a square with a square hole, joined by a cut that is gone along twice
+        vec![[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0], [0.0, 0.0], [1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0]],
+        star,
+        comb,
+    ];
+    outlines.into_iter().flat_map(|outline| (0..outline.len()).map(move |k| [&outline[k..], &outline[..k]].concat())).collect()
+}
+
+#[test]
+fn concave_faces_are_cut_without_folds() {
+    for outline in concave() {
+        let (obj, area) = prism(&outline);
+        let mut mesh = TriMesh::from_obj(&obj).unwrap();
+        assert_eq!(mesh.triangles.len(), 2 * (outline.len() - 2) + 2 * outline.len(), "{outline:?}");
+        // the triangles of the two ends have the area of the outline: folds would have more
+        let flat = |t: usize| { let [a, b, c] = mesh.corners(t); a.z == b.z && b.z == c.z };
+        let ends: f64 = (0..mesh.triangles.len()).filter(|t| flat(*t)).map(|t| { let [a, b, c] = mesh.corners(t); 0.5 * (b - a).cross(&(c - a)).norm() }).sum();
+        assert_near(ends, 2.0 * area, 1e-12, &format!("{outline:?}"));
+        assert_near(mesh.check_closed().unwrap().volume, area, 1e-12, &format!("{outline:?}"));
+    }
+}
+
+#[test]
+fn a_fan_that_is_right_stays_and_hostile_faces_end() {
+    let (obj, _) = prism(&(0..64).map(|k| f64::from(k) * PI / 32.0).map(|a| [a.cos(), a.sin()]).collect::<Vec<_>>());
+    let mesh = TriMesh::from_obj(&obj).unwrap();
+    assert!(mesh.triangles[..62].iter().enumerate().all(|(k, t)| *t == [63, 62 - k as u32, 61 - k as u32]));
+    // a zigzag of more corners than are cut, and a face that crosses itself
+    let zigzag: String = (0..5001).map(|k| format!("v {k} {} 0\n", k % 2 * 100)).chain(["f".into()]).chain((1..=5001).map(|k| format!(" {k}"))).collect();
+    let error = TriMesh::from_obj(&zigzag).unwrap_err().to_string();
+    assert!(error.starts_with("line 5002: a concave face of 5001 corners; at most 5000"), "{error}");
+    let star: String = (0..7).map(|k| f64::from(3 * k) * PI / 3.5).map(|a| format!("v {} {} 0\n", a.cos(), a.sin())).collect();
+    assert_eq!(TriMesh::from_obj(&(star + "f 1 2 3 4 5 6 7\n")).unwrap().triangles.len(), 5);
+}
+
+/// The L that a fan folds: the sheet over its notch has no thickness and is no part of the solid.
+#[test]
+fn a_sheet_over_a_notch_does_not_break_the_bound_of_a_tree() {
+    let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+    let mut mesh = TriMesh::from_obj(&prism(&outline).0).unwrap();
+    let fan = |from: u32, down: bool| (1..5).map(move |k| if down { [from + 5, from + 5 - k, from + 4 - k] } else { [from, from + k, from + k + 1] });
+    mesh.triangles.splice(..8, fan(0, true).chain(fan(6, false)).collect::<Vec<_>>());
+    assert!(mesh.check_closed().unwrap().crossing_faces > 0);
+    // the distance from the L, outside of it exact
+    let block = |p: &Vec3, x: f64, y: f64| { let q = (p - Vec3::new(0.5 * x, 0.5 * y, 0.5)).abs() - Vec3::new(0.5 * x, 0.5 * y, 0.5); q.sup(&Vec3::zeros()).norm() };
+    let outside = |p: &Vec3| block(p, 2.0, 1.0).min(block(p, 1.0, 2.0));
+    let distance = MeshDistance::new(&mesh);
+    for p in [Vec3::new(1.25, 1.25, 0.0), Vec3::new(1.4, 1.2, 1.0), Vec3::new(1.1, 1.2, 0.0)] {
+        assert_near(distance.closest(&p).signed_distance, outside(&p), 1e-12, "in the sheet");
+    }
+    for depth in 1..4 {
+        let tree = SphereTree::build(&mesh, &TreeSettings { depth, ..TreeSettings::octree() }).unwrap();
+        for ball in tree.nodes() {
+            let farthest = TriMesh::icosphere(ball.radius, 2).vertices.iter().map(|d| outside(&(ball.center + d))).fold(0.0, f64::max);
+            assert!(farthest <= ball.outward + 1e-12, "{ball:?} reaches {farthest}");
+        }
+    }
+}
+
+#[test]
+fn obj_files_come_in_several_spellings() {
+    let plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    let wanted = TriMesh::from_obj(plain).unwrap();
+    let read = |bytes: &[u8]| TriMesh::from_obj(&text_of(bytes).unwrap()).unwrap();
+    assert_eq!(read(format!("\u{feff}{plain}").as_bytes()), wanted);
+    assert_eq!(read(plain.replace('\n', "\r").as_bytes()), wanted);
+    assert_eq!(read(plain.replace('\n', "\r\n").as_bytes()), wanted);
+    assert_eq!(read(&[b"# caf\xe9 \xff\n", plain.as_bytes()].concat()), wanted);
+    assert_eq!(read(plain.replace("1 3 2", "1 \\\n3 \\\r\n 2").as_bytes()), wanted);
+    assert_eq!(read(format!("# ends in \\\n{plain}").as_bytes()), wanted);
+    // lines are those of the file, and of a line that goes on the first
+    let (_, lines) = TriMesh::from_obj_with_lines(&plain.replace("1 3 2", "1 \\\n3 2")).unwrap();
+    assert_eq!(lines, [5, 7, 8, 9]);
+    assert_eq!(text_of(b"v 0\0"), Err(3));
+}
+
+#[test]
+fn stl_text_may_be_in_capitals() {
+    let text = "solid x\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid\n".repeat(1) + &" ".repeat(80);
+    let wanted = TriMesh::from_stl(text.as_bytes()).unwrap();
+    assert_eq!(wanted.triangles.len(), 1);
+    for other in [text.to_uppercase(), text.replace('\n', "\r"), format!("\u{feff}{text}")] {
+        assert_eq!(TriMesh::from_stl(other.as_bytes()).unwrap(), wanted);
+    }
+}
+
+#[test]
+fn a_mesh_of_no_size_says_so() {
+    let mut mesh = TriMesh::box_(Vec3::repeat(1e-120));
+    assert!(matches!(mesh.check_closed(), Err(MeshError::TooSmall { diagonal }) if (diagonal / 1e-120 - 12.0_f64.sqrt()).abs() < 1e-12));
+    let mut line = TriMesh { vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::x() * 2.0], triangles: vec![[0, 1, 2], [0, 2, 1]] };
+    assert_eq!(line.check_closed().unwrap_err().to_string(), "none of the 2 triangles has an area; at least 4 are needed to close a solid");
+}
+
+/// A box of six quads as PLY, with a property and an element that are passed over.
+fn ply(encoding: &str, corners: &[[f32; 3]], quads: &[[i32; 4]]) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat {encoding} 1.0\ncomment made here\nelement vertex {}\nproperty float x\nproperty float y\nproperty uchar red\nproperty float z\n\
+         element edge 1\nproperty int vertex1\nproperty list uchar double weights\nelement face {}\nproperty list uchar int vertex_indices\nproperty short group\nend_header\n",
+        corners.len(), quads.len()
+    )
+    .into_bytes();
+    let swap = encoding == "binary_big_endian";
+    let mut put = |little: &[u8], word: String| match encoding {
+        "ascii" => bytes.extend(format!("{word} ").bytes()),
+        _ if swap => bytes.extend(little.iter().rev()),
+        _ => bytes.extend(little),
+    };
+    for [x, y, z] in corners {
+        put(&x.to_le_bytes(), x.to_string());
+        put(&y.to_le_bytes(), y.to_string());
+        put(&[200], "200".into());
+        put(&z.to_le_bytes(), z.to_string());
+    }
+    put(&7_i32.to_le_bytes(), "7".into());
+    put(&[2], "2".into());
+    [0.5_f64, -1.5].iter().for_each(|w| put(&w.to_le_bytes(), w.to_string()));
+    for quad in quads {
+        put(&[4], "4".into());
+        quad.iter().for_each(|k| put(&k.to_le_bytes(), k.to_string()));
+        put(&(-3_i16).to_le_bytes(), "-3".into());
+    }
+    bytes
+}
+
+#[test]
+fn ply_is_read_in_all_three_encodings() {
+    let corners: Vec<[f32; 3]> = (0..8).map(|k| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 1.5 } else { -0.25 })).collect();
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    for encoding in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        let bytes = ply(encoding, &corners, &quads);
+        let mut mesh = TriMesh::from_ply(&bytes).unwrap();
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len(), mesh.triangles[..2].to_vec()), (8, 12, vec![[0, 2, 3], [0, 3, 1]]), "{encoding}");
+        assert_near(mesh.check_closed().unwrap().volume, 1.75_f64.powi(3), 1e-12, encoding);
+        // a file that is cut is an error that says so, and one with other bytes is an error or a mesh
+        for end in 0..bytes.len() - 1 {
+            assert!(TriMesh::from_ply(&bytes[..end]).is_err() || encoding == "ascii", "{encoding} cut at {end}");
+        }
+        for at in 0..bytes.len() {
+            for with in [0, 9, b'-', b'9', 0xff] {
+                let mut bytes = bytes.clone();
+                bytes[at] = with;
+                let _ = TriMesh::from_ply(&bytes);
+            }
+        }
+    }
+}
+
+#[test]
+fn ply_errors_name_the_place() {
+    let good = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    assert_eq!(TriMesh::from_ply(good.as_bytes()).unwrap().triangles, [[0, 1, 2]]);
+    assert_eq!(TriMesh::from_ply(good.replace('\n', "\r\n").as_bytes()).unwrap().triangles, [[0, 1, 2]]);
+    let cases = [
+        ("ply\n", "plx\n", "line 1: wanted `ply`"),
+        ("ascii 1.0", "hex 1.0", "line 2: the format `hex`; wanted ascii"),
+        ("vertex 3", "vertex 99999999999999999", "vertex 5: the file ends before it"),
+        ("float y", "float q", "the element `vertex`: wanted properties x, y and z"),
+        ("float y", "real y", "line 5: `real` is no kind of number"),
+        ("vertex_index", "corners", "the element `face`: wanted `property list"),
+        ("end_header\n", "", "line 9: `0` where format, element"),
+        ("1 0 0", "1 a 0", "vertex 2: `a` where a number should be"),
+        ("3 0 1 2", "2 0 1", "face 1: 2 corners, but it needs at least 3"),
+        ("3 0 1 2", "3 0 1 3", "face 1 points at vertex 4, but there are 3 vertices"),
+        ("3 0 1 2", "3 0 1 -1", "face 1 points at vertex 0, but there are 3 vertices"),
+        ("3 0 1 2", "3 0 1 1.5", "face 1: 1.5 where the number of a vertex should be"),
+        ("3 0 1 2", "-3 0 1 2", "face 1: a list of -3 numbers"),
+        ("1 0 0", "1 nan 0", "vertex 2 is (1, NaN, 0), but coordinates must be finite"),
+    ];
+    for (from, to, said) in cases {
+        let error = TriMesh::from_ply(good.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
+        assert!(error.contains(said), "{from} → {to}: {error}");
+    }
 }

@@ -212,3 +212,15 @@ fn files_of_others_stay_whatever_their_names_end_in() {
     assert!(others.iter().all(|name| folder.0.join(name).exists()));
     assert!(!kept[0].exists() && !unfinished.exists());
 }
+
+#[test]
+fn a_file_in_place_of_the_folder_is_told_as_what_it_is() {
+    let folder = Folder::new();
+    std::fs::create_dir_all(&folder.0).unwrap();
+    let file = folder.0.join("file");
+    std::fs::write(&file, "mine").unwrap();
+    let built = cached(&ring(), &TreeCache::at(&file));
+    let note = built.note.unwrap();
+    assert!(note.starts_with("the tree is not kept in") && !note.contains("anew"), "{note}");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
+}

@@ -65,7 +65,7 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
         ("\"r\":4", "\"r\":null", "invalid type: null"),
         ("[-2,0,0]", "[-2e11,0,0]", "ball 1 of level 2: its centre has the coordinate -200000000000; wanted at most 1e10 m"),
         ("[-2,0,0]", "[-2,0]", "invalid length 2"),
-        ("[-2,0,0]", "[-5,0,0]", "ball 3 sticks out of its parent 2 by 3e0 m"),
+        ("[-2,0,0]", "[-5,0,0]", "ball 1 of level 2: it sticks out of its parent, ball 1 of level 1, by 3e0 m"),
         ("\"r\":4,\"out\":1", "\"r\":4,\"out\":-1", "outward error `out` is -1"),
         ("\"parent\":-1", "\"parent\":0", "ball 0 of level 0: its parent is 0; the root has none"),
         ("\"r\":3,\"out\":1,\"parent\":0", "\"r\":3,\"out\":1,\"parent\":1", "ball 1 of level 1: its parent is 1; wanted 0 to 0"),
@@ -73,15 +73,31 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
         ("[0,0,0],\"r\":2,\"out\":1,\"parent\":1", "[0,0,0],\"r\":2,\"out\":1,\"parent\":0", "its parent 0 comes after 1; balls stand in the order of their parents"),
         ("\"levels\":[[", "\"levels\":[],\"other\":[[", "unknown field"),
         ("\"levels\":[[{", "\"levels\":[[],[{", "there are 0 balls in level 0; wanted 1, the root"),
+        ("],\n[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2", "],[],[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2", "there are 0 balls in level 2; wanted at least 1"),
+        ("]]}", "],[]]}", "there are 0 balls in level 3; wanted at least 1"),
+        ("\"quality\":[]", "\"quality\":[QUALITY]", "there are 1 rows of `quality`; wanted one for each of the 3 levels, or none"),
+        ("\"diagonal\":1.0", "\"diagonal\":0", "`diagonal` of `mesh` is 0; wanted above 0"),
     ];
     for (from, to, said) in cases {
         assert!(GOOD.contains(from), "{from}");
-        let error = TreeFile::from_json(&GOOD.replacen(from, to, 1)).unwrap_err().to_string();
+        let row = serde_json::to_string(&LevelQuality::default()).unwrap();
+        let error = TreeFile::from_json(&GOOD.replacen(from, &to.replace("QUALITY", &row), 1)).unwrap_err().to_string();
         assert!(error.contains(said), "{from} → {to}: {error}");
     }
     let repeated = GOOD.replace("]]}", "],[{\"c\":[1,0,0],\"r\":1,\"out\":1,\"parent\":0}]]}");
     let error = TreeFile::from_json(&repeated).unwrap_err();
     assert_eq!(error, TreeFileError::Ball { level: 3, ball: 0, what: "its parent repeats the ball above it, as only a leaf is".into() });
+}
+
+#[test]
+fn a_tree_by_hand_needs_its_balls_alone() {
+    let text = r#"{"format":"tumble sphere tree","version":1,"levels":[[{"c":[0,0,0],"r":2}],[{"c":[0,0,1],"r":1,"parent":0},{"c":[0,0,-1],"r":1,"out":0.5,"parent":0}]]}"#;
+    let file = TreeFile::from_json(text).unwrap();
+    assert_eq!(file.tree.nodes().iter().map(|n| n.outward).collect::<Vec<_>>(), [4.0, 2.0, 0.5]);
+    // the box around the two leaves is 2 by 2 by 4
+    assert!((file.mesh.diagonal - 24.0_f64.sqrt()).abs() < 1e-12);
+    assert_eq!((file.quality.len(), file.stages.len(), file.settings), (0, 0, TreeSettings::default()));
+    assert_eq!(TreeFile::from_json(&file.to_json()).unwrap(), file);
 }
 
 #[test]

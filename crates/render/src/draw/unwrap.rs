@@ -4,6 +4,7 @@
 //! laid on by position.
 
 use std::path::Path;
+use tumble_collide::{FaceCutter, Vec3, obj_lines, text_of};
 
 /// A larger file is not read.
 const MOST_BYTES: u64 = 256 << 20;
@@ -20,30 +21,36 @@ impl Unwrapped {
         if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) || path.metadata().ok()?.len() > MOST_BYTES {
             return None;
         }
-        Unwrapped::parse(&std::fs::read_to_string(path).ok()?)
+        Unwrapped::parse(&text_of(&std::fs::read(path).ok()?).ok()?)
     }
 
-    /// Polygons become fans around their first corner, as in [`tumble_collide::TriMesh::from_obj`].
+    /// Polygons are cut as in [`tumble_collide::TriMesh::from_obj`].
     fn parse(text: &str) -> Option<Unwrapped> {
-        let (mut vertices, mut known) = (0i64, Vec::new());
-        let mut out = Unwrapped { triangles: Vec::new(), places: Vec::new() };
-        for line in text.lines() {
+        let (mut vertices, mut known, mut faces) = (Vec::new(), Vec::new(), Vec::new());
+        for (_, line) in obj_lines(text) {
             let mut words = line.split_whitespace();
             match words.next() {
-                Some("v") => vertices += 1,
+                Some("v") => {
+                    let mut number = || words.next()?.parse::<f64>().ok();
+                    vertices.push(Vec3::new(number()?, number()?, number()?));
+                }
                 Some("vt") => {
                     let mut number = || words.next()?.parse::<f32>().ok().filter(|x| x.is_finite());
                     known.push([number()?, number().unwrap_or(0.0)]);
                 }
                 Some("f") => {
-                    let corners: Vec<(u32, [f32; 2])> = words.take_while(|w| !w.starts_with('#')).map(|word| corner(word, vertices, &known)).collect::<Option<_>>()?;
-                    for k in 1..corners.len().saturating_sub(1) {
-                        let fan = [corners[0], corners[k], corners[k + 1]];
-                        out.triangles.push(fan.map(|c| c.0));
-                        out.places.push(fan.map(|c| c.1));
-                    }
+                    let corners = words.take_while(|w| !w.starts_with('#')).map(|word| corner(word, vertices.len() as i64, &known));
+                    faces.push(corners.collect::<Option<Vec<(u32, [f32; 2])>>>()?);
                 }
                 _ => {}
+            }
+        }
+        let (mut out, mut cutter) = (Unwrapped { triangles: Vec::new(), places: Vec::new() }, FaceCutter::default());
+        for corners in faces {
+            let points: Vec<Vec3> = corners.iter().map(|c| vertices.get(c.0 as usize).copied()).collect::<Option<_>>()?;
+            for triangle in cutter.cut(&points).ok()? {
+                out.triangles.push(triangle.map(|k| corners[k].0));
+                out.places.push(triangle.map(|k| corners[k].1));
             }
         }
         (!out.triangles.is_empty()).then_some(out)

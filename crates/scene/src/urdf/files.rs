@@ -22,7 +22,7 @@ pub(crate) fn find(uri: &str, folder: &Path, options: &UrdfOptions) -> Found {
     let places = places(uri.trim(), folder, options);
     let extension = Path::new(uri.trim()).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     match places.iter().find(|place| place.is_file()) {
-        _ if !["stl", "obj", "dae"].contains(&extension.as_str()) => Found::Format(extension),
+        _ if !["stl", "obj", "ply", "dae"].contains(&extension.as_str()) => Found::Format(extension),
         Some(place) => Found::Here(place.clone()),
         None => Found::Missing(places.first().map_or_else(|| uri.to_owned(), |place| place.display().to_string())),
     }

@@ -10,7 +10,7 @@ use tumble_core::collide::{Mat3, Pose, Vec3};
 
 use super::files::{Found, find};
 use super::xml::Element;
-use super::{CollisionMeshes, MissingMeshes, UrdfOptions};
+use super::{CollisionMeshes, MissingMeshes, UrdfOptions, Wanted};
 use crate::bound::Bound;
 use crate::link::{Geometry, InertiaFault, LinkShape, inertia_fault};
 use crate::look::Color;
@@ -25,8 +25,7 @@ pub(crate) struct Context<'c> {
     /// The file, for messages.
     pub(crate) file: &'c str,
     pub(crate) options: &'c UrdfOptions,
-    /// Whether shapes are wanted at all.
-    pub(crate) shapes: bool,
+    pub(crate) wanted: Wanted,
     /// Colours of the materials at the top of the file.
     pub(crate) colors: BTreeMap<String, Color>,
     pub(crate) notes: NoteList,
@@ -58,7 +57,7 @@ impl LinkElement {
     pub(crate) fn read(link: &Element<'_, '_>, context: &mut Context<'_>) -> Option<LinkElement> {
         let name = link.required_text("name", "a name of its own")?.to_owned();
         let mass = link.child("inertial").map_or_else(LinkMass::none, |inertial| read_inertial(&inertial, context));
-        let shapes = if context.shapes { read_shapes(link, context) } else { Vec::new() };
+        let shapes = if context.wanted != Wanted::Tree { read_shapes(link, context) } else { Vec::new() };
         Some(LinkElement { name, span: link.span(), mass, shapes })
     }
 }
@@ -162,7 +161,7 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
 }
 
 fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<Geometry> {
-    let uri = mesh.required_text("filename", "the path of an .stl, .obj or .dae file")?;
+    let uri = mesh.required_text("filename", "the path of an .stl, .obj, .ply or .dae file")?;
     let scale: [f64; 3] = mesh.numbers("scale", Bound::ANY).unwrap_or([1.0; 3]);
     if scale.contains(&0.0) {
         mesh.wrong("scale", "three numbers other than 0");
@@ -175,10 +174,10 @@ fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) 
         Found::Here(path) => return Some(Geometry::File { path, scale, place, hull, required }),
         Found::Missing(path) if collides && required => format!("there is no file {path}"),
         Found::Missing(_) => "there is no such file".into(),
-        Found::Format(format) => format!("the format '{format}' is not read, only .stl, .obj and .dae"),
+        Found::Format(format) => format!("the format '{format}' is not read, only .stl, .obj, .ply and .dae"),
     };
     if collides && required {
-        let wanted = "wanted a mesh that is there; `packages` says where packages are, missing_meshes = \"skip\" leaves it out";
+        let wanted = "wanted a mesh that is there; `packages` (--package NAME=DIR) says where packages are, missing_meshes = \"skip\" (--missing-meshes skip) leaves it out";
         mesh.problem(format_args!("\"{uri}\" cannot be collided with: {why}"), wanted);
     } else {
         let kind = if collides { "collision" } else { "visual" };

@@ -18,7 +18,7 @@
 //! | `<limit>` | position limits; effort is the limit of drives that name none; velocity is kept and not enforced |
 //! | `<dynamics>` | viscous damping and dry friction |
 //! | `<mimic>` | a coupling of the two joints |
-//! | `<collision>` | box, cylinder, sphere, capsule; meshes in STL, OBJ and COLLADA |
+//! | `<collision>` | box, cylinder, sphere, capsule; meshes in STL, OBJ, PLY and COLLADA |
 //! | `<visual>` | the same, with the colour of its material; where no visual of a link can be read its collision shapes are drawn |
 //!
 //! All else (transmissions, sensors, simulators' own elements) is passed over. The root link is fixed to the base, or floats if asked.
@@ -26,6 +26,7 @@
 mod files;
 mod joint;
 mod link;
+mod share;
 mod spheres;
 mod tree;
 mod xml;
@@ -147,7 +148,7 @@ pub enum UrdfError {
 /// [`UrdfError`]: a file cannot be read, or has problems; those of the XML are told at once with line and column.
 pub fn load(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<(ArticulatedBody, Notes), UrdfError> {
     let path = path.as_ref();
-    let robot = read_file(path, options, true)?;
+    let robot = read_file(path, options, Wanted::Body)?;
     let mut maker = ShapeMaker::new(&[]);
     let spec = ArticulatedSpec { part_overlaps: true, ..ArticulatedSpec::of(robot.name, robot.links) };
     let body = assemble::body(&spec, &mut maker).map_err(|why| UrdfError::Body { file: path.to_path_buf(), why })?;
@@ -173,7 +174,7 @@ pub struct UrdfModel {
 /// [`UrdfError`]: the file cannot be read, or has problems, all of which are told at once with line and column.
 pub fn model(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<UrdfModel, UrdfError> {
     let path = path.as_ref();
-    let robot = read_file(path, options, false)?;
+    let robot = read_file(path, options, Wanted::Tree)?;
     robot.into_model(path)
 }
 
@@ -183,7 +184,7 @@ pub fn model(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<UrdfModel,
 /// As [`model`], but for those of files.
 pub fn parse_model(text: &str, file_name: &str, options: &UrdfOptions) -> Result<UrdfModel, UrdfError> {
     let path = Path::new(file_name);
-    read_text(text, path, options, false)?.into_model(path)
+    read_text(text, path, options, Wanted::Tree)?.into_model(path)
 }
 
 impl Robot {
@@ -212,9 +213,20 @@ pub(crate) struct Robot {
     pub(crate) notes: Vec<String>,
 }
 
-/// Reads a file; without `shapes` no mesh is looked for.
-pub(crate) fn read_file(path: &Path, options: &UrdfOptions, shapes: bool) -> Result<Robot, UrdfError> {
-    read_text(&text_of(path)?, path, options, shapes)
+/// What a file is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// Links, joints and masses; no mesh is looked for.
+    Tree,
+    /// All of it.
+    Body,
+    /// The shapes, which need not have masses to move.
+    Geometry,
+}
+
+/// Reads a file.
+pub(crate) fn read_file(path: &Path, options: &UrdfOptions, wanted: Wanted) -> Result<Robot, UrdfError> {
+    read_text(&text_of(path)?, path, options, wanted)
 }
 
 /// The text of a file.
@@ -233,13 +245,13 @@ fn text_of(path: &Path) -> Result<String, UrdfError> {
 }
 
 /// Reads a text; `path` is shown in messages, and meshes are looked for from its folder.
-pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, shapes: bool) -> Result<Robot, UrdfError> {
+pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, wanted: Wanted) -> Result<Robot, UrdfError> {
     let log = Log::new(text);
     let file = path.display().to_string();
     let document = xml::parse(&log, text);
     let robot = document.as_ref().and_then(|document| {
         let context = Context {
-            folder: path.parent().unwrap_or(Path::new("")), file: &file, options, shapes, colors: BTreeMap::new(), notes: NoteList::default(),
+            folder: path.parent().unwrap_or(Path::new("")), file: &file, options, wanted, colors: BTreeMap::new(), notes: NoteList::default(),
         };
         read_robot(&Element::new(&log, document.root_element()), context)
     });
@@ -279,7 +291,7 @@ fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot
     }
     let root = tree::find_root(robot.log, &elements, &joints)?;
     let name = robot.text("name").unwrap_or("robot").to_owned();
-    let links = TreeBuilder::new(robot.log, elements, &joints).build(root, context.options.floating, &mut context.notes);
+    let links = TreeBuilder::new(robot.log, elements, &joints).build(root, &mut context);
     Some(Robot { name, links, notes: context.notes.take() })
 }
 

@@ -1,28 +1,27 @@
 //! A robot whose collision geometry is spheres, for motion planners and for fast contact.
 //!
 //! The text of the URDF stays as it is but for the `<collision>` elements: each becomes one element per sphere, which keeps its attributes and its
-//! children other than `<origin>` and `<geometry>`. Spheres stay spheres. The other shapes of a link share the spheres that it may have by their surface:
+//! children other than `<origin>` and `<geometry>`. Spheres stay spheres. The other shapes of a link begin with one sphere each; then, as long as the link may have one more, the shape
+//! whose spheres reach furthest outside it gets it ([`share`]). So more spheres never reach further.
 //!
 //! | shape | spheres |
 //! |---|---|
 //! | capsule | on its axis at equal distances `d`, of radius `√(R² + d²/4)`: they cover it and reach `√(R² + d²/4) − R` outside |
-//! | box, cylinder, mesh | up to 64: a tree of one level with that many branches; more, or an octree: the best of the cuts ([`SphereTree::cut`]) of deeper trees |
-//! | open mesh | those of the mesh with its holes closed, else of its convex hull |
-//!
-//! Whatever made them, the spheres are then grown until they cover the surface as it was given, which is found by splitting its triangles until each piece
-//! lies in one sphere ([`grow_to_cover`]); mostly nothing grows. So all of the surface is inside, not all samples of it.
+//! | box, cylinder, mesh | balls that hold all pieces of its surface, the worst divided in two each time ([`Covering`](tumble_core::collide::Covering)); at 4, 8, 16 and so on the balls of a tree are tried, and taken if they reach less far |
+//! | open mesh | as of the mesh with its holes closed, else of its convex hull; it is the surface as given that is covered |
 
 use std::ops::Range;
 use std::path::Path;
 
 use roxmltree::Node;
 use tumble_core::collide::{
-    Builder, MeshDistance, MeshError, Pose, Progress, RepairSettings, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, grow_to_cover,
+    MeshError, Pose, Progress, RepairSettings, TreeCache, TreeSettings, TriMesh, Vec3,
 };
 
 use super::link::{Context, read_shape};
+use super::share::{self, Share};
 use super::xml::{self, Element};
-use super::{UrdfError, UrdfOptions, read_text, text_of};
+use super::{UrdfError, UrdfOptions, Wanted, read_text, text_of};
 use crate::link::{Geometry, LinkShape};
 use crate::link_shapes::{read_file, stretched};
 use crate::log::Log;
@@ -33,13 +32,11 @@ use crate::shape::ShapeSpec;
 const SIDES: usize = 48;
 /// Spheres are written larger by this share, so that they hold what they should after any reader's rounding.
 const ROUNDING: f64 = 1e-9;
-/// Most branches of a tree.
-const MOST_BRANCHES: usize = 64;
 
 /// How a robot is covered by spheres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereOptions {
-    /// Most spheres of a link; a link with more collision elements than this has one for each.
+    /// Most spheres of a link; a link with more collision elements than this is an error.
     pub most: usize,
     /// Spheres that reach at most this far outside a shape are not divided: a share of the shape's diagonal.
     pub error: f64,
@@ -75,15 +72,6 @@ pub struct LinkSpheres {
     pub spheres: Vec<(Vec3, f64)>,
     /// How far each reaches outside the shape it stands for, at most, metres.
     pub outward: Vec<f64>,
-    /// Most that a sphere was grown to cover the surface, metres.
-    pub grown: f64,
-}
-
-/// Spheres in a shape's own frame, and how far each reaches outside it at most.
-struct Covered {
-    spheres: Vec<(Vec3, f64)>,
-    outward: Vec<f64>,
-    grown: f64,
 }
 
 /// A collision element: where it stands, what it is, and the surface to cover, in its own frame. Spheres and capsules are known by formula.
@@ -93,7 +81,7 @@ struct Part<'a, 'd> {
     surface: Surface,
 }
 
-enum Surface {
+pub(super) enum Surface {
     Sphere(f64),
     /// Radius, and length of the straight part.
     Capsule(f64, f64),
@@ -109,7 +97,7 @@ pub fn spherize(path: impl AsRef<Path>, options: &SphereOptions, progress: &dyn 
     let path = path.as_ref();
     let text = text_of(path)?;
     // all that is wrong with it is found by the one reader of robots
-    let robot = read_text(&text, path, &options.urdf, true)?;
+    let robot = read_text(&text, path, &options.urdf, Wanted::Geometry)?;
     let log = Log::new(&text);
     let file = path.display().to_string();
     let wrong = |why: String| UrdfError::Body { file: path.to_path_buf(), why };
@@ -118,7 +106,7 @@ pub fn spherize(path: impl AsRef<Path>, options: &SphereOptions, progress: &dyn 
         folder: path.parent().unwrap_or(Path::new("")),
         file: &file,
         options: &options.urdf,
-        shapes: true,
+        wanted: Wanted::Geometry,
         colors: Default::default(),
         notes: NoteList::default(),
     };
@@ -128,8 +116,8 @@ pub fn spherize(path: impl AsRef<Path>, options: &SphereOptions, progress: &dyn 
         let name = link.text("name").unwrap_or("").to_owned();
         let parts = parts(link, &mut context).map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
         if !parts.is_empty() {
-            let covered = cover_parts(&parts, options).map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
-            links.push(written(name, &parts, covered, &text, &mut edits).map_err(wrong)?);
+            let shares = share::shared(parts.iter().map(|part| &part.surface), options).map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
+            links.push(written(name, &parts, &shares, &text, &mut edits).map_err(wrong)?);
         }
         progress.at((n + 1) as f64 / elements.len() as f64);
     }
@@ -184,96 +172,13 @@ fn solid_of(given: &TriMesh, hull: bool) -> Result<(TriMesh, Option<String>), Me
     }
 }
 
-/// The spheres of all parts of a link, which share what it may have by their surfaces.
-fn cover_parts(parts: &[Part<'_, '_>], options: &SphereOptions) -> Result<Vec<Covered>, String> {
-    let area = |part: &Part<'_, '_>| match &part.surface {
-        Surface::Sphere(_) => 0.0,
-        Surface::Capsule(radius, length) => 2.0 * std::f64::consts::PI * radius * (length + 2.0 * radius),
-        Surface::Mesh { solid, .. } => solid.area(),
-    };
-    let whole: f64 = parts.iter().map(area).sum();
-    // one for each, the rest by surface
-    let spare = options.most.saturating_sub(parts.len()) as f64;
-    let most = |part: &Part<'_, '_>| 1 + (spare * area(part) / whole.max(f64::MIN_POSITIVE)) as usize;
-    parts.iter().map(|part| part.surface.cover(most(part), options)).collect()
-}
-
-impl Surface {
-    fn cover(&self, most: usize, options: &SphereOptions) -> Result<Covered, String> {
-        match self {
-            Surface::Sphere(radius) => Ok(Covered { spheres: vec![(Vec3::zeros(), *radius)], outward: vec![0.0], grown: 0.0 }),
-            Surface::Capsule(radius, length) => Ok(cover_capsule(*radius, *length, most, options.error)),
-            Surface::Mesh { given, solid, slack } => {
-                let covered = cover_mesh(given, solid, most, options)?;
-                Ok(Covered { outward: covered.outward.iter().map(|o| o + slack).collect(), ..covered })
-            }
-        }
-    }
-}
-
-fn cover_capsule(radius: f64, length: f64, most: usize, error: f64) -> Covered {
-    let reach = |count: usize| {
-        // one alone holds the ends
-        if count == 1 { radius + 0.5 * length } else { (radius * radius + 0.25 * (length / (count - 1) as f64).powi(2)).sqrt() }
-    };
-    let wanted = radius + error * (length + 2.0 * radius);
-    let count = (1..=most.max(1)).find(|n| reach(*n) <= wanted).unwrap_or(most.max(1));
-    let at = |n: usize| if count == 1 { 0.0 } else { length * (n as f64 / (count - 1) as f64 - 0.5) };
-    let spheres: Vec<(Vec3, f64)> = (0..count).map(|n| (Vec3::z() * at(n), reach(count))).collect();
-    Covered { outward: vec![reach(count) - radius; count], spheres, grown: 0.0 }
-}
-
-fn cover_mesh(given: &TriMesh, solid: &TriMesh, most: usize, options: &SphereOptions) -> Result<Covered, String> {
-    let distance = MeshDistance::new(solid);
-    let diagonal = solid.diagonal();
-    let mut best: Option<Covered> = None;
-    let mut take = |mut spheres: Vec<(Vec3, f64)>| {
-        let grown = grow_to_cover(&mut spheres, given);
-        let outward: Vec<f64> = spheres.iter().map(|(c, r)| (r + distance.closest(c).signed_distance).max(0.0)).collect();
-        let covered = Covered { spheres, outward, grown };
-        if best.as_ref().is_none_or(|best| covered.worst() < best.worst()) {
-            best = Some(covered);
-        }
-    };
-    let bounds = solid.aabb();
-    let middle = 0.5 * (bounds.min + bounds.max);
-    take(vec![(middle, solid.vertices.iter().map(|v| (v - middle).norm()).fold(0.0, f64::max))]);
-    for settings in trees(most, &options.tree) {
-        let tree = SphereTree::build_cached(solid, &settings, &options.cache).map_err(|e| e.to_string())?.tree;
-        take(tree.cut(most, options.error * diagonal).iter().map(|&n| (tree.nodes()[n].center, tree.nodes()[n].radius)).collect());
-        if tree.leaves().count() > most {
-            break;
-        }
-    }
-    best.ok_or_else(|| "no tree was built".into())
-}
-
-/// The trees worth trying for at most so many balls, coarse ones first. Leaves are tighter than the balls around them, so a tree with few more leaves
-/// than are wanted gives the best cut.
-fn trees(most: usize, usual: &TreeSettings) -> Vec<TreeSettings> {
-    if usual.builder != Builder::Octree && most <= MOST_BRANCHES {
-        return vec![TreeSettings { branch: most.max(2) as u32, depth: 1, ..*usual }];
-    }
-    let enough = (1..usual.depth).find(|d| (usual.branch as usize).saturating_pow(*d) >= most).unwrap_or(usual.depth);
-    let first = if usual.builder == Builder::Octree { 1 } else { enough };
-    let last = if usual.builder == Builder::Octree { usual.depth } else { enough };
-    (first..=last).map(|depth| TreeSettings { depth, ..*usual }).collect()
-}
-
-impl Covered {
-    fn worst(&self) -> f64 {
-        self.outward.iter().copied().fold(0.0, f64::max)
-    }
-}
-
 /// The spheres in the link's frame, and the edits that write them.
-fn written(name: String, parts: &[Part<'_, '_>], covered: Vec<Covered>, text: &str, edits: &mut Vec<(Range<usize>, String)>) -> Result<LinkSpheres, String> {
-    let mut link = LinkSpheres { name, shapes: parts.len(), spheres: Vec::new(), outward: Vec::new(), grown: 0.0 };
-    for (part, covered) in parts.iter().zip(covered) {
-        link.grown = link.grown.max(covered.grown);
+fn written(name: String, parts: &[Part<'_, '_>], shares: &[Share<'_>], text: &str, edits: &mut Vec<(Range<usize>, String)>) -> Result<LinkSpheres, String> {
+    let mut link = LinkSpheres { name, shapes: parts.len(), spheres: Vec::new(), outward: Vec::new() };
+    for (part, share) in parts.iter().zip(shares) {
         let exact = matches!(part.surface, Surface::Sphere(_));
-        let placed = covered.spheres.iter().map(|(center, radius)| placed(&part.shape.pose, center, *radius, exact));
-        let placed: Vec<(Vec3, f64)> = placed.collect();
+        let spheres = share.spheres();
+        let placed: Vec<(Vec3, f64)> = spheres.iter().map(|(center, radius, _)| placed(&part.shape.pose, center, *radius, exact)).collect();
         if !exact {
             let range = part.node.range();
             if text.get(range.clone()).is_none_or(|own| !own.starts_with("<collision")) {
@@ -282,7 +187,7 @@ fn written(name: String, parts: &[Part<'_, '_>], covered: Vec<Covered>, text: &s
             edits.push((range, elements(&part.node, &placed, text)));
         }
         link.spheres.extend(placed);
-        link.outward.extend(covered.outward);
+        link.outward.extend(spheres.iter().map(|sphere| sphere.2));
     }
     Ok(link)
 }

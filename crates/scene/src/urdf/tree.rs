@@ -5,7 +5,8 @@ use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Pose, Vec3};
 
 use super::joint::{JointElement, Kind};
-use super::link::LinkElement;
+use super::link::{Context, LinkElement};
+use super::Wanted;
 use crate::joint::{JointSpec, MimicSpec};
 use crate::link::{LinkMassSpec, LinkSpec};
 use crate::log::Log;
@@ -59,13 +60,13 @@ impl<'t> TreeBuilder<'t> {
         TreeBuilder { log, elements, joints, links: Vec::new(), spans: Vec::new() }
     }
 
-    /// All links, with mimics resolved and masses checked.
-    pub(crate) fn build(mut self, root: usize, floating: bool, notes: &mut NoteList) -> Vec<LinkSpec> {
+    /// All links, with mimics resolved and masses, where they are wanted, checked.
+    pub(crate) fn build(mut self, root: usize, context: &mut Context<'_>) -> Vec<LinkSpec> {
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); self.elements.len()];
         for (number, joint) in self.joints.iter().enumerate() {
             children[joint.parent].push(number);
         }
-        let kind = if floating { Joint::Floating } else { Joint::Fixed };
+        let kind = if context.options.floating { Joint::Floating } else { Joint::Fixed };
         let span = self.elements[root].span.clone();
         let name = self.elements[root].name.clone();
         let placed = self.hang(root, None, Pose::identity(), JointSpec::new(name, kind), span);
@@ -74,8 +75,10 @@ impl<'t> TreeBuilder<'t> {
             let placed = self.add(&self.joints[number], parent);
             waiting.extend(children[self.joints[number].child].iter().rev().map(|&joint| (joint, placed)));
         }
-        self.resolve_mimics(notes);
-        self.check_masses();
+        self.resolve_mimics(&mut context.notes);
+        if context.wanted != Wanted::Geometry {
+            self.check_masses();
+        }
         self.links
     }
 

@@ -283,8 +283,8 @@ fn mesh_files() {
         ],
     );
     told(
-        &mesh("bunny.ply"),
-        &["s.toml:3:8: `file` of [meshes.m] is \"bunny.ply\"; wanted the path of an .obj, .stl or .dae file"],
+        &mesh("bunny.off"),
+        &["s.toml:3:8: `file` of [meshes.m] is \"bunny.off\"; wanted the path of an .obj, .stl, .ply or .dae file"],
     );
 }
 

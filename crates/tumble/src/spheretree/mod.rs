@@ -11,16 +11,27 @@ use std::time::Instant;
 use tumble::collide::{Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
 use tumble::scene::read_solid;
 use tumble::table::table;
+use tumble::whole::{check_writable, write_whole};
 
 /// Builds, measures, prints and writes.
 pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
+    check_outputs(options)?;
     match (&options.mesh, &options.urdf) {
         (_, Some(urdf)) => robot::spherize(urdf, options),
-        (Some(_), None) if options.planner.is_some() || options.spheres.is_some() => {
-            Err(Failure::input("--planner and --spheres go with --urdf ROBOT, not with a mesh"))
-        }
         (Some(mesh), None) => of_mesh(mesh, options),
         (None, None) => Err(Failure::input("wanted a mesh, or --urdf ROBOT")),
+    }
+}
+
+/// What would be refused after the work is refused before it.
+fn check_outputs(options: &SphereTreeOptions) -> Result<(), Failure> {
+    for path in options.output.iter().chain(&options.picture) {
+        check_writable(path).map_err(|why| Failure::input(format!("{} cannot be written: {why}", path.display())))?;
+    }
+    let depth = settings(options).depth;
+    match options.level {
+        Some(level) if level > depth => Err(Failure::input(format!("--level is {level}; a tree of --depth {depth} has levels 0 to {depth} at most"))),
+        _ => Ok(()),
     }
 }
 
@@ -40,7 +51,7 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     if !options.quiet {
         let from = if built.found { "from the cache".into() } else { format!("built in {seconds:.2} s") };
         let volume = mesh.union_mass_properties(1.0).mass;
-        println!("{}: {} triangles, volume {volume:.6e} m³, diagonal {:.6} m; {from}", path.display(), mesh.triangles.len(), mesh.diagonal());
+        println!("{}: {} triangles, volume {volume:.6e} m³, diagonal {} m; {from}", path.display(), mesh.triangles.len(), length(mesh.diagonal()));
         print!("{}", table(&file, options.verbose));
     }
     if let Some(output) = &options.output {
@@ -85,8 +96,13 @@ fn cache(options: &SphereTreeOptions) -> TreeCache {
     }
 }
 
+/// Metres; those that six places would not show by their power of ten.
+fn length(metres: f64) -> String {
+    if metres >= 1e-3 { format!("{metres:.6}") } else { format!("{metres:.6e}") }
+}
+
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, bytes).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
+    write_whole(path, |path| std::fs::write(path, bytes)).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
 }
 
 fn say(options: &SphereTreeOptions, what: &str, path: &Path) {

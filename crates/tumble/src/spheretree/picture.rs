@@ -4,6 +4,7 @@ use crate::args::SphereTreeOptions;
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{SphereTree, TriMesh};
+use tumble::whole::write_whole;
 use tumble::render::{RenderError, Renderer, UpAxis, tree_over_mesh};
 
 /// Draws and writes. Without a graphics adapter all else still counts, and the message says what brings one.
@@ -28,7 +29,7 @@ pub fn picture(mesh: &TriMesh, tree: &SphereTree, path: &Path, options: &SphereT
         }
         Err(error) => return Err(failed(error)),
     };
-    image.write_png(path).map_err(failed)?;
+    write_whole(path, |path| image.write_png(path).map_err(std::io::Error::other)).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))?;
     super::say(options, "picture", path);
     Ok(())
 }

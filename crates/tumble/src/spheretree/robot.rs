@@ -8,6 +8,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use tumble::scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfOptions, spherize as cover};
 use tumble::table::{aligned, percent};
+use tumble::whole::check_writable;
 
 /// Spheres per link unless told otherwise.
 const MOST: u32 = 32;
@@ -26,13 +27,19 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
         error,
         tree: tumble::collide::TreeSettings { error: settings.error.min(error), even: false, ..settings },
         cache: super::cache(options),
-        urdf: UrdfOptions::default(),
+        urdf: UrdfOptions { packages: options.packages.iter().cloned().collect(), missing_meshes: options.missing_meshes, ..UrdfOptions::default() },
     };
     let planner = planner_file(path, options)?;
+    if let Some((file, _)) = &planner {
+        check_writable(file).map_err(|why| Failure::input(format!("{} cannot be written: {why}", file.display())))?;
+    }
     let progress = Share::new("covering", options.quiet);
     let robot = cover(path, &how, &progress);
     progress.done();
     let robot = robot?;
+    if robot.links.is_empty() {
+        return Err(Failure::input(format!("{}: no link has a <collision>; there is nothing to cover", path.display())));
+    }
     if !options.quiet {
         robot.notes.iter().for_each(|note| println!("{note}"));
         print!("{}", table(&robot));

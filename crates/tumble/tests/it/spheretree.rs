@@ -54,7 +54,7 @@ fn many_processes_share_a_cache_and_all_write_the_same() {
     let mut named = command(&[&["spheretree", &mesh][..], &QUICK].concat());
     let said = String::from_utf8(named.env("TUMBLE_CACHE", &cache).output().unwrap().stdout).unwrap();
     assert!(said.contains("from the cache"), "{said}");
-    let said = String::from_utf8(named.env("TUMBLE_CACHE", "off").output().unwrap().stdout).unwrap();
+    let said = String::from_utf8(named.env("TUMBLE_CACHE", "OFF").output().unwrap().stdout).unwrap();
     assert!(said.contains("built in"), "{said}");
 }
 
@@ -98,14 +98,24 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
     let none = text(&folder.path("none.obj"));
     let level = text(&folder.path("level.png"));
     let robot = folder.write("robot.urdf", ROBOT);
-    let cases: [(&[&str], &str); 10] = [
+    let (nowhere, here) = (text(&folder.path("nowhere/tree.json")), text(&folder.path("")));
+    let bare = folder.write("bare.urdf", "<robot name=\"r\"><link name=\"a\"/></robot>");
+    let gone = folder.write("gone.urdf", GONE);
+    let cases: [(&[&str], &str); 17] = [
         (&[&none], "none.obj: cannot be read"),
         (&[&open], "the mesh is open: 3 edges"),
         (&[&mesh, "--method", "foo"], "unknown method foo, expected one of"),
         (&[&mesh, "--branch", "100"], "ring.obj: the branching of a sphere tree is 100, but must be 2 to 64"),
         (&[&mesh, "--depth", "0"], "the depth of a sphere tree is 0, but must be 1 to 9"),
         (&[&mesh, "--error", "2"], "wanted a number from 0.0001 to 1"),
-        (&[&mesh, "--method", "octree", "--depth", "2", "--picture", &level, "--level", "7"], "--level is 7; the tree has levels 0 to 2"),
+        (&[&mesh, "--method", "octree", "--depth", "2", "--picture", &level, "--level", "7"], "--level is 7; a tree of --depth 2 has levels 0 to 2 at most"),
+        (&[], "wanted a mesh, or --urdf ROBOT"),
+        (&[&mesh, "-o", &nowhere], "nowhere/tree.json cannot be written: there is no folder"),
+        (&[&mesh, "-o", &here], "it is a folder; wanted the name of a file"),
+        (&["--urdf", &bare], "bare.urdf: no link has a <collision>"),
+        (&["--urdf", &robot, "--package", "nodir"], "wanted NAME=DIR"),
+        (&["--urdf", &robot, "--missing-meshes", "maybe"], "wanted error or skip"),
+        (&["--urdf", &gone], "--package NAME=DIR"),
         (&["--urdf", &none], "cannot read the URDF"),
         (&["--urdf", &robot, "--planner", "xml"], "wanted yaml, json, or a file that ends in .yml, .yaml or .json"),
         (&["--urdf", &robot, "--planner", "yaml"], "name a file, such as --planner robot.yaml"),
@@ -116,6 +126,40 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
     }
     let said = succeed(&[&["spheretree", &open, "--no-cache", "--repair"][..], &QUICK].concat());
     assert!(said.contains("1 hole(s) were filled"), "{said}");
+}
+
+const GONE: &str = "<robot name=\"r\"><link name=\"a\"><collision><geometry><sphere radius=\"1\"/></geometry></collision><collision><geometry><mesh filename=\"package://parts/ring.obj\"/></geometry></collision></link></robot>";
+
+#[test]
+fn packages_are_named_and_meshes_that_are_not_there_skipped() {
+    let folder = Folder::new("spheretree-packages");
+    let robot = folder.write("gone.urdf", GONE);
+    std::fs::create_dir(folder.path("elsewhere")).unwrap();
+    folder.write("elsewhere/ring.obj", obj(&ring()));
+    let package = format!("parts={}", text(&folder.path("elsewhere")));
+    let said = succeed(&["spheretree", "--no-cache", "--urdf", &robot, "--package", &package, "--spheres", "9"]);
+    assert!(said.contains("9 spheres"), "{said}");
+    let said = succeed(&["spheretree", "--no-cache", "--urdf", &robot, "--missing-meshes", "skip"]);
+    assert!(said.contains("left out") && said.contains("1 spheres"), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_that_cannot_be_written_whole_stays_as_it_was() {
+    let folder = Folder::new("spheretree-whole");
+    let (mesh, out) = (folder.write("ring.obj", obj(&ring())), folder.path("tree.json"));
+    std::fs::write(&out, "what was there").unwrap();
+    // a limit on the size of files stands for a full disk
+    let words = [&["spheretree", &mesh, "--no-cache", "-o", &text(&out)][..], &QUICK].concat().join(" ");
+    let run = format!("trap '' XFSZ; ulimit -f 1; exec {} {words}", env!("CARGO_BIN_EXE_tumble"));
+    let done = std::process::Command::new("sh").args(["-c", &run]).output().unwrap();
+    assert_eq!(done.status.code(), Some(1), "{done:?}");
+    assert!(String::from_utf8_lossy(&done.stderr).contains("writing"), "{done:?}");
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), "what was there");
+    assert_eq!(std::fs::read_dir(folder.path("")).unwrap().count(), 2, "something was left behind");
+    // what is no file is written into
+    let said = succeed(&[&["spheretree", &mesh, "--no-cache", "-q", "-o", "/dev/stdout"][..], &QUICK].concat());
+    TreeFile::from_json(&said).unwrap();
 }
 
 const ROBOT: &str = r#"<robot name="two 1"><link name="a"><collision><origin xyz="0 0 0.5"/><geometry><box size="0.2 0.2 1"/></geometry></collision></link>

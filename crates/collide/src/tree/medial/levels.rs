@@ -9,7 +9,7 @@ use super::reduce::{WAYS, reduce};
 use super::refit::{Fit, own};
 use super::site::Site;
 use super::spheres::{CoverPoints, Want};
-use crate::tree::ball::Ball;
+use crate::tree::ball::{Ball, around_points};
 use crate::tree::close::closed;
 use crate::tree::builder::{Cell, Job, StageCount};
 use rayon::prelude::*;
@@ -94,6 +94,10 @@ impl<'a> Levels<'a> {
     /// The leaves, and of each level the balls' parents.
     fn leaves(&mut self) -> (Fit, Vec<Vec<usize>>) {
         let all: Vec<u32> = (0..self.cover.points.len() as u32).collect();
+        let alone = self.alone(&all);
+        if alone.worst() <= self.enough() {
+            return (alone, Vec::new());
+        }
         let mut axis = Axis::new(&self.cover, &all, self.job.distance, FIRST_SITES);
         let site = Site::at(self.cover.points[0], self.job.distance);
         let mut fit = Fit { sites: vec![site], parts: vec![all], errors: vec![self.scale] };
@@ -119,6 +123,14 @@ impl<'a> Levels<'a> {
             groups = next_groups;
         }
         (fit, parents)
+    }
+
+    /// One ball for all points.
+    fn alone(&self, all: &[u32]) -> Fit {
+        let center = around_points(&self.cover.points).center;
+        let mut fit = Fit::of(vec![Site::at(center, self.job.distance)], &self.cover.points, all);
+        fit.refit(4, &self.cover.points, all, self.job.distance);
+        fit
     }
 
     /// An outward error that needs no dividing, metres.

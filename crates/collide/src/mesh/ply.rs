@@ -1,0 +1,283 @@
+//! PLY, text and binary of either byte order: positions and faces. Every other property and element is passed over.
+//!
+//! ```text
+//! ply
+//! format ascii 1.0                          or binary_little_endian, binary_big_endian
+//! element vertex 8
+//! property float x                          and y, z
+//! element face 6
+//! property list uchar int vertex_indices    or vertex_index
+//! end_header
+//! ```
+//!
+//! Then the elements follow in the order of the header, each with its properties in theirs; a list begins with its length. Counts in the header are not
+//! believed: memory grows with what the file holds.
+
+use super::TriMesh;
+use super::polygon::FaceCutter;
+use crate::{MeshError, Vec3};
+
+/// Lines of a header.
+const MOST_LINES: usize = 10_000;
+
+impl TriMesh {
+    /// Reads the bytes of a PLY file. A face of more than three corners is cut into triangles ([`FaceCutter`](crate::FaceCutter)).
+    ///
+    /// # Errors
+    /// [`MeshError`] names the line of the header, or the vertex or face (from 1).
+    pub fn from_ply(bytes: &[u8]) -> Result<TriMesh, MeshError> {
+        let (header, body) = Header::read(bytes)?;
+        let mut mesh = TriMesh::default();
+        let mut faces = Vec::new();
+        let mut values = Values { encoding: header.encoding, rest: body };
+        for element in &header.elements {
+            for number in 1..=element.count {
+                let place = || format!("{} {number}", element.name);
+                match element.kind()? {
+                    Kind::Vertex(at) => mesh.vertices.push(read_vertex(element, at, &mut values).map_err(|why| refused(&place(), &why))?),
+                    Kind::Face(at) => faces.push(read_face(element, at, &mut values).map_err(|why| refused(&place(), &why))?),
+                    Kind::Other => element.properties.iter().try_for_each(|p| values.property(p, |_| {})).map_err(|why| refused(&place(), &why))?,
+                }
+            }
+        }
+        let mut cutter = FaceCutter::default();
+        for (n, corners) in faces.iter().enumerate() {
+            mesh.push_face(corners, n + 1, &mut cutter)?;
+        }
+        mesh.check_data()?;
+        Ok(mesh)
+    }
+}
+
+fn refused(place: &str, what: &str) -> MeshError {
+    MeshError::Ply { what: format!("{place}: {what}") }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Encoding {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+#[derive(Clone, Copy)]
+enum Number {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Number {
+    fn named(word: &str) -> Option<Number> {
+        Some(match word {
+            "char" | "int8" => Number::I8,
+            "uchar" | "uint8" => Number::U8,
+            "short" | "int16" => Number::I16,
+            "ushort" | "uint16" => Number::U16,
+            "int" | "int32" => Number::I32,
+            "uint" | "uint32" => Number::U32,
+            "float" | "float32" => Number::F32,
+            "double" | "float64" => Number::F64,
+            _ => return None,
+        })
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Number::I8 | Number::U8 => 1,
+            Number::I16 | Number::U16 => 2,
+            Number::I32 | Number::U32 | Number::F32 => 4,
+            Number::F64 => 8,
+        }
+    }
+
+    /// Of its bytes, the lowest first; the others are 0.
+    fn value(self, b: [u8; 8]) -> f64 {
+        let (two, four) = ([b[0], b[1]], [b[0], b[1], b[2], b[3]]);
+        match self {
+            Number::I8 => f64::from(b[0].cast_signed()),
+            Number::U8 => f64::from(b[0]),
+            Number::I16 => f64::from(i16::from_le_bytes(two)),
+            Number::U16 => f64::from(u16::from_le_bytes(two)),
+            Number::I32 => f64::from(i32::from_le_bytes(four)),
+            Number::U32 => f64::from(u32::from_le_bytes(four)),
+            Number::F32 => f64::from(f32::from_le_bytes(four)),
+            Number::F64 => f64::from_le_bytes(b),
+        }
+    }
+}
+
+struct Property {
+    name: String,
+    number: Number,
+    /// The kind of a list's length.
+    length: Option<Number>,
+}
+
+struct Element {
+    name: String,
+    count: u64,
+    properties: Vec<Property>,
+}
+
+/// What of an element is wanted: the places of its properties.
+#[derive(Clone, Copy)]
+enum Kind {
+    Vertex([usize; 3]),
+    Face(usize),
+    Other,
+}
+
+impl Element {
+    fn kind(&self) -> Result<Kind, MeshError> {
+        let at = |name: &str, list: bool| self.properties.iter().position(|p| p.name == name && p.length.is_some() == list);
+        match self.name.as_str() {
+            "vertex" => match ["x", "y", "z"].map(|name| at(name, false)) {
+                [Some(x), Some(y), Some(z)] => Ok(Kind::Vertex([x, y, z])),
+                _ => Err(refused("the element `vertex`", "wanted properties x, y and z")),
+            },
+            "face" => match at("vertex_indices", true).or_else(|| at("vertex_index", true)) {
+                Some(list) => Ok(Kind::Face(list)),
+                None => Err(refused("the element `face`", "wanted `property list … vertex_indices`")),
+            },
+            _ => Ok(Kind::Other),
+        }
+    }
+}
+
+struct Header {
+    encoding: Encoding,
+    elements: Vec<Element>,
+}
+
+impl Header {
+    /// The header, and what comes after it.
+    fn read(bytes: &[u8]) -> Result<(Header, &[u8]), MeshError> {
+        let (mut encoding, mut elements) = (None, Vec::<Element>::new());
+        let mut rest = bytes;
+        for number in 1..=MOST_LINES {
+            let (line, after) = first_line(rest).ok_or_else(|| refused(&format!("line {number}"), "the file ends before `end_header`"))?;
+            rest = after;
+            let wrong = |what: String| refused(&format!("line {number}"), &what);
+            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            match words.as_slice() {
+                _ if number == 1 && words != ["ply"] => return Err(wrong("wanted `ply`".into())),
+                ["format", word, "1.0"] => {
+                    encoding = Some(match *word {
+                        "ascii" => Encoding::Ascii,
+                        "binary_little_endian" => Encoding::LittleEndian,
+                        "binary_big_endian" => Encoding::BigEndian,
+                        other => return Err(wrong(format!("the format `{other}`; wanted ascii, binary_little_endian or binary_big_endian"))),
+                    });
+                }
+                ["element", name, count] => {
+                    let count = count.parse().map_err(|_| wrong(format!("`{count}` where a count should be")))?;
+                    elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
+                }
+                ["property", "list", length, kind, name] => add(&mut elements, name, kind, Some(length)).map_err(wrong)?,
+                ["property", kind, name] => add(&mut elements, name, kind, None).map_err(wrong)?,
+                ["end_header"] => {
+                    let encoding = encoding.ok_or_else(|| wrong("the header has no line `format`".into()))?;
+                    // an element without properties takes no place, however many there are
+                    elements.retain(|e| !e.properties.is_empty());
+                    return Ok((Header { encoding, elements }, rest));
+                }
+                ["ply" | "comment" | "obj_info", ..] | [] => {}
+                [other, ..] => return Err(wrong(format!("`{other}` where format, element, property, comment or end_header should be"))),
+            }
+        }
+        Err(refused(&format!("line {MOST_LINES}"), "the header has no end"))
+    }
+}
+
+fn add(elements: &mut [Element], name: &str, kind: &str, length: Option<&str>) -> Result<(), String> {
+    let number = |word: &str| Number::named(word).ok_or_else(|| format!("`{word}` is no kind of number; wanted char, uchar, short, ushort, int, uint, float or double"));
+    let property = Property { name: name.into(), number: number(kind)?, length: length.map(number).transpose()? };
+    elements.last_mut().ok_or("a property before any element")?.properties.push(property);
+    Ok(())
+}
+
+/// The first line, as far as it is text, and the bytes after its end, which is `\n`, `\r\n` or `\r`.
+fn first_line(bytes: &[u8]) -> Option<(&str, &[u8])> {
+    let end = bytes.iter().position(|b| matches!(b, b'\n' | b'\r'))?;
+    let long = if bytes[end..].starts_with(b"\r\n") { 2 } else { 1 };
+    let line = &bytes[..end];
+    // comments may be in any encoding
+    let text = std::str::from_utf8(line).unwrap_or_else(|e| std::str::from_utf8(&line[..e.valid_up_to()]).unwrap_or(""));
+    Some((text, &bytes[end + long..]))
+}
+
+/// The numbers after the header.
+struct Values<'a> {
+    encoding: Encoding,
+    rest: &'a [u8],
+}
+
+impl Values<'_> {
+    /// Reads a property, and gives `each` the numbers of it that are no length.
+    fn property(&mut self, property: &Property, mut each: impl FnMut(f64)) -> Result<(), String> {
+        let Some(length) = property.length else { return Ok(each(self.next(property.number)?)) };
+        let length = self.next(length)?;
+        if !(0.0..=1e9).contains(&length) || length.fract() != 0.0 {
+            return Err(format!("a list of {length} numbers"));
+        }
+        (0..length as usize).try_for_each(|_| Ok(each(self.next(property.number)?)))
+    }
+
+    fn next(&mut self, number: Number) -> Result<f64, String> {
+        if self.encoding == Encoding::Ascii { self.next_word() } else { self.next_bytes(number) }
+    }
+
+    fn next_bytes(&mut self, number: Number) -> Result<f64, String> {
+        let (own, rest) = self.rest.split_at_checked(number.bytes()).ok_or("the file ends before it")?;
+        self.rest = rest;
+        let mut bytes = [0; 8];
+        bytes[..own.len()].copy_from_slice(own);
+        if self.encoding == Encoding::BigEndian {
+            bytes[..own.len()].reverse();
+        }
+        Ok(number.value(bytes))
+    }
+
+    fn next_word(&mut self) -> Result<f64, String> {
+        let start = self.rest.iter().position(|b| !b.is_ascii_whitespace()).ok_or("the file ends before it")?;
+        let rest = &self.rest[start..];
+        let (word, rest) = rest.split_at(rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len()));
+        self.rest = rest;
+        let word = String::from_utf8_lossy(word);
+        word.parse().map_err(|_| format!("`{}` where a number should be", word.chars().take(40).collect::<String>()))
+    }
+}
+
+fn read_vertex(element: &Element, at: [usize; 3], values: &mut Values<'_>) -> Result<Vec3, String> {
+    let mut vertex = Vec3::zeros();
+    for (n, property) in element.properties.iter().enumerate() {
+        let axis = at.iter().position(|k| *k == n);
+        values.property(property, |value| axis.into_iter().for_each(|k| vertex[k] = value))?;
+    }
+    Ok(vertex)
+}
+
+/// Corners as numbers from 1.
+fn read_face(element: &Element, at: usize, values: &mut Values<'_>) -> Result<Vec<i64>, String> {
+    let mut corners = Vec::new();
+    let mut odd = None;
+    for (n, property) in element.properties.iter().enumerate() {
+        values.property(property, |value| {
+            if n == at {
+                corners.push((value as i64).saturating_add(1));
+                odd = odd.or((value.fract() != 0.0).then_some(value));
+            }
+        })?;
+    }
+    match odd {
+        Some(value) => Err(format!("{value} where the number of a vertex should be")),
+        None if corners.len() < 3 => Err(format!("{} corners, but it needs at least 3", corners.len())),
+        None => Ok(corners),
+    }
+}
