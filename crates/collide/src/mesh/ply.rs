@@ -221,12 +221,18 @@ struct Values<'a> {
 impl Values<'_> {
     /// Reads a property, and gives `each` the numbers of it that are no length.
     fn property(&mut self, property: &Property, mut each: impl FnMut(f64)) -> Result<(), String> {
-        let Some(length) = property.length else { return Ok(each(self.next(property.number)?)) };
+        let Some(length) = property.length else {
+            each(self.next(property.number)?);
+            return Ok(());
+        };
         let length = self.next(length)?;
         if !(0.0..=1e9).contains(&length) || length.fract() != 0.0 {
             return Err(format!("a list of {length} numbers"));
         }
-        (0..length as usize).try_for_each(|_| Ok(each(self.next(property.number)?)))
+        for _ in 0..length as usize {
+            each(self.next(property.number)?);
+        }
+        Ok(())
     }
 
     fn next(&mut self, number: Number) -> Result<f64, String> {

@@ -372,7 +372,7 @@ fn obj_files_come_in_several_spellings() {
 
 #[test]
 fn stl_text_may_be_in_capitals() {
-    let text = "solid x\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid\n".repeat(1) + &" ".repeat(80);
+    let text = "solid x\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid\n".to_owned() + &" ".repeat(80);
     let wanted = TriMesh::from_stl(text.as_bytes()).unwrap();
     assert_eq!(wanted.triangles.len(), 1);
     for other in [text.to_uppercase(), text.replace('\n', "\r"), format!("\u{feff}{text}")] {

@@ -349,3 +349,16 @@ fn meshes_on_a_half_space_are_exact() {
         }
     }
 }
+
+/// An edge of the block passes below the flat base of the wedge and beyond a corner of it: where the base's edge is crossed there is none of it any more.
+#[test]
+fn an_edge_ends_at_its_corner() {
+    let all = meshes();
+    let [a, b] = ["wedge", "box mesh"].map(|name| all.iter().find(|b| b.name == name).unwrap());
+    let pose = |t: [f64; 3], q: [f64; 4]| Pose::from_parts(Vec3::from(t).into(), Quat::new_normalize(nalgebra::Quaternion::from_vector(q.into())));
+    let pa = pose([0.2069119298842264, 0.20855159641010135, -0.2993257480564795], [0.6342206306288174, 0.5419454537867789, 0.39955081511607654, 0.380024292571812]);
+    let pb = pose([0.02536194900253591, -0.19192266397821206, 0.19823866505207138], [0.09169844050522347, 0.38733862619982207, 0.036220080719898226, 0.9166505825095997]);
+    let (distance, _) = apart(a, &pa, b, &pb);
+    let least = ask(&a.ours, &pa, &b.ours, &pb).iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+    assert!((least - distance).abs() < 1e-9, "{least} but {distance}");
+}

@@ -307,10 +307,8 @@ impl Pass<'_> {
             if rise < tolerance || turn.abs() <= LEVEL {
                 return outer.s;
             }
-            if let Some(s) = self.leaves_towards(line, look, &outer, tolerance) {
-                return s;
-            }
-            let s = outer.s - rise / turn;
+            // the edge may end before that place: the look there tells
+            let s = self.leaves_towards(line, look, &outer, tolerance).unwrap_or(outer.s - rise / turn);
             if (s - look.s) * (outer.s - look.s) <= 0.0 || (s - outer.s) * (look.s - outer.s) <= 0.0 {
                 return look.s;
             }
