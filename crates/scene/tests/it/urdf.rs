@@ -281,7 +281,7 @@ fn meshes_that_are_missing_open_or_in_another_format() {
     let path = file("nowhere.stl", "open.obj");
     let error = load(&path, &UrdfOptions::default()).err().unwrap().to_string();
     assert!(error.starts_with(&format!("{}:2:", path.display())), "{error}");
-    assert!(error.contains("nowhere.stl\" cannot be collided with: there is no file") && error.ends_with("missing_meshes = \"skip\" leaves it out"), "{error}");
+    assert!(error.contains("nowhere.stl\" cannot be collided with: there is no file") && error.ends_with("missing_meshes = \"skip\" (--missing-meshes skip) leaves it out"), "{error}");
     let (body, notes) = load(&path, &skip).unwrap();
     assert_eq!(body.collidable().unwrap().parts(), 2, "a link and the base");
     assert_eq!(notes, [format!("{}:2: collision mesh nowhere.stl: left out: there is no such file", path.display())]);
@@ -293,7 +293,7 @@ fn meshes_that_are_missing_open_or_in_another_format() {
     let Some(Shape::Mesh(hull)) = body.collidable().unwrap().shape(2) else { panic!("a mesh") };
     assert!(hull.volume() > 0.9 * ball.signed_volume() && hull.volume() < ball.signed_volume() * (1.0 + 1e-6), "the hull of most of a ball");
     assert_eq!(notes.len(), 2, "{notes:?}");
-    assert!(notes[0].ends_with("visual mesh ball.mesh: left out: the format 'mesh' is not read, only .stl, .obj and .dae"), "{notes:?}");
+    assert!(notes[0].ends_with("visual mesh ball.mesh: left out: the format 'mesh' is not read, only .stl, .obj, .ply and .dae"), "{notes:?}");
     assert!(notes[1].ends_with("open.obj: its surface is not closed, so its convex hull collides"), "{notes:?}");
     assert_eq!(body.renderable().unwrap().visuals().len(), 1, "what collides is drawn instead");
 

@@ -137,9 +137,12 @@ impl Pass<'_> {
     fn look(&self, line: &Line, s: f64) -> Look {
         let end = if s == 0.0 { Some(0) } else if s == line.length { Some(1) } else { None };
         let name = end.and_then(|end: usize| line.edge.map(|edge| edge.points[end]));
-        let hit = self.hit_of(&line.at(s), name, line.normals, TOUCHING);
-        self.note(hit.distance - line.radius);
-        Look { s, slope: hit.normal.dot(&line.along), hit }
+        let at = line.at(s);
+        let hit = self.hit_of(&at, name, line.normals, TOUCHING);
+        let slope = hit.normal.dot(&line.along);
+        // the surface around an axis is its radius away across it alone
+        self.note(&at, hit.distance, if slope.abs() <= ASIDE { line.radius } else { 0.0 });
+        Look { s, slope, hit }
     }
 
     /// The minimum between two looks, if it is not at one of them, and where the line leaves a face that it lies on.

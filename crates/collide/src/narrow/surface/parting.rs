@@ -77,7 +77,7 @@ pub(super) fn part(a: &Body, b: &Body, a_in_b: &Pose, size: f64, seen: &Seen, fo
         }
         return;
     }
-    if found.deepest().is_some_and(|c| two.overlap(&c.normal) <= LONGER * told + SAME * size) {
+    if found.deepest().is_some_and(|c| two.overlap(&c.normal) <= told.max(LONGER * told) + SAME * size) {
         return;
     }
     let (way, depth) = two.least();

@@ -83,8 +83,13 @@ impl<'a> Pass<'a> {
         self.least.get()
     }
 
-    pub(super) fn note(&self, distance: f64) {
-        self.least.set(self.least.get().min(distance));
+    /// Takes note of a look at a place. One beside a face may be told how deep it is below another: then its distance from the surface counts.
+    pub(super) fn note(&self, at: &Vec3, told: f64, radius: f64) {
+        let least = self.least.get();
+        if told - radius < least {
+            let distance = if told >= 0.0 { told } else { self.mesh.map_or_else(|| self.field.bound(at), |mesh| mesh.nearest(at).distance) };
+            self.least.set(least.min(distance - radius));
+        }
     }
 
     pub(super) fn place(&self, local: &Vec3) -> Vec3 {
@@ -182,7 +187,7 @@ impl<'a> Pass<'a> {
         }
         let reach = (radius + found.limit()).max(0.0);
         mesh.minima(at, reach, &mut |name, hit| {
-            self.note(hit.distance - radius);
+            self.note(at, hit.distance, radius);
             let feature = (3 << 60 | u64::from(index) << 59) ^ (name & ((1 << 59) - 1)) ^ (name >> 62 << 57);
             self.push(at, radius, &hit, point_normal(&hit), feature, found);
         });
@@ -252,7 +257,7 @@ impl<'a> Pass<'a> {
     }
 
     fn point_at(&self, at: &Vec3, radius: f64, hit: Hit, ways: &[Vec3], index: u32, found: &mut Collector) {
-        self.note(hit.distance - radius);
+        self.note(at, hit.distance, radius);
         let down = self.rotation.tr_mul(&hit.normal);
         let closest = hit.feature == Feature::Face || ways.iter().all(|way| down.dot(way) >= -ASIDE);
         self.push_if(hit.facing && closest, at, radius, &hit, point_normal(&hit), u64::from(index), found);

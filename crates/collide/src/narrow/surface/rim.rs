@@ -132,8 +132,9 @@ impl Pass<'_> {
     }
 
     fn look_on(&self, rim: &Rim, way: &Vec3) -> Look {
-        let hit = self.field.hit(&rim.at(way), &[*way, rim.up], OVERHANG);
-        self.note(hit.distance);
+        let at = rim.at(way);
+        let hit = self.field.hit(&at, &[*way, rim.up], OVERHANG);
+        self.note(&at, hit.distance, 0.0);
         Look { way: *way, slope: hit.normal.dot(&rim.axis.cross(way)), hit }
     }
 
