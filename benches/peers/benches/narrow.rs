@@ -179,17 +179,32 @@ fn approached(body: &Body, n: u64) -> (Pose, Vec3) {
     (pose, way)
 }
 
+/// The surface mode alone: µs per query apart, touching and overlapping, each pose again and again, then with poses that change.
 fn alone(body: &Body, rounds: usize) {
-    let poses: Vec<Pose> = (0..5).flat_map(|n| [-MARGIN, 0.0, MARGIN].map(|into| touching(body, n, into))).collect();
-    let clock = Clock::new();
-    let mut found = Vec::new();
-    let before = clock.seconds();
-    for pose in (0..rounds).flat_map(|_| &poses) {
+    let places = [-MARGIN, 0.0, MARGIN];
+    let few = places.map(|into| (0..POSES).map(|n| touching(body, n, into)).collect::<Vec<_>>());
+    let ways: Vec<(Pose, Vec3)> = (0..CHANGING).map(|n| approached(body, n)).collect();
+    let many = places.map(|into| ways.iter().map(|(pose, way)| moved(pose, way, into)).collect::<Vec<_>>());
+    let (clock, mut found) = (Clock::new(), Vec::new());
+    let mut query = |pose: &Pose| {
         found.clear();
         contacts_in(ContactMode::Surface, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
         black_box(&found);
+    };
+    let mut figures = Vec::new();
+    for poses in &few {
+        let before = clock.seconds();
+        poses.iter().for_each(|pose| (0..rounds).for_each(|_| query(pose)));
+        figures.push(1e6 * (clock.seconds() - before) / (rounds * poses.len()) as f64);
     }
-    println!("{:.1} µs per query, mean of {} poses", 1e6 * (clock.seconds() - before) / (rounds * poses.len()) as f64, poses.len());
+    for poses in &many {
+        let before = clock.seconds();
+        let times = rounds / 10 + 1;
+        (0..times).for_each(|_| poses.iter().for_each(&mut query));
+        figures.push(1e6 * (clock.seconds() - before) / (times * poses.len()) as f64);
+    }
+    let figures: Vec<String> = figures.iter().map(|f| format!("{f:.1}")).collect();
+    println!("{} µs per query, means: apart, touching, overlap; the same with poses that change", figures.join(" "));
 }
 
 fn bunny() -> Option<Body> {

@@ -10,6 +10,7 @@ mod holes;
 mod hull;
 mod integrals;
 mod obj;
+mod order;
 mod pairing;
 mod ply;
 mod polygon;
@@ -28,6 +29,7 @@ pub use polygon::FaceCutter;
 pub use text::{obj_lines, text_of};
 pub(crate) use distance::{Descent, closest_on_triangle, pseudonormals};
 pub use repair::{RepairReport, RepairSettings};
+pub(crate) use order::along_curve;
 pub(crate) use shells::shells;
 pub use winding::WindingNumber;
 

@@ -17,6 +17,7 @@
 //! further from the other body. The least gap is then known to the same `ε`.
 
 use crate::mesh::{edge_groups, pseudonormals};
+use crate::tree::around_points;
 use crate::{Aabb, SphereTree, TriMesh, Vec3};
 use nalgebra::ComplexField;
 
@@ -215,8 +216,7 @@ impl Elements {
         let all = &*self;
         let held = || ranges.iter().flat_map(|[a, b]| &points[*a..*b]);
         let ends = |fine: bool| held().flat_map(move |p| all.edges_of(p, fine).iter().map(|e| e.ends[1]).chain([p.at]));
-        let bounds = Aabb::around(ends(false));
-        let middle = 0.5 * (bounds.min + bounds.max);
+        let middle = around_points(&ends(false).collect::<Vec<_>>()).center;
         let center: [f32; 3] = std::array::from_fn(|k| middle[k] as f32);
         let from = Vec3::from(center.map(f64::from));
         let reach = [false, true].map(|fine| (ends(fine).map(|p| (p - from).norm()).fold(0.0, f64::max) * ABOVE) as f32);

@@ -31,8 +31,9 @@ pub(crate) struct Surface {
 impl Surface {
     /// Of a closed, outward-wound mesh and the tree around it.
     pub fn new(mesh: &TriMesh, tree: &SphereTree) -> Surface {
-        let (elements, searched) = Elements::new(mesh, tree);
-        Surface { elements, field: MeshField::new(mesh, searched) }
+        let mesh = mesh.ordered();
+        let (elements, searched) = Elements::new(&mesh, tree);
+        Surface { elements, field: MeshField::new(&mesh, searched) }
     }
 }
 
@@ -52,8 +53,10 @@ pub(crate) enum Feature {
 /// What a field says of a point; in the field's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hit {
-    /// Signed distance of the point from the surface, metres.
+    /// Signed distance of the point from the part of the surface that is meant, metres: how deep it is below one that it faces, where another is nearer.
     pub distance: f64,
+    /// Signed distance of the point from the whole surface, metres.
+    pub nearest: f64,
     /// Outward unit normal: from the surface to the point, or back if it is inside.
     pub normal: Vec3,
     /// From the surface back along the normal to the core that carries it: a radius, or 0.

@@ -35,7 +35,7 @@ impl Field for HalfSpaceField {
 
     fn hit(&self, p: &Vec3, normals: &[Vec3], _beside: f64) -> Hit {
         let normal = Vec3::z();
-        Hit { distance: p.z, normal, core: 0.0, feature: Feature::Face, facing: facing(normals, &normal) }
+        Hit { distance: p.z, nearest: p.z, normal, core: 0.0, feature: Feature::Face, facing: facing(normals, &normal) }
     }
 
     fn convex(&self) -> bool {
@@ -57,7 +57,8 @@ impl Field for RoundField {
         let length = offset.norm();
         let normal = if length > 1e-12 * self.radius { offset / length } else { Vec3::x() };
         let feature = if p.z.abs() < self.half_length { Feature::Line(Vec3::z()) } else { Feature::Point };
-        Hit { distance: length - self.radius, normal, core: self.radius, feature, facing: facing(normals, &normal) }
+        let distance = length - self.radius;
+        Hit { distance, nearest: distance, normal, core: self.radius, feature, facing: facing(normals, &normal) }
     }
 
     fn round(&self) -> bool {
@@ -93,7 +94,7 @@ impl Field for BoxField {
                 (false, 1) => Feature::Edge(Vec3::ith(free.sum(), 1.0)),
                 _ => Feature::Point,
             };
-            return Hit { distance, normal, core: 0.0, feature, facing: facing(normals, &normal) };
+            return Hit { distance, nearest: distance, normal, core: 0.0, feature, facing: facing(normals, &normal) };
         }
         let nearer = |&a: &usize, &b: &usize| {
             // of faces at the same distance, the one that the element faces most squarely
@@ -102,7 +103,7 @@ impl Field for BoxField {
         };
         let facing_one = (0..3).filter(|&k| facing(normals, &sign(k)) && outside[k] > outside.max() - AROUND * self.half.max()).min_by(nearer);
         let k = facing_one.unwrap_or(outside.imax());
-        Hit { distance: outside[k], normal: sign(k), core: 0.0, feature: Feature::Face, facing: facing_one.is_some() }
+        Hit { distance: outside[k], nearest: if distance > 0.0 { distance } else { outside.max() }, normal: sign(k), core: 0.0, feature: Feature::Face, facing: facing_one.is_some() }
     }
 
     fn convex(&self) -> bool {
@@ -123,16 +124,16 @@ impl Field for CylinderField {
         let outward = if length > 1e-12 * self.radius { across / length } else { Vec3::x() };
         let up = Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 };
         let (r, z) = (length - self.radius, p.z.abs() - self.half_length);
-        let side = Hit { distance: r, normal: outward, core: self.radius, feature: Feature::Line(Vec3::z()), facing: facing(normals, &outward) };
-        let end = Hit { distance: z, normal: up, core: 0.0, feature: Feature::Face, facing: facing(normals, &up) };
         let distance = self.bound(p);
+        let side = Hit { distance: r, nearest: distance, normal: outward, core: self.radius, feature: Feature::Line(Vec3::z()), facing: facing(normals, &outward) };
+        let end = Hit { distance: z, nearest: distance, normal: up, core: 0.0, feature: Feature::Face, facing: facing(normals, &up) };
         if distance > touching {
             return match (r > ABOVE * distance, z > ABOVE * distance) {
                 (true, _) => side,
                 (_, true) => end,
                 _ => {
                     let normal = (outward * r + up * z) / distance;
-                    Hit { distance, normal, core: 0.0, feature: Feature::Point, facing: facing(normals, &normal) }
+                    Hit { distance, nearest: distance, normal, core: 0.0, feature: Feature::Point, facing: facing(normals, &normal) }
                 }
             };
         }

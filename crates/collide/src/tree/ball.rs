@@ -15,7 +15,7 @@ const EVALUATIONS: usize = 40;
 
 /// A ball; metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ball {
+pub(crate) struct Ball {
     pub center: Vec3,
     pub radius: f64,
 }
@@ -34,7 +34,7 @@ impl Ball {
 }
 
 /// A ball around points, close to the smallest; zero for none.
-pub(super) fn around_points(points: &[Vec3]) -> Ball {
+pub(crate) fn around_points(points: &[Vec3]) -> Ball {
     let bounds = crate::Aabb::around(points.iter().copied());
     let mut center = 0.5 * (bounds.min + bounds.max);
     let Some((mut far, mut square)) = farthest(points, &center) else {

@@ -40,6 +40,7 @@ pub use settings::{Builder, TreeSettings};
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
 use ball::Ball;
+pub(crate) use ball::around_points;
 use builder::{Cell, Job, TreeBuilder};
 
 /// One ball of a tree, in the mesh's frame.

@@ -67,7 +67,7 @@ mod tests {
         for (feature, closest, least) in [(Feature::Edge(Vec3::z()), Vec3::new(0.0, 0.0, 1.0), 2.0), (Feature::Point, Vec3::zeros(), 5.0_f64.sqrt())] {
             let (offset, s) = (at - closest, 7.5);
             let normal = offset.normalize();
-            let hit = Hit { distance: offset.norm(), normal, core: 0.0, feature, facing: true };
+            let hit = Hit { distance: offset.norm(), nearest: offset.norm(), normal, core: 0.0, feature, facing: true };
             let arc = Arc::new(&hit, s, normal.dot(&along), &along).unwrap();
             assert!((arc.foot - 6.0).abs() < 1e-12, "x = 0 is at s = 6, not {}", arc.foot);
             assert!((arc.height(6.0) - least).abs() < 1e-12);
@@ -84,7 +84,8 @@ mod tests {
         let (along, s) = (Vec3::x(), 3.0);
         let (at, closest) = (Vec3::new(s, 0.0, 1.0), Vec3::new(0.5 * s, 0.5 * s, 0.0));
         let normal = (at - closest).normalize();
-        let hit = Hit { distance: (at - closest).norm(), normal, core: 0.0, feature: Feature::Line(way), facing: true };
+        let distance = (at - closest).norm();
+        let hit = Hit { distance, nearest: distance, normal, core: 0.0, feature: Feature::Line(way), facing: true };
         let arc = Arc::new(&hit, s, normal.dot(&along), &along).unwrap();
         assert!(arc.foot.abs() < 1e-12 && (arc.height(0.0) - 1.0).abs() < 1e-12);
         assert!((arc.height(2.0) - 3.0_f64.sqrt()).abs() < 1e-12);

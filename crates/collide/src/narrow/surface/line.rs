@@ -141,7 +141,7 @@ impl Pass<'_> {
         let hit = self.hit_of(&at, name, line.normals, TOUCHING);
         let slope = hit.normal.dot(&line.along);
         // the surface around an axis is its radius away across it alone
-        self.note(&at, hit.distance, if slope.abs() <= ASIDE { line.radius } else { 0.0 });
+        self.note(&hit, if slope.abs() <= ASIDE { line.radius } else { 0.0 });
         Look { s, slope, hit }
     }
 

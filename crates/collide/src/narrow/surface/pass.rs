@@ -2,7 +2,7 @@
 
 use super::super::reduce::Collector;
 use super::{Body, Source};
-use super::line::LYING_EDGE;
+use super::line::{LEVEL, LYING_EDGE};
 use crate::surface::elements::{Edge, Elements, Group, PARTS, Point};
 use crate::surface::field::MeshField;
 use crate::surface::{Feature, Field, Hit, OVERHANG};
@@ -83,13 +83,9 @@ impl<'a> Pass<'a> {
         self.least.get()
     }
 
-    /// Takes note of a look at a place. One beside a face may be told how deep it is below another: then its distance from the surface counts.
-    pub(super) fn note(&self, at: &Vec3, told: f64, radius: f64) {
-        let least = self.least.get();
-        if told - radius < least {
-            let distance = if told >= 0.0 { told } else { self.mesh.map_or_else(|| self.field.bound(at), |mesh| mesh.nearest(at).distance) };
-            self.least.set(least.min(distance - radius));
-        }
+    /// Takes note of a look at a place.
+    pub(super) fn note(&self, hit: &Hit, radius: f64) {
+        self.least.set(self.least.get().min(hit.nearest - radius));
     }
 
     pub(super) fn place(&self, local: &Vec3) -> Vec3 {
@@ -138,10 +134,13 @@ impl<'a> Pass<'a> {
         if only_points || bound - longest > found.limit() {
             return;
         }
-        // where the distance rises steeply from here an edge has nothing but its end; a long one may come near another part of the body
+        // where the distance rises steeply from here an edge has nothing but its end, one of a smooth surface where it rises at all; a long one may come near
+        // another part of the body
         let up = seen.up.map(|up| self.rotation.tr_mul(&up));
         let rises = |edge: &Edge| {
-            self.is_one_piece(edge.length, edge.spared > 0.0) && up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= LYING_EDGE * edge.length)
+            let smooth = edge.spared > 0.0;
+            let least = if smooth { -LEVEL } else { LYING_EDGE };
+            self.is_one_piece(edge.length, smooth) && up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= least * edge.length)
         };
         for edge in elements.edges_of(point, fine) {
             if bound - edge.length <= found.limit() && !rises(edge) && self.may_touch(edge, found) {
@@ -187,7 +186,7 @@ impl<'a> Pass<'a> {
         }
         let reach = (radius + found.limit()).max(0.0);
         mesh.minima(at, reach, &mut |name, hit| {
-            self.note(at, hit.distance, radius);
+            self.note(&hit, radius);
             let feature = (3 << 60 | u64::from(index) << 59) ^ (name & ((1 << 59) - 1)) ^ (name >> 62 << 57);
             self.push(at, radius, &hit, point_normal(&hit), feature, found);
         });
@@ -257,7 +256,7 @@ impl<'a> Pass<'a> {
     }
 
     fn point_at(&self, at: &Vec3, radius: f64, hit: Hit, ways: &[Vec3], index: u32, found: &mut Collector) {
-        self.note(at, hit.distance, radius);
+        self.note(&hit, radius);
         let down = self.rotation.tr_mul(&hit.normal);
         let closest = hit.feature == Feature::Face || ways.iter().all(|way| down.dot(way) >= -ASIDE);
         self.push_if(hit.facing && closest, at, radius, &hit, point_normal(&hit), u64::from(index), found);

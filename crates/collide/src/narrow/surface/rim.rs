@@ -134,7 +134,7 @@ impl Pass<'_> {
     fn look_on(&self, rim: &Rim, way: &Vec3) -> Look {
         let at = rim.at(way);
         let hit = self.field.hit(&at, &[*way, rim.up], OVERHANG);
-        self.note(&at, hit.distance, 0.0);
+        self.note(&hit, 0.0);
         Look { way: *way, slope: hit.normal.dot(&rim.axis.cross(way)), hit }
     }
 

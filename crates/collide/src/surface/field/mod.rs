@@ -111,10 +111,17 @@ impl MeshField {
         sides
     }
 
-    /// At most the signed distance at `p`, told what the octree says: a convex solid is below all its sides.
+    /// At most the signed distance at `p`, told what the octree says.
+    #[inline]
     fn below_sides(&self, p: &Vec3, bound: f64) -> f64 {
+        if self.sides.is_empty() { bound } else { self.above_sides(p).max(bound) }
+    }
+
+    /// How far `p` is above the highest side, at most: a convex solid is below all.
+    #[inline(never)]
+    fn above_sides(&self, p: &Vec3) -> f64 {
         let slack = 1e-11 * self.diagonal;
-        self.sides.iter().map(|(n, height)| n.dot(p) - height - slack).fold(bound, f64::max)
+        self.sides.iter().map(|(n, height)| n.dot(p) - height - slack).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Centre and radius of a ball around triangle `t`.
@@ -228,7 +235,8 @@ impl MeshField {
             }
             _ => Feature::Point,
         };
-        Hit { distance: sign * length, normal, core: 0.0, feature, facing: true }
+        let distance = sign * length;
+        Hit { distance, nearest: distance, normal, core: 0.0, feature, facing: true }
     }
 
     /// The closest face among those listed that faces the element, has `p` behind it (or on it), and is not much further
@@ -254,7 +262,7 @@ impl MeshField {
                 // beyond an edge by less than counts, it is still above or below the face
                 let beside = (p - point - normal * above).norm();
                 let distance_signed = if above > 0.0 || beside < aside { above } else { -distance };
-                let hit = Hit { distance: distance_signed, normal, core: 0.0, feature: Feature::Face, facing: true };
+                let hit = Hit { distance: distance_signed, nearest, normal, core: 0.0, feature: Feature::Face, facing: true };
                 best = Some((distance, square, hit));
             }
         }

@@ -11,9 +11,12 @@
 use crate::Vec3;
 
 /// Divisions that are passed at once on the way down, at most.
-const TOP: usize = 6;
+const TOP: u32 = 6;
 /// Of single precision in a place and in a bound, in half sides of the outermost cell.
 const ROUNDING: f64 = 2e-6;
+/// The greatest number below 2, and the digits of a number behind the first one.
+const LAST: f32 = 1.999_999_9;
+const MANTISSA: u32 = (1 << 23) - 1;
 
 /// Thirty-two bytes, in single precision, since most of the time of a query goes by waiting for cells.
 #[derive(Clone, Copy, Debug)]
@@ -96,8 +99,8 @@ pub(super) struct Octree {
     pub center: Vec3,
     /// Half the side.
     pub half: f64,
-    /// How often the outermost cell is divided for `top`, and how many of the cubes that makes go into a metre.
-    level: usize,
+    /// How often the outermost cell is divided for `top`, and how many of the outermost cells go into a metre.
+    level: u32,
     per_metre: f32,
     /// The cell, times 16, plus its depth, at or above each of these cubes.
     top: Vec<u32>,
@@ -122,17 +125,16 @@ impl Octree {
     /// To be called once all cells are there, and divided so often at most.
     pub fn finish(&mut self, deepest: u32) {
         self.cells.shrink_to_fit();
-        self.level = TOP.min(deepest as usize);
-        self.per_metre = 0.5 / self.halves[self.level];
+        self.level = TOP.min(deepest);
         self.top = (0..1 << (3 * self.level)).map(|n| self.cell_above(n)).collect();
     }
 
     /// The cell at or above a cube of the top.
     fn cell_above(&self, cube: usize) -> u32 {
-        let (mut cell, mut depth) = (0, 0);
-        while depth < self.level && self.cells[cell].children() > 0 {
+        let (mut cell, mut depth, level) = (0, 0, self.level as usize);
+        while depth < level && self.cells[cell].children() > 0 {
             depth += 1;
-            let octant: usize = (0..3).map(|k| (cube >> (k * self.level + self.level - depth) & 1) << k).sum();
+            let octant: usize = (0..3).map(|k| (cube >> (k * level + level - depth) & 1) << k).sum();
             cell = self.cells[cell].children() + octant;
         }
         (cell << 4 | depth) as u32
@@ -149,28 +151,36 @@ impl Octree {
     /// At most the signed distance at `p`.
     pub fn bound(&self, p: &Vec3) -> f64 {
         let from_low = (p - self.center).add_scalar(self.half);
-        let inside = from_low.map(|x| x.clamp(0.0, 2.0 * self.half));
+        let most = 2.0 * self.half;
+        let inside = from_low.map(|x| if x > 0.0 { if x < most { x } else { most } } else { 0.0 });
         let bound = self.bound_at(&self.descend(&inside));
         let outside = (from_low - inside).norm_squared();
         if outside == 0.0 { bound } else { (outside + bound.max(0.0).powi(2)).sqrt() }
     }
 
     /// The same at a place.
+    #[inline]
     pub fn bound_at(&self, place: &Place) -> f64 {
         place.bound() - self.rounding
     }
 
-    /// The smallest cell around a place that lies so far from the lowest corner. One near a face of a cell may be taken for the neighbour's; then
-    /// the offset is more than half the side by rounding.
+    /// The smallest cell around a place that lies so far from the lowest corner, which is within the outermost cell. One near a face of a cell may be taken
+    /// for the neighbour's; then the offset is more than half the side by rounding.
+    #[inline]
     fn descend(&self, from_low: &Vec3) -> Place<'_> {
         let level = self.level;
-        let most = (1 << level) - 1;
         let low = [from_low.x as f32, from_low.y as f32, from_low.z as f32, 0.0];
-        let place: [i32; 4] = std::array::from_fn(|k| ((low[k] * self.per_metre) as i32).clamp(0, most));
+        // the cube's number is the first digits of 1 + x/2^level
+        let place: [u32; 4] = std::array::from_fn(|k| {
+            let x = low[k] * self.per_metre + 1.0;
+            let x = if x < LAST { x } else { LAST };
+            (x.to_bits() & MANTISSA) >> (23 - level)
+        });
         let top = self.top[(place[0] | place[1] << level | place[2] << (2 * level)) as usize];
-        let (mut cell, depth) = (&self.cells[(top >> 4) as usize], (top & 15) as usize);
-        let mut half = self.halves[depth];
-        let mut offset: [f32; 4] = std::array::from_fn(|k| low[k] - ((place[k] >> (level - depth)) * 2 + 1) as f32 * half);
+        let (mut cell, depth) = (&self.cells[(top >> 4) as usize], top & 15);
+        let mut half = self.halves[depth as usize];
+        let above = level - depth;
+        let mut offset: [f32; 4] = std::array::from_fn(|k| low[k] - ((place[k] >> above) * 2 + 1) as i32 as f32 * half);
         while cell.children() > 0 {
             half *= 0.5;
             let octant: usize = (0..3).map(|k| usize::from(offset[k].is_sign_positive()) << k).sum();

@@ -4,18 +4,12 @@
 //! randomised construction, the curve keeps each point close to the one before. The dice are a hash of the index, so
 //! that the order is a function of the points alone.
 
-use crate::{Aabb, Vec3};
-
-/// Bits of the curve per axis.
-const BITS: u32 = 20;
+use crate::Vec3;
+use crate::mesh::along_curve;
 
 /// All indices of `points`, in the order in which to insert them.
 pub(super) fn order(points: &[Vec3]) -> Vec<u32> {
-    let bounds = Aabb::around(points.iter().copied());
-    let side = (bounds.max - bounds.min).max();
-    let scale = if side > 0.0 { f64::from((1u32 << BITS) - 1) / side } else { 0.0 };
-    let mut keys: Vec<(u32, u64, u32)> =
-        points.iter().enumerate().map(|(n, p)| (round(n as u64), along_curve((p - bounds.min) * scale), n as u32)).collect();
+    let mut keys: Vec<(u32, u64, u32)> = along_curve(points).into_iter().zip(0..).map(|(place, n)| (round(u64::from(n)), place, n)).collect();
     keys.sort_unstable();
     keys.into_iter().map(|k| k.2).collect()
 }
@@ -31,10 +25,4 @@ fn hash(n: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     x ^ (x >> 31)
-}
-
-/// Place on Morton's curve: the bits of the three coordinates in turn.
-fn along_curve(p: Vec3) -> u64 {
-    let [x, y, z] = [p.x as u64, p.y as u64, p.z as u64];
-    (0..BITS).rev().fold(0, |key, b| key << 3 | (x >> b & 1) << 2 | (y >> b & 1) << 1 | (z >> b & 1))
 }
