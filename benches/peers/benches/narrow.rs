@@ -30,7 +30,7 @@ const CHANGING: u64 = 256;
 const STEP: f64 = 2e-3;
 const HALVINGS: u32 = 24;
 /// Seconds of CPU that one figure takes, about.
-const PATIENCE: f64 = 0.15;
+const PATIENCE: f64 = 0.6;
 
 struct Body {
     name: String,

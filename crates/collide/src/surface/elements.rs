@@ -98,6 +98,10 @@ impl Group {
         Vec3::from(self.center.map(f64::from))
     }
 
+    pub fn center_single(&self) -> &[f32; 3] {
+        &self.center
+    }
+
     /// From the centre, with the fine edges or without, metres.
     pub fn reach(&self, fine: bool) -> f64 {
         f64::from(self.reach[usize::from(fine)])

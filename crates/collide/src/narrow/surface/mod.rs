@@ -65,8 +65,8 @@ fn elements(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector)
     let b_in_a = a_in_b.inverse();
     let memory_first = Memory::new();
     let memory_second = Memory::new();
-    let first = Pass::new(a_in_b, b, size, None, &memory_first);
-    let second = Pass::new(&b_in_a, a, size, Some(a_in_b), &memory_second);
+    let first = Pass::new([a, b], a_in_b, size, None, &memory_first);
+    let second = Pass::new([b, a], &b_in_a, size, Some(a_in_b), &memory_second);
     first.run(&a.source, found);
     second.run(&b.source, found);
     if found.overlap() > DEEP * size {

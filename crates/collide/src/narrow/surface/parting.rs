@@ -142,8 +142,8 @@ impl Two<'_> {
         if found.least() > -DEEP * self.size {
             let inverse = self.pose.inverse();
             let memories = [Memory::new(), Memory::new()];
-            let first = Pass::new(self.pose, self.b, self.size, None, &memories[0]);
-            let second = Pass::new(&inverse, self.a, self.size, Some(self.pose), &memories[1]);
+            let first = Pass::new([self.a, self.b], self.pose, self.size, None, &memories[0]);
+            let second = Pass::new([self.b, self.a], &inverse, self.size, Some(self.pose), &memories[1]);
             faces([&first, &second], [self.a, self.b], found);
         }
         let deepest = found.deepest().copied().filter(|c| c.gap < -SAME * self.size);

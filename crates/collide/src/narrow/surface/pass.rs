@@ -4,7 +4,7 @@ use super::super::reduce::Collector;
 use super::{Body, Source};
 use super::line::{LEVEL, LYING_EDGE};
 use crate::surface::elements::{Edge, Elements, Group, PARTS, Point};
-use crate::surface::field::MeshField;
+use crate::surface::field::{MeshField, Way};
 use crate::surface::{Feature, Field, Hit, OVERHANG};
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 use arrayvec::ArrayVec;
@@ -38,6 +38,8 @@ pub(super) struct Pass<'a> {
     /// In the second pass, where the field is A's: the pose of A in B.
     pub(super) second: Option<&'a Pose>,
     memory: &'a Memory,
+    /// From the element's frame to a mesh's field.
+    way: Option<Way>,
     /// The least distance of a place looked at, less its radius.
     least: Cell<f64>,
 }
@@ -63,9 +65,11 @@ const SEEN: usize = 192;
 const SLOTS: usize = 1024;
 
 impl<'a> Pass<'a> {
-    pub(super) fn new(pose: &'a Pose, other: &Body<'a>, size: f64, second: Option<&'a Pose>, memory: &'a Memory) -> Pass<'a> {
+    /// The elements of one body, which has that `pose` in the frame of the other.
+    pub(super) fn new([one, other]: [&Body<'a>; 2], pose: &'a Pose, size: f64, second: Option<&'a Pose>, memory: &'a Memory) -> Pass<'a> {
         let rotation = *pose.rotation.to_rotation_matrix().matrix();
-        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, memory, least: Cell::new(f64::INFINITY) }
+        let way = other.mesh.and_then(|mesh| mesh.way_from(&rotation, &pose.translation.vector, one.radius));
+        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, memory, way, least: Cell::new(f64::INFINITY) }
     }
 
     pub(super) fn run(&self, source: &Source, found: &mut Collector) {
@@ -94,7 +98,7 @@ impl<'a> Pass<'a> {
 
     fn mesh(&self, elements: &Elements, found: &mut Collector) {
         let Some(all) = elements.groups.first() else { return };
-        let bound = self.field.bound(&self.place(&all.center()));
+        let bound = self.bound(all.center_single(), || all.center());
         if bound - all.reach(self.field.bent()) <= found.limit() {
             self.group(elements, all, bound, found);
         }
@@ -105,7 +109,7 @@ impl<'a> Pass<'a> {
     /// All parts are asked for before any is opened: so the memory that each waits for is waited for once.
     fn group(&self, elements: &Elements, group: &Group, bound: f64, found: &mut Collector) {
         for parts in elements.parts_of(group).chunks(PARTS) {
-            let bounds: ArrayVec<f64, PARTS> = parts.iter().map(|part| self.bound(&self.place(&part.center()))).collect();
+            let bounds: ArrayVec<f64, PARTS> = parts.iter().map(|part| self.bound(part.center_single(), || part.center())).collect();
             for (part, bound) in parts.iter().zip(bounds) {
                 if bound - part.reach(self.field.bent()) <= found.limit() {
                     self.group(elements, part, bound, found);
@@ -117,8 +121,13 @@ impl<'a> Pass<'a> {
         }
     }
 
-    fn bound(&self, at: &Vec3) -> f64 {
-        self.mesh.map_or_else(|| self.field.bound(at), |mesh| mesh.bound(at))
+    /// At most the field's distance at a point of the element, told in single precision too.
+    #[inline]
+    pub(super) fn bound(&self, single: &[f32; 3], point: impl Fn() -> Vec3) -> f64 {
+        match (self.mesh, &self.way) {
+            (Some(mesh), Some(way)) => mesh.bound_on(way, single),
+            _ => self.field.bound(&self.place(&point())),
+        }
     }
 
     /// A point of a mesh and the edges that it holds; `bound` is at most the field's distance there.

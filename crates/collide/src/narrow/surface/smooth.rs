@@ -12,23 +12,23 @@ use super::super::reduce::Collector;
 use super::line::LEVEL;
 use super::pass::{Normals, Pass};
 use crate::surface::elements::Edge;
-use crate::surface::field::MeshField;
-use crate::surface::{Feature, Field, TOUCHING};
+use crate::surface::{Feature, TOUCHING};
 
 impl Pass<'_> {
     /// Whether an edge may have a contact of its own.
     pub(super) fn may_touch(&self, edge: &Edge, found: &Collector) -> bool {
         let short = edge.spared > 0.0 && self.is_one_piece(edge.length, true);
-        self.mesh.filter(|_| short).is_none_or(|mesh| self.may_dip(mesh, edge, found))
+        self.mesh.is_none() || !short || self.may_dip(edge, found)
     }
 
-    fn may_dip(&self, mesh: &MeshField, edge: &Edge, found: &Collector) -> bool {
-        let [start, end] = edge.ends.map(|p| self.place(&p));
-        let way = end - start;
-        let near = |s: f64, within: f64| mesh.bound(&(start + way * s)) - within * edge.length <= found.limit();
+    fn may_dip(&self, edge: &Edge, found: &Collector) -> bool {
+        let at = |s: f64| edge.ends[0] + (edge.ends[1] - edge.ends[0]) * s;
+        let near = |s: f64, within: f64| self.bound(&at(s).map(|x| x as f32).into(), || at(s)) - within * edge.length <= found.limit();
         if !near(0.5, 0.5) || !(near(0.25, 0.25) || near(0.75, 0.25)) {
             return false;
         }
+        let [start, end] = edge.ends.map(|p| self.place(&p));
+        let way = end - start;
         let normals: Normals = edge.normals.iter().map(|n| self.rotation * n).collect();
         let low = self.hit_of(&start, Some(edge.points[0]), &normals, TOUCHING);
         let fall = -low.normal.dot(&way);

@@ -256,6 +256,25 @@ mod tests {
         }
     }
 
+    /// Bounds of places told in another frame, in single precision, in and around the mesh and far away: never above the distance, and as good as the others.
+    #[test]
+    fn bounds_from_another_frame() {
+        let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
+        let field = MeshField::new(&mesh, vec![[true; 3]; mesh.triangles.len()]);
+        for n in 0..4000_u32 {
+            let place = |step: u32, span: f64| span * (f64::from(n * step % 3989) / 1994.5 - 1.0);
+            let rotation = crate::Quat::from_euler_angles(place(7, 3.0), place(31, 1.5), place(57, 3.0)).to_rotation_matrix().into_inner();
+            let far = if n % 3 == 0 { 1e3 } else { 1.5 };
+            let offset = Vec3::new(place(11, far), place(13, far), place(17, far));
+            let single = [place(1, 1.0) as f32, place(611, 1.0) as f32, place(1301, 1.0) as f32];
+            let p = rotation * Vec3::from(single.map(f64::from)) + offset;
+            let way = field.way_from(&rotation, &offset, 1.8).unwrap();
+            let (bound, usual, truth) = (field.bound_on(&way, &single), field.tree.bound(&p), field.nearest(&p).distance);
+            assert!(bound <= truth, "{p:?}: bound {bound} above {truth}");
+            assert!(bound >= usual - 4.0 * way.rounding(), "{p:?}: bound {bound} below {usual}");
+        }
+    }
+
     /// Above, below and beside a large slab of twelve triangles the bound is the distance itself; past its edges no more.
     #[test]
     fn the_bound_of_a_slab_is_its_distance() {

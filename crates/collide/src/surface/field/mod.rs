@@ -12,8 +12,9 @@ mod octree;
 
 use super::{Feature, Field, Hit, TOUCHING, facing, opposition};
 use crate::mesh::{closest_on_triangle, edge_groups, pseudonormals, shells};
-use crate::{Aabb, MeshDistance, TriMesh, Vec3};
+use crate::{Aabb, Mat3, MeshDistance, TriMesh, Vec3};
 use arrayvec::ArrayVec;
+pub(crate) use octree::Way;
 use octree::{Cell, Octree, Place};
 
 /// Triangles up to this much further than the closest are listed if they face another way, as a part of the diagonal.
@@ -203,6 +204,17 @@ impl MeshField {
         }
         let list = self.tree.locate(p).map_or(&[][..], |place| self.list(place.cell));
         self.behind(p, normals, list, hit.distance, beside).unwrap_or(Hit { facing: faces, ..hit })
+    }
+
+    /// For [`MeshField::bound_on`]; `None` where the sides of a convex solid tell more.
+    pub fn way_from(&self, rotation: &Mat3, translation: &Vec3, reach: f64) -> Option<Way> {
+        self.sides.is_empty().then(|| self.tree.way_from(rotation, translation, reach))
+    }
+
+    /// At most the signed distance of a point told in another frame.
+    #[inline]
+    pub fn bound_on(&self, way: &Way, p: &[f32; 3]) -> f64 {
+        self.tree.bound_on(way, p)
     }
 
     fn closest_of(&self, p: &Vec3, triangle: usize) -> Closest {

@@ -8,7 +8,7 @@
 //!
 //! The last holds since `p − q` makes no acute angle with the way from `q` to anything in that cell.
 
-use crate::Vec3;
+use crate::{Mat3, Vec3};
 
 /// Divisions that are passed at once on the way down, at most.
 const TOP: u32 = 6;
@@ -79,6 +79,7 @@ pub(super) struct Place<'a> {
 
 impl Place<'_> {
     /// At most the signed distance here, but for rounding.
+    #[inline(always)]
     fn bound(&self) -> f64 {
         let products: [f32; 4] = std::array::from_fn(|k| self.cell.plane[k] * self.offset[k]);
         let plane = (products[0] + products[1]) + (products[2] + products[3]);
@@ -90,6 +91,27 @@ impl Place<'_> {
         let squares: [f32; 4] = std::array::from_fn(|k| self.offset[k] * self.offset[k]);
         (squares[0] + squares[1] + squares[2]).sqrt()
     }
+}
+
+/// From another frame to places in the outermost cell, told from its lowest corner; in single precision.
+pub(crate) struct Way {
+    columns: [[f32; 4]; 3],
+    offset: [f32; 4],
+    /// The side of the outermost cell, metres.
+    most: f32,
+    /// What single precision may add to a bound, metres.
+    rounding: f64,
+}
+
+#[cfg(test)]
+impl Way {
+    pub(super) fn rounding(&self) -> f64 {
+        self.rounding
+    }
+}
+
+fn single(v: &Vec3) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, 0.0]
 }
 
 /// Cells within a cube.
@@ -145,7 +167,7 @@ impl Octree {
         // written so that what is not a number is outside
         let from_low = (p - self.center).add_scalar(self.half);
         let within = from_low.iter().all(|x| *x >= 0.0 && *x <= 2.0 * self.half);
-        within.then(|| self.descend(&from_low))
+        within.then(|| self.descend(&single(&from_low)))
     }
 
     /// At most the signed distance at `p`.
@@ -153,9 +175,28 @@ impl Octree {
         let from_low = (p - self.center).add_scalar(self.half);
         let most = 2.0 * self.half;
         let inside = from_low.map(|x| if x > 0.0 { if x < most { x } else { most } } else { 0.0 });
-        let bound = self.bound_at(&self.descend(&inside));
+        let bound = self.bound_at(&self.descend(&single(&inside)));
         let outside = (from_low - inside).norm_squared();
         if outside == 0.0 { bound } else { (outside + bound.max(0.0).powi(2)).sqrt() }
+    }
+
+    /// The way from another frame to this one, for points that are no further from its origin than `reach`.
+    pub fn way_from(&self, rotation: &Mat3, translation: &Vec3, reach: f64) -> Way {
+        let offset = (translation - self.center).add_scalar(self.half);
+        let columns = [0, 1, 2].map(|k| single(&rotation.column(k).into_owned()));
+        Way { columns, offset: single(&offset), most: (2.0 * self.half) as f32, rounding: ROUNDING * (offset.norm() + reach + self.half) }
+    }
+
+    /// [`Octree::bound`] of a point in that other frame, a little less.
+    #[inline(always)]
+    pub fn bound_on(&self, way: &Way, p: &[f32; 3]) -> f64 {
+        let [a, b, c] = &way.columns;
+        let from_low: [f32; 4] = std::array::from_fn(|k| (a[k] * p[0] + b[k] * p[1]) + (c[k] * p[2] + way.offset[k]));
+        let inside = from_low.map(|x| if x > 0.0 { if x < way.most { x } else { way.most } } else { 0.0 });
+        let bound = self.descend(&inside).bound();
+        let squares: [f32; 4] = std::array::from_fn(|k| (from_low[k] - inside[k]) * (from_low[k] - inside[k]));
+        let outside = f64::from((squares[0] + squares[1]) + squares[2]);
+        (if outside == 0.0 { bound } else { (outside + bound.max(0.0).powi(2)).sqrt() }) - way.rounding
     }
 
     /// The same at a place.
@@ -166,10 +207,10 @@ impl Octree {
 
     /// The smallest cell around a place that lies so far from the lowest corner, which is within the outermost cell. One near a face of a cell may be taken
     /// for the neighbour's; then the offset is more than half the side by rounding.
-    #[inline]
-    fn descend(&self, from_low: &Vec3) -> Place<'_> {
+    /// Inlined: on the way through memory four numbers at once wait for each other.
+    #[inline(always)]
+    fn descend(&self, low: &[f32; 4]) -> Place<'_> {
         let level = self.level;
-        let low = [from_low.x as f32, from_low.y as f32, from_low.z as f32, 0.0];
         // the cube's number is the first digits of 1 + x/2^level
         let place: [u32; 4] = std::array::from_fn(|k| {
             let x = low[k] * self.per_metre + 1.0;
