@@ -2,6 +2,9 @@
 //!
 //! `cargo run --release -p tumble-collide --example shape_cost -- MESH.obj…` prints seconds by the clock on the wall and of CPU, medians of three.
 
+mod cpu;
+
+use cpu::cpu_seconds;
 use std::error::Error;
 use std::time::Instant;
 use tumble_collide::{Shape, TreeCache, TreeSettings, TriMesh};
@@ -30,13 +33,4 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let _ = std::fs::remove_dir_all(&folder);
     Ok(())
-}
-
-/// CPU time of this process on all cores; NaN where there is no /proc.
-fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // after the name in brackets: utime and stime are the 12th and 13th fields, in hundredths of a second
-    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
-    let ticks = |n: usize| fields.get(n).and_then(|f| f.parse::<f64>().ok()).unwrap_or(f64::NAN);
-    (ticks(11) + ticks(12)) / 100.0
 }

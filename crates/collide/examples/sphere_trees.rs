@@ -3,6 +3,9 @@
 //! `cargo run --release -p tumble-collide --example sphere_trees -- MESHES [DEPTH] [METHOD…]`, with a folder of OBJ files. Reference: trees of the
 //! toolkit of Bradshaw and O'Sullivan (2003; method medial, branch 8), measured by the same definitions; as it makes them, and made to cover and nest.
 
+mod cpu;
+
+use cpu::cpu_seconds;
 use std::error::Error;
 use tumble_collide::{Builder, QualitySettings, SphereTree, TreeSettings, TriMesh};
 
@@ -56,13 +59,4 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     Ok(())
-}
-
-/// CPU time of this process on all cores; NaN where there is no /proc.
-fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // after the name in brackets: utime and stime are the 12th and 13th fields, in hundredths of a second
-    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
-    let ticks = |n: usize| fields.get(n).and_then(|f| f.parse::<f64>().ok()).unwrap_or(f64::NAN);
-    (ticks(11) + ticks(12)) / 100.0
 }
