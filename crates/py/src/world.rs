@@ -1,6 +1,6 @@
 //! The world: made or loaded, filled, stepped, asked.
 
-use crate::adding::{add, articulated, own_place, rigid};
+use crate::adding::{add, articulated, contact_mode, own_place, rigid};
 use crate::articulation::Articulation;
 use crate::bodies::{Bodies, by_name, handle, place_of};
 use crate::body::RigidBody;
@@ -294,30 +294,31 @@ impl World {
     ///
     /// mass: kg, or density: kg/m³, one of the two; position: of the centre of mass, metres; orientation: unit quaternion (x, y, z, w); velocity,
     /// m/s, and angular_velocity, rad/s, world axes; restitution: 0 to 1; friction: at least 0; kinematic: follows the velocity it is given.
+    /// contacts: by its ``"surface"``, or as in the thesis by the ``"spheres"`` of its tree; a pair goes by spheres if either asks for it.
     #[pyo3(signature = (name, shape, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
-        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true))]
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
         &self, py: Python<'_>, name: &str, shape: PyRef<'_, Shape>, mass: Option<f64>, density: Option<f64>, position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>, velocity: Option<&Bound<'_, PyAny>>, angular_velocity: Option<&Bound<'_, PyAny>>, restitution: f64,
-        friction: f64, linear_damping: f64, angular_damping: f64, kinematic: bool, collidable: bool,
+        friction: f64, linear_damping: f64, angular_damping: f64, kinematic: bool, collidable: bool, contacts: &str,
     ) -> Result<RigidBody> {
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
         let motion = [vec3_or(velocity, "velocity", Vec3::zeros())?, vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?];
         let mut body = rigid(name, &shape, mass, density, kinematic)?.at(pose(position, orientation)? * shape.placement).surface(restitution, friction);
-        (body.linear_damping, body.angular_damping) = (linear_damping, angular_damping);
+        (body.linear_damping, body.angular_damping, body.contact_mode) = (linear_damping, angular_damping, contact_mode(contacts)?);
         add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
     }
 
-    /// Adds geometry that never moves. position, orientation, restitution, friction: as in ``add_rigid``.
-    #[pyo3(signature = (name, shape, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true))]
+    /// Adds geometry that never moves. position, orientation, restitution, friction, contacts: as in ``add_rigid``.
+    #[pyo3(signature = (name, shape, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
         &self, py: Python<'_>, name: &str, shape: PyRef<'_, Shape>, position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, PyAny>>,
-        restitution: f64, friction: f64, collidable: bool,
+        restitution: f64, friction: f64, collidable: bool, contacts: &str,
     ) -> Result<RigidBody> {
         let pose = pose(position, orientation)? * shape.placement;
-        let body = Rigid::fixture(name, shape.solid.clone()).at(pose).surface(restitution, friction);
+        let body = Rigid::fixture(name, shape.solid.clone()).at(pose).surface(restitution, friction).colliding_by(contact_mode(contacts)?);
         add(&self.shared, py, body, Mode::Static, collidable)
     }
 

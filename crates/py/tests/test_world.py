@@ -78,6 +78,26 @@ def test_a_ball_rests_where_its_half_space_ends(normal):
     assert ball.position == pytest.approx(0.6 * n, abs=1e-6)
 
 
+def test_a_pair_goes_by_spheres_if_either_asks_for_it():
+    """A cube of triangles that just touches the ground: by its surface the gap is 0, by the balls of its tree they overlap by what those reach beyond it."""
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    cube = tumble.Mesh(corners, [t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
+
+    def depth(body, ground):
+        world = tumble.World(gravity=(0, 0, 0))
+        world.add_static("ground", tumble.HalfSpace(), contacts=ground)
+        world.add_rigid("cube", cube, mass=1.0, position=(0, 0, 1 - 1e-9), contacts=body)
+        world.step()
+        return world.contacts["depth"].max()
+
+    assert depth("surface", "surface") < 1e-6
+    for modes in [("spheres", "surface"), ("surface", "spheres"), ("spheres", "spheres")]:
+        assert depth(*modes) > 1e-3, modes
+    with pytest.raises(ValueError, match='contacts: wanted "surface" or "spheres", not "balls"'):
+        tumble.World().add_static("ground", tumble.HalfSpace(), contacts="balls")
+
+
 def test_state_is_a_view_that_follows_until_bodies_come_or_go():
     world, ball = ball_world()
     state = world.state

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias, final, overload
+from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -439,6 +439,7 @@ class World:
         angular_damping: float = 0.0,
         kinematic: bool = False,
         collidable: bool = True,
+        contacts: Literal["surface", "spheres"] = "surface",
     ) -> RigidBody: ...
     def add_static(
         self,
@@ -450,6 +451,7 @@ class World:
         friction: float = 0.5,
         *,
         collidable: bool = True,
+        contacts: Literal["surface", "spheres"] = "surface",
     ) -> RigidBody: ...
     def add_articulation(
         self, articulation: Articulation | _Path, base: ArrayLike | None = None, *, name: str | None = None
