@@ -211,7 +211,7 @@ impl Octree {
     #[inline(always)]
     fn descend(&self, low: &[f32; 4]) -> Place<'_> {
         let level = self.level;
-        // the cube's number is the first digits of 1 + x/2^level
+        // which cube: the first binary digits of the place, as a part of the side, behind the 1 that is added
         let place: [u32; 4] = std::array::from_fn(|k| {
             let x = low[k] * self.per_metre + 1.0;
             let x = if x < LAST { x } else { LAST };
