@@ -191,7 +191,14 @@ fn gather_cluster(found: &mut [Contact]) -> usize {
     let deepest = (1..found.len()).fold(0, |best, n| if deeper(&found[n], &found[best]) { n } else { best });
     found.swap(0, deepest);
     let normal = found[0].normal;
-    1 + gather(&mut found[1..], |c| c.normal.dot(&normal) >= SAME_SIDE)
+    let mut end = 1;
+    for n in 1..found.len() {
+        if found[n].normal.dot(&normal) >= SAME_SIDE {
+            found.swap(end, n);
+            end += 1;
+        }
+    }
+    end
 }
 
 /// Moves to the front the deepest contact of a cluster (its first) and its support points; returns how many.
@@ -205,9 +212,8 @@ fn keep_hull(cluster: &mut [Contact], slack: f64, resting: f64, far: bool) -> us
     let (normal, deepest) = (cluster[0].normal, cluster[0].gap);
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let v = normal.cross(&u);
-    let first = cluster[0].point;
     let mut kept = 1;
-    let mut keep = |cluster: &mut [Contact], tilt: f64, n: usize, slack: f64| {
+    let mut keep = |tilt: f64, n: usize, slack: f64| {
         let (x, y) = DIRECTIONS[n];
         let way = (u * x + v * y) * tilt;
         let support = best_named(cluster, slack, |c| way.dot(&c.point) - c.gap);
@@ -215,34 +221,17 @@ fn keep_hull(cluster: &mut [Contact], slack: f64, resting: f64, far: bool) -> us
             cluster.swap(kept, support);
             kept += 1;
         }
-        kept
     };
-    let mut count = 1;
-    for (tilt, n) in SUPPORTS {
-        count = keep(cluster, tilt, n, slack);
+    SUPPORTS.iter().for_each(|&(tilt, n)| keep(tilt, n, slack));
+    if far {
+        WIDER.iter().for_each(|&tilt| (0..DIRECTIONS.len()).for_each(|n| keep(tilt, n, slack)));
     }
-    for tilt in WIDER.iter().filter(|_| far) {
-        (0..DIRECTIONS.len()).for_each(|n| count = keep(cluster, *tilt, n, slack));
-    }
-    for finer in FINER.iter().filter(|_| deepest.abs() < resting) {
-        // a tilt lowers no place by more than its way from the deepest
-        let (tilt, slack) = (finer * SUPPORTS[0].0, finer * slack);
-        let near = count + gather(&mut cluster[count..], |c| c.gap - deepest <= tilt * (c.point - first).norm() + slack);
-        (0..DIRECTIONS.len()).for_each(|n| count = keep(&mut cluster[..near], tilt, n, slack));
-    }
-    count
-}
-
-/// Moves the contacts that it is said of to the front; returns how many those are.
-fn gather(found: &mut [Contact], said: impl Fn(&Contact) -> bool) -> usize {
-    let mut end = 0;
-    for n in 0..found.len() {
-        if said(&found[n]) {
-            found.swap(end, n);
-            end += 1;
+    if deepest.abs() < resting {
+        for finer in FINER {
+            (0..DIRECTIONS.len()).for_each(|n| keep(finer * SUPPORTS[0].0, n, finer * slack));
         }
     }
-    end
+    kept
 }
 
 /// Of the contacts whose score is within `slack` of the greatest, the one with the least feature.

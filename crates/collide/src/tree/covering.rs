@@ -83,7 +83,7 @@ impl Covering {
 
     /// The most that a ball reaches outside, metres.
     pub fn worst(&self) -> f64 {
-        self.balls.iter().map(|own| own.outward).fold(0.0, f64::max)
+        worst(&self.balls)
     }
 
     /// Divides the ball that reaches furthest outside into two; `false` where none can be divided.
