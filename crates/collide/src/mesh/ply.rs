@@ -30,10 +30,11 @@ impl TriMesh {
         let mut mesh = TriMesh::default();
         let mut faces = Vec::new();
         let mut values = Values { encoding: header.encoding, rest: body };
-        for element in &header.elements {
+        for element in header.elements.iter().filter(|e| e.count > 0) {
+            let kind = element.kind()?;
             for number in 1..=element.count {
                 let place = || format!("{} {number}", element.name);
-                match element.kind()? {
+                match kind {
                     Kind::Vertex(at) => mesh.vertices.push(read_vertex(element, at, &mut values).map_err(|why| refused(&place(), &why))?),
                     Kind::Face(at) => faces.push(read_face(element, at, &mut values).map_err(|why| refused(&place(), &why))?),
                     Kind::Other => element.properties.iter().try_for_each(|p| values.property(p, |_| {})).map_err(|why| refused(&place(), &why))?,
