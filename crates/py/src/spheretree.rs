@@ -7,10 +7,9 @@ use crate::shapes::triangles;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 use tumble::collide::{Builder, CachedTree, LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree as Tree, TreeCache, TreeFile, TreeSettings, TriMesh};
-use tumble::whole::write_whole;
 
 /// The methods by the words of the command.
 const METHODS: [(&str, Builder); 4] =
@@ -113,11 +112,10 @@ impl SphereTree {
         })
     }
 
-    /// Writes the tree and its figures as JSON, whole or not at all: the file of ``tumble spheretree --output``.
+    /// Writes the tree and its figures as JSON: the file of ``tumble spheretree --output``.
     fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<()> {
         let (path, file): (PathBuf, TreeFile) = (self::path(path)?, self.whole(py)?);
-        let write = |own: &Path| std::fs::write(own, file.to_json());
-        py.detach(|| write_whole(&path, write).map_err(|source| Error::File { file: path.display().to_string(), source }))
+        py.detach(|| std::fs::write(&path, file.to_json()).map_err(|source| Error::File { file: path.display().to_string(), source }))
     }
 
     /// The same as a string.

@@ -60,19 +60,6 @@ def test_a_file_brings_the_same_tree_back(tree, tmp_path):
     assert all((a.centers == b.centers).all() and (a.radii == b.radii).all() for a, b in zip(again.levels, tree.levels))
 
 
-def test_a_file_is_written_whole_or_stays(tmp_path):
-    tree = tumble.SphereTree.build(CUBE, SIDES, method="octree", depth=1, cache=False)
-    path, other = tmp_path / "cube.json", tmp_path / "other_name"
-    path.write_text("old")
-    other.hardlink_to(path)
-    tree.save(path)
-    # written in place, the other name of the file would show the new tree
-    assert path.read_text() == tree.to_json() and other.read_text() == "old"
-    with pytest.raises(FileNotFoundError, match="missing"):
-        tree.save(tmp_path / "missing" / "cube.json")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["cube.json", "other_name"]
-
-
 def test_the_report_is_the_command_s(command, tmp_path):
     mesh = tmp_path / "cube.obj"
     lines = [f"v {x} {y} {z}" for x, y, z in CUBE] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in SIDES]
