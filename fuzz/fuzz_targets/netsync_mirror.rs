@@ -21,7 +21,10 @@ fuzz_target!(|bytes: &[u8]| {
     mirror.apply_snapshot(&publisher.snapshot()).expect("its own list");
     mirror.apply_state(1, 0.0, &published.state).expect("its own state");
     let before = mirror.hash();
-    assert!(mirror.apply_state(1, 0.0, bytes).is_ok() || mirror.hash() == before, "a state that is refused changes nothing");
+    assert!(
+        mirror.apply_state(1, 0.0, bytes).is_ok() || mirror.hash() == before,
+        "a state that is refused changes nothing"
+    );
     let before = mirror.hash();
     assert!(mirror.apply_snapshot(bytes).is_ok() || mirror.hash() == before, "a list that is refused changes nothing");
 });

@@ -10,8 +10,19 @@ use tumble_net::sync::wire::{Header, Kind, message, open};
 use tumble_net::sync::{FacetOptions, FacetSession, Seat, ServerOptions, ServerSession, Task, Viewer};
 
 const KINDS: [Kind; 13] = [
-    Kind::Join, Kind::Refused, Kind::Snapshot, Kind::State, Kind::Ready, Kind::Present, Kind::Presented, Kind::Resync, Kind::Rejoin, Kind::Beat, Kind::End,
-    Kind::Leave, Kind::Input,
+    Kind::Join,
+    Kind::Refused,
+    Kind::Snapshot,
+    Kind::State,
+    Kind::Ready,
+    Kind::Present,
+    Kind::Presented,
+    Kind::Resync,
+    Kind::Rejoin,
+    Kind::Beat,
+    Kind::End,
+    Kind::Leave,
+    Kind::Input,
 ];
 
 fn world() -> World {
@@ -45,7 +56,13 @@ fuzz_target!(|bytes: &[u8]| {
             server.publish(now, &world(), &Viewer::default()).expect("a sound world");
         }
         server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
-        let header = Header { kind: KINDS[*kind as usize % 13], run: (*whose as u64) & 1, join: if whose & 2 == 0 { join } else { 0 }, frame: *frame as u64, time_s: 0.0 };
+        let header = Header {
+            kind: KINDS[*kind as usize % 13],
+            run: (*whose as u64) & 1,
+            join: if whose & 2 == 0 { join } else { 0 },
+            frame: *frame as u64,
+            time_s: 0.0,
+        };
         let shot = message(&header, |out| out.extend(payload));
         if whose & 4 == 0 {
             server.on_event(now, 0, LinkEvent::Message, &shot);

@@ -8,7 +8,11 @@ fuzz_target!(|text: &str| {
     match SceneFile::parse(text, "fuzz.toml") {
         Err(error) => assert!(!error.report(false).is_empty()),
         // files named in the text stay closed, and building stays cheap
-        Ok(scene) if scene.bodies.len() <= 50 && scene.meshes.iter().all(|m| !matches!(m.source, MeshSource::File { .. })) && scene.meshes.is_empty() => {
+        Ok(scene)
+            if scene.bodies.len() <= 50
+                && scene.meshes.iter().all(|m| !matches!(m.source, MeshSource::File { .. }))
+                && scene.meshes.is_empty() =>
+        {
             if let Ok((mut world, _)) = scene.build() {
                 let _ = world.step();
             }

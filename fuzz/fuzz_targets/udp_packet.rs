@@ -14,7 +14,10 @@ fuzz_target!(|bytes: &[u8]| {
         assert_eq!(written, bytes);
     }
     if let Some(bytes) = bytes.first_chunk::<HEAD>() {
-        let words: Vec<u64> = bytes.chunks_exact(8).map(|word| word.iter().rev().fold(0, |sum, byte| sum << 8 | u64::from(*byte))).collect();
+        let words: Vec<u64> = bytes
+            .chunks_exact(8)
+            .map(|word| word.iter().rev().fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
+            .collect();
         let words = [0, 1, 2, 3, 4, 5].map(|k| words[k]);
         assert!(Head::parse(words).is_ok_and(|head| head.words() == words) || Head::parse(words).is_err());
     }

@@ -18,8 +18,14 @@ fuzz_target!(|bytes: &[u8]| {
     let agreed = Agreement { session: 1, facet: 0, facet_nonce: [1; 32], server_nonce: [2; 32] };
     let mut session = Session::new(Duration::ZERO, &shared, agreed, Side::Server, there, timing, numbering);
     let mut seal = Seal::new(&shared, &agreed, Side::Facet, 0);
-    let mut server = ServerMachine::new(ServerSettings { facets: 1, timing, numbering }, shared.clone(), Entropy::seeded(1));
-    let mut facet = FacetMachine::new(Duration::ZERO, FacetSettings { facet: 0, server: here, timing, numbering }, shared, Entropy::seeded(2));
+    let mut server =
+        ServerMachine::new(ServerSettings { facets: 1, timing, numbering }, shared.clone(), Entropy::seeded(1));
+    let mut facet = FacetMachine::new(
+        Duration::ZERO,
+        FacetSettings { facet: 0, server: here, timing, numbering },
+        shared,
+        Entropy::seeded(2),
+    );
     let (mut rest, mut now, mut counters, mut datagram) = (bytes, Duration::ZERO, LinkCounters::default(), Vec::new());
     while let [low, high, ms, tail @ ..] = rest {
         let body;

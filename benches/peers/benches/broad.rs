@@ -37,14 +37,25 @@ fn main() {
 
 /// Slow crowds of growing size.
 fn curves() -> [(&'static str, &'static str, Vec<(f64, f64)>); 3] {
-    println!("CPU µs per step, boxes in a cube of constant density that move by 1 % of their radius per step; medians of {ROUNDS} rounds.\n");
-    println!("| boxes | tumble | per box, ns | fastest tenth, ns | parry | ratio | plain pass | pairs |\n|---|---|---|---|---|---|---|---|");
-    let mut curves = [("tumble", "#1060c0", Vec::new()), ("parry (Rapier)", "#c05010", Vec::new()), ("a plain pass", "#808080", Vec::new())];
+    println!(
+        "CPU µs per step, boxes in a cube of constant density that move by 1 % of their radius per step; medians of {ROUNDS} rounds.\n"
+    );
+    println!(
+        "| boxes | tumble | per box, ns | fastest tenth, ns | parry | ratio | plain pass | pairs |\n|---|---|---|---|---|---|---|---|"
+    );
+    let mut curves = [
+        ("tumble", "#1060c0", Vec::new()),
+        ("parry (Rapier)", "#c05010", Vec::new()),
+        ("a plain pass", "#808080", Vec::new()),
+    ];
     for n in [1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000] {
         let [ours, theirs, plain] = all(Kind::Slow, n);
         let per_box = [ours.step, ours.tenth].map(|time| 1e3 * time / n as f64);
         let ratio = ours.step / theirs.step;
-        println!("| {n} | {:.1} | {:.1} | {:.1} | {:.1} | {ratio:.2} | {:.1} | {} |", ours.step, per_box[0], per_box[1], theirs.step, plain.step, ours.pairs);
+        println!(
+            "| {n} | {:.1} | {:.1} | {:.1} | {:.1} | {ratio:.2} | {:.1} | {} |",
+            ours.step, per_box[0], per_box[1], theirs.step, plain.step, ours.pairs
+        );
         for (curve, cost) in curves.iter_mut().zip([ours, theirs, plain]) {
             curve.2.push((n as f64, cost.step));
         }
@@ -60,7 +71,8 @@ fn exponent(points: &[(f64, f64)]) -> f64 {
     let logarithms: Vec<(f64, f64)> = points.iter().map(|(n, time)| (n.ln(), time.ln())).collect();
     let mean = |of: fn(&(f64, f64)) -> f64| logarithms.iter().map(of).sum::<f64>() / logarithms.len() as f64;
     let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    logarithms.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / logarithms.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
+    logarithms.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>()
+        / logarithms.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
 /// Every kind of crowd.
@@ -80,7 +92,8 @@ fn all(kind: Kind, n: usize) -> [Cost; 3] {
     let margin = ROOM * 2.0 * RADIUS;
     let mut costs = [Vec::new(), Vec::new(), Vec::new()];
     for _ in 0..ROUNDS {
-        let followers: [Box<dyn Follower>; 3] = [Box::new(Sweep::default()), Box::new(Tree::new(margin)), Box::new(Plain::new(margin))];
+        let followers: [Box<dyn Follower>; 3] =
+            [Box::new(Sweep::default()), Box::new(Tree::new(margin)), Box::new(Plain::new(margin))];
         for (costs, mut follower) in costs.iter_mut().zip(followers) {
             costs.push(follow(follower.as_mut(), kind, n, steps(n)));
         }

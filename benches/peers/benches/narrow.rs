@@ -40,7 +40,8 @@ struct Body {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
-    let bodies: Vec<Body> = [bunny(), Some(body("torus", TriMesh::torus(1.0, 0.35, 96, 34)))].into_iter().flatten().collect();
+    let bodies: Vec<Body> =
+        [bunny(), Some(body("torus", TriMesh::torus(1.0, 0.35, 96, 34)))].into_iter().flatten().collect();
     if let [flag, rounds] = &arguments[..]
         && flag == "--tumble"
     {
@@ -54,7 +55,9 @@ fn main() {
             row(body, pose, into);
         }
         let ways: Vec<(Pose, Vec3)> = (0..CHANGING).map(|n| approached(body, n)).collect();
-        for (pose, into) in [("1 mm apart, changing", -MARGIN), ("touching, changing", 0.0), ("1 % overlap, changing", MARGIN)] {
+        for (pose, into) in
+            [("1 mm apart, changing", -MARGIN), ("touching, changing", 0.0), ("1 % overlap, changing", MARGIN)]
+        {
             changing(body, pose, &ways.iter().map(|(pose, way)| moved(pose, way, into)).collect::<Vec<_>>());
         }
     }
@@ -85,8 +88,16 @@ fn changing(body: &Body, name: &str, poses: &[Pose]) {
     };
     let (surface, spheres) = (by(ContactMode::Surface), by(ContactMode::Spheres));
     let mesh = &body.theirs;
-    let contact = time(|| theirs.iter().for_each(|pose| { black_box(query::contact(pose, mesh, &fixed, mesh, MARGIN)).ok(); })) / poses.len() as f64;
-    println!("| two of {} | {name} | {surface:.0} | {spheres:.0} | {contact:.0} | | {:.1} |", body.name, contact / surface);
+    let contact = time(|| {
+        theirs.iter().for_each(|pose| {
+            black_box(query::contact(pose, mesh, &fixed, mesh, MARGIN)).ok();
+        })
+    }) / poses.len() as f64;
+    println!(
+        "| two of {} | {name} | {surface:.0} | {spheres:.0} | {contact:.0} | | {:.1} |",
+        body.name,
+        contact / surface
+    );
 }
 
 /// µs of all queries of one pose.
@@ -102,8 +113,12 @@ fn measure(body: &Body, pose: &Pose) -> [f64; 4] {
     };
     let (surface, spheres) = (by(ContactMode::Surface), by(ContactMode::Spheres));
     let mesh = &body.theirs;
-    let contact = time(|| { black_box(query::contact(&theirs, mesh, &fixed, mesh, MARGIN)).ok(); });
-    let distance = time(|| { black_box(query::distance(&theirs, mesh, &fixed, mesh)).ok(); });
+    let contact = time(|| {
+        black_box(query::contact(&theirs, mesh, &fixed, mesh, MARGIN)).ok();
+    });
+    let distance = time(|| {
+        black_box(query::distance(&theirs, mesh, &fixed, mesh)).ok();
+    });
     [surface, spheres, contact, distance]
 }
 
@@ -152,7 +167,9 @@ fn touching(body: &Body, n: u64, into: f64) -> Pose {
     let (mut pose, way) = far(n);
     // parry's distance says how far the way is free
     for _ in 0..20 {
-        let free = query::distance(&to_parry(&pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs).expect("two meshes").distance;
+        let free = query::distance(&to_parry(&pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs)
+            .expect("two meshes")
+            .distance;
         pose = moved(&pose, &way, free);
         if free < 1e-7 {
             break;
@@ -164,7 +181,11 @@ fn touching(body: &Body, n: u64, into: f64) -> Pose {
 /// The same by steps, then halves, with parry's test of intersection, which is faster by far; and the way.
 fn approached(body: &Body, n: u64) -> (Pose, Vec3) {
     let (mut pose, way) = far(n);
-    let meet = |pose: &Pose| query::intersection_test(&to_parry(pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs).expect("two meshes").intersecting;
+    let meet = |pose: &Pose| {
+        query::intersection_test(&to_parry(pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs)
+            .expect("two meshes")
+            .intersecting
+    };
     let mut step = STEP;
     while pose.translation.vector.dot(&way) > 0.0 && !meet(&moved(&pose, &way, step)) {
         pose = moved(&pose, &way, step);
@@ -209,7 +230,9 @@ fn alone(body: &Body, rounds: usize) {
 
 fn bunny() -> Option<Body> {
     let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let folder = std::env::var_os("TUMBLE_MESHES").map(PathBuf::from).or_else(|| here.ancestors().map(|a| a.join("shared/meshes")).find(|p| p.is_dir()));
+    let folder = std::env::var_os("TUMBLE_MESHES")
+        .map(PathBuf::from)
+        .or_else(|| here.ancestors().map(|a| a.join("shared/meshes")).find(|p| p.is_dir()));
     let Some(folder) = folder else {
         println!("SKIPPED bunny: no shared/meshes above {} and TUMBLE_MESHES is not set", here.display());
         return None;

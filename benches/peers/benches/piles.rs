@@ -22,7 +22,13 @@ fn options() -> Options {
     let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            "--runs" => options.runs = arguments.next().and_then(|n| n.parse().ok()).filter(|n| *n > 0).expect("--runs wants a number above 0"),
+            "--runs" => {
+                options.runs = arguments
+                    .next()
+                    .and_then(|n| n.parse().ok())
+                    .filter(|n| *n > 0)
+                    .expect("--runs wants a number above 0")
+            }
             "--tumble" => options.alone = true,
             _ => options.names.push(argument),
         }
@@ -33,7 +39,10 @@ fn options() -> Options {
 fn main() {
     let options = options();
     let scenes = [spheres(100), spheres(500), spheres(1000), pyramid(10), pyramid(20)];
-    println!("CPU s per simulated s, t = 1 to 4 s, dt 1/60, median of {} runs. Errors in mm; residual in m/s.", options.runs);
+    println!(
+        "CPU s per simulated s, t = 1 to 4 s, dt 1/60, median of {} runs. Errors in mm; residual in m/s.",
+        options.runs
+    );
     println!("| case | tumble | Rapier f64 | ratio | penetration (Rapier) | movement (Rapier) | residual |");
     println!("|---|---|---|---|---|---|---|");
     for scene in scenes.iter().filter(|s| options.names.is_empty() || options.names.contains(&s.name)) {
@@ -54,7 +63,13 @@ fn line(scene: &Scene, options: &Options) -> String {
     let mm = |x: f64, y: f64| format!("{:.3} ({:.3})", 1e3 * x, 1e3 * y);
     format!(
         "| {} | {:.4} | {:.4} | {:.2} | {} | {} | {:.1e} |",
-        scene.name, a.cpu, b.cpu, a.cpu / b.cpu, mm(a.penetration, b.penetration), mm(a.movement, b.movement), a.residual.unwrap_or(0.0)
+        scene.name,
+        a.cpu,
+        b.cpu,
+        a.cpu / b.cpu,
+        mm(a.penetration, b.penetration),
+        mm(a.movement, b.movement),
+        a.residual.unwrap_or(0.0)
     )
 }
 

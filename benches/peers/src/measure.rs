@@ -28,7 +28,8 @@ pub fn run(engine: &mut dyn Engine, scene: &Scene) -> Run {
     let clock = Clock::new();
     let frames = |t: f64| (t / DT).round() as usize;
     (0..frames(FROM)).for_each(|_| engine.step());
-    let centers = |engine: &dyn Engine| -> Vec<[f64; 3]> { (0..scene.centers.len()).map(|i| engine.center(i)).collect() };
+    let centers =
+        |engine: &dyn Engine| -> Vec<[f64; 3]> { (0..scene.centers.len()).map(|i| engine.center(i)).collect() };
     let start = centers(engine);
     let mut run = Run::default();
     for _ in frames(FROM)..frames(TO) {

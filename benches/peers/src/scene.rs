@@ -51,7 +51,12 @@ pub fn spheres(n: usize) -> Scene {
     let centers = (0..n).map(center).collect();
     let walls = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]];
     let walls = walls.map(|normal| Plane { point: normal.map(|x| -half * x), normal });
-    Scene { name: format!("spheres-{n}"), body: Body::Sphere, centers, planes: [FLOOR].into_iter().chain(walls).collect() }
+    Scene {
+        name: format!("spheres-{n}"),
+        body: Body::Sphere,
+        centers,
+        planes: [FLOOR].into_iter().chain(walls).collect(),
+    }
 }
 
 /// A wall of cubes on the floor, `rows` at its foot and one at its top, 20 mm between neighbours; 10 rows are 55 cubes, 20 are 210.

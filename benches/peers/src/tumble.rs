@@ -16,7 +16,9 @@ impl Tumble {
     pub fn new(scene: &Scene) -> Tumble {
         let mut world = World::new(Settings { dt: DT, ..Settings::default() }).expect("the default settings are valid");
         for (i, plane) in scene.planes.iter().enumerate() {
-            let fixture = RigidBody::fixture(format!("plane{i}"), Shape::half_space()).surface(RESTITUTION, FRICTION).at(pose(plane));
+            let fixture = RigidBody::fixture(format!("plane{i}"), Shape::half_space())
+                .surface(RESTITUTION, FRICTION)
+                .at(pose(plane));
             world.add_static(fixture).expect("a fixture is valid");
         }
         let shape = match scene.body {
@@ -25,7 +27,8 @@ impl Tumble {
         };
         let shape = shape.expect("the sizes are valid");
         let mut add = |(i, c): (usize, &[f64; 3])| {
-            let body = RigidBody::with_density(format!("body{i}"), shape.clone(), DENSITY).expect("the density is valid");
+            let body =
+                RigidBody::with_density(format!("body{i}"), shape.clone(), DENSITY).expect("the density is valid");
             let body = body.surface(RESTITUTION, FRICTION).at(Pose::translation(c[0], c[1], c[2]));
             world.add(body).expect("names are unique")
         };

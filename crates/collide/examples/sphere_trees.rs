@@ -25,18 +25,31 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = words.next().ok_or("wanted a folder of OBJ files")?;
     let depth = words.next().map_or(Ok(2), |word| word.parse())?;
     let named: Vec<String> = words.collect();
-    let all = [("octree", Builder::Octree), ("grid", Builder::Grid), ("hubbard", Builder::Hubbard), ("medial", Builder::Medial)];
+    let all = [
+        ("octree", Builder::Octree),
+        ("grid", Builder::Grid),
+        ("hubbard", Builder::Hubbard),
+        ("medial", Builder::Medial),
+    ];
     let methods = all.iter().filter(|(name, _)| named.is_empty() || named.iter().any(|n| n == name));
-    let mut files: Vec<_> = std::fs::read_dir(folder)?.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.extension().is_some_and(|e| e == "obj")).collect();
+    let mut files: Vec<_> = std::fs::read_dir(folder)?
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|p| p.extension().is_some_and(|e| e == "obj"))
+        .collect();
     files.sort();
-    println!("| mesh | method | balls | worst % | mean % | at most % | covered % | sticking out | volume | CPU s | toolkit worst / mean % | covering and nesting | CPU s |");
+    println!(
+        "| mesh | method | balls | worst % | mean % | at most % | covered % | sticking out | volume | CPU s | toolkit worst / mean % | covering and nesting | CPU s |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (name, builder) in methods {
         for file in &files {
             let mut mesh = TriMesh::from_obj(&std::fs::read_to_string(file)?)?;
             mesh.check_closed()?;
             let before = cpu_seconds();
-            let tree = SphereTree::build(&mesh, &TreeSettings { builder: *builder, branch: 8, depth, error: 1e-4, even: false })?;
+            let tree = SphereTree::build(
+                &mesh,
+                &TreeSettings { builder: *builder, branch: 8, depth, error: 1e-4, even: false },
+            )?;
             let taken = cpu_seconds() - before;
             let rows = tree.quality(&mesh, &QualitySettings::default());
             let Some(q) = rows.last() else { continue };

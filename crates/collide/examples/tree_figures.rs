@@ -5,7 +5,9 @@ use tumble_collide::{Builder, SphereTree, TreeSettings, TriMesh};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().collect();
-    let [_, mesh, depth, out, rest @ ..] = &args[..] else { return Err("tree_figures MESH DEPTH OUT [BUILDER]".into()) };
+    let [_, mesh, depth, out, rest @ ..] = &args[..] else {
+        return Err("tree_figures MESH DEPTH OUT [BUILDER]".into());
+    };
     let builder = match rest.first().map(String::as_str) {
         Some("grid") => Builder::Grid,
         Some("hubbard") => Builder::Hubbard,

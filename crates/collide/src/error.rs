@@ -59,7 +59,9 @@ pub enum MeshError {
         faces: usize,
     },
     /// A concave face, or all of them together, with more corners than can be cut into triangles in a reasonable time.
-    #[error("a concave face of {corners} corners; at most {most}, and fewer where there are many such faces, are cut into triangles: cut it before")]
+    #[error(
+        "a concave face of {corners} corners; at most {most}, and fewer where there are many such faces, are cut into triangles: cut it before"
+    )]
     Concave {
         /// How many it has.
         corners: usize,

@@ -36,12 +36,15 @@ pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
 pub use contact::{Contact, ContactMode, NormalFrom};
 pub use error::{MeshError, ShapeError};
 pub use mass::MassProperties;
-pub use mesh::{ClosedReport, ClosestPoint, FaceCutter, MeshDistance, RepairReport, RepairSettings, TriMesh, WindingNumber, obj_lines, text_of};
+pub use mesh::{
+    ClosedReport, ClosestPoint, FaceCutter, MeshDistance, RepairReport, RepairSettings, TriMesh, WindingNumber,
+    obj_lines, text_of,
+};
 pub use narrow::{contacts, contacts_in};
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
 pub use tree::{
-    Builder, CachedTree, Covering, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree, StageCount, TreeCache, TreeFile, TreeFileError,
-    TreeSettings, grow_to_cover,
+    Builder, CachedTree, Covering, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree,
+    StageCount, TreeCache, TreeFile, TreeFileError, TreeSettings, grow_to_cover,
 };

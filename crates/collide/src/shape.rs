@@ -1,7 +1,8 @@
 //! The shapes that a body's part can have.
 
 use crate::{
-    Aabb, CylinderShape, MassProperties, MeshShape, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, mass,
+    Aabb, CylinderShape, MassProperties, MeshShape, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh,
+    Vec3, mass,
 };
 use std::sync::Arc;
 
@@ -77,7 +78,11 @@ impl Shape {
     }
 
     /// [`Shape::mesh`] with its tree from the cache where it has one. Also returns what is to be said of the cache.
-    pub fn mesh_cached(mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<(Shape, Vec3, Option<String>), ShapeError> {
+    pub fn mesh_cached(
+        mesh: TriMesh,
+        settings: &TreeSettings,
+        cache: &TreeCache,
+    ) -> Result<(Shape, Vec3, Option<String>), ShapeError> {
         let (shape, offset, note) = MeshShape::new_cached(mesh, settings, cache)?;
         Ok((Shape::Mesh(Arc::new(shape)), offset, note))
     }

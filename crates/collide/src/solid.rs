@@ -3,7 +3,9 @@
 use crate::shape::axis;
 use crate::surface::Surface;
 use crate::surface::parts::parts;
-use crate::{Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3};
+use crate::{
+    Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3,
+};
 
 /// A closed mesh about its centre of mass, with its sphere tree.
 #[derive(Clone, Debug)]
@@ -35,7 +37,11 @@ impl MeshShape {
     }
 
     /// The same with a tree from the cache where it has one; also returns what is to be said of the cache.
-    pub fn new_cached(mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<(MeshShape, Vec3, Option<String>), MeshError> {
+    pub fn new_cached(
+        mesh: TriMesh,
+        settings: &TreeSettings,
+        cache: &TreeCache,
+    ) -> Result<(MeshShape, Vec3, Option<String>), MeshError> {
         let mut note = None;
         let tree_of = |mesh: &TriMesh| {
             let cached = SphereTree::build_cached(mesh, settings, cache)?;
@@ -46,7 +52,10 @@ impl MeshShape {
         Ok((shape, offset, note))
     }
 
-    fn with_tree(mut mesh: TriMesh, tree_of: impl FnOnce(&TriMesh) -> Result<SphereTree, MeshError>) -> Result<(MeshShape, Vec3), MeshError> {
+    fn with_tree(
+        mut mesh: TriMesh,
+        tree_of: impl FnOnce(&TriMesh) -> Result<SphereTree, MeshError>,
+    ) -> Result<(MeshShape, Vec3), MeshError> {
         let report = mesh.check_closed()?;
         let overlaps = report.crossing_faces > 0 || report.shells > 1;
         let mass = if overlaps { mesh.union_mass_properties(1.0) } else { mesh.mass_properties(1.0) };

@@ -41,7 +41,10 @@ pub(crate) fn apart(a: &Oriented, b: &Oriented, closing: impl Fn(&Vec3) -> f64) 
     match (a.bounded, b.bounded) {
         (true, true) => {
             let faces = a.axes.column_iter().chain(b.axes.column_iter()).map(|n| n.into_owned());
-            let edges = a.axes.column_iter().flat_map(|x| b.axes.column_iter().filter_map(move |y| x.cross(&y).try_normalize(1e-6)));
+            let edges = a
+                .axes
+                .column_iter()
+                .flat_map(|x| b.axes.column_iter().filter_map(move |y| x.cross(&y).try_normalize(1e-6)));
             off.try_normalize(1e-300).into_iter().chain(faces).chain(edges).any(gap)
         }
         // below its plane a half-space is everywhere

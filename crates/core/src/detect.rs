@@ -1,9 +1,9 @@
 //! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
 
 use crate::collidable::ContactFrame;
+use crate::pair::{Pair, Reach, Recalled, Travel};
 use crate::settings::Settings;
 use crate::site::Site;
-use crate::pair::{Pair, Reach, Recalled, Travel};
 use crate::step::meet_at;
 use crate::view::{Entry, Mode, ObjectId, Table};
 use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
@@ -243,7 +243,14 @@ impl Detector<'_> {
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
         let near = 2.0 * self.settings.drift_tolerance;
-        let pair = Pair { mode, shapes: [shape_a, shape_b], sites: [site_a, site_b], travel: [self.scratch.travel[i], self.scratch.travel[j]], near, reach };
+        let pair = Pair {
+            mode,
+            shapes: [shape_a, shape_b],
+            sites: [site_a, site_b],
+            travel: [self.scratch.travel[i], self.scratch.travel[j]],
+            near,
+            reach,
+        };
         if pair.is_dear() && pair.stays_apart() {
             return;
         }

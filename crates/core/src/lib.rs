@@ -32,20 +32,24 @@ mod row_builder;
 pub mod rows;
 mod settings;
 mod site;
+mod sleep;
 pub mod solver;
 pub mod spatial;
-mod sleep;
 mod step;
 mod sync;
 mod view;
 mod world;
 
-pub use articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Drive, Freedom, Joint, LinkMass, Model, ModelBuilder, ModelError, Playback, Spring};
+pub use articulated::{
+    ArticulatedBody, ArticulatedError, Collider, Coupling, Drive, Freedom, Joint, LinkMass, Model, ModelBuilder,
+    ModelError, Playback, Spring,
+};
 pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
 pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
 pub use mounts::{CameraCarrier, CameraMount, Detail, LightCarrier, LightMount, Spread};
 pub use object::{
-    Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget, SyncError, Visual,
+    Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget,
+    SyncError, Visual,
 };
 pub use rigid::{BodyError, RigidBody};
 pub use row_builder::RowBuilder;

@@ -67,8 +67,17 @@ impl Motion<'_> {
             wrench.torque += held.torque;
         }
         self.forces.generalized.clear();
-        self.forces.generalized.extend(self.held.iter().zip(self.applied_generalized).map(|(held, applied)| held + applied));
-        let view = WorldView { time: t, gravity: self.gravity, implicit: self.implicit, x: self.x, sites: self.sites, table: self.table };
+        self.forces
+            .generalized
+            .extend(self.held.iter().zip(self.applied_generalized).map(|(held, applied)| held + applied));
+        let view = WorldView {
+            time: t,
+            gravity: self.gravity,
+            implicit: self.implicit,
+            x: self.x,
+            sites: self.sites,
+            table: self.table,
+        };
         for entry in self.table.iter().filter(|e| e.status.alive) {
             if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {
                 body.accumulate_forces(&entry.span, &view, self.forces);
@@ -87,7 +96,9 @@ impl Motion<'_> {
                 body.accelerations(&self.x[span.x.clone()], dp, sites);
             } else {
                 // what is led keeps its generalized velocity: a link that turns about another still has its centripetal acceleration
-                sites.iter_mut().for_each(|s| (s.acceleration, s.angular_acceleration) = (s.bias_acceleration, s.bias_angular_acceleration));
+                sites.iter_mut().for_each(|s| {
+                    (s.acceleration, s.angular_acceleration) = (s.bias_acceleration, s.bias_angular_acceleration)
+                });
             }
         }
     }
@@ -139,7 +150,14 @@ impl Motion<'_> {
 
     /// Integrates over `h` from time `t`: one step, or as many inner steps of `adaptive` as its tolerance asks for, which it records. Returns how far
     /// it came, s: `h`, but for a record that is full. Sites and caches are left at the new state.
-    pub fn integrate(&mut self, integrator: Integrator, t: f64, h: f64, dp: &mut [f64], adaptive: &mut Adaptive) -> Result<f64, StepError> {
+    pub fn integrate(
+        &mut self,
+        integrator: Integrator,
+        t: f64,
+        h: f64,
+        dp: &mut [f64],
+        adaptive: &mut Adaptive,
+    ) -> Result<f64, StepError> {
         let start = self.x.to_vec();
         match integrator {
             Integrator::Verlet => {

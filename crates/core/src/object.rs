@@ -6,10 +6,10 @@
 
 use crate::collidable::Collidable;
 use crate::mounts::{CameraCarrier, Detail, LightCarrier};
+use crate::row_builder::RowBuilder;
 use crate::rows::RowSet;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::view::{ObjectId, WorldView};
-use crate::row_builder::RowBuilder;
 use std::any::Any;
 use std::path::Path;
 use std::sync::Arc;
@@ -316,6 +316,14 @@ pub struct Look {
 
 impl Default for Look {
     fn default() -> Look {
-        Look { color: [0.7, 0.7, 0.72], roughness: 0.5, metallic: 0.0, shader: "plain".into(), properties: Vec::new(), texture: None, detail: Detail::Full }
+        Look {
+            color: [0.7, 0.7, 0.72],
+            roughness: 0.5,
+            metallic: 0.0,
+            shader: "plain".into(),
+            properties: Vec::new(),
+            texture: None,
+            detail: Detail::Full,
+        }
     }
 }

@@ -58,10 +58,11 @@ impl Travel {
     fn along(&self, n: &Vec3, other: &Travel, reach: Reach) -> f64 {
         let turns = self.turn + other.turn + self.gain.norm() + other.gain.norm();
         let (this, that) = (-n.dot(&self.way), n.dot(&other.way));
-        turns + match reach {
-            Reach::Relative => (this + that).max(0.0),
-            Reach::Each => this.max(0.0) + that.max(0.0),
-        }
+        turns
+            + match reach {
+                Reach::Relative => (this + that).max(0.0),
+                Reach::Each => this.max(0.0) + that.max(0.0),
+            }
     }
 
     /// By how much a gap between two parts may close, metres.
@@ -104,7 +105,9 @@ impl Pair<'_> {
         let margin = match (self.mode, self.shapes.map(|shape| shape.tree())) {
             // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
             (ContactMode::Spheres, [Some(_), Some(_)]) => closing.min(self.near + TREE_REACH * size),
-            (ContactMode::Surface, [Some(_), Some(_)]) if !self.has_simple_mesh() => closing.min(self.near + MESH_REACH * size),
+            (ContactMode::Surface, [Some(_), Some(_)]) if !self.has_simple_mesh() => {
+                closing.min(self.near + MESH_REACH * size)
+            }
             _ => closing,
         };
         (margin, closing)
@@ -213,7 +216,10 @@ impl Recalled {
         while asked.get(self.place).is_some_and(|k| k.rows < rows) {
             self.place += 1;
         }
-        let Some(known) = asked.get(self.place).filter(|k| k.rows == rows && k.poses == *poses && k.margin >= margin) else { return false };
+        let Some(known) = asked.get(self.place).filter(|k| k.rows == rows && k.poses == *poses && k.margin >= margin)
+        else {
+            return false;
+        };
         let start = self.place.checked_sub(1).map_or(0, |before| asked[before].end);
         found.extend(self.last.contacts[start..known.end].iter().filter(|contact| contact.gap <= margin));
         true

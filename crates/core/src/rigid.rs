@@ -14,8 +14,8 @@ use crate::collidable::{Collidable, CollisionKind, Material};
 use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
 use crate::rotation;
-use crate::sync;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
+use crate::sync;
 use crate::view::WorldView;
 use nalgebra::{Quaternion, SymmetricEigen, Translation3, Unit};
 use tumble_collide::{ContactMode, Mat3, Pose, Quat, Shape, Vec3};
@@ -32,7 +32,9 @@ pub enum BodyError {
         mass: f64,
     },
     /// The inertia is not that of any body.
-    #[error("body '{name}': inertia has principal moments {moments:?} kg·m²; each must be finite and above 0, and none above the sum of the other two")]
+    #[error(
+        "body '{name}': inertia has principal moments {moments:?} kg·m²; each must be finite and above 0, and none above the sum of the other two"
+    )]
     Inertia {
         /// Body.
         name: String,
@@ -126,9 +128,25 @@ impl RigidBody {
         let cache = Cache { respond: inertia.inverse_root, recover: inertia.root };
         let visuals = vec![Visual { part: 0, pose: Pose::identity(), shape: shape.clone(), look: Default::default() }];
         Ok(RigidBody {
-            name, shape, mass, root_mass: mass.sqrt(), inertia, material: Material::default(), contact_mode: ContactMode::default(), linear_damping: 0.0, angular_damping: 0.0,
-            kind: CollisionKind::default(), meets: u64::MAX, initial_pose: Pose::identity(), initial_velocity: Vec3::zeros(),
-            initial_angular_velocity: Vec3::zeros(), fixture: false, visuals, cameras: Vec::new(), lights: Vec::new(), cache,
+            name,
+            shape,
+            mass,
+            root_mass: mass.sqrt(),
+            inertia,
+            material: Material::default(),
+            contact_mode: ContactMode::default(),
+            linear_damping: 0.0,
+            angular_damping: 0.0,
+            kind: CollisionKind::default(),
+            meets: u64::MAX,
+            initial_pose: Pose::identity(),
+            initial_velocity: Vec3::zeros(),
+            initial_angular_velocity: Vec3::zeros(),
+            fixture: false,
+            visuals,
+            cameras: Vec::new(),
+            lights: Vec::new(),
+            cache,
         })
     }
 
@@ -226,7 +244,11 @@ impl RigidBody {
     /// Checks everything that can be set freely: restitution in 0..=1, friction and damping at least 0, finite pose and velocity.
     pub fn validate(&self) -> Result<(), BodyError> {
         let range = |what, value: f64, right: bool, wanted| {
-            if right && value.is_finite() { Ok(()) } else { Err(BodyError::Range { name: self.name.clone(), what, value, wanted }) }
+            if right && value.is_finite() {
+                Ok(())
+            } else {
+                Err(BodyError::Range { name: self.name.clone(), what, value, wanted })
+            }
         };
         let (m, unit) = (&self.material, self.initial_pose.rotation.norm());
         range("restitution", m.restitution, (0.0..=1.0).contains(&m.restitution), "between 0 and 1")?;
@@ -235,7 +257,10 @@ impl RigidBody {
         range("angular damping", self.angular_damping, self.angular_damping >= 0.0, "at least 0")?;
         range("norm of the orientation", unit, (unit - 1.0).abs() < 1e-6, "1")?;
         let numbers = [self.initial_pose.translation.vector, self.initial_velocity, self.initial_angular_velocity];
-        numbers.iter().flat_map(|v| v.iter()).try_for_each(|&value| range("a position or velocity", value, true, "finite"))
+        numbers
+            .iter()
+            .flat_map(|v| v.iter())
+            .try_for_each(|&value| range("a position or velocity", value, true, "finite"))
     }
 
     /// Twice the kinetic energy of its rotation, J.
@@ -267,7 +292,14 @@ impl Inertia {
         }
         let with = |f: fn(f64) -> f64| axes * Mat3::from_diagonal(&moments.map(f)) * axes.transpose();
         let principal = Quat::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(axes));
-        Ok(Inertia { tensor: symmetric, inverse: with(|i| 1.0 / i), root: with(f64::sqrt), inverse_root: with(|i| 1.0 / i.sqrt()), moments, principal })
+        Ok(Inertia {
+            tensor: symmetric,
+            inverse: with(|i| 1.0 / i),
+            root: with(f64::sqrt),
+            inverse_root: with(|i| 1.0 / i.sqrt()),
+            moments,
+            principal,
+        })
     }
 }
 

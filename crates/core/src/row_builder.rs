@@ -99,7 +99,10 @@ impl RowBuilder<'_> {
     fn on_part(&mut self, entry: Option<&Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
         let Some(entry) = entry else { return self.refuse("a row names an object that is not in the world".into()) };
         if part >= entry.span.site.len() || !add(self, entry) {
-            self.refuse(format!("'{}' has no part {part} that answers impulses, or the row names a third object", entry.object.name()));
+            self.refuse(format!(
+                "'{}' has no part {part} that answers impulses, or the row names a third object",
+                entry.object.name()
+            ));
         }
     }
 
@@ -124,7 +127,11 @@ impl RowBuilder<'_> {
             side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()
         });
         if !done {
-            self.refuse(format!("'{}': the row's Jacobian has {} numbers, or it names a third object", entry.object.name(), jacobian.len()));
+            self.refuse(format!(
+                "'{}': the row's Jacobian has {} numbers, or it names a third object",
+                entry.object.name(),
+                jacobian.len()
+            ));
         }
         self
     }
@@ -174,5 +181,7 @@ impl RowBuilder<'_> {
 /// The constraints of the table in the order in which they were added; without those that hold nothing but an object that nothing moves.
 pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (ObjectId, &Entry, &dyn Constraint)> {
     let entries = table.order.iter().map(|&id| (id, &table.slots[id]));
-    entries.filter(|(_, e)| e.status.alive).filter_map(|(id, e)| Some((id, e, e.object.constraint().filter(|c| e.moves() || !c.on_itself())?)))
+    entries
+        .filter(|(_, e)| e.status.alive)
+        .filter_map(|(id, e)| Some((id, e, e.object.constraint().filter(|c| e.moves() || !c.on_itself())?)))
 }

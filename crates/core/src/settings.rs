@@ -104,7 +104,12 @@ impl Settings {
         check("sweeps", self.accuracy.sweeps as f64, (1..=1_000_000).contains(&self.accuracy.sweeps), "1 to 1000000")?;
         check("solver tolerance", self.accuracy.tolerance, self.accuracy.tolerance >= 0.0, "at least 0")?;
         check("contact tolerance", self.contact_tolerance, self.contact_tolerance > 0.0, "above 0 m")?;
-        check("drift tolerance", self.drift_tolerance, self.drift_tolerance >= self.contact_tolerance, "at least the contact tolerance")?;
+        check(
+            "drift tolerance",
+            self.drift_tolerance,
+            self.drift_tolerance >= self.contact_tolerance,
+            "at least the contact tolerance",
+        )?;
         if let Some(sleep) = &self.sleep {
             check("sleep: seconds", sleep.after, sleep.after > 0.0, "above 0 s")?;
             check("sleep: distance", sleep.within, sleep.within > 0.0, "above 0 m")?;

@@ -49,8 +49,13 @@ impl Default for Site {
     fn default() -> Site {
         let zero = Vec3::zeros();
         Site {
-            pose: Pose::identity(), angular_velocity: zero, velocity: zero, angular_acceleration: zero, acceleration: zero,
-            bias_angular_acceleration: zero, bias_acceleration: zero,
+            pose: Pose::identity(),
+            angular_velocity: zero,
+            velocity: zero,
+            angular_acceleration: zero,
+            acceleration: zero,
+            bias_angular_acceleration: zero,
+            bias_acceleration: zero,
         }
     }
 }

@@ -94,7 +94,9 @@ impl Group {
     /// Whether a snapshot may hold it.
     pub fn sound(&self) -> bool {
         let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
-        let fine = self.load.iter().all(|load| finite(load)) && self.warm.iter().all(|w| finite(&w.1)) && self.watched.iter().flat_map(|w| &w.1).all(|p| finite(p));
+        let fine = self.load.iter().all(|load| finite(load))
+            && self.warm.iter().all(|w| finite(&w.1))
+            && self.watched.iter().flat_map(|w| &w.1).all(|p| finite(p));
         fine && !self.members.is_empty() && self.members.is_sorted_by(|a, b| a < b)
     }
 }
@@ -148,7 +150,8 @@ impl Core {
             let sites = &self.sites[e.span.site.clone()];
             e.moves() || !e.status.alive || !at_rest(sites) || poses(sites) != *from
         };
-        group.members.iter().filter_map(|&s| self.by_serial(s)).any(|id| pushed(&self.table.slots[id])) || group.watched.iter().any(bed)
+        group.members.iter().filter_map(|&s| self.by_serial(s)).any(|id| pushed(&self.table.slots[id]))
+            || group.watched.iter().any(bed)
     }
 
     /// Whether a user pushes the object during this frame.
@@ -175,7 +178,9 @@ impl Core {
             let span = &self.table.slots[id].span;
             load.extend(self.forces.generalized.get(span.v.clone()).unwrap_or_default());
             let wrenches = self.forces.wrenches.get(span.site.clone()).unwrap_or_default();
-            load.extend(wrenches.iter().flat_map(|w| w.torque.iter().chain(w.force.iter()).copied().collect::<Vec<_>>()));
+            load.extend(
+                wrenches.iter().flat_map(|w| w.torque.iter().chain(w.force.iter()).copied().collect::<Vec<_>>()),
+            );
         }
         load
     }
@@ -194,7 +199,9 @@ impl Core {
             return;
         }
         let Some(bonds) = self.bonds() else { return };
-        let place = |id: ObjectId| self.table.order.binary_search_by_key(&self.table.slots[id].serial, |&o| self.table.slots[o].serial).ok();
+        let place = |id: ObjectId| {
+            self.table.order.binary_search_by_key(&self.table.slots[id].serial, |&o| self.table.slots[o].serial).ok()
+        };
         let mut ready = ready;
         let mut parent: Vec<usize> = (0..ready.len()).collect();
         let mut beds: Vec<(usize, ObjectId)> = Vec::new();
@@ -237,8 +244,17 @@ impl Core {
                 continue;
             }
             let now = poses(&self.sites[entry.span.site.clone()]);
-            let radius = |part: usize| entry.object.collidable().and_then(|c| c.shape(part)).map(|s| s.bounding_radius()).filter(|r| r.is_finite()).unwrap_or(0.0);
-            let far = |(part, (from, to)): (usize, (&[f64; 7], &[f64; 7]))| moved(from, to, radius(part)) > sleep.within;
+            let radius = |part: usize| {
+                entry
+                    .object
+                    .collidable()
+                    .and_then(|c| c.shape(part))
+                    .map(|s| s.bounding_radius())
+                    .filter(|r| r.is_finite())
+                    .unwrap_or(0.0)
+            };
+            let far =
+                |(part, (from, to)): (usize, (&[f64; 7], &[f64; 7]))| moved(from, to, radius(part)) > sleep.within;
             let from = &entry.still.from;
             let restless = from.len() != now.len() || self.pushed(entry) || from.iter().zip(&now).enumerate().any(far);
             ready.push(!restless && self.time - entry.still.since >= sleep.after);
@@ -253,7 +269,8 @@ impl Core {
     fn bonds(&self) -> Option<Vec<[ObjectId; 2]>> {
         let mut bonds: Vec<[ObjectId; 2]> = self.contacts.iter().map(|c| [c.a, c.b]).collect();
         let mut partners = Vec::new();
-        for (_, _, constraint) in constraints(&self.table).filter(|(_, _, c): &(_, _, &dyn Constraint)| !c.on_itself()) {
+        for (_, _, constraint) in constraints(&self.table).filter(|(_, _, c): &(_, _, &dyn Constraint)| !c.on_itself())
+        {
             partners.clear();
             if !constraint.partners(&mut partners) {
                 return None;
@@ -298,6 +315,7 @@ fn root(parent: &[usize], mut i: usize) -> usize {
 impl Entry {
     /// Whether it comes towards others by itself: moved by forces, or led with a velocity.
     pub fn comes(&self, sites: &[Site]) -> bool {
-        self.moves() || (self.status.alive && self.status.mode == Mode::Kinematic && !at_rest(&sites[self.span.site.clone()]))
+        self.moves()
+            || (self.status.alive && self.status.mode == Mode::Kinematic && !at_rest(&sites[self.span.site.clone()]))
     }
 }

@@ -69,9 +69,16 @@ fn main() -> Result<(), Failure> {
     println!("publish  {}\napply    {}\nhash     {}", percentiles(publish), percentiles(apply), percentiles(hash));
 
     let hub = Hub::new(facets);
-    let workers: Vec<_> = (0..facets).map(|k| (k, hub.clone())).map(|(k, hub)| std::thread::spawn(move || facet(&hub, k, bodies))).collect();
+    let workers: Vec<_> = (0..facets)
+        .map(|k| (k, hub.clone()))
+        .map(|(k, hub)| std::thread::spawn(move || facet(&hub, k, bodies)))
+        .collect();
     let seats = (0..facets).map(|k| Seat { name: format!("{k}"), critical: true }).collect();
-    let mut server = Server::new(hub.server(), ServerOptions { ready_after: Duration::from_secs(10), ..ServerOptions::new(1, [0; 32], seats) }, &world);
+    let mut server = Server::new(
+        hub.server(),
+        ServerOptions { ready_after: Duration::from_secs(10), ..ServerOptions::new(1, [0; 32], seats) },
+        &world,
+    );
     server.wait_for_facets(Duration::from_secs(30))?;
     let mut barrier = Vec::new();
     for _ in 0..frames {

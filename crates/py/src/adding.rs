@@ -62,7 +62,11 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, body: Rigid, mode: Mode, collid
 
 /// Adds an articulated body, a description or the path of one, and gives its handle.
 pub fn articulated(
-    shared: &Arc<Shared>, py: Python<'_>, description: &Bound<'_, PyAny>, base: Option<&Bound<'_, PyAny>>, name: Option<&str>,
+    shared: &Arc<Shared>,
+    py: Python<'_>,
+    description: &Bound<'_, PyAny>,
+    base: Option<&Bound<'_, PyAny>>,
+    name: Option<&str>,
 ) -> Result<Articulation> {
     let description = described(description)?;
     let description = description.get();

@@ -3,11 +3,11 @@
 use crate::body::{Place, hash};
 use crate::collect::{Anchor, anchor};
 use crate::convert::{Numbers, array, numbers, path, vec3, vector};
-use crate::pool;
 use crate::errors::{Error, Result};
+use crate::inner::Inner;
+use crate::pool;
 use crate::robot::{Robot, Rows};
 use crate::spot::{Now, Source, Spot, Which, locked, start};
-use crate::inner::Inner;
 use numpy::{IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -37,7 +37,12 @@ pub struct Articulation {
 impl Articulation {
     /// A handle of one in a world.
     pub fn placed(py: Python<'_>, place: Place, robot: Arc<Robot>) -> Result<Articulation> {
-        Ok(Articulation { name: place.name.clone(), robot, anchor: Some(anchor(py, &place.shared)?), spot: Spot::Placed(place) })
+        Ok(Articulation {
+            name: place.name.clone(),
+            robot,
+            anchor: Some(anchor(py, &place.shared)?),
+            spot: Spot::Placed(place),
+        })
     }
 
     /// Where it stands, if it is in a world.
@@ -51,14 +56,20 @@ impl Articulation {
     /// The body to be put into a world, in the state that the description has.
     pub fn body(&self, py: Python<'_>, base: Pose, name: Option<&str>) -> Result<(ArticulatedBody, Robot)> {
         let Spot::Free { source, now } = &self.spot else {
-            return Err(Error::value(format!("'{}' is in a world already; add the description that it was made of", self.name)));
+            return Err(Error::value(format!(
+                "'{}' is in a world already; add the description that it was made of",
+                self.name
+            )));
         };
         let body = py.detach(|| pool::run(|| source.body(&source.options)))?.at(base).named(name.unwrap_or(&self.name));
         let Now { mut q, qd, .. } = locked(now).clone();
         // where a floating root is, is said from the base
         let model = body.model();
         for link in model.links().iter().filter(|link| link.joint == tumble::core::Joint::Floating) {
-            let own = Pose::from_parts(Vec3::from_column_slice(&q[link.q..link.q + 3]).into(), crate::convert::unit(&q[link.q + 3..link.q + 7]));
+            let own = Pose::from_parts(
+                Vec3::from_column_slice(&q[link.q..link.q + 3]).into(),
+                crate::convert::unit(&q[link.q + 3..link.q + 7]),
+            );
             q[link.q..link.q + 7].copy_from_slice(&crate::convert::pose_numbers(&(base * own)));
         }
         let body = body.with_positions(&q)?.with_velocities(&qd)?;
@@ -80,7 +91,12 @@ impl Articulation {
     }
 
     fn in_world(&self) -> Result<&Place> {
-        self.place().ok_or_else(|| Error::value(format!("'{}' is in no world; World.add_articulation gives the handle of one that is", self.name)))
+        self.place().ok_or_else(|| {
+            Error::value(format!(
+                "'{}' is in no world; World.add_articulation gives the handle of one that is",
+                self.name
+            ))
+        })
     }
 
     /// The freedom of a hinge or slider, by the name of its joint.
@@ -91,7 +107,10 @@ impl Articulation {
         })?;
         let link = &self.robot.model.links()[number];
         if link.joint.dof() != 1 {
-            return Err(Error::value(format!("joint '{joint}' has {} freedoms; drives are of hinges and sliders", link.joint.dof())));
+            return Err(Error::value(format!(
+                "joint '{joint}' has {} freedoms; drives are of hinges and sliders",
+                link.joint.dof()
+            )));
         }
         Ok(link.v)
     }
@@ -104,7 +123,11 @@ impl Articulation {
 
     /// Something at a point of a link, by default the origin of its frame.
     fn push(
-        &self, py: Python<'_>, link: &str, point: Option<&Bound<'_, PyAny>>, apply: impl FnOnce(&mut Inner, &Place, usize, Vec3) -> Result<()>,
+        &self,
+        py: Python<'_>,
+        link: &str,
+        point: Option<&Bound<'_, PyAny>>,
+        apply: impl FnOnce(&mut Inner, &Place, usize, Vec3) -> Result<()>,
     ) -> Result<()> {
         let (place, part) = (self.in_world()?, self.part(link)?);
         let point = point.map(|p| vec3(p, "point")).transpose()?;
@@ -135,10 +158,17 @@ impl Articulation {
     #[staticmethod]
     #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact"))]
     fn from_urdf(
-        py: Python<'_>, path: &Bound<'_, PyAny>, floating: bool, packages: Option<BTreeMap<String, PathBuf>>, missing_meshes: &str, collision_meshes: &str,
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        floating: bool,
+        packages: Option<BTreeMap<String, PathBuf>>,
+        missing_meshes: &str,
+        collision_meshes: &str,
     ) -> Result<Articulation> {
         let file = crate::convert::path(path)?;
-        let word = |what: &str, got: &str, wanted: &str| Error::value(format!("{what}: `{got}` is not known; wanted {wanted}"));
+        let word = |what: &str, got: &str, wanted: &str| {
+            Error::value(format!("{what}: `{got}` is not known; wanted {wanted}"))
+        };
         let options = UrdfOptions {
             floating,
             packages: packages.unwrap_or_default(),
@@ -159,7 +189,12 @@ impl Articulation {
         let (q, qd) = start.split_at(read.model.positions());
         let now = Now { gravity: Vec3::new(0.0, 0.0, -9.81), q: q.to_vec(), qd: qd.to_vec(), tau: vec![0.0; qd.len()] };
         let robot = Robot { model: read.model, base: Pose::identity(), joints: read.joints };
-        Ok(Articulation { name: read.name.into(), robot: Arc::new(robot), spot: Spot::Free { source: Source { file, options }, now: Mutex::new(now) }, anchor: None })
+        Ok(Articulation {
+            name: read.name.into(),
+            robot: Arc::new(robot),
+            spot: Spot::Free { source: Source { file, options }, now: Mutex::new(now) },
+            anchor: None,
+        })
     }
 
     /// The robot's name in its file, or the body's in its world.
@@ -271,7 +306,13 @@ impl Articulation {
     /// Accelerations ``qdd`` that generalized forces ``tau`` cause. q: (nq,), qd, tau: (dof,), each also batched (batch, …); what is not given is
     /// what it is now. Returns (dof,) or (batch, dof).
     #[pyo3(signature = (q=None, qd=None, tau=None))]
-    fn forward_dynamics<'py>(&self, py: Python<'py>, q: Given<'_, 'py>, qd: Given<'_, 'py>, tau: Given<'_, 'py>) -> Result<Array<'py>> {
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: Given<'_, 'py>,
+        qd: Given<'_, 'py>,
+        tau: Given<'_, 'py>,
+    ) -> Result<Array<'py>> {
         let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "tau", tau)])?;
         let gravity = self.spot.gravity()?;
         let out = py.detach(|| self.robot.forward_dynamics(&gravity, &mut rows))?;
@@ -281,9 +322,16 @@ impl Articulation {
     /// Generalized forces that accelerations ``qdd`` take, gravity included. q: (nq,), qd, qdd: (dof,), each also batched. Without ``qdd`` those that
     /// hold the motion unaccelerated. Returns (dof,) or (batch, dof).
     #[pyo3(signature = (q=None, qd=None, qdd=None))]
-    fn inverse_dynamics<'py>(&self, py: Python<'py>, q: Given<'_, 'py>, qd: Given<'_, 'py>, qdd: Given<'_, 'py>) -> Result<Array<'py>> {
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: Given<'_, 'py>,
+        qd: Given<'_, 'py>,
+        qdd: Given<'_, 'py>,
+    ) -> Result<Array<'py>> {
         let still = array(py, &vec![0.0; self.robot.dof()]).into_any();
-        let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "qdd", Some(qdd.unwrap_or(&still)))])?;
+        let mut rows =
+            self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "qdd", Some(qdd.unwrap_or(&still)))])?;
         let gravity = self.spot.gravity()?;
         let out = py.detach(|| self.robot.inverse_dynamics(&gravity, &mut rows))?;
         result(py, &rows, out, &[self.robot.dof()])
@@ -343,15 +391,30 @@ impl Articulation {
     #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, limit=f64::INFINITY))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_drive(
-        &self, py: Python<'_>, joint: &str, target: Option<f64>, velocity: Option<f64>, stiffness: f64, damping: f64, limit: f64,
+        &self,
+        py: Python<'_>,
+        joint: &str,
+        target: Option<f64>,
+        velocity: Option<f64>,
+        stiffness: f64,
+        damping: f64,
+        limit: f64,
     ) -> Result<()> {
         let (place, index) = (self.in_world()?, self.freedom(joint)?);
         let stiff = stiffness != 0.0 || damping != 0.0;
         let drive = match (target, velocity) {
             (None, None) if !stiff => Drive::None,
-            (Some(_), _) if !stiff => return Err(Error::value("target: a drive to a position wants a stiffness or a damping above 0")),
+            (Some(_), _) if !stiff => {
+                return Err(Error::value("target: a drive to a position wants a stiffness or a damping above 0"));
+            }
             (None, Some(target)) if !stiff => Drive::Velocity { target, limit },
-            _ => Drive::Position { stiffness, damping, target: target.unwrap_or(0.0), velocity: velocity.unwrap_or(0.0), limit },
+            _ => Drive::Position {
+                stiffness,
+                damping,
+                target: target.unwrap_or(0.0),
+                velocity: velocity.unwrap_or(0.0),
+                limit,
+            },
         };
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
@@ -376,13 +439,27 @@ impl Articulation {
 
     /// An impulse on a link, at once. impulse: shape (3,), N·s; point: as in ``apply_force``.
     #[pyo3(signature = (link, impulse, point=None))]
-    fn apply_impulse(&self, py: Python<'_>, link: &str, impulse: &Bound<'_, PyAny>, point: Given<'_, '_>) -> Result<()> {
+    fn apply_impulse(
+        &self,
+        py: Python<'_>,
+        link: &str,
+        impulse: &Bound<'_, PyAny>,
+        point: Given<'_, '_>,
+    ) -> Result<()> {
         let impulse = vec3(impulse, "impulse")?;
-        self.push(py, link, point, |inner, place, part, at| Ok(inner.world.apply_impulse(place.id, part, impulse, &at)?))
+        self.push(py, link, point, |inner, place, part, at| {
+            Ok(inner.world.apply_impulse(place.id, part, impulse, &at)?)
+        })
     }
 
     fn __repr__(&self) -> String {
-        let place = if !self.exists().unwrap_or(true) { ", removed" } else if self.place().is_some() { "" } else { ", a description" };
+        let place = if !self.exists().unwrap_or(true) {
+            ", removed"
+        } else if self.place().is_some() {
+            ""
+        } else {
+            ", a description"
+        };
         format!("<tumble.Articulation '{}', {} freedoms{place}>", self.name, self.robot.dof())
     }
 

@@ -4,8 +4,8 @@ use crate::articulation::Articulation;
 use crate::body::{Place, RigidBody};
 use crate::collect::{Anchor, anchor};
 use crate::errors::{Error, Result};
-use crate::robot::Robot;
 use crate::inner::Inner;
+use crate::robot::Robot;
 use crate::shared::Shared;
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::gc::{PyTraverseError, PyVisit};
@@ -66,7 +66,8 @@ impl Bodies {
     }
 
     fn list<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyList>> {
-        let handles = self.all()?.into_iter().map(|found| handle(py, &self.shared, found)).collect::<Result<Vec<_>>>()?;
+        let handles =
+            self.all()?.into_iter().map(|found| handle(py, &self.shared, found)).collect::<Result<Vec<_>>>()?;
         Ok(PyList::new(py, handles)?)
     }
 }
@@ -75,8 +76,10 @@ impl Bodies {
 pub fn by_name(inner: &Inner, name: &str) -> Result<Found> {
     let id = inner.world.find(name).filter(|&id| is_body(&inner.world, id));
     id.and_then(|id| found(inner, id)).ok_or_else(|| {
-        let names: Vec<&str> = body_ids(&inner.world).iter().filter_map(|&id| Some(inner.world.object(id)?.name())).take(8).collect();
-        let known = if names.is_empty() { "it has none".to_string() } else { format!("there are {}", names.join(", ")) };
+        let names: Vec<&str> =
+            body_ids(&inner.world).iter().filter_map(|&id| Some(inner.world.object(id)?.name())).take(8).collect();
+        let known =
+            if names.is_empty() { "it has none".to_string() } else { format!("there are {}", names.join(", ")) };
         Error::Name(format!("the world has no body named '{name}'; {known}"))
     })
 }

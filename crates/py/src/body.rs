@@ -3,8 +3,8 @@
 use crate::collect::{Anchor, anchor};
 use crate::convert::{array, pose, quaternion, rotation, some, symmetric, vec3, vec3_or, vector};
 use crate::errors::{Error, Result};
-use crate::looks;
 use crate::inner::Inner;
+use crate::looks;
 use crate::shared::Shared;
 use numpy::{PyArray1, PyArray2};
 use pyo3::gc::{PyTraverseError, PyVisit};
@@ -113,7 +113,11 @@ impl RigidBody {
         let place = &self.place;
         place.write(py, |inner| {
             let site = *inner.world.site(place.id, 0).ok_or_else(|| place.removed())?;
-            Ok(inner.world.set_velocity(place.id, velocity.unwrap_or(site.velocity), angular.unwrap_or(site.angular_velocity))?)
+            Ok(inner.world.set_velocity(
+                place.id,
+                velocity.unwrap_or(site.velocity),
+                angular.unwrap_or(site.angular_velocity),
+            )?)
         })
     }
 
@@ -214,7 +218,10 @@ impl RigidBody {
     fn set_mode(&self, py: Python<'_>, value: &str) -> Result<()> {
         let mode = mode_of(value)?;
         if mode == Mode::Dynamic && self.constant(Rigid::is_fixture)? {
-            return Err(Error::value(format!("'{}' has no mass: it was added as static, and cannot be dynamic", self.place.name)));
+            return Err(Error::value(format!(
+                "'{}' has no mass: it was added as static, and cannot be dynamic",
+                self.place.name
+            )));
         }
         self.place.write(py, |inner| Ok(inner.world.set_mode(self.place.id, mode)?))
     }
@@ -312,7 +319,8 @@ impl RigidBody {
     fn apply_force(&self, py: Python<'_>, force: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<()> {
         let (force, point) = (vec3(force, "force")?, point.map(|p| vec3(p, "point")).transpose()?);
         self.place.write(py, |inner| {
-            let at = point.unwrap_or(inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+            let at =
+                point.unwrap_or(inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
             Ok(inner.world.apply_force(self.place.id, 0, force, &at)?)
         })
     }
@@ -325,17 +333,28 @@ impl RigidBody {
 
     /// An impulse, at once. impulse: shape (3,), N·s, world axes; point: where in the world it acts, metres (default: the centre of mass).
     #[pyo3(signature = (impulse, point=None))]
-    fn apply_impulse(&self, py: Python<'_>, impulse: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<()> {
+    fn apply_impulse(
+        &self,
+        py: Python<'_>,
+        impulse: &Bound<'_, PyAny>,
+        point: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
         let (impulse, point) = (vec3(impulse, "impulse")?, point.map(|p| vec3(p, "point")).transpose()?);
         self.place.write(py, |inner| {
-            let at = point.unwrap_or(inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+            let at =
+                point.unwrap_or(inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
             Ok(inner.world.apply_impulse(self.place.id, 0, impulse, &at)?)
         })
     }
 
     /// Gives a kinematic body the velocity that brings it to a pose by the end of the next frame. What is not given stays as it is.
     #[pyo3(signature = (position=None, orientation=None))]
-    fn move_to(&self, py: Python<'_>, position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, PyAny>>) -> Result<()> {
+    fn move_to(
+        &self,
+        py: Python<'_>,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
         let target = pose(position, orientation)?;
         let (moves, turns) = (position.is_some(), orientation.is_some());
         self.place.write(py, |inner| {

@@ -19,7 +19,10 @@ impl Choices<'_> {
     /// Writes them into a scene's settings.
     pub fn apply(&self, world: &mut WorldSettings) -> Result<()> {
         world.dt_s = self.dt.unwrap_or(world.dt_s);
-        let told = |what: &str| { let what = what.to_string(); move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}")) };
+        let told = |what: &str| {
+            let what = what.to_string();
+            move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}"))
+        };
         world.stepper = self.stepper.map_or(Ok(world.stepper), |s| s.parse().map_err(told("stepper")))?;
         world.integrator = self.integrator.map_or(Ok(world.integrator), |s| s.parse().map_err(told("integrator")))?;
         world.solver = self.solver.map_or(Ok(world.solver), |s| s.parse().map_err(told("solver")))?;
@@ -33,8 +36,17 @@ pub fn build(scene: SceneFile) -> Result<(Inner, Vec<String>)> {
     let mut inner = Inner::new(world, Arc::new(scene));
     let scene = inner.scene.clone();
     for spec in &scene.articulated {
-        let Some((id, body)) = inner.world.find(&spec.name).and_then(|id| Some((id, inner.world.get::<ArticulatedBody>(id)?))) else { continue };
-        let joints = spec.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.clone()).collect();
+        let Some((id, body)) =
+            inner.world.find(&spec.name).and_then(|id| Some((id, inner.world.get::<ArticulatedBody>(id)?)))
+        else {
+            continue;
+        };
+        let joints = spec
+            .links
+            .iter()
+            .filter(|link| link.joint.kind != Joint::Fixed)
+            .map(|link| link.joint.name.clone())
+            .collect();
         let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
         inner.robots.insert(id, Arc::new(robot));
     }

@@ -11,7 +11,13 @@ use tumble::core::{ArticulatedBody, ObjectId};
 
 /// Fields of a contact: name, format, how many. All have 8 bytes, so that there is no padding.
 const FIELDS: [(&str, &str, usize); 8] = [
-    ("bodies", "<i8", 2), ("parts", "<i8", 2), ("point", "<f8", 3), ("normal", "<f8", 3), ("depth", "<f8", 1), ("velocity", "<f8", 3), ("impulse", "<f8", 3),
+    ("bodies", "<i8", 2),
+    ("parts", "<i8", 2),
+    ("point", "<f8", 3),
+    ("normal", "<f8", 3),
+    ("depth", "<f8", 1),
+    ("velocity", "<f8", 3),
+    ("impulse", "<f8", 3),
     ("force", "<f8", 3),
 ];
 
@@ -24,7 +30,8 @@ pub fn bytes(inner: &Inner) -> Vec<u8> {
     for c in contacts {
         let whole = [number(c.a), number(c.b), link(inner, c.a, c.part_a), link(inner, c.b, c.part_b)];
         whole.iter().for_each(|k| out.extend_from_slice(&k.to_le_bytes()));
-        let (first, last) = (c.point.iter().chain(c.normal.iter()), c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()));
+        let (first, last) =
+            (c.point.iter().chain(c.normal.iter()), c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()));
         let real = first.copied().chain([-c.gap]).chain(last.copied());
         real.for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
     }

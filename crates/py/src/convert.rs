@@ -2,7 +2,10 @@
 
 use crate::errors::{Error, Result};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayDescrMethods, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{
+    AllowTypeChange, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -48,7 +51,10 @@ pub fn room(len: usize, what: &str) -> Result<Vec<f64>> {
     let reserved = if len <= MOST { room.try_reserve_exact(len).is_ok() } else { false };
     match reserved {
         true => Ok(room),
-        false => Err(PyMemoryError::new_err(format!("{what}: {len} numbers are more than there is room for (at most {MOST})")).into()),
+        false => Err(PyMemoryError::new_err(format!(
+            "{what}: {len} numbers are more than there is room for (at most {MOST})"
+        ))
+        .into()),
     }
 }
 
@@ -115,7 +121,10 @@ pub fn base_pose(base: &Bound<'_, PyAny>) -> Result<Pose> {
             Ok(Pose::from_parts(Vec3::from_column_slice(&data[..3]).into(), unit(&data[3..])))
         }
         [7] => Err(Error::value("base: the quaternion (x, y, z, w) in its last four numbers must have length 1")),
-        _ => Err(Error::value(format!("base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}", shown(&shape)))),
+        _ => Err(Error::value(format!(
+            "base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}",
+            shown(&shape)
+        ))),
     }
 }
 
@@ -137,7 +146,8 @@ pub fn whole_number<'py, T: for<'a> FromPyObject<'a, 'py>>(value: &Bound<'py, Py
         if !error.is_instance_of::<PyOverflowError>(value.py()) {
             return error;
         }
-        let written: String = value.str().map_or_else(|_| "the number".into(), |s| s.to_string()).chars().take(40).collect();
+        let written: String =
+            value.str().map_or_else(|_| "the number".into(), |s| s.to_string()).chars().take(40).collect();
         Error::value(format!("{written}: wanted a whole number that is neither negative nor that large")).into()
     })
 }

@@ -63,14 +63,20 @@ pub enum Error {
     Name(String),
     #[error("{0}")]
     Removed(String),
-    #[error("the world is being stepped by another thread; wait until that step returns, or give each thread a fork of its own")]
+    #[error(
+        "the world is being stepped by another thread; wait until that step returns, or give each thread a fork of its own"
+    )]
     Busy,
-    #[error("the world is being stepped, and this call comes from within that step; a force or behaviour reads the view it is given")]
+    #[error(
+        "the world is being stepped, and this call comes from within that step; a force or behaviour reads the view it is given"
+    )]
     Within,
     /// A panic that was caught.
     #[error("an error inside tumble: {0}; please report it")]
     Internal(String),
-    #[error("an error inside tumble stopped this world in the middle of a call; make it anew, or go on from a fork or a snapshot in another world")]
+    #[error(
+        "an error inside tumble stopped this world in the middle of a call; make it anew, or go on from a fork or a snapshot in another world"
+    )]
     Broken,
     /// What Python itself raised.
     #[error(transparent)]
@@ -124,7 +130,9 @@ impl From<Error> for PyErr {
     fn from(error: Error) -> PyErr {
         let error = match error {
             Error::Python(error) => return error,
-            Error::Fork { fork, frame, source } if matches!(*source, Error::Python(_)) => return noted(PyErr::from(*source), fork, frame),
+            Error::Fork { fork, frame, source } if matches!(*source, Error::Python(_)) => {
+                return noted(PyErr::from(*source), fork, frame);
+            }
             error => error,
         };
         Python::attach(|py| match class(py, error.class()) {
@@ -145,9 +153,10 @@ fn class<'py>(py: Python<'py>, name: &'static str) -> PyResult<Bound<'py, PyType
     static CLASSES: PyOnceLock<BTreeMap<String, Py<PyType>>> = PyOnceLock::new();
     let classes = CLASSES.get_or_try_init(py, || {
         let module = py.import("tumble._errors")?;
-        let classes = module.dict().iter().filter_map(|(name, class)| {
-            Some((name.extract().ok()?, class.cast_into::<PyType>().ok()?.unbind()))
-        });
+        let classes = module
+            .dict()
+            .iter()
+            .filter_map(|(name, class)| Some((name.extract().ok()?, class.cast_into::<PyType>().ok()?.unbind())));
         PyResult::Ok(classes.collect())
     })?;
     classes.get(name).map(|class| class.bind(py).clone()).ok_or_else(|| PyRuntimeError::new_err(name))
@@ -156,7 +165,8 @@ fn class<'py>(py: Python<'py>, name: &'static str) -> PyResult<Bound<'py, PyType
 /// Runs what must not panic; a panic becomes an [`Error::Internal`] with its text.
 pub fn caught<T>(call: impl FnOnce() -> Result<T>) -> Result<T> {
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().map(|s| s.to_string()).or_else(|| panic.downcast_ref::<String>().cloned());
+        let text =
+            panic.downcast_ref::<&str>().map(|s| s.to_string()).or_else(|| panic.downcast_ref::<String>().cloned());
         Err(Error::Internal(text.unwrap_or_else(|| "a panic without words".into())))
     })
 }

@@ -41,7 +41,10 @@ impl Code {
             let object = self.object.call_method0(py, "fork")?;
             match object.getattr(py, method).is_ok() && object.getattr(py, "fork").is_ok() {
                 true => Ok(object),
-                false => Err(PyErr::from(Error::value(format!("'{}': `fork` must return an object with `{method}` and `fork`", self.name)))),
+                false => Err(PyErr::from(Error::value(format!(
+                    "'{}': `fork` must return an object with `{method}` and `fork`",
+                    self.name
+                )))),
             }
         };
         Python::attach(|py| match fork(py) {
@@ -59,7 +62,13 @@ impl Code {
     }
 
     /// Calls a method with a view; `each` gets what was added to it, by site.
-    fn call(&self, world: &WorldView, method: &str, rows: Option<&[i64]>, mut each: impl FnMut(usize, Wrench)) -> Result<()> {
+    fn call(
+        &self,
+        world: &WorldView,
+        method: &str,
+        rows: Option<&[i64]>,
+        mut each: impl FnMut(usize, Wrench),
+    ) -> Result<()> {
         let layout = self.layout(world);
         Python::attach(|py| {
             let arrays = match lock(&self.arrays).take().filter(|arrays| arrays.free(py, layout.len())) {
@@ -76,7 +85,10 @@ impl Code {
             view.get().end();
             drop(view);
             if !outcome?.is_none() {
-                return Err(Error::value(format!("'{}': `{method}` must return None; add what it does to view.force and view.torque", self.name)));
+                return Err(Error::value(format!(
+                    "'{}': `{method}` must return None; add what it does to view.force and view.torque",
+                    self.name
+                )));
             }
             arrays.take(py, &layout, &self.name, |row, wrench| {
                 let (site, wrench) = layout.at_site(row, world.sites, wrench);
@@ -147,14 +159,19 @@ impl Extension {
     /// For a fork of the world.
     pub fn fork(&self) -> Extension {
         let attached = |a: &Attached| Attached { code: a.code.fork("act"), bodies: a.bodies.clone() };
-        Extension { forces: self.forces.clone(), behaviours: self.behaviours.iter().map(attached).collect(), before: Checkpoint::default() }
+        Extension {
+            forces: self.forces.clone(),
+            behaviours: self.behaviours.iter().map(attached).collect(),
+            before: Checkpoint::default(),
+        }
     }
 }
 
 impl Inner {
     /// What a callback raised since it was last asked.
     pub fn take_raised(&self) -> Result<()> {
-        let forces = self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
+        let forces =
+            self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
         let codes = forces.chain(self.extension.behaviours.iter().map(|b| &b.code));
         let mut raised: Vec<PyErr> = codes.filter_map(|code| lock(&code.raised).take()).collect();
         if raised.is_empty() { Ok(()) } else { Err(raised.swap_remove(0).into()) }
@@ -179,7 +196,8 @@ impl Inner {
         for Attached { code, bodies } in &self.extension.behaviours {
             let view = self.world.view();
             let layout = code.layout(&view);
-            let rows: Vec<i64> = bodies.iter().filter_map(|&id| layout.rows(id)).flatten().map(|row| row as i64).collect();
+            let rows: Vec<i64> =
+                bodies.iter().filter_map(|&id| layout.rows(id)).flatten().map(|row| row as i64).collect();
             if rows.is_empty() {
                 continue;
             }
@@ -238,7 +256,8 @@ impl Inner {
 
     /// The objects of all forces and behaviours.
     pub fn callables(&self) -> Vec<Callable> {
-        let forces = self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
+        let forces =
+            self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
         forces.chain(self.extension.behaviours.iter().map(|b| &b.code)).map(|code| code.object.clone()).collect()
     }
 
@@ -252,7 +271,12 @@ impl Inner {
     /// Names and objects of the forces, then of the behaviours, in the order of adding.
     pub fn extensions(&self, py: Python<'_>) -> [Vec<(String, Py<PyAny>)>; 2] {
         let pair = |code: &Code| (code.name.clone(), code.object.clone_ref(py));
-        let forces = self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| pair(&force.code));
+        let forces = self
+            .extension
+            .forces
+            .iter()
+            .filter_map(|&id| self.world.get::<PythonForce>(id))
+            .map(|force| pair(&force.code));
         [forces.collect(), self.extension.behaviours.iter().map(|b| pair(&b.code)).collect()]
     }
 }

@@ -32,14 +32,27 @@ pub struct Inner {
 impl Inner {
     /// A world of a scene.
     pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
-        Inner { world, scene, robots: BTreeMap::new(), efforts: BTreeMap::new(), extension: Extension::default(), shown: Shown::default(), broken: false }
+        Inner {
+            world,
+            scene,
+            robots: BTreeMap::new(),
+            efforts: BTreeMap::new(),
+            extension: Extension::default(),
+            shown: Shown::default(),
+            broken: false,
+        }
     }
 
     /// An independent copy, with no arrays yet.
     pub fn fork(&self) -> Inner {
         Inner {
-            world: self.world.fork(), scene: self.scene.clone(), robots: self.robots.clone(), efforts: self.efforts.clone(), extension: self.extension.fork(),
-            shown: Shown::default(), broken: false,
+            world: self.world.fork(),
+            scene: self.scene.clone(),
+            robots: self.robots.clone(),
+            efforts: self.efforts.clone(),
+            extension: self.extension.fork(),
+            shown: Shown::default(),
+            broken: false,
         }
     }
 
@@ -78,7 +91,9 @@ impl Inner {
         let mut write = |from: &[f64]| -> Result<()> {
             let ids = self.world.ids().to_vec();
             for id in ids {
-                let Some(span) = self.world.view().span(id).map(|span| span.x.clone()).filter(|x| !x.is_empty()) else { continue };
+                let Some(span) = self.world.view().span(id).map(|span| span.x.clone()).filter(|x| !x.is_empty()) else {
+                    continue;
+                };
                 self.world.write_state_of(id, &from[span])?;
             }
             Ok(())

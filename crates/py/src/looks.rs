@@ -4,16 +4,27 @@ use tumble::collide::Shape;
 use tumble::core::{Look, Renderable, RigidBody as Rigid};
 
 /// Colours that new bodies take in turn, sRGB.
-const PALETTE: [[f32; 3]; 7] =
-    [[0.84, 0.37, 0.23], [0.20, 0.49, 0.72], [0.93, 0.71, 0.22], [0.30, 0.62, 0.42], [0.55, 0.38, 0.66], [0.22, 0.64, 0.68], [0.80, 0.46, 0.60]];
+const PALETTE: [[f32; 3]; 7] = [
+    [0.84, 0.37, 0.23],
+    [0.20, 0.49, 0.72],
+    [0.93, 0.71, 0.22],
+    [0.30, 0.62, 0.42],
+    [0.55, 0.38, 0.66],
+    [0.22, 0.64, 0.68],
+    [0.80, 0.46, 0.60],
+];
 
 /// A body as it looks unless told otherwise: the `count`th colour; planes are a grey checkerboard of half a metre, other static geometry is grey.
 pub fn usual(body: Rigid, count: usize) -> Rigid {
     let plane = matches!(body.shape(), Shape::HalfSpace);
     let look = match (plane, body.is_fixture()) {
         (true, _) => Look {
-            color: [0.62, 0.64, 0.66], roughness: 0.8, shader: "checker".into(),
-            properties: [("second_r", 0.50), ("second_g", 0.52), ("second_b", 0.54), ("scale_m", 0.5)].map(|(key, value)| (key.into(), value)).to_vec(),
+            color: [0.62, 0.64, 0.66],
+            roughness: 0.8,
+            shader: "checker".into(),
+            properties: [("second_r", 0.50), ("second_g", 0.52), ("second_b", 0.54), ("scale_m", 0.5)]
+                .map(|(key, value)| (key.into(), value))
+                .to_vec(),
             ..Look::default()
         },
         (_, true) => return body,
@@ -28,7 +39,8 @@ pub fn colored(body: Rigid, color: [f64; 3]) -> Rigid {
 }
 
 fn looking(body: Rigid, look: Look) -> Rigid {
-    let visuals = body.visuals().iter().cloned().map(|visual| tumble::core::Visual { look: look.clone(), ..visual }).collect();
+    let visuals =
+        body.visuals().iter().cloned().map(|visual| tumble::core::Visual { look: look.clone(), ..visual }).collect();
     body.drawn_as(visuals)
 }
 

@@ -43,17 +43,27 @@ enum From {
 impl Shot {
     /// Checks what can be checked before anything is drawn.
     pub fn new(
-        size: [Option<u32>; 2], camera: Option<&Bound<'_, PyAny>>, facet: Option<&str>, cave: Option<&str>, overlays: Option<&str>,
+        size: [Option<u32>; 2],
+        camera: Option<&Bound<'_, PyAny>>,
+        facet: Option<&str>,
+        cave: Option<&str>,
+        overlays: Option<&str>,
     ) -> Result<Shot> {
-        let overlays = overlays.map_or(Ok(DebugDraw::default()), str::parse).map_err(|e: tumble::render::UnknownOverlay| Error::value(e.to_string()))?;
+        let overlays = overlays
+            .map_or(Ok(DebugDraw::default()), str::parse)
+            .map_err(|e: tumble::render::UnknownOverlay| Error::value(e.to_string()))?;
         let from = match (camera, facet, cave) {
             (None, None, None) => From::Scene,
             (Some(camera), None, None) => From::Camera(camera_of(camera)?),
             (None, Some(facet), None) => {
                 let parts = facet.rsplit_once(':').filter(|(cave, name)| !cave.is_empty() && !name.is_empty());
-                let (cave, name) = parts.ok_or_else(|| Error::value(format!("facet: wanted CAVE:NAME, such as cube4:front, and got `{facet}`")))?;
+                let (cave, name) = parts.ok_or_else(|| {
+                    Error::value(format!("facet: wanted CAVE:NAME, such as cube4:front, and got `{facet}`"))
+                })?;
                 if size != [None, None] {
-                    return Err(Error::value("the cave says how large a facet is (size_px); width and height go without facet"));
+                    return Err(Error::value(
+                        "the cave says how large a facet is (size_px); width and height go without facet",
+                    ));
                 }
                 From::Facet(cave.into(), name.into())
             }
@@ -67,7 +77,8 @@ impl Shot {
     pub fn take<'py>(&self, py: Python<'py>, shared: &Shared) -> Result<Bound<'py, PyArray3<u8>>> {
         ready(py)?;
         let image = py.detach(|| {
-            let (list, scene) = shared.read(|inner| Ok((self.list(&inner.world, &inner.scene)?, inner.scene.clone())))?;
+            let (list, scene) =
+                shared.read(|inner| Ok((self.list(&inner.world, &inner.scene)?, inner.scene.clone())))?;
             let mut kept = RENDERER.lock().unwrap_or_else(PoisonError::into_inner);
             let renderer = kept.as_mut().ok_or_else(|| Error::Internal("the graphics device is gone".into()))?;
             caught(|| self.draw(renderer, list, &scene))
@@ -137,7 +148,11 @@ fn ready(py: Python<'_>) -> Result<()> {
 
 /// `(eye, target)`, and after them `up` and the opening angle in degrees.
 fn camera_of(camera: &Bound<'_, PyAny>) -> Result<Camera> {
-    let wrong = || Error::value("camera: wanted (eye, target), (eye, target, up) or (eye, target, up, fov_deg), or a tumble.Camera");
+    let wrong = || {
+        Error::value(
+            "camera: wanted (eye, target), (eye, target, up) or (eye, target, up, fov_deg), or a tumble.Camera",
+        )
+    };
     let parts: Vec<Bound<'_, PyAny>> = camera.try_iter().map_err(|_| wrong())?.take(5).collect::<PyResult<_>>()?;
     if !(2..=4).contains(&parts.len()) {
         return Err(wrong());

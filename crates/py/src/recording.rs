@@ -83,7 +83,8 @@ impl Recorder {
         let path = self::path(path)?;
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-            let source = std::io::Error::new(std::io::ErrorKind::NotFound, format!("there is no folder {}", folder.display()));
+            let source =
+                std::io::Error::new(std::io::ErrorKind::NotFound, format!("there is no folder {}", folder.display()));
             return Err(Error::File { file: path.display().to_string(), source });
         }
         Ok(Recorder { path, stage: Mutex::new(Stage::Empty), frames: Mutex::new(0) })
@@ -97,7 +98,13 @@ impl Recorder {
 
     /// Steps the world ``n`` times and adds it after every ``every`` steps; before the first step too where nothing is recorded yet.
     #[pyo3(signature = (world, n, *, every=1))]
-    fn run(&self, py: Python<'_>, world: &Bound<'_, World>, #[pyo3(from_py_with = whole_number)] n: u32, #[pyo3(from_py_with = whole_number)] every: u32) -> Result<()> {
+    fn run(
+        &self,
+        py: Python<'_>,
+        world: &Bound<'_, World>,
+        #[pyo3(from_py_with = whole_number)] n: u32,
+        #[pyo3(from_py_with = whole_number)] every: u32,
+    ) -> Result<()> {
         if every == 0 {
             return Err(Error::value("every is 0; it must be at least 1"));
         }
@@ -142,7 +149,13 @@ impl Recorder {
     }
 
     /// Ends the file, also where the block raised.
-    fn __exit__(&self, py: Python<'_>, _kind: &Bound<'_, PyAny>, _error: &Bound<'_, PyAny>, _trace: &Bound<'_, PyAny>) -> Result<()> {
+    fn __exit__(
+        &self,
+        py: Python<'_>,
+        _kind: &Bound<'_, PyAny>,
+        _error: &Bound<'_, PyAny>,
+        _trace: &Bound<'_, PyAny>,
+    ) -> Result<()> {
         self.close(py)
     }
 
@@ -219,7 +232,10 @@ fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
         }
         all.bytes += frame.state.len();
         if (all.times.len() + 1) * all.names.len() * 7 > MOST || all.bytes > MOST {
-            return Err(Error::value(format!("{}: more frames than are read at once ({MOST} numbers or bytes)", file.display())));
+            return Err(Error::value(format!(
+                "{}: more frames than are read at once ({MOST} numbers or bytes)",
+                file.display()
+            )));
         }
         all.times.push(frame.time_s);
         all.frames.push(frame.frame);

@@ -39,12 +39,37 @@ pub struct StepReport {
 impl StepReport {
     /// The report of a world's last frame.
     pub fn of(world: &World) -> StepReport {
-        let Core { substeps, tries, inner_steps, floor_hits, contacts, impact_passes, residual, unconverged, rays, iterations, max_penetration, out_of_reach, asleep } =
-            *world.report();
+        let Core {
+            substeps,
+            tries,
+            inner_steps,
+            floor_hits,
+            contacts,
+            impact_passes,
+            residual,
+            unconverged,
+            rays,
+            iterations,
+            max_penetration,
+            out_of_reach,
+            asleep,
+        } = *world.report();
         let name = out_of_reach.and_then(|o| Some(world.object(o.closure)?.name().to_string()));
         StepReport {
-            substeps, tries, inner_steps, floor_hits, contacts, impact_passes, residual, unconverged, rays, iterations, max_penetration, asleep,
-            out_of_reach: name, out_of_reach_distance: out_of_reach.map_or(0.0, |o| o.distance),
+            substeps,
+            tries,
+            inner_steps,
+            floor_hits,
+            contacts,
+            impact_passes,
+            residual,
+            unconverged,
+            rays,
+            iterations,
+            max_penetration,
+            asleep,
+            out_of_reach: name,
+            out_of_reach_distance: out_of_reach.map_or(0.0, |o| o.distance),
         }
     }
 }

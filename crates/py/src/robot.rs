@@ -9,8 +9,8 @@ use crate::pool;
 use rayon::prelude::*;
 use tumble::collide::{Pose, Vec3};
 use tumble::core::articulated::{
-    BatchDynamics, Dynamics, Frame, InverseDynamics, Kinematics, Lanes, MassMatrix, Model, center_of_mass, forward_dynamics, inverse_dynamics, link_jacobian,
-    normalize,
+    BatchDynamics, Dynamics, Frame, InverseDynamics, Kinematics, Lanes, MassMatrix, Model, center_of_mass,
+    forward_dynamics, inverse_dynamics, link_jacobian, normalize,
 };
 
 /// States that one call of the batched sweep moves.
@@ -49,8 +49,19 @@ impl Rows {
                     rows.batch = Some(*count);
                     true
                 }
-                [_, w] if *w == width => return Err(Error::value(format!("{name}: shape {} in a batch of {}", shown(&shape), rows.batch.unwrap_or(0)))),
-                _ => return Err(Error::value(format!("{name}: wanted shape ({width},) or (batch, {width}), and got {}", shown(&shape)))),
+                [_, w] if *w == width => {
+                    return Err(Error::value(format!(
+                        "{name}: shape {} in a batch of {}",
+                        shown(&shape),
+                        rows.batch.unwrap_or(0)
+                    )));
+                }
+                _ => {
+                    return Err(Error::value(format!(
+                        "{name}: wanted shape ({width},) or (batch, {width}), and got {}",
+                        shown(&shape)
+                    )));
+                }
             };
             rows.arguments.push((data, width, batched));
         }
@@ -77,7 +88,10 @@ impl Rows {
             for (link, at) in model.links().iter().filter_map(|link| Some((link, link.q + link.joint.quaternion()?))) {
                 let norm = row[at..at + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
                 if (norm - 1.0).abs() > UNIT {
-                    return Err(Error::value(format!("q: the quaternion of link '{}' in row {k} has length {norm}; it must be 1", link.name)));
+                    return Err(Error::value(format!(
+                        "q: the quaternion of link '{}' in row {k} has length {norm}; it must be 1",
+                        link.name
+                    )));
                 }
             }
             normalize(model, row);
@@ -86,12 +100,23 @@ impl Rows {
     }
 
     /// One result of `width` numbers per row; `make` gives each thread its working memory.
-    fn each<W>(&self, width: usize, make: impl Fn() -> W + Sync + Send, run: impl Fn(&mut W, usize, &mut [f64]) + Sync + Send) -> Result<Vec<f64>> {
+    fn each<W>(
+        &self,
+        width: usize,
+        make: impl Fn() -> W + Sync + Send,
+        run: impl Fn(&mut W, usize, &mut [f64]) + Sync + Send,
+    ) -> Result<Vec<f64>> {
         self.chunks(width, 1, make, run)
     }
 
     /// The same by chunks of rows: `run` gets the first row and room for the results of all.
-    fn chunks<W>(&self, width: usize, rows: usize, make: impl Fn() -> W + Sync + Send, run: impl Fn(&mut W, usize, &mut [f64]) + Sync + Send) -> Result<Vec<f64>> {
+    fn chunks<W>(
+        &self,
+        width: usize,
+        rows: usize,
+        make: impl Fn() -> W + Sync + Send,
+        run: impl Fn(&mut W, usize, &mut [f64]) + Sync + Send,
+    ) -> Result<Vec<f64>> {
         let numbers = self.count().saturating_mul(width);
         let mut out = room(numbers, "the result")?;
         out.resize(numbers, 0.0);
@@ -103,7 +128,9 @@ impl Rows {
             let mut work = make();
             out.chunks_mut(size).enumerate().for_each(|(k, out)| run(&mut work, k * rows, out));
         } else {
-            pool::shared()?.install(|| out.par_chunks_mut(size).enumerate().for_each_init(make, |work, (k, out)| run(work, k * rows, out)));
+            pool::shared()?.install(|| {
+                out.par_chunks_mut(size).enumerate().for_each_init(make, |work, (k, out)| run(work, k * rows, out))
+            });
         }
         Ok(out)
     }
@@ -142,11 +169,20 @@ impl Robot {
         let (rows, model, dof) = (&*rows, &self.model, self.dof());
         caught(|| {
             if rows.count() < LANES {
-                return rows.each(dof, || Dynamics::new(model), |d, k, qdd| {
-                    forward_dynamics(d, gravity, rows.row(0, k), rows.row(1, k), rows.row(2, k), qdd);
-                });
+                return rows.each(
+                    dof,
+                    || Dynamics::new(model),
+                    |d, k, qdd| {
+                        forward_dynamics(d, gravity, rows.row(0, k), rows.row(1, k), rows.row(2, k), qdd);
+                    },
+                );
             }
-            let make = || (BatchDynamics::<LANES>::new(model), [self.positions(), dof, dof, dof].map(|n| vec![Lanes([0.0; LANES]); n]));
+            let make = || {
+                (
+                    BatchDynamics::<LANES>::new(model),
+                    [self.positions(), dof, dof, dof].map(|n| vec![Lanes([0.0; LANES]); n]),
+                )
+            };
             rows.chunks(dof, LANES, make, |(batch, [q, v, tau, qdd]), first, out| {
                 let last = first + out.len() / dof - 1;
                 for lane in 0..LANES {
@@ -178,7 +214,9 @@ impl Robot {
 
     /// `M` of `q`, by rows.
     pub fn mass_matrix(&self, rows: &mut Rows) -> Result<Vec<f64>> {
-        self.at_positions(rows, self.dof() * self.dof(), |kin, _, out| MassMatrix::new(&self.model).write(&self.model, kin, out))
+        self.at_positions(rows, self.dof() * self.dof(), |kin, _, out| {
+            MassMatrix::new(&self.model).write(&self.model, kin, out)
+        })
     }
 
     /// Angular, then linear velocity of a frame's origin per unit of each velocity, world axes: 6 rows.
@@ -215,14 +253,23 @@ impl Robot {
     }
 
     /// Something of the positions alone, with the kinematics there.
-    fn at_positions(&self, rows: &mut Rows, width: usize, run: impl Fn(&mut Kinematics, usize, &mut [f64]) + Sync + Send) -> Result<Vec<f64>> {
+    fn at_positions(
+        &self,
+        rows: &mut Rows,
+        width: usize,
+        run: impl Fn(&mut Kinematics, usize, &mut [f64]) + Sync + Send,
+    ) -> Result<Vec<f64>> {
         rows.settle(&self.model)?;
         let (rows, still) = (&*rows, vec![0.0; self.dof()]);
         caught(|| {
-            rows.each(width, || Kinematics::new(&self.model), |kin, k, out| {
-                kin.refresh(&self.model, rows.row(0, k), &still);
-                run(kin, k, out);
-            })
+            rows.each(
+                width,
+                || Kinematics::new(&self.model),
+                |kin, k, out| {
+                    kin.refresh(&self.model, rows.row(0, k), &still);
+                    run(kin, k, out);
+                },
+            )
         })
     }
 }

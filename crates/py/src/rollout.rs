@@ -42,21 +42,42 @@ pub struct Plan {
 
 impl Plan {
     /// For some articulated bodies, or all. Checks shapes against each other and the world.
-    pub fn new(inner: &Inner, asked: Option<Vec<ObjectId>>, controls: Numbers, states: Option<Numbers>, every: usize) -> Result<Plan> {
+    pub fn new(
+        inner: &Inner,
+        asked: Option<Vec<ObjectId>>,
+        controls: Numbers,
+        states: Option<Numbers>,
+        every: usize,
+    ) -> Result<Plan> {
         let depth = DEPTH.get() + 1;
         if depth > DEEPEST {
-            return Err(PyRecursionError::new_err(format!("a force that rolls out a world from within a rollout, more than {DEEPEST} deep")).into());
+            return Err(PyRecursionError::new_err(format!(
+                "a force that rolls out a world from within a rollout, more than {DEEPEST} deep"
+            ))
+            .into());
         }
         let all = || body_ids(&inner.world).into_iter().filter(|id| inner.robots.contains_key(id)).collect();
-        let freedoms = |id: ObjectId| inner.robots.get(&id).map(|robot| (id, robot.dof())).ok_or_else(|| Error::value("controls are of articulations"));
+        let freedoms = |id: ObjectId| {
+            inner
+                .robots
+                .get(&id)
+                .map(|robot| (id, robot.dof()))
+                .ok_or_else(|| Error::value("controls are of articulations"))
+        };
         let driven = asked.unwrap_or_else(all).into_iter().map(freedoms).collect::<Result<Vec<_>>>()?;
         let width: usize = driven.iter().map(|(_, dof)| dof).sum();
         let [count, frames, got] = controls.shape[..] else {
-            return Err(Error::value(format!("controls: wanted shape (forks, steps, {width}), and got {}", shown(&controls.shape))));
+            return Err(Error::value(format!(
+                "controls: wanted shape (forks, steps, {width}), and got {}",
+                shown(&controls.shape)
+            )));
         };
         if got != width {
             let why = "as many as the articulations have freedoms";
-            return Err(Error::value(format!("controls: wanted {width} numbers a step, {why}, and got shape {}", shown(&controls.shape))));
+            return Err(Error::value(format!(
+                "controls: wanted {width} numbers a step, {why}, and got shape {}",
+                shown(&controls.shape)
+            )));
         }
         if every == 0 || frames % every != 0 {
             return Err(Error::value(format!("every is {every}; it must divide the {frames} steps")));
@@ -66,11 +87,16 @@ impl Plan {
             && states.shape != [x]
             && states.shape != [count, x]
         {
-            return Err(Error::value(format!("states: wanted shape ({x},) or ({count}, {x}), and got {}", shown(&states.shape))));
+            return Err(Error::value(format!(
+                "states: wanted shape ({x},) or ({count}, {x}), and got {}",
+                shown(&states.shape)
+            )));
         }
         let numbers = count.checked_mul(frames / every).and_then(|n| n.checked_mul(x.max(1)));
         if numbers.is_none_or(|n| n > MOST) {
-            return Err(Error::value(format!("{count} forks of {frames} steps have more than {MOST} numbers; keep fewer with `every`")));
+            return Err(Error::value(format!(
+                "{count} forks of {frames} steps have more than {MOST} numbers; keep fewer with `every`"
+            )));
         }
         Ok(Plan { depth, count, frames, every, driven, controls: controls.data, states })
     }
@@ -109,18 +135,23 @@ impl Plan {
                     let own = template.lock().map_err(|_| Error::Broken)?.fork();
                     caught(|| self.fork(own, fork, out))
                 };
-                pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>()).into_iter().collect::<Result<()>>()?;
+                pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>())
+                    .into_iter()
+                    .collect::<Result<()>>()?;
             }
             // a fork runs code in Python, which may wait for the threads of the pool: none of them may wait for it
             false => {
                 let few = 4 * pool.current_num_threads();
                 for (first, out) in out.chunks_mut(few * kept).enumerate().map(|(k, out)| (k * few, out)) {
-                    let own: Vec<Mutex<Option<Inner>>> = (0..out.len() / kept).map(|_| Mutex::new(Some(world.fork()))).collect();
+                    let own: Vec<Mutex<Option<Inner>>> =
+                        (0..out.len() / kept).map(|_| Mutex::new(Some(world.fork()))).collect();
                     let each = |(k, out): (usize, &mut [f64])| {
                         let own = own[k].lock().map_err(|_| Error::Broken)?.take().ok_or(Error::Broken)?;
                         caught(|| self.fork(own, first + k, out))
                     };
-                    pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>()).into_iter().collect::<Result<()>>()?;
+                    pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>())
+                        .into_iter()
+                        .collect::<Result<()>>()?;
                 }
             }
         }

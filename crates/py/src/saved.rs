@@ -20,7 +20,9 @@ pub fn write(inner: &Inner) -> Vec<u8> {
     let mut bytes = inner.world.save();
     let first = bytes.len();
     for (place, id) in inner.world.ids().iter().enumerate() {
-        let Some(forces) = inner.efforts.get(id).filter(|forces| forces.iter().any(|force| *force != 0.0)) else { continue };
+        let Some(forces) = inner.efforts.get(id).filter(|forces| forces.iter().any(|force| *force != 0.0)) else {
+            continue;
+        };
         bytes.extend((place as u32).to_le_bytes());
         bytes.extend((forces.len() as u32).to_le_bytes());
         bytes.extend(forces.iter().flat_map(|force| force.to_le_bytes()));
@@ -65,7 +67,9 @@ fn efforts(inner: &Inner, mut bytes: &[u8]) -> Result<Vec<(ObjectId, Vec<f64>)>,
         let (place, rest) = bytes.split_first_chunk::<4>().ok_or_else(|| wrong("are cut off"))?;
         let (count, rest) = rest.split_first_chunk::<4>().ok_or_else(|| wrong("are cut off"))?;
         let id = inner.world.ids().get(u32::from_le_bytes(*place) as usize).copied();
-        let (id, robot) = id.and_then(|id| Some((id, inner.robots.get(&id)?))).ok_or_else(|| wrong("are of a body that is not articulated"))?;
+        let (id, robot) = id
+            .and_then(|id| Some((id, inner.robots.get(&id)?)))
+            .ok_or_else(|| wrong("are of a body that is not articulated"))?;
         let count = u32::from_le_bytes(*count) as usize;
         if count != robot.dof() || rest.len() < 8 * count {
             return Err(wrong("have the wrong length"));

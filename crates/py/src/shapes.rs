@@ -1,8 +1,8 @@
 //! Shapes: what bodies are made of. Sizes are those that one measures: full edge lengths, lengths without caps.
 
 use crate::convert::{number, numbers, path, shown, some, vec3_or};
-use crate::pool;
 use crate::errors::{Error, Result, caught};
+use crate::pool;
 use nalgebra::Translation3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::PyClass;
@@ -111,7 +111,11 @@ impl Cylinder {
 }
 
 fn half(length: f64) -> Result<f64> {
-    if length.is_finite() && length > 0.0 { Ok(0.5 * length) } else { Err(Error::value(format!("length is {length}, but must be finite and above 0 m"))) }
+    if length.is_finite() && length > 0.0 {
+        Ok(0.5 * length)
+    } else {
+        Err(Error::value(format!("length is {length}, but must be finite and above 0 m")))
+    }
 }
 
 /// All points x with ``normal · x <= offset``. normal: of any length above 0, points out of the solid; offset: metres along the unit normal.
@@ -133,7 +137,8 @@ impl HalfSpace {
         }
         let n = (given / largest).normalize();
         // half a turn about x where the normal points straight down
-        let rotation = Quat::rotation_between(&Vec3::z(), &n).unwrap_or_else(|| Quat::from_quaternion(nalgebra::Quaternion::new(0.0, 1.0, 0.0, 0.0)));
+        let rotation = Quat::rotation_between(&Vec3::z(), &n)
+            .unwrap_or_else(|| Quat::from_quaternion(nalgebra::Quaternion::new(0.0, 1.0, 0.0, 0.0)));
         let placement = Pose::from_parts(Translation3::from(n * offset), rotation);
         let words = format!("HalfSpace(normal=({}, {}, {}), offset={offset})", given.x, given.y, given.z);
         Ok(Shape { solid: Solid::half_space(), placement, words }.into_a(HalfSpace))
@@ -154,13 +159,20 @@ pub struct Mesh {
 impl Mesh {
     #[new]
     #[pyo3(signature = (vertices, faces=None, *, scale=1.0))]
-    fn new(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>, scale: f64) -> Result<PyClassInitializer<Mesh>> {
+    fn new(
+        py: Python<'_>,
+        vertices: &Bound<'_, PyAny>,
+        faces: Option<&Bound<'_, PyAny>>,
+        scale: f64,
+    ) -> Result<PyClassInitializer<Mesh>> {
         if !(scale.is_finite() && scale > 0.0) {
             return Err(Error::value(format!("scale is {scale}; it must be finite and above 0")));
         }
         let mesh = triangles(py, vertices, faces)?.scaled(scale);
         let count = mesh.triangles.len();
-        let (solid, center, _) = py.detach(|| pool::run(|| Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?)))?;
+        let (solid, center, _) = py.detach(|| {
+            pool::run(|| Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?))
+        })?;
         Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh { center }))
     }
 
@@ -200,7 +212,9 @@ pub fn triangles(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bou
     let file = path(vertices)?;
     py.detach(|| {
         let bytes = std::fs::read(&file).map_err(|source| Error::File { file: file.display().to_string(), source })?;
-        let (mesh, _) = pool::run(|| read_solid(&file, &bytes, None).map_err(|why| Error::value(format!("{}: {why}", file.display()))))?;
+        let (mesh, _) = pool::run(|| {
+            read_solid(&file, &bytes, None).map_err(|why| Error::value(format!("{}: {why}", file.display())))
+        })?;
         Ok(mesh)
     })
 }

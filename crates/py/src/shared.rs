@@ -74,7 +74,11 @@ impl Shared {
 
     /// The same in parts of the given length, until one answers that it was the last: the world stays held over all of them, and Ctrl-C is heard between
     /// two.
-    pub fn work_in_parts(&self, py: Python<'_>, mut part: impl FnMut(&mut Inner, Duration) -> Result<bool> + Send) -> Result<()> {
+    pub fn work_in_parts(
+        &self,
+        py: Python<'_>,
+        mut part: impl FnMut(&mut Inner, Duration) -> Result<bool> + Send,
+    ) -> Result<()> {
         let mut held = self.hold()?;
         apart(py, &mut held, |py, inner| {
             loop {

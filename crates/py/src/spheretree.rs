@@ -1,15 +1,18 @@
 //! Sphere trees: built, measured, written and read. The trees and all their figures are the library's.
 
 use crate::convert::{path, whole_number};
-use crate::pool;
 use crate::errors::{Error, Result, caught};
+use crate::pool;
 use crate::shapes::triangles;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::path::PathBuf;
 use std::sync::OnceLock;
-use tumble::collide::{Builder, CachedTree, LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree as Tree, TreeCache, TreeFile, TreeSettings, TriMesh};
+use tumble::collide::{
+    Builder, CachedTree, LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree as Tree, TreeCache, TreeFile,
+    TreeSettings, TriMesh,
+};
 
 /// The methods by the words of the command.
 const METHODS: [(&str, Builder); 4] =
@@ -40,7 +43,9 @@ impl SphereTree {
     fn measured(&self, py: Python<'_>) -> Result<&[LevelQuality]> {
         if self.quality.get().is_none() {
             let Some(mesh) = &self.mesh else {
-                return Err(Error::value("the file of this tree holds no figures, and without its mesh none can be measured; build it anew"));
+                return Err(Error::value(
+                    "the file of this tree holds no figures, and without its mesh none can be measured; build it anew",
+                ));
             };
             let quality = py.detach(|| pool::run(|| Ok(self.file.tree.quality(mesh, &QualitySettings::default()))))?;
             _ = self.quality.set(quality); // whoever came first measured the same
@@ -60,14 +65,25 @@ fn settings(method: &str, branch: Option<u32>, depth: Option<u32>, error: Option
         let names = METHODS.map(|(name, _)| name).join(", ");
         return Err(Error::value(format!("method: `{method}` is not known; there are {names}")));
     };
-    let usual = if builder == Builder::Octree { TreeSettings::octree() } else { TreeSettings { builder, ..TreeSettings::default() } };
-    Ok(TreeSettings { branch: branch.unwrap_or(usual.branch), depth: depth.unwrap_or(usual.depth), error: error.unwrap_or(usual.error), ..usual })
+    let usual = if builder == Builder::Octree {
+        TreeSettings::octree()
+    } else {
+        TreeSettings { builder, ..TreeSettings::default() }
+    };
+    Ok(TreeSettings {
+        branch: branch.unwrap_or(usual.branch),
+        depth: depth.unwrap_or(usual.depth),
+        error: error.unwrap_or(usual.error),
+        ..usual
+    })
 }
 
 /// What the mesh is called in the tree's file.
 fn name_of(vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>) -> String {
     let file = faces.is_none().then(|| path(vertices).ok()).flatten();
-    file.as_deref().and_then(|file| file.file_name()).map_or_else(|| "mesh".into(), |name| name.to_string_lossy().into_owned())
+    file.as_deref()
+        .and_then(|file| file.file_name())
+        .map_or_else(|| "mesh".into(), |name| name.to_string_lossy().into_owned())
 }
 
 #[pymethods]
@@ -85,8 +101,14 @@ impl SphereTree {
     #[pyo3(signature = (vertices, faces=None, *, method="medial", branch=None, depth=None, error=None, cache=true))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn build(
-        py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>, method: &str,
-        #[pyo3(from_py_with = whole_number)] branch: Option<u32>, #[pyo3(from_py_with = whole_number)] depth: Option<u32>, error: Option<f64>, cache: bool,
+        py: Python<'_>,
+        vertices: &Bound<'_, PyAny>,
+        faces: Option<&Bound<'_, PyAny>>,
+        method: &str,
+        #[pyo3(from_py_with = whole_number)] branch: Option<u32>,
+        #[pyo3(from_py_with = whole_number)] depth: Option<u32>,
+        error: Option<f64>,
+        cache: bool,
     ) -> Result<SphereTree> {
         let settings = settings(method, branch, depth, error)?;
         let (name, mut mesh) = (name_of(vertices, faces), triangles(py, vertices, faces)?);
@@ -106,8 +128,11 @@ impl SphereTree {
     fn load(py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<SphereTree> {
         let path = self::path(path)?;
         py.detach(|| {
-            let text = std::fs::read_to_string(&path).map_err(|source| Error::File { file: path.display().to_string(), source })?;
-            let file = caught(|| TreeFile::from_json(&text).map_err(|why| Error::value(format!("{}: {why}", path.display()))))?;
+            let text = std::fs::read_to_string(&path)
+                .map_err(|source| Error::File { file: path.display().to_string(), source })?;
+            let file = caught(|| {
+                TreeFile::from_json(&text).map_err(|why| Error::value(format!("{}: {why}", path.display())))
+            })?;
             Ok(SphereTree::of(file, None))
         })
     }
@@ -115,7 +140,10 @@ impl SphereTree {
     /// Writes the tree and its figures as JSON: the file of ``tumble spheretree --output``.
     fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<()> {
         let (path, file): (PathBuf, TreeFile) = (self::path(path)?, self.whole(py)?);
-        py.detach(|| std::fs::write(&path, file.to_json()).map_err(|source| Error::File { file: path.display().to_string(), source }))
+        py.detach(|| {
+            std::fs::write(&path, file.to_json())
+                .map_err(|source| Error::File { file: path.display().to_string(), source })
+        })
     }
 
     /// The same as a string.
@@ -164,7 +192,8 @@ impl SphereTree {
     /// For each level, of each ball the index of its parent in the level above, shape (n,); -1 for the root.
     #[getter]
     fn parents<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
-        let parents = |balls: &Vec<LevelBall>| PyArray1::from_iter(py, balls.iter().map(|b| b.parent.map_or(-1, |p| p as i64)));
+        let parents =
+            |balls: &Vec<LevelBall>| PyArray1::from_iter(py, balls.iter().map(|b| b.parent.map_or(-1, |p| p as i64)));
         Ok(PyTuple::new(py, self.levels.iter().map(parents))?)
     }
 
@@ -183,8 +212,13 @@ impl SphereTree {
     fn quality<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         type Figure = (&'static str, fn(&LevelQuality) -> f64);
         const FIGURES: [Figure; 7] = [
-            ("coverage", |q| q.coverage), ("protrusion_mean", |q| q.protrusion_mean), ("protrusion_p95", |q| q.protrusion_p95),
-            ("protrusion_max", |q| q.protrusion_max), ("gap_mean", |q| q.gap_mean), ("gap_max", |q| q.gap_max), ("volume_ratio", |q| q.volume_ratio),
+            ("coverage", |q| q.coverage),
+            ("protrusion_mean", |q| q.protrusion_mean),
+            ("protrusion_p95", |q| q.protrusion_p95),
+            ("protrusion_max", |q| q.protrusion_max),
+            ("gap_mean", |q| q.gap_mean),
+            ("gap_max", |q| q.gap_max),
+            ("volume_ratio", |q| q.volume_ratio),
         ];
         let (levels, dict) = (self.measured(py)?, PyDict::new(py));
         dict.set_item("level", PyArray1::from_iter(py, levels.iter().map(|q| i64::from(q.level))))?;

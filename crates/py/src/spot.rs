@@ -90,7 +90,9 @@ impl Spot {
     pub fn gravity(&self) -> Result<Vec3> {
         match self {
             Spot::Free { now, .. } => Ok(locked(now).gravity),
-            Spot::Placed(place) => place.read(|inner| inner.world.status(place.id).map(|_| inner.world.settings().gravity)),
+            Spot::Placed(place) => {
+                place.read(|inner| inner.world.status(place.id).map(|_| inner.world.settings().gravity))
+            }
         }
     }
 
@@ -145,7 +147,9 @@ impl Spot {
     pub fn freedoms(&self, py: Python<'_>) -> Result<Vec<Freedom>> {
         match self {
             Spot::Free { source, .. } => Ok(py.detach(|| source.joints())?.freedoms().to_vec()),
-            Spot::Placed(place) => place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.freedoms().to_vec())),
+            Spot::Placed(place) => {
+                place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.freedoms().to_vec()))
+            }
         }
     }
 }

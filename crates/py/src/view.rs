@@ -4,10 +4,10 @@
 //! kept would look into it. The arrays of one call serve the next, unless Python kept any. After the call the view
 //! refuses to be asked, and what was added to its arrays is read once and then no more.
 
+use crate::bodies::place_of;
 use crate::convert::{vec3, whole_number};
 use crate::errors::{Error, Result};
 use crate::state::holders;
-use crate::bodies::place_of;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyString};
@@ -65,7 +65,14 @@ impl Row {
 impl Layout {
     /// Of the world as it is.
     pub fn of(view: &WorldView) -> Layout {
-        let mut layout = Layout { ids: view.ids().to_vec(), objects: Vec::new(), links: Vec::new(), rows: Vec::new(), sites: view.sites.len(), plain: true };
+        let mut layout = Layout {
+            ids: view.ids().to_vec(),
+            objects: Vec::new(),
+            links: Vec::new(),
+            rows: Vec::new(),
+            sites: view.sites.len(),
+            plain: true,
+        };
         for &id in view.ids() {
             let (Some(span), Some(object)) = (view.span(id), view.object(id)) else { continue };
             if span.site.is_empty() {
@@ -77,14 +84,28 @@ impl Layout {
                     let links = body.model().links();
                     let moving = links.iter().enumerate().map(|(i, link)| (i, link.mass.center, link.mass.mass, true));
                     let rows = moving.chain([(links.len(), Vec3::zeros(), 0.0, false)]);
-                    layout.rows.extend(rows.map(|(part, center, mass, may_move)| Row { site: span.site.start + part, center, mass, may_move }));
-                    let names = body.model().frames().iter().map(|frame| (frame.name.clone(), frame.link.unwrap_or(links.len())));
+                    layout.rows.extend(rows.map(|(part, center, mass, may_move)| Row {
+                        site: span.site.start + part,
+                        center,
+                        mass,
+                        may_move,
+                    }));
+                    let names = body
+                        .model()
+                        .frames()
+                        .iter()
+                        .map(|frame| (frame.name.clone(), frame.link.unwrap_or(links.len())));
                     layout.links.push((id, names.collect()));
                     layout.plain = false;
                 }
                 None => {
                     let mass = view.get::<Rigid>(id).filter(|body| !body.is_fixture()).map_or(0.0, |body| body.mass());
-                    layout.rows.extend(span.site.clone().map(|site| Row { site, center: Vec3::zeros(), mass, may_move: true }));
+                    layout.rows.extend(span.site.clone().map(|site| Row {
+                        site,
+                        center: Vec3::zeros(),
+                        mass,
+                        may_move: true,
+                    }));
                 }
             }
             layout.objects.push((id, object.name().into(), first..layout.rows.len()));
@@ -187,13 +208,25 @@ impl Arrays {
     }
 
     /// What a callback added, by row.
-    pub fn take(&self, py: Python<'_>, layout: &Layout, whose: &str, mut each: impl FnMut(usize, Wrench)) -> Result<()> {
-        let (force, torque) = (self.force.bind(py).try_readonly().map_err(PyErr::from)?, self.torque.bind(py).try_readonly().map_err(PyErr::from)?);
+    pub fn take(
+        &self,
+        py: Python<'_>,
+        layout: &Layout,
+        whose: &str,
+        mut each: impl FnMut(usize, Wrench),
+    ) -> Result<()> {
+        let (force, torque) = (
+            self.force.bind(py).try_readonly().map_err(PyErr::from)?,
+            self.torque.bind(py).try_readonly().map_err(PyErr::from)?,
+        );
         let (force, torque) = (force.as_slice().map_err(PyErr::from)?, torque.as_slice().map_err(PyErr::from)?);
         for (what, numbers) in [("force", force), ("torque", torque)] {
             if let Some(k) = numbers.iter().position(|x| !x.is_finite()) {
                 let name = layout.owner(k / 3).map_or("nothing", |(_, _, name)| name);
-                return Err(Error::value(format!("'{whose}': its {what} on '{name}' is {}; it must be finite", numbers[k])));
+                return Err(Error::value(format!(
+                    "'{whose}': its {what} on '{name}' is {}; it must be finite",
+                    numbers[k]
+                )));
             }
         }
         for (row, (force, torque)) in force.chunks_exact(3).zip(torque.chunks_exact(3)).enumerate() {
@@ -204,7 +237,12 @@ impl Arrays {
 }
 
 /// Writes one row of each site.
-fn copy<const N: usize>(py: Python<'_>, (array, _): &Column, sites: &[Site], get: impl Fn(&Site) -> [f64; N]) -> Result<()> {
+fn copy<const N: usize>(
+    py: Python<'_>,
+    (array, _): &Column,
+    sites: &[Site],
+    get: impl Fn(&Site) -> [f64; N],
+) -> Result<()> {
     let mut out = array.bind(py).try_readwrite().map_err(PyErr::from)?;
     let rows = out.as_slice_mut().map_err(PyErr::from)?.as_chunks_mut().0;
     rows.iter_mut().zip(sites).for_each(|(row, site)| *row = get(site));
@@ -233,7 +271,14 @@ impl View {
             let moving = view.status(*id).is_some_and(|status| status.moves());
             rows.clone().for_each(|row| moves[row] = moving && layout.rows[row].may_move);
         }
-        View { arrays: arrays.clone(), layout: layout.clone(), moves, time: view.time, gravity: view.gravity, over: AtomicBool::new(false) }
+        View {
+            arrays: arrays.clone(),
+            layout: layout.clone(),
+            moves,
+            time: view.time,
+            gravity: view.gravity,
+            over: AtomicBool::new(false),
+        }
     }
 
     /// The callback has returned.
@@ -243,7 +288,9 @@ impl View {
 
     fn open(&self) -> Result<()> {
         match self.over.load(Ordering::Relaxed) {
-            true => Err(Error::Removed("this view belonged to a call that has returned; copy what is needed later while the call lasts".into())),
+            true => Err(Error::Removed(
+                "this view belonged to a call that has returned; copy what is needed later while the call lasts".into(),
+            )),
             false => Ok(()),
         }
     }
@@ -265,7 +312,9 @@ impl View {
         let own = array.bind(py);
         // `view.force += …` gives back what it was given
         match value.cast::<PyArray2<f64>>() {
-            Ok(value) if value.data() == own.data() && value.shape() == own.shape() && value.is_c_contiguous() => Ok(()),
+            Ok(value) if value.data() == own.data() && value.shape() == own.shape() && value.is_c_contiguous() => {
+                Ok(())
+            }
             _ => Ok(own.set_item(py.Ellipsis(), value)?),
         }
     }
@@ -387,7 +436,9 @@ impl View {
         let rows = self.row_of(body)?;
         let part = match (part, self.layout.owner(rows.start)) {
             (None, _) => 0,
-            (Some(part), Some((id, ..))) if part.is_instance_of::<PyString>() => self.layout.link(id, &part.extract::<String>()?)?,
+            (Some(part), Some((id, ..))) if part.is_instance_of::<PyString>() => {
+                self.layout.link(id, &part.extract::<String>()?)?
+            }
             (Some(part), _) => whole_number(part)?,
         };
         match part < rows.len() {
@@ -403,7 +454,13 @@ impl View {
     }
 
     /// Adds a force, shape (3,), N, that acts on a row at a point of the world, shape (3,), m: with the torque ``(point - position) × force``.
-    fn push(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] row: usize, force: &Bound<'_, PyAny>, point: &Bound<'_, PyAny>) -> Result<()> {
+    fn push(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole_number)] row: usize,
+        force: &Bound<'_, PyAny>,
+        point: &Bound<'_, PyAny>,
+    ) -> Result<()> {
         self.open()?;
         let (force, point) = (vec3(force, "force")?, vec3(point, "point")?);
         if row >= self.moves.len() {

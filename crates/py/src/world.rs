@@ -4,17 +4,17 @@ use crate::adding::{add, articulated, contact_mode, own_place, rigid};
 use crate::articulation::Articulation;
 use crate::bodies::{Bodies, by_name, handle, place_of};
 use crate::body::RigidBody;
-use crate::collect::{Anchor, anchor};
 use crate::building::{Choices, build};
+use crate::collect::{Anchor, anchor};
 use crate::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
-use crate::pool;
 use crate::errors::{Error, Result};
-use crate::report::StepReport;
-use crate::shapes::Shape;
 use crate::inner::Inner;
-use crate::shared::Shared;
 use crate::picture::Shot;
+use crate::pool;
+use crate::report::StepReport;
 use crate::rollout::Plan;
+use crate::shapes::Shape;
+use crate::shared::Shared;
 use crate::{bodies, contacts, saved};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
@@ -70,14 +70,24 @@ impl World {
         contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
-        py: Python<'_>, gravity: Option<&Bound<'_, PyAny>>, dt: f64, stepper: &str, integrator: &str, solver: &str, #[pyo3(from_py_with = whole_number)] substeps: u32,
-        #[pyo3(from_py_with = whole_number)] iterations: u32, contact_tolerance: f64,
-        integrator_tolerance: f64, sleep_after: Option<f64>, sleep_within: f64,
+        py: Python<'_>,
+        gravity: Option<&Bound<'_, PyAny>>,
+        dt: f64,
+        stepper: &str,
+        integrator: &str,
+        solver: &str,
+        #[pyo3(from_py_with = whole_number)] substeps: u32,
+        #[pyo3(from_py_with = whole_number)] iterations: u32,
+        contact_tolerance: f64,
+        integrator_tolerance: f64,
+        sleep_after: Option<f64>,
+        sleep_within: f64,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
         world.gravity_m_per_s2 = vec3_or(gravity, "gravity", Vec3::from(world.gravity_m_per_s2))?.into();
-        Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }.apply(world)?;
+        Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }
+            .apply(world)?;
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
         (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
@@ -91,7 +101,12 @@ impl World {
     #[staticmethod]
     #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None))]
     fn load(
-        py: Python<'_>, path_or_name: &Bound<'_, PyAny>, dt: Option<f64>, stepper: Option<&str>, integrator: Option<&str>, solver: Option<&str>,
+        py: Python<'_>,
+        path_or_name: &Bound<'_, PyAny>,
+        dt: Option<f64>,
+        stepper: Option<&str>,
+        integrator: Option<&str>,
+        solver: Option<&str>,
     ) -> Result<World> {
         let asked = path(path_or_name)?;
         let built = py.detach(|| {
@@ -121,7 +136,9 @@ impl World {
     /// On a ``StepError`` the world is as it was before the step that failed; the steps before that stand.
     #[pyo3(signature = (n=1))]
     fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] n: i64) -> Result<()> {
-        let Ok(mut left) = u64::try_from(n) else { return Err(Error::value(format!("n is {n}; it must be at least 0"))) };
+        let Ok(mut left) = u64::try_from(n) else {
+            return Err(Error::value(format!("n is {n}; it must be at least 0")));
+        };
         self.shared.work_in_parts(py, |inner, turn| {
             let begun = (left > 1).then(Instant::now);
             while left > 0 {
@@ -218,7 +235,10 @@ impl World {
     /// Momentum of everything that moves: ``linear`` (3,), N·s, and ``angular`` (3,) about the world's origin, N·m·s. World axes.
     fn momentum(&self, py: Python<'_>) -> Result<Py<PyAny>> {
         let m = self.shared.read(|inner| Ok(inner.world.momentum()))?;
-        Ok(py.import("tumble._values")?.call_method1("Momentum", (vector(py, &m.linear), vector(py, &m.angular)))?.unbind())
+        Ok(py
+            .import("tumble._values")?
+            .call_method1("Momentum", (vector(py, &m.linear), vector(py, &m.angular)))?
+            .unbind())
     }
 
     /// What the last step took and how well it went.
@@ -255,15 +275,23 @@ impl World {
     /// (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which.
     #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
     fn rollout<'py>(
-        &self, py: Python<'py>, controls: &Bound<'py, PyAny>, articulations: Option<Vec<Bound<'py, PyAny>>>, states: Option<&Bound<'py, PyAny>>,
-        #[pyo3(from_py_with = whole_number)] every: usize, #[pyo3(from_py_with = whole_number)] threads: Option<usize>,
+        &self,
+        py: Python<'py>,
+        controls: &Bound<'py, PyAny>,
+        articulations: Option<Vec<Bound<'py, PyAny>>>,
+        states: Option<&Bound<'py, PyAny>>,
+        #[pyo3(from_py_with = whole_number)] every: usize,
+        #[pyo3(from_py_with = whole_number)] threads: Option<usize>,
     ) -> Result<Bound<'py, PyArray3<f64>>> {
         if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
             return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
         }
-        let asked = articulations.map(|all| all.iter().map(|one| Ok(own_place(&self.shared, one)?.id)).collect::<Result<Vec<_>>>()).transpose()?;
+        let asked = articulations
+            .map(|all| all.iter().map(|one| Ok(own_place(&self.shared, one)?.id)).collect::<Result<Vec<_>>>())
+            .transpose()?;
         let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
-        let (plan, fork) = self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
+        let (plan, fork) =
+            self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
         let (shape, out) = py.detach(|| {
             let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
             plan.run(fork, threads).map(|out| (shape, out))
@@ -299,14 +327,34 @@ impl World {
         friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
-        &self, py: Python<'_>, name: &str, shape: PyRef<'_, Shape>, mass: Option<f64>, density: Option<f64>, position: Option<&Bound<'_, PyAny>>,
-        orientation: Option<&Bound<'_, PyAny>>, velocity: Option<&Bound<'_, PyAny>>, angular_velocity: Option<&Bound<'_, PyAny>>, restitution: f64,
-        friction: f64, linear_damping: f64, angular_damping: f64, kinematic: bool, collidable: bool, contacts: &str,
+        &self,
+        py: Python<'_>,
+        name: &str,
+        shape: PyRef<'_, Shape>,
+        mass: Option<f64>,
+        density: Option<f64>,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        angular_velocity: Option<&Bound<'_, PyAny>>,
+        restitution: f64,
+        friction: f64,
+        linear_damping: f64,
+        angular_damping: f64,
+        kinematic: bool,
+        collidable: bool,
+        contacts: &str,
     ) -> Result<RigidBody> {
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
-        let motion = [vec3_or(velocity, "velocity", Vec3::zeros())?, vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?];
-        let mut body = rigid(name, &shape, mass, density, kinematic)?.at(pose(position, orientation)? * shape.placement).surface(restitution, friction);
-        (body.linear_damping, body.angular_damping, body.contact_mode) = (linear_damping, angular_damping, contact_mode(contacts)?);
+        let motion = [
+            vec3_or(velocity, "velocity", Vec3::zeros())?,
+            vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?,
+        ];
+        let mut body = rigid(name, &shape, mass, density, kinematic)?
+            .at(pose(position, orientation)? * shape.placement)
+            .surface(restitution, friction);
+        (body.linear_damping, body.angular_damping, body.contact_mode) =
+            (linear_damping, angular_damping, contact_mode(contacts)?);
         add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
     }
 
@@ -314,11 +362,22 @@ impl World {
     #[pyo3(signature = (name, shape, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
-        &self, py: Python<'_>, name: &str, shape: PyRef<'_, Shape>, position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, PyAny>>,
-        restitution: f64, friction: f64, collidable: bool, contacts: &str,
+        &self,
+        py: Python<'_>,
+        name: &str,
+        shape: PyRef<'_, Shape>,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+        restitution: f64,
+        friction: f64,
+        collidable: bool,
+        contacts: &str,
     ) -> Result<RigidBody> {
         let pose = pose(position, orientation)? * shape.placement;
-        let body = Rigid::fixture(name, shape.solid.clone()).at(pose).surface(restitution, friction).colliding_by(contact_mode(contacts)?);
+        let body = Rigid::fixture(name, shape.solid.clone())
+            .at(pose)
+            .surface(restitution, friction)
+            .colliding_by(contact_mode(contacts)?);
         add(&self.shared, py, body, Mode::Static, collidable)
     }
 
@@ -329,7 +388,11 @@ impl World {
     /// said from the base.
     #[pyo3(signature = (articulation, base=None, *, name=None))]
     fn add_articulation(
-        &self, py: Python<'_>, articulation: &Bound<'_, PyAny>, base: Option<&Bound<'_, PyAny>>, name: Option<&str>,
+        &self,
+        py: Python<'_>,
+        articulation: &Bound<'_, PyAny>,
+        base: Option<&Bound<'_, PyAny>>,
+        name: Option<&str>,
     ) -> Result<Articulation> {
         articulated(&self.shared, py, articulation, base, name)
     }
@@ -356,14 +419,22 @@ impl World {
     }
 
     /// Adds a behaviour of your own, an object of a subclass of ``tumble.Behaviour``, to bodies given by name or as handles.
-    fn add_behaviour(&self, py: Python<'_>, name: &str, behaviour: &Bound<'_, PyAny>, bodies: &Bound<'_, PyAny>) -> Result<()> {
+    fn add_behaviour(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        behaviour: &Bound<'_, PyAny>,
+        bodies: &Bound<'_, PyAny>,
+    ) -> Result<()> {
         py.import("tumble._extension")?.call_method1("check_behaviour", (behaviour,))?;
-        let given: Vec<Bound<'_, PyAny>> = match bodies.is_instance_of::<pyo3::types::PyString>() || place_of(bodies).is_ok() {
-            true => vec![bodies.clone()],
-            false => bodies.try_iter()?.collect::<PyResult<_>>()?,
-        };
+        let given: Vec<Bound<'_, PyAny>> =
+            match bodies.is_instance_of::<pyo3::types::PyString>() || place_of(bodies).is_ok() {
+                true => vec![bodies.clone()],
+                false => bodies.try_iter()?.collect::<PyResult<_>>()?,
+            };
         let places = given.iter().map(|body| own_place(&self.shared, body)).collect::<Result<Vec<_>>>()?;
-        self.shared.extend(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
+        self.shared
+            .extend(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
     }
 
     /// Forces of your own by name: a new dict.
@@ -387,8 +458,13 @@ impl World {
     #[pyo3(signature = (width=None, height=None, *, camera=None, facet=None, cave=None, overlays=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn render<'py>(
-        &self, py: Python<'py>, #[pyo3(from_py_with = whole_number)] width: Option<u32>, #[pyo3(from_py_with = whole_number)] height: Option<u32>,
-        camera: Option<&Bound<'py, PyAny>>, facet: Option<&str>, cave: Option<&str>,
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole_number)] width: Option<u32>,
+        #[pyo3(from_py_with = whole_number)] height: Option<u32>,
+        camera: Option<&Bound<'py, PyAny>>,
+        facet: Option<&str>,
+        cave: Option<&str>,
         overlays: Option<&str>,
     ) -> Result<Bound<'py, PyArray3<u8>>> {
         Shot::new([width, height], camera, facet, cave, overlays)?.take(py, &self.shared)
@@ -412,7 +488,11 @@ impl World {
     /// As ``plot_energy`` otherwise.
     #[pyo3(signature = (seconds=5.0, *, bodies=None, along="y", ax=None))]
     fn plot_paths(
-        slf: &Bound<'_, Self>, seconds: f64, bodies: Option<&Bound<'_, PyAny>>, along: &str, ax: Option<&Bound<'_, PyAny>>,
+        slf: &Bound<'_, Self>,
+        seconds: f64,
+        bodies: Option<&Bound<'_, PyAny>>,
+        along: &str,
+        ax: Option<&Bound<'_, PyAny>>,
     ) -> Result<Py<PyAny>> {
         Ok(slf.py().import("tumble._plots")?.call_method1("paths", (slf, seconds, bodies, along, ax))?.unbind())
     }
@@ -424,7 +504,11 @@ impl World {
     fn __repr__(&self) -> Result<String> {
         self.shared.read(|inner| {
             let (stepper, solver) = inner.world.methods();
-            Ok(format!("<tumble.World {} bodies, t = {} s, {stepper}, {solver}>", bodies::body_ids(&inner.world).len(), inner.world.time()))
+            Ok(format!(
+                "<tumble.World {} bodies, t = {} s, {stepper}, {solver}>",
+                bodies::body_ids(&inner.world).len(),
+                inner.world.time()
+            ))
         })
     }
 }

@@ -48,7 +48,9 @@ fn main() -> Result<(), Failure> {
     let mut renderer = Renderer::new()?;
     let adapter = renderer.adapter().to_owned();
     println!("adapter: {adapter}; {} threads", std::thread::available_parallelism().map_or(1, |n| n.get()));
-    println!("\n| world | facets | quality | frames per second | ms per frame | processor ms per frame |\n|---|---|---|---|---|---|");
+    println!(
+        "\n| world | facets | quality | frames per second | ms per frame | processor ms per frame |\n|---|---|---|---|---|---|"
+    );
     let words: Vec<String> = match &options.quality {
         Some(words) => vec![words.clone()],
         None => ["fastest", "fastest,samples=4", "fast", "fast,samples=4", "usual"].map(String::from).to_vec(),
@@ -64,7 +66,8 @@ fn main() -> Result<(), Failure> {
                 cells.push(row(&options, &mut renderer, subject, &facets, quality)?);
             }
             if cells.iter().any(Option::is_some) {
-                let shown: Vec<String> = cells.iter().map(|fps| fps.map_or(String::new(), |fps| format!("{fps:.1}"))).collect();
+                let shown: Vec<String> =
+                    cells.iter().map(|fps| fps.map_or(String::new(), |fps| format!("{fps:.1}"))).collect();
                 summary.push(format!("| {} | {count} | {} |", subject.name, shown.join(" | ")));
             }
         }
@@ -75,13 +78,18 @@ fn main() -> Result<(), Failure> {
             row(&options, &mut renderer, &mut subjects[2], &facets, quality)?;
         }
     }
-    println!("\nFrames per second:\n\n| world | facets | `{}` |\n|---|---|{}", words.join("` | `"), "---|".repeat(words.len()));
+    println!(
+        "\nFrames per second:\n\n| world | facets | `{}` |\n|---|---|{}",
+        words.join("` | `"),
+        "---|".repeat(words.len())
+    );
     summary.iter().for_each(|row| println!("{row}"));
     Ok(())
 }
 
 fn options() -> Result<Options, Failure> {
-    let mut options = Options { seconds: 1.5, only: String::new(), quality: None, readback: false, stages: false, pictures: None };
+    let mut options =
+        Options { seconds: 1.5, only: String::new(), quality: None, readback: false, stages: false, pictures: None };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} wants a value"));
@@ -129,7 +137,13 @@ fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failu
 }
 
 /// One cell: frames per second, or none where it was not asked for.
-fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets: &Facets, quality: &Quality) -> Result<Option<f64>, Failure> {
+fn row(
+    options: &Options,
+    renderer: &mut Renderer,
+    subject: &mut Subject,
+    facets: &Facets,
+    quality: &Quality,
+) -> Result<Option<f64>, Failure> {
     let label = format!("{} | {} | {quality}", subject.name, facets.shown);
     if !label.contains(&options.only) {
         return Ok(None);
@@ -154,7 +168,8 @@ fn row(options: &Options, renderer: &mut Renderer, subject: &mut Subject, facets
     }
     let (begin, spent) = (Instant::now(), processor_s());
     let mut frames = 0;
-    while frames < 1 || begin.elapsed().as_secs_f64() < if frames < ENOUGH_FRAMES { LONGEST_S } else { options.seconds } {
+    while frames < 1 || begin.elapsed().as_secs_f64() < if frames < ENOUGH_FRAMES { LONGEST_S } else { options.seconds }
+    {
         frame(renderer)?;
         frames += 1;
     }
@@ -190,7 +205,11 @@ fn draw(renderer: &mut Renderer, list: &DrawList, facets: &Facets, readback: boo
 
 /// The scene's camera, or a cube around the middle of the scene.
 fn facets(scene: &SceneFile, count: usize, size: [u32; 2], stereo: Stereo) -> Result<Facets, Failure> {
-    let shown = if stereo == Stereo::Mono { format!("{count}") } else { format!("{count} of {} x {} in stereo", size[0], size[1]) };
+    let shown = if stereo == Stereo::Mono {
+        format!("{count}")
+    } else {
+        format!("{count} of {} x {} in stereo", size[0], size[1])
+    };
     if count == 1 {
         return Ok(Facets { cave: None, shown, size });
     }
@@ -198,7 +217,8 @@ fn facets(scene: &SceneFile, count: usize, size: [u32; 2], stereo: Stereo) -> Re
     cave.facets.iter_mut().for_each(|facet| (facet.size_px, facet.stereo) = (size, stereo));
     let mut scene = scene.clone();
     let eye: Vector3<f64> = cave.users[0].eye_m.coords;
-    scene.cave = Some(tumble_scene::CavePlace { origin_m: [-eye.x, -eye.y, 1.2 - eye.z], heading_deg: 0.0, scale: 1.0 });
+    scene.cave =
+        Some(tumble_scene::CavePlace { origin_m: [-eye.x, -eye.y, 1.2 - eye.z], heading_deg: 0.0, scale: 1.0 });
     Ok(Facets { cave: Some(CaveView::new(cave, &scene)?), shown, size })
 }
 

@@ -43,7 +43,14 @@ impl Default for Camera {
 impl Camera {
     /// A pinhole at `eye` looking at `target`: z up, 40 degrees from bottom to top, depth range from 5 cm to 500 m.
     pub fn look_at(eye: Point3<f32>, target: Point3<f32>) -> Self {
-        Camera::LookAt { eye, target, up: Vector3::z(), vertical_fov_rad: 40f32.to_radians(), near_m: 0.05, far_m: 500.0 }
+        Camera::LookAt {
+            eye,
+            target,
+            up: Vector3::z(),
+            vertical_fov_rad: 40f32.to_radians(),
+            near_m: 0.05,
+            far_m: 500.0,
+        }
     }
 
     /// The same pinhole with another opening angle (radians, bottom to top). Raw cameras stay as they are.
@@ -79,23 +86,49 @@ impl Camera {
         match *self {
             Camera::LookAt { eye, target, up, vertical_fov_rad, near_m, far_m } => {
                 let forward = target - eye;
-                check(forward.norm() > 1e-9 && forward.norm().is_finite(), "target", format!("{target:?}"), "a finite point away from the eye")?;
-                check(up.cross(&forward).norm() > 1e-6 * up.norm() * forward.norm(), "up", format!("{up:?}"), "a direction not along the line of sight")?;
-                check(vertical_fov_rad > 0.0 && vertical_fov_rad < std::f32::consts::PI, "vertical_fov_rad", vertical_fov_rad.to_string(), "0 < angle < pi")?;
+                check(
+                    forward.norm() > 1e-9 && forward.norm().is_finite(),
+                    "target",
+                    format!("{target:?}"),
+                    "a finite point away from the eye",
+                )?;
+                check(
+                    up.cross(&forward).norm() > 1e-6 * up.norm() * forward.norm(),
+                    "up",
+                    format!("{up:?}"),
+                    "a direction not along the line of sight",
+                )?;
+                check(
+                    vertical_fov_rad > 0.0 && vertical_fov_rad < std::f32::consts::PI,
+                    "vertical_fov_rad",
+                    vertical_fov_rad.to_string(),
+                    "0 < angle < pi",
+                )?;
                 check(near_m > 0.0 && near_m.is_finite(), "near_m", near_m.to_string(), "above 0")?;
                 check(far_m > near_m && far_m.is_finite(), "far_m", far_m.to_string(), "above near_m")?;
                 Ok((Matrix4::look_at_rh(&eye, &target, &up), perspective(vertical_fov_rad, aspect, near_m, far_m)))
             }
             Camera::Raw { view, projection } => {
-                check(view.iter().chain(projection.iter()).all(|x| x.is_finite()), "raw matrices", "not finite".into(), "finite numbers")?;
+                check(
+                    view.iter().chain(projection.iter()).all(|x| x.is_finite()),
+                    "raw matrices",
+                    "not finite".into(),
+                    "finite numbers",
+                )?;
                 let r = view.fixed_view::<3, 3>(0, 0).into_owned();
-                let rigid = (r * r.transpose() - nalgebra::Matrix3::identity()).norm() < 1e-3 && view.row(3) == nalgebra::RowVector4::new(0.0, 0.0, 0.0, 1.0);
+                let rigid = (r * r.transpose() - nalgebra::Matrix3::identity()).norm() < 1e-3
+                    && view.row(3) == nalgebra::RowVector4::new(0.0, 0.0, 0.0, 1.0);
                 check(rigid, "view", format!("{view:?}"), "a rotation and a translation")?;
                 let last = projection.row(3).into_owned();
                 let frustum = last == nalgebra::RowVector4::new(0.0, 0.0, -1.0, 0.0);
                 let ortho = last == nalgebra::RowVector4::new(0.0, 0.0, 0.0, 1.0);
                 check(frustum || ortho, "projection", format!("{projection:?}"), "a last row of 0 0 -1 0 or 0 0 0 1")?;
-                check(projection[(0, 0)] != 0.0 && projection[(1, 1)] != 0.0, "projection", format!("{projection:?}"), "a scale other than 0")?;
+                check(
+                    projection[(0, 0)] != 0.0 && projection[(1, 1)] != 0.0,
+                    "projection",
+                    format!("{projection:?}"),
+                    "a scale other than 0",
+                )?;
                 Ok((view, projection))
             }
         }
@@ -117,10 +150,22 @@ impl Camera {
 pub(crate) fn perspective(vertical_fov_rad: f32, aspect: f32, near: f32, far: f32) -> Matrix4<f32> {
     let f = 1.0 / (0.5 * vertical_fov_rad).tan();
     Matrix4::new(
-        f / aspect, 0.0, 0.0, 0.0, //
-        0.0, f, 0.0, 0.0, //
-        0.0, 0.0, far / (near - far), near * far / (near - far), //
-        0.0, 0.0, -1.0, 0.0,
+        f / aspect,
+        0.0,
+        0.0,
+        0.0, //
+        0.0,
+        f,
+        0.0,
+        0.0, //
+        0.0,
+        0.0,
+        far / (near - far),
+        near * far / (near - far), //
+        0.0,
+        0.0,
+        -1.0,
+        0.0,
     )
 }
 
@@ -128,10 +173,22 @@ pub(crate) fn perspective(vertical_fov_rad: f32, aspect: f32, near: f32, far: f3
 pub(crate) fn orthographic(min: Vector3<f32>, max: Vector3<f32>) -> Matrix4<f32> {
     let size = max - min;
     Matrix4::new(
-        2.0 / size.x, 0.0, 0.0, -(max.x + min.x) / size.x, //
-        0.0, 2.0 / size.y, 0.0, -(max.y + min.y) / size.y, //
-        0.0, 0.0, -1.0 / size.z, max.z / size.z, //
-        0.0, 0.0, 0.0, 1.0,
+        2.0 / size.x,
+        0.0,
+        0.0,
+        -(max.x + min.x) / size.x, //
+        0.0,
+        2.0 / size.y,
+        0.0,
+        -(max.y + min.y) / size.y, //
+        0.0,
+        0.0,
+        -1.0 / size.z,
+        max.z / size.z, //
+        0.0,
+        0.0,
+        0.0,
+        1.0,
     )
 }
 

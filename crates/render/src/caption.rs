@@ -16,7 +16,8 @@ const INK: [u8; 4] = [236, 238, 240, 255];
 /// than that, are cut off.
 pub fn caption<S: AsRef<str>>(lines: &[S], scale: u32) -> Image {
     let scale = i64::from(scale.clamp(1, 8));
-    let lines: Vec<String> = lines.iter().take(MOST).map(|l| l.as_ref().to_uppercase().chars().take(MOST).collect()).collect();
+    let lines: Vec<String> =
+        lines.iter().take(MOST).map(|l| l.as_ref().to_uppercase().chars().take(MOST).collect()).collect();
     let width = lines.iter().map(|l| font::text_width(l, scale)).max().unwrap_or(0) + 2 * RIM * scale;
     let height = (LINE * lines.len() as i64 - 3).max(0) * scale + 2 * RIM * scale;
     let mut image = blank(width as u32, height as u32, GROUND);

@@ -31,7 +31,9 @@ pub enum RenderError {
         reason: String,
     },
     /// The picture is empty, or larger than the caps or the device allow.
-    #[error("cannot render a picture of {width} x {height} pixels: each side must be 1 to {max_side} and their product at most {max_pixels}")]
+    #[error(
+        "cannot render a picture of {width} x {height} pixels: each side must be 1 to {max_side} and their product at most {max_pixels}"
+    )]
     BadSize {
         /// Width asked for, in pixels.
         width: u32,

@@ -16,8 +16,8 @@ mod window;
 
 use crate::list::bounds::Bounds;
 use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
-pub(crate) use finish::{Finish, Placed};
 use finish::Finisher;
+pub(crate) use finish::{Finish, Placed};
 use frame::Frame;
 use meshes::MeshCache;
 use nalgebra::Matrix4;
@@ -80,7 +80,18 @@ impl Renderer {
         let finisher = Finisher::new(&gpu);
         let textures = TextureCache::new(&gpu, &pipelines.texture_layout);
         gpu.complaint()?;
-        Ok(Renderer { gpu, pipelines, meshes: MeshCache::default(), textures, finisher, shadows: None, targets: Vec::new(), picture: None, stages: 0, ends: Default::default() })
+        Ok(Renderer {
+            gpu,
+            pipelines,
+            meshes: MeshCache::default(),
+            textures,
+            finisher,
+            shadows: None,
+            targets: Vec::new(),
+            picture: None,
+            stages: 0,
+            ends: Default::default(),
+        })
     }
 
     /// The adapter in use: its name, kind and interface.
@@ -100,7 +111,13 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::render`], or a point of view that is none.
-    pub fn render_from(&mut self, from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Result<Image, RenderError> {
+    pub fn render_from(
+        &mut self,
+        from: &dyn Viewpoint,
+        list: &DrawList,
+        width: u32,
+        height: u32,
+    ) -> Result<Image, RenderError> {
         self.draw(from, list, width, height)?;
         self.read()
     }
@@ -134,7 +151,13 @@ impl Renderer {
     ///
     /// # Errors
     /// A size that cannot be drawn, a point of view that is none, or a device that fails.
-    pub fn draw_stage(&mut self, stage: &Stage, from: &dyn Viewpoint, width: u32, height: u32) -> Result<(), RenderError> {
+    pub fn draw_stage(
+        &mut self,
+        stage: &Stage,
+        from: &dyn Viewpoint,
+        width: u32,
+        height: u32,
+    ) -> Result<(), RenderError> {
         self.check_size(width, height)?;
         let lens = from.lens(width as f32 / height as f32)?;
         self.draw_lens(stage, lens, width, height)
@@ -205,7 +228,8 @@ impl Renderer {
             self.check_size(width + 2 * rim, height + 2 * rim)?;
             lens = lens.widened(width, height, rim);
         }
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+        let mut encoder =
+            self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         self.want_targets(width + 2 * rim, height + 2 * rim, stage.variant.samples);
         let targets = &self.targets[self.targets.len() - 1]; // put there by the line above
         let (size, count) = (stage.shadow_map_size, stage.shadow_views.len());
@@ -226,7 +250,13 @@ impl Renderer {
     }
 
     /// Draws what one eye sees, and puts it, finished for its projector, into its place in the whole picture of this size.
-    pub(crate) fn draw_placed(&mut self, stage: &Stage, from: &dyn Viewpoint, [width, height]: [u32; 2], placed: &Placed) -> Result<(), RenderError> {
+    pub(crate) fn draw_placed(
+        &mut self,
+        stage: &Stage,
+        from: &dyn Viewpoint,
+        [width, height]: [u32; 2],
+        placed: &Placed,
+    ) -> Result<(), RenderError> {
         self.check_size(width, height)?;
         self.check_size(placed.whole_px[0], placed.whole_px[1])?;
         let lens = from.lens(width as f32 / height as f32)?;
@@ -243,7 +273,9 @@ impl Renderer {
             None => {
                 // old ones go before new ones come
                 let new = u64::from(width) * u64::from(height);
-                while !self.targets.is_empty() && new + self.targets.iter().map(Targets::pixels).sum::<u64>() > KEPT_PIXELS {
+                while !self.targets.is_empty()
+                    && new + self.targets.iter().map(Targets::pixels).sum::<u64>() > KEPT_PIXELS
+                {
                     self.targets.remove(0);
                 }
                 self.targets.push(Targets::new(&self.gpu.device, width, height, samples));
@@ -256,7 +288,10 @@ impl Renderer {
         let max_side = MAX_SIDE.min(limits.max_texture_dimension_2d);
         let max_pixels = MAX_PIXELS.min(limits.max_buffer_size / 4);
         let sides = 1..=max_side;
-        if sides.contains(&width) && sides.contains(&height) && u64::from(width.next_multiple_of(64)) * u64::from(height) <= max_pixels {
+        if sides.contains(&width)
+            && sides.contains(&height)
+            && u64::from(width.next_multiple_of(64)) * u64::from(height) <= max_pixels
+        {
             return Ok(());
         }
         Err(RenderError::BadSize { width, height, max_side, max_pixels })
@@ -271,7 +306,11 @@ impl Gpu {
         limits.max_buffer_size = adapter.limits().max_buffer_size;
         let opengl = info.backend == wgpu::Backend::Gl;
         let asked = adapter
-            .request_device(&wgpu::DeviceDescriptor { label: Some("tumble"), required_limits: limits, ..Default::default() })
+            .request_device(&wgpu::DeviceDescriptor {
+                label: Some("tumble"),
+                required_limits: limits,
+                ..Default::default()
+            })
             .await
             .map_err(|e| RenderError::Device { adapter: name.clone(), reason: e.to_string() })?;
         let complaint = Arc::new(Mutex::new(None));
@@ -283,9 +322,19 @@ impl Gpu {
         let note = lost.clone();
         asked.0.set_device_lost_callback(move |_, message| {
             let why = if message.is_empty() { String::new() } else { format!(" ({message})") };
-            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("the device was lost{why}; a new renderer can be made"));
+            note.lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .get_or_insert(format!("the device was lost{why}; a new renderer can be made"));
         });
-        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, opengl, choosy: info.device_type == wgpu::DeviceType::Cpu, complaint, lost })
+        Ok(Gpu {
+            device: asked.0,
+            queue: asked.1,
+            adapter: name,
+            opengl,
+            choosy: info.device_type == wgpu::DeviceType::Cpu,
+            complaint,
+            lost,
+        })
     }
 
     /// What went wrong on the device since the last call.

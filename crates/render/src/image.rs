@@ -82,7 +82,10 @@ impl Image {
         if (info.color_type, info.bit_depth) != (png::ColorType::Rgba, png::BitDepth::Eight) {
             return Err(fail("expected an 8-bit RGBA PNG".into()));
         }
-        if width > crate::MAX_SIDE || height > crate::MAX_SIDE || u64::from(width) * u64::from(height) > crate::MAX_PIXELS {
+        if width > crate::MAX_SIDE
+            || height > crate::MAX_SIDE
+            || u64::from(width) * u64::from(height) > crate::MAX_PIXELS
+        {
             return Err(fail(format!("{width} x {height} pixels are more than a picture may have")));
         }
         let mut rgba = vec![0; 4 * width as usize * height as usize];

@@ -42,8 +42,8 @@ pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Wa
 pub use gpu::{Renderer, Screen, Shown, Stage};
 pub use image::Image;
 pub use list::{
-    Capsule, DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere,
-    SphereStyle, UnknownQuality,
+    Capsule, DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS,
+    MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere, SphereStyle, UnknownQuality,
 };
 pub use material::{Material, Pattern, Shader, Texture};
 pub use mesh::{MAX_MESH_VERTICES, MeshData};

@@ -98,12 +98,24 @@ pub enum Light {
 impl Light {
     /// A sun with soft shadows that travels along `direction`.
     pub fn sun(direction: Vector3<f32>, intensity: f32) -> Self {
-        Light::Directional { direction, color: [1.0, 0.97, 0.92], intensity, angular_radius_rad: 0.02, casts_shadow: true }
+        Light::Directional {
+            direction,
+            color: [1.0, 0.97, 0.92],
+            intensity,
+            angular_radius_rad: 0.02,
+            casts_shadow: true,
+        }
     }
 
     /// A lamp at `position` that gives `intensity` at the distance `at_m`.
     pub fn lamp(position: Point3<f32>, intensity: f32, at_m: f32) -> Self {
-        Light::Point { position, color: [1.0, 0.95, 0.87], intensity: intensity * at_m * at_m, radius_m: 0.05 * at_m, casts_shadow: true }
+        Light::Point {
+            position,
+            color: [1.0, 0.95, 0.87],
+            intensity: intensity * at_m * at_m,
+            radius_m: 0.05 * at_m,
+            casts_shadow: true,
+        }
     }
 
     /// Whether it is meant to throw shadows.
@@ -133,19 +145,40 @@ pub struct Sky {
 
 impl Default for Sky {
     fn default() -> Self {
-        Sky { zenith: [0.42, 0.53, 0.68], horizon: [0.80, 0.84, 0.88], ground: [0.42, 0.40, 0.38], ambient: 1.0, softbox: 0.0, backdrop: None }
+        Sky {
+            zenith: [0.42, 0.53, 0.68],
+            horizon: [0.80, 0.84, 0.88],
+            ground: [0.42, 0.40, 0.38],
+            ambient: 1.0,
+            softbox: 0.0,
+            backdrop: None,
+        }
     }
 }
 
 impl Sky {
     /// A dim, warm hall: for tables and lanes under lamps.
     pub fn hall() -> Self {
-        Sky { zenith: [0.27, 0.25, 0.24], horizon: [0.33, 0.30, 0.28], ground: [0.22, 0.19, 0.17], ambient: 2.4, softbox: 5.0, backdrop: None }
+        Sky {
+            zenith: [0.27, 0.25, 0.24],
+            horizon: [0.33, 0.30, 0.28],
+            ground: [0.22, 0.19, 0.17],
+            ambient: 2.4,
+            softbox: 5.0,
+            backdrop: None,
+        }
     }
 
     /// No ambient light, a flat backdrop: for tests and plots.
     pub fn flat(backdrop: [f32; 3]) -> Self {
-        Sky { zenith: [0.0; 3], horizon: [0.0; 3], ground: [0.0; 3], ambient: 0.0, softbox: 0.0, backdrop: Some(backdrop) }
+        Sky {
+            zenith: [0.0; 3],
+            horizon: [0.0; 3],
+            ground: [0.0; 3],
+            ambient: 0.0,
+            softbox: 0.0,
+            backdrop: Some(backdrop),
+        }
     }
 }
 
@@ -168,7 +201,6 @@ impl Ground {
     }
 }
 
-
 /// Numbers of the picture as a whole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -190,7 +222,15 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { exposure: 1.0, shadow_map_size: 2048, occlusion_m: None, tone_map: true, shadows: Shadows::Soft, samples: 4, reflections: true }
+        Settings {
+            exposure: 1.0,
+            shadow_map_size: 2048,
+            occlusion_m: None,
+            tone_map: true,
+            shadows: Shadows::Soft,
+            samples: 4,
+            reflections: true,
+        }
     }
 }
 
@@ -250,14 +290,26 @@ impl DrawList {
     }
 
     /// Adds a sphere that throws a shadow.
-    pub fn add_sphere(&mut self, center: Point3<f32>, radius: f32, orientation: UnitQuaternion<f32>, material: Material) -> &mut Sphere {
+    pub fn add_sphere(
+        &mut self,
+        center: Point3<f32>,
+        radius: f32,
+        orientation: UnitQuaternion<f32>,
+        material: Material,
+    ) -> &mut Sphere {
         self.spheres.push(Sphere { center, radius, orientation, material, casts_shadow: true });
         let last = self.spheres.len() - 1;
         &mut self.spheres[last]
     }
 
     /// Adds a capsule that throws a shadow.
-    pub fn add_capsule(&mut self, pose: Isometry3<f32>, half_length: f32, radius: f32, material: Material) -> &mut Capsule {
+    pub fn add_capsule(
+        &mut self,
+        pose: Isometry3<f32>,
+        half_length: f32,
+        radius: f32,
+        material: Material,
+    ) -> &mut Capsule {
         self.capsules.push(Capsule { pose, half_length, radius, material, casts_shadow: true });
         let last = self.capsules.len() - 1;
         &mut self.capsules[last]

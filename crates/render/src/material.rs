@@ -153,7 +153,15 @@ const BALL_COLORS: [[f32; 3]; 9] = [
 impl Material {
     /// Satin plastic.
     pub fn plastic(color: [f32; 3]) -> Self {
-        Material { color, roughness: 0.45, metallic: 0.0, clearcoat: 0.0, pattern: Pattern::Plain, shader: Shader::Lit, texture: None }
+        Material {
+            color,
+            roughness: 0.45,
+            metallic: 0.0,
+            clearcoat: 0.0,
+            pattern: Pattern::Plain,
+            shader: Shader::Lit,
+            texture: None,
+        }
     }
 
     /// Chalky and dull.
@@ -185,20 +193,14 @@ impl Material {
 
     /// Light varnished maple in boards of 27 mm (a bowling lane has 39 of them).
     pub fn lane_wood() -> Self {
-        Material { roughness: 0.35, clearcoat: 0.7, ..Material::plastic([0.80, 0.61, 0.41]) }.with_pattern(Pattern::Wood {
-            dark: [0.58, 0.38, 0.21],
-            ring_m: 0.005,
-            board_m: 0.027,
-        })
+        Material { roughness: 0.35, clearcoat: 0.7, ..Material::plastic([0.80, 0.61, 0.41]) }
+            .with_pattern(Pattern::Wood { dark: [0.58, 0.38, 0.21], ring_m: 0.005, board_m: 0.027 })
     }
 
     /// Dark oiled walnut, one piece.
     pub fn walnut() -> Self {
-        Material { roughness: 0.5, clearcoat: 0.2, ..Material::plastic([0.42, 0.25, 0.14]) }.with_pattern(Pattern::Wood {
-            dark: [0.20, 0.10, 0.05],
-            ring_m: 0.012,
-            board_m: 0.0,
-        })
+        Material { roughness: 0.5, clearcoat: 0.2, ..Material::plastic([0.42, 0.25, 0.14]) }
+            .with_pattern(Pattern::Wood { dark: [0.20, 0.10, 0.05], ring_m: 0.012, board_m: 0.0 })
     }
 
     /// Green billiard cloth.
@@ -208,19 +210,27 @@ impl Material {
 
     /// A bowling pin of the usual size (38.1 cm, its base at object z = −`base_m`): white lacquer, two red rings on the neck.
     pub fn bowling_pin(base_m: f32) -> Self {
-        Material::glossy([0.95, 0.93, 0.89]).with_pattern(Pattern::Rings { other: [0.75, 0.05, 0.06], from_m: 0.268 - base_m, to_m: 0.280 - base_m })
+        Material::glossy([0.95, 0.93, 0.89]).with_pattern(Pattern::Rings {
+            other: [0.75, 0.05, 0.06],
+            from_m: 0.268 - base_m,
+            to_m: 0.280 - base_m,
+        })
     }
 
     /// A grey checkerboard.
     pub fn checker(size_m: f32) -> Self {
-        Material { roughness: 0.7, ..Material::plastic([0.55, 0.56, 0.58]) }.with_pattern(Pattern::Checker { other: [0.40, 0.41, 0.43], size_m })
+        Material { roughness: 0.7, ..Material::plastic([0.55, 0.56, 0.58]) }
+            .with_pattern(Pattern::Checker { other: [0.40, 0.41, 0.43], size_m })
     }
 
     /// What its pipelines are made for: the pattern's number, 100 more where light does not matter, 1000 more under lacquer,
     /// 10000 more with a texture.
     pub(crate) fn surface(&self) -> u32 {
         let unlit = self.shader == Shader::Unlit;
-        self.pattern.packed().0 + if unlit { 100 } else { 0 } + if self.clearcoat > 0.0 && !unlit { 1000 } else { 0 } + if self.texture.is_some() { 10_000 } else { 0 }
+        self.pattern.packed().0
+            + if unlit { 100 } else { 0 }
+            + if self.clearcoat > 0.0 && !unlit { 1000 } else { 0 }
+            + if self.texture.is_some() { 10_000 } else { 0 }
     }
 
     /// The same surface under another pattern.
@@ -230,7 +240,8 @@ impl Material {
     }
 
     /// The names that [`Material::preset`] knows, in alphabetical order.
-    pub const PRESETS: [&'static str; 9] = ["checker", "felt", "glossy", "lane", "matte", "metal", "plastic", "unlit", "walnut"];
+    pub const PRESETS: [&'static str; 9] =
+        ["checker", "felt", "glossy", "lane", "matte", "metal", "plastic", "unlit", "walnut"];
 
     /// A surface by name, as scene files give it; `color` (sRGB) replaces the preset's own where given. `None` for an unknown name.
     pub fn preset(name: &str, color: Option<[f32; 3]>) -> Option<Self> {

@@ -30,7 +30,11 @@ impl MeshData {
     ///
     /// # Errors
     /// [`RenderError::BadMesh`] for an index out of range, a number that is not finite, or too many vertices.
-    pub fn from_triangles(positions: &[[f32; 3]], triangles: &[[u32; 3]], crease_rad: f32) -> Result<Self, RenderError> {
+    pub fn from_triangles(
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        crease_rad: f32,
+    ) -> Result<Self, RenderError> {
         check_counts(positions.len(), triangles.len() * 3)?;
         check_finite(positions, "position")?;
         check_indices(triangles.iter().flatten().copied(), positions.len())?;
@@ -41,12 +45,21 @@ impl MeshData {
     ///
     /// # Errors
     /// As [`MeshData::from_triangles`]; also for another number of triangles, or places that are not finite.
-    pub fn from_unwrapped(positions: &[[f32; 3]], triangles: &[[u32; 3]], places: &[[[f32; 2]; 3]], crease_rad: f32) -> Result<Self, RenderError> {
+    pub fn from_unwrapped(
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        places: &[[[f32; 2]; 3]],
+        crease_rad: f32,
+    ) -> Result<Self, RenderError> {
         check_counts(positions.len(), triangles.len() * 3)?;
         check_finite(positions, "position")?;
         check_indices(triangles.iter().flatten().copied(), positions.len())?;
         if places.len() != triangles.len() || places.iter().flatten().flatten().any(|x| !x.is_finite()) {
-            return Err(RenderError::BadMesh(format!("texture coordinates of {} triangles, expected finite ones of {}", places.len(), triangles.len())));
+            return Err(RenderError::BadMesh(format!(
+                "texture coordinates of {} triangles, expected finite ones of {}",
+                places.len(),
+                triangles.len()
+            )));
         }
         Ok(Self::smoothed(positions, triangles, places, crease_rad))
     }
@@ -54,7 +67,8 @@ impl MeshData {
     /// Vertices split at creases, and where places in the texture differ.
     fn smoothed(positions: &[[f32; 3]], triangles: &[[u32; 3]], places: &[[[f32; 2]; 3]], crease_rad: f32) -> Self {
         let point = |i: u32| Vector3::from(positions[i as usize]);
-        let faces: Vec<Face> = triangles.iter().enumerate().filter_map(|(i, &t)| Face::new(t, t.map(point), places.get(i))).collect();
+        let faces: Vec<Face> =
+            triangles.iter().enumerate().filter_map(|(i, &t)| Face::new(t, t.map(point), places.get(i))).collect();
         let around = corners_around(&faces, positions.len());
         let mut mesh = MeshData::default();
         let cos_crease = crease_rad.clamp(0.0, PI).cos() - 1e-6;
@@ -70,7 +84,8 @@ impl MeshData {
                 let place = face.places.map(|places| [places[k][0], places[k][1], face.per_metre]);
                 let same = |&i: &u32| {
                     let i = i as usize;
-                    (Vector3::from(mesh.normals[i]) - Vector3::from(normal)).norm() < 1e-4 && place.is_none_or(|p| mesh.unwrapped[i][..2] == p[..2])
+                    (Vector3::from(mesh.normals[i]) - Vector3::from(normal)).norm() < 1e-4
+                        && place.is_none_or(|p| mesh.unwrapped[i][..2] == p[..2])
                 };
                 let index = match made[v as usize].iter().copied().find(same) {
                     Some(index) => index,
@@ -125,14 +140,16 @@ impl MeshData {
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                 // the two edges of each strip are fillets of 45 degrees, the middle is flat
                 let fillet = |i: i32, side: f32| (i as f32 / n as f32 * PI / 4.0, side);
-                let stations: Vec<(f32, f32)> = (-n..=0).map(|i| fillet(i, -1.0)).chain((0..=n).map(|i| fillet(i, 1.0))).collect();
+                let stations: Vec<(f32, f32)> =
+                    (-n..=0).map(|i| fillet(i, -1.0)).chain((0..=n).map(|i| fillet(i, 1.0))).collect();
                 for &(a, side_u) in &stations {
                     for &(b, side_v) in &stations {
                         let mut dir = Vector3::zeros();
                         (dir[axis], dir[u], dir[v]) = (sign, a.tan(), b.tan());
                         let normal = dir.normalize();
                         let mut core = Vector3::zeros();
-                        (core[axis], core[u], core[v]) = (sign * (half[axis] - radius), side_u * (half[u] - radius), side_v * (half[v] - radius));
+                        (core[axis], core[u], core[v]) =
+                            (sign * (half[axis] - radius), side_u * (half[u] - radius), side_v * (half[v] - radius));
                         mesh.push((core + normal * radius).into(), normal.into());
                     }
                 }
@@ -182,7 +199,9 @@ impl MeshData {
             let before = if i > 0 { edge_normal(i - 1) } else { None };
             let after = if i + 1 < profile.len() { edge_normal(i) } else { None };
             match (before, after) {
-                (Some(a), Some(b)) if a.dot(&b) < crease_rad.cos() => points.extend([(profile[i], a.into()), (profile[i], b.into())]),
+                (Some(a), Some(b)) if a.dot(&b) < crease_rad.cos() => {
+                    points.extend([(profile[i], a.into()), (profile[i], b.into())])
+                }
                 (a, b) => {
                     let sum = a.unwrap_or_default() + b.unwrap_or_default();
                     points.push((profile[i], sum.try_normalize(1e-12).map_or([0.0, 1.0], Into::into)));
@@ -195,7 +214,12 @@ impl MeshData {
     /// A square of the plane `z = 0`, normal up, from `-half_extent` to `half_extent`.
     pub fn ground_quad(half_extent: f32) -> Self {
         let h = half_extent;
-        MeshData { positions: vec![[-h, -h, 0.0], [h, -h, 0.0], [h, h, 0.0], [-h, h, 0.0]], normals: vec![[0.0, 0.0, 1.0]; 4], indices: vec![0, 1, 2, 0, 2, 3], unwrapped: Vec::new() }
+        MeshData {
+            positions: vec![[-h, -h, 0.0], [h, -h, 0.0], [h, h, 0.0], [-h, h, 0.0]],
+            normals: vec![[0.0, 0.0, 1.0]; 4],
+            indices: vec![0, 1, 2, 0, 2, 3],
+            unwrapped: Vec::new(),
+        }
     }
 
     /// The corners `(min, max)` of the smallest box around the mesh; `None` when it is empty.
@@ -214,10 +238,18 @@ impl MeshData {
     pub fn validate(&self) -> Result<(), RenderError> {
         check_counts(self.positions.len(), self.indices.len())?;
         if self.normals.len() != self.positions.len() {
-            return Err(RenderError::BadMesh(format!("{} normals for {} positions, expected as many", self.normals.len(), self.positions.len())));
+            return Err(RenderError::BadMesh(format!(
+                "{} normals for {} positions, expected as many",
+                self.normals.len(),
+                self.positions.len()
+            )));
         }
         if !self.unwrapped.is_empty() && self.unwrapped.len() != self.positions.len() {
-            return Err(RenderError::BadMesh(format!("{} texture coordinates for {} positions, expected as many", self.unwrapped.len(), self.positions.len())));
+            return Err(RenderError::BadMesh(format!(
+                "{} texture coordinates for {} positions, expected as many",
+                self.unwrapped.len(),
+                self.positions.len()
+            )));
         }
         check_finite(&self.unwrapped, "texture coordinate")?;
         if !self.indices.len().is_multiple_of(3) {
@@ -283,7 +315,8 @@ struct Face {
 impl Face {
     fn new(vertices: [u32; 3], [a, b, c]: [Vector3<f32>; 3], places: Option<&[[f32; 2]; 3]>) -> Option<Face> {
         let area = (b - a).cross(&(c - a));
-        let flat = places.map_or(0.0, |[p, q, r]| ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])).abs());
+        let flat =
+            places.map_or(0.0, |[p, q, r]| ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])).abs());
         let per_metre = (flat / area.norm()).sqrt().min(1e6);
         let normal = area.try_normalize(0.0).filter(|n| n.iter().all(|x| x.is_finite()))?;
         let angles = [(b - a).angle(&(c - a)), (a - b).angle(&(c - b)), (a - c).angle(&(b - c))];

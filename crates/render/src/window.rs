@@ -2,8 +2,8 @@
 //!
 //! One window per process: the desktop's library allows one event loop.
 
-use crate::gpu::Screen;
 use crate::RenderError;
+use crate::gpu::Screen;
 use std::sync::Arc;
 use std::time::Instant;
 use winit::application::ApplicationHandler;
@@ -99,7 +99,11 @@ fn without_place(reason: &str) -> String {
 
 /// With what was tried, where something was.
 fn tried(reason: String) -> String {
-    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(|value| format!("{name}={}", value.to_string_lossy()));
+    let set = |name: &str| {
+        std::env::var_os(name)
+            .filter(|value| !value.is_empty())
+            .map(|value| format!("{name}={}", value.to_string_lossy()))
+    };
     let tried: Vec<String> = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"].into_iter().filter_map(set).collect();
     if tried.is_empty() { reason } else { format!("{}: {reason}", tried.join(", ")) }
 }

@@ -9,8 +9,8 @@ use tumble_core::collide::Pose;
 
 use crate::body::{Library, read_name};
 use crate::bound::Bound;
-use crate::file::Place;
 use crate::fields::{Fields, Names, Value, number_of};
+use crate::file::Place;
 use crate::link::{Inherited, LinkRow, LinkSpec, Surface};
 use crate::rotation;
 use crate::urdf::{CollisionMeshes, MissingMeshes, UrdfOptions};
@@ -53,7 +53,16 @@ impl ArticulatedSpec {
     /// One of these links, its base at the origin.
     pub(crate) fn of(name: String, links: Vec<LinkSpec>) -> ArticulatedSpec {
         let (base, keep_apart, notes) = (Pose::identity(), Vec::new(), Vec::new());
-        ArticulatedSpec { name, base, links, self_collision: true, keep_apart, part_overlaps: false, alive: true, notes }
+        ArticulatedSpec {
+            name,
+            base,
+            links,
+            self_collision: true,
+            keep_apart,
+            part_overlaps: false,
+            alive: true,
+            notes,
+        }
     }
 
     /// Reads one; `None`, with the problems recorded, where it has no links.
@@ -62,13 +71,16 @@ impl ArticulatedSpec {
         let base = rotation::read_pose(&mut f);
         let surface = Surface::read(&mut f, library, &Surface { contacts: library.contacts, ..Surface::default() });
         let floating = f.flag_or("floating", false);
-        let mut spec = ArticulatedSpec {
-            base, part_overlaps: f.value("urdf").is_some(), ..ArticulatedSpec::of(name, Vec::new())
-        };
+        let mut spec =
+            ArticulatedSpec { base, part_overlaps: f.value("urdf").is_some(), ..ArticulatedSpec::of(name, Vec::new()) };
         (spec.self_collision, spec.alive) = (f.flag_or("self_collision", true), f.flag_or("alive", true));
         let from = Inherited {
-            library, surface: &surface, floating, room: MOST_LINKS,
-            collides: f.flag_or("collides", true), visible: f.flag_or("visible", true),
+            library,
+            surface: &surface,
+            floating,
+            room: MOST_LINKS,
+            collides: f.flag_or("collides", true),
+            visible: f.flag_or("visible", true),
         };
         match f.value("urdf") {
             Some(_) => spec.read_urdf(&mut f, &from, place)?,
@@ -163,7 +175,11 @@ impl ArticulatedSpec {
                 let told = error.to_string();
                 let lines: Vec<&str> = told.lines().collect();
                 for line in &lines {
-                    f.log.report(value.span(), format!("`urdf` of {}: {line}", f.what), "wanted a URDF that can be read");
+                    f.log.report(
+                        value.span(),
+                        format!("`urdf` of {}: {line}", f.what),
+                        "wanted a URDF that can be read",
+                    );
                 }
                 None
             }
@@ -174,7 +190,8 @@ impl ArticulatedSpec {
     fn read_joints(&mut self, f: &mut Fields<'_>) {
         for mut table in f.tables("joint", MOST_LINKS) {
             let named = table.texts("name", MOST_LINKS, "the name of a joint, or a list of them");
-            let joints: Vec<usize> = named.iter().filter_map(|(name, value)| self.named_joint(&table, "name", name, value)).collect();
+            let joints: Vec<usize> =
+                named.iter().filter_map(|(name, value)| self.named_joint(&table, "name", name, value)).collect();
             if let Some((name, _)) = named.first() {
                 table.what = format!("joint \"{name}\"");
             }
@@ -192,7 +209,8 @@ impl ArticulatedSpec {
     fn named_joint(&self, f: &Fields<'_>, key: &str, name: &str, value: &Value<'_>) -> Option<usize> {
         let found = self.joint(name);
         if found.is_none() {
-            let moving = self.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.as_str());
+            let moving =
+                self.links.iter().filter(|link| link.joint.kind != Joint::Fixed).map(|link| link.joint.name.as_str());
             f.unknown_name(key, value, name, moving.collect());
         }
         found
@@ -203,9 +221,12 @@ impl ArticulatedSpec {
         let Some(start) = f.table("start", "{ JOINT = 0.5 }") else { return };
         for (name, span, value) in start.entries() {
             let Some(link) = self.joint(name).filter(|&k| self.links[k].joint.is_single()) else {
-                let single = self.links.iter().filter(|link| link.joint.is_single()).map(|link| link.joint.name.as_str());
+                let single =
+                    self.links.iter().filter(|link| link.joint.is_single()).map(|link| link.joint.name.as_str());
                 let near = crate::suggest::nearest(name, single);
-                let wanted = near.map_or("wanted the name of a revolute or prismatic joint".into(), |near| format!("did you mean `{near}`?"));
+                let wanted = near.map_or("wanted the name of a revolute or prismatic joint".into(), |near| {
+                    format!("did you mean `{near}`?")
+                });
                 f.log.report(span, format!("{} has no joint \"{name}\" with one position", f.what), wanted);
                 continue;
             };

@@ -1,6 +1,8 @@
 //! From links to what the dynamics knows: a model, and a body with colliders, pictures and motors.
 
-use tumble_core::articulated::{ArticulatedBody, ArticulatedError, Collider, Coupling, Kinematics, LinkMass, Model, ModelBuilder, ModelError};
+use tumble_core::articulated::{
+    ArticulatedBody, ArticulatedError, Collider, Coupling, Kinematics, LinkMass, Model, ModelBuilder, ModelError,
+};
 use tumble_core::collide::{Pose, Shape, contacts};
 use tumble_core::{CameraMount, Joint, Look, Material, Object, Visual};
 
@@ -45,11 +47,19 @@ pub(crate) fn body(spec: &ArticulatedSpec, maker: &mut ShapeMaker<'_>) -> Result
 }
 
 /// The body with all that is on its links and joints.
-fn furnished(spec: &ArticulatedSpec, model: Model, shapes: &[Vec<Placed<'_>>], maker: &mut ShapeMaker<'_>) -> Result<ArticulatedBody, ArticulatedError> {
+fn furnished(
+    spec: &ArticulatedSpec,
+    model: Model,
+    shapes: &[Vec<Placed<'_>>],
+    maker: &mut ShapeMaker<'_>,
+) -> Result<ArticulatedBody, ArticulatedError> {
     let moving: Vec<&LinkSpec> = spec.links.iter().filter(|link| moves(link)).collect();
     let positions: Vec<f64> = moving.iter().flat_map(|link| position(link, &spec.base)).collect();
     let velocities: Vec<f64> = moving.iter().flat_map(|link| link.joint.velocity.clone()).collect();
-    let mut body = ArticulatedBody::new(&spec.name, model).at(spec.base).with_positions(&positions)?.with_velocities(&velocities)?;
+    let mut body = ArticulatedBody::new(&spec.name, model)
+        .at(spec.base)
+        .with_positions(&positions)?
+        .with_velocities(&velocities)?;
     body.self_collision = spec.self_collision;
     for (link, placed) in spec.links.iter().zip(shapes) {
         for placed in placed {
@@ -99,7 +109,10 @@ fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Resul
     let surface = &placed.spec.surface;
     if placed.spec.collides {
         let material = Material { restitution: surface.restitution, friction: surface.friction };
-        body.add_collider(link, Collider { material, contact_mode: surface.contacts, ..Collider::new(placed.shape.clone(), placed.pose) })?;
+        body.add_collider(
+            link,
+            Collider { material, contact_mode: surface.contacts, ..Collider::new(placed.shape.clone(), placed.pose) },
+        )?;
     }
     if placed.visible {
         let look: Look = look(&surface.look, &placed.center);
@@ -125,9 +138,15 @@ fn keep_apart_across_stacks(spec: &ArticulatedSpec, body: &mut ArticulatedBody) 
 
 /// Keeps apart all links that overlap at the start: files of robots do not say which links may meet, and their shapes reach into each other.
 fn part_overlaps(
-    spec: &ArticulatedSpec, shapes: &[Vec<Placed<'_>>], poses: &[Pose], body: &mut ArticulatedBody, maker: &mut ShapeMaker<'_>,
+    spec: &ArticulatedSpec,
+    shapes: &[Vec<Placed<'_>>],
+    poses: &[Pose],
+    body: &mut ArticulatedBody,
+    maker: &mut ShapeMaker<'_>,
 ) -> Result<(), ArticulatedError> {
-    let solid: Vec<Solid<'_>> = shapes.iter().enumerate()
+    let solid: Vec<Solid<'_>> = shapes
+        .iter()
+        .enumerate()
         .flat_map(|(link, placed)| placed.iter().filter(|p| p.spec.collides).map(move |p| (link, p)))
         .map(|(link, placed)| Solid { link, shape: &placed.shape, pose: poses[link] * placed.pose })
         .collect();
@@ -181,5 +200,8 @@ fn link_poses(spec: &ArticulatedSpec, body: &ArticulatedBody, q: &[f64], v: &[f6
     let mut kinematics = Kinematics::new(model);
     kinematics.refresh(model, q, v);
     let carrier = |link: Option<usize>| link.map_or(*body.base(), |l| kinematics.links()[l].pose);
-    spec.links.iter().map(|link| model.frame(&link.name).map_or(Pose::identity(), |f| carrier(f.link) * f.pose)).collect()
+    spec.links
+        .iter()
+        .map(|link| model.frame(&link.name).map_or(Pose::identity(), |f| carrier(f.link) * f.pose))
+        .collect()
 }

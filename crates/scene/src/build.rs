@@ -6,13 +6,16 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
 use tumble_collide::{Pose, RepairSettings, Shape, TreeCache, TreeSettings, TriMesh, Vec3, text_of};
 use tumble_core::solver::{self, Accuracy};
-use tumble_core::{ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, RigidBody, Settings, Sleep, Visual, World, WorldError, stepper_by_name};
+use tumble_core::{
+    ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, RigidBody, Settings, Sleep, Visual,
+    World, WorldError, stepper_by_name,
+};
 
-use crate::body::{BodySpec, MassSpec};
 use crate::articulated::ArticulatedSpec;
 use crate::assemble;
-use crate::collada;
+use crate::body::{BodySpec, MassSpec};
 use crate::closure::{ClosureKind, ClosureSpec, PartSpec};
+use crate::collada;
 use crate::file::SceneFile;
 use crate::link_shapes::{self, ShapeMaker};
 use crate::look::Look;
@@ -120,7 +123,12 @@ impl SceneFile {
         Ok((built, notes))
     }
 
-    fn add_articulated(&self, spec: &ArticulatedSpec, maker: &mut ShapeMaker<'_>, world: &mut World) -> Result<(), BuildError> {
+    fn add_articulated(
+        &self,
+        spec: &ArticulatedSpec,
+        maker: &mut ShapeMaker<'_>,
+        world: &mut World,
+    ) -> Result<(), BuildError> {
         let wrong = |why: String| BuildError::Articulated { scene: self.file.clone(), body: spec.name.clone(), why };
         let body = assemble::body(spec, maker).map_err(wrong)?;
         let id = world.add(body).map_err(|e| wrong(e.to_string()))?;
@@ -178,20 +186,30 @@ impl SceneFile {
             MeshSource::File { path, .. } => Some(path.clone()),
             _ => None,
         };
-        let wrong = |why: String| BuildError::Mesh { scene: self.file.clone(), mesh: spec.name.clone(), file: file.clone(), why };
+        let wrong = |why: String| BuildError::Mesh {
+            scene: self.file.clone(),
+            mesh: spec.name.clone(),
+            file: file.clone(),
+            why,
+        };
         let (mut mesh, lines) = self.triangles(spec, &wrong)?;
         let told = make_solid(&mut mesh, &lines, spec.repair.then(RepairSettings::default).as_ref()).map_err(&wrong)?;
         notes.extend(told.into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
         let mut settings = TreeSettings::octree();
         settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
         settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
-        let (shape, center, note) = Shape::mesh_cached(mesh, &settings, &TreeCache::of_environment()).map_err(|e| wrong(e.to_string()))?;
+        let (shape, center, note) =
+            Shape::mesh_cached(mesh, &settings, &TreeCache::of_environment()).map_err(|e| wrong(e.to_string()))?;
         notes.extend(note.filter(|note| !notes.contains(note)));
         Ok((shape, center))
     }
 
     /// With the file's line of each triangle, where it has any.
-    fn triangles(&self, spec: &MeshSpec, wrong: &impl Fn(String) -> BuildError) -> Result<(TriMesh, Vec<usize>), BuildError> {
+    fn triangles(
+        &self,
+        spec: &MeshSpec,
+        wrong: &impl Fn(String) -> BuildError,
+    ) -> Result<(TriMesh, Vec<usize>), BuildError> {
         let made = match &spec.source {
             MeshSource::File { path, scale } => {
                 let (mesh, lines) = self.read_mesh(spec, path, wrong)?;
@@ -205,7 +223,9 @@ impl SceneFile {
                 TriMesh::torus(*radius_m, *tube_radius_m, *segments as usize, *tube_segments as usize)
             }
             MeshSource::Icosphere { radius_m, subdivisions } => TriMesh::icosphere(*radius_m, *subdivisions),
-            MeshSource::Cylinder { radius_m, height_m, segments } => TriMesh::cylinder(*radius_m, 0.5 * height_m, *segments as usize),
+            MeshSource::Cylinder { radius_m, height_m, segments } => {
+                TriMesh::cylinder(*radius_m, 0.5 * height_m, *segments as usize)
+            }
             MeshSource::Capsule { radius_m, length_m, segments } => {
                 TriMesh::capsule(*radius_m, 0.5 * length_m, *segments as usize, (*segments as usize / 4).max(2))
             }
@@ -214,8 +234,18 @@ impl SceneFile {
         Ok((made, Vec::new()))
     }
 
-    fn read_mesh(&self, spec: &MeshSpec, path: &PathBuf, wrong: &impl Fn(String) -> BuildError) -> Result<(TriMesh, Vec<usize>), BuildError> {
-        let unread = |source| BuildError::MeshFile { scene: self.file.clone(), mesh: spec.name.clone(), file: path.clone(), source };
+    fn read_mesh(
+        &self,
+        spec: &MeshSpec,
+        path: &PathBuf,
+        wrong: &impl Fn(String) -> BuildError,
+    ) -> Result<(TriMesh, Vec<usize>), BuildError> {
+        let unread = |source| BuildError::MeshFile {
+            scene: self.file.clone(),
+            mesh: spec.name.clone(),
+            file: path.clone(),
+            source,
+        };
         let size = std::fs::metadata(path).map_err(unread)?.len();
         if size > MOST_MESH_BYTES {
             return Err(wrong(format!("the file has {size} bytes; the most that is read is {MOST_MESH_BYTES}")));
@@ -263,7 +293,11 @@ impl SceneFile {
 /// ([`TriMesh::check_closed`]), which is repaired where `repair` says how ([`TriMesh::repair`]). Also returns a sentence
 /// for each thing that was mended or that a user should know. The error names the first triangle that is wrong, and in
 /// an OBJ its line; the caller adds the file's name.
-pub fn read_solid(path: &std::path::Path, bytes: &[u8], repair: Option<&RepairSettings>) -> Result<(TriMesh, Vec<String>), String> {
+pub fn read_solid(
+    path: &std::path::Path,
+    bytes: &[u8],
+    repair: Option<&RepairSettings>,
+) -> Result<(TriMesh, Vec<String>), String> {
     let (mut mesh, lines) = read_with_lines(path, bytes)?;
     let notes = make_solid(&mut mesh, &lines, repair)?;
     Ok((mesh, notes))
@@ -293,7 +327,8 @@ fn read_with_lines(path: &std::path::Path, bytes: &[u8]) -> Result<(TriMesh, Vec
             TriMesh::from_obj_with_lines(&text).map_err(|e| e.to_string())
         }
         "dae" => {
-            let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is not UTF-8; a COLLADA file is text", e.valid_up_to()))?;
+            let text = std::str::from_utf8(bytes)
+                .map_err(|e| format!("byte {} is not UTF-8; a COLLADA file is text", e.valid_up_to()))?;
             Ok((collada::read(text)?, Vec::new()))
         }
         other => Err(format!("the extension is '{other}'; meshes are read from .obj, .stl, .ply and .dae")),

@@ -17,8 +17,12 @@ pub enum ClosureKind {
     Slider,
 }
 
-const KINDS: Names<ClosureKind> =
-    &[("point", ClosureKind::Point), ("hinge", ClosureKind::Hinge), ("weld", ClosureKind::Weld), ("slider", ClosureKind::Slider)];
+const KINDS: Names<ClosureKind> = &[
+    ("point", ClosureKind::Point),
+    ("hinge", ClosureKind::Hinge),
+    ("weld", ClosureKind::Weld),
+    ("slider", ClosureKind::Slider),
+];
 
 /// A part of an object, by place in the description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -32,7 +32,8 @@ pub(crate) fn read(text: &str) -> Result<TriMesh, String> {
     }
     let ids = root.descendants().filter_map(|node| Some((node.attribute("id")?, node))).collect();
     let mut reader = Reader { ids, geometries: BTreeMap::new(), made: TriMesh::default() };
-    let unit = descendant(root, "unit").and_then(|unit| unit.attribute("meter")).map_or(Ok(1.0), |m| number(m).ok_or(m));
+    let unit =
+        descendant(root, "unit").and_then(|unit| unit.attribute("meter")).map_or(Ok(1.0), |m| number(m).ok_or(m));
     let unit = unit.map_err(|m| format!("`meter` of <unit> is \"{m}\"; it must be a number"))?;
     match reader.scene(root) {
         Some(scene) => reader.children(scene, &Matrix4::new_scaling(unit), 0)?,
@@ -72,7 +73,9 @@ fn fault(node: Node<'_, '_>, what: impl std::fmt::Display) -> String {
 /// All numbers between blanks in an element.
 fn numbers<T: std::str::FromStr>(node: Node<'_, '_>) -> Result<Vec<T>, String> {
     let words = node.text().unwrap_or("").split_whitespace();
-    words.map(|word| word.parse().map_err(|_| fault(node, format_args!("holds \"{word}\"; it must be a number")))).collect()
+    words
+        .map(|word| word.parse().map_err(|_| fault(node, format_args!("holds \"{word}\"; it must be a number"))))
+        .collect()
 }
 
 /// Triangles of one geometry, in its own axes.
@@ -160,7 +163,11 @@ impl<'a, 'd> Reader<'a, 'd> {
                 let corner = |k: usize| -> Result<u32, String> {
                     let index = list[(start + k) * stride + offset];
                     let known = (index as usize) < points.len();
-                    if known { Ok(first + index) } else { Err(fault(primitive, format_args!("points at vertex {index} of {}", points.len()))) }
+                    if known {
+                        Ok(first + index)
+                    } else {
+                        Err(fault(primitive, format_args!("points at vertex {index} of {}", points.len())))
+                    }
                 };
                 if polygons && len > 3 {
                     let corners = (0..len).map(corner).collect::<Result<Vec<u32>, String>>()?;
@@ -186,9 +193,13 @@ impl<'a, 'd> Reader<'a, 'd> {
     /// Where the index of a corner's position stands among the numbers of the corner, how many those are, and the positions.
     fn inputs(&self, primitive: Node<'a, 'd>) -> Result<Option<(usize, usize, Vec<Vec3>)>, String> {
         let inputs: Vec<Node<'a, 'd>> = primitive.children().filter(|node| is(node, "input")).collect();
-        let offset = |input: &Node<'_, '_>| input.attribute("offset").and_then(|o| o.trim().parse::<usize>().ok()).filter(|o| *o < 64).unwrap_or(0);
+        let offset = |input: &Node<'_, '_>| {
+            input.attribute("offset").and_then(|o| o.trim().parse::<usize>().ok()).filter(|o| *o < 64).unwrap_or(0)
+        };
         let stride = inputs.iter().map(offset).max().unwrap_or(0) + 1;
-        let Some(vertex) = inputs.iter().find(|input| input.attribute("semantic") == Some("VERTEX")) else { return Ok(None) };
+        let Some(vertex) = inputs.iter().find(|input| input.attribute("semantic") == Some("VERTEX")) else {
+            return Ok(None);
+        };
         let vertices = self.target(*vertex, "source")?;
         let position = vertices.children().find(|node| node.attribute("semantic") == Some("POSITION"));
         let source = self.target(position.ok_or_else(|| fault(vertices, "has no input POSITION"))?, "source")?;
@@ -243,7 +254,9 @@ fn transform(step: Node<'_, '_>) -> Result<Matrix4<f64>, String> {
         "scale" => Matrix4::new_nonuniform_scaling(&Vec3::new(n[0], n[1], n[2])),
         _ => {
             let axis = Unit::try_new(Vec3::new(n[0], n[1], n[2]), 1e-12);
-            axis.map_or(Matrix4::identity(), |axis| Rotation3::from_axis_angle(&axis, n[3].to_radians()).to_homogeneous())
+            axis.map_or(Matrix4::identity(), |axis| {
+                Rotation3::from_axis_angle(&axis, n[3].to_radians()).to_homogeneous()
+            })
         }
     })
 }
@@ -256,7 +269,8 @@ mod tests {
     /// A unit cube of six quads, each corner with a normal's index beside its own, in a scene with the transformation given.
     fn cube(transform: &str) -> String {
         let quads = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
-        let corners: String = quads.iter().enumerate().flat_map(|(n, quad)| quad.map(|v| format!("{v} {n} "))).collect();
+        let corners: String =
+            quads.iter().enumerate().flat_map(|(n, quad)| quad.map(|v| format!("{v} {n} "))).collect();
         format!(
             "<COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\"><asset><unit meter=\"0.01\"/><up_axis>Y_UP</up_axis></asset>\n\
              <library_geometries><geometry id=\"g\"><mesh><source id=\"s\"><float_array count=\"24\">0 0 0 0 0 1 0 1 0 0 1 1 1 0 0 1 0 1 1 1 0 1 1 1</float_array></source>\n\
@@ -292,7 +306,10 @@ mod tests {
         }
         let told = |from: &str, to: &str| read(&text.replace(from, to)).unwrap_err();
         assert_eq!(told("<p>0 0", "<p>8 0"), "line 4: <polylist> points at vertex 8 of 8");
-        assert_eq!(told("url=\"#g\"", "url=\"#h\""), "line 5: <instance_geometry> points at \"#h\", which is not there");
+        assert_eq!(
+            told("url=\"#g\"", "url=\"#h\""),
+            "line 5: <instance_geometry> points at \"#h\", which is not there"
+        );
         assert_eq!(told("4 4 4 4 4 4<", "4 4 4 4 4 5<"), "line 4: <polylist> counts more corners than it has");
         assert_eq!(told("0 0 0 0 0 1", "0 0 0 0 x 1"), "line 2: <float_array> holds \"x\"; it must be a number");
     }

@@ -325,7 +325,11 @@ impl<'a> Fields<'a> {
             }
             None => {
                 let mut once: Vec<&str> = Vec::new();
-                known.into_iter().for_each(|word| if !once.contains(&word) { once.push(word) });
+                known.into_iter().for_each(|word| {
+                    if !once.contains(&word) {
+                        once.push(word)
+                    }
+                });
                 self.wrong(key, value, listed(once.into_iter().take(20), "or"));
             }
         }

@@ -202,7 +202,11 @@ fn in_our_words(message: &str) -> (String, String) {
 }
 
 /// The table `[key]`, if it is there.
-pub(crate) fn read_table<'a, T>(f: &mut Fields<'a>, key: &'static str, read: impl FnOnce(Fields<'a>) -> T) -> Option<T> {
+pub(crate) fn read_table<'a, T>(
+    f: &mut Fields<'a>,
+    key: &'static str,
+    read: impl FnOnce(Fields<'a>) -> T,
+) -> Option<T> {
     let value = f.value(key)?;
     Fields::of(f.log, value, format!("[{key}]"), &format!("[{key}]")).map(read)
 }
@@ -227,7 +231,11 @@ fn read_named<'a, T>(
     tables.entries().map(one).collect()
 }
 
-fn library<'a>(meshes: &[(&'a str, Option<MeshSpec>)], materials: &'a [MaterialSpec], contacts: ContactMode) -> Library<'a> {
+fn library<'a>(
+    meshes: &[(&'a str, Option<MeshSpec>)],
+    materials: &'a [MaterialSpec],
+    contacts: ContactMode,
+) -> Library<'a> {
     let mut right = 0..;
     let meshes = meshes.iter().map(|(name, mesh)| (*name, mesh.as_ref().and_then(|_| right.next()))).collect();
     let material_names = materials.iter().enumerate().map(|(index, m)| (m.name.as_str(), index)).collect();
@@ -259,7 +267,12 @@ fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>, names: &mut Taken) -> 
 }
 
 /// All articulated bodies, each with a name that no other object has.
-fn read_articulated(f: &mut Fields<'_>, library: &Library<'_>, files: &Place<'_>, names: &mut Taken) -> Vec<ArticulatedSpec> {
+fn read_articulated(
+    f: &mut Fields<'_>,
+    library: &Library<'_>,
+    files: &Place<'_>,
+    names: &mut Taken,
+) -> Vec<ArticulatedSpec> {
     let one = |mut table: Fields<'_>| {
         let (log, place) = (table.log, name_span(&mut table));
         let spec = ArticulatedSpec::read(table, library, files)?;
@@ -301,7 +314,9 @@ impl Parts for Objects<'_> {
     }
 
     fn names(&self) -> Vec<String> {
-        let links = |spec: &ArticulatedSpec| spec.links.iter().map(|link| format!("{}/{}", spec.name, link.name)).collect::<Vec<_>>();
+        let links = |spec: &ArticulatedSpec| {
+            spec.links.iter().map(|link| format!("{}/{}", spec.name, link.name)).collect::<Vec<_>>()
+        };
         self.bodies.iter().map(|body| body.name.clone()).chain(self.articulated.iter().flat_map(links)).collect()
     }
 }
@@ -320,13 +335,7 @@ fn note_name(table: &Fields<'_>, names: &mut Taken, name: &str, place: &Range<us
 }
 
 /// Files `name`; `false`, with the problem recorded, where it is taken.
-fn note_unique(
-    log: &Log<'_>,
-    what: &str,
-    names: &mut Taken,
-    name: &str,
-    place: &Range<usize>,
-) -> bool {
+fn note_unique(log: &Log<'_>, what: &str, names: &mut Taken, name: &str, place: &Range<usize>) -> bool {
     match names.insert(name.to_owned(), place.clone()) {
         None => true,
         Some(earlier) => {

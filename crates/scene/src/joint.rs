@@ -55,8 +55,12 @@ enum Kind {
     Spherical,
 }
 
-const KINDS: Names<Kind> =
-    &[("revolute", Kind::Revolute), ("prismatic", Kind::Prismatic), ("spherical", Kind::Spherical), ("fixed", Kind::Fixed)];
+const KINDS: Names<Kind> = &[
+    ("revolute", Kind::Revolute),
+    ("prismatic", Kind::Prismatic),
+    ("spherical", Kind::Spherical),
+    ("fixed", Kind::Fixed),
+];
 
 #[derive(Clone, Copy)]
 enum Motor {
@@ -65,7 +69,8 @@ enum Motor {
     Playback,
 }
 
-const MOTORS: Names<Motor> = &[("position", Motor::Position), ("velocity", Motor::Velocity), ("playback", Motor::Playback)];
+const MOTORS: Names<Motor> =
+    &[("position", Motor::Position), ("velocity", Motor::Velocity), ("playback", Motor::Playback)];
 
 /// A key in SI units, and for angles the same in degrees.
 type Key = (&'static str, Option<&'static str>);
@@ -125,7 +130,17 @@ impl JointSpec {
         }
         let velocity = vec![0.0; kind.dof()];
         let freedom = Freedom::default();
-        JointSpec { name: name.into(), kind, freedom, mimic: None, position, velocity, effort: None, speed: None, holds_start: false }
+        JointSpec {
+            name: name.into(),
+            kind,
+            freedom,
+            mimic: None,
+            position,
+            velocity,
+            effort: None,
+            speed: None,
+            holds_start: false,
+        }
     }
 
     /// Whether it has one degree of freedom, with a position of its own.
@@ -205,12 +220,22 @@ impl JointSpec {
                 let damping = f.number_or(words.damping, Bound::NOT_NEGATIVE, 0.0);
                 if stiffness + damping == 0.0 {
                     let message = format!("{} has no stiffness and no damping", f.what);
-                    f.log.report(f.span.clone(), message, format!("wanted `{}` or `{}` greater than 0", words.stiffness, words.damping));
+                    f.log.report(
+                        f.span.clone(),
+                        message,
+                        format!("wanted `{}` or `{}` greater than 0", words.stiffness, words.damping),
+                    );
                 }
                 let target = number(&mut f, words.target);
                 self.holds_start = target.is_none();
                 let velocity = f.number_or(words.target_rate, Bound::ANY, 0.0);
-                Some(Drive::Position { stiffness, damping, target: target.unwrap_or(0.0), velocity, limit: f.number_or(words.limit, Bound::NOT_NEGATIVE, most) })
+                Some(Drive::Position {
+                    stiffness,
+                    damping,
+                    target: target.unwrap_or(0.0),
+                    velocity,
+                    limit: f.number_or(words.limit, Bound::NOT_NEGATIVE, most),
+                })
             }
             Motor::Velocity => {
                 let target = f.number(words.target_rate, Bound::ANY);
@@ -241,7 +266,9 @@ impl JointSpec {
 
     /// Lets a position drive without a target hold the position at time 0.
     pub(crate) fn settle(&mut self) {
-        if let (true, Drive::Position { target, .. }, Some(start)) = (self.holds_start, &mut self.freedom.drive, self.position.first()) {
+        if let (true, Drive::Position { target, .. }, Some(start)) =
+            (self.holds_start, &mut self.freedom.drive, self.position.first())
+        {
             *target = *start;
         }
     }

@@ -122,7 +122,12 @@ pub struct Surface {
 
 impl Default for Surface {
     fn default() -> Surface {
-        Surface { friction: DEFAULT_FRICTION, restitution: DEFAULT_RESTITUTION, contacts: ContactMode::default(), look: Look::default() }
+        Surface {
+            friction: DEFAULT_FRICTION,
+            restitution: DEFAULT_RESTITUTION,
+            contacts: ContactMode::default(),
+            look: Look::default(),
+        }
     }
 }
 
@@ -175,8 +180,12 @@ impl<'a> LinkRow<'a> {
         let joint = if floats { read_floating(f, &name) } else { JointSpec::read(f, &name) };
         let surface = Surface::read(f, from.library, from.surface);
         let from = Inherited {
-            surface: &surface, library: from.library, floating: from.floating, room: from.room,
-            collides: f.flag_or("collides", from.collides), visible: f.flag_or("visible", from.visible),
+            surface: &surface,
+            library: from.library,
+            floating: from.floating,
+            room: from.room,
+            collides: f.flag_or("collides", from.collides),
+            visible: f.flag_or("visible", from.visible),
         };
         let shapes = read_shapes(f, &from);
         let mounts = Mounts::read(f);
@@ -184,7 +193,13 @@ impl<'a> LinkRow<'a> {
         let (count, next, colors) = read_repeat(f, &name, from.room);
         let mut joint = joint?;
         let mimic = joint.read_mimic(f);
-        Some(LinkRow { link: LinkSpec { name, parent, placement, joint, mass, shapes, mounts }, count, next, colors, mimic })
+        Some(LinkRow {
+            link: LinkSpec { name, parent, placement, joint, mass, shapes, mounts },
+            count,
+            next,
+            colors,
+            mimic,
+        })
     }
 
     /// Adds its links to a list: `name`, or `name_1` to `name_n`.
@@ -234,7 +249,8 @@ fn read_shapes(f: &mut Fields<'_>, from: &Inherited<'_, '_>) -> Vec<LinkShape> {
         f.log.report(f.span.clone(), format!("{what} has both `shape` and `shapes`"), "wanted one of them");
     }
     let all = single.into_iter().map(|value| (value, format!("the shape of {what}")));
-    let all = all.chain(several.into_iter().enumerate().map(|(n, value)| (value, format!("shape {} of {what}", n + 1))));
+    let all =
+        all.chain(several.into_iter().enumerate().map(|(n, value)| (value, format!("shape {} of {what}", n + 1))));
     all.filter_map(|(value, what)| LinkShape::read(Fields::of(f.log, value, what, example)?, from)).collect()
 }
 
@@ -246,7 +262,11 @@ impl LinkShape {
         };
         if shape == ShapeSpec::HalfSpace {
             let message = format!("{} is a half-space, which has no end", f.what);
-            f.log.report(f.span.clone(), message, "wanted a shape of finite size; make the half-space a static [[body]]");
+            f.log.report(
+                f.span.clone(),
+                message,
+                "wanted a shape of finite size; make the half-space a static [[body]]",
+            );
         }
         let mass = f.optional_number("mass_kg", Bound::POSITIVE).map(MassSpec::Mass);
         let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE).map(MassSpec::Density);
@@ -274,7 +294,8 @@ fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassS
     let inertia = read_inertia(f);
     let own = shapes.iter().filter(|s| s.mass.is_some()).count();
     let given = mass.is_some() || density.is_some() || center.is_some() || inertia.is_some();
-    let contradiction = |message: &str, wanted: &str| f.log.report(f.span.clone(), format!("{} {message}", f.what), wanted);
+    let contradiction =
+        |message: &str, wanted: &str| f.log.report(f.span.clone(), format!("{} {message}", f.what), wanted);
     if given && own > 0 {
         contradiction("has a mass and so have its shapes", "wanted the mass of the link, or that of each shape");
     } else if mass.is_some() && density.is_some() {
@@ -282,7 +303,10 @@ fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassS
     } else if (center.is_some() || inertia.is_some()) && mass.is_none() {
         contradiction("has `center_m` or `inertia_kg_m2` but no `mass_kg`", "wanted `mass_kg` with them");
     } else if inertia.is_none() && center.is_some() && !shapes.is_empty() {
-        contradiction("has `center_m` but no `inertia_kg_m2`", "wanted both, or neither: the mass is then spread over the shapes");
+        contradiction(
+            "has `center_m` but no `inertia_kg_m2`",
+            "wanted both, or neither: the mass is then spread over the shapes",
+        );
     } else if own > 0 && own < shapes.len() {
         contradiction("has shapes with a mass and shapes without", "wanted a mass for each shape, or one for the link");
     } else if !given && own == 0 && !shapes.is_empty() && !fixed {
@@ -349,7 +373,10 @@ impl std::fmt::Display for InertiaFault {
         match self {
             InertiaFault::Negative(a) => write!(f, "principal moments of at least 0; the least is {a:.6e} kg·m²"),
             InertiaFault::Triangle([a, b, c]) => {
-                write!(f, "no principal moment greater than the sum of the others; they are {a:.6e}, {b:.6e} and {c:.6e} kg·m²")
+                write!(
+                    f,
+                    "no principal moment greater than the sum of the others; they are {a:.6e}, {b:.6e} and {c:.6e} kg·m²"
+                )
             }
         }
     }

@@ -91,7 +91,13 @@ impl<'m> ShapeMaker<'m> {
             Geometry::Shape(shape) => return make(shape, self.meshes).map(Some).map_err(|e| e.to_string()),
             Geometry::File { path, scale, place, hull, required } => (path, scale, place, *hull, *required),
         };
-        let used = if !spec.collides { Use::Drawing } else if hull { Use::Hull } else { Use::Collision };
+        let used = if !spec.collides {
+            Use::Drawing
+        } else if hull {
+            Use::Hull
+        } else {
+            Use::Collision
+        };
         let key = (path.clone(), scale.map(f64::to_bits), used);
         if !self.files.contains_key(&key) {
             let made = self.read(path, *scale, used);

@@ -175,7 +175,9 @@ fn read_torus(f: &mut Fields<'_>) -> MeshSource {
 fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
     let (text, value) = f.text("file", "the path of an .obj, .stl, .ply or .dae file")?;
     let path = folder.join(text);
-    let known = path.extension().is_some_and(|e| ["obj", "stl", "ply", "dae"].iter().any(|known| e.eq_ignore_ascii_case(known)));
+    let known = path
+        .extension()
+        .is_some_and(|e| ["obj", "stl", "ply", "dae"].iter().any(|known| e.eq_ignore_ascii_case(known)));
     if !known {
         f.wrong("file", value, "the path of an .obj, .stl, .ply or .dae file");
         return None;

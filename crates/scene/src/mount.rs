@@ -30,9 +30,15 @@ impl Mounts {
     pub(crate) fn read(f: &mut Fields<'_>) -> Mounts {
         let (log, what) = (f.log, f.what.clone());
         let example = "{ position_m = [0, 0, 0.1], ahead = [1, 0, 0] }";
-        let camera = f.value("camera").and_then(|value| Fields::of(log, value, format!("the camera of {what}"), example)).map(read_camera);
+        let camera = f
+            .value("camera")
+            .and_then(|value| Fields::of(log, value, format!("the camera of {what}"), example))
+            .map(read_camera);
         let example = "{ type = \"point\", position_m = [0, 0, 0.1] }";
-        let light = f.value("light").and_then(|value| Fields::of(log, value, format!("the light of {what}"), example)).and_then(read_light);
+        let light = f
+            .value("light")
+            .and_then(|value| Fields::of(log, value, format!("the light of {what}"), example))
+            .and_then(read_light);
         Mounts { camera, light }
     }
 }
@@ -43,7 +49,11 @@ fn read_camera(mut f: Fields<'_>) -> CameraMount {
     let fov_deg = f.number_or("vertical_fov_deg", FOV, 40.0);
     let (near, far) = (f.number_or("near_m", Bound::POSITIVE, 0.05), f.number_or("far_m", Bound::POSITIVE, 500.0));
     if near >= far {
-        f.log.report(f.span.clone(), format!("`near_m` of {} is {near}, `far_m` {far}", f.what), "wanted near_m less than far_m");
+        f.log.report(
+            f.span.clone(),
+            format!("`near_m` of {} is {near}, `far_m` {far}", f.what),
+            "wanted near_m less than far_m",
+        );
     }
     let pose = facing(position, ahead, up).unwrap_or_else(|| {
         f.log.report(f.span.clone(), format!("{} looks along its own `up`", f.what), "wanted `ahead` not along `up`");

@@ -32,7 +32,10 @@ pub(crate) fn read_pose(f: &mut Fields<'_>) -> Pose {
 
 /// A pose from its numbers: metres, and a unit quaternion `[x, y, z, w]`.
 pub(crate) fn pose(position_m: [f64; 3], [x, y, z, w]: [f64; 4]) -> Pose {
-    Pose::from_parts(Translation3::from(Vec3::from(position_m)), UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)))
+    Pose::from_parts(
+        Translation3::from(Vec3::from(position_m)),
+        UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)),
+    )
 }
 
 /// Roll, pitch and yaw about the fixed axes x, then y, then z, radians, as a unit quaternion `[x, y, z, w]`.

@@ -30,8 +30,18 @@ macro_rules! shipped_scenes {
     };
 }
 
-const SHIPPED: &[Shipped] =
-    shipped_scenes!["falling", "stack", "billiards", "bowling", "incline", "pendulum", "chain", "piston", "skeleton", "robot" ["arm.urdf"]];
+const SHIPPED: &[Shipped] = shipped_scenes![
+    "falling",
+    "stack",
+    "billiards",
+    "bowling",
+    "incline",
+    "pendulum",
+    "chain",
+    "piston",
+    "skeleton",
+    "robot"["arm.urdf"]
+];
 
 /// The scenes that come with tumble.
 pub fn shipped() -> &'static [Shipped] {

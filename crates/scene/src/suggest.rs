@@ -97,7 +97,10 @@ mod tests {
     #[test]
     fn another_unit_is_found() {
         assert_eq!(nearest("limits_m", ["lights", "limits_rad", "limits_deg"]), Some("limits_rad"));
-        assert_eq!(nearest("damping_n_s_per_m", ["friction_n_m", "damping_n_m_s_per_rad"]), Some("damping_n_m_s_per_rad"));
+        assert_eq!(
+            nearest("damping_n_s_per_m", ["friction_n_m", "damping_n_m_s_per_rad"]),
+            Some("damping_n_m_s_per_rad")
+        );
         assert_eq!(nearest("mass_m", ["color", "collides"]), None);
     }
 

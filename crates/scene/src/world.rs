@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use thiserror::Error;
-use tumble_core::{Combine, Sleep};
 use tumble_core::collide::ContactMode;
+use tumble_core::{Combine, Sleep};
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};

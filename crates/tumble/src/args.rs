@@ -332,8 +332,15 @@ fn folder(text: &str) -> Result<PathBuf, String> {
 }
 
 fn package(text: &str) -> Result<(String, PathBuf), String> {
-    let (name, folder) = text.split_once('=').filter(|(name, folder)| !name.is_empty() && !folder.is_empty()).ok_or("wanted NAME=DIR")?;
-    if Path::new(folder).is_dir() { Ok((name.into(), folder.into())) } else { Err(format!("there is no folder {folder}")) }
+    let (name, folder) = text
+        .split_once('=')
+        .filter(|(name, folder)| !name.is_empty() && !folder.is_empty())
+        .ok_or("wanted NAME=DIR")?;
+    if Path::new(folder).is_dir() {
+        Ok((name.into(), folder.into()))
+    } else {
+        Err(format!("there is no folder {folder}"))
+    }
 }
 
 fn missing(text: &str) -> Result<MissingMeshes, String> {
@@ -348,7 +355,9 @@ fn missing(text: &str) -> Result<MissingMeshes, String> {
 fn png(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension() {
-        Some(ending) if !ending.eq_ignore_ascii_case("png") => Err("pictures are written as PNG; wanted a file that ends in .png".into()),
+        Some(ending) if !ending.eq_ignore_ascii_case("png") => {
+            Err("pictures are written as PNG; wanted a file that ends in .png".into())
+        }
         _ => Ok(path),
     }
 }
@@ -356,12 +365,19 @@ fn png(text: &str) -> Result<PathBuf, String> {
 fn planner(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or(text);
-    if ["yaml", "yml", "json"].contains(&ending) { Ok(path) } else { Err("wanted yaml, json, or a file that ends in .yml, .yaml or .json".into()) }
+    if ["yaml", "yml", "json"].contains(&ending) {
+        Ok(path)
+    } else {
+        Err("wanted yaml, json, or a file that ends in .yml, .yaml or .json".into())
+    }
 }
 
 fn size(text: &str) -> Result<(u32, u32), String> {
     let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     let side = 1..=MAX_SIDE;
-    let fits = |(w, h): &(u32, u32)| side.contains(w) && side.contains(h) && u64::from(*w) * u64::from(*h) <= MAX_PIXELS;
-    parsed.filter(fits).ok_or_else(|| format!("wanted WIDTHxHEIGHT in pixels, each 1 to {MAX_SIDE}, together at most {MAX_PIXELS}"))
+    let fits =
+        |(w, h): &(u32, u32)| side.contains(w) && side.contains(h) && u64::from(*w) * u64::from(*h) <= MAX_PIXELS;
+    parsed
+        .filter(fits)
+        .ok_or_else(|| format!("wanted WIDTHxHEIGHT in pixels, each 1 to {MAX_SIDE}, together at most {MAX_PIXELS}"))
 }

@@ -39,7 +39,11 @@ fn robot(path: &Path) -> Result<String, Failure> {
     let (body, notes) = urdf::load(path, &urdf::UrdfOptions::default())?;
     notes.iter().for_each(|note| println!("{note}"));
     let (links, model) = (body.model().frames().len(), body.model());
-    Ok(format!("a robot of {links} links, {} degrees of freedom on a fixed base, {:.6} kg that move", model.dof(), model.mass()))
+    Ok(format!(
+        "a robot of {links} links, {} degrees of freedom on a fixed base, {:.6} kg that move",
+        model.dof(),
+        model.mass()
+    ))
 }
 
 /// A file is a cave where it has a table that caves have and scenes have not; a name where it is a shipped cave's and no scene's.
@@ -49,7 +53,8 @@ fn looks_like_cave(file: &str) -> bool {
         let small = path.metadata().is_ok_and(|about| about.len() <= MOST_BYTES);
         return small && std::fs::read_to_string(path).is_ok_and(|text| is_cave(&text));
     }
-    let shipped_cave = shipped_caves().iter().any(|cave| file == cave.name || file == format!("caves/{}.toml", cave.name));
+    let shipped_cave =
+        shipped_caves().iter().any(|cave| file == cave.name || file == format!("caves/{}.toml", cave.name));
     shipped_cave && !path.is_dir() && !shipped().iter().any(|scene| scene.name == file)
 }
 
@@ -79,7 +84,9 @@ fn scene(name: &str) -> Result<String, Failure> {
     let scene = scene.load()?;
     let (world, notes) = scene.build().map_err(Failure::input)?;
     // textures are read when a picture is made
-    Drawing::new(&scene).list(&world, &DebugDraw::default()).map_err(|e| Failure::input(format!("{}: {e}", scene.file)))?;
+    Drawing::new(&scene)
+        .list(&world, &DebugDraw::default())
+        .map_err(|e| Failure::input(format!("{}: {e}", scene.file)))?;
     notes.iter().for_each(|note| println!("{note}"));
     Ok(format!("a scene of {} bodies, {} degrees of freedom", world.ids().len(), degrees(&world)))
 }
@@ -106,6 +113,10 @@ fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {
     let error = shape.tree().map_or(0.0, |tree| tree.outward_error());
     Ok(format!(
         "a closed mesh of {triangles} triangles, volume {:.6e} m³, centre of mass ({:.6}, {:.6}, {:.6}) m, sphere tree within {:.3} % of its diagonal",
-        shape.volume(), center.x, center.y, center.z, 100.0 * error / diagonal
+        shape.volume(),
+        center.x,
+        center.y,
+        center.z,
+        100.0 * error / diagonal
     ))
 }

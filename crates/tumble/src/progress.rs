@@ -71,7 +71,8 @@ impl Share {
         if !std::io::stderr().is_terminal() {
             return Share::Lines { what: what.to_owned(), last: Mutex::new(Instant::now()) };
         }
-        let style = ProgressStyle::with_template("{msg} {bar:40} {percent} %  {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style = ProgressStyle::with_template("{msg} {bar:40} {percent} %  {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
         let bar = ProgressBar::new(PARTS as u64).with_style(style).with_message(what.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
         Share::Bar(bar)

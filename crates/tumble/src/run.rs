@@ -73,7 +73,9 @@ fn simulate(
     let (begin, mut tally, mut wall) = (world.time(), Tally::default(), 0.0);
     let mut progress = Progress::new(frames, options.quiet);
     let mut record = |world: &World| match &mut recorder {
-        Some(r) => r.frame(world.time(), world.frame(), &poses(world), &world.save()).map_err(|e| Failure::run("recording", e)),
+        Some(r) => {
+            r.frame(world.time(), world.frame(), &poses(world), &world.save()).map_err(|e| Failure::run("recording", e))
+        }
         None => Ok(()),
     };
     let mut shoot = |world: &World| shots.as_mut().map_or(Ok(()), |shots| shots.frame(world, begin));

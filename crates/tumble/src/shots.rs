@@ -48,7 +48,9 @@ impl Shots {
         if options.picture.is_none() && options.frames_dir.is_none() && options.video.is_none() {
             return match from {
                 From::Camera(_) => Ok(None),
-                _ => Err(Failure::input("--cave draws pictures; say which: --picture FILE, --frames-dir DIR or --video FILE")),
+                _ => Err(Failure::input(
+                    "--cave draws pictures; say which: --picture FILE, --frames-dir DIR or --video FILE",
+                )),
             };
         }
         if options.video.is_some() {
@@ -144,7 +146,9 @@ fn from(scene: &SceneFile, options: &RunOptions) -> Result<From, Failure> {
     let facet = options.facet.as_ref().map(|facet| cave.facet(facet).cloned()).transpose()?;
     let view = Box::new(CaveView::new(cave, scene).map_err(Failure::input)?);
     match facet {
-        Some(_) if size.is_some() => Err(Failure::input("the cave says how large a facet is (size_px); --size goes with the unfolded cave or without one")),
+        Some(_) if size.is_some() => Err(Failure::input(
+            "the cave says how large a facet is (size_px); --size goes with the unfolded cave or without one",
+        )),
         Some(facet) => Ok(From::Facet(view, Box::new(facet))),
         None => Ok(From::Unfolded(view, size.unwrap_or(USUAL))),
     }
@@ -155,7 +159,8 @@ fn frames(from: &From, options: &RunOptions) -> Result<Option<Frames>, Failure> 
         return Ok(None);
     }
     if let Some(folder) = &options.frames_dir {
-        std::fs::create_dir_all(folder).map_err(|e| Failure::input(format!("{}: cannot be made: {e}", folder.display())))?;
+        std::fs::create_dir_all(folder)
+            .map_err(|e| Failure::input(format!("{}: cannot be made: {e}", folder.display())))?;
     }
     let size = match from {
         From::Camera(size) => *size,

@@ -148,17 +148,32 @@ impl Summary {
     pub fn lines(&self) -> String {
         let mut text = format!(
             "{}: {:.3} s in {} frames by {} and {}; {:.1} times real time; a frame at most {:.2} ms (99 %), {:.2} ms (all)\n",
-            self.scene, self.simulated_s, self.steps, self.stepper, self.solver, self.real_time_factor, self.frame_p99_ms, self.frame_max_ms
+            self.scene,
+            self.simulated_s,
+            self.steps,
+            self.stepper,
+            self.solver,
+            self.real_time_factor,
+            self.frame_p99_ms,
+            self.frame_max_ms
         );
         text += &format!(
             "contacts {:.1} a frame (at most {}); residual at most {:.1e} m/s ({} solves unconverged, {} rays); penetration at most {:.2e} m\n",
-            self.contacts_mean, self.contacts_max, self.solver_residual_max_m_per_s, self.unconverged_solves, self.rays, self.max_penetration_m
+            self.contacts_mean,
+            self.contacts_max,
+            self.solver_residual_max_m_per_s,
+            self.unconverged_solves,
+            self.rays,
+            self.max_penetration_m
         );
         if let Some(name) = &self.out_of_reach {
             text += &format!("'{name}' was led out of reach: {:.3} m open at most\n", self.out_of_reach_max_m);
         }
         if self.tries_max > 0 {
-            text += &format!("tries {:.1} a frame (at most {}); {} floor hits\n", self.tries_mean, self.tries_max, self.floor_hits);
+            text += &format!(
+                "tries {:.1} a frame (at most {}); {} floor hits\n",
+                self.tries_mean, self.tries_max, self.floor_hits
+            );
         }
         let total = |s: &State| s.kinetic_energy_j + s.potential_energy_j;
         text + &format!("energy {:.6} J at the start, {:.6} J at the end\n", total(&self.start), total(&self.end))

@@ -35,7 +35,8 @@ pub fn table(file: &TreeFile, verbose: bool) -> String {
     let s = file.settings;
     // the method's name as it is typed
     let method = serde_json::to_value(s.builder).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
-    let mut text = format!("{method}, branch {}, depth {}, error {}; lengths in % of the diagonal\n", s.branch, s.depth, s.error);
+    let mut text =
+        format!("{method}, branch {}, depth {}, error {}; lengths in % of the diagonal\n", s.branch, s.depth, s.error);
     text += &aligned(heads.into_iter().chain(cells));
     if verbose {
         for stage in &file.stages {
@@ -49,7 +50,9 @@ pub fn table(file: &TreeFile, verbose: bool) -> String {
 pub fn aligned(rows: impl Iterator<Item = Vec<String>>) -> String {
     let rows: Vec<Vec<String>> = rows.collect();
     let width = |k: usize| rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).max().unwrap_or(0);
-    let line = |row: &Vec<String>| row.iter().enumerate().map(|(k, cell)| format!("{cell:>wide$}", wide = width(k))).collect::<Vec<_>>().join("  ");
+    let line = |row: &Vec<String>| {
+        row.iter().enumerate().map(|(k, cell)| format!("{cell:>wide$}", wide = width(k))).collect::<Vec<_>>().join("  ")
+    };
     rows.iter().map(|row| line(row).trim_end().to_owned() + "\n").collect()
 }
 

@@ -31,7 +31,12 @@ pub struct Video {
 impl Video {
     /// Whether there is an `ffmpeg` to be started.
     pub fn probe() -> Result<(), Failure> {
-        let started = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        let started = Command::new("ffmpeg")
+            .arg("-version")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn();
         match started {
             Ok(mut child) => wait(&mut child, PATIENCE).map(|_| ()),
             Err(e) => Err(missing(&e)),
@@ -44,8 +49,16 @@ impl Video {
         command.args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
         command.args(["-s", &format!("{}x{}", size[0], size[1]), "-r", &per_second.to_string(), "-i", "pipe:0"]);
         // even sides, and the pixel format that players know
-        command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]).arg("--").arg(path);
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().map_err(|e| missing(&e))?;
+        command
+            .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-movflags", "+faststart"])
+            .arg("--")
+            .arg(path);
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|e| missing(&e))?;
         let (send, receive) = sync_channel(2);
         let (input, complaints) = (child.stdin.take(), child.stderr.take());
         let writer = input.map(|input| std::thread::spawn(move || pour(input, &receive)));
@@ -56,7 +69,13 @@ impl Video {
     /// The next frame.
     pub fn add(&mut self, image: &Image) -> Result<(), Failure> {
         if [image.width, image.height] != self.size {
-            return Err(Failure::run("the video", format!("a frame of {} x {} pixels in a video of {} x {}", image.width, image.height, self.size[0], self.size[1])));
+            return Err(Failure::run(
+                "the video",
+                format!(
+                    "a frame of {} x {} pixels in a video of {} x {}",
+                    image.width, image.height, self.size[0], self.size[1]
+                ),
+            ));
         }
         let (mut frame, begin) = (image.rgba.clone(), Instant::now());
         loop {
@@ -64,7 +83,9 @@ impl Video {
             match frames.try_send(frame) {
                 Ok(()) => return Ok(()),
                 Err(TrySendError::Disconnected(_)) => return Err(self.failed("ffmpeg ended early")),
-                Err(TrySendError::Full(_)) if begin.elapsed() > PATIENCE => return Err(self.failed("ffmpeg takes no more frames")),
+                Err(TrySendError::Full(_)) if begin.elapsed() > PATIENCE => {
+                    return Err(self.failed("ffmpeg takes no more frames"));
+                }
                 Err(TrySendError::Full(back)) => frame = back,
             }
             std::thread::sleep(PAUSE);
@@ -86,7 +107,10 @@ impl Video {
         self.end();
         let said = self.said.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
         let said = said.trim();
-        Failure::run("the video", if said.is_empty() { format!("{what}, and said nothing") } else { format!("{what}: {said}") })
+        Failure::run(
+            "the video",
+            if said.is_empty() { format!("{what}, and said nothing") } else { format!("{what}: {said}") },
+        )
     }
 
     fn end(&mut self) {
@@ -144,7 +168,10 @@ fn wait(child: &mut Child, patience: Duration) -> Result<bool, Failure> {
 
 fn missing(error: &std::io::Error) -> Failure {
     match error.kind() {
-        ErrorKind::NotFound => Failure::run("the video", "there is no ffmpeg; on Debian and Ubuntu: apt-get install ffmpeg; or write pictures with --frames-dir"),
+        ErrorKind::NotFound => Failure::run(
+            "the video",
+            "there is no ffmpeg; on Debian and Ubuntu: apt-get install ffmpeg; or write pictures with --frames-dir",
+        ),
         _ => Failure::run("the video", format!("ffmpeg cannot be started: {error}")),
     }
 }

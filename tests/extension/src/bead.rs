@@ -17,8 +17,8 @@
 
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    Collidable, CollisionKind, Constraint, Dims, Energy, ForceSlice, Forces, Integratable, Level, Material, Momentum, Object,
-    RowBuilder, RowTarget, Site, Span, WorldView, rows::RowSet,
+    Collidable, CollisionKind, Constraint, Dims, Energy, ForceSlice, Forces, Integratable, Level, Material, Momentum,
+    Object, RowBuilder, RowTarget, Site, Span, WorldView, rows::RowSet,
 };
 
 /// A bead on a cycloid in the x–z plane, lowest at the origin; its ends are at `|φ| = π`.
@@ -46,7 +46,18 @@ impl Bead {
     /// A bead of `mass` kg and the given shape on the cycloid of a circle of `radius` m (both above 0).
     pub fn new(name: impl Into<String>, mass: f64, radius: f64, shape: Shape) -> Bead {
         let (root, tangent) = (2.0 * radius * mass.sqrt(), Vec3::new(2.0 * radius, 0.0, 0.0));
-        Bead { name: name.into(), mass, radius, shape, material: Material::default(), angle: 0.0, speed: 0.0, stop: None, root, tangent }
+        Bead {
+            name: name.into(),
+            mass,
+            radius,
+            shape,
+            material: Material::default(),
+            angle: 0.0,
+            speed: 0.0,
+            stop: None,
+            root,
+            tangent,
+        }
     }
 
     /// Sets the angle (rad, within ±π) and the speed along the wire (m/s) at time 0.
@@ -183,7 +194,10 @@ impl Integratable for Bead {
     }
 
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
-        Energy { kinetic: 0.5 * x[1] * x[1] / self.inertia(x[0]), potential: -self.mass * gravity.dot(&self.position(x[0])) }
+        Energy {
+            kinetic: 0.5 * x[1] * x[1] / self.inertia(x[0]),
+            potential: -self.mass * gravity.dot(&self.position(x[0])),
+        }
     }
 
     fn momentum(&self, x: &[f64]) -> Momentum {

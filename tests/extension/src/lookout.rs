@@ -16,7 +16,14 @@ impl Lookout {
     /// A lookout; the camera is `height` m above its particle.
     pub fn new(particle: Particle, height: f64) -> Lookout {
         let pose = Pose::translation(0.0, 0.0, height);
-        let lamp = LightMount { part: 0, pose, spread: Spread::Point { radius: 0.05 }, color: [1.0; 3], intensity: 1.0, casts_shadow: false };
+        let lamp = LightMount {
+            part: 0,
+            pose,
+            spread: Spread::Point { radius: 0.05 },
+            color: [1.0; 3],
+            intensity: 1.0,
+            casts_shadow: false,
+        };
         Lookout { particle, cameras: [CameraMount::new("", 0, pose)], lights: [lamp] }
     }
 }

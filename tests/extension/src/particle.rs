@@ -8,7 +8,8 @@
 
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    Collidable, CollisionKind, Dims, Energy, ForceSlice, Forces, Integratable, Material, Momentum, Object, Site, Span, WorldView,
+    Collidable, CollisionKind, Dims, Energy, ForceSlice, Forces, Integratable, Material, Momentum, Object, Site, Span,
+    WorldView,
 };
 
 /// A point mass that collides as a sphere and never turns.
@@ -28,7 +29,14 @@ pub struct Particle {
 impl Particle {
     /// A particle of `mass` kg (above 0) with a sphere of the given shape around it, at rest at the origin.
     pub fn new(name: impl Into<String>, mass: f64, shape: Shape) -> Particle {
-        Particle { name: name.into(), mass, shape, material: Material::default(), position: Vec3::zeros(), velocity: Vec3::zeros() }
+        Particle {
+            name: name.into(),
+            mass,
+            shape,
+            material: Material::default(),
+            position: Vec3::zeros(),
+            velocity: Vec3::zeros(),
+        }
     }
 
     /// Sets position (m) and velocity (m/s) at time 0.
@@ -134,7 +142,10 @@ impl Integratable for Particle {
     }
 
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
-        Energy { kinetic: 0.5 * vec3(&x[3..]).norm_squared() / self.mass, potential: -self.mass * gravity.dot(&vec3(x)) }
+        Energy {
+            kinetic: 0.5 * vec3(&x[3..]).norm_squared() / self.mass,
+            potential: -self.mass * gravity.dot(&vec3(x)),
+        }
     }
 
     fn momentum(&self, x: &[f64]) -> Momentum {

@@ -71,7 +71,8 @@ impl Constraint for Rod {
         let n = d / distance;
         let turning = (v - n * n.dot(&v)).norm_squared() / distance;
         let (set, sign) = if self.rope { (RowSet::HalfLine, -1.0) } else { (RowSet::Equality, 1.0) };
-        let target = RowTarget { bias_acceleration: sign * turning, ..RowTarget::new(set, sign * (distance - self.length)) };
+        let target =
+            RowTarget { bias_acceleration: sign * turning, ..RowTarget::new(set, sign * (distance - self.length)) };
         out.row(target);
         for (end, p, side) in [(self.ends[0], pa, sign), (self.ends[1], pb, -sign)] {
             if let End::Object(id) = end {
@@ -81,7 +82,9 @@ impl Constraint for Rod {
     }
 
     fn gaps(&self, _me: &Span, view: &WorldView, out: &mut Vec<f64>) {
-        if let (true, Some((pa, _)), Some((pb, _))) = (self.rope, motion(self.ends[0], view), motion(self.ends[1], view)) {
+        if let (true, Some((pa, _)), Some((pb, _))) =
+            (self.rope, motion(self.ends[0], view), motion(self.ends[1], view))
+        {
             out.push(self.length - (pa - pb).norm());
         }
     }

@@ -18,7 +18,8 @@ impl Dynibo {
         let path = std::env::temp_dir().join(format!("tumble-bench-{}-{}.urdf", std::process::id(), robot.dof()));
         std::fs::write(&path, urdf(robot)).expect("the temporary directory takes a file");
         let made = if robot.floating {
-            let rest = BaseState::new(Frame::translation(0.0, 0.0, 0.0), Twist::zeros(), Twist::zeros()).expect("finite");
+            let rest =
+                BaseState::new(Frame::translation(0.0, 0.0, 0.0), Twist::zeros(), Twist::zeros()).expect("finite");
             Dynibo::Floating(FloatingRobot::from_urdf(&path).expect("a valid URDF"), rest)
         } else {
             Dynibo::Fixed(dynibo::Robot::from_urdf(&path).expect("a valid URDF"))

@@ -114,5 +114,10 @@ pub fn panda() -> Robot {
 
 /// Floating, two legs of 6, a torso of 2, two arms of 7 with a gripper each, a neck of 2, as the reduced Talos is: 38 degrees of freedom.
 pub fn talos() -> Robot {
-    limbs("Talos shape (38)", true, &[(None, 6), (None, 6), (None, 2), (Some(13), 8), (Some(13), 8), (Some(13), 2)], 4.41)
+    limbs(
+        "Talos shape (38)",
+        true,
+        &[(None, 6), (None, 6), (None, 2), (Some(13), 8), (Some(13), 8), (Some(13), 2)],
+        4.41,
+    )
 }

@@ -17,7 +17,9 @@ pub fn model(robot: &Robot) -> Model {
         inertia: Mat3::from_diagonal(&moments.into()),
     };
     let (weight, center, moments) = base();
-    let root = robot.floating.then(|| builder.link("base", None, Joint::Floating, Pose::identity(), mass(weight, center, moments)));
+    let root = robot
+        .floating
+        .then(|| builder.link("base", None, Joint::Floating, Pose::identity(), mass(weight, center, moments)));
     let mut numbers = Vec::new();
     for (i, part) in robot.parts.iter().enumerate() {
         let joint = match part.motion {
@@ -26,9 +28,18 @@ pub fn model(robot: &Robot) -> Model {
         };
         let about = |axis: Vec3, angle: f64| Pose::rotation(angle * axis);
         let [r, p, w] = part.turn;
-        let placement = Pose::translation(part.at[0], part.at[1], part.at[2]) * about(Vec3::z(), w) * about(Vec3::y(), p) * about(Vec3::x(), r);
+        let placement = Pose::translation(part.at[0], part.at[1], part.at[2])
+            * about(Vec3::z(), w)
+            * about(Vec3::y(), p)
+            * about(Vec3::x(), r);
         let parent = part.parent.map_or(root, |p| Some(numbers[p]));
-        numbers.push(builder.link(format!("l{i}"), parent, joint, placement, mass(part.mass, part.center, part.moments)));
+        numbers.push(builder.link(
+            format!("l{i}"),
+            parent,
+            joint,
+            placement,
+            mass(part.mass, part.center, part.moments),
+        ));
     }
     builder.build().expect("a valid model")
 }

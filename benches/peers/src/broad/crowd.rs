@@ -67,7 +67,14 @@ impl Crowd {
         };
         let mut random = Random(n as u64);
         let mut crowd = Crowd {
-            boxes: Vec::new(), moving: Vec::new(), replaced: vec![false; n], velocities: Vec::new(), kind, half, random: Random(0), turn: 0,
+            boxes: Vec::new(),
+            moving: Vec::new(),
+            replaced: vec![false; n],
+            velocities: Vec::new(),
+            kind,
+            half,
+            random: Random(0),
+            turn: 0,
         };
         let speed = if kind == Kind::Fast { RADIUS } else { 0.01 * RADIUS };
         for i in 0..n {
@@ -86,7 +93,9 @@ impl Crowd {
 
     /// One step.
     pub fn advance(&mut self) {
-        for ((b, v), _) in self.boxes.iter_mut().zip(&mut self.velocities).zip(&self.moving).filter(|(_, moves)| **moves) {
+        for ((b, v), _) in
+            self.boxes.iter_mut().zip(&mut self.velocities).zip(&self.moving).filter(|(_, moves)| **moves)
+        {
             b.min += *v;
             b.max += *v;
             for k in 0..3 {

@@ -13,7 +13,8 @@ const BOTTOM: f64 = 60.0;
 pub fn write(curves: &[(&str, &str, Vec<(f64, f64)>)]) -> String {
     let points = || curves.iter().flat_map(|c| &c.2);
     let span = |of: fn(&(f64, f64)) -> f64| {
-        let (low, high) = points().map(of).fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), x| (low.min(x), high.max(x)));
+        let (low, high) =
+            points().map(of).fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), x| (low.min(x), high.max(x)));
         (low.log10().floor(), high.log10().ceil())
     };
     let (x, y) = (span(|p| p.0), span(|p| p.1));
@@ -21,7 +22,9 @@ pub fn write(curves: &[(&str, &str, Vec<(f64, f64)>)]) -> String {
         let (u, v) = ((p.0.log10() - x.0) / (x.1 - x.0), (p.1.log10() - y.0) / (y.1 - y.0));
         (LEFT + u * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - v * (HEIGHT - TOP - BOTTOM))
     };
-    let mut svg = format!("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"13\">\n");
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"13\">\n"
+    );
     svg += "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
     let mut line = |from: (f64, f64), to: (f64, f64), style: &str| {
         let _ = writeln!(svg, "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" {style}/>", from.0, from.1, to.0, to.1);
@@ -56,7 +59,12 @@ pub fn write(curves: &[(&str, &str, Vec<(f64, f64)>)]) -> String {
             let _ = writeln!(svg, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{color}\"/>", p.0, p.1);
         }
         if let Some(last) = points.last().map(place) {
-            let _ = writeln!(svg, "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{name}</text>", last.0 + 10.0, last.1 + 4.0);
+            let _ = writeln!(
+                svg,
+                "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{name}</text>",
+                last.0 + 10.0,
+                last.1 + 4.0
+            );
         }
     }
     svg + "</svg>\n"

@@ -1,7 +1,7 @@
 //! Crowds of boxes in motion, and what follows them: tumble's broad phase, the bounding volume hierarchy of parry (Rapier's), and a plain pass over memory.
 
-mod curve;
 mod crowd;
+mod curve;
 
 pub use crowd::{Crowd, Kind};
 pub use curve::write as write_curve;
@@ -128,7 +128,8 @@ impl Follower for Plain {
         for &[i, j] in &self.near {
             let (a, [x, y, z, u, v, w, ..]) = (&self.boxes[i as usize], self.boxes[j as usize]);
             self.pairs[count] = [i, j];
-            count += usize::from(a.iter().zip([-u, -v, -w, -x, -y, -z, 1.0, 1.0]).fold(true, |all, (a, b)| all & (*a <= b)));
+            count +=
+                usize::from(a.iter().zip([-u, -v, -w, -x, -y, -z, 1.0, 1.0]).fold(true, |all, (a, b)| all & (*a <= b)));
         }
         count
     }

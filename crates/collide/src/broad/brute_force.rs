@@ -32,7 +32,9 @@ impl BroadPhase for BruteForce {
     fn pairs(&mut self, out: &mut Vec<[u32; 2]>) {
         out.clear();
         let proper = |b: &Aabb| (0..3).all(|k| b.min[k] <= b.max[k]);
-        let filed = |(i, b): (usize, &Option<(Aabb, bool)>)| b.filter(|(b, _)| proper(b)).map(|(b, moving)| (i as u32, b, moving));
+        let filed = |(i, b): (usize, &Option<(Aabb, bool)>)| {
+            b.filter(|(b, _)| proper(b)).map(|(b, moving)| (i as u32, b, moving))
+        };
         let filed: Vec<(u32, Aabb, bool)> = self.boxes.iter().enumerate().filter_map(filed).collect();
         for (n, (i, a, a_moves)) in filed.iter().enumerate() {
             let met = filed[n + 1..].iter().filter(|(_, b, b_moves)| (*a_moves || *b_moves) && a.overlaps(b));

@@ -106,7 +106,10 @@ impl Cells {
                 None => {}
                 Some(Node::Cut { axis, at, low }) => {
                     let k = *axis as usize;
-                    let sides = [(was && old.min(k) < *at, is && new.min(k) < *at), (was && old.max(k) >= *at, is && new.max(k) >= *at)];
+                    let sides = [
+                        (was && old.min(k) < *at, is && new.min(k) < *at),
+                        (was && old.max(k) >= *at, is && new.max(k) >= *at),
+                    ];
                     let reached = sides.iter().zip([*low, low + 1]).filter(|((was, is), _)| *was || *is);
                     places.extend(reached.map(|((was, is), node)| (node, *was, *is)));
                 }
@@ -126,7 +129,8 @@ impl Cells {
     /// Cuts a cell that has grown too full, where it stands.
     fn cut(&mut self, node: u32, index: u32) {
         let cell = &mut self.cells[index as usize];
-        let (boxes, handles, region, depth) = (std::mem::take(&mut cell.boxes), std::mem::take(&mut cell.handles), cell.region, cell.depth);
+        let (boxes, handles, region, depth) =
+            (std::mem::take(&mut cell.boxes), std::mem::take(&mut cell.handles), cell.region, cell.depth);
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
         buffer.extend(boxes.into_iter().zip(handles).map(|(fat, handle)| Entry { fat, handle }));
@@ -137,7 +141,15 @@ impl Cells {
     }
 
     /// Makes of a node whatever suits the boxes of `buffer` from `from` on, what lies before is not touched; and shows every new cell.
-    fn divide(&mut self, node: usize, depth: u32, region: Fat, buffer: &mut Vec<Entry>, from: usize, show: &mut impl FnMut(&Fat, &mut [Entry])) {
+    fn divide(
+        &mut self,
+        node: usize,
+        depth: u32,
+        region: Fat,
+        buffer: &mut Vec<Entry>,
+        from: usize,
+        show: &mut impl FnMut(&Fat, &mut [Entry]),
+    ) {
         let found = if buffer.len() - from > FULL && depth < DEEPEST { place_cut(&buffer[from..]) } else { None };
         let Some((axis, at)) = found else {
             let entries = &mut buffer[from..];

@@ -104,7 +104,13 @@ impl Rounded {
         let seeker = [-d, -e, -f, -a, -b, -c, -g, -h];
         let not_above = self.0.iter().zip(&seeker).fold(true, |all, (a, b)| all & (a <= b));
         let below = self.0.iter().zip(&seeker).fold(true, |all, (a, b)| all & (a < b));
-        if not_above != below { Guess::Perhaps } else if below { Guess::Yes } else { Guess::No }
+        if not_above != below {
+            Guess::Perhaps
+        } else if below {
+            Guess::Yes
+        } else {
+            Guess::No
+        }
     }
 }
 

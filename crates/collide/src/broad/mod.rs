@@ -33,7 +33,8 @@ pub trait BroadPhase: Send {
 }
 
 /// The box that overlaps nothing: no comparison with it holds.
-const NOWHERE: Aabb = Aabb { min: crate::Vec3::new(f64::NAN, f64::NAN, f64::NAN), max: crate::Vec3::new(f64::NAN, f64::NAN, f64::NAN) };
+const NOWHERE: Aabb =
+    Aabb { min: crate::Vec3::new(f64::NAN, f64::NAN, f64::NAN), max: crate::Vec3::new(f64::NAN, f64::NAN, f64::NAN) };
 
 /// The box as it takes part.
 fn proper(bounds: &Aabb) -> Aabb {

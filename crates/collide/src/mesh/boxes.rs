@@ -33,7 +33,8 @@ impl BoxNode {
 impl BoxTree {
     /// Of at least one triangle. Halved along the longest side, so the depth is at most 32.
     pub fn new(corners: &[[Vec3; 3]]) -> BoxTree {
-        let mut items: Vec<(Vec3, u32)> = corners.iter().enumerate().map(|(t, c)| (c.iter().sum::<Vec3>() / 3.0, t as u32)).collect();
+        let mut items: Vec<(Vec3, u32)> =
+            corners.iter().enumerate().map(|(t, c)| (c.iter().sum::<Vec3>() / 3.0, t as u32)).collect();
         let mut nodes = Vec::new();
         split(corners, &mut items, 0, &mut nodes);
         BoxTree { nodes, ids: items.iter().map(|i| i.1).collect() }

@@ -48,7 +48,8 @@ impl ClosedReport {
             (self.flipped_faces, "faces were reversed to agree with their neighbours"),
             (self.nonmanifold_edges, "edges have four or more faces (accepted: the volume is well defined)"),
         ];
-        let mut notes: Vec<String> = counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        let mut notes: Vec<String> =
+            counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
         if self.turned {
             notes.push("the mesh was inside out and was turned".into());
         }
@@ -136,7 +137,9 @@ impl TriMesh {
         order.sort_unstable();
         order.dedup();
         let key = |v: u32| self.vertices[v as usize].map(|x| x + 0.0);
-        let compare = |a: &Vec3, b: &Vec3| (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal);
+        let compare = |a: &Vec3, b: &Vec3| {
+            (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+        };
         order.sort_by(|&u, &v| compare(&key(u), &key(v)).then(u.cmp(&v)));
         let mut stands_for: Vec<u32> = (0..self.vertices.len() as u32).collect();
         let mut merged = 0;
@@ -186,7 +189,8 @@ impl TriMesh {
             let k = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
             [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
         };
-        let mut order: Vec<([u32; 3], usize)> = self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
+        let mut order: Vec<([u32; 3], usize)> =
+            self.triangles.iter().enumerate().map(|(n, t)| (smallest_first(*t), n)).collect();
         order.sort_unstable();
         let mut repeats = vec![false; order.len()];
         order.windows(2).filter(|w| w[0].0 == w[1].0).for_each(|w| repeats[w[1].1] = true);

@@ -44,7 +44,8 @@ impl Crossings {
         }
         let tree = BoxTree::new(&corners);
         let boxes: Vec<Aabb> = corners.iter().map(|c| Aabb::around(*c)).collect();
-        let (looks, most) = ((MOST_LOOKS * corners.len()).max(FEWEST_LOOKS), (MOST_PAIRS * corners.len()).max(FEWEST_PAIRS));
+        let (looks, most) =
+            ((MOST_LOOKS * corners.len()).max(FEWEST_LOOKS), (MOST_PAIRS * corners.len()).max(FEWEST_PAIRS));
         let mut found = Crossings::default();
         let mut looked = 0;
         let mut open = Vec::new();
@@ -100,7 +101,8 @@ fn cross(mesh: &TriMesh, corners: &[[Vec3; 3]], i: usize, j: usize) -> bool {
         (&[k, l], &[m, n]) => segment_meets([&a[k], &a[l]], b) || segment_meets([&b[m], &b[n]], a),
         (&[], _) | (_, &[]) => true,
         _ => {
-            let edges = |t: &[Vec3; 3], other: &[Vec3; 3]| (0..3).any(|k| segment_meets([&t[k], &t[(k + 1) % 3]], other));
+            let edges =
+                |t: &[Vec3; 3], other: &[Vec3; 3]| (0..3).any(|k| segment_meets([&t[k], &t[(k + 1) % 3]], other));
             edges(a, b) || edges(b, a)
         }
     }

@@ -137,7 +137,8 @@ impl MeshDistance {
             *left = left.saturating_sub(here.count as usize);
             return;
         }
-        let mut children = [node + 1, here.second as usize].map(|c| (box_distance_squared(&self.tree.nodes[c].bounds, p), c));
+        let mut children =
+            [node + 1, here.second as usize].map(|c| (box_distance_squared(&self.tree.nodes[c].bounds, p), c));
         if children[1].0 < children[0].0 {
             children.swap(0, 1);
         }

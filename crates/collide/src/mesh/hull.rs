@@ -47,7 +47,8 @@ impl TriMesh {
         if cell == 0.0 {
             return Err(MeshError::NoVolume { volume: 0.0 });
         }
-        let mut points: Vec<Point> = mesh.vertices.iter().map(|v| ((v - least) / cell).map(|x| x.round() as i64).into()).collect();
+        let mut points: Vec<Point> =
+            mesh.vertices.iter().map(|v| ((v - least) / cell).map(|x| x.round() as i64).into()).collect();
         points.sort_unstable();
         points.dedup();
         let faces = Hull::of(&points).ok_or(MeshError::NoVolume { volume: 0.0 })?.finished();
@@ -81,7 +82,12 @@ impl<'p> Hull<'p> {
         let points = self.points;
         let all = || 0..points.len() as u32;
         let (a, b) = (0, points.len() as u32 - 1);
-        let area = |p: &u32| cross(points[a as usize], points[b as usize], points[*p as usize]).iter().map(|x| i128::from(*x).pow(2)).sum::<i128>();
+        let area = |p: &u32| {
+            cross(points[a as usize], points[b as usize], points[*p as usize])
+                .iter()
+                .map(|x| i128::from(*x).pow(2))
+                .sum::<i128>()
+        };
         let c = all().max_by_key(area).filter(|p| area(p) > 0)?;
         let height = |p: &u32| self.sees(&[a, b, c], *p).abs();
         let d = all().max_by_key(height).filter(|p| height(p) > 0)?;
@@ -117,14 +123,21 @@ impl<'p> Hull<'p> {
     /// Replaces all faces that see the farthest point of `face` by a cone from their rim to it.
     fn add_farthest(&mut self, face: usize) {
         let corners = self.faces[face].corners;
-        let Some(apex) = self.faces[face].outside.iter().copied().max_by_key(|&p| (self.sees(&corners, p), p)) else { return };
+        let Some(apex) = self.faces[face].outside.iter().copied().max_by_key(|&p| (self.sees(&corners, p), p)) else {
+            return;
+        };
         let (patch, rim) = self.patch(face, apex);
         let first = self.faces.len();
         let number: BTreeMap<u32, usize> = rim.iter().enumerate().map(|(k, (from, ..))| (*from, first + k)).collect();
         let before: BTreeMap<u32, usize> = rim.iter().enumerate().map(|(k, (_, to, ..))| (*to, first + k)).collect();
         for (k, &(from, to, beyond, edge)) in rim.iter().enumerate() {
             self.faces[beyond].beyond[edge] = first + k;
-            self.faces.push(Face { corners: [from, to, apex], beyond: [beyond, number[&to], before[&from]], outside: Vec::new(), alive: true });
+            self.faces.push(Face {
+                corners: [from, to, apex],
+                beyond: [beyond, number[&to], before[&from]],
+                outside: Vec::new(),
+                alive: true,
+            });
         }
         let mut left = Vec::new();
         for gone in patch {

@@ -25,12 +25,12 @@ pub use check::ClosedReport;
 pub(crate) use check::edge_groups;
 pub(crate) use crossing::crossing_shells;
 pub use distance::{ClosestPoint, MeshDistance};
-pub use polygon::FaceCutter;
-pub use text::{obj_lines, text_of};
 pub(crate) use distance::{Descent, closest_on_triangle, pseudonormals};
-pub use repair::{RepairReport, RepairSettings};
 pub(crate) use order::along_curve;
+pub use polygon::FaceCutter;
+pub use repair::{RepairReport, RepairSettings};
 pub(crate) use shells::shells;
+pub use text::{obj_lines, text_of};
 pub use winding::WindingNumber;
 
 use crate::{Aabb, MeshError, Vec3};

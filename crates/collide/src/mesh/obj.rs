@@ -33,7 +33,8 @@ impl TriMesh {
         let mut lines = Vec::new();
         let mut cutter = FaceCutter::default();
         for (number, (line, corners)) in faces.iter().enumerate() {
-            mesh.push_face(corners, number + 1, &mut cutter).map_err(|error| MeshError::At { line: *line, error: Box::new(error) })?;
+            mesh.push_face(corners, number + 1, &mut cutter)
+                .map_err(|error| MeshError::At { line: *line, error: Box::new(error) })?;
             lines.resize(mesh.triangles.len(), *line);
         }
         if mesh.triangles.is_empty() { Err(MeshError::Empty) } else { Ok((mesh, lines)) }

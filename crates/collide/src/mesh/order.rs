@@ -33,10 +33,14 @@ impl TriMesh {
         let order = by_place(&self.vertices);
         let mut renamed = vec![0; order.len()];
         order.iter().zip(0..).for_each(|(&old, new)| renamed[old as usize] = new);
-        let middles: Vec<Vec3> = (0..self.triangles.len()).map(|t| self.corners(t).iter().sum::<Vec3>() / 3.0).collect();
+        let middles: Vec<Vec3> =
+            (0..self.triangles.len()).map(|t| self.corners(t).iter().sum::<Vec3>() / 3.0).collect();
         TriMesh {
             vertices: order.iter().map(|&n| self.vertices[n as usize]).collect(),
-            triangles: by_place(&middles).iter().map(|&t| self.triangles[t as usize].map(|v| renamed[v as usize])).collect(),
+            triangles: by_place(&middles)
+                .iter()
+                .map(|&t| self.triangles[t as usize].map(|v| renamed[v as usize]))
+                .collect(),
         }
     }
 }
@@ -58,7 +62,9 @@ mod tests {
         };
         assert_eq!(sorted(&mesh), sorted(&ordered));
         // neighbours in memory are near each other
-        let way = |mesh: &TriMesh| (1..count).map(|t| (mesh.corners(t)[0] - mesh.corners(t - 1)[0]).norm()).sum::<f64>() / count as f64;
+        let way = |mesh: &TriMesh| {
+            (1..count).map(|t| (mesh.corners(t)[0] - mesh.corners(t - 1)[0]).norm()).sum::<f64>() / count as f64
+        };
         assert!(way(&ordered) < 0.3 * way(&mesh), "{} {}", way(&ordered), way(&mesh));
     }
 }

@@ -112,7 +112,8 @@ fn pair_group(group: &[EdgeUse], sheet: &[u32], area: &[f64], join: &mut impl Fn
     for same_sheet in [true, false] {
         let mut n = 0;
         while n < left.len() {
-            let fits = |u: &&EdgeUse| u.forward != left[n].forward && (!same_sheet || sheet[u.face] == sheet[left[n].face]);
+            let fits =
+                |u: &&EdgeUse| u.forward != left[n].forward && (!same_sheet || sheet[u.face] == sheet[left[n].face]);
             match left[n + 1..].iter().position(fits) {
                 Some(m) => {
                     join(left[n], left[n + 1 + m]);

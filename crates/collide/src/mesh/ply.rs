@@ -35,9 +35,17 @@ impl TriMesh {
             for number in 1..=element.count {
                 let place = || format!("{} {number}", element.name);
                 match kind {
-                    Kind::Vertex(at) => mesh.vertices.push(read_vertex(element, at, &mut values).map_err(|why| refused(&place(), &why))?),
-                    Kind::Face(at) => faces.push(read_face(element, at, &mut values).map_err(|why| refused(&place(), &why))?),
-                    Kind::Other => element.properties.iter().try_for_each(|p| values.property(p, |_| {})).map_err(|why| refused(&place(), &why))?,
+                    Kind::Vertex(at) => mesh
+                        .vertices
+                        .push(read_vertex(element, at, &mut values).map_err(|why| refused(&place(), &why))?),
+                    Kind::Face(at) => {
+                        faces.push(read_face(element, at, &mut values).map_err(|why| refused(&place(), &why))?)
+                    }
+                    Kind::Other => element
+                        .properties
+                        .iter()
+                        .try_for_each(|p| values.property(p, |_| {}))
+                        .map_err(|why| refused(&place(), &why))?,
                 }
             }
         }
@@ -136,7 +144,8 @@ enum Kind {
 
 impl Element {
     fn kind(&self) -> Result<Kind, MeshError> {
-        let at = |name: &str, list: bool| self.properties.iter().position(|p| p.name == name && p.length.is_some() == list);
+        let at =
+            |name: &str, list: bool| self.properties.iter().position(|p| p.name == name && p.length.is_some() == list);
         match self.name.as_str() {
             "vertex" => match ["x", "y", "z"].map(|name| at(name, false)) {
                 [Some(x), Some(y), Some(z)] => Ok(Kind::Vertex([x, y, z])),
@@ -162,7 +171,8 @@ impl Header {
         let (mut encoding, mut elements) = (None, Vec::<Element>::new());
         let mut rest = bytes;
         for number in 1..=MOST_LINES {
-            let (line, after) = first_line(rest).ok_or_else(|| refused(&format!("line {number}"), "the file ends before `end_header`"))?;
+            let (line, after) = first_line(rest)
+                .ok_or_else(|| refused(&format!("line {number}"), "the file ends before `end_header`"))?;
             rest = after;
             let wrong = |what: String| refused(&format!("line {number}"), &what);
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
@@ -173,14 +183,20 @@ impl Header {
                         "ascii" => Encoding::Ascii,
                         "binary_little_endian" => Encoding::LittleEndian,
                         "binary_big_endian" => Encoding::BigEndian,
-                        other => return Err(wrong(format!("the format `{other}`; wanted ascii, binary_little_endian or binary_big_endian"))),
+                        other => {
+                            return Err(wrong(format!(
+                                "the format `{other}`; wanted ascii, binary_little_endian or binary_big_endian"
+                            )));
+                        }
                     });
                 }
                 ["element", name, count] => {
                     let count = count.parse().map_err(|_| wrong(format!("`{count}` where a count should be")))?;
                     elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
                 }
-                ["property", "list", length, kind, name] => add(&mut elements, name, kind, Some(length)).map_err(wrong)?,
+                ["property", "list", length, kind, name] => {
+                    add(&mut elements, name, kind, Some(length)).map_err(wrong)?
+                }
                 ["property", kind, name] => add(&mut elements, name, kind, None).map_err(wrong)?,
                 ["end_header"] => {
                     let encoding = encoding.ok_or_else(|| wrong("the header has no line `format`".into()))?;
@@ -189,7 +205,11 @@ impl Header {
                     return Ok((Header { encoding, elements }, rest));
                 }
                 ["ply" | "comment" | "obj_info", ..] | [] => {}
-                [other, ..] => return Err(wrong(format!("`{other}` where format, element, property, comment or end_header should be"))),
+                [other, ..] => {
+                    return Err(wrong(format!(
+                        "`{other}` where format, element, property, comment or end_header should be"
+                    )));
+                }
             }
         }
         Err(refused(&format!("line {MOST_LINES}"), "the header has no end"))
@@ -197,7 +217,11 @@ impl Header {
 }
 
 fn add(elements: &mut [Element], name: &str, kind: &str, length: Option<&str>) -> Result<(), String> {
-    let number = |word: &str| Number::named(word).ok_or_else(|| format!("`{word}` is no kind of number; wanted char, uchar, short, ushort, int, uint, float or double"));
+    let number = |word: &str| {
+        Number::named(word).ok_or_else(|| {
+            format!("`{word}` is no kind of number; wanted char, uchar, short, ushort, int, uint, float or double")
+        })
+    };
     let property = Property { name: name.into(), number: number(kind)?, length: length.map(number).transpose()? };
     elements.last_mut().ok_or("a property before any element")?.properties.push(property);
     Ok(())
@@ -209,7 +233,8 @@ fn first_line(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let long = if bytes[end..].starts_with(b"\r\n") { 2 } else { 1 };
     let line = &bytes[..end];
     // comments may be in any encoding
-    let text = std::str::from_utf8(line).unwrap_or_else(|e| std::str::from_utf8(&line[..e.valid_up_to()]).unwrap_or(""));
+    let text =
+        std::str::from_utf8(line).unwrap_or_else(|e| std::str::from_utf8(&line[..e.valid_up_to()]).unwrap_or(""));
     Some((text, &bytes[end + long..]))
 }
 

@@ -67,7 +67,10 @@ impl RepairReport {
                 notes.push(what);
             }
         };
-        say(self.welded_vertices, format!("{} vertices at or close to the place of another were welded", self.welded_vertices));
+        say(
+            self.welded_vertices,
+            format!("{} vertices at or close to the place of another were welded", self.welded_vertices),
+        );
         say(self.degenerate_faces, format!("{} faces of zero area were dropped", self.degenerate_faces));
         say(self.duplicate_faces, format!("{} faces that were there twice were dropped", self.duplicate_faces));
         say(self.flipped_faces, format!("{} faces were reversed to agree with their neighbours", self.flipped_faces));
@@ -75,7 +78,10 @@ impl RepairReport {
             self.dangling_pieces,
             format!("{} dangling piece(s) of {} face(s) were dropped", self.dangling_pieces, self.dangling_faces),
         );
-        say(self.debris_pieces, format!("{} small open piece(s) of {} face(s) were dropped", self.debris_pieces, self.debris_faces));
+        say(
+            self.debris_pieces,
+            format!("{} small open piece(s) of {} face(s) were dropped", self.debris_pieces, self.debris_faces),
+        );
         say(
             self.filled_holes,
             format!(
@@ -118,7 +124,9 @@ impl TriMesh {
                 return Ok(RepairReport { closed, ..report });
             }
             // nothing is missing there that could be added
-            Err(refused @ (MeshError::Empty | MeshError::Flat { .. } | MeshError::NoVolume { .. })) => return Err(refused),
+            Err(refused @ (MeshError::Empty | MeshError::Flat { .. } | MeshError::NoVolume { .. })) => {
+                return Err(refused);
+            }
             Err(refused) => refused,
         };
         match mesh.closed_up(settings, &mut report) {
@@ -160,7 +168,9 @@ impl TriMesh {
         pairing.piece.iter().enumerate().for_each(|(face, &piece)| faces[piece as usize].push(face));
         let area = |faces: &Vec<usize>| -> f64 { faces.iter().map(|&f| self.face_area(f)).sum() };
         let areas: Vec<f64> = faces.iter().map(area).collect();
-        let Some(largest) = (0..areas.len()).max_by(|&a, &b| areas[a].total_cmp(&areas[b]).then(b.cmp(&a))) else { return };
+        let Some(largest) = (0..areas.len()).max_by(|&a, &b| areas[a].total_cmp(&areas[b]).then(b.cmp(&a))) else {
+            return;
+        };
         let limit = debris * self.diagonal();
         let open = pairing.open();
         let mut keep = vec![true; self.triangles.len()];
@@ -252,7 +262,11 @@ impl RepairSettings {
     fn check(&self, diagonal: f64) -> Result<(), MeshError> {
         let refuse = |what, value, allowed| Err(MeshError::Settings { what, value, allowed });
         if self.weld != 0.0 && !(1e-12 * diagonal..=0.01 * diagonal).contains(&self.weld) {
-            return refuse("the welding distance of a repair", self.weld, "0, or 1e-12 to 0.01 of the mesh's diagonal, metres");
+            return refuse(
+                "the welding distance of a repair",
+                self.weld,
+                "0, or 1e-12 to 0.01 of the mesh's diagonal, metres",
+            );
         }
         if !(3..=5000).contains(&self.hole_edges) {
             return refuse("the longest hole of a repair", self.hole_edges as f64, "3 to 5000 edges");

@@ -61,8 +61,10 @@ impl TriMesh {
                 (all.without(&p, &[face as u32]) - own / (4.0 * PI)).abs() < 0.5
             })
         };
-        let mut turned: Vec<bool> = members.iter().zip(&negative).map(|(faces, negative)| *negative && outside(faces)).collect();
-        let those: Vec<[u32; 3]> = (0..shell.len()).filter(|&f| turned[shell[f] as usize]).map(|f| self.triangles[f]).collect();
+        let mut turned: Vec<bool> =
+            members.iter().zip(&negative).map(|(faces, negative)| *negative && outside(faces)).collect();
+        let those: Vec<[u32; 3]> =
+            (0..shell.len()).filter(|&f| turned[shell[f] as usize]).map(|f| self.triangles[f]).collect();
         if those.is_empty() {
             return 0;
         }

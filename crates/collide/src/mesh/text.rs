@@ -29,7 +29,9 @@ pub fn obj_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     let mut lines = numbered(text);
     std::iter::from_fn(move || {
         let (number, first) = lines.next()?;
-        let Some(mut begun) = first.trim_end().strip_suffix('\\').map(str::to_owned) else { return Some((number, first.into())) };
+        let Some(mut begun) = first.trim_end().strip_suffix('\\').map(str::to_owned) else {
+            return Some((number, first.into()));
+        };
         // a comment ends with its line, whatever that ends in
         if first.trim_start().starts_with('#') {
             return Some((number, first.into()));

@@ -179,7 +179,14 @@ enum Told {
     Doubtful,
 }
 
-fn tell(mesh: &TriMesh, winding: &WindingNumber, face: usize, part: &[Vec3; 3], others: &[u32], tolerance: f64) -> Told {
+fn tell(
+    mesh: &TriMesh,
+    winding: &WindingNumber,
+    face: usize,
+    part: &[Vec3; 3],
+    others: &[u32],
+    tolerance: f64,
+) -> Told {
     let center = part.iter().sum::<Vec3>() / 3.0;
     let normal = area_vector(&mesh.corners(face));
     let mut through = vec![face as u32];
@@ -317,7 +324,9 @@ fn patches(mesh: &TriMesh, groups: &[Vec<EdgeUse>], crossings: &Crossings) -> Pa
 /// Which vertices have more than one fan of faces around them, an edge of more than two, or a face without area.
 fn pinched(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> Vec<bool> {
     let mut pinched = vec![false; mesh.vertices.len()];
-    for (_, triangle) in mesh.triangles.iter().enumerate().filter(|(t, _)| area_vector(&mesh.corners(*t)) == Vec3::zeros()) {
+    for (_, triangle) in
+        mesh.triangles.iter().enumerate().filter(|(t, _)| area_vector(&mesh.corners(*t)) == Vec3::zeros())
+    {
         triangle.iter().for_each(|&v| pinched[v as usize] = true);
     }
     // corners of faces, joined over the edges that meet there: one set per fan
@@ -329,7 +338,8 @@ fn pinched(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> Vec<bool> {
         }
         n
     }
-    let corner = |face: usize, v: u32| (3 * face + mesh.triangles[face].iter().position(|&w| w == v).unwrap_or(0)) as u32;
+    let corner =
+        |face: usize, v: u32| (3 * face + mesh.triangles[face].iter().position(|&w| w == v).unwrap_or(0)) as u32;
     for group in groups {
         for v in [group[0].low, group[0].high] {
             if group.len() != 2 {

@@ -91,7 +91,11 @@ impl WindingNumber {
     fn sum_in_doubt(&self, p: &Vec3, skipped: &[u32], angle: Angle) -> f64 {
         let near = self.sum(p, skipped, 1.0, angle);
         // what is skipped may stand for halves
-        if (2.0 * near - (2.0 * near).round()).abs() <= DOUBT { near } else { self.sum(p, skipped, f64::INFINITY, angle) }
+        if (2.0 * near - (2.0 * near).round()).abs() <= DOUBT {
+            near
+        } else {
+            self.sum(p, skipped, f64::INFINITY, angle)
+        }
     }
 
     fn sum(&self, p: &Vec3, skipped: &[u32], caution: f64, angle: Angle) -> f64 {

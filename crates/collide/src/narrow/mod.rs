@@ -91,10 +91,12 @@ fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose
         (Box { half_extents }, HalfSpace) => half_space::cuboid(half_extents, pose_a, pose_b, margin, out),
         (HalfSpace, HalfSpace) => {}
         (Cylinder(c), HalfSpace) => cylinder::half_space((c.radius(), c.half_length()), pose_a, pose_b, margin, out),
-        _ if mode == ContactMode::Surface && parts_of(a) == 1 && parts_of(b) == 1 => with_body(a, 0, &mut |a| {
-            with_body(b, 0, &mut |b| surface::surface(a, pose_a, b, pose_b, margin, out))
-        }),
-        _ if mode == ContactMode::Surface && parts_of(a) > 0 && parts_of(b) > 0 => parts::parts(a, pose_a, b, pose_b, margin, out),
+        _ if mode == ContactMode::Surface && parts_of(a) == 1 && parts_of(b) == 1 => {
+            with_body(a, 0, &mut |a| with_body(b, 0, &mut |b| surface::surface(a, pose_a, b, pose_b, margin, out)))
+        }
+        _ if mode == ContactMode::Surface && parts_of(a) > 0 && parts_of(b) > 0 => {
+            parts::parts(a, pose_a, b, pose_b, margin, out)
+        }
         _ => match (a.tree(), b.tree()) {
             (Some(tree_a), Some(tree_b)) => tree::tree_tree(tree_a, pose_a, tree_b, pose_b, margin, out),
             (Some(tree_a), None) => tree::tree_primitive(tree_a, pose_a, b, pose_b, margin, out),

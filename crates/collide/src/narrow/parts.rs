@@ -46,5 +46,6 @@ const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 /// Whether a place on a shape's part, in world axes, lies inside another part.
 fn buried(shape: &Shape, pose: &Pose, part: usize, at: Vec3) -> bool {
     let Shape::Mesh(mesh) = shape else { return false };
-    mesh.surfaces().len() > 1 && is_buried(mesh.surfaces(), part, &pose.inverse_transform_point(&Point3::from(at)).coords)
+    mesh.surfaces().len() > 1
+        && is_buried(mesh.surfaces(), part, &pose.inverse_transform_point(&Point3::from(at)).coords)
 }

@@ -131,13 +131,21 @@ impl Elements {
         points.sort_by_key(|p| (p.0, p.1.index));
         edges.sort_by_key(|e| (e.points[0], e.fine, e.index));
         for (_, point) in &mut points {
-            let of = |fine: bool| (edges.partition_point(|e| (e.points[0], e.fine) < (point.index, fine)), edges.partition_point(|e| (e.points[0], e.fine) <= (point.index, fine)));
+            let of = |fine: bool| {
+                (
+                    edges.partition_point(|e| (e.points[0], e.fine) < (point.index, fine)),
+                    edges.partition_point(|e| (e.points[0], e.fine) <= (point.index, fine)),
+                )
+            };
             let ((a, b), (_, c)) = (of(false), of(true));
             let longest = |end: usize| edges[a..end].iter().map(|e| e.length).fold(0.0, f64::max);
-            (point.first_edge, point.edges, point.longest) = (a as u32, [(b - a) as u32, (c - b) as u32], [longest(b), longest(c)]);
+            (point.first_edge, point.edges, point.longest) =
+                (a as u32, [(b - a) as u32, (c - b) as u32], [longest(b), longest(c)]);
         }
         all.edges = edges;
-        let held: Vec<[usize; 2]> = (0..tree.nodes().len() as u32).map(|node| [node, node + 1].map(|n| points.partition_point(|p| p.0 < n))).collect();
+        let held: Vec<[usize; 2]> = (0..tree.nodes().len() as u32)
+            .map(|node| [node, node + 1].map(|n| points.partition_point(|p| p.0 < n)))
+            .collect();
         let mut points: Vec<Point> = points.into_iter().map(|p| p.1).collect();
         let mut halved = Vec::new();
         all.gather(tree, 0, &held, &mut points, &mut halved);
@@ -173,7 +181,14 @@ impl Elements {
     }
 
     /// The group of a ball of the tree and of its children; nothing where they hold nothing. `held`: ranges in `points`, per ball.
-    fn gather(&mut self, tree: &SphereTree, node: usize, held: &[[usize; 2]], points: &mut [Point], out: &mut Vec<Halved>) {
+    fn gather(
+        &mut self,
+        tree: &SphereTree,
+        node: usize,
+        held: &[[usize; 2]],
+        points: &mut [Point],
+        out: &mut Vec<Halved>,
+    ) {
         let mut below = Vec::new();
         let mut stack = vec![node];
         while let Some(n) = stack.pop() {
@@ -223,7 +238,8 @@ impl Elements {
         let middle = around_points(&ends(false).collect::<Vec<_>>()).center;
         let center: [f32; 3] = std::array::from_fn(|k| middle[k] as f32);
         let from = Vec3::from(center.map(f64::from));
-        let reach = [false, true].map(|fine| (ends(fine).map(|p| (p - from).norm()).fold(0.0, f64::max) * ABOVE) as f32);
+        let reach =
+            [false, true].map(|fine| (ends(fine).map(|p| (p - from).norm()).fold(0.0, f64::max) * ABOVE) as f32);
         out.push(Halved { group: Group { center, reach, first: 0, count: 0, parted: true }, end: 0 });
         out.len() - 1
     }
@@ -243,7 +259,13 @@ impl Elements {
     }
 
     /// The vertices, each with the ball that holds it.
-    fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], tree: &SphereTree, searched: &[[bool; 3]]) -> Vec<(u32, Point)> {
+    fn gather_points(
+        &mut self,
+        mesh: &TriMesh,
+        face: &[Vec3],
+        tree: &SphereTree,
+        searched: &[[bool; 3]],
+    ) -> Vec<(u32, Point)> {
         let mut ways: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for k in (0..3).filter(|&k| searched[t][k]) {
@@ -267,7 +289,17 @@ impl Elements {
                 continue;
             }
             let at = mesh.vertices[v];
-            let point = Point { at, index: v as u32, first: self.normals.len() as u32, count: normals.len() as u32, first_way: self.ways.len() as u32, ways: ways[v].len() as u32, first_edge: 0, edges: [0; 2], longest: [0.0; 2] };
+            let point = Point {
+                at,
+                index: v as u32,
+                first: self.normals.len() as u32,
+                count: normals.len() as u32,
+                first_way: self.ways.len() as u32,
+                ways: ways[v].len() as u32,
+                first_edge: 0,
+                edges: [0; 2],
+                longest: [0.0; 2],
+            };
             self.normals.extend(normals);
             self.ways.extend(&ways[v]);
             points.push((holder(tree, &at), point));
@@ -283,8 +315,15 @@ fn parts_of(halved: &[Halved], group: usize) -> Vec<usize> {
     };
     let mut parts = direct(group);
     loop {
-        let wider = |n: &usize| parts.iter().filter(|m| halved[**m].group.parted).all(|m| halved[*m].group.reach[0] <= halved[parts[*n]].group.reach[0]);
-        let Some(widest) = (0..parts.len()).filter(|n| halved[parts[*n]].group.parted).find(wider) else { return parts };
+        let wider = |n: &usize| {
+            parts
+                .iter()
+                .filter(|m| halved[**m].group.parted)
+                .all(|m| halved[*m].group.reach[0] <= halved[parts[*n]].group.reach[0])
+        };
+        let Some(widest) = (0..parts.len()).filter(|n| halved[parts[*n]].group.parted).find(wider) else {
+            return parts;
+        };
         let own = direct(parts[widest]);
         if parts.len() + own.len() - 1 > PARTS {
             return parts;
@@ -321,7 +360,15 @@ fn gather_edges(mesh: &TriMesh, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
                 searched[u.face][k] = true;
             }
         }
-        edges.push(Edge { ends, length, points: [group[0].low, group[0].high], spared, fine, normals, index: index as u32 });
+        edges.push(Edge {
+            ends,
+            length,
+            points: [group[0].low, group[0].high],
+            spared,
+            fine,
+            normals,
+            index: index as u32,
+        });
     }
     (edges, searched)
 }

@@ -23,14 +23,18 @@ pub(crate) fn parts(mesh: &TriMesh, tree: &SphereTree) -> Option<Vec<Surface>> {
         return None;
     }
     let faces = |n: u32| mesh.triangles.iter().zip(&shell).filter(move |(_, s)| **s == n).map(|(t, _)| *t).collect();
-    let meshes: Vec<TriMesh> = (0..count as u32).map(|n| TriMesh { vertices: mesh.vertices.clone(), triangles: faces(n) }.compacted()).collect();
+    let meshes: Vec<TriMesh> = (0..count as u32)
+        .map(|n| TriMesh { vertices: mesh.vertices.clone(), triangles: faces(n) }.compacted())
+        .collect();
     if meshes.iter().any(|part| part.signed_volume() <= 0.0) {
         return None;
     }
     let all: Vec<Surface> = meshes.iter().map(|part| Surface::new(part, tree)).collect();
     // what does not cross is inside with all its points or with none
     let crosses = |n: usize, m: usize| crossings.contains(&(n.min(m) as u32, n.max(m) as u32));
-    let within = |n: usize, m: usize| n != m && !crosses(n, m) && meshes[n].vertices.iter().take(1).all(|p| all[m].field.nearest(p).distance < 0.0);
+    let within = |n: usize, m: usize| {
+        n != m && !crosses(n, m) && meshes[n].vertices.iter().take(1).all(|p| all[m].field.nearest(p).distance < 0.0)
+    };
     let hidden: Vec<bool> = (0..count).map(|n| (0..count).any(|m| within(n, m))).collect();
     Some(all.into_iter().zip(hidden).filter(|(_, hidden)| !hidden).map(|(surface, _)| surface).collect())
 }

@@ -101,9 +101,18 @@ impl Field for BoxField {
             let square = || opposition(normals, &sign(a)).total_cmp(&opposition(normals, &sign(b)));
             if (outside[a] - outside[b]).abs() < touching { square() } else { outside[b].total_cmp(&outside[a]) }
         };
-        let facing_one = (0..3).filter(|&k| facing(normals, &sign(k)) && outside[k] > outside.max() - AROUND * self.half.max()).min_by(nearer);
+        let facing_one = (0..3)
+            .filter(|&k| facing(normals, &sign(k)) && outside[k] > outside.max() - AROUND * self.half.max())
+            .min_by(nearer);
         let k = facing_one.unwrap_or(outside.imax());
-        Hit { distance: outside[k], nearest: if distance > 0.0 { distance } else { outside.max() }, normal: sign(k), core: 0.0, feature: Feature::Face, facing: facing_one.is_some() }
+        Hit {
+            distance: outside[k],
+            nearest: if distance > 0.0 { distance } else { outside.max() },
+            normal: sign(k),
+            core: 0.0,
+            feature: Feature::Face,
+            facing: facing_one.is_some(),
+        }
     }
 
     fn convex(&self) -> bool {
@@ -125,15 +134,36 @@ impl Field for CylinderField {
         let up = Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 };
         let (r, z) = (length - self.radius, p.z.abs() - self.half_length);
         let distance = self.bound(p);
-        let side = Hit { distance: r, nearest: distance, normal: outward, core: self.radius, feature: Feature::Line(Vec3::z()), facing: facing(normals, &outward) };
-        let end = Hit { distance: z, nearest: distance, normal: up, core: 0.0, feature: Feature::Face, facing: facing(normals, &up) };
+        let side = Hit {
+            distance: r,
+            nearest: distance,
+            normal: outward,
+            core: self.radius,
+            feature: Feature::Line(Vec3::z()),
+            facing: facing(normals, &outward),
+        };
+        let end = Hit {
+            distance: z,
+            nearest: distance,
+            normal: up,
+            core: 0.0,
+            feature: Feature::Face,
+            facing: facing(normals, &up),
+        };
         if distance > touching {
             return match (r > ABOVE * distance, z > ABOVE * distance) {
                 (true, _) => side,
                 (_, true) => end,
                 _ => {
                     let normal = (outward * r + up * z) / distance;
-                    Hit { distance, nearest: distance, normal, core: 0.0, feature: Feature::Point, facing: facing(normals, &normal) }
+                    Hit {
+                        distance,
+                        nearest: distance,
+                        normal,
+                        core: 0.0,
+                        feature: Feature::Point,
+                        facing: facing(normals, &normal),
+                    }
                 }
             };
         }

@@ -64,13 +64,17 @@ impl TreeCache {
     /// As the environment says: in the folder `$TUMBLE_CACHE`, or none if that is `off` in any case; where it is empty or blank, in `tumble/trees` of `$XDG_CACHE_HOME` or
     /// `~/.cache`; none where there is no home.
     pub fn of_environment() -> TreeCache {
-        let path = |name: &str| std::env::var_os(name).filter(|value| !value.to_string_lossy().trim().is_empty()).map(PathBuf::from);
+        let path = |name: &str| {
+            std::env::var_os(name).filter(|value| !value.to_string_lossy().trim().is_empty()).map(PathBuf::from)
+        };
         match path("TUMBLE_CACHE") {
             Some(word) if word.to_string_lossy().trim().eq_ignore_ascii_case("off") => TreeCache::off(),
             Some(folder) => TreeCache::at(folder),
             None => {
                 // a relative path there is to be passed over, says the XDG specification
-                let base = path("XDG_CACHE_HOME").filter(|p| p.is_absolute()).or_else(|| path("HOME").map(|home| home.join(".cache")));
+                let base = path("XDG_CACHE_HOME")
+                    .filter(|p| p.is_absolute())
+                    .or_else(|| path("HOME").map(|home| home.join(".cache")));
                 TreeCache { folder: base.map(|base| base.join("tumble/trees")), ..TreeCache::off() }
             }
         }
@@ -100,7 +104,12 @@ impl SphereTree {
     ///
     /// # Errors
     /// As [`SphereTree::build_cached`].
-    pub fn build_cached_watched(mesh: &TriMesh, settings: &TreeSettings, cache: &TreeCache, progress: &dyn Progress) -> Result<CachedTree, MeshError> {
+    pub fn build_cached_watched(
+        mesh: &TriMesh,
+        settings: &TreeSettings,
+        cache: &TreeCache,
+        progress: &dyn Progress,
+    ) -> Result<CachedTree, MeshError> {
         settings.check()?;
         let entry = cache.folder.as_ref().map(|folder| Entry::new(folder, mesh, settings));
         let mut note = None;
@@ -136,7 +145,8 @@ impl<'a> Entry<'a> {
     fn new(folder: &'a Path, mesh: &TriMesh, settings: &TreeSettings) -> Entry<'a> {
         let mesh = MeshId::of(mesh);
         // every field of the settings, numbers in their shortest exact form
-        let name = blake3::hash(format!("{HEAD} {BUILDERS} {} {settings:?}", mesh.blake3).as_bytes()).to_hex().to_string();
+        let name =
+            blake3::hash(format!("{HEAD} {BUILDERS} {} {settings:?}", mesh.blake3).as_bytes()).to_hex().to_string();
         Entry { folder, name, mesh, settings: *settings }
     }
 
@@ -155,7 +165,9 @@ impl<'a> Entry<'a> {
         let file = match fs::File::open(&path) {
             Ok(file) => file,
             // a file where the folder should be holds no tree, and is told when one is to be kept
-            Err(error) if matches!(error.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) => return Ok(None),
+            Err(error) if matches!(error.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) => {
+                return Ok(None);
+            }
             Err(error) => return Err(told(error.to_string())),
         };
         let mut text = String::new();
@@ -175,13 +187,21 @@ impl<'a> Entry<'a> {
         // names within a process are told apart by the counter, processes by their id
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         let (name, mesh) = (String::new(), self.mesh.clone());
-        let file = TreeFile { name, mesh, settings: self.settings, stages: built.stages.clone(), quality: Vec::new(), tree: built.tree.clone() };
+        let file = TreeFile {
+            name,
+            mesh,
+            settings: self.settings,
+            stages: built.stages.clone(),
+            quality: Vec::new(),
+            tree: built.tree.clone(),
+        };
         let body = file.to_json();
         let told = |error: std::io::Error| format!("the tree is not kept in {}: {error}", self.folder.display());
         fs::create_dir_all(self.folder).map_err(told)?;
         let number = COUNTER.fetch_add(1, Ordering::Relaxed);
         let own = self.folder.join(format!("{}.{}.{number}.{UNFINISHED}", self.name, std::process::id()));
-        let written = fs::write(&own, format!("{HEAD} {} {}\n{body}", self.name, self.checksum(&body))).and_then(|()| fs::rename(&own, self.path()));
+        let written = fs::write(&own, format!("{HEAD} {} {}\n{body}", self.name, self.checksum(&body)))
+            .and_then(|()| fs::rename(&own, self.path()));
         if let Err(error) = written {
             let _ = fs::remove_file(&own);
             return Err(told(error));
@@ -193,19 +213,30 @@ impl<'a> Entry<'a> {
 
 /// Whether a file has a name that only this cache gives: 64 hexadecimal digits and what a tree or an unfinished one ends in.
 fn is_ours(path: &Path) -> bool {
-    let Some((name, rest)) = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.split_at_checked(64)) else { return false };
+    let Some((name, rest)) = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.split_at_checked(64))
+    else {
+        return false;
+    };
     let hexadecimal = name.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b));
     let mut parts = rest.split('.').skip(1);
     let number = |part: Option<&str>| part.is_some_and(|p| !p.is_empty() && p.bytes().all(|b| b.is_ascii_digit()));
-    let unfinished = number(parts.next()) && number(parts.next()) && parts.next() == Some(UNFINISHED) && parts.next().is_none();
+    let unfinished =
+        number(parts.next()) && number(parts.next()) && parts.next() == Some(UNFINISHED) && parts.next().is_none();
     hexadecimal && (rest.strip_prefix('.') == Some(EXTENSION) || unfinished)
 }
 
 /// Removes our files, oldest first, until the rest has at most `most_bytes`. What another process removes meanwhile is gone, and as well.
 fn remove_oldest(folder: &Path, most_bytes: u64) {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).filter(|path| is_ours(path));
-    let mut files: Vec<(SystemTime, PathBuf, u64)> =
-        entries.filter_map(|path| fs::metadata(&path).ok().filter(fs::Metadata::is_file).and_then(|m| Some((m.modified().ok()?, path, m.len())))).collect();
+    let entries =
+        fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).filter(|path| is_ours(path));
+    let mut files: Vec<(SystemTime, PathBuf, u64)> = entries
+        .filter_map(|path| {
+            fs::metadata(&path)
+                .ok()
+                .filter(fs::Metadata::is_file)
+                .and_then(|m| Some((m.modified().ok()?, path, m.len())))
+        })
+        .collect();
     files.sort_unstable();
     let mut total: u64 = files.iter().map(|f| f.2).sum();
     for (_, path, size) in files {

@@ -90,7 +90,11 @@ impl Covering {
     pub fn refine(&mut self) -> bool {
         loop {
             let candidates = (0..self.balls.len()).filter(|k| !self.balls[*k].whole);
-            let Some(worst) = candidates.max_by(|a, b| self.balls[*a].outward.total_cmp(&self.balls[*b].outward).then(b.cmp(a))) else { return false };
+            let Some(worst) =
+                candidates.max_by(|a, b| self.balls[*a].outward.total_cmp(&self.balls[*b].outward).then(b.cmp(a)))
+            else {
+                return false;
+            };
             match self.divided(worst) {
                 Some([one, other]) => {
                     self.balls[worst] = one;
@@ -154,7 +158,11 @@ impl Covering {
             }
             need
         };
-        let first = tried.iter().chain([&start.center]).map(|c| (judge(c), *c)).fold((f64::INFINITY, start.center), |a, b| if b.0 < a.0 { b } else { a });
+        let first = tried
+            .iter()
+            .chain([&start.center])
+            .map(|c| (judge(c), *c))
+            .fold((f64::INFINITY, start.center), |a, b| if b.0 < a.0 { b } else { a });
         simplex(first.1, 0.4 * start.radius, EVALUATIONS, &mut judge);
         Own { outward: best.0.max(0.0), ball: best.1, pieces, whole: false }
     }
@@ -179,7 +187,12 @@ impl Covering {
             .collect();
         let mut parts: Vec<Vec<u32>> = vec![Vec::new(); centers.len()];
         pieces.iter().zip(chosen).for_each(|(n, k)| parts[k].push(*n));
-        parts.into_par_iter().zip(centers).filter(|(part, _)| !part.is_empty()).map(|(part, center)| self.own(part, &[*center])).collect()
+        parts
+            .into_par_iter()
+            .zip(centers)
+            .filter(|(part, _)| !part.is_empty())
+            .map(|(part, center)| self.own(part, &[*center]))
+            .collect()
     }
 
     fn divided(&mut self, worst: usize) -> Option<[Own; 2]> {
@@ -194,11 +207,17 @@ impl Covering {
         let mean = middles.iter().sum::<Vec3>() / middles.len() as f64;
         let covariance: Mat3 = middles.iter().map(|m| (m - mean) * (m - mean).transpose()).sum();
         let across = |axis: &Vec3| {
-            let (one, other): (Vec<_>, Vec<_>) = pieces.iter().zip(&middles).partition(|(_, m)| (*m - mean).dot(axis) < 0.0);
+            let (one, other): (Vec<_>, Vec<_>) =
+                pieces.iter().zip(&middles).partition(|(_, m)| (*m - mean).dot(axis) < 0.0);
             [one, other].map(|half| half.into_iter().map(|(n, _)| *n).collect::<Vec<u32>>())
         };
-        let ways: Vec<[Vec<u32>; 2]> = directions(&covariance).iter().map(across).filter(|[one, other]| !one.is_empty() && !other.is_empty()).collect();
-        let mut ranked: Vec<(f64, [Vec<u32>; 2])> = ways.into_iter().map(|halves| (self.rough(&halves[0]).max(self.rough(&halves[1])), halves)).collect();
+        let ways: Vec<[Vec<u32>; 2]> = directions(&covariance)
+            .iter()
+            .map(across)
+            .filter(|[one, other]| !one.is_empty() && !other.is_empty())
+            .collect();
+        let mut ranked: Vec<(f64, [Vec<u32>; 2])> =
+            ways.into_iter().map(|halves| (self.rough(&halves[0]).max(self.rough(&halves[1])), halves)).collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         ranked.truncate(FITTED);
         // the old ball does for either half, so that neither needs more

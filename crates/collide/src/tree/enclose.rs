@@ -81,8 +81,7 @@ fn touching(balls: &[Ball]) -> Option<Ball> {
         axes.push(e);
     }
     let least = balls.iter().map(|b| b.radius).fold(0.0, f64::max);
-    let (a, half_b, c) =
-        (v.dot(&v) - 1.0, u.dot(&v) + first.radius, u.dot(&u) - first.radius * first.radius);
+    let (a, half_b, c) = (v.dot(&v) - 1.0, u.dot(&v) + first.radius, u.dot(&u) - first.radius * first.radius);
     let radius = roots(a, half_b, c).into_iter().filter(|r| *r >= least * (1.0 - 1e-9)).fold(f64::INFINITY, f64::min);
     radius.is_finite().then(|| Ball { center: first.center + u + v * radius, radius })
 }

@@ -163,7 +163,11 @@ impl MeshId {
         hash.update(&(mesh.vertices.len() as u64).to_le_bytes());
         mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]).for_each(|x| _ = hash.update(&x.to_bits().to_le_bytes()));
         mesh.triangles.iter().flatten().for_each(|n| _ = hash.update(&n.to_le_bytes()));
-        MeshId { blake3: hash.finalize().to_hex().to_string(), triangles: mesh.triangles.len(), diagonal: mesh.diagonal() }
+        MeshId {
+            blake3: hash.finalize().to_hex().to_string(),
+            triangles: mesh.triangles.len(),
+            diagonal: mesh.diagonal(),
+        }
     }
 }
 
@@ -187,7 +191,11 @@ impl TreeFile {
                 lines(level.iter().map(|b| {
                     let [x, y, z] = [b.center.x, b.center.y, b.center.z].map(|x| json(&x));
                     let parent = b.parent.map_or(String::new(), |p| format!(",\"parent\":{p}"));
-                    format!("{{\"c\":[{x},{y},{z}],\"r\":{},\"out\":{}{parent}}}", json(&b.radius), json(&self.tree.nodes()[b.node].outward))
+                    format!(
+                        "{{\"c\":[{x},{y},{z}],\"r\":{},\"out\":{}{parent}}}",
+                        json(&b.radius),
+                        json(&self.tree.nodes()[b.node].outward)
+                    )
                 }))
             })
             .collect();
@@ -214,13 +222,31 @@ impl TreeFile {
         tree.check_nesting().map_err(|e| TreeFileError::Tree(e.to_string()))?;
         let (rows, levels) = (text.quality.len(), tree.levels() as usize);
         if rows != 0 && rows != levels {
-            return Err(TreeFileError::Count { what: "rows of `quality`".into(), count: rows, wanted: format!("one for each of the {levels} levels, or none") });
+            return Err(TreeFileError::Count {
+                what: "rows of `quality`".into(),
+                count: rows,
+                wanted: format!("one for each of the {levels} levels, or none"),
+            });
         }
-        let mesh = text.mesh.unwrap_or_else(|| MeshId { blake3: String::new(), triangles: 0, diagonal: (tree.bounds().max - tree.bounds().min).norm() });
+        let mesh = text.mesh.unwrap_or_else(|| MeshId {
+            blake3: String::new(),
+            triangles: 0,
+            diagonal: (tree.bounds().max - tree.bounds().min).norm(),
+        });
         if !(mesh.diagonal > 0.0 && mesh.diagonal <= FARTHEST) {
-            return Err(TreeFileError::Tree(format!("`diagonal` of `mesh` is {}; wanted above 0, at most {FARTHEST:e} m", mesh.diagonal)));
+            return Err(TreeFileError::Tree(format!(
+                "`diagonal` of `mesh` is {}; wanted above 0, at most {FARTHEST:e} m",
+                mesh.diagonal
+            )));
         }
-        Ok(TreeFile { name: text.name, mesh, settings: text.settings, stages: text.stages, quality: text.quality, tree })
+        Ok(TreeFile {
+            name: text.name,
+            mesh,
+            settings: text.settings,
+            stages: text.stages,
+            quality: text.quality,
+            tree,
+        })
     }
 }
 
@@ -242,7 +268,11 @@ fn read_levels(levels: &[Vec<TextBall>]) -> Result<SphereTree, TreeFileError> {
         return count("balls in level 0", levels[0].len(), "1, the root".into());
     }
     if let Some(empty) = levels.iter().position(Vec::is_empty) {
-        return count(&format!("balls in level {empty}"), 0, "at least 1: each level stands for the whole solid".into());
+        return count(
+            &format!("balls in level {empty}"),
+            0,
+            "at least 1: each level stands for the whole solid".into(),
+        );
     }
     let balls = levels.iter().map(Vec::len).sum();
     if balls > MOST_BALLS {
@@ -257,7 +287,12 @@ fn read_levels(levels: &[Vec<TextBall>]) -> Result<SphereTree, TreeFileError> {
     Ok(SphereTree::of_nodes(nodes))
 }
 
-fn read_level(number: usize, level: &[TextBall], above: &[(usize, bool)], nodes: &mut Vec<SphereNode>) -> Result<Vec<(usize, bool)>, TreeFileError> {
+fn read_level(
+    number: usize,
+    level: &[TextBall],
+    above: &[(usize, bool)],
+    nodes: &mut Vec<SphereNode>,
+) -> Result<Vec<(usize, bool)>, TreeFileError> {
     let mut placed = Vec::with_capacity(level.len());
     for (n, ball) in level.iter().enumerate() {
         let wrong = |what: String| TreeFileError::Ball { level: number, ball: n, what };
@@ -268,7 +303,10 @@ fn read_level(number: usize, level: &[TextBall], above: &[(usize, bool)], nodes:
             nodes.push(node);
             continue;
         };
-        let alone = [n.checked_sub(1), Some(n + 1)].iter().flatten().all(|m| level.get(*m).is_none_or(|other| other.parent != ball.parent));
+        let alone = [n.checked_sub(1), Some(n + 1)]
+            .iter()
+            .flatten()
+            .all(|m| level.get(*m).is_none_or(|other| other.parent != ball.parent));
         let of = &nodes[parent];
         let same = alone && (node.center, node.radius, node.outward) == (of.center, of.radius, of.outward);
         if same {
@@ -278,7 +316,10 @@ fn read_level(number: usize, level: &[TextBall], above: &[(usize, bool)], nodes:
         } else {
             let excess = (node.center - of.center).norm() + node.radius - of.radius;
             if excess > STICKS_OUT * of.radius {
-                return Err(wrong(format!("it sticks out of its parent, ball {number_above} of level {}, by {excess:e} m", number - 1)));
+                return Err(wrong(format!(
+                    "it sticks out of its parent, ball {number_above} of level {}, by {excess:e} m",
+                    number - 1
+                )));
             }
             let index = nodes.len();
             let of = &mut nodes[parent];
@@ -302,7 +343,14 @@ fn read_ball(number: usize, ball: &TextBall) -> Result<SphereNode, String> {
             return Err(format!("its {what} is {value}; wanted 0 to {FARTHEST:e} m"));
         }
     }
-    Ok(SphereNode { center: Vec3::new(x, y, z), radius: ball.r, outward: ball.out(), first_child: 0, children: 0, level: number as u32 })
+    Ok(SphereNode {
+        center: Vec3::new(x, y, z),
+        radius: ball.r,
+        outward: ball.out(),
+        first_child: 0,
+        children: 0,
+        level: number as u32,
+    })
 }
 
 /// The parent's index in the level above; `None` for the root. Parents must not fall along a level, so that siblings are neighbours.
@@ -314,7 +362,10 @@ fn read_parent(number: usize, n: usize, level: &[TextBall], above: usize) -> Res
     let index = usize::try_from(parent).ok().filter(|p| *p < above);
     let index = index.ok_or_else(|| format!("its parent is {parent}; wanted 0 to {}", above - 1))?;
     if n > 0 && level[n - 1].parent > parent {
-        return Err(format!("its parent {parent} comes after {}; balls stand in the order of their parents", level[n - 1].parent));
+        return Err(format!(
+            "its parent {parent} comes after {}; balls stand in the order of their parents",
+            level[n - 1].parent
+        ));
     }
     Ok(Some(index))
 }

@@ -76,7 +76,8 @@ impl Cubes {
 fn divided(region: &[u32], points: &[Vec3], most: usize, distance: &MeshDistance) -> Vec<Part> {
     let looked_at: Vec<u32> = region.iter().copied().step_by(region.len().div_ceil(LOOKED_AT)).collect();
     let some: Vec<Vec3> = looked_at.iter().map(|&i| points[i as usize]).collect();
-    let mut ranked: Vec<(f64, Cubes)> = grids(&some).into_iter().filter_map(|cubes| Some((cubes.rank(&some, most)?, cubes))).collect();
+    let mut ranked: Vec<(f64, Cubes)> =
+        grids(&some).into_iter().filter_map(|cubes| Some((cubes.rank(&some, most)?, cubes))).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = ranked
         .iter()

@@ -79,10 +79,12 @@ struct Group {
 impl Balls<'_> {
     fn divide(&self, region: &[u32], most: usize) -> Vec<Part> {
         let mut groups = self.groups(region);
-        let mut merging = Merging { points: &self.cover.points, distance: self.distance, left: groups.len(), groups: &mut groups };
+        let mut merging =
+            Merging { points: &self.cover.points, distance: self.distance, left: groups.len(), groups: &mut groups };
         merging.run(most);
         let parts = groups.into_iter().filter(|g| g.alive);
-        let parts: Vec<Part> = parts.map(|g| Part::of(g.points, Some(g.center), &self.cover.points, self.distance)).collect();
+        let parts: Vec<Part> =
+            parts.map(|g| Part::of(g.points, Some(g.center), &self.cover.points, self.distance)).collect();
         if parts.len() < 2 { Vec::new() } else { refitted(parts, &self.cover.points, self.distance) }
     }
 
@@ -161,7 +163,8 @@ impl Merging<'_> {
     fn at_least(&self, a: u32, b: u32) -> f64 {
         let [a, b] = [a, b].map(|g| &self.groups[g as usize]);
         let half = 0.5 * (a.center - b.center).norm();
-        let centers = [(a.center, a.signed), (b.center, b.signed), (0.5 * (a.center + b.center), a.signed.max(b.signed) - half)];
+        let centers =
+            [(a.center, a.signed), (b.center, b.signed), (0.5 * (a.center + b.center), a.signed.max(b.signed) - half)];
         let some = |g: &'_ Group| g.points.len().div_ceil(BOUNDED_BY);
         let reaches = centers.map(|(center, signed)| {
             let square = |i: &u32| (self.points[*i as usize] - center).norm_squared();
@@ -176,7 +179,8 @@ impl Merging<'_> {
     fn merged(&self, a: u32, b: u32) -> (f64, Vec3, f64) {
         let [a, b] = [a, b].map(|g| &self.groups[g as usize]);
         let middle = 0.5 * (a.center + b.center);
-        let centers = [(a.center, a.signed), (b.center, b.signed), (middle, self.distance.closest(&middle).signed_distance)];
+        let centers =
+            [(a.center, a.signed), (b.center, b.signed), (middle, self.distance.closest(&middle).signed_distance)];
         let judged = centers.map(|(center, signed)| {
             let square = |i: &u32| (self.points[*i as usize] - center).norm_squared();
             let reach = a.points.iter().chain(&b.points).map(square).fold(0.0, f64::max).sqrt();

@@ -27,7 +27,12 @@ impl SphereTree {
     /// The balls of [`SphereTree::at_level`] for every level from the root's on, with their parents. Balls stand in the order of their
     /// parents, so that the children of one ball are neighbours.
     pub fn level_lists(&self) -> Vec<Vec<LevelBall>> {
-        let ball = |node: usize, parent| LevelBall { center: self.nodes[node].center, radius: self.nodes[node].radius, parent, node };
+        let ball = |node: usize, parent| LevelBall {
+            center: self.nodes[node].center,
+            radius: self.nodes[node].radius,
+            parent,
+            node,
+        };
         let mut lists = vec![vec![ball(0, None)]];
         for _ in 1..self.levels() {
             let above = &lists[lists.len() - 1];

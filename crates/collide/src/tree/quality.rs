@@ -48,7 +48,13 @@ pub struct QualitySettings {
 impl Default for QualitySettings {
     /// 20,000 on the surface, 60,000 (48 at least) on the balls, 131,072 in the volume; tolerance 1e-6.
     fn default() -> QualitySettings {
-        QualitySettings { surface_samples: 20_000, sphere_samples: 60_000, least_on_a_sphere: 48, volume_samples: 1 << 17, tolerance: 1e-6 }
+        QualitySettings {
+            surface_samples: 20_000,
+            sphere_samples: 60_000,
+            least_on_a_sphere: 48,
+            volume_samples: 1 << 17,
+            tolerance: 1e-6,
+        }
     }
 }
 
@@ -107,7 +113,12 @@ impl LevelQuality {
     pub fn of_levels(levels: &[Vec<LevelBall>], mesh: &TriMesh, settings: &QualitySettings) -> Vec<LevelQuality> {
         let solid = Solid::new(mesh, settings);
         let above = std::iter::once(None).chain(levels.iter().map(Some));
-        levels.iter().zip(above).enumerate().map(|(n, (level, above))| solid.measure(n, level, above.map(Vec::as_slice))).collect()
+        levels
+            .iter()
+            .zip(above)
+            .enumerate()
+            .map(|(n, (level, above))| solid.measure(n, level, above.map(Vec::as_slice)))
+            .collect()
     }
 }
 
@@ -216,7 +227,9 @@ impl<'a> Solid<'a> {
         let in_mesh = samples::inside(&self.distance, &points, &bounds);
         let in_union: Vec<bool> = points.par_iter().map(|p| union.holds(p, 0.0)).collect();
         let one = (bounds.max - bounds.min).product() / points.len() as f64 / self.volume;
-        let count = |wanted: fn(bool, bool) -> bool| in_union.iter().zip(&in_mesh).filter(|(l, m)| wanted(**l, **m)).count() as f64 * one;
+        let count = |wanted: fn(bool, bool) -> bool| {
+            in_union.iter().zip(&in_mesh).filter(|(l, m)| wanted(**l, **m)).count() as f64 * one
+        };
         row.volume_ratio = count(|l, _| l);
         row.outside = count(|l, m| l && !m);
         row.missing = count(|l, m| m && !l);

@@ -101,7 +101,11 @@ pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> 
         let divided: Vec<Vec<Part>> = leaves
             .into_par_iter()
             .map(|part| {
-                let mut parts = if part.outward > enough && part.points.len() >= FEWEST { divide(&part.points) } else { Vec::new() };
+                let mut parts = if part.outward > enough && part.points.len() >= FEWEST {
+                    divide(&part.points)
+                } else {
+                    Vec::new()
+                };
                 // points at one place make no ball; closing has others hold them
                 parts.retain(|p| p.ball.radius > tiny);
                 if parts.len() < 2 { vec![part] } else { parts }

@@ -16,7 +16,8 @@ fn repaired(mut mesh: TriMesh) -> (TriMesh, RepairReport) {
 
 /// Without the faces of which `gone` says so.
 fn without(mut mesh: TriMesh, gone: impl Fn(&[Vec3; 3]) -> bool) -> TriMesh {
-    mesh.triangles = (0..mesh.triangles.len()).filter(|&t| !gone(&mesh.corners(t))).map(|t| mesh.triangles[t]).collect();
+    mesh.triangles =
+        (0..mesh.triangles.len()).filter(|&t| !gone(&mesh.corners(t))).map(|t| mesh.triangles[t]).collect();
     mesh
 }
 
@@ -48,8 +49,15 @@ fn hole_in_a_ball_is_closed_within_the_cap() {
         let h = 1.0 - height + 0.05;
         let cap = std::f64::consts::PI * h * h * (3.0 - h) / 3.0;
         assert!(report.longest_hole > edges, "{report:?}");
-        assert_eq!((report.filled_holes, report.closed.crossing_faces, report.filled_faces), (1, 0, report.longest_hole - 2));
-        assert!(full - report.closed.volume <= cap && report.closed.volume < full, "{height}: {} of {full}", report.closed.volume);
+        assert_eq!(
+            (report.filled_holes, report.closed.crossing_faces, report.filled_faces),
+            (1, 0, report.longest_hole - 2)
+        );
+        assert!(
+            full - report.closed.volume <= cap && report.closed.volume < full,
+            "{height}: {} of {full}",
+            report.closed.volume
+        );
         assert!(mesh.vertices.iter().all(|p| p.norm() <= 1.0 + 1e-12));
     }
 }
@@ -71,7 +79,10 @@ fn long_rim_is_filled_in_its_plane() {
     assert_eq!(report.closed.crossing_faces, 0);
     let mut mesh = without(TriMesh::cylinder(1.0, 0.5, sides), |c| all(c, |p| p.z == 0.5));
     let error = mesh.repair(&RepairSettings { hole_edges: 100, ..RepairSettings::default() }).unwrap_err();
-    assert!(error.to_string().ends_with("repair was asked for, but its longest hole has 640 edges; at most 100 are filled"), "{error}");
+    assert!(
+        error.to_string().ends_with("repair was asked for, but its longest hole has 640 edges; at most 100 are filled"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -95,7 +106,8 @@ fn fins_walls_and_debris_go() {
     assert_eq!((report.dangling_pieces, report.dangling_faces), (1, 2));
     near(report.closed.volume, 2.0, 1e-12, "wall");
     // a stray triangle beside it
-    let speck = TriMesh { vertices: vec![Vec3::x(), Vec3::x() * 1.02, Vec3::new(1.0, 0.02, 0.0)], triangles: vec![[0, 1, 2]] };
+    let speck =
+        TriMesh { vertices: vec![Vec3::x(), Vec3::x() * 1.02, Vec3::new(1.0, 0.02, 0.0)], triangles: vec![[0, 1, 2]] };
     let (_, report) = repaired(both(&unit, &speck));
     assert_eq!((report.debris_pieces, report.debris_faces, report.filled_holes), (1, 1, 0));
     near(report.closed.volume, 1.0, 1e-12, "speck");
@@ -106,8 +118,12 @@ fn cracks_close_within_the_tolerance_given() {
     // each face of the ball for itself, its corners off by up to 1e-5
     let ball = TriMesh::icosphere(1.0, 3);
     let mut rng = Rng::new(3);
-    let vertices: Vec<Vec3> = (0..ball.triangles.len()).flat_map(|t| ball.corners(t)).map(|p| p + rng.vec(5e-6)).collect();
-    let soup = TriMesh { triangles: (0..vertices.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(), vertices };
+    let vertices: Vec<Vec3> =
+        (0..ball.triangles.len()).flat_map(|t| ball.corners(t)).map(|p| p + rng.vec(5e-6)).collect();
+    let soup = TriMesh {
+        triangles: (0..vertices.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+        vertices,
+    };
     let mut mesh = soup.clone();
     let report = mesh.repair(&RepairSettings { weld: 1e-4, ..RepairSettings::default() }).unwrap();
     assert_eq!((report.welded_vertices, report.filled_holes), (soup.vertices.len() - ball.vertices.len(), 0));
@@ -122,7 +138,15 @@ fn cracks_close_within_the_tolerance_given() {
 #[test]
 fn holes_that_share_a_vertex_are_filled_each_for_itself() {
     let v = Vec3::new;
-    let vertices = vec![v(0.0, 0.0, 0.0), v(1.0, 0.0, 0.0), v(0.0, 1.0, 0.0), v(0.0, 0.0, 1.0), v(-1.0, 0.0, 0.0), v(0.0, -1.0, 0.0), v(0.0, 0.0, -1.0)];
+    let vertices = vec![
+        v(0.0, 0.0, 0.0),
+        v(1.0, 0.0, 0.0),
+        v(0.0, 1.0, 0.0),
+        v(0.0, 0.0, 1.0),
+        v(-1.0, 0.0, 0.0),
+        v(0.0, -1.0, 0.0),
+        v(0.0, 0.0, -1.0),
+    ];
     // without [0, 2, 1] and [0, 4, 5]
     let triangles = vec![[0, 1, 3], [0, 3, 2], [1, 2, 3], [0, 6, 4], [0, 5, 6], [4, 6, 5]];
     let (_, report) = repaired(TriMesh { vertices, triangles });
@@ -148,7 +172,10 @@ fn what_repair_cannot_do_is_an_error_that_names_the_face() {
     }
     let before = band.clone();
     let error = band.repair(&RepairSettings::default()).unwrap_err();
-    assert!(matches!(&error, MeshError::BeyondRepair { error, .. } if matches!(**error, MeshError::NonManifold { .. })), "{error}");
+    assert!(
+        matches!(&error, MeshError::BeyondRepair { error, .. } if matches!(**error, MeshError::NonManifold { .. })),
+        "{error}"
+    );
     assert_eq!(band, before);
     // one triangle closes around nothing
     let mut lone = TriMesh { vertices: vec![Vec3::x(), Vec3::y(), Vec3::z()], triangles: vec![[0, 1, 2]] };

@@ -70,7 +70,14 @@ fn a_ball_in_the_seam_touches_both_blocks() {
 
 #[test]
 fn gaps_are_those_of_the_union() {
-    let meshes = [step(), boxes(&[(Vec3::new(0.5, 0.1, 0.1), Vec3::zeros()), (Vec3::new(0.1, 0.5, 0.1), Vec3::new(0.1, 0.05, 0.03)), (Vec3::repeat(0.02), Vec3::zeros())])];
+    let meshes = [
+        step(),
+        boxes(&[
+            (Vec3::new(0.5, 0.1, 0.1), Vec3::zeros()),
+            (Vec3::new(0.1, 0.5, 0.1), Vec3::new(0.1, 0.05, 0.03)),
+            (Vec3::repeat(0.02), Vec3::zeros()),
+        ]),
+    ];
     let mut rng = Rng::new(6);
     for mesh in &meshes {
         let (shape, pose) = shape(mesh);
@@ -113,13 +120,15 @@ fn no_contact_lies_inside_the_union() {
 #[test]
 fn a_shell_within_another_changes_nothing() {
     let (alone, pose) = shape(&boxes(&[(Vec3::repeat(0.5), Vec3::zeros())]));
-    let (both, pose_of_both) = shape(&boxes(&[(Vec3::repeat(0.5), Vec3::zeros()), (Vec3::repeat(0.45), Vec3::zeros())]));
+    let (both, pose_of_both) =
+        shape(&boxes(&[(Vec3::repeat(0.5), Vec3::zeros()), (Vec3::repeat(0.45), Vec3::zeros())]));
     let mut rng = Rng::new(9);
     let block = Shape::cuboid(Vec3::new(0.2, 0.1, 0.15)).unwrap();
     let mut touching = 0;
     for _ in 0..300 {
         let other = rng.pose(0.9);
-        let [one, two] = [(&alone, &pose), (&both, &pose_of_both)].map(|(shape, pose)| ask(&block, &other, shape, pose, 0.01));
+        let [one, two] =
+            [(&alone, &pose), (&both, &pose_of_both)].map(|(shape, pose)| ask(&block, &other, shape, pose, 0.01));
         assert_eq!(one.len(), two.len());
         touching += usize::from(!one.is_empty());
         for (c, d) in one.iter().zip(&two) {

@@ -25,7 +25,8 @@ fn check(points: &[Vec3], hull: &TriMesh) -> f64 {
 
 #[test]
 fn a_cube_full_of_points_in_its_faces_and_edges_is_a_cube() {
-    let points: Vec<Vec3> = (0..7 * 7 * 7).map(|n| Vec3::new((n % 7) as f64, (n / 7 % 7) as f64, (n / 49) as f64) / 6.0).collect();
+    let points: Vec<Vec3> =
+        (0..7 * 7 * 7).map(|n| Vec3::new((n % 7) as f64, (n / 7 % 7) as f64, (n / 49) as f64) / 6.0).collect();
     let hull = cloud(points.clone()).convex_hull().unwrap();
     assert!((check(&points, &hull) - 1.0).abs() < 1e-12);
     assert_eq!(hull.triangles.len(), 2 * hull.vertices.len() - 4, "Euler");
@@ -33,7 +34,11 @@ fn a_cube_full_of_points_in_its_faces_and_edges_is_a_cube() {
 
 #[test]
 fn convex_meshes_are_their_own_hulls() {
-    for (mesh, vertices) in [(TriMesh::icosphere(0.3, 3), 642), (TriMesh::cylinder(0.2, 1.0, 48), 96), (TriMesh::box_(Vec3::new(1.0, 2.0, 3.0)), 8)] {
+    for (mesh, vertices) in [
+        (TriMesh::icosphere(0.3, 3), 642),
+        (TriMesh::cylinder(0.2, 1.0, 48), 96),
+        (TriMesh::box_(Vec3::new(1.0, 2.0, 3.0)), 8),
+    ] {
         let hull = mesh.convex_hull().unwrap();
         let (volume, exact) = (check(&mesh.vertices, &hull), mesh.signed_volume());
         assert_eq!(hull.vertices.len(), vertices);
@@ -56,10 +61,14 @@ fn random_clouds_agree_with_parry() {
     for seed in 0..30 {
         let mut rng = Rng::new(seed);
         let stretch = Vec3::new(1.0, rng.between(0.01, 1.0), rng.between(0.01, 1.0));
-        let points: Vec<Vec3> = (0..20 + 50 * seed).map(|_| Vec3::from_fn(|k, _| stretch[k] * rng.between(-1.0, 1.0))).collect();
+        let points: Vec<Vec3> =
+            (0..20 + 50 * seed).map(|_| Vec3::from_fn(|k, _| stretch[k] * rng.between(-1.0, 1.0))).collect();
         let volume = check(&points, &cloud(points.clone()).convex_hull().unwrap());
-        let (vertices, triangles) = parry3d_f64::transformation::convex_hull(&points.iter().map(|p| [p.x, p.y, p.z].into()).collect::<Vec<_>>());
-        let theirs = TriMesh { vertices: vertices.iter().map(|v| Vec3::new(v.x, v.y, v.z)).collect(), triangles }.signed_volume();
+        let (vertices, triangles) = parry3d_f64::transformation::convex_hull(
+            &points.iter().map(|p| [p.x, p.y, p.z].into()).collect::<Vec<_>>(),
+        );
+        let theirs = TriMesh { vertices: vertices.iter().map(|v| Vec3::new(v.x, v.y, v.z)).collect(), triangles }
+            .signed_volume();
         assert!((volume - theirs).abs() < 1e-4 * theirs, "seed {seed}: {volume} {theirs}");
     }
 }

@@ -112,7 +112,9 @@ fn tells_how_far_it_is_and_what_each_stage_did() {
     let (tree, stages) = SphereTree::build_watched(&mesh, &settings(2), &told).unwrap();
     let shares = told.0.into_inner().unwrap();
     assert!(shares.len() > 5 && shares.windows(2).all(|w| w[0] <= w[1]) && shares.last() == Some(&1.0), "{shares:?}");
-    let count = |level, stage: &str| stages.iter().filter(|s| s.level == level && s.stage == stage).map(|s| s.count).sum::<u64>();
+    let count = |level, stage: &str| {
+        stages.iter().filter(|s| s.level == level && s.stage == stage).map(|s| s.count).sum::<u64>()
+    };
     for level in [1, 2] {
         let regions = 8_u64.pow(level - 1);
         let ways = ["expand won", "merge won", "burst won"].map(|way| count(level, way)).iter().sum::<u64>();
@@ -154,8 +156,16 @@ fn tighter_than_the_reference_toolkit_and_yet_covering() {
         let tree = SphereTree::build(&mesh, &settings(2)).unwrap();
         let rows = tree.quality(&mesh, &QualitySettings::default());
         let [_, one, two] = &rows[..] else { panic!("{name}: {} levels", rows.len()) };
-        assert!(two.spheres <= 64 && (two.coverage, two.gap_max, two.nesting_broken) == (1.0, 0.0, 0), "{name}: {two:?}");
-        assert!(two.protrusion_max <= worst && two.protrusion_mean <= mean, "{name}: {} / {}", two.protrusion_max, two.protrusion_mean);
+        assert!(
+            two.spheres <= 64 && (two.coverage, two.gap_max, two.nesting_broken) == (1.0, 0.0, 0),
+            "{name}: {two:?}"
+        );
+        assert!(
+            two.protrusion_max <= worst && two.protrusion_mean <= mean,
+            "{name}: {} / {}",
+            two.protrusion_max,
+            two.protrusion_mean
+        );
         assert!(first.is_none_or(|first| one.protrusion_max <= first), "{name}: {}", one.protrusion_max);
     }
 }

@@ -196,8 +196,24 @@ fn poses_that_are_not_numbers_do_no_harm() {
         for a in &all {
             for b in &all {
                 out.clear();
-                contacts_in(mode, &a.ours, &Pose::translation(bad, 0.0, 0.0), &b.ours, &Pose::identity(), 0.1, &mut out);
-                contacts_in(mode, &b.ours, &Pose::identity(), &a.ours, &Pose::translation(0.0, bad, 0.0), 0.1, &mut out);
+                contacts_in(
+                    mode,
+                    &a.ours,
+                    &Pose::translation(bad, 0.0, 0.0),
+                    &b.ours,
+                    &Pose::identity(),
+                    0.1,
+                    &mut out,
+                );
+                contacts_in(
+                    mode,
+                    &b.ours,
+                    &Pose::identity(),
+                    &a.ours,
+                    &Pose::translation(0.0, bad, 0.0),
+                    0.1,
+                    &mut out,
+                );
                 contacts_in(
                     mode,
                     &a.ours,

@@ -3,7 +3,9 @@
 use crate::rng::Rng;
 use crate::shared_meshes::text;
 use std::f64::consts::PI;
-use tumble_collide::{ClosedReport, Mat3, MeshDistance, MeshError, Pose, Quat, Shape, SphereTree, TreeSettings, TriMesh, Vec3, text_of};
+use tumble_collide::{
+    ClosedReport, Mat3, MeshDistance, MeshError, Pose, Quat, Shape, SphereTree, TreeSettings, TriMesh, Vec3, text_of,
+};
 
 fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
     assert!((found - expected).abs() <= relative * expected.abs(), "{what}: {found} instead of {expected}");
@@ -280,26 +282,51 @@ fn errors_number_faces_as_the_user_sees_them() {
 /// A prism of height 1 over a polygon, its faces as polygons, and the polygon's area by the shoelace formula.
 fn prism(outline: &[[f64; 2]]) -> (String, f64) {
     let n = outline.len();
-    let vertices: String = [0.0, 1.0].iter().flat_map(|z| outline.iter().map(move |[x, y]| format!("v {x} {y} {z}\n"))).collect();
-    let (bottom, top): (String, String) = ((1..=n).rev().map(|k| format!(" {k}")).collect(), (n + 1..=2 * n).map(|k| format!(" {k}")).collect());
-    let sides: String = (0..n).map(|k| (k + 1, (k + 1) % n + 1)).map(|(a, b)| format!("f {a} {b} {} {}\n", b + n, a + n)).collect();
-    let area: f64 = (0..n).map(|k| (outline[k], outline[(k + 1) % n])).map(|(p, q)| 0.5 * (p[0] * q[1] - q[0] * p[1])).sum();
+    let vertices: String =
+        [0.0, 1.0].iter().flat_map(|z| outline.iter().map(move |[x, y]| format!("v {x} {y} {z}\n"))).collect();
+    let (bottom, top): (String, String) =
+        ((1..=n).rev().map(|k| format!(" {k}")).collect(), (n + 1..=2 * n).map(|k| format!(" {k}")).collect());
+    let sides: String =
+        (0..n).map(|k| (k + 1, (k + 1) % n + 1)).map(|(a, b)| format!("f {a} {b} {} {}\n", b + n, a + n)).collect();
+    let area: f64 =
+        (0..n).map(|k| (outline[k], outline[(k + 1) % n])).map(|(p, q)| 0.5 * (p[0] * q[1] - q[0] * p[1])).sum();
     (format!("{vertices}f{bottom}\nf{top}\n{sides}"), area)
 }
 
 /// The outlines, each begun at every one of its corners: a fan is right from some of them at best.
 fn concave() -> Vec<Vec<[f64; 2]>> {
-    let star = (0..20).map(|k| (f64::from(k) * PI / 10.0, if k % 2 == 1 { 1.0 } else { 0.3 })).map(|(a, r)| [r * a.cos(), r * a.sin()]).collect();
-    let comb = (0..9).flat_map(|k| [[f64::from(2 * k), 0.2 + f64::from(k % 2)], [f64::from(2 * k) + 0.5, 3.0]]).rev().chain([[0.0, 0.0], [17.0, 0.0]]).collect();
+    let star = (0..20)
+        .map(|k| (f64::from(k) * PI / 10.0, if k % 2 == 1 { 1.0 } else { 0.3 }))
+        .map(|(a, r)| [r * a.cos(), r * a.sin()])
+        .collect();
+    let comb = (0..9)
+        .flat_map(|k| [[f64::from(2 * k), 0.2 + f64::from(k % 2)], [f64::from(2 * k) + 0.5, 3.0]])
+        .rev()
+        .chain([[0.0, 0.0], [17.0, 0.0]])
+        .collect();
     let outlines: [Vec<[f64; 2]>; 5] = [
         vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]],
         vec![[4.0, 0.0], [0.0, 2.0], [1.0, 0.0], [0.0, -2.0]],
         // a square with a square hole, joined by a cut that is gone along twice
-        vec![[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0], [0.0, 0.0], [1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0]],
+        vec![
+            [0.0, 0.0],
+            [3.0, 0.0],
+            [3.0, 3.0],
+            [0.0, 3.0],
+            [0.0, 0.0],
+            [1.0, 1.0],
+            [1.0, 2.0],
+            [2.0, 2.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
+        ],
         star,
         comb,
     ];
-    outlines.into_iter().flat_map(|outline| (0..outline.len()).map(move |k| [&outline[k..], &outline[..k]].concat())).collect()
+    outlines
+        .into_iter()
+        .flat_map(|outline| (0..outline.len()).map(move |k| [&outline[k..], &outline[..k]].concat()))
+        .collect()
 }
 
 #[test]
@@ -309,8 +336,17 @@ fn concave_faces_are_cut_without_folds() {
         let mut mesh = TriMesh::from_obj(&obj).unwrap();
         assert_eq!(mesh.triangles.len(), 2 * (outline.len() - 2) + 2 * outline.len(), "{outline:?}");
         // the triangles of the two ends have the area of the outline: folds would have more
-        let flat = |t: usize| { let [a, b, c] = mesh.corners(t); a.z == b.z && b.z == c.z };
-        let ends: f64 = (0..mesh.triangles.len()).filter(|t| flat(*t)).map(|t| { let [a, b, c] = mesh.corners(t); 0.5 * (b - a).cross(&(c - a)).norm() }).sum();
+        let flat = |t: usize| {
+            let [a, b, c] = mesh.corners(t);
+            a.z == b.z && b.z == c.z
+        };
+        let ends: f64 = (0..mesh.triangles.len())
+            .filter(|t| flat(*t))
+            .map(|t| {
+                let [a, b, c] = mesh.corners(t);
+                0.5 * (b - a).cross(&(c - a)).norm()
+            })
+            .sum();
         assert_near(ends, 2.0 * area, 1e-12, &format!("{outline:?}"));
         assert_near(mesh.check_closed().unwrap().volume, area, 1e-12, &format!("{outline:?}"));
     }
@@ -322,10 +358,15 @@ fn a_fan_that_is_right_stays_and_hostile_faces_end() {
     let mesh = TriMesh::from_obj(&obj).unwrap();
     assert!(mesh.triangles[..62].iter().enumerate().all(|(k, t)| *t == [63, 62 - k as u32, 61 - k as u32]));
     // a zigzag of more corners than are cut, and a face that crosses itself
-    let zigzag: String = (0..5001).map(|k| format!("v {k} {} 0\n", k % 2 * 100)).chain(["f".into()]).chain((1..=5001).map(|k| format!(" {k}"))).collect();
+    let zigzag: String = (0..5001)
+        .map(|k| format!("v {k} {} 0\n", k % 2 * 100))
+        .chain(["f".into()])
+        .chain((1..=5001).map(|k| format!(" {k}")))
+        .collect();
     let error = TriMesh::from_obj(&zigzag).unwrap_err().to_string();
     assert!(error.starts_with("line 5002: a concave face of 5001 corners; at most 5000"), "{error}");
-    let star: String = (0..7).map(|k| f64::from(3 * k) * PI / 3.5).map(|a| format!("v {} {} 0\n", a.cos(), a.sin())).collect();
+    let star: String =
+        (0..7).map(|k| f64::from(3 * k) * PI / 3.5).map(|a| format!("v {} {} 0\n", a.cos(), a.sin())).collect();
     assert_eq!(TriMesh::from_obj(&(star + "f 1 2 3 4 5 6 7\n")).unwrap().triangles.len(), 5);
 }
 
@@ -334,11 +375,16 @@ fn a_fan_that_is_right_stays_and_hostile_faces_end() {
 fn a_sheet_over_a_notch_does_not_break_the_bound_of_a_tree() {
     let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
     let mut mesh = TriMesh::from_obj(&prism(&outline).0).unwrap();
-    let fan = |from: u32, down: bool| (1..5).map(move |k| if down { [from + 5, from + 5 - k, from + 4 - k] } else { [from, from + k, from + k + 1] });
+    let fan = |from: u32, down: bool| {
+        (1..5).map(move |k| if down { [from + 5, from + 5 - k, from + 4 - k] } else { [from, from + k, from + k + 1] })
+    };
     mesh.triangles.splice(..8, fan(0, true).chain(fan(6, false)).collect::<Vec<_>>());
     assert!(mesh.check_closed().unwrap().crossing_faces > 0);
     // the distance from the L, outside of it exact
-    let block = |p: &Vec3, x: f64, y: f64| { let q = (p - Vec3::new(0.5 * x, 0.5 * y, 0.5)).abs() - Vec3::new(0.5 * x, 0.5 * y, 0.5); q.sup(&Vec3::zeros()).norm() };
+    let block = |p: &Vec3, x: f64, y: f64| {
+        let q = (p - Vec3::new(0.5 * x, 0.5 * y, 0.5)).abs() - Vec3::new(0.5 * x, 0.5 * y, 0.5);
+        q.sup(&Vec3::zeros()).norm()
+    };
     let outside = |p: &Vec3| block(p, 2.0, 1.0).min(block(p, 1.0, 2.0));
     let distance = MeshDistance::new(&mesh);
     for p in [Vec3::new(1.25, 1.25, 0.0), Vec3::new(1.4, 1.2, 1.0), Vec3::new(1.1, 1.2, 0.0)] {
@@ -347,7 +393,11 @@ fn a_sheet_over_a_notch_does_not_break_the_bound_of_a_tree() {
     for depth in 1..4 {
         let tree = SphereTree::build(&mesh, &TreeSettings { depth, ..TreeSettings::octree() }).unwrap();
         for ball in tree.nodes() {
-            let farthest = TriMesh::icosphere(ball.radius, 2).vertices.iter().map(|d| outside(&(ball.center + d))).fold(0.0, f64::max);
+            let farthest = TriMesh::icosphere(ball.radius, 2)
+                .vertices
+                .iter()
+                .map(|d| outside(&(ball.center + d)))
+                .fold(0.0, f64::max);
             assert!(farthest <= ball.outward + 1e-12, "{ball:?} reaches {farthest}");
         }
     }
@@ -383,9 +433,15 @@ fn stl_text_may_be_in_capitals() {
 #[test]
 fn a_mesh_of_no_size_says_so() {
     let mut mesh = TriMesh::box_(Vec3::repeat(1e-120));
-    assert!(matches!(mesh.check_closed(), Err(MeshError::TooSmall { diagonal }) if (diagonal / 1e-120 - 12.0_f64.sqrt()).abs() < 1e-12));
-    let mut line = TriMesh { vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::x() * 2.0], triangles: vec![[0, 1, 2], [0, 2, 1]] };
-    assert_eq!(line.check_closed().unwrap_err().to_string(), "none of the 2 triangles has an area; at least 4 are needed to close a solid");
+    assert!(
+        matches!(mesh.check_closed(), Err(MeshError::TooSmall { diagonal }) if (diagonal / 1e-120 - 12.0_f64.sqrt()).abs() < 1e-12)
+    );
+    let mut line =
+        TriMesh { vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::x() * 2.0], triangles: vec![[0, 1, 2], [0, 2, 1]] };
+    assert_eq!(
+        line.check_closed().unwrap_err().to_string(),
+        "none of the 2 triangles has an area; at least 4 are needed to close a solid"
+    );
 }
 
 /// A box of six quads as PLY, with a property and an element that are passed over.
@@ -421,12 +477,17 @@ fn ply(encoding: &str, corners: &[[f32; 3]], quads: &[[i32; 4]]) -> Vec<u8> {
 
 #[test]
 fn ply_is_read_in_all_three_encodings() {
-    let corners: Vec<[f32; 3]> = (0..8).map(|k| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 1.5 } else { -0.25 })).collect();
+    let corners: Vec<[f32; 3]> =
+        (0..8).map(|k| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 1.5 } else { -0.25 })).collect();
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     for encoding in ["ascii", "binary_little_endian", "binary_big_endian"] {
         let bytes = ply(encoding, &corners, &quads);
         let mut mesh = TriMesh::from_ply(&bytes).unwrap();
-        assert_eq!((mesh.vertices.len(), mesh.triangles.len(), mesh.triangles[..2].to_vec()), (8, 12, vec![[0, 2, 3], [0, 3, 1]]), "{encoding}");
+        assert_eq!(
+            (mesh.vertices.len(), mesh.triangles.len(), mesh.triangles[..2].to_vec()),
+            (8, 12, vec![[0, 2, 3], [0, 3, 1]]),
+            "{encoding}"
+        );
         assert_near(mesh.check_closed().unwrap().volume, 1.75_f64.powi(3), 1e-12, encoding);
         // a file that is cut is an error that says so, and one with other bytes is an error or a mesh
         for end in 0..bytes.len() - 1 {

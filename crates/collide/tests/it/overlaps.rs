@@ -24,7 +24,10 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
 /// The deepest contact has this depth and parts the two along this way.
 fn parts(label: &str, found: &[Contact], depth: f64, way: Vec3, slack: f64) {
     let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).unwrap_or_else(|| panic!("{label}: no contact"));
-    assert!((deepest.gap + depth).abs() < slack && deepest.normal.dot(&way) > 1.0 - 1e-3, "{label}: {depth} along {way:?}, but {deepest:?}");
+    assert!(
+        (deepest.gap + depth).abs() < slack && deepest.normal.dot(&way) > 1.0 - 1e-3,
+        "{label}: {depth} along {way:?}, but {deepest:?}"
+    );
     // none pushes it back
     assert!(found.iter().filter(|c| c.gap < 0.0).all(|c| c.normal.dot(&way) > 0.0), "{label}: {found:?}");
 }
@@ -36,11 +39,26 @@ fn aligned_cubes_part_by_their_overlap() {
     let (mesh, block) = (cube(), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for overlap in OVERLAPS {
-            for (k, shift) in [(2, Vec3::zeros()), (0, Vec3::zeros()), (2, Vec3::new(1e-9, 0.7e-9, 0.0)), (2, Vec3::new(1e-4, 1e-3, 0.0)), (2, Vec3::new(0.01, 0.007, 0.0))] {
+            for (k, shift) in [
+                (2, Vec3::zeros()),
+                (0, Vec3::zeros()),
+                (2, Vec3::new(1e-9, 0.7e-9, 0.0)),
+                (2, Vec3::new(1e-4, 1e-3, 0.0)),
+                (2, Vec3::new(0.01, 0.007, 0.0)),
+            ] {
                 let way = Vec3::ith(k, 1.0);
                 for (way, yaw) in [(way, 0.0), (-way, 0.0), (way, if k == 2 { 0.05 } else { 0.0 })] {
-                    let pose = Pose::from_parts((way * (1.0 - overlap) + shift).into(), Quat::from_scaled_axis(Vec3::z() * yaw));
-                    parts(&format!("{overlap} {shift:?} {yaw}"), &ask(a, &pose, b, &Pose::identity()), overlap, way, 1e-9);
+                    let pose = Pose::from_parts(
+                        (way * (1.0 - overlap) + shift).into(),
+                        Quat::from_scaled_axis(Vec3::z() * yaw),
+                    );
+                    parts(
+                        &format!("{overlap} {shift:?} {yaw}"),
+                        &ask(a, &pose, b, &Pose::identity()),
+                        overlap,
+                        way,
+                        1e-9,
+                    );
                 }
             }
         }
@@ -55,9 +73,21 @@ fn aligned_cylinders_part_by_their_overlap() {
         for (name, other) in [("cylinder", &cylinder), ("block", &block), ("cube", &cube)] {
             for (a, b) in [(&cylinder, other), (other, &cylinder)] {
                 let stacked = Pose::translation(0.0, 0.0, 1.0 - overlap);
-                parts(&format!("{overlap} stacked on {name}"), &ask(a, &stacked, b, &Pose::identity()), overlap, Vec3::z(), 1e-9);
+                parts(
+                    &format!("{overlap} stacked on {name}"),
+                    &ask(a, &stacked, b, &Pose::identity()),
+                    overlap,
+                    Vec3::z(),
+                    1e-9,
+                );
                 let beside = Pose::translation(1.0 - overlap, 0.0, 0.0);
-                parts(&format!("{overlap} beside {name}"), &ask(a, &beside, b, &Pose::identity()), overlap, Vec3::x(), 1e-9);
+                parts(
+                    &format!("{overlap} beside {name}"),
+                    &ask(a, &beside, b, &Pose::identity()),
+                    overlap,
+                    Vec3::x(),
+                    1e-9,
+                );
             }
         }
     }
@@ -68,7 +98,13 @@ fn aligned_cylinders_part_by_their_overlap() {
 fn aligned_fine_meshes_part_by_their_overlap() {
     let fine = mesh(TriMesh::cylinder(0.5, 0.5, 32));
     for overlap in OVERLAPS {
-        parts("stacked", &ask(&fine, &Pose::translation(0.0, 0.0, 1.0 - overlap), &fine, &Pose::identity()), overlap, Vec3::z(), 1e-6);
+        parts(
+            "stacked",
+            &ask(&fine, &Pose::translation(0.0, 0.0, 1.0 - overlap), &fine, &Pose::identity()),
+            overlap,
+            Vec3::z(),
+            1e-6,
+        );
         // the corners of the two prisms are at ±0.5
         let beside = ask(&fine, &Pose::translation(1.0 - overlap, 0.0, 0.0), &fine, &Pose::identity());
         let deepest = beside.iter().map(|c| -c.gap).fold(0.0, f64::max);
@@ -83,7 +119,9 @@ fn angle() -> Shape {
     let outline = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.5), (0.5, 0.5), (0.5, 1.0), (0.0, 1.0)];
     let vertices = [0.0, 1.0].iter().flat_map(|z| outline.map(|(x, y)| Vec3::new(x, y, *z))).collect();
     let sides = (0..6).flat_map(|k| [[k, (k + 1) % 6, (k + 1) % 6 + 6], [k, (k + 1) % 6 + 6, k + 6]]);
-    let ends = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]].into_iter().flat_map(|[a, b, c]| [[c, b, a], [a + 6, b + 6, c + 6]]);
+    let ends = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]]
+        .into_iter()
+        .flat_map(|[a, b, c]| [[c, b, a], [a + 6, b + 6, c + 6]]);
     mesh(TriMesh { vertices, triangles: sides.chain(ends).collect() })
 }
 
@@ -93,7 +131,13 @@ fn aligned_angles_part_by_their_overlap() {
     for overlap in OVERLAPS.into_iter().filter(|x| *x < 0.2) {
         // on each other, and heel to toe
         for way in [Vec3::z(), Vec3::x()] {
-            parts(&format!("{overlap} {way:?}"), &ask(&angle, &Pose::from(way * (1.0 - overlap)), &angle, &Pose::identity()), overlap, way, 1e-3);
+            parts(
+                &format!("{overlap} {way:?}"),
+                &ask(&angle, &Pose::from(way * (1.0 - overlap)), &angle, &Pose::identity()),
+                overlap,
+                way,
+                1e-3,
+            );
         }
     }
 }
@@ -116,7 +160,10 @@ fn coincident_bodies_have_a_way_out() {
                 let way = way_out(&found);
                 let free = Pose::from_parts((a.translation.vector + way * (1.0 + 1e-4)).into(), a.rotation);
                 let left = ask(&shape, &free, &shape, &pose);
-                assert!(left.iter().all(|c| c.gap > -1e-4), "{name} {shift}: moved by {way:?} leaves {left:?} of {found:?}");
+                assert!(
+                    left.iter().all(|c| c.gap > -1e-4),
+                    "{name} {shift}: moved by {way:?} leaves {left:?} of {found:?}"
+                );
             }
         }
     }

@@ -1,7 +1,9 @@
 //! The quality report against closed forms and plain quadrature.
 
 use std::f64::consts::PI;
-use tumble_collide::{LevelBall, LevelQuality, QualitySettings, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover};
+use tumble_collide::{
+    LevelBall, LevelQuality, QualitySettings, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover,
+};
 
 /// The figures of balls `(x, r)` with their centres on the x axis.
 fn on_axis(balls: &[(f64, f64)], mesh: &TriMesh) -> LevelQuality {
@@ -49,7 +51,10 @@ fn a_ball_around_a_cube() {
 fn a_ball_in_a_cube() {
     let d = 12.0_f64.sqrt();
     let q = on_axis(&[(0.0, 1.0)], &TriMesh::box_(Vec3::repeat(1.0)));
-    assert_eq!((q.coverage, q.vertex_coverage, q.protrusion_max, q.protrusion_mean, q.outside), (0.0, 0.0, 0.0, 0.0, 0.0));
+    assert_eq!(
+        (q.coverage, q.vertex_coverage, q.protrusion_max, q.protrusion_mean, q.outside),
+        (0.0, 0.0, 0.0, 0.0, 0.0)
+    );
     near("gap at the corners", q.vertex_gap_max, (3.0_f64.sqrt() - 1.0) / d, 1e-15);
     let mean = over_square(|x, y| (1.0 + x * x + y * y).sqrt() - 1.0) / 4.0;
     near("mean gap", q.gap_mean, mean / d, 1e-4);
@@ -110,7 +115,10 @@ fn a_hidden_ball_protrudes_from_nothing_but_has_its_own_error() {
 fn broken_nesting_is_counted() {
     let mesh = TriMesh::box_(Vec3::repeat(1.0));
     let child = |x: f64, r: f64, parent| LevelBall { parent, ..LevelBall::new(Vec3::x() * x, r) };
-    let levels = [vec![child(0.0, 2.0, None)], vec![child(1.0, 1.0, Some(0)), child(1.0, 1.25, Some(0)), child(0.0, 0.1, None), child(0.0, 0.1, Some(1))]];
+    let levels = [
+        vec![child(0.0, 2.0, None)],
+        vec![child(1.0, 1.0, Some(0)), child(1.0, 1.25, Some(0)), child(0.0, 0.1, None), child(0.0, 0.1, Some(1))],
+    ];
     let rows = LevelQuality::of_levels(&levels, &mesh, &QualitySettings::default());
     assert_eq!((rows[0].nesting_broken, rows[1].nesting_broken), (0, 3));
     near("excess", rows[1].nesting_max, 0.25 / mesh.diagonal(), 1e-15);
@@ -127,7 +135,11 @@ fn a_tree_covers_nests_and_keeps_its_stated_error() {
         assert_eq!(row.spheres, tree.at_level(row.level).count());
         let bound = tree.outward_error_at(row.level) / mesh.diagonal();
         assert!(row.sphere_worst <= bound + 1e-12 && row.sphere_worst > 0.5 * bound, "{} of {bound}", row.sphere_worst);
-        assert!(row.protrusion_mean <= row.protrusion_p95 && row.protrusion_p95 <= row.protrusion_max && row.protrusion_max <= row.sphere_worst);
+        assert!(
+            row.protrusion_mean <= row.protrusion_p95
+                && row.protrusion_p95 <= row.protrusion_max
+                && row.protrusion_max <= row.sphere_worst
+        );
         near("volumes", row.volume_ratio - row.outside + row.missing, 1.0, 3e-3);
     }
 }

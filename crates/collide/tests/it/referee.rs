@@ -29,14 +29,18 @@ pub struct Closest {
 pub fn closest(a: &TriMesh, pa: &Pose, b: &TriMesh, pb: &Pose, distance: &MeshDistance, more: f64) -> Vec<Closest> {
     let to = pb.inv_mul(pa);
     let near_of_b: Vec<[Vec3; 3]> = (0..b.triangles.len()).map(|t| b.corners(t)).collect();
-    let placed: Vec<[Vec3; 3]> = (0..a.triangles.len()).map(|t| a.corners(t).map(|p| (to * nalgebra::Point3::from(p)).coords)).collect();
+    let placed: Vec<[Vec3; 3]> =
+        (0..a.triangles.len()).map(|t| a.corners(t).map(|p| (to * nalgebra::Point3::from(p)).coords)).collect();
     let middle = |t: &[Vec3; 3]| (t[0] + t[1] + t[2]) / 3.0;
     let radius = |t: &[Vec3; 3]| t.iter().map(|p| (p - middle(t)).norm()).fold(0.0, f64::max);
     // no vertex of A is closer than the surfaces are
-    let vertices = placed.iter().flatten().map(|p| distance.closest(p).signed_distance.abs()).fold(f64::INFINITY, f64::min);
+    let vertices =
+        placed.iter().flatten().map(|p| distance.closest(p).signed_distance.abs()).fold(f64::INFINITY, f64::min);
     let mut all = Vec::new();
-    for t in placed.iter().filter(|t| distance.closest(&middle(t)).signed_distance.abs() - radius(t) <= vertices + more) {
-        for u in near_of_b.iter().filter(|u| (middle(t) - middle(u)).norm() - radius(t) - radius(u) <= vertices + more) {
+    for t in placed.iter().filter(|t| distance.closest(&middle(t)).signed_distance.abs() - radius(t) <= vertices + more)
+    {
+        for u in near_of_b.iter().filter(|u| (middle(t) - middle(u)).norm() - radius(t) - radius(u) <= vertices + more)
+        {
             pairs(t, u, &mut all);
         }
     }
@@ -112,9 +116,15 @@ fn the_referee_knows_cubes() {
     let across = nalgebra::Rotation3::from_axis_angle(&nalgebra::Unit::new_normalize(way), 0.7);
     let upper = tumble_collide::Quat::from_rotation_matrix(&across);
     let found = ask(&Pose::from_parts((way * (2.0_f64.sqrt() + 0.1)).into(), upper));
-    assert!((found.distance - 0.1).abs() < 1e-12 && found.kind == Kind::Edges && (found.normal - way).norm() < 1e-9, "{found:?}");
+    assert!(
+        (found.distance - 0.1).abs() < 1e-12 && found.kind == Kind::Edges && (found.normal - way).norm() < 1e-9,
+        "{found:?}"
+    );
     // a corner down on a face
     let corner = turn(Vec3::new(1.0, -1.0, 0.0).normalize(), (1.0 / 3.0_f64.sqrt()).acos());
     let found = ask(&Pose::from_parts(Vec3::new(0.1, 0.07, 0.5 + 0.75_f64.sqrt() + 0.1).into(), corner));
-    assert!((found.distance - 0.1).abs() < 1e-12 && found.kind == Kind::Face && (found.normal - Vec3::z()).norm() < 1e-9, "{found:?}");
+    assert!(
+        (found.distance - 0.1).abs() < 1e-12 && found.kind == Kind::Face && (found.normal - Vec3::z()).norm() < 1e-9,
+        "{found:?}"
+    );
 }

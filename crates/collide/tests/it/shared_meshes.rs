@@ -12,7 +12,10 @@ pub fn folder() -> Option<PathBuf> {
     let found = here.ancestors().map(|a| a.join("shared/meshes")).find(|p| p.is_dir());
     if found.is_none() {
         // past the harness, which keeps what passing tests print
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set\n", here.display()));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set\n", here.display()),
+        );
     }
     found
 }

@@ -8,7 +8,10 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> 
     let mut out = Vec::new();
     contacts(a, pa, b, pb, margin, &mut out);
     for c in &out {
-        assert!((c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= margin && c.point.iter().all(|x| x.is_finite()), "{c:?}");
+        assert!(
+            (c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= margin && c.point.iter().all(|x| x.is_finite()),
+            "{c:?}"
+        );
     }
     let mut names: Vec<u64> = out.iter().map(|c| c.feature).collect();
     names.sort_unstable();
@@ -58,7 +61,10 @@ fn blocks_of_the_same_size_meet_face_to_face() {
                 assert!(found.iter().all(|c| (c.normal - Vec3::z()).norm() < 1e-6), "{shift} {gap}: {found:?}");
                 assert!(found.iter().all(|c| (c.gap - gap).abs() < 1e-9), "{shift} {gap}: {found:?}");
                 let wide = spread(&found);
-                assert!(wide.x > 1.0 - shift.abs() - 1e-6 && wide.y > 1.0 - 0.5 * shift.abs() - 1e-6, "{shift} {gap}: {found:?}");
+                assert!(
+                    wide.x > 1.0 - shift.abs() - 1e-6 && wide.y > 1.0 - 0.5 * shift.abs() - 1e-6,
+                    "{shift} {gap}: {found:?}"
+                );
                 assert!((4..=9).contains(&found.len()));
             }
         }
@@ -75,7 +81,10 @@ fn a_block_turned_on_another_touches_where_the_edges_cross() {
             // the octagon in which the two squares overlap has its corners at (½, ½·tan 22.5°) and the like
             for c in &found {
                 let (x, y) = (c.point.x.abs(), c.point.y.abs());
-                assert!((x.max(y) - 0.5).abs() < 1e-3 && (x.min(y) - 0.5 * (FRAC_PI_4 / 2.0).tan()).abs() < 1e-3, "{c:?}");
+                assert!(
+                    (x.max(y) - 0.5).abs() < 1e-3 && (x.min(y) - 0.5 * (FRAC_PI_4 / 2.0).tan()).abs() < 1e-3,
+                    "{c:?}"
+                );
                 assert!((c.normal - Vec3::z()).norm() < 1e-3 && (c.gap - gap).abs() < 1e-6, "{gap}: {c:?}");
             }
         }
@@ -124,10 +133,16 @@ fn a_thin_plate_is_not_seen_from_its_other_side() {
     let (plate, block) = (mesh_box(0.2, 0.2, 0.0005), mesh_box(0.5, 0.5, 0.5));
     for gap in [1e-4, 0.0, -1e-4] {
         let found = ask(&plate, &Pose::translation(0.0, 0.0, 0.5005 + gap), &block, &Pose::identity(), 5e-4);
-        assert!(found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z > 0.999), "{gap}: {found:?}");
+        assert!(
+            found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z > 0.999),
+            "{gap}: {found:?}"
+        );
         // the same from below, and a block that hangs from the plate's underside
         let found = ask(&block, &Pose::translation(0.0, 0.0, -0.5005 - gap), &plate, &Pose::identity(), 5e-4);
-        assert!(found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z < -0.999), "{gap}: {found:?}");
+        assert!(
+            found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z < -0.999),
+            "{gap}: {found:?}"
+        );
     }
 }
 
@@ -140,7 +155,10 @@ fn a_cylinder_on_a_block_touches_as_on_a_plane() {
             let standing = case % 3 == 0;
             let turn = match case % 3 {
                 0 => Quat::from_scaled_axis(Vec3::z() * rng.between(0.0, 6.0)),
-                1 => Quat::from_scaled_axis(Vec3::z() * rng.between(0.0, 6.0)) * Quat::from_scaled_axis(Vec3::x() * FRAC_PI_2),
+                1 => {
+                    Quat::from_scaled_axis(Vec3::z() * rng.between(0.0, 6.0))
+                        * Quat::from_scaled_axis(Vec3::x() * FRAC_PI_2)
+                }
                 _ => rng.pose(1.0).rotation,
             };
             let axis = turn * Vec3::z();
@@ -180,8 +198,12 @@ fn the_round_side_of_a_cylinder_beside_an_edge_is_not_lost() {
     // a pose that was found at random; 11.5239 mm are parry's distance of a prism of 720 sides, which is 1 µm short
     let half = Vec3::new(0.2, 0.3, 0.1) / (2.0 * 0.14_f64.sqrt());
     let (mesh, cylinder) = (mesh_box(half.x, half.y, half.z), Shape::cylinder(0.1, 0.15).unwrap());
-    let turn = nalgebra::Quaternion::new(0.846268223820806, -0.2642777604899751, -0.3376229903667359, 0.31622472236908467);
-    let pose = Pose::from_parts(Vec3::new(0.18382241907346522, -0.5465112021749865, 0.20248664782432102).into(), Quat::from_quaternion(turn));
+    let turn =
+        nalgebra::Quaternion::new(0.846268223820806, -0.2642777604899751, -0.3376229903667359, 0.31622472236908467);
+    let pose = Pose::from_parts(
+        Vec3::new(0.18382241907346522, -0.5465112021749865, 0.20248664782432102).into(),
+        Quat::from_quaternion(turn),
+    );
     let found = ask(&mesh, &pose, &cylinder, &Pose::identity(), 0.02);
     let least = found.iter().map(|c| c.gap).fold(9.0, f64::min);
     assert!((least - 0.011_523_9).abs() < 2e-6, "{found:?}");
@@ -275,7 +297,8 @@ fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
 fn dented_block() -> Shape {
     let mut mesh = TriMesh::box_(Vec3::repeat(1.0));
     let at = |mesh: &TriMesh, v: u32| mesh.vertices[v as usize];
-    let side: Vec<[u32; 3]> = mesh.triangles.iter().copied().filter(|t| t.iter().all(|&v| at(&mesh, v).y > 0.0)).collect();
+    let side: Vec<[u32; 3]> =
+        mesh.triangles.iter().copied().filter(|t| t.iter().all(|&v| at(&mesh, v).y > 0.0)).collect();
     mesh.triangles.retain(|t| !side.contains(t));
     let middle = mesh.vertices.len() as u32;
     mesh.vertices.push(Vec3::new(0.0, 0.99, 0.0));
@@ -293,7 +316,10 @@ fn convex_meshes_through_each_other_have_the_depth_of_the_least_translation() {
     for (rise, depth) in [(0.0, 1.4), (0.1, 1.3)] {
         let found = ask(&bar, &Pose::translation(0.0, 0.0, rise), &block, &Pose::identity(), 1e-3);
         let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
-        assert!((least + depth).abs() < 1e-9 && found.iter().all(|c| c.normal.z.abs() > 1.0 - 1e-9), "{least} but {depth}: {found:?}");
+        assert!(
+            (least + depth).abs() < 1e-9 && found.iter().all(|c| c.normal.z.abs() > 1.0 - 1e-9),
+            "{least} but {depth}: {found:?}"
+        );
         assert!(rise == 0.0 || found.iter().all(|c| c.normal.z > 0.0), "{found:?}");
         assert!(spread(&found).x > 1.9 && spread(&found).y > 1.3, "{found:?}");
     }

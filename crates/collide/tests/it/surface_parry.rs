@@ -46,7 +46,9 @@ fn solid(name: &'static str, mesh: TriMesh) -> Body {
         let steps = ((b - a).norm().max((c - a).norm()) / 0.05).ceil().clamp(2.0, 12.0) as u32;
         for i in 0..=steps {
             for j in 0..=steps - i {
-                samples.push(a + (b - a) * (f64::from(i) / f64::from(steps)) + (c - a) * (f64::from(j) / f64::from(steps)));
+                samples.push(
+                    a + (b - a) * (f64::from(i) / f64::from(steps)) + (c - a) * (f64::from(j) / f64::from(steps)),
+                );
             }
         }
     }
@@ -55,7 +57,8 @@ fn solid(name: &'static str, mesh: TriMesh) -> Body {
 }
 
 fn primitives() -> Vec<Body> {
-    let body = |name, ours, theirs: Box<dyn ParryShape>| Body { name, ours, theirs, distance: None, samples: Vec::new() };
+    let body =
+        |name, ours, theirs: Box<dyn ParryShape>| Body { name, ours, theirs, distance: None, samples: Vec::new() };
     // parry's cylinder is along y: a prism of many sides is as good
     let prism = TriMesh::cylinder(0.1, 0.15, 720);
     let prism = ConvexPolyhedron::from_convex_hull(&prism.vertices.iter().map(vector).collect::<Vec<_>>()).unwrap();
@@ -91,9 +94,13 @@ fn signed(body: &Body, p: &Vec3) -> f64 {
     let corner = |q: Vec3| q.sup(&Vec3::zeros()).norm() + q.max().min(0.0);
     match &body.ours {
         Shape::Sphere { radius } => p.norm() - radius,
-        Shape::Capsule { radius, half_length } => (p - Vec3::z() * p.z.clamp(-half_length, *half_length)).norm() - radius,
+        Shape::Capsule { radius, half_length } => {
+            (p - Vec3::z() * p.z.clamp(-half_length, *half_length)).norm() - radius
+        }
         Shape::Box { half_extents } => corner(p.abs() - half_extents),
-        Shape::Cylinder(c) => corner(Vec3::new(p.xy().norm() - c.radius(), p.z.abs() - c.half_length(), f64::NEG_INFINITY)),
+        Shape::Cylinder(c) => {
+            corner(Vec3::new(p.xy().norm() - c.radius(), p.z.abs() - c.half_length(), f64::NEG_INFINITY))
+        }
         _ => panic!("no formula"),
     }
 }
@@ -136,7 +143,9 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
 /// How far apart parry says that the two are, up to a bit more than the margin, and the line from its closest point of B to that of A.
 fn apart(a: &Body, pa: &Pose, b: &Body, pb: &Pose) -> (f64, Option<Vec3>) {
     match query::closest_points(&to_parry(pa), &*a.theirs, &to_parry(pb), &*b.theirs, 1.1 * MARGIN).unwrap() {
-        ClosestPoints::WithinMargin(x, y) => ((x - y).length(), Some(x - y).map(|l: Vector| Vec3::new(l.x, l.y, l.z).normalize())),
+        ClosestPoints::WithinMargin(x, y) => {
+            ((x - y).length(), Some(x - y).map(|l: Vector| Vec3::new(l.x, l.y, l.z).normalize()))
+        }
         ClosestPoints::Intersecting => (0.0, None),
         ClosestPoints::Disjoint => (f64::INFINITY, None),
     }
@@ -168,7 +177,8 @@ fn compare_by_halves(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut R
         let (mut touching, mut free) = (0.0, 1.5);
         for _ in 0..12 {
             let middle = 0.5 * (touching + free);
-            let meets = query::intersection_test(&to_parry(&place(middle)), &*a.theirs, &to_parry(&pb), &*b.theirs).unwrap();
+            let meets =
+                query::intersection_test(&to_parry(&place(middle)), &*a.theirs, &to_parry(&pb), &*b.theirs).unwrap();
             (touching, free) = if meets.intersecting { (middle, free) } else { (touching, middle) };
         }
         for n in 0..POSES.min(cases - way_number * POSES) {
@@ -249,7 +259,13 @@ fn judge(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bo
 fn closest_is_face((a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), distance: f64) -> bool {
     let (Shape::Mesh(x), Shape::Mesh(y), Some(field)) = (&a.ours, &b.ours, &b.distance) else { return true };
     let all = referee::closest(x.mesh(), pa, y.mesh(), pb, field, 1e-9);
-    assert!((all[0].distance - distance).abs() < 1e-9, "{} on {}: {} but parry says {distance}", a.name, b.name, all[0].distance);
+    assert!(
+        (all[0].distance - distance).abs() < 1e-9,
+        "{} on {}: {} but parry says {distance}",
+        a.name,
+        b.name,
+        all[0].distance
+    );
     all.iter().any(|c| c.kind == Kind::Face)
 }
 
@@ -355,9 +371,17 @@ fn meshes_on_a_half_space_are_exact() {
 fn an_edge_ends_at_its_corner() {
     let all = meshes();
     let [a, b] = ["wedge", "box mesh"].map(|name| all.iter().find(|b| b.name == name).unwrap());
-    let pose = |t: [f64; 3], q: [f64; 4]| Pose::from_parts(Vec3::from(t).into(), Quat::new_normalize(nalgebra::Quaternion::from_vector(q.into())));
-    let pa = pose([0.2069119298842264, 0.20855159641010135, -0.2993257480564795], [0.6342206306288174, 0.5419454537867789, 0.39955081511607654, 0.380024292571812]);
-    let pb = pose([0.02536194900253591, -0.19192266397821206, 0.19823866505207138], [0.09169844050522347, 0.38733862619982207, 0.036220080719898226, 0.9166505825095997]);
+    let pose = |t: [f64; 3], q: [f64; 4]| {
+        Pose::from_parts(Vec3::from(t).into(), Quat::new_normalize(nalgebra::Quaternion::from_vector(q.into())))
+    };
+    let pa = pose(
+        [0.2069119298842264, 0.20855159641010135, -0.2993257480564795],
+        [0.6342206306288174, 0.5419454537867789, 0.39955081511607654, 0.380024292571812],
+    );
+    let pb = pose(
+        [0.02536194900253591, -0.19192266397821206, 0.19823866505207138],
+        [0.09169844050522347, 0.38733862619982207, 0.036220080719898226, 0.9166505825095997],
+    );
     let (distance, _) = apart(a, &pa, b, &pb);
     let least = ask(&a.ours, &pa, &b.ours, &pb).iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
     assert!((least - distance).abs() < 1e-9, "{least} but {distance}");

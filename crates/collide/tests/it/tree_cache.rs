@@ -20,7 +20,8 @@ impl Folder {
     }
 
     fn files(&self) -> Vec<PathBuf> {
-        let mut files: Vec<PathBuf> = fs::read_dir(&self.0).map(|entries| entries.map(|e| e.unwrap().path()).collect()).unwrap_or_default();
+        let mut files: Vec<PathBuf> =
+            fs::read_dir(&self.0).map(|entries| entries.map(|e| e.unwrap().path()).collect()).unwrap_or_default();
         files.sort();
         files
     }
@@ -204,7 +205,14 @@ fn files_of_others_stay_whatever_their_names_end_in() {
     let kept = folder.files();
     let hex = "0123456789abcdef".repeat(4);
     let unfinished = folder.0.join(format!("{hex}.7.1.tmp"));
-    let others = ["oak.tree".to_owned(), "work.tmp".to_owned(), format!("{hex}.tree.tmp"), format!("{hex}0.tree"), format!("{hex}.x.1.tmp"), hex.clone()];
+    let others = [
+        "oak.tree".to_owned(),
+        "work.tmp".to_owned(),
+        format!("{hex}.tree.tmp"),
+        format!("{hex}0.tree"),
+        format!("{hex}.x.1.tmp"),
+        hex.clone(),
+    ];
     others.iter().for_each(|name| fs::write(folder.0.join(name), vec![0; 1000]).unwrap());
     fs::write(&unfinished, vec![0; 1000]).unwrap();
     std::thread::sleep(std::time::Duration::from_millis(20));

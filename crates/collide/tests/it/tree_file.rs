@@ -2,26 +2,49 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use tumble_collide::{LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree, TreeFile, TreeFileError, TreeSettings, TriMesh, Vec3};
+use tumble_collide::{
+    LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree, TreeFile, TreeFileError, TreeSettings, TriMesh, Vec3,
+};
 
 fn file(mesh: &TriMesh, depth: u32) -> TreeFile {
     // an error at which some leaves are above the last level
     let settings = TreeSettings { depth, error: 0.03, ..TreeSettings::octree() };
     let (tree, stages) = SphereTree::build_watched(mesh, &settings, &()).unwrap();
-    let few = QualitySettings { surface_samples: 500, sphere_samples: 500, volume_samples: 500, ..QualitySettings::default() };
-    TreeFile { name: "a \"ring\"\n".into(), mesh: MeshId::of(mesh), settings, stages, quality: tree.quality(mesh, &few), tree }
+    let few = QualitySettings {
+        surface_samples: 500,
+        sphere_samples: 500,
+        volume_samples: 500,
+        ..QualitySettings::default()
+    };
+    TreeFile {
+        name: "a \"ring\"\n".into(),
+        mesh: MeshId::of(mesh),
+        settings,
+        stages,
+        quality: tree.quality(mesh, &few),
+        tree,
+    }
 }
 
 #[test]
 fn a_tree_comes_back_with_the_same_bits() {
-    for (mesh, depth) in [(TriMesh::torus(1.0, 0.3, 48, 24), 6), (TriMesh::box_(Vec3::new(0.1, 1.0 / 3.0, 1e-4)), 5), (TriMesh::icosphere(1e-7, 2), 1)] {
+    for (mesh, depth) in [
+        (TriMesh::torus(1.0, 0.3, 48, 24), 6),
+        (TriMesh::box_(Vec3::new(0.1, 1.0 / 3.0, 1e-4)), 5),
+        (TriMesh::icosphere(1e-7, 2), 1),
+    ] {
         let file = file(&mesh, depth);
         let leaf_levels: Vec<u32> = file.tree.leaves().map(|l| l.level).collect();
         let text = file.to_json();
         let back = TreeFile::from_json(&text).unwrap();
         assert_eq!(back, file);
         assert_eq!(back.to_json(), text);
-        eprintln!("{} balls, leaves at levels {:?} to {:?}", file.tree.nodes().len(), leaf_levels.iter().min(), leaf_levels.iter().max());
+        eprintln!(
+            "{} balls, leaves at levels {:?} to {:?}",
+            file.tree.nodes().len(),
+            leaf_levels.iter().min(),
+            leaf_levels.iter().max()
+        );
     }
 }
 
@@ -48,7 +71,8 @@ const GOOD: &str = r#"{"format":"tumble sphere tree","version":1,"name":"","unit
 #[test]
 fn a_leaf_that_is_carried_down_is_one_ball() {
     let tree = TreeFile::from_json(GOOD).unwrap().tree;
-    let said: Vec<(f64, u32, u32, u32)> = tree.nodes().iter().map(|n| (n.center.x, n.level, n.first_child, n.children)).collect();
+    let said: Vec<(f64, u32, u32, u32)> =
+        tree.nodes().iter().map(|n| (n.center.x, n.level, n.first_child, n.children)).collect();
     assert_eq!(said, [(0.0, 0, 1, 2), (1.0, 1, 0, 0), (-1.0, 1, 3, 2), (-2.0, 2, 0, 0), (0.0, 2, 0, 0)]);
 }
 
@@ -63,19 +87,39 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
         ("\"r\":4", "\"r\":-4", "ball 0 of level 0: its radius `r` is -4; wanted 0 to 1e10 m"),
         ("\"r\":4", "\"r\":1e400", "number out of range"),
         ("\"r\":4", "\"r\":null", "invalid type: null"),
-        ("[-2,0,0]", "[-2e11,0,0]", "ball 1 of level 2: its centre has the coordinate -200000000000; wanted at most 1e10 m"),
+        (
+            "[-2,0,0]",
+            "[-2e11,0,0]",
+            "ball 1 of level 2: its centre has the coordinate -200000000000; wanted at most 1e10 m",
+        ),
         ("[-2,0,0]", "[-2,0]", "invalid length 2"),
         ("[-2,0,0]", "[-5,0,0]", "ball 1 of level 2: it sticks out of its parent, ball 1 of level 1, by 3e0 m"),
         ("\"r\":4,\"out\":1", "\"r\":4,\"out\":-1", "outward error `out` is -1"),
         ("\"parent\":-1", "\"parent\":0", "ball 0 of level 0: its parent is 0; the root has none"),
-        ("\"r\":3,\"out\":1,\"parent\":0", "\"r\":3,\"out\":1,\"parent\":1", "ball 1 of level 1: its parent is 1; wanted 0 to 0"),
+        (
+            "\"r\":3,\"out\":1,\"parent\":0",
+            "\"r\":3,\"out\":1,\"parent\":1",
+            "ball 1 of level 1: its parent is 1; wanted 0 to 0",
+        ),
         ("\"r\":3,\"out\":1,\"parent\":0", "\"r\":3,\"out\":1", "ball 1 of level 1: its parent is -1; wanted 0 to 0"),
-        ("[0,0,0],\"r\":2,\"out\":1,\"parent\":1", "[0,0,0],\"r\":2,\"out\":1,\"parent\":0", "its parent 0 comes after 1; balls stand in the order of their parents"),
+        (
+            "[0,0,0],\"r\":2,\"out\":1,\"parent\":1",
+            "[0,0,0],\"r\":2,\"out\":1,\"parent\":0",
+            "its parent 0 comes after 1; balls stand in the order of their parents",
+        ),
         ("\"levels\":[[", "\"levels\":[],\"other\":[[", "unknown field"),
         ("\"levels\":[[{", "\"levels\":[[],[{", "there are 0 balls in level 0; wanted 1, the root"),
-        ("],\n[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2", "],[],[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2", "there are 0 balls in level 2; wanted at least 1"),
+        (
+            "],\n[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2",
+            "],[],[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2",
+            "there are 0 balls in level 2; wanted at least 1",
+        ),
         ("]]}", "],[]]}", "there are 0 balls in level 3; wanted at least 1"),
-        ("\"quality\":[]", "\"quality\":[QUALITY]", "there are 1 rows of `quality`; wanted one for each of the 3 levels, or none"),
+        (
+            "\"quality\":[]",
+            "\"quality\":[QUALITY]",
+            "there are 1 rows of `quality`; wanted one for each of the 3 levels, or none",
+        ),
         ("\"diagonal\":1.0", "\"diagonal\":0", "`diagonal` of `mesh` is 0; wanted above 0"),
     ];
     for (from, to, said) in cases {
@@ -86,7 +130,14 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
     }
     let repeated = GOOD.replace("]]}", "],[{\"c\":[1,0,0],\"r\":1,\"out\":1,\"parent\":0}]]}");
     let error = TreeFile::from_json(&repeated).unwrap_err();
-    assert_eq!(error, TreeFileError::Ball { level: 3, ball: 0, what: "its parent repeats the ball above it, as only a leaf is".into() });
+    assert_eq!(
+        error,
+        TreeFileError::Ball {
+            level: 3,
+            ball: 0,
+            what: "its parent repeats the ball above it, as only a leaf is".into()
+        }
+    );
 }
 
 #[test]
@@ -126,7 +177,10 @@ fn ring() -> (TriMesh, Vec<Vec<LevelBall>>) {
     let balls = |count: usize, radius: f64, parents: Option<usize>| -> Vec<LevelBall> {
         let at = |n: usize| {
             let (sin, cos) = (std::f64::consts::TAU * n as f64 / count as f64).sin_cos();
-            LevelBall { parent: parents.map(|p| n * p / count), ..LevelBall::new(Vec3::new(cos, sin, 0.0) * parents.map_or(0.0, |_| 1.0), radius) }
+            LevelBall {
+                parent: parents.map(|p| n * p / count),
+                ..LevelBall::new(Vec3::new(cos, sin, 0.0) * parents.map_or(0.0, |_| 1.0), radius)
+            }
         };
         (0..count).map(at).collect()
     };
@@ -135,9 +189,7 @@ fn ring() -> (TriMesh, Vec<Vec<LevelBall>>) {
 
 /// The text of levels, for the measure in Python.
 fn levels_text(levels: &[Vec<LevelBall>]) -> String {
-    let ball = |b: &LevelBall| {
-        serde_json::json!({"c": [b.center.x, b.center.y, b.center.z], "r": b.radius, "parent": b.parent.map_or(-1, |p| p as i64)})
-    };
+    let ball = |b: &LevelBall| serde_json::json!({"c": [b.center.x, b.center.y, b.center.z], "r": b.radius, "parent": b.parent.map_or(-1, |p| p as i64)});
     let levels: Vec<Vec<_>> = levels.iter().map(|level| level.iter().map(ball).collect()).collect();
     serde_json::json!({"levels": levels}).to_string()
 }
@@ -152,14 +204,23 @@ fn measure_in_python(mesh: &TriMesh, tree: &str) -> Option<serde_json::Value> {
     let Some(script) = script else { return skipped("no sphere_quality.py; TUMBLE_SPHERE_QUALITY names it") };
     let there = Command::new(&python).args(["-c", "import numpy, scipy, trimesh, rtree"]).output();
     if !there.is_ok_and(|o| o.status.success()) {
-        return skipped("python (TUMBLE_PYTHON) has no numpy, scipy, trimesh and rtree; `make references` installs them");
+        return skipped(
+            "python (TUMBLE_PYTHON) has no numpy, scipy, trimesh and rtree; `make references` installs them",
+        );
     }
     let folder = std::env::temp_dir().join(format!("tumble-quality-{}-{}", std::process::id(), tree.len()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = |name: &str| folder.join(name);
     std::fs::write(path("mesh.obj"), obj(mesh)).unwrap();
     std::fs::write(path("tree.json"), tree).unwrap();
-    let said = Command::new(&python).arg(script).arg("eval").args([path("mesh.obj"), path("tree.json")]).arg("--json").arg(path("said.json")).output().unwrap();
+    let said = Command::new(&python)
+        .arg(script)
+        .arg("eval")
+        .args([path("mesh.obj"), path("tree.json")])
+        .arg("--json")
+        .arg(path("said.json"))
+        .output()
+        .unwrap();
     assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
     let answer = serde_json::from_str(&std::fs::read_to_string(path("said.json")).unwrap()).unwrap();
     std::fs::remove_dir_all(folder).unwrap();
@@ -202,21 +263,57 @@ fn assert_agreement(ours: &[LevelQuality], its: &[Said]) {
     assert_eq!(ours.len(), its.len());
     for (ours, its) in ours.iter().zip(its) {
         for ((key, figure, tolerance), its) in KEYS.iter().zip(its) {
-            assert!((figure(ours) - its).abs() <= *tolerance, "level {}: {key} is {} here and {its} there", ours.level, figure(ours));
+            assert!(
+                (figure(ours) - its).abs() <= *tolerance,
+                "level {}: {key} is {} here and {its} there",
+                ours.level,
+                figure(ours)
+            );
         }
     }
 }
 
 fn said(answer: &serde_json::Value) -> Vec<Said> {
-    answer["levels"].as_array().unwrap().iter().map(|level| KEYS.map(|(key, ..)| level[key].as_f64().unwrap_or(0.0))).collect()
+    answer["levels"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|level| KEYS.map(|(key, ..)| level[key].as_f64().unwrap_or(0.0)))
+        .collect()
 }
 
 /// What `tools/sphere_quality.py` said of [`ring`] with numpy 2.4, scipy 1.17, trimesh 5.2 and rtree 1.4. The next test prints it anew:
 /// `TUMBLE_PYTHON=target/python/bin/python cargo test --release -p tumble-collide --test it figures_agree -- --nocapture`.
 const RING: [Said; 3] = [
     [1.0, 0.0, 1.0, 0.0, 0.379274048, 0.13714331, 0.379274048, 0.379274048, 6.85171579, 5.85151487, 0.0, 0.0],
-    [1.0, 0.0, 1.0, 0.0, 0.0838871694, 0.0690927105, 0.0838871694, 0.0838855224, 3.56816801, 2.56825591, 0.0, 0.0536828127],
-    [0.66265, 0.0120711016, 0.388888889, 0.00403356617, 0.0109505371, 0.00342230214, 0.0109505371, 0.00983196055, 1.04880897, 0.0910463908, 0.0425505419, 0.0295740344],
+    [
+        1.0,
+        0.0,
+        1.0,
+        0.0,
+        0.0838871694,
+        0.0690927105,
+        0.0838871694,
+        0.0838855224,
+        3.56816801,
+        2.56825591,
+        0.0,
+        0.0536828127,
+    ],
+    [
+        0.66265,
+        0.0120711016,
+        0.388888889,
+        0.00403356617,
+        0.0109505371,
+        0.00342230214,
+        0.0109505371,
+        0.00983196055,
+        1.04880897,
+        0.0910463908,
+        0.0425505419,
+        0.0295740344,
+    ],
 ];
 
 #[test]

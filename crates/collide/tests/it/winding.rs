@@ -54,14 +54,27 @@ fn winding_by_ray(mesh: &TriMesh, p: &Vec3, along: &Vec3) -> i32 {
 #[test]
 fn winding_number_is_the_sum_of_solid_angles_and_counts_what_a_ray_counts() {
     let mut rng = Rng::new(41);
-    let names = ["bunny", "spot", "cow", "fandisk", "fertility", "torus", "wingnut", "hand", "panda_link5", "fetch_gripper", "armadillo"];
+    let names = [
+        "bunny",
+        "spot",
+        "cow",
+        "fandisk",
+        "fertility",
+        "torus",
+        "wingnut",
+        "hand",
+        "panda_link5",
+        "fetch_gripper",
+        "armadillo",
+    ];
     for name in names {
         let Some(obj) = text(&format!("{name}.obj")) else { return };
         let mesh = TriMesh::from_obj(&obj).unwrap();
         let winding = WindingNumber::new(&mesh);
         let bounds = mesh.aabb();
         for n in 0..1000 {
-            let p = bounds.min + (bounds.max - bounds.min).component_mul(&Vec3::from_fn(|_, _| rng.between(-0.05, 1.05)));
+            let p =
+                bounds.min + (bounds.max - bounds.min).component_mul(&Vec3::from_fn(|_, _| rng.between(-0.05, 1.05)));
             let ray = winding_by_ray(&mesh, &p, &rng.direction());
             near(winding.at(&p), f64::from(ray), 0.1, name);
             if n < 20 {
@@ -146,8 +159,11 @@ fn depth_in_union(p: &Vec3, half: &Vec3, shift: &Vec3) -> f64 {
                 let [v0, v1] = range(&own, v);
                 let [a0, a1] = range(&other, u).map(|x| x.clamp(u0, u1));
                 let [b0, b1] = range(&other, v).map(|x| x.clamp(v0, v1));
-                let rectangles =
-                    if cut { vec![[u0, a0, v0, v1], [a1, u1, v0, v1], [u0, u1, v0, b0], [u0, u1, b1, v1]] } else { vec![[u0, u1, v0, v1]] };
+                let rectangles = if cut {
+                    vec![[u0, a0, v0, v1], [a1, u1, v0, v1], [u0, u1, v0, b0], [u0, u1, b1, v1]]
+                } else {
+                    vec![[u0, u1, v0, v1]]
+                };
                 for [x0, x1, y0, y1] in rectangles.into_iter().filter(|r| r[0] < r[1] && r[2] < r[3]) {
                     let d = Vec3::new(p[k] - height, p[u] - p[u].clamp(x0, x1), p[v] - p[v].clamp(y0, y1));
                     least = least.min(d.norm());
@@ -205,7 +221,12 @@ fn folded_face_counts_what_it_bounds() {
     let winding = WindingNumber::new(&joined);
     for _ in 0..2000 {
         let p = rng.vec(1.5);
-        assert_eq!(distance.closest(&p).signed_distance < 0.0, winding_by_ray(&joined, &p, &rng.direction()) >= 1, "{p:?} {}", winding.exact(&p));
+        assert_eq!(
+            distance.closest(&p).signed_distance < 0.0,
+            winding_by_ray(&joined, &p, &rng.direction()) >= 1,
+            "{p:?} {}",
+            winding.exact(&p)
+        );
     }
 }
 
@@ -271,7 +292,12 @@ fn crossing_public_meshes_have_the_sign_of_their_union() {
         let mut mesh = TriMesh::from_obj(&obj).unwrap();
         let raw = mesh.signed_volume();
         let report = mesh.check_closed().unwrap();
-        eprintln!("{name}: {} crossing faces, {:.9} m³ of {raw:.9}, {:?}", report.crossing_faces, report.volume, report.notes());
+        eprintln!(
+            "{name}: {} crossing faces, {:.9} m³ of {raw:.9}, {:?}",
+            report.crossing_faces,
+            report.volume,
+            report.notes()
+        );
         assert_eq!(report.doubtful, 0.0, "{name}");
         let distance = MeshDistance::new(&mesh);
         let winding = WindingNumber::new(&mesh);

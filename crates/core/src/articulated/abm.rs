@@ -97,7 +97,8 @@ impl<T: Scalar> Sweep<T> {
     pub fn new(compiled: &Compiled, zero: T) -> Sweep<T> {
         let (none, one) = (Vector::splat(zero), zero.constant(1.0));
         let (still, no_force) = (Motion::new(none, none), Force::new(none, none));
-        let unit = Matrix::new(Vector::new(one, zero, zero), Vector::new(zero, one, zero), Vector::new(zero, zero, one));
+        let unit =
+            Matrix::new(Vector::new(one, zero, zero), Vector::new(zero, one, zero), Vector::new(zero, zero, one));
         let nothing = Symmetric::scaled_identity(zero);
         let inertia = ArticulatedInertia { rotational: nothing, coupling: [none; 3], mass: nothing };
         let world = Slot {

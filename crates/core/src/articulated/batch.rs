@@ -5,9 +5,9 @@
 
 use super::abm::{Input, Sweep};
 use super::compiled::Compiled;
-use super::lanes::{Lanes, Register};
 #[cfg(target_arch = "x86_64")]
 use super::lanes::{Eight, Four};
+use super::lanes::{Lanes, Register};
 use super::model::Model;
 use tumble_collide::Vec3;
 
@@ -44,7 +44,14 @@ impl<const N: usize> BatchDynamics<N> {
 
     /// `q̈` of every lane from its `q`, `v` and joint forces `tau` (lengths `positions` and `dof` of the model, one state per lane), in uniform gravity,
     /// m/s². Where a joint is singular its axis is held still, as [`Dynamics::singular`](super::Dynamics::singular) says.
-    pub fn forward_dynamics(&mut self, gravity: &Vec3, q: &[Lanes<N>], v: &[Lanes<N>], tau: &[Lanes<N>], qdd: &mut [Lanes<N>]) {
+    pub fn forward_dynamics(
+        &mut self,
+        gravity: &Vec3,
+        q: &[Lanes<N>],
+        v: &[Lanes<N>],
+        tau: &[Lanes<N>],
+        qdd: &mut [Lanes<N>],
+    ) {
         let call = Call { compiled: &self.compiled, gravity, q, v, tau, qdd };
         match &mut self.way {
             Way::One(sweep) => call.run((), sweep),
@@ -88,7 +95,9 @@ impl<const N: usize> Call<'_, N> {
     fn run<T: Register>(self, token: T::Token, sweep: &mut Sweep<T>) {
         let Call { compiled, gravity, q, v, tau, qdd } = self;
         for first in (0..N).step_by(T::LANES) {
-            sweep.run(compiled, gravity, &Rows::<T, N> { token, first, q, v, tau }, |k, x| x.store(&mut qdd[k].0[first..]));
+            sweep.run(compiled, gravity, &Rows::<T, N> { token, first, q, v, tau }, |k, x| {
+                x.store(&mut qdd[k].0[first..])
+            });
         }
     }
 }

@@ -42,7 +42,9 @@ pub enum ArticulatedError {
         wanted: &'static str,
     },
     /// A coupling between freedoms that cannot be.
-    #[error("articulated body '{body}': a coupling of freedom {freedom} to {of}; both must be different revolute or prismatic freedoms below {dof}, ratio and offset finite")]
+    #[error(
+        "articulated body '{body}': a coupling of freedom {freedom} to {of}; both must be different revolute or prismatic freedoms below {dof}, ratio and offset finite"
+    )]
     Coupling {
         /// Body.
         body: String,
@@ -85,7 +87,14 @@ pub struct Collider {
 impl Collider {
     /// A shape with the usual surface that meets everything.
     pub fn new(shape: Shape, pose: Pose) -> Collider {
-        Collider { pose, shape, material: Material::default(), contact_mode: ContactMode::default(), kind: CollisionKind::default(), meets: u64::MAX }
+        Collider {
+            pose,
+            shape,
+            material: Material::default(),
+            contact_mode: ContactMode::default(),
+            kind: CollisionKind::default(),
+            meets: u64::MAX,
+        }
     }
 }
 
@@ -158,10 +167,20 @@ impl Working {
 impl Clone for ArticulatedBody {
     fn clone(&self) -> ArticulatedBody {
         ArticulatedBody {
-            name: self.name.clone(), model: self.model.clone(), base: self.base, colliders: self.colliders.clone(), visuals: self.visuals.clone(),
-            cameras: self.cameras.clone(), lights: self.lights.clone(),
-            freedoms: self.freedoms.clone(), couplings: self.couplings.clone(), self_collision: self.self_collision, apart: self.apart.clone(),
-            start: self.start.clone(), dynamics: self.dynamics.clone(), working: Mutex::new(self.working().clone()),
+            name: self.name.clone(),
+            model: self.model.clone(),
+            base: self.base,
+            colliders: self.colliders.clone(),
+            visuals: self.visuals.clone(),
+            cameras: self.cameras.clone(),
+            lights: self.lights.clone(),
+            freedoms: self.freedoms.clone(),
+            couplings: self.couplings.clone(),
+            self_collision: self.self_collision,
+            apart: self.apart.clone(),
+            start: self.start.clone(),
+            dynamics: self.dynamics.clone(),
+            working: Mutex::new(self.working().clone()),
         }
     }
 }
@@ -176,13 +195,29 @@ impl ArticulatedBody {
             write_pose(&mut start[link.q..link.q + 7], &link.placement);
         }
         let working = Working {
-            scratch: dynamics.scratch(), elsewhere: dynamics.clone(), kinematics: Kinematics::new(&model), zeros: vec![0.0; model.dof()], wrenches: vec![Default::default(); model.links().len()],
+            scratch: dynamics.scratch(),
+            elsewhere: dynamics.clone(),
+            kinematics: Kinematics::new(&model),
+            zeros: vec![0.0; model.dof()],
+            wrenches: vec![Default::default(); model.links().len()],
             accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],
         };
         let freedoms = vec![Freedom::default(); model.dof()];
         let mut body = ArticulatedBody {
-            name: name.into(), model, base: Pose::identity(), colliders: Vec::new(), visuals: Vec::new(), cameras: Vec::new(), lights: Vec::new(), freedoms, couplings: Vec::new(),
-            self_collision: true, apart: Vec::new(), start, dynamics, working: Mutex::new(working),
+            name: name.into(),
+            model,
+            base: Pose::identity(),
+            colliders: Vec::new(),
+            visuals: Vec::new(),
+            cameras: Vec::new(),
+            lights: Vec::new(),
+            freedoms,
+            couplings: Vec::new(),
+            self_collision: true,
+            apart: Vec::new(),
+            start,
+            dynamics,
+            working: Mutex::new(working),
         };
         body.refresh_dynamics(&body.start.clone());
         body
@@ -287,7 +322,13 @@ impl ArticulatedBody {
             return Err(self.no_link(&format!("of freedom {index}")));
         };
         if let Some((what, value, wanted)) = freedom.fault(link.joint.dof() == 1) {
-            return Err(ArticulatedError::Range { body: self.name.clone(), link: link.name.clone(), what, value, wanted });
+            return Err(ArticulatedError::Range {
+                body: self.name.clone(),
+                link: link.name.clone(),
+                what,
+                value,
+                wanted,
+            });
         }
         self.freedoms[index] = freedom;
         Ok(())
@@ -296,7 +337,10 @@ impl ArticulatedBody {
     /// Makes one freedom follow another.
     pub fn couple(&mut self, coupling: Coupling) -> Result<(), ArticulatedError> {
         let Coupling { freedom, of, multiplier, offset } = coupling;
-        let fine = freedom != of && [freedom, of].iter().all(|&i| self.position_of(i).is_some()) && multiplier.is_finite() && offset.is_finite();
+        let fine = freedom != of
+            && [freedom, of].iter().all(|&i| self.position_of(i).is_some())
+            && multiplier.is_finite()
+            && offset.is_finite();
         if !fine {
             return Err(ArticulatedError::Coupling { body: self.name.clone(), freedom, of, dof: self.model.dof() });
         }

@@ -64,7 +64,12 @@ pub(super) struct Compiled {
 
 impl Compiled {
     pub fn new(model: &Model) -> Compiled {
-        let mut compiled = Compiled { bodies: Vec::with_capacity(model.links().len()), blocks: 0, positions: model.positions(), dof: model.dof() };
+        let mut compiled = Compiled {
+            bodies: Vec::with_capacity(model.links().len()),
+            blocks: 0,
+            positions: model.positions(),
+            dof: model.dof(),
+        };
         for link in model.links() {
             let outer = link.parent.map_or(Mat3::identity(), |p| compiled.bodies[p].own);
             let kind = compiled.kind(&link.joint);

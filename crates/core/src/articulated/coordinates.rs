@@ -54,7 +54,8 @@ pub fn normalize(model: &Model, q: &mut [f64]) {
     for link in model.links() {
         if let Some(k) = link.joint.quaternion() {
             let turn = &mut q[link.q + k..link.q + k + 4];
-            let unit = Unit::try_new(Quaternion::new(turn[3], turn[0], turn[1], turn[2]), 0.0).unwrap_or_else(Quat::identity);
+            let unit =
+                Unit::try_new(Quaternion::new(turn[3], turn[0], turn[1], turn[2]), 0.0).unwrap_or_else(Quat::identity);
             write_rotation(&unit, turn);
         }
     }

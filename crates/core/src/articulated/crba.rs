@@ -33,7 +33,12 @@ struct Composite {
 impl MassMatrix {
     /// Room for `model`.
     pub fn new(model: &Model) -> MassMatrix {
-        MassMatrix { composites: vec![Composite { mass: 0.0, moment: Vec3::zeros(), inertia: Mat3::zeros() }; model.links().len()] }
+        MassMatrix {
+            composites: vec![
+                Composite { mass: 0.0, moment: Vec3::zeros(), inertia: Mat3::zeros() };
+                model.links().len()
+            ],
+        }
     }
 
     /// Writes `M` at the refreshed position: dof×dof numbers by rows, symmetric to the bit.

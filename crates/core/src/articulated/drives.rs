@@ -134,7 +134,10 @@ impl RowMaker<'_, '_> {
         let (down, up) = match self.level.step() {
             // the view is that of the middle of the step
             Some(h) => ((lo - (p.q - 0.5 * h * p.v)) / h, (hi - (p.q - 0.5 * h * p.v)) / h),
-            None => (if p.q - lo > AT_LIMIT { f64::NEG_INFINITY } else { 0.0 }, if hi - p.q > AT_LIMIT { f64::INFINITY } else { 0.0 }),
+            None => (
+                if p.q - lo > AT_LIMIT { f64::NEG_INFINITY } else { 0.0 },
+                if hi - p.q > AT_LIMIT { f64::INFINITY } else { 0.0 },
+            ),
         };
         target.max(down.min(0.0)).min(up.max(0.0))
     }
@@ -149,11 +152,17 @@ impl RowMaker<'_, '_> {
                 let (q, gain) = (p.q - 0.5 * h * p.v, damping + h * stiffness);
                 let aim = (stiffness * (target - q) + damping * velocity) / gain;
                 let set = if hard(*limit) { RowSet::Equality } else { self.bounded(*limit) };
-                self.row(RowTarget { velocity: aim, compliance: 1.0 / (h * gain), ..RowTarget::new(set, 0.0) }, &[(p.index, 1.0)]);
+                self.row(
+                    RowTarget { velocity: aim, compliance: 1.0 / (h * gain), ..RowTarget::new(set, 0.0) },
+                    &[(p.index, 1.0)],
+                );
             }
             Drive::Velocity { target, limit } => {
                 let set = if hard(*limit) { RowSet::Equality } else { self.bounded(*limit) };
-                self.row(RowTarget { velocity: self.within_limits(p, *target), ..RowTarget::new(set, 0.0) }, &[(p.index, 1.0)]);
+                self.row(
+                    RowTarget { velocity: self.within_limits(p, *target), ..RowTarget::new(set, 0.0) },
+                    &[(p.index, 1.0)],
+                );
             }
             Drive::Playback { motion, limit } if hard(*limit) => {
                 let (position, velocity) = motion.at(time);

@@ -54,7 +54,13 @@ impl Dynamics {
     pub fn new(model: &Model) -> Dynamics {
         let compiled = Compiled::new(model);
         let sweep = Sweep::new(&compiled, 0.0);
-        Dynamics { roots: vec![[0.0; 2]; compiled.bodies.len() + 1], sines: Sines::new(&compiled), compiled, sweep, singular: None }
+        Dynamics {
+            roots: vec![[0.0; 2]; compiled.bodies.len() + 1],
+            sines: Sines::new(&compiled),
+            compiled,
+            sweep,
+            singular: None,
+        }
     }
 
     /// Moving links.
@@ -75,7 +81,11 @@ impl Dynamics {
     /// Working memory for the maps.
     pub fn scratch(&self) -> Scratch {
         let slots = self.sweep.slots.len();
-        Scratch { motions: vec![Motion::default(); slots], forces: vec![Force::default(); slots], efforts: vec![Force::default(); slots] }
+        Scratch {
+            motions: vec![Motion::default(); slots],
+            forces: vec![Force::default(); slots],
+            efforts: vec![Force::default(); slots],
+        }
     }
 
     /// Takes a new state. Quaternions in `q` may have any length above 0.
@@ -161,7 +171,8 @@ impl Dynamics {
     pub fn link_accelerations(&self, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
         let slots = &self.sweep.slots;
         for (i, body) in self.compiled.bodies.iter().enumerate() {
-            let parent = body.parent.checked_sub(1).map_or(Motion::default(), |p| Motion::new(out[p].0.into(), out[p].1.into()));
+            let parent =
+                body.parent.checked_sub(1).map_or(Motion::default(), |p| Motion::new(out[p].0.into(), out[p].1.into()));
             let a = carried(body, &slots[i + 1], parent, qdd);
             out[i] = (a.angular.into(), a.linear.into());
         }

@@ -31,7 +31,8 @@ pub fn momentum(model: &Model, kin: &Kinematics) -> Momentum {
         let m = link.mass.mass;
         let linear = m * (own.linear + own.angular.cross(&own.center));
         sum.linear += linear;
-        sum.angular += own.inertia * own.angular + m * own.center.cross(&own.linear) + own.pose.translation.vector.cross(&linear);
+        sum.angular +=
+            own.inertia * own.angular + m * own.center.cross(&own.linear) + own.pose.translation.vector.cross(&linear);
     }
     sum
 }
@@ -39,6 +40,7 @@ pub fn momentum(model: &Model, kin: &Kinematics) -> Momentum {
 /// Centre of all mass: position, metres, and velocity, m/s, in the world. `None` for a model without mass (inertia alone).
 pub fn center_of_mass(model: &Model, kin: &Kinematics) -> Option<(Vec3, Vec3)> {
     let mass = model.mass();
-    let moment: Vec3 = model.links().iter().zip(kin.links()).map(|(l, k)| l.mass.mass * (k.pose.translation.vector + k.center)).sum();
+    let moment: Vec3 =
+        model.links().iter().zip(kin.links()).map(|(l, k)| l.mass.mass * (k.pose.translation.vector + k.center)).sum();
     (mass > 0.0).then(|| (moment / mass, momentum(model, kin).linear / mass))
 }

@@ -97,11 +97,18 @@ pub struct Coupling {
 impl Freedom {
     /// What is out of its range, if anything: which constant, its value, what would be right.
     pub(super) fn fault(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
-        let least = |what, value: f64| (!(value.is_finite() && value >= 0.0)).then_some((what, value, "finite and at least 0"));
+        let least =
+            |what, value: f64| (!(value.is_finite() && value >= 0.0)).then_some((what, value, "finite and at least 0"));
         let finite = |what, value: f64| (!value.is_finite()).then_some((what, value, "finite"));
-        let limit = |value: f64| (value.is_nan() || value < 0.0).then_some(("the drive's limit", value, "at least 0; infinite for none"));
+        let limit = |value: f64| {
+            (value.is_nan() || value < 0.0).then_some(("the drive's limit", value, "at least 0; infinite for none"))
+        };
         if !positional && (self.limits.is_some() || self.spring.is_some() || self.drive != Drive::None) {
-            return Some(("the number of its joint's freedoms that have limits, springs or drives", 1.0, "0: only revolute and prismatic joints have them"));
+            return Some((
+                "the number of its joint's freedoms that have limits, springs or drives",
+                1.0,
+                "0: only revolute and prismatic joints have them",
+            ));
         }
         let [lo, hi] = self.limits.unwrap_or([-1.0, 1.0]);
         if lo.is_nan() || hi.is_nan() || lo > hi {
@@ -109,15 +116,23 @@ impl Freedom {
         }
         let spring = self.spring.unwrap_or(Spring { stiffness: 0.0, rest: 0.0 });
         let own = least("damping", self.damping).or(least("friction", self.friction));
-        let own = own.or(least("the spring's stiffness", spring.stiffness)).or(finite("the spring's rest position", spring.rest));
+        let own = own
+            .or(least("the spring's stiffness", spring.stiffness))
+            .or(finite("the spring's rest position", spring.rest));
         own.or(match &self.drive {
             Drive::None => None,
-            Drive::Position { stiffness, damping, target, velocity, limit: most } => least("the drive's stiffness", *stiffness)
-                .or(least("the drive's damping", *damping))
-                .or(finite("the drive's target", *target))
-                .or(finite("the drive's velocity", *velocity))
-                .or(limit(*most))
-                .or((stiffness + damping <= 0.0).then_some(("the sum of the drive's stiffness and damping", 0.0, "above 0"))),
+            Drive::Position { stiffness, damping, target, velocity, limit: most } => {
+                least("the drive's stiffness", *stiffness)
+                    .or(least("the drive's damping", *damping))
+                    .or(finite("the drive's target", *target))
+                    .or(finite("the drive's velocity", *velocity))
+                    .or(limit(*most))
+                    .or((stiffness + damping <= 0.0).then_some((
+                        "the sum of the drive's stiffness and damping",
+                        0.0,
+                        "above 0",
+                    )))
+            }
             Drive::Velocity { target, limit: most } => finite("the drive's target", *target).or(limit(*most)),
             Drive::Playback { limit: most, .. } => limit(*most),
         })

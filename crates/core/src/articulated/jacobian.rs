@@ -43,7 +43,10 @@ fn columns_at(model: &Model, kin: &Kinematics, link: usize, point: &Vec3, mut vi
         let (link, origin) = (&model.links()[i], kin.links()[i].pose.translation.vector);
         for k in link.v..link.v + link.joint.dof() {
             let column = kin.columns()[k];
-            visit(k, Rates { angular: column.angular, linear: column.linear + column.angular.cross(&(point - origin)) });
+            visit(
+                k,
+                Rates { angular: column.angular, linear: column.linear + column.angular.cross(&(point - origin)) },
+            );
         }
         at = link.parent;
     }

@@ -82,7 +82,11 @@ impl Kinematics {
             inertia: Mat3::zeros(),
         };
         let count = model.links().len();
-        let mut made = Kinematics { links: vec![still; count], columns: vec![Rates::zero(); model.dof()], joint_rates: vec![Rates::zero(); count] };
+        let mut made = Kinematics {
+            links: vec![still; count],
+            columns: vec![Rates::zero(); model.dof()],
+            joint_rates: vec![Rates::zero(); count],
+        };
         let mut zero = vec![0.0; model.positions()];
         model.write_zero(&mut zero);
         made.refresh(model, &zero, &vec![0.0; model.dof()]);
@@ -133,7 +137,9 @@ impl Kinematics {
             if let Some(parent) = link.parent {
                 let (turn, from) = (self.links[parent].angular, out[parent]);
                 a.angular = from.angular + turn.cross(&moves.angular);
-                a.linear = from.linear + from.angular.cross(&own.arm) + turn.cross(&(turn.cross(&own.arm) + 2.0 * moves.linear));
+                a.linear = from.linear
+                    + from.angular.cross(&own.arm)
+                    + turn.cross(&(turn.cross(&own.arm) + 2.0 * moves.linear));
             }
             if !qdd.is_empty() {
                 a.add(&self.along(link, qdd), 1.0);

@@ -166,11 +166,37 @@ macro_rules! register {
 
 #[cfg(target_arch = "x86_64")]
 register!(
-    "Four lanes of AVX2.", Four, pulp::x86::V3, f64x4, 4, 32,
-    splat_f64x4, add_f64x4, sub_f64x4, mul_f64x4, div_f64x4, sqrt_f64x4, xor_f64x4, cmp_gt_f64x4, select_f64x4
+    "Four lanes of AVX2.",
+    Four,
+    pulp::x86::V3,
+    f64x4,
+    4,
+    32,
+    splat_f64x4,
+    add_f64x4,
+    sub_f64x4,
+    mul_f64x4,
+    div_f64x4,
+    sqrt_f64x4,
+    xor_f64x4,
+    cmp_gt_f64x4,
+    select_f64x4
 );
 #[cfg(target_arch = "x86_64")]
 register!(
-    "Eight lanes of AVX-512.", Eight, pulp::x86::V4, f64x8, 8, 64,
-    splat_f64x8, add_f64x8, sub_f64x8, mul_f64x8, div_f64x8, sqrt_f64x8, xor_f64x8, cmp_gt_f64x8, select_f64x8
+    "Eight lanes of AVX-512.",
+    Eight,
+    pulp::x86::V4,
+    f64x8,
+    8,
+    64,
+    splat_f64x8,
+    add_f64x8,
+    sub_f64x8,
+    mul_f64x8,
+    div_f64x8,
+    sqrt_f64x8,
+    xor_f64x8,
+    cmp_gt_f64x8,
+    select_f64x8
 );

@@ -58,7 +58,9 @@ pub enum ModelError {
         wanted: &'static str,
     },
     /// Nothing that a joint moves has any inertia along it.
-    #[error("link '{0}' and all that hangs on it have no inertia about its joint, so no force could move it as asked: give it or a link below it mass")]
+    #[error(
+        "link '{0}' and all that hangs on it have no inertia about its joint, so no force could move it as asked: give it or a link below it mass"
+    )]
     Massless(String),
 }
 
@@ -86,7 +88,8 @@ impl LinkMass {
 
     /// The inertia about the link's origin: `I + m(|c|²·1 − c·cᵀ)`.
     pub fn about_origin(&self) -> Mat3 {
-        self.inertia + self.mass * (self.center.norm_squared() * Mat3::identity() - self.center * self.center.transpose())
+        self.inertia
+            + self.mass * (self.center.norm_squared() * Mat3::identity() - self.center * self.center.transpose())
     }
 
     /// The two held together, `other` in the same frame.
@@ -103,7 +106,11 @@ impl LinkMass {
     /// The same mass seen from the frame in which this one's frame has pose `pose`.
     pub fn seen_from(&self, pose: &Pose) -> LinkMass {
         let r = pose.rotation.to_rotation_matrix().into_inner();
-        LinkMass { mass: self.mass, center: pose.transform_point(&self.center.into()).coords, inertia: r * self.inertia * r.transpose() }
+        LinkMass {
+            mass: self.mass,
+            center: pose.transform_point(&self.center.into()).coords,
+            inertia: r * self.inertia * r.transpose(),
+        }
     }
 
     fn validate(&self, link: &str) -> Result<(), ModelError> {
@@ -257,7 +264,14 @@ impl ModelBuilder {
 
     /// Adds a link and returns its number, for its children to name as their parent. `placement` is the joint's frame in the parent link's frame; where the joint is
     /// at zero it is also the link's own. Nothing is checked before [`build`](Self::build).
-    pub fn link(&mut self, name: impl Into<String>, parent: Option<usize>, joint: Joint, placement: Pose, mass: LinkMass) -> usize {
+    pub fn link(
+        &mut self,
+        name: impl Into<String>,
+        parent: Option<usize>,
+        joint: Joint,
+        placement: Pose,
+        mass: LinkMass,
+    ) -> usize {
         self.added.push(Added { name: name.into(), parent, joint, placement, mass });
         self.added.len() - 1
     }
@@ -320,7 +334,8 @@ impl Model {
 
     /// Whether something of mass hangs on every joint: what is below it must have mass, or inertia of its own.
     fn check_masses(&self) -> Result<(), ModelError> {
-        let mut heavy: Vec<bool> = self.links.iter().map(|l| l.mass.mass > 0.0 || l.mass.inertia.amax() > 0.0).collect();
+        let mut heavy: Vec<bool> =
+            self.links.iter().map(|l| l.mass.mass > 0.0 || l.mass.inertia.amax() > 0.0).collect();
         for i in (0..self.links.len()).rev() {
             if !heavy[i] {
                 return Err(ModelError::Massless(self.links[i].name.clone()));
@@ -337,7 +352,11 @@ fn unit_axis(joint: Joint, link: &str) -> Result<Joint, ModelError> {
     let unit = |axis: Vec3| {
         let norm = axis.norm();
         let fine = norm.is_finite() && norm > 1e-12;
-        if fine { Ok(axis / norm) } else { Err(ModelError::Axis { link: link.to_string(), axis: [axis.x, axis.y, axis.z] }) }
+        if fine {
+            Ok(axis / norm)
+        } else {
+            Err(ModelError::Axis { link: link.to_string(), axis: [axis.x, axis.y, axis.z] })
+        }
     };
     Ok(match joint {
         Joint::Revolute { axis } => Joint::Revolute { axis: unit(axis)? },

@@ -8,9 +8,9 @@ use super::joint::Joint;
 use crate::collidable::{Collidable, CollisionKind, Material};
 use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
-use crate::site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
 use crate::rigid::vec3;
 use crate::rotation;
+use crate::site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
 use crate::sync;
 use crate::view::WorldView;
 use tumble_collide::{ContactMode, Pose, Shape, Vec3};
@@ -32,7 +32,8 @@ impl Object for ArticulatedBody {
         self.dynamics.link_accelerations(&working.zeros, &mut working.accelerations);
         for (i, site) in moving.iter_mut().enumerate() {
             let (angular_velocity, velocity) = self.dynamics.link_velocity(i);
-            (site.pose, site.angular_velocity, site.velocity) = (self.dynamics.link_pose(i), angular_velocity, velocity);
+            (site.pose, site.angular_velocity, site.velocity) =
+                (self.dynamics.link_pose(i), angular_velocity, velocity);
             (site.bias_angular_acceleration, site.bias_acceleration) = working.accelerations[i];
         }
         rest[0] = Site { pose: *self.base(), ..Site::default() };
@@ -43,7 +44,9 @@ impl Object for ArticulatedBody {
             let arm = point - carrier.position();
             (site.angular_velocity, site.velocity) = (spin, carrier.velocity_at(&point));
             site.bias_angular_acceleration = carrier.bias_angular_acceleration;
-            site.bias_acceleration = carrier.bias_acceleration + carrier.bias_angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
+            site.bias_acceleration = carrier.bias_acceleration
+                + carrier.bias_angular_acceleration.cross(&arm)
+                + spin.cross(&spin.cross(&arm));
         }
     }
 
@@ -92,7 +95,11 @@ impl ArticulatedBody {
 
 impl Integratable for ArticulatedBody {
     fn dims(&self) -> Dims {
-        Dims { x: self.model.positions() + self.model.dof(), dof: self.model.dof(), sites: self.model.links().len() + 1 + self.colliders.len() }
+        Dims {
+            x: self.model.positions() + self.model.dof(),
+            dof: self.model.dof(),
+            sites: self.model.links().len() + 1 + self.colliders.len(),
+        }
     }
 
     fn write_initial(&self, x: &mut [f64]) {
@@ -146,7 +153,11 @@ impl Integratable for ArticulatedBody {
             let carrier = link.map_or(Site::default(), |l| moving[l]);
             let point = site.position();
             site.angular_acceleration = carrier.angular_acceleration;
-            site.acceleration = if link.is_some() { carrier.acceleration_following(&point, &carrier.velocity_at(&point)) } else { Vec3::zeros() };
+            site.acceleration = if link.is_some() {
+                carrier.acceleration_following(&point, &carrier.velocity_at(&point))
+            } else {
+                Vec3::zeros()
+            };
         }
     }
 

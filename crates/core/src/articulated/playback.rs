@@ -15,7 +15,9 @@ pub enum PlaybackError {
         values: usize,
     },
     /// A number that is not finite, or a time that is not after the one before.
-    #[error("sample {index} of a recorded motion: time {time} s, value {value}; both must be finite and times must rise")]
+    #[error(
+        "sample {index} of a recorded motion: time {time} s, value {value}; both must be finite and times must rise"
+    )]
     Sample {
         /// Which sample, from 0.
         index: usize,
@@ -122,7 +124,10 @@ mod tests {
         for i in 0..=20 {
             let t = 0.1 * i as f64;
             let (value, velocity) = motion.at(t);
-            assert!((value - f(t)).abs() < 1e-12 && (velocity - (4.0 * t - 3.0)).abs() < 1e-11, "t = {t}: {value} {velocity}");
+            assert!(
+                (value - f(t)).abs() < 1e-12 && (velocity - (4.0 * t - 3.0)).abs() < 1e-11,
+                "t = {t}: {value} {velocity}"
+            );
         }
         assert_eq!(motion.at(3.0), (f(2.0), 0.0));
     }

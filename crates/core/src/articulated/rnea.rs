@@ -37,7 +37,15 @@ impl InverseDynamics {
 
     /// `tau = M·qdd + C(q, v) − (what gravity and wrenches do)`: the generalized forces under which the refreshed motion accelerates by `qdd`
     /// (empty for none). `wrenches` has one per link, in world axes, with torque about the link's origin; empty for none.
-    pub fn solve(&mut self, model: &Model, kin: &Kinematics, gravity: &Vec3, qdd: &[f64], wrenches: &[Wrench], tau: &mut [f64]) {
+    pub fn solve(
+        &mut self,
+        model: &Model,
+        kin: &Kinematics,
+        gravity: &Vec3,
+        qdd: &[f64],
+        wrenches: &[Wrench],
+        tau: &mut [f64],
+    ) {
         kin.accelerations(model, qdd, &-gravity, &mut self.accelerations);
         self.own_loads(model, kin, wrenches);
         for (i, link) in model.links().iter().enumerate().rev() {
@@ -79,7 +87,13 @@ impl InverseDynamics {
 /// [`InverseDynamics::solve`] with the kinematics refreshed first: from `q`, `v`, `qdd` to `tau`.
 #[allow(clippy::too_many_arguments, reason = "the arguments of τ = RNEA(q, v, q̈, f), and where to work")]
 pub fn inverse_dynamics(
-    model: &Model, (kin, work): (&mut Kinematics, &mut InverseDynamics), gravity: &Vec3, q: &[f64], v: &[f64], qdd: &[f64], wrenches: &[Wrench],
+    model: &Model,
+    (kin, work): (&mut Kinematics, &mut InverseDynamics),
+    gravity: &Vec3,
+    q: &[f64],
+    v: &[f64],
+    qdd: &[f64],
+    wrenches: &[Wrench],
     tau: &mut [f64],
 ) {
     kin.refresh(model, q, v);

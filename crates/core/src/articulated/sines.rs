@@ -16,7 +16,8 @@ pub(super) struct Sines {
 
 impl Sines {
     pub fn new(compiled: &Compiled) -> Sines {
-        let hinges = compiled.bodies.iter().enumerate().filter(|(_, b)| b.kind == Kind::Revolute).map(|(i, b)| (i, b.q));
+        let hinges =
+            compiled.bodies.iter().enumerate().filter(|(_, b)| b.kind == Kind::Revolute).map(|(i, b)| (i, b.q));
         Sines { hinges: hinges.collect(), turns: vec![(0.0, 1.0); compiled.bodies.len()] }
     }
 

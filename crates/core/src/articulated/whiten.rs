@@ -44,7 +44,11 @@ impl Dynamics {
                 Kind::Floating(block) => {
                     let Block { first, w, second } = &self.sweep.blocks[block];
                     put(u, body.v, second.upper_times(motion.angular));
-                    put(u, body.v + 3, first.upper_times(motion.linear) + first.divide_root(rows_times(w, motion.angular)));
+                    put(
+                        u,
+                        body.v + 3,
+                        first.upper_times(motion.linear) + first.divide_root(rows_times(w, motion.angular)),
+                    );
                 }
             }
         }
@@ -115,7 +119,11 @@ impl Dynamics {
                 Kind::Floating(block) => {
                     let Block { first, w, second } = &self.sweep.blocks[block];
                     let (angular, linear) = (at(u, body.v), at(u, body.v + 3));
-                    put(j, body.v, second.lower_times(angular) + rows_transposed_times(w, first.divide_root(linear)) + p.torque);
+                    put(
+                        j,
+                        body.v,
+                        second.lower_times(angular) + rows_transposed_times(w, first.divide_root(linear)) + p.torque,
+                    );
                     put(j, body.v + 3, first.lower_times(linear) + p.force);
                 }
             }
@@ -156,7 +164,14 @@ impl Dynamics {
 
     /// `yᵢ` of one joint to `out`, and what it passes to the parent, about the parent's origin.
     #[inline(always)]
-    fn respond_link(&self, i: usize, body: &Body, mut p: Force, j: impl Fn(usize) -> f64, mut out: impl FnMut(usize, f64)) -> Force {
+    fn respond_link(
+        &self,
+        i: usize,
+        body: &Body,
+        mut p: Force,
+        j: impl Fn(usize) -> f64,
+        mut out: impl FnMut(usize, f64),
+    ) -> Force {
         let slot = &self.sweep.slots[i];
         match body.kind {
             Kind::Revolute | Kind::Prismatic => {
@@ -178,7 +193,8 @@ impl Dynamics {
                 let Block { first, w, second } = &self.sweep.blocks[block];
                 let own = |k| Vector::new(j(k), j(k + 1), j(k + 2));
                 let linear = first.lower_solve(own(body.v + 3) + p.force);
-                let angular = second.lower_solve(own(body.v) + p.torque - rows_transposed_times(w, first.divide_root(linear)));
+                let angular =
+                    second.lower_solve(own(body.v) + p.torque - rows_transposed_times(w, first.divide_root(linear)));
                 (0..3).for_each(|k| out(body.v + k, [angular.x, angular.y, angular.z][k]));
                 (0..3).for_each(|k| out(body.v + 3 + k, [linear.x, linear.y, linear.z][k]));
             }

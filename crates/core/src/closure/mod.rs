@@ -141,26 +141,59 @@ impl Closure {
     }
 
     /// Joins two parts as they stand at a world point (m): a ball joint.
-    pub fn point_at(name: impl Into<String>, world: &World, a: Part, b: Part, point: Vec3) -> Result<Closure, ClosureError> {
+    pub fn point_at(
+        name: impl Into<String>,
+        world: &World,
+        a: Part,
+        b: Part,
+        point: Vec3,
+    ) -> Result<Closure, ClosureError> {
         Closure::at(name.into(), ClosureKind::Point, world, [a, b], point, Vec3::z())
     }
 
     /// Joins two parts as they stand by a hinge at a world point (m) about a world axis (of any length but 0).
-    pub fn hinge_at(name: impl Into<String>, world: &World, a: Part, b: Part, point: Vec3, axis: Vec3) -> Result<Closure, ClosureError> {
+    pub fn hinge_at(
+        name: impl Into<String>,
+        world: &World,
+        a: Part,
+        b: Part,
+        point: Vec3,
+        axis: Vec3,
+    ) -> Result<Closure, ClosureError> {
         Closure::at(name.into(), ClosureKind::Hinge, world, [a, b], point, axis)
     }
 
     /// Joins two parts as they stand; a world point (m) says where, which matters only for how errors are told.
-    pub fn weld_at(name: impl Into<String>, world: &World, a: Part, b: Part, point: Vec3) -> Result<Closure, ClosureError> {
+    pub fn weld_at(
+        name: impl Into<String>,
+        world: &World,
+        a: Part,
+        b: Part,
+        point: Vec3,
+    ) -> Result<Closure, ClosureError> {
         Closure::at(name.into(), ClosureKind::Weld, world, [a, b], point, Vec3::z())
     }
 
     /// Lets two parts as they stand slide along a world axis (of any length but 0) through a world point (m), and do nothing else.
-    pub fn slider_at(name: impl Into<String>, world: &World, a: Part, b: Part, point: Vec3, axis: Vec3) -> Result<Closure, ClosureError> {
+    pub fn slider_at(
+        name: impl Into<String>,
+        world: &World,
+        a: Part,
+        b: Part,
+        point: Vec3,
+        axis: Vec3,
+    ) -> Result<Closure, ClosureError> {
         Closure::at(name.into(), ClosureKind::Slider, world, [a, b], point, axis)
     }
 
-    fn at(name: String, kind: ClosureKind, world: &World, parts: [Part; 2], point: Vec3, axis: Vec3) -> Result<Closure, ClosureError> {
+    fn at(
+        name: String,
+        kind: ClosureKind,
+        world: &World,
+        parts: [Part; 2],
+        point: Vec3,
+        axis: Vec3,
+    ) -> Result<Closure, ClosureError> {
         if point.iter().chain(axis.iter()).any(|x| !x.is_finite()) {
             return Err(ClosureError::NotFinite(name));
         }
@@ -216,7 +249,9 @@ struct End {
 
 impl End {
     fn of(anchor: &Anchor, view: &WorldView) -> Option<End> {
-        let Some((id, part)) = anchor.part else { return Some(End { part: None, site: Site::default(), frame: anchor.frame }) };
+        let Some((id, part)) = anchor.part else {
+            return Some(End { part: None, site: Site::default(), frame: anchor.frame });
+        };
         view.status(id).filter(|s| s.alive)?;
         // a part that is not there is left to the row, which refuses it by name
         let mut site = view.site(id, part).copied().unwrap_or_default();
@@ -314,14 +349,18 @@ impl Pair {
     fn translation(&self, out: &mut RowBuilder, points: [&Vec3; 2], axis: &Vec3, error: f64, bias: f64) {
         let row = out.row(RowTarget { bias_acceleration: bias, ..RowTarget::new(RowSet::Equality, error) });
         for ((end, sign), p) in self.sides().into_iter().zip(points) {
-            end.part.into_iter().for_each(|(id, part)| { row.on_point(id, part, p, axis, sign); });
+            end.part.into_iter().for_each(|(id, part)| {
+                row.on_point(id, part, p, axis, sign);
+            });
         }
     }
 
     fn rotation(&self, out: &mut RowBuilder, axis: &Vec3, error: f64, bias: f64) {
         let row = out.row(RowTarget { bias_acceleration: bias, ..RowTarget::new(RowSet::Equality, error) });
         for (end, sign) in self.sides() {
-            end.part.into_iter().for_each(|(id, part)| { row.on_rotation(id, part, axis, sign); });
+            end.part.into_iter().for_each(|(id, part)| {
+                row.on_rotation(id, part, axis, sign);
+            });
         }
     }
 }

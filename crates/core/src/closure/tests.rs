@@ -27,8 +27,14 @@ impl Pairing {
     fn new(bodies: Vec<(RigidBody, Mode)>) -> Pairing {
         let mut all = Pairing { table: Table::default(), ids: Vec::new(), x: Vec::new(), sites: Vec::new(), dof: 0 };
         for (serial, (body, mode)) in bodies.into_iter().enumerate() {
-            let Some(Dims { x, dof, sites }) = (&body as &dyn Object).integratable().map(|i| i.dims()) else { continue };
-            let span = Span { x: all.x.len()..all.x.len() + x, v: all.dof..all.dof + dof, site: all.sites.len()..all.sites.len() + sites };
+            let Some(Dims { x, dof, sites }) = (&body as &dyn Object).integratable().map(|i| i.dims()) else {
+                continue;
+            };
+            let span = Span {
+                x: all.x.len()..all.x.len() + x,
+                v: all.dof..all.dof + dof,
+                site: all.sites.len()..all.sites.len() + sites,
+            };
             all.x.resize(span.x.end, 0.0);
             all.sites.resize(span.site.end, Site::default());
             all.dof = span.v.end;
@@ -43,7 +49,13 @@ impl Pairing {
 
     /// Everything moves on for `t` with its generalized velocity held.
     fn after(&self, t: f64) -> Pairing {
-        let mut next = Pairing { table: self.table.clone(), ids: self.ids.clone(), x: self.x.clone(), sites: self.sites.clone(), dof: self.dof };
+        let mut next = Pairing {
+            table: self.table.clone(),
+            ids: self.ids.clone(),
+            x: self.x.clone(),
+            sites: self.sites.clone(),
+            dof: self.dof,
+        };
         let Pairing { table, x, sites, .. } = &mut next;
         table.for_each_mut(|entry| {
             let x = &mut x[entry.span.x.clone()];
@@ -63,11 +75,26 @@ impl Pairing {
     }
 
     fn tell(&self, rows_of: impl FnOnce(&WorldView, &mut RowBuilder)) -> Told {
-        let (mut rows, mut bias, mut targets, mut kinds, mut problem) = (Rows::default(), Vec::new(), Vec::new(), Vec::new(), None);
+        let (mut rows, mut bias, mut targets, mut kinds, mut problem) =
+            (Rows::default(), Vec::new(), Vec::new(), Vec::new(), None);
         rows.clear(self.dof);
-        let view = WorldView { time: 0.0, gravity: Vec3::zeros(), implicit: true, x: &self.x, sites: &self.sites, table: &self.table };
+        let view = WorldView {
+            time: 0.0,
+            gravity: Vec3::zeros(),
+            implicit: true,
+            x: &self.x,
+            sites: &self.sites,
+            table: &self.table,
+        };
         let mut out = RowBuilder {
-            rows: &mut rows, bias: &mut bias, targets: &mut targets, kinds: &mut kinds, table: &self.table, x: &self.x, sites: &self.sites, problem: &mut problem,
+            rows: &mut rows,
+            bias: &mut bias,
+            targets: &mut targets,
+            kinds: &mut kinds,
+            table: &self.table,
+            x: &self.x,
+            sites: &self.sites,
+            problem: &mut problem,
             owner: ObjectId::default(),
         };
         rows_of(&view, &mut out);
@@ -79,7 +106,11 @@ impl Pairing {
             }
         }
         rows.add_velocity(&u, &mut bias);
-        Told { errors: targets.iter().map(|t| t.error).collect(), velocities: bias, biases: targets.iter().map(|t| t.bias_acceleration).collect() }
+        Told {
+            errors: targets.iter().map(|t| t.error).collect(),
+            velocities: bias,
+            biases: targets.iter().map(|t| t.bias_acceleration).collect(),
+        }
     }
 
     fn tell_closure(&self, closure: &Closure) -> Told {
@@ -94,19 +125,32 @@ fn body(name: &str, pose: Pose, velocity: Vec3, spin: Vec3) -> RigidBody {
 
 /// Two bodies whose frames are parallel (so that rotations are closed) and `offset` apart.
 fn pairing(modes: [Mode; 2], offset: Vec3) -> (Pairing, [Anchor; 2]) {
-    let frames = [Pose::new(Vec3::new(0.2, -0.1, 0.3), Vec3::new(0.5, 1.0, -0.7)), Pose::new(Vec3::new(-0.3, 0.2, 0.1), Vec3::new(-0.4, 0.3, 1.1))];
+    let frames = [
+        Pose::new(Vec3::new(0.2, -0.1, 0.3), Vec3::new(0.5, 1.0, -0.7)),
+        Pose::new(Vec3::new(-0.3, 0.2, 0.1), Vec3::new(-0.4, 0.3, 1.1)),
+    ];
     let closed = Pose::new(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.3, -0.8, 0.6));
     let places = [Pose::from_parts((closed.translation.vector + offset).into(), closed.rotation), closed];
-    let bodies = [(Vec3::new(1.0, -2.0, 0.5), Vec3::new(3.0, -1.0, 2.0)), (Vec3::new(-0.5, 0.7, 1.5), Vec3::new(-2.0, 1.5, 0.5))];
-    let made = (0..2).map(|i| (body(["a", "b"][i], places[i] * frames[i].inverse(), bodies[i].0, bodies[i].1), modes[i])).collect();
+    let bodies = [
+        (Vec3::new(1.0, -2.0, 0.5), Vec3::new(3.0, -1.0, 2.0)),
+        (Vec3::new(-0.5, 0.7, 1.5), Vec3::new(-2.0, 1.5, 0.5)),
+    ];
+    let made = (0..2)
+        .map(|i| (body(["a", "b"][i], places[i] * frames[i].inverse(), bodies[i].0, bodies[i].1), modes[i]))
+        .collect();
     let pairing = Pairing::new(made).after(0.0);
     let anchors = [0, 1].map(|i| Anchor::on(pairing.ids[i], 0, frames[i]));
     (pairing, anchors)
 }
 
-const KINDS: [(ClosureKind, usize); 4] = [(ClosureKind::Point, 3), (ClosureKind::Hinge, 5), (ClosureKind::Weld, 6), (ClosureKind::Slider, 5)];
-const MODES: [[Mode; 2]; 4] =
-    [[Mode::Dynamic, Mode::Dynamic], [Mode::Dynamic, Mode::Kinematic], [Mode::Kinematic, Mode::Dynamic], [Mode::Dynamic, Mode::Static]];
+const KINDS: [(ClosureKind, usize); 4] =
+    [(ClosureKind::Point, 3), (ClosureKind::Hinge, 5), (ClosureKind::Weld, 6), (ClosureKind::Slider, 5)];
+const MODES: [[Mode; 2]; 4] = [
+    [Mode::Dynamic, Mode::Dynamic],
+    [Mode::Dynamic, Mode::Kinematic],
+    [Mode::Kinematic, Mode::Dynamic],
+    [Mode::Dynamic, Mode::Static],
+];
 
 #[test]
 fn velocities_are_the_rates_of_errors_and_biases_the_rates_of_velocities() {
@@ -123,9 +167,17 @@ fn velocities_are_the_rates_of_errors_and_biases_the_rates_of_velocities() {
                 assert_eq!(now.errors.len(), rows);
                 for i in 0..rows {
                     let rate = (after.errors[i] - before.errors[i]) / (2.0 * t);
-                    assert!((rate - now.velocities[i]).abs() < 1e-8, "{kind:?} {modes:?} row {i}: velocity {}, error's rate {rate}", now.velocities[i]);
+                    assert!(
+                        (rate - now.velocities[i]).abs() < 1e-8,
+                        "{kind:?} {modes:?} row {i}: velocity {}, error's rate {rate}",
+                        now.velocities[i]
+                    );
                     let rate = (after.velocities[i] - before.velocities[i]) / (2.0 * t);
-                    assert!((rate - now.biases[i]).abs() < 1e-7, "{kind:?} {modes:?} row {i}: bias {}, velocity's rate {rate}", now.biases[i]);
+                    assert!(
+                        (rate - now.biases[i]).abs() < 1e-7,
+                        "{kind:?} {modes:?} row {i}: bias {}, velocity's rate {rate}",
+                        now.biases[i]
+                    );
                 }
             }
         }
@@ -140,7 +192,9 @@ fn a_row_on_a_rotation_has_the_angular_velocity_along_its_axis() {
             let row = |ends: &[(usize, f64)]| {
                 let told = pairing.tell(|_, out| {
                     let row = out.row(RowTarget::new(RowSet::Equality, 0.0));
-                    ends.iter().for_each(|&(i, sign)| { row.on_rotation(pairing.ids[i], 0, &axis, sign); });
+                    ends.iter().for_each(|&(i, sign)| {
+                        row.on_rotation(pairing.ids[i], 0, &axis, sign);
+                    });
                 });
                 told.velocities[0]
             };
@@ -159,7 +213,12 @@ fn errors_of_rotations_are_the_rotation_that_is_left() {
     for turn in [Vec3::new(1e-6, -2e-6, 3e-6), Vec3::new(0.5, 1.0, -0.3)] {
         let turned = Pose::from_parts(frame.translation, Quat::from_scaled_axis(turn) * frame.rotation);
         let pairing = Pairing::new(vec![(body("a", turned, Vec3::zeros(), Vec3::zeros()), Mode::Dynamic)]).after(0.0);
-        let told = |kind| pairing.tell_closure(&Closure::new("joint", kind, Anchor::on(pairing.ids[0], 0, Pose::identity()), Anchor::world(frame)).unwrap());
+        let told = |kind| {
+            pairing.tell_closure(
+                &Closure::new("joint", kind, Anchor::on(pairing.ids[0], 0, Pose::identity()), Anchor::world(frame))
+                    .unwrap(),
+            )
+        };
         let weld = told(ClosureKind::Weld);
         assert!((Vec3::from_column_slice(&weld.errors[3..]) - turn).norm() < 1e-12, "{:?}", weld.errors);
         // a hinge does not see the turn about its axis: z_B and the tilt make z_A

@@ -45,7 +45,8 @@ const A: [[f64; STAGES - 1]; STAGES] = [
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
 ];
 /// Fifth order less fourth.
-const E: [f64; STAGES] = [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+const E: [f64; STAGES] =
+    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
 /// Inner steps in one frame at most, refused ones included.
 const MOST_STEPS: u32 = 100_000;
@@ -103,7 +104,14 @@ impl Adaptive {
 
     /// Integrates from time `t` over `h` exactly, as many inner steps as the tolerance asks for. With `record` the path is kept, and the call ends
     /// early where no more of it can be. Returns how far it came, s; state, sites and forces are left there, the last rates in `dp`.
-    pub fn integrate(&mut self, motion: &mut Motion, t: f64, h: f64, dp: &mut [f64], record: bool) -> Result<f64, StepError> {
+    pub fn integrate(
+        &mut self,
+        motion: &mut Motion,
+        t: f64,
+        h: f64,
+        dp: &mut [f64],
+        record: bool,
+    ) -> Result<f64, StepError> {
         let n = dp.len();
         self.begin(motion, t, n);
         if record {
@@ -215,7 +223,9 @@ impl Adaptive {
     }
 
     fn give_up(&self, motion: &Motion, time: f64, step: f64, worst: Worst) -> StepError {
-        let Some(entry) = motion.table.iter().nth(worst.object) else { unreachable!("the object was found in this table") };
+        let Some(entry) = motion.table.iter().nth(worst.object) else {
+            unreachable!("the object was found in this table")
+        };
         let object = entry.object.name().to_string();
         match entry.object.integratable().and_then(|body| body.trouble()) {
             Some(why) => StepError::Singular { object, why, time },

@@ -47,7 +47,9 @@ struct Bench {
 impl Bench {
     fn new() -> Bench {
         let inertia = Mat3::from_diagonal(&Vec3::new(1.0, 2.0, 3.0));
-        let body = RigidBody::new("top", Shape::sphere(1.0).unwrap(), 1.0, inertia).unwrap().moving(Vec3::new(10.0, 0.0, 3.0), Vec3::new(0.1, 5.0, 2.0));
+        let body = RigidBody::new("top", Shape::sphere(1.0).unwrap(), 1.0, inertia)
+            .unwrap()
+            .moving(Vec3::new(10.0, 0.0, 3.0), Vec3::new(0.1, 5.0, 2.0));
         let mut table = Table::default();
         let mut x = vec![0.0; 13];
         crate::object::Integratable::write_initial(&body, &mut x);
@@ -57,13 +59,30 @@ impl Bench {
             let id = table.slots.insert(Entry::new(object, span, Status::default(), serial));
             table.order.push(id);
         }
-        Bench { table, x, sites: vec![Site::default()], forces: Forces::default(), applied: vec![Wrench::default()], held: vec![0.0; 6] }
+        Bench {
+            table,
+            x,
+            sites: vec![Site::default()],
+            forces: Forces::default(),
+            applied: vec![Wrench::default()],
+            held: vec![0.0; 6],
+        }
     }
 
     fn motion(&mut self) -> Motion<'_> {
         Motion {
-            table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces, gravity: Vec3::zeros(),
-            implicit: false, applied: &self.applied, applied_generalized: &[0.0; 6], held: &self.held, held_wrenches: &[], pinned: &[], pinned_sites: &mut [],
+            table: &mut self.table,
+            x: &mut self.x,
+            sites: &mut self.sites,
+            forces: &mut self.forces,
+            gravity: Vec3::zeros(),
+            implicit: false,
+            applied: &self.applied,
+            applied_generalized: &[0.0; 6],
+            held: &self.held,
+            held_wrenches: &[],
+            pinned: &[],
+            pinned_sites: &mut [],
         }
     }
 }
@@ -94,7 +113,11 @@ fn dense_output_is_as_good_as_the_steps() {
             integrate(&mut fine, 1e-13, t);
             worst = worst.max(apart(&bench.x, &fine.x));
         }
-        println!("tolerance {tolerance:e}: {worst:e} in {} steps; at the end {:e}", adaptive.steps, apart(&bench.x, &end));
+        println!(
+            "tolerance {tolerance:e}: {worst:e} in {} steps; at the end {:e}",
+            adaptive.steps,
+            apart(&bench.x, &end)
+        );
         assert!(worst < 10.0 * tolerance, "tolerance {tolerance:e}: the dense output is off by {worst:e}");
         assert!(apart(&bench.x, &end) < 1e-14 * 10.0, "its end is the end of the last step");
     }
@@ -104,11 +127,15 @@ fn dense_output_is_as_good_as_the_steps() {
 #[test]
 fn the_pulled_back_rate_turns_with_the_velocity() {
     for size in [1e-6, 1e-3, 0.09, 0.11, 1.0, 3.0] {
-        for (theta, omega) in [(Vec3::new(1.0, 2.0, -1.0), Vec3::new(0.4, -0.3, 0.9)), (Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.2, 0.5))] {
+        for (theta, omega) in [
+            (Vec3::new(1.0, 2.0, -1.0), Vec3::new(0.4, -0.3, 0.9)),
+            (Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.2, 0.5)),
+        ] {
             let theta = theta.normalize() * size;
             let rate = rotation::pull_back(&theta, &omega);
             let (h, q) = (1e-5, Quat::identity());
-            let (after, before) = (rotation::turn(&q, &(theta + h * rate), 1.0), rotation::turn(&q, &(theta - h * rate), 1.0));
+            let (after, before) =
+                (rotation::turn(&q, &(theta + h * rate), 1.0), rotation::turn(&q, &(theta - h * rate), 1.0));
             let turned = (after * before.inverse()).imag() / h;
             assert!((turned - omega).norm() < 1e-8, "at |θ| = {size}: it turns with {turned}, not {omega}");
         }

@@ -27,7 +27,12 @@ fn travel(shape: &Shape, site: &Site) -> Travel {
 #[test]
 fn what_is_told_apart_touches_at_no_moment_of_the_step() {
     let (mut seed, mut told, mut touched) = (3, 0, 0);
-    let shapes = [Shape::cuboid(Vec3::new(0.5, 0.1, 0.2)).unwrap(), Shape::sphere(0.2).unwrap(), Shape::cuboid(Vec3::new(0.05, 0.3, 0.3)).unwrap(), Shape::half_space()];
+    let shapes = [
+        Shape::cuboid(Vec3::new(0.5, 0.1, 0.2)).unwrap(),
+        Shape::sphere(0.2).unwrap(),
+        Shape::cuboid(Vec3::new(0.05, 0.3, 0.3)).unwrap(),
+        Shape::half_space(),
+    ];
     for n in 0..4000 {
         let pair = [&shapes[n % 3], &shapes[(n / 3) % 4]];
         let mut site = |size: f64| Site {
@@ -38,7 +43,11 @@ fn what_is_told_apart_touches_at_no_moment_of_the_step() {
             ..Site::default()
         };
         let sites = [site(1.0), site(0.2)];
-        let sites = if n % 12 >= 9 { [sites[0], Site { velocity: Vec3::zeros(), angular_velocity: Vec3::zeros(), ..sites[1] }] } else { sites };
+        let sites = if n % 12 >= 9 {
+            [sites[0], Site { velocity: Vec3::zeros(), angular_velocity: Vec3::zeros(), ..sites[1] }]
+        } else {
+            sites
+        };
         let travel = [0, 1].map(|k| travel(pair[k], &sites[k]));
         let moments = (0..=40).map(|k| H * f64::from(k) / 40.0);
         let mut meets = moments.map(|t| {
@@ -48,7 +57,14 @@ fn what_is_told_apart_touches_at_no_moment_of_the_step() {
         });
         let meets = meets.any(|m| m);
         for reach in [Reach::Relative, Reach::Each] {
-            let asked = Pair { mode: ContactMode::Surface, shapes: pair, sites: [&sites[0], &sites[1]], travel, near: 1e-4, reach };
+            let asked = Pair {
+                mode: ContactMode::Surface,
+                shapes: pair,
+                sites: [&sites[0], &sites[1]],
+                travel,
+                near: 1e-4,
+                reach,
+            };
             let apart = asked.stays_apart();
             assert!(!(apart && meets), "{n}, {reach:?}: told apart, and they meet");
             told += usize::from(apart);
@@ -64,7 +80,14 @@ fn what_has_not_moved_is_recalled() {
     let (cylinder, block) = (Shape::cylinder(0.1, 0.2).unwrap(), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
     let at = |z: f64| Site { pose: Pose::translation(0.0, 0.0, z), ..Site::default() };
     let sites = [at(0.7001), at(0.0)];
-    let pair = |near: f64| Pair { mode: ContactMode::Surface, shapes: [&cylinder, &block], sites: [&sites[0], &sites[1]], travel: [Travel::default(); 2], near, reach: Reach::Relative };
+    let pair = |near: f64| Pair {
+        mode: ContactMode::Surface,
+        shapes: [&cylinder, &block],
+        sites: [&sites[0], &sites[1]],
+        travel: [Travel::default(); 2],
+        near,
+        reach: Reach::Relative,
+    };
     let mut recalled = Recalled::default();
     let ask = |near: f64, recalled: &mut Recalled| {
         let mut found = Vec::new();

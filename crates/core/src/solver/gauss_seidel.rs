@@ -42,7 +42,15 @@ impl RowSolver for GaussSeidel {
         "gauss_seidel"
     }
 
-    fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome {
+    fn solve(
+        &self,
+        rows: &Rows,
+        blocks: &[u32],
+        c: &[f64],
+        lambda: &mut [f64],
+        du: &mut [f64],
+        accuracy: Accuracy,
+    ) -> Outcome {
         let mut linkages = Linkages::new(rows, blocks);
         let mut locals: SmallVec<[Local; FEW]> = SmallVec::with_capacity(blocks.len());
         for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
@@ -164,7 +172,8 @@ impl Momentum {
         let mut stretches: SmallVec<[(u32, u32); 2 * FEW]> = linkages.stretches().collect();
         for (i, local) in locals.iter().enumerate() {
             // the contacts of a pair follow one another: one of them is enough
-            let same = |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));
+            let same =
+                |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));
             if i == 0 || !same(&locals[i - 1]) {
                 stretches.extend(local.block.sides().iter().map(|s| (s.u, s.u + s.dof)));
             }
@@ -212,7 +221,15 @@ impl Momentum {
     }
 
     /// Makes `du` anew from the multipliers, which are not extrapolated yet, and starts from rest.
-    fn renew(&mut self, locals: &[Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) {
+    fn renew(
+        &mut self,
+        locals: &[Local],
+        linkages: &Linkages,
+        rows: &Rows,
+        c: &[f64],
+        lambda: &mut [f64],
+        du: &mut [f64],
+    ) {
         self.clear(du);
         apply(locals, linkages, rows, c, lambda, du);
         self.extrapolate(true, du);
@@ -253,7 +270,8 @@ impl Step {
     fn new(rows: &Rows, linkages: &Linkages, block: &Block, reach: Reach) -> Step {
         let (lo, hi) = match block.set {
             RowSet::Cone { mu } => {
-                let k = if reach.is_own() { Symmetric::own(rows, block) } else { linkages.own_contact(rows, block, reach) };
+                let k =
+                    if reach.is_own() { Symmetric::own(rows, block) } else { linkages.own_contact(rows, block, reach) };
                 return if k.m00 <= f64::MIN_POSITIVE { Step::Dead } else { Step::Contact(Contact::new(k, mu)) };
             }
             RowSet::Equality => (f64::NEG_INFINITY, f64::INFINITY),
@@ -286,7 +304,15 @@ impl<'a> Local<'a> {
 
     /// Extrapolates the multipliers of this block, solves it with the others held, and goes this share of the way there.
     #[inline(always)]
-    fn relax(&mut self, beta: f64, share: f64, rows: &Rows, linkages: &Linkages, du: &mut [f64], progress: &mut Progress) {
+    fn relax(
+        &mut self,
+        beta: f64,
+        share: f64,
+        rows: &Rows,
+        linkages: &Linkages,
+        du: &mut [f64],
+        progress: &mut Progress,
+    ) {
         match &self.step {
             Step::Dead => {}
             Step::Scalar(scalar) => {
@@ -331,7 +357,9 @@ impl<'a> Local<'a> {
                     }
                     self.lambda = next;
                     let last = &self.last;
-                    progress.against -= delta[0] * (next[0] - last[0]) + delta[1] * (next[1] - last[1]) + delta[2] * (next[2] - last[2]);
+                    progress.against -= delta[0] * (next[0] - last[0])
+                        + delta[1] * (next[1] - last[1])
+                        + delta[2] * (next[2] - last[2]);
                     match self.six {
                         Some(six) => six.push(rows, delta, du),
                         None => self.push(rows, linkages, &delta, du),

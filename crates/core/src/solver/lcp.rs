@@ -57,7 +57,15 @@ impl RowSolver for LcpPyramid {
         "lcp_pyramid"
     }
 
-    fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome {
+    fn solve(
+        &self,
+        rows: &Rows,
+        blocks: &[u32],
+        c: &[f64],
+        lambda: &mut [f64],
+        du: &mut [f64],
+        accuracy: Accuracy,
+    ) -> Outcome {
         solve(Friction::Pyramid, rows, blocks, c, lambda, du, accuracy)
     }
 
@@ -71,7 +79,15 @@ impl RowSolver for LcpSliding {
         "lcp_sliding"
     }
 
-    fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome {
+    fn solve(
+        &self,
+        rows: &Rows,
+        blocks: &[u32],
+        c: &[f64],
+        lambda: &mut [f64],
+        du: &mut [f64],
+        accuracy: Accuracy,
+    ) -> Outcome {
         solve(Friction::Sliding, rows, blocks, c, lambda, du, accuracy)
     }
 
@@ -130,13 +146,18 @@ fn solve(
 
 /// Whether all that the island's problem is made of is a number; an interval may end at infinity.
 fn finite(rows: &Rows, blocks: &[u32], c: &[f64]) -> bool {
-    let responses = |block: &Block, k: usize| block.sides().iter().all(|s| rows.response(s, k).iter().all(|y| y.is_finite()));
+    let responses =
+        |block: &Block, k: usize| block.sides().iter().all(|s| rows.response(s, k).iter().all(|y| y.is_finite()));
     let set = |set: &RowSet| match set {
         RowSet::Equality | RowSet::HalfLine => true,
         RowSet::Interval { lo, hi } => !lo.is_nan() && !hi.is_nan(),
         RowSet::Cone { mu } => mu.is_finite(),
     };
-    let row = |block: &Block| set(&block.set) && block.range().enumerate().all(|(k, i)| c[i].is_finite() && responses(block, k)) && block.compliance.is_finite();
+    let row = |block: &Block| {
+        set(&block.set)
+            && block.range().enumerate().all(|(k, i)| c[i].is_finite() && responses(block, k))
+            && block.compliance.is_finite()
+    };
     blocks.iter().all(|&b| row(&rows.blocks[b as usize]))
 }
 
@@ -188,7 +209,8 @@ impl Problem {
         let scale = c.iter().fold(SLOWEST, |a: f64, c| a.max(c.abs()));
         let start = vec![0.0; c.len()];
         let equalities = Equalities::new(&[], 0, RANK);
-        let mut problem = Problem { k, c, scale, start, columns: Vec::new(), bounds: Vec::new(), free: Vec::new(), equalities };
+        let mut problem =
+            Problem { k, c, scale, start, columns: Vec::new(), bounds: Vec::new(), free: Vec::new(), equalities };
         let mut first = 0;
         for block in island() {
             if rows.own(block, 0, 0) > f64::MIN_POSITIVE {
@@ -197,7 +219,8 @@ impl Problem {
             first += block.set.rows();
         }
         let free = &problem.free;
-        let among: Vec<f64> = free.iter().flat_map(|&i| free.iter().map(move |&j| (i, j))).map(|(i, j)| problem.entry(i, j)).collect();
+        let among: Vec<f64> =
+            free.iter().flat_map(|&i| free.iter().map(move |&j| (i, j))).map(|(i, j)| problem.entry(i, j)).collect();
         problem.equalities = Equalities::new(&among, free.len(), RANK);
         problem
     }
@@ -293,7 +316,8 @@ impl Problem {
                 m[i * n + j] = (0..2).map(|e| a.weight[e] * self.against(a.row[e], b)).sum();
             }
         }
-        let coupling: Vec<Vec<f64>> = self.columns.iter().map(|z| self.free.iter().map(|&i| self.against(i, z)).collect()).collect();
+        let coupling: Vec<Vec<f64>> =
+            self.columns.iter().map(|z| self.free.iter().map(|&i| self.against(i, z)).collect()).collect();
         let free: Vec<f64> = self.free.iter().map(|&i| c[i]).collect();
         self.equalities.reduce(&coupling, &free, &mut m, n, &mut q[..columns]);
         q.iter_mut().filter(|q| q.abs() <= ROUNDING * self.scale).for_each(|q| *q = 0.0);
@@ -314,7 +338,9 @@ impl Problem {
     /// `c + (K + R)·λ` of the island's rows.
     fn velocities(&self, lambda: &[f64]) -> Vec<f64> {
         let n = self.c.len();
-        (0..n).map(|i| self.c[i] + self.k[i * n..(i + 1) * n].iter().zip(lambda).map(|(k, l)| k * l).sum::<f64>()).collect()
+        (0..n)
+            .map(|i| self.c[i] + self.k[i * n..(i + 1) * n].iter().zip(lambda).map(|(k, l)| k * l).sum::<f64>())
+            .collect()
     }
 
     /// The island's multipliers, and the largest velocity left on an equality row.

@@ -317,7 +317,8 @@ fn walk(dictionary: &mut Dictionary, problem: &Scaled, cover: &[f64], cap: u32) 
     let mut age = 0;
     // The row that needs z₀ most; of equals the last, whose εⁱ is the least.
     let need = |i: usize| -dictionary.b[i] / cover[i];
-    let Some(first) = (0..n).reduce(|best, i| if need(i) >= need(best) { i } else { best }).filter(|&i| need(i) > 0.0) else {
+    let Some(first) = (0..n).reduce(|best, i| if need(i) >= need(best) { i } else { best }).filter(|&i| need(i) > 0.0)
+    else {
         return (End::Complementary, 0);
     };
     let mut left = dictionary.basic[first];

@@ -81,7 +81,11 @@ impl Linkages {
         for joined in groups(rows, &joints) {
             let objects = objects_of(rows, &joined);
             let meets = |block: &&Block| block.sides().iter().any(|s| objects.binary_search(&(s.u, s.dof)).is_ok());
-            let met: usize = if joined.len() > DIRECT_ROWS { 0 } else { island(rows, blocks).filter(meets).map(|b| b.set.rows()).sum() };
+            let met: usize = if joined.len() > DIRECT_ROWS {
+                0
+            } else {
+                island(rows, blocks).filter(meets).map(|b| b.set.rows()).sum()
+            };
             if joined.len() <= DIRECT_ROWS && joined.len().pow(2) * met <= WORK {
                 all.objects.extend(objects.iter().map(|(u, _)| (*u, all.linkages.len())));
                 all.linkages.push(Linkage::new(rows, joined, objects));
@@ -144,11 +148,15 @@ impl Linkages {
     fn hold_joints(&mut self, rows: &Rows, block: &Block, linkage: usize, first: usize) {
         for k in 0..block.set.rows() {
             let linkage = &self.linkages[linkage];
-            let coupling: Vec<f64> = island(rows, &linkage.rows).map(|joint| rows.coupling(joint, 0, block, k)).collect();
+            let coupling: Vec<f64> =
+                island(rows, &linkage.rows).map(|joint| rows.coupling(joint, 0, block, k)).collect();
             let held = linkage.factor.solve(&coupling);
             let joints: Vec<(u32, f64)> = linkage.rows.iter().copied().zip(held).filter(|(_, h)| *h != 0.0).collect();
             for (joint, held) in joints {
-                rows.blocks[joint as usize].sides().iter().for_each(|s| self.add(first, s, k, -held, rows.response(s, 0)));
+                rows.blocks[joint as usize]
+                    .sides()
+                    .iter()
+                    .for_each(|s| self.add(first, s, k, -held, rows.response(s, 0)));
             }
         }
     }
@@ -181,7 +189,11 @@ impl Linkages {
     /// The sides that a block moves, and the numbers that their responses are in.
     #[inline(always)]
     pub fn moved<'a>(&'a self, rows: &'a Rows, block: &'a Block, reach: Reach) -> (&'a [Side], &'a [f64]) {
-        if reach.is_own() { (block.sides(), &rows.y) } else { (&self.sides[reach.first as usize..reach.end as usize], &self.y) }
+        if reach.is_own() {
+            (block.sides(), &rows.y)
+        } else {
+            (&self.sides[reach.first as usize..reach.end as usize], &self.y)
+        }
     }
 
     /// `K̃_ij = Y_iᵀ·Ỹ_j` of a block's own rows.
@@ -219,7 +231,9 @@ impl Linkage {
     fn settle(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
         island(rows, &self.rows).for_each(|joint| lambda[joint.row as usize] = 0.0);
         let velocities = |lambda: &[f64], du: &[f64]| -> Vec<f64> {
-            let w = |joint: &Block| c[joint.row as usize] + rows.row_velocity(joint, 0, du) + joint.compliance * lambda[joint.row as usize];
+            let w = |joint: &Block| {
+                c[joint.row as usize] + rows.row_velocity(joint, 0, du) + joint.compliance * lambda[joint.row as usize]
+            };
             island(rows, &self.rows).map(w).collect()
         };
         let largest = |w: &[f64]| w.iter().fold(0.0, |a: f64, w| a.max(w.abs()));
@@ -256,7 +270,8 @@ fn island<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = &'a Blo
 
 /// The objects of some blocks, sorted: where `u` starts, freedoms.
 fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
-    let mut objects: Vec<(u32, u32)> = island(rows, blocks).flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))).collect();
+    let mut objects: Vec<(u32, u32)> =
+        island(rows, blocks).flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))).collect();
     objects.sort_unstable();
     objects.dedup();
     objects

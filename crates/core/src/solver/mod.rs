@@ -83,7 +83,15 @@ pub trait RowSolver: Send + Sync {
     /// The name that `--solver` takes.
     fn name(&self) -> &'static str;
     /// Solves the island made of `blocks` (indices into `rows.blocks`).
-    fn solve(&self, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) -> Outcome;
+    fn solve(
+        &self,
+        rows: &Rows,
+        blocks: &[u32],
+        c: &[f64],
+        lambda: &mut [f64],
+        du: &mut [f64],
+        accuracy: Accuracy,
+    ) -> Outcome;
     /// An independent copy.
     fn fork(&self) -> Box<dyn RowSolver>;
 }

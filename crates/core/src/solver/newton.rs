@@ -82,7 +82,15 @@ impl Newton {
 
     /// After the sweep `sweeps.start` that changed row velocities by `change`, of those up to `sweeps.end` that may follow: whether the multipliers jumped, or went back from a jump that was
     /// none. The velocities are then to be made anew.
-    pub fn after(&mut self, sweeps: Range<u32>, change: f64, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du: &[f64]) -> bool {
+    pub fn after(
+        &mut self,
+        sweeps: Range<u32>,
+        change: f64,
+        locals: &mut [Local],
+        rows: &Rows,
+        momentum: &Momentum,
+        du: &[f64],
+    ) -> bool {
         let (sweep, left) = (sweeps.start, sweeps.len() as u32);
         if sweep < self.due {
             return false;
@@ -127,8 +135,16 @@ fn jump(size: usize, cut: bool, locals: &mut [Local], rows: &Rows, momentum: &Mo
     if !matrix.lu().solve_mut(&mut right) || !right.iter().all(|x| x.is_finite()) {
         return false;
     }
-    let changes: Vec<[f64; 3]> = locals.iter().zip(&answers).map(|(local, answer)| change_of(local, answer, rows, momentum, right.as_slice())).collect();
-    let share = if cut { locals.iter().zip(&changes).map(|(local, change)| room(local, change)).fold(1.0, f64::min) } else { 1.0 };
+    let changes: Vec<[f64; 3]> = locals
+        .iter()
+        .zip(&answers)
+        .map(|(local, answer)| change_of(local, answer, rows, momentum, right.as_slice()))
+        .collect();
+    let share = if cut {
+        locals.iter().zip(&changes).map(|(local, change)| room(local, change)).fold(1.0, f64::min)
+    } else {
+        1.0
+    };
     for (local, change) in locals.iter_mut().zip(&changes) {
         (0..3).for_each(|k| local.lambda[k] += share * change[k]);
         local.bound();
@@ -236,7 +252,14 @@ fn of_contact(contact: &Contact, old: [f64; 3], w: [f64; 3], epsilon: f64) -> An
 }
 
 /// Adds `Y G Yᵀ` and `Y a` of one block.
-fn gather(local: &Local, answer: &Answer, rows: &Rows, momentum: &Momentum, matrix: &mut DMatrix<f64>, right: &mut DVector<f64>) {
+fn gather(
+    local: &Local,
+    answer: &Answer,
+    rows: &Rows,
+    momentum: &Momentum,
+    matrix: &mut DMatrix<f64>,
+    right: &mut DVector<f64>,
+) {
     let n = local.block.set.rows();
     for side in local.block.sides() {
         let (at, d) = (momentum.place(side.u), side.dof as usize);
@@ -248,7 +271,10 @@ fn gather(local: &Local, answer: &Answer, rows: &Rows, momentum: &Momentum, matr
                 for j in (0..n).filter(|&j| answer.g[k][j] != 0.0) {
                     for (column, x) in rows.response(other, j).iter().enumerate() {
                         let share = answer.g[k][j] * x;
-                        matrix.column_mut(from + column).as_mut_slice()[at..at + d].iter_mut().zip(y).for_each(|(m, y)| *m += y * share);
+                        matrix.column_mut(from + column).as_mut_slice()[at..at + d]
+                            .iter_mut()
+                            .zip(y)
+                            .for_each(|(m, y)| *m += y * share);
                     }
                 }
             }

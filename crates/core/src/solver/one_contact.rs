@@ -127,7 +127,11 @@ impl Contact {
     fn descend(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let normal = (old[0] - w[0] / self.k.m00).max(0.0);
         let dn = normal - old[0];
-        self.bounded([normal, old[1] - self.rho * (w[1] + self.k.m10 * dn), old[2] - self.rho * (w[2] + self.k.m20 * dn)])
+        self.bounded([
+            normal,
+            old[1] - self.rho * (w[1] + self.k.m10 * dn),
+            old[2] - self.rho * (w[2] + self.k.m20 * dn),
+        ])
     }
 
     /// A normal multiplier of at least 0, and tangents shortened to the disc of `μ` times that.
@@ -196,6 +200,13 @@ impl Symmetric {
     }
 
     fn scaled(self, s: f64) -> Symmetric {
-        Symmetric { m00: s * self.m00, m10: s * self.m10, m20: s * self.m20, m11: s * self.m11, m21: s * self.m21, m22: s * self.m22 }
+        Symmetric {
+            m00: s * self.m00,
+            m10: s * self.m10,
+            m20: s * self.m20,
+            m11: s * self.m11,
+            m21: s * self.m21,
+            m22: s * self.m22,
+        }
     }
 }

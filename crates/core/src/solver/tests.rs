@@ -74,7 +74,8 @@ impl Bodies {
             let root = self.root(body);
             let y = self.rows.side(6 * body, 6).expect("two sides at most");
             for (k, d) in frame.iter().enumerate().take(set.rows()) {
-                let j = [r[1] * d[2] - r[2] * d[1], r[2] * d[0] - r[0] * d[2], r[0] * d[1] - r[1] * d[0], d[0], d[1], d[2]];
+                let j =
+                    [r[1] * d[2] - r[2] * d[1], r[2] * d[0] - r[0] * d[2], r[0] * d[1] - r[1] * d[0], d[0], d[1], d[2]];
                 (0..6).for_each(|i| y[6 * k + i] += sign * j[i] / root[i]);
             }
         }

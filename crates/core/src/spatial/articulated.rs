@@ -104,7 +104,8 @@ impl<T: Scalar> Add for ArticulatedInertia<T> {
     type Output = ArticulatedInertia<T>;
     #[inline(always)]
     fn add(self, b: ArticulatedInertia<T>) -> ArticulatedInertia<T> {
-        let coupling = [self.coupling[0] + b.coupling[0], self.coupling[1] + b.coupling[1], self.coupling[2] + b.coupling[2]];
+        let coupling =
+            [self.coupling[0] + b.coupling[0], self.coupling[1] + b.coupling[1], self.coupling[2] + b.coupling[2]];
         ArticulatedInertia { rotational: self.rotational + b.rotational, coupling, mass: self.mass + b.mass }
     }
 }

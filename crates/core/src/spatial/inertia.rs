@@ -51,9 +51,11 @@ impl Inertia<f64> {
     /// The inertia of B's coordinates in those of A:
     /// `J' = R J Rᵀ + m(|p|² − p pᵀ) + 2 (p·Rh) − p Rhᵀ − Rh pᵀ`, `h' = R h + m p`.
     pub fn seen_from(&self, frame: &Transform<f64>) -> Inertia<f64> {
-        let (r, p, h): (Mat3, Vec3, Vec3) = (frame.rotation.into(), frame.position.into(), (frame.rotation * self.moment).into());
+        let (r, p, h): (Mat3, Vec3, Vec3) =
+            (frame.rotation.into(), frame.position.into(), (frame.rotation * self.moment).into());
         let moved = |a: &Vec3, b: &Vec3| a.dot(b) * Mat3::identity() - a * b.transpose();
-        let rotational = r * Mat3::from(self.rotational) * r.transpose() + self.mass * moved(&p, &p) + moved(&p, &h) + moved(&h, &p);
+        let rotational =
+            r * Mat3::from(self.rotational) * r.transpose() + self.mass * moved(&p, &p) + moved(&p, &h) + moved(&h, &p);
         Inertia { rotational: rotational.into(), moment: (h + self.mass * p).into(), mass: self.mass }
     }
 }

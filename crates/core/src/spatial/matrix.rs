@@ -60,7 +60,11 @@ impl<T: Scalar> Mul for Matrix<T> {
 
 impl From<Mat3> for Matrix<f64> {
     fn from(m: Mat3) -> Matrix<f64> {
-        Matrix { x: m.column(0).into_owned().into(), y: m.column(1).into_owned().into(), z: m.column(2).into_owned().into() }
+        Matrix {
+            x: m.column(0).into_owned().into(),
+            y: m.column(1).into_owned().into(),
+            z: m.column(2).into_owned().into(),
+        }
     }
 }
 

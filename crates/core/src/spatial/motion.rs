@@ -45,13 +45,19 @@ impl<T: Scalar> Motion<T> {
     /// `m × m'`: how a motion `other` that is fixed in the body changes as the body moves.
     #[inline(always)]
     pub fn cross(self, other: Motion<T>) -> Motion<T> {
-        Motion { angular: self.angular.cross(other.angular), linear: self.angular.cross(other.linear) + self.linear.cross(other.angular) }
+        Motion {
+            angular: self.angular.cross(other.angular),
+            linear: self.angular.cross(other.linear) + self.linear.cross(other.angular),
+        }
     }
 
     /// `m ×* f`: how a force that is fixed in the body changes as the body moves.
     #[inline(always)]
     pub fn cross_force(self, force: Force<T>) -> Force<T> {
-        Force { torque: self.angular.cross(force.torque) + self.linear.cross(force.force), force: self.angular.cross(force.force) }
+        Force {
+            torque: self.angular.cross(force.torque) + self.linear.cross(force.force),
+            force: self.angular.cross(force.force),
+        }
     }
 
     /// The same velocity of the same body, seen at the point `r` away: `v + ω × r`.

@@ -6,7 +6,14 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 /// `f64`, or some of them side by side in the lanes of a SIMD register. Every operation acts on each lane alone and rounds as `f64` does, so a lane's
 /// bits do not depend on how many lanes there are. None contracts a product and a sum into one rounding.
 pub trait Scalar:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> + Mul<f64, Output = Self> + AddAssign + SubAssign
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+    + Mul<f64, Output = Self>
+    + AddAssign
+    + SubAssign
 {
     /// `value` in every lane. A method, because a value may carry the proof that the processor has the instructions.
     fn constant(self, value: f64) -> Self;

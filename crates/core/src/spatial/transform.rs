@@ -6,8 +6,8 @@
 //! force  of B seen in A   n' = R n + p × R f;  f' = R f
 //! ```
 
-use super::motion::{Force, Motion};
 use super::matrix::Matrix;
+use super::motion::{Force, Motion};
 use super::scalar::Scalar;
 use super::vector::Vector;
 use tumble_collide::Pose;
@@ -65,13 +65,17 @@ impl<T: Scalar> Transform<T> {
     #[inline(always)]
     pub fn inverse(&self) -> Transform<T> {
         let (x, y, z) = (self.rotation.x, self.rotation.y, self.rotation.z);
-        let rotation = Matrix { x: Vector::new(x.x, y.x, z.x), y: Vector::new(x.y, y.y, z.y), z: Vector::new(x.z, y.z, z.z) };
+        let rotation =
+            Matrix { x: Vector::new(x.x, y.x, z.x), y: Vector::new(x.y, y.y, z.y), z: Vector::new(x.z, y.z, z.z) };
         Transform { rotation, position: -(rotation * self.position) }
     }
 }
 
 impl From<Pose> for Transform<f64> {
     fn from(pose: Pose) -> Transform<f64> {
-        Transform { rotation: pose.rotation.to_rotation_matrix().into_inner().into(), position: pose.translation.vector.into() }
+        Transform {
+            rotation: pose.rotation.to_rotation_matrix().into_inner().into(),
+            position: pose.translation.vector.into(),
+        }
     }
 }

@@ -20,15 +20,17 @@
 //! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is one time-stepping sub-step. Both are
 //!   counted as floor hits.
 
-use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten};
+use super::contacts::{
+    Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten,
+};
 use super::hold::{self, Held};
 use super::impact::{self, Candidate};
 use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection, reach};
 use crate::detect::Touch;
-use crate::pair::Reach;
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
+use crate::pair::Reach;
 use crate::rows::RowSet;
 use crate::settings::Integrator;
 use crate::site::Wrench;
@@ -104,7 +106,13 @@ impl Backtracking {
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = |t: &RowTarget| t.set == RowSet::HalfLine && off(t.error);
         if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
-            projection::project(core, &mut self.work, projection::Displacement::InPlace, core.settings.recovery_speed * left, 1e-2 * core.settings.contact_tolerance)?;
+            projection::project(
+                core,
+                &mut self.work,
+                projection::Displacement::InPlace,
+                core.settings.recovery_speed * left,
+                1e-2 * core.settings.contact_tolerance,
+            )?;
             core.motion().refresh();
             detect(core, left, Reach::Relative, &mut self.work.touches);
         }
@@ -122,8 +130,10 @@ impl Backtracking {
         let role = |touch: &Touch| {
             let lasts = core.warm.carries(&touch.key) && touch.contact.gap <= s.drift_tolerance;
             let touches = lasts || touch.contact.gap <= s.contact_tolerance;
-            let speed = touch.velocity(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).dot(&touch.contact.normal);
-            let allowed = if lasts || (touches && speed.abs() < SLOW) { s.drift_tolerance } else { s.contact_tolerance };
+            let speed =
+                touch.velocity(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).dot(&touch.contact.normal);
+            let allowed =
+                if lasts || (touches && speed.abs() < SLOW) { s.drift_tolerance } else { s.contact_tolerance };
             Role { lasts, touches, allowed: allowed.max(-touch.contact.gap + s.contact_tolerance) }
         };
         self.watch.roles.clear();
@@ -134,12 +144,20 @@ impl Backtracking {
     fn resolve_impacts(&mut self, core: &mut Core) -> bool {
         let work = &mut self.work;
         let s = core.settings;
-        let candidates: Vec<Candidate> = work.touches.iter().zip(&self.watch.roles).map(|(touch, role)| {
-            let pressing = (-touch.acceleration(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).x).max(0.0);
-            let rebound = (2.0 * pressing * if role.lasts { s.drift_tolerance } else { s.contact_tolerance }).sqrt();
-            let rest_speed = (rebound / touch.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
-            Candidate { takes_part: role.touches, rest_speed, restitution: touch.restitution }
-        }).collect();
+        let candidates: Vec<Candidate> = work
+            .touches
+            .iter()
+            .zip(&self.watch.roles)
+            .map(|(touch, role)| {
+                let pressing =
+                    (-touch.acceleration(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).x).max(0.0);
+                let rebound =
+                    (2.0 * pressing * if role.lasts { s.drift_tolerance } else { s.contact_tolerance }).sqrt();
+                let rest_speed =
+                    (rebound / touch.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
+                Candidate { takes_part: role.touches, rest_speed, restitution: touch.restitution }
+            })
+            .collect();
         let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);
         whiten(core, &work.dp, 0.0, &mut u, &mut work.du_force);
         let before = u.clone();
@@ -188,7 +206,11 @@ impl Backtracking {
         warm_start(core, work, 1.0);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         let s = core.settings.accuracy;
-        let accuracy = Accuracy { sweeps: s.sweeps.max(2000), relaxations: s.relaxations.max(1_000_000), tolerance: s.tolerance / left };
+        let accuracy = Accuracy {
+            sweeps: s.sweeps.max(2000),
+            relaxations: s.relaxations.max(1_000_000),
+            tolerance: s.tolerance / left,
+        };
         let ray = solve(core, work, accuracy, left, |b| keep[b]);
         self.held = hold::pushing(work);
         let mut held = vec![0.0; core.dof];
@@ -222,7 +244,13 @@ impl Backtracking {
             watch.limits.push(role);
         }
         watch.guesses.clear();
-        for (target, block) in work.targets.iter().zip(&work.rows.blocks[touches..]).zip(&located).filter_map(|(t, located)| (!located).then_some(t)) {
+        for (target, block) in work
+            .targets
+            .iter()
+            .zip(&work.rows.blocks[touches..])
+            .zip(&located)
+            .filter_map(|(t, located)| (!located).then_some(t))
+        {
             let rate = velocity[block.row as usize];
             if target.set == RowSet::HalfLine && target.error > 0.0 && rate < 0.0 {
                 watch.guesses.push(-target.error / rate);
@@ -339,7 +367,9 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
         return;
     }
     let mut joined = vec![0.0; core.dof];
-    work.rows.blocks[work.touches.len()..].iter().for_each(|block| work.rows.apply_block(block, &work.lambda, &mut joined));
+    work.rows.blocks[work.touches.len()..]
+        .iter()
+        .for_each(|block| work.rows.apply_block(block, &work.lambda, &mut joined));
     let mut generalized = vec![0.0; core.dof];
     recover(core, &joined, &mut generalized);
     for entry in core.table.iter().filter(|e| on_links(e)) {

@@ -63,7 +63,9 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     let aims = |closer: f64, rows: &Workspace| reach::left(rows, |i| errors[i], closer);
     let aim = aims(closer, &rows);
     let mut far = onto(core, &mut rows, level, &aim);
-    if far.as_ref().is_ok_and(|far| far.is_empty()) && Piece::all(core, &mut rows).iter().any(|p| p.direct() && reach::weak(&rows, &p.rows)) {
+    if far.as_ref().is_ok_and(|far| far.is_empty())
+        && Piece::all(core, &mut rows).iter().any(|p| p.direct() && reach::weak(&rows, &p.rows))
+    {
         let mut end = Workspace::default();
         let middle = core.x.to_vec();
         core.motion().coast(ahead);
@@ -138,14 +140,24 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
         core.motion().refresh();
         lay_rows(core, probe, level, None)?;
     }
-    let mut far: Vec<u32> = pieces.iter().filter(|p| p.direct() && p.left.0 > core.settings.contact_tolerance).flat_map(|p| p.rows.clone()).collect();
+    let mut far: Vec<u32> = pieces
+        .iter()
+        .filter(|p| p.direct() && p.left.0 > core.settings.contact_tolerance)
+        .flat_map(|p| p.rows.clone())
+        .collect();
     far.sort_unstable();
     Ok(far)
 }
 
 /// Closes the joints of `work`, whose rows were built at the state `start`, at the present state, `step.0` seconds later; `step.1` is the level of the
 /// rows. `kept` is the error of each constraint row that is to stay. Sites and caches are those of `start` before and after.
-pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: (f64, Level), kept: &[f64]) -> Result<(), StepError> {
+pub(super) fn close(
+    core: &mut Core,
+    work: &mut Workspace,
+    start: &[f64],
+    step: (f64, Level),
+    kept: &[f64],
+) -> Result<(), StepError> {
     if !work.targets.iter().any(is_joint) {
         return Ok(());
     }
@@ -156,7 +168,9 @@ pub(super) fn close(core: &mut Core, work: &mut Workspace, start: &[f64], step: 
     let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
     pieces.iter_mut().for_each(|piece| piece.left = open.of(piece));
     loop {
-        pieces.iter_mut().for_each(|piece| piece.done |= (piece.left.0 <= 1.0 && piece.left.1 <= 1.0) || piece.rounds == 0);
+        pieces
+            .iter_mut()
+            .for_each(|piece| piece.done |= (piece.left.0 <= 1.0 && piece.left.1 <= 1.0) || piece.rounds == 0);
         if pieces.iter().all(|p| p.done) {
             break;
         }
@@ -229,14 +243,29 @@ impl Piece {
         work.islands.build(&work.rows, |b| b >= touches && is_joint(&targets[b - touches]));
         let entries = by_start(core);
         let piece = |blocks: &[u32]| {
-            let mut starts: Vec<u32> = blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides()).map(|s| s.u).collect();
+            let mut starts: Vec<u32> =
+                blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides()).map(|s| s.u).collect();
             starts.sort_unstable();
             starts.dedup();
-            let stretches = starts.iter().filter_map(|u| entry_at(&entries, *u)).map(|e| (e.span.x.clone(), e.span.v.clone())).collect();
+            let stretches = starts
+                .iter()
+                .filter_map(|u| entry_at(&entries, *u))
+                .map(|e| (e.span.x.clone(), e.span.v.clone()))
+                .collect();
             let rounds = if blocks.len() > DIRECT_ROWS { FEW_ROUNDS } else { ROUNDS };
             let rows = blocks.iter().map(|b| b - touches as u32).collect();
             let left = (f64::INFINITY, f64::INFINITY);
-            Piece { blocks: blocks.to_vec(), rows, stretches, left, rounds, chord: true, place_first: false, damping: 1.0, done: false }
+            Piece {
+                blocks: blocks.to_vec(),
+                rows,
+                stretches,
+                left,
+                rounds,
+                chord: true,
+                place_first: false,
+                damping: 1.0,
+                done: false,
+            }
         };
         work.islands.iter().map(piece).collect()
     }
@@ -289,14 +318,28 @@ struct Open {
 
 impl Open {
     /// Sites and caches are left at the present, whose rows come in `probe`. Nothing is open where they are not those of `work`.
-    fn measure(core: &mut Core, work: &Workspace, probe: &mut Workspace, step: (f64, Level), kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
+    fn measure(
+        core: &mut Core,
+        work: &Workspace,
+        probe: &mut Workspace,
+        step: (f64, Level),
+        kept: &[f64],
+        pushed: &[bool],
+    ) -> Result<Open, StepError> {
         let pinned = core.lift_pin();
         let open = Open::measure_here(core, work, probe, step, kept, pushed);
         core.pin_again(pinned);
         open
     }
 
-    fn measure_here(core: &mut Core, work: &Workspace, probe: &mut Workspace, step: (f64, Level), kept: &[f64], pushed: &[bool]) -> Result<Open, StepError> {
+    fn measure_here(
+        core: &mut Core,
+        work: &Workspace,
+        probe: &mut Workspace,
+        step: (f64, Level),
+        kept: &[f64],
+        pushed: &[bool],
+    ) -> Result<Open, StepError> {
         core.motion().refresh();
         let time = core.time;
         core.time += step.0;
@@ -328,7 +371,13 @@ impl Open {
     /// A round with the rows of the step, in the caches that they were built with.
     fn chord(&self, core: &mut Core, work: &Workspace, pieces: &[Piece], moved: &mut [f64]) {
         let touches = work.touches.len();
-        self.apply(core, &work.rows, touches, pieces.iter().filter(|p| !p.done && p.chord).map(|p| (&p.blocks[..], p.moves_first())), moved);
+        self.apply(
+            core,
+            &work.rows,
+            touches,
+            pieces.iter().filter(|p| !p.done && p.chord).map(|p| (&p.blocks[..], p.moves_first())),
+            moved,
+        );
     }
 
     /// A round with the rows of the present, where those of the step have got too little done.
@@ -336,17 +385,32 @@ impl Open {
         for piece in pieces.iter().filter(|p| !p.done && !p.chord) {
             piece.soften(probe, piece.largest(&self.place));
         }
-        self.apply(core, &probe.rows, 0, pieces.iter().filter(|p| !p.done && !p.chord).map(|p| (&p.rows[..], p.moves_first())), moved);
+        self.apply(
+            core,
+            &probe.rows,
+            0,
+            pieces.iter().filter(|p| !p.done && !p.chord).map(|p| (&p.rows[..], p.moves_first())),
+            moved,
+        );
     }
 
-    fn apply<'p>(&self, core: &mut Core, rows: &Rows, touches: usize, pieces: impl Iterator<Item = (&'p [u32], bool)>, moved: &mut [f64]) {
+    fn apply<'p>(
+        &self,
+        core: &mut Core,
+        rows: &Rows,
+        touches: usize,
+        pieces: impl Iterator<Item = (&'p [u32], bool)>,
+        moved: &mut [f64],
+    ) {
         let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
         let mut c = [vec![0.0; rows.len], vec![0.0; rows.len]];
         for (i, block) in rows.blocks[touches..].iter().enumerate() {
             (c[0][block.row as usize], c[1][block.row as usize]) = (self.place[i], self.speed[i]);
         }
         for (blocks, moves_first) in pieces {
-            for (c, du, least, wanted) in [(&c[0], &mut dx, self.least.0, true), (&c[1], &mut dv, self.least.1, !moves_first)] {
+            for (c, du, least, wanted) in
+                [(&c[0], &mut dx, self.least.0, true), (&c[1], &mut dv, self.least.1, !moves_first)]
+            {
                 if wanted && blocks.iter().any(|&b| c[rows.blocks[b as usize].row as usize].abs() > least) {
                     solve(rows, blocks, c, du, 0.1 * least);
                 }
@@ -367,7 +431,9 @@ fn pushed(work: &mut Workspace) -> Vec<bool> {
     }
     work.islands.build(&work.rows, |_| true);
     for blocks in work.islands.iter() {
-        let pushes = |&b: &u32| (b as usize) < work.touches.len() && work.lambda[work.rows.blocks[b as usize].row as usize] != 0.0;
+        let pushes = |&b: &u32| {
+            (b as usize) < work.touches.len() && work.lambda[work.rows.blocks[b as usize].row as usize] != 0.0
+        };
         if blocks.iter().any(pushes) {
             let sides = blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides());
             sides.for_each(|s| pushed[s.u as usize] = true);

@@ -3,9 +3,9 @@
 use super::closing;
 use super::projection::Projection;
 use crate::detect::{Detector, Touch};
-use crate::pair::Reach;
 use crate::motion::coast;
 use crate::object::{Integratable, Level, RowTarget};
+use crate::pair::Reach;
 use crate::row_builder::{RowBuilder, RowKind, constraints};
 use crate::rows::{RowSet, Rows};
 use crate::site::Site;
@@ -57,15 +57,29 @@ pub(crate) struct Limit {
 /// The one-sided rows that constraints locate, at the present state and sites and at a given time; sorted by key.
 pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(), StepError> {
     out.clear();
-    let view = WorldView { time, gravity: core.settings.gravity, implicit: core.implicit, x: &core.x, sites: &core.sites, table: &core.table };
+    let view = WorldView {
+        time,
+        gravity: core.settings.gravity,
+        implicit: core.implicit,
+        x: &core.x,
+        sites: &core.sites,
+        table: &core.table,
+    };
     let mut gaps = Vec::new();
     for (place, (_, entry, constraint)) in constraints(&core.table).enumerate() {
         gaps.clear();
         constraint.gaps(&entry.span, &view, &mut gaps);
         if gaps.iter().any(|gap| !gap.is_finite()) {
-            return Err(StepError::Row { object: entry.object.name().to_string(), why: "a gap that it tells is not finite".into() });
+            return Err(StepError::Row {
+                object: entry.object.name().to_string(),
+                why: "a gap that it tells is not finite".into(),
+            });
         }
-        out.extend(gaps.iter().enumerate().map(|(row, gap)| Limit { key: [place as u32, row as u32], gap: *gap, target: None }));
+        out.extend(gaps.iter().enumerate().map(|(row, gap)| Limit {
+            key: [place as u32, row as u32],
+            gap: *gap,
+            target: None,
+        }));
     }
     Ok(())
 }
@@ -73,8 +87,13 @@ pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(),
 /// Finds the contacts within reach of the next `horizon` seconds.
 pub(crate) fn detect(core: &mut Core, horizon: f64, reach: Reach, out: &mut Vec<Touch>) {
     let mut detector = Detector {
-        table: &core.table, owners: &core.owners, sites: &core.sites, settings: &core.settings,
-        broad: core.broad.as_mut(), scratch: &mut core.detect_scratch, stirred: &mut core.sleepers.stirred,
+        table: &core.table,
+        owners: &core.owners,
+        sites: &core.sites,
+        settings: &core.settings,
+        broad: core.broad.as_mut(),
+        scratch: &mut core.detect_scratch,
+        stirred: &mut core.sleepers.stirred,
     };
     detector.detect(horizon, reach, out);
     let deepest = out.iter().map(|t| -t.contact.gap).fold(0.0, f64::max);
@@ -137,16 +156,35 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
 }
 
 /// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment.
-pub(crate) fn lay_rows(core: &Core, work: &mut Workspace, level: Level, moment: Option<&Moment>) -> Result<(), StepError> {
+pub(crate) fn lay_rows(
+    core: &Core,
+    work: &mut Workspace,
+    level: Level,
+    moment: Option<&Moment>,
+) -> Result<(), StepError> {
     lay_touches(core, work);
     let mut problem = None;
     let mut builder = RowBuilder {
-        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, kinds: &mut work.kinds, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut problem,
+        rows: &mut work.rows,
+        bias: &mut work.bias,
+        targets: &mut work.targets,
+        kinds: &mut work.kinds,
+        table: &core.table,
+        x: &core.x,
+        sites: &core.sites,
+        problem: &mut problem,
         owner: ObjectId::default(),
     };
     let (x, sites, ahead) = moment.map_or((&core.x[..], &core.sites, 0.0), |m| (&m.x[..], &m.sites, m.ahead));
     builder.sites = sites;
-    let view = WorldView { time: core.time + ahead, gravity: core.settings.gravity, implicit: core.implicit, x, sites, table: &core.table };
+    let view = WorldView {
+        time: core.time + ahead,
+        gravity: core.settings.gravity,
+        implicit: core.implicit,
+        x,
+        sites,
+        table: &core.table,
+    };
     let mut first = std::mem::take(&mut work.first);
     first.clear();
     for (id, entry, constraint) in constraints(&core.table) {
@@ -176,7 +214,14 @@ fn lay_touches(core: &Core, work: &mut Workspace) {
     work.targets.clear();
     work.kinds.clear();
     let mut builder = RowBuilder {
-        rows: &mut work.rows, bias: &mut work.bias, targets: &mut work.targets, kinds: &mut work.kinds, table: &core.table, x: &core.x, sites: &core.sites, problem: &mut None,
+        rows: &mut work.rows,
+        bias: &mut work.bias,
+        targets: &mut work.targets,
+        kinds: &mut work.kinds,
+        table: &core.table,
+        x: &core.x,
+        sites: &core.sites,
+        problem: &mut None,
         owner: ObjectId::default(),
     };
     for touch in &work.touches {
@@ -317,7 +362,11 @@ pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
 
 /// The same along the rows of a step, which is how joints are closed: momenta stay, and what that does to the energy the next step undoes.
 pub(crate) fn shift(core: &mut Core, u: &[f64], h: f64) {
-    each_displaced(core, u, |body, x, v| if body.holds_velocity() { body.displace(x, v, h) } else { body.drift(x, v, h) });
+    each_displaced(
+        core,
+        u,
+        |body, x, v| if body.holds_velocity() { body.displace(x, v, h) } else { body.drift(x, v, h) },
+    );
 }
 
 /// `v += L⁻¹·u`.
@@ -352,7 +401,13 @@ pub(crate) fn row_velocities(rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f
 
 /// Solves the blocks that `keep` names, island by island, from `work.c` and the warm start in `work.lambda`, into `work.du`. `unit` is what
 /// one unit of `c` is in m/s, for the report: 1, or the step's length where `c` holds accelerations. Whether any solve ended on a ray.
-pub(crate) fn solve(core: &mut Core, work: &mut Workspace, accuracy: Accuracy, unit: f64, keep: impl Fn(usize) -> bool) -> bool {
+pub(crate) fn solve(
+    core: &mut Core,
+    work: &mut Workspace,
+    accuracy: Accuracy,
+    unit: f64,
+    keep: impl Fn(usize) -> bool,
+) -> bool {
     zero(&mut work.du, core.dof);
     work.islands.build(&work.rows, keep);
     let mut ray = false;
@@ -379,7 +434,8 @@ pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
 
 /// The impulse on A of each touch, world axes, for given multipliers.
 pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Iterator<Item = Vec3> + 'a {
-    work.touches.iter().zip(&work.rows.blocks).map(|(touch, block)| {
-        block.range().zip(&touch.frame.axes).map(|(row, axis)| lambda[row] * axis).sum()
-    })
+    work.touches
+        .iter()
+        .zip(&work.rows.blocks)
+        .map(|(touch, block)| block.range().zip(&touch.frame.axes).map(|(row, axis)| lambda[row] * axis).sum())
 }

@@ -44,7 +44,8 @@ pub(super) fn time_contacts(core: &Core, h: f64, touches: &mut Vec<Touch>) {
         }
         let (side_a, side_b) = ((shape_a, a), (shape_b, b));
         let Some((time, contact)) = follow(touch, side_a, side_b, h, near, &mut found) else { return false };
-        let rounded = matches!(contact.normal_from, NormalFrom::CorePoints | NormalFrom::LineOfA(_) | NormalFrom::LineOfB(_));
+        let rounded =
+            matches!(contact.normal_from, NormalFrom::CorePoints | NormalFrom::LineOfA(_) | NormalFrom::LineOfB(_));
         let samples = (h * (a.velocity - b.velocity).norm() / (SHORT * size)).min(MOST_SAMPLES).ceil();
         let end = if rounded { glance(side_a, side_b, time, h, samples, near, &mut found) } else { None };
         let (time, contact) = end.map_or((time, contact), |end| (h, end));
@@ -57,7 +58,15 @@ pub(super) fn time_contacts(core: &Core, h: f64, touches: &mut Vec<Touch>) {
 
 /// Where bodies that have met at `time` go on to the end of the step without overlap, as a ball does that rolls over the seam of two boxes, the
 /// contact of the end holds: its normal is not that of the edge which the ball never strikes. `None` where they overlap on the way.
-fn glance(a: (&Shape, &Site), b: (&Shape, &Site), time: f64, h: f64, samples: f64, near: f64, found: &mut Vec<Contact>) -> Option<Contact> {
+fn glance(
+    a: (&Shape, &Site),
+    b: (&Shape, &Site),
+    time: f64,
+    h: f64,
+    samples: f64,
+    near: f64,
+    found: &mut Vec<Contact>,
+) -> Option<Contact> {
     let mut end = None;
     for sample in 1..=samples as u32 {
         let t = time + (h - time) * sample as f64 / samples;
@@ -78,7 +87,14 @@ fn shape(core: &Core, site: u32) -> Option<&Shape> {
 }
 
 /// The moment at which the touch has closed to `near`, and the contact there; `None` where it does not within `h`.
-fn follow(touch: &Touch, a: (&Shape, &Site), b: (&Shape, &Site), h: f64, near: f64, found: &mut Vec<Contact>) -> Option<(f64, Contact)> {
+fn follow(
+    touch: &Touch,
+    a: (&Shape, &Site),
+    b: (&Shape, &Site),
+    h: f64,
+    near: f64,
+    found: &mut Vec<Contact>,
+) -> Option<(f64, Contact)> {
     let (mut time, mut contact) = (0.0, touch.contact);
     for _ in 0..if contact.gap <= near { 0 } else { ADVANCES } {
         // aim at half the distance that counts as near, so that the last advance is not for ever short of it
@@ -123,7 +139,12 @@ pub(crate) fn meet(touch: &mut Touch, contact: &Contact, a: &Site, b: &Site, t: 
     let moved = |s: &Site| coasted(s, t).translation.vector - s.position();
     let (move_a, move_b): (Vec3, Vec3) = (moved(a), moved(b));
     let closed = contact.normal.dot(&(move_a - move_b));
-    touch.contact = Contact { point: contact.point - move_a, gap: contact.gap - closed, feature: touch.contact.feature, ..*contact };
+    touch.contact = Contact {
+        point: contact.point - move_a,
+        gap: contact.gap - closed,
+        feature: touch.contact.feature,
+        ..*contact
+    };
     touch.offset = move_a - move_b;
     touch.frame = ContactFrame::new(contact.point, contact.normal);
 }

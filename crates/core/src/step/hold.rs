@@ -86,7 +86,9 @@ pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64
     let s = core.settings;
     let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
     for blocks in probe.islands.iter().filter(|blocks| blocks.iter().any(|&b| chosen[b as usize])) {
-        for (c, tolerance, du) in [(&place, 1e-3 * s.contact_tolerance, &mut dx), (&speed, s.accuracy.tolerance, &mut dv)] {
+        for (c, tolerance, du) in
+            [(&place, 1e-3 * s.contact_tolerance, &mut dx), (&speed, s.accuracy.tolerance, &mut dv)]
+        {
             zero(&mut probe.lambda, probe.rows.len);
             let accuracy = Accuracy { sweeps: 100, relaxations: u32::MAX, tolerance };
             GaussSeidel.solve(&probe.rows, blocks, c, &mut probe.lambda, du, accuracy);

@@ -39,14 +39,25 @@ const APPROACH: f64 = 1e-9;
 pub(crate) const SLOWEST_BOUNCE: f64 = 1e-4;
 
 /// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`.
-pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candidate], cap: u32, u: &mut [f64], total: &mut [f64]) {
+pub(crate) fn resolve(
+    core: &mut Core,
+    work: &mut Workspace,
+    candidates: &[Candidate],
+    cap: u32,
+    u: &mut [f64],
+    total: &mut [f64],
+) {
     let (set, reach) = (core.settings.accuracy, core.settings.contact_tolerance);
     let mut c = Vec::new();
     for pass in 0..=cap {
         row_velocities(&work.rows, &work.bias, u, &mut c);
         aim_constraints(work, &mut c);
         let approach = |i: usize| candidates[i].takes_part && c[work.rows.blocks[i].row as usize] < -APPROACH;
-        let bounces = |i: usize| approach(i) && candidates[i].restitution > 0.0 && -c[work.rows.blocks[i].row as usize] > candidates[i].rest_speed;
+        let bounces = |i: usize| {
+            approach(i)
+                && candidates[i].restitution > 0.0
+                && -c[work.rows.blocks[i].row as usize] > candidates[i].rest_speed
+        };
         let limits = work.rows.blocks[candidates.len()..].iter().zip(&work.targets);
         let at_limit = |(block, t): (&Block, &RowTarget)| at_stop(t, reach) && c[block.row as usize] < -APPROACH;
         if !(0..candidates.len()).any(approach) && !limits.clone().any(at_limit) {
@@ -54,10 +65,16 @@ pub(crate) fn resolve(core: &mut Core, work: &mut Workspace, candidates: &[Candi
         }
         core.report.impact_passes += 1;
         let fastest = c.iter().fold(0.0, |f: f64, c| f.max(c.abs()));
-        let accuracy = Accuracy { sweeps: set.sweeps.max(1000), relaxations: set.relaxations.max(100_000), tolerance: PRECISION * fastest };
+        let accuracy = Accuracy {
+            sweeps: set.sweeps.max(1000),
+            relaxations: set.relaxations.max(100_000),
+            tolerance: PRECISION * fastest,
+        };
         let last = pass == cap || !(0..candidates.len()).any(bounces);
-        let member: Vec<bool> = (0..candidates.len()).map(|i| if last { candidates[i].takes_part } else { approach(i) }).collect();
-        let bounce: Vec<f64> = (0..candidates.len()).map(|i| if !last && bounces(i) { candidates[i].restitution } else { 0.0 }).collect();
+        let member: Vec<bool> =
+            (0..candidates.len()).map(|i| if last { candidates[i].takes_part } else { approach(i) }).collect();
+        let bounce: Vec<f64> =
+            (0..candidates.len()).map(|i| if !last && bounces(i) { candidates[i].restitution } else { 0.0 }).collect();
         reflect(core, work, &c, &member, &bounce, accuracy);
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
         total.iter_mut().zip(&work.lambda).for_each(|(t, l)| *t += l);
@@ -126,7 +143,15 @@ fn work_done(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64])
 /// Goes from the plastic solution (`e = 0`, which never adds energy) towards the bouncing one as far as no energy is made.
 ///
 /// With `δ = λ_e − λ_0` the energy is `W(s) = W_0 + s·B + s²·A`, `B = δᵀ(c + Kλ_0)`, `A = W_e − W_0 − B`; `s` is its positive root.
-fn blend(solver: &dyn RowSolver, rows: &Rows, blocks: &[u32], c: &[f64], lambda: &mut [f64], du: &mut [f64], accuracy: Accuracy) {
+fn blend(
+    solver: &dyn RowSolver,
+    rows: &Rows,
+    blocks: &[u32],
+    c: &[f64],
+    lambda: &mut [f64],
+    du: &mut [f64],
+    accuracy: Accuracy,
+) {
     let energy_bounce = work_done(rows, blocks, c, lambda, du);
     let bounce: Vec<f64> = rows_of(rows, blocks).map(|i| lambda[i]).collect();
     rows_of(rows, blocks).for_each(|i| lambda[i] = 0.0);

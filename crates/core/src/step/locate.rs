@@ -43,7 +43,14 @@ impl LimitRole {
             (true, true) => s.drift_tolerance,
             _ => s.contact_tolerance,
         };
-        LimitRole { key: limit.key, gap: limit.gap, rate, acceleration, touches, allowed: allowed.max(s.contact_tolerance - limit.gap) }
+        LimitRole {
+            key: limit.key,
+            gap: limit.gap,
+            rate,
+            acceleration,
+            touches,
+            allowed: allowed.max(s.contact_tolerance - limit.gap),
+        }
     }
 
     /// Whether its force belongs to the sub-step that begins: it is reached and not left.

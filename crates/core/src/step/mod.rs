@@ -12,9 +12,9 @@ mod reach;
 mod time_stepping;
 
 pub use backtracking::Backtracking;
-pub use time_stepping::TimeStepping;
 pub(crate) use contacts::Workspace;
 pub(crate) use flight::{coasted, meet as meet_at};
+pub use time_stepping::TimeStepping;
 
 use crate::world::{Core, StepError};
 

@@ -26,13 +26,21 @@ pub(crate) enum Displacement<'a> {
 
 /// Corrects positions so that the displacement ends without overlap. `recovery` bounds how much of the error that was there before is undone,
 /// metres; an island that is wrong by no more than `least` metres is left alone.
-pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displacement, recovery: f64, least: f64) -> Result<(), StepError> {
+pub(crate) fn project(
+    core: &mut Core,
+    work: &mut Workspace,
+    displacement: Displacement,
+    recovery: f64,
+    least: f64,
+) -> Result<(), StepError> {
     let in_place = matches!(displacement, Displacement::InPlace);
     let h = if let Displacement::Step { h, .. } = displacement { h } else { 1.0 };
     for (b, block) in work.rows.blocks.iter().enumerate() {
         let target = b.checked_sub(work.touches.len()).map_or(0.0, |i| work.targets[i].velocity);
         work.c[block.row as usize] = match displacement {
-            Displacement::Step { mean, .. } => work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean) - target,
+            Displacement::Step { mean, .. } => {
+                work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean) - target
+            }
             Displacement::InPlace => 0.0,
         };
     }
@@ -72,7 +80,11 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
             // the rows of a body's limits and contacts lean on each other through all its links, and a pile's do not
             let jointed = blocks.iter().any(|&b| b as usize >= touches);
             let most = if jointed { core.settings.accuracy.sweeps } else { 0 };
-            let accuracy = Accuracy { sweeps: core.settings.projection_sweeps.max(most), relaxations: u32::MAX, tolerance: 0.1 * least / h };
+            let accuracy = Accuracy {
+                sweeps: core.settings.projection_sweeps.max(most),
+                relaxations: u32::MAX,
+                tolerance: 0.1 * least / h,
+            };
             GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, accuracy);
         }
     }
@@ -85,7 +97,9 @@ pub(crate) fn project(core: &mut Core, work: &mut Workspace, displacement: Displ
 fn ask_limits(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64) -> Result<(), StepError> {
     let touches = work.touches.len();
     let row = |target: u32| work.rows.blocks[touches + target as usize].row as usize;
-    let near = |target: u32| work.targets[target as usize].error <= core.settings.drift_tolerance + 2.0 * h * work.c[row(target)].abs();
+    let near = |target: u32| {
+        work.targets[target as usize].error <= core.settings.drift_tolerance + 2.0 * h * work.c[row(target)].abs()
+    };
     if !work.limits.iter().any(|limit| limit.target.is_some_and(near)) {
         return Ok(());
     }

@@ -45,7 +45,13 @@ fn alike(work: &Workspace) -> Vec<Range<usize>> {
     for of_one in work.first.windows(2) {
         for i in of_one[0]..of_one[1] {
             match out.last_mut() {
-                Some(last) if last.start >= of_one[0] && kind(last.start) == kind(i) && kind(i) != (RowKind::Coordinate, true) => last.end = i + 1,
+                Some(last)
+                    if last.start >= of_one[0]
+                        && kind(last.start) == kind(i)
+                        && kind(i) != (RowKind::Coordinate, true) =>
+                {
+                    last.end = i + 1
+                }
                 _ => out.push(i..i + 1),
             }
         }
@@ -58,7 +64,10 @@ pub(super) fn soften(work: &mut Workspace, targets: &[u32], share: f64) {
     let touches = work.touches.len();
     if !targets.is_empty() {
         let references = references(work);
-        targets.iter().map(|&i| i as usize).for_each(|i| work.rows.blocks[touches + i].compliance = share * references[i]);
+        targets
+            .iter()
+            .map(|&i| i as usize)
+            .for_each(|i| work.rows.blocks[touches + i].compliance = share * references[i]);
     }
 }
 
@@ -98,13 +107,22 @@ pub(super) fn left(work: &Workspace, errors: impl Fn(usize) -> f64, reach: f64) 
 
 /// Gives the objects with these stretches of the state the velocity that their way in `h` is: the mean of those of the states `start` and `arrived`, and what they
 /// were `moved` from there, generalized velocities times seconds.
-pub(super) fn go_as_moved(core: &mut Core, stretches: &[(Range<usize>, Range<usize>)], [start, arrived]: [&[f64]; 2], moved: &[f64], h: f64) {
+pub(super) fn go_as_moved(
+    core: &mut Core,
+    stretches: &[(Range<usize>, Range<usize>)],
+    [start, arrived]: [&[f64]; 2],
+    moved: &[f64],
+    h: f64,
+) {
     for entry in core.table.iter().filter(|e| e.moves() && stretches.iter().any(|(x, _)| *x == e.span.x)) {
         let Some(body) = entry.object.integratable() else { continue };
         let (mut v, mut first) = (vec![0.0; entry.span.v.len()], vec![0.0; entry.span.v.len()]);
         body.velocity(&start[entry.span.x.clone()], &mut first);
         body.velocity(&arrived[entry.span.x.clone()], &mut v);
-        v.iter_mut().zip(&first).zip(&moved[entry.span.v.clone()]).for_each(|((v, first), moved)| *v = 0.5 * (*v + first) + moved / h);
+        v.iter_mut()
+            .zip(&first)
+            .zip(&moved[entry.span.v.clone()])
+            .for_each(|((v, first), moved)| *v = 0.5 * (*v + first) + moved / h);
         body.write_velocity(&mut core.x[entry.span.x.clone()], &v);
     }
 }

@@ -20,15 +20,17 @@
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
-use super::contacts::{build_rows, coasting, detect, gyroscopic, impulses, push, row_velocities, shift, solve, warm_start, whiten, zero};
+use super::contacts::{
+    build_rows, coasting, detect, gyroscopic, impulses, push, row_velocities, shift, solve, warm_start, whiten, zero,
+};
 use super::impact::{self, Candidate};
-use super::{closing, hold, reach};
 use super::projection::{self, Displacement};
 use super::{Frame, Stepper, Workspace, flight};
+use super::{closing, hold, reach};
 use crate::detect::Touch;
-use crate::pair::Reach;
 use crate::motion::coast;
 use crate::object::Level;
+use crate::pair::Reach;
 use crate::rows::RowSet;
 use crate::view::Entry;
 use crate::world::{Core, StepError};
@@ -123,7 +125,14 @@ impl TimeStepping {
 
     /// Times the impacts that free motion meets within the step and resolves them: `after` is the whitened velocity after them, forces not yet added. Where there are
     /// any, rows and whitened velocities are made anew for where they are.
-    fn impacts(&mut self, core: &mut Core, h: f64, u: &mut Vec<f64>, du_force: &mut Vec<f64>, after: &mut Vec<f64>) -> Result<(), StepError> {
+    fn impacts(
+        &mut self,
+        core: &mut Core,
+        h: f64,
+        u: &mut Vec<f64>,
+        du_force: &mut Vec<f64>,
+        after: &mut Vec<f64>,
+    ) -> Result<(), StepError> {
         let work = &mut self.work;
         after.clone_from(u);
         self.share.clear();
@@ -140,13 +149,21 @@ impl TimeStepping {
         for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
             let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], touch.contact.gap);
             let rest_speed = (-dv).max(impact::SLOWEST_BOUNCE);
-            let share = if touch.restitution > 0.0 { meeting(gap / h, v, dv).filter(|s| -(v + s * dv) > rest_speed) } else { None };
+            let share = if touch.restitution > 0.0 {
+                meeting(gap / h, v, dv).filter(|s| -(v + s * dv) > rest_speed)
+            } else {
+                None
+            };
             for i in block.sides().iter().flat_map(|s| s.u..s.u + s.dof) {
                 let slot = &mut self.share[i as usize];
                 *slot = share.map_or(*slot, |s| if *slot < 0.0 { s } else { slot.min(s) });
             }
             meets.push(share);
-            self.candidates.push(Candidate { takes_part: gap <= core.settings.drift_tolerance, rest_speed, restitution: touch.restitution });
+            self.candidates.push(Candidate {
+                takes_part: gap <= core.settings.drift_tolerance,
+                rest_speed,
+                restitution: touch.restitution,
+            });
         }
         if self.share.iter().all(|s| *s < 0.0) {
             return Ok(());
@@ -201,7 +218,8 @@ impl TimeStepping {
         for ((touch, candidate), block) in work.touches.drain(..).zip(&self.candidates).zip(&work.rows.blocks) {
             filed.push((touch, *candidate, self.impact[block.range()].to_vec()));
         }
-        let fresh = |t: &Touch| Candidate { takes_part: false, rest_speed: impact::SLOWEST_BOUNCE, restitution: t.restitution };
+        let fresh =
+            |t: &Touch| Candidate { takes_part: false, rest_speed: impact::SLOWEST_BOUNCE, restitution: t.restitution };
         filed.extend(found.into_iter().map(|t| (t.clone(), fresh(&t), Vec::new())));
         filed.sort_by_key(|(touch, ..)| touch.key.pair);
         work.touches.extend(filed.iter().map(|(touch, ..)| touch.clone()));
@@ -228,7 +246,9 @@ impl TimeStepping {
         }
         let (candidates, touches) = (&mut self.candidates, work.touches.len());
         work.islands.build(&work.rows, |b| b >= touches || candidates[b].takes_part);
-        for blocks in work.islands.iter().filter(|blocks| !blocks.iter().any(|&b| strikes.get(b as usize) == Some(&true))) {
+        for blocks in
+            work.islands.iter().filter(|blocks| !blocks.iter().any(|&b| strikes.get(b as usize) == Some(&true)))
+        {
             blocks.iter().map(|&b| b as usize).filter(|b| *b < touches).for_each(|b| candidates[b].takes_part = false);
         }
     }
@@ -244,14 +264,20 @@ impl TimeStepping {
         for (i, touch) in work.touches.iter().enumerate() {
             let (row, gap) = (work.rows.blocks[i].row as usize, touch.contact.gap);
             let struck = self.impact[row] > 0.0;
-            if !struck && gap > core.settings.drift_tolerance && touch.restitution > 0.0 && work.c[row] < -2.0 * self.candidates[i].rest_speed {
+            if !struck
+                && gap > core.settings.drift_tolerance
+                && touch.restitution > 0.0
+                && work.c[row] < -2.0 * self.candidates[i].rest_speed
+            {
                 keep[i] = gap + h * work.c[row] >= 0.0;
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / h };
         }
-        let (turning, coasting) = if work.targets.is_empty() { Default::default() } else { (gyroscopic(core), coasting(core, 0.5 * h)) };
+        let (turning, coasting) =
+            if work.targets.is_empty() { Default::default() } else { (gyroscopic(core), coasting(core, 0.5 * h)) };
         for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
-            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &coasting) - 0.5 * h * work.rows.row_velocity(block, 0, &turning);
+            work.c[block.row as usize] +=
+                work.rows.row_velocity(block, 0, &coasting) - 0.5 * h * work.rows.row_velocity(block, 0, &turning);
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
@@ -292,7 +318,11 @@ impl TimeStepping {
         projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean, h }, recovery, least)?;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
-        core.publish(&self.work.touches, impulses(&self.work, total), impulses(&self.work, &self.work.lambda).map(|i| i / h));
+        core.publish(
+            &self.work.touches,
+            impulses(&self.work, total),
+            impulses(&self.work, &self.work.lambda).map(|i| i / h),
+        );
         let kept = reach::left(&self.work, |i| self.work.targets[i].error, recovery);
         closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();

@@ -149,7 +149,11 @@ impl World {
         self.core.wake(id);
         let core = &mut self.core;
         let entry = &core.table.slots[id];
-        let (Some(collidable), Some(body), true) = (entry.object.collidable(), entry.object.integratable(), entry.moves()) else { return Ok(()) };
+        let (Some(collidable), Some(body), true) =
+            (entry.object.collidable(), entry.object.integratable(), entry.moves())
+        else {
+            return Ok(());
+        };
         let dof = entry.span.v.len();
         let (mut y, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof]);
         collidable.test_impulse(part, &core.sites[index], point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
@@ -176,7 +180,8 @@ impl World {
         let core = &mut self.core;
         let entry = core.table.slots.get(id).ok_or(WorldError::Stale)?;
         let any: &dyn std::any::Any = entry.object.as_ref();
-        let body = any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.object.name().to_string()))?;
+        let body =
+            any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.object.name().to_string()))?;
         let mut x = core.x[entry.span.x.clone()].to_vec();
         edit(body, &mut x);
         if !body.accepts(&x) {

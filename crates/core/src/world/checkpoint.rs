@@ -44,7 +44,9 @@ impl World {
     /// Goes back to where [`mark`](Self::mark) was called last. Switches and constants stay as they are; after objects came or went nothing is done.
     pub fn go_back(&mut self, to: &Checkpoint) {
         let core = &mut self.core;
-        if (to.x.len(), to.applied.len(), to.applied_generalized.len()) != (core.x.len(), core.applied.len(), core.applied_generalized.len()) {
+        if (to.x.len(), to.applied.len(), to.applied_generalized.len())
+            != (core.x.len(), core.applied.len(), core.applied_generalized.len())
+        {
             return;
         }
         (core.time, core.frame, core.inner_step) = (to.time, to.frame, to.inner_step);

@@ -34,7 +34,9 @@ pub enum StepError {
         time: f64,
     },
     /// The adaptive integrator cannot hold its tolerance.
-    #[error("'{object}' at t = {time} s: its motion needs more than the {steps} inner steps of this frame (the last of {step} s) at the integrator's tolerance {tolerance}; soften what acts on it, or loosen the tolerance")]
+    #[error(
+        "'{object}' at t = {time} s: its motion needs more than the {steps} inner steps of this frame (the last of {step} s) at the integrator's tolerance {tolerance}; soften what acts on it, or loosen the tolerance"
+    )]
     Tolerance {
         /// The object whose error is greatest.
         object: String,
@@ -157,25 +159,49 @@ impl Core {
 
     pub(crate) fn motion(&mut self) -> Motion<'_> {
         Motion {
-            table: &mut self.table, x: &mut self.x, sites: &mut self.sites, forces: &mut self.forces,
-            gravity: self.settings.gravity, implicit: self.implicit, applied: &self.applied, applied_generalized: &self.applied_generalized, held: &self.held, held_wrenches: &self.held_wrenches,
-            pinned: &self.pinned.0, pinned_sites: &mut self.pinned.1,
+            table: &mut self.table,
+            x: &mut self.x,
+            sites: &mut self.sites,
+            forces: &mut self.forces,
+            gravity: self.settings.gravity,
+            implicit: self.implicit,
+            applied: &self.applied,
+            applied_generalized: &self.applied_generalized,
+            held: &self.held,
+            held_wrenches: &self.held_wrenches,
+            pinned: &self.pinned.0,
+            pinned_sites: &mut self.pinned.1,
         }
     }
 
     /// Shows the contacts of the sub-step and files their forces as warm starts.
-    pub(crate) fn publish(&mut self, touches: &[Touch], impulses: impl Iterator<Item = Vec3>, forces: impl Iterator<Item = Vec3>) {
+    pub(crate) fn publish(
+        &mut self,
+        touches: &[Touch],
+        impulses: impl Iterator<Item = Vec3>,
+        forces: impl Iterator<Item = Vec3>,
+    ) {
         self.contacts.clear();
         for ((touch, impulse), force) in touches.iter().zip(impulses).zip(forces) {
             let (a, b) = (self.owners[touch.a as usize], self.owners[touch.b as usize]);
             let velocity = touch.velocity(&self.sites[touch.a as usize], &self.sites[touch.b as usize]);
             self.contacts.push(ContactPoint {
-                a: a.id, part_a: a.part as usize, b: b.id, part_b: b.part as usize, velocity, impulse, force,
-                point: touch.contact.point, normal: touch.contact.normal, gap: touch.contact.gap,
+                a: a.id,
+                part_a: a.part as usize,
+                b: b.id,
+                part_b: b.part as usize,
+                velocity,
+                impulse,
+                force,
+                point: touch.contact.point,
+                normal: touch.contact.normal,
+                gap: touch.contact.gap,
             });
         }
         let contacts = &self.contacts;
-        self.warm.replace(touches.iter().zip(contacts).filter(|(_, c)| c.force != Vec3::zeros()).map(|(t, c)| (t.key, c.force)));
+        self.warm.replace(
+            touches.iter().zip(contacts).filter(|(_, c)| c.force != Vec3::zeros()).map(|(t, c)| (t.key, c.force)),
+        );
     }
 
     /// Counts time, lets objects put right what they must, writes the sites anew and checks the state.
@@ -189,19 +215,30 @@ impl Core {
         }
         self.motion().refresh();
         let moves = |s: &Site| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
-        let fine = |e: &&Entry| self.x[e.span.x.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(moves);
+        let fine = |e: &&Entry| {
+            self.x[e.span.x.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(moves)
+        };
         let bad = self.table.iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
     }
 
     /// Stops forces and impulses that are not numbers, and objects that cannot move.
     pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
-        let trouble = |e: &Entry| Some(StepError::Singular { why: e.object.integratable()?.trouble()?, object: e.object.name().to_string(), time: self.time });
+        let trouble = |e: &Entry| {
+            Some(StepError::Singular {
+                why: e.object.integratable()?.trouble()?,
+                object: e.object.name().to_string(),
+                time: self.time,
+            })
+        };
         if let Some(error) = self.table.iter().filter(|e| e.moves()).find_map(trouble) {
             return Err(error);
         }
         let accelerates = |s: &Site| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
-        let fine = |e: &&Entry| dp[e.span.v.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(accelerates);
+        let fine = |e: &&Entry| {
+            dp[e.span.v.clone()].iter().all(|x| x.is_finite())
+                && self.sites[e.span.site.clone()].iter().all(accelerates)
+        };
         let bad = self.table.iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "the force on it")))
     }

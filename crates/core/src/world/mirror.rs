@@ -60,7 +60,8 @@ impl World {
         let entry = core.table.slots.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.object.name().to_string();
         let sync = entry.object.net_sync().ok_or_else(|| MirrorError::NotSynchronizable(name()))?;
-        sync.read_data(data, &mut core.x[entry.span.x.clone()]).map_err(|why| MirrorError::Message { name: name(), why })?;
+        sync.read_data(data, &mut core.x[entry.span.x.clone()])
+            .map_err(|why| MirrorError::Message { name: name(), why })?;
         core.motion().refresh_one(id);
         Ok(())
     }

@@ -77,7 +77,9 @@ pub enum WorldError {
         given: usize,
     },
     /// Numbers that are no state of this object: wrong length, not finite, or an orientation that is not of unit length.
-    #[error("'{0}': these numbers are no state of it (wrong length, not finite, or an orientation that is not of unit length)")]
+    #[error(
+        "'{0}': these numbers are no state of it (wrong length, not finite, or an orientation that is not of unit length)"
+    )]
     BadState(String),
     /// A number given is not finite.
     #[error("'{0}': a number given is not finite")]
@@ -99,12 +101,39 @@ impl World {
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
         let core = Core {
-            table: Table::default(), x: Default::default(), dof: 0, sites: Vec::new(), owners: Vec::new(), applied: Vec::new(), applied_generalized: Vec::new(), implicit: false, held: Vec::new(), held_wrenches: Vec::new(), pinned: Default::default(), unpinned: Default::default(),
-            forces: Forces::default(), settings, time: 0.0, frame: 0, broad: Box::<SweepAndPrune>::default(),
-            detect_scratch: Scratch::default(), solver: Box::new(GaussSeidel), warm: WarmStarts::default(), contacts: Vec::new(),
-            report: StepReport::default(), next_serial: 0, sleepers: Sleepers::default(), inner_step: 0.0,
+            table: Table::default(),
+            x: Default::default(),
+            dof: 0,
+            sites: Vec::new(),
+            owners: Vec::new(),
+            applied: Vec::new(),
+            applied_generalized: Vec::new(),
+            implicit: false,
+            held: Vec::new(),
+            held_wrenches: Vec::new(),
+            pinned: Default::default(),
+            unpinned: Default::default(),
+            forces: Forces::default(),
+            settings,
+            time: 0.0,
+            frame: 0,
+            broad: Box::<SweepAndPrune>::default(),
+            detect_scratch: Scratch::default(),
+            solver: Box::new(GaussSeidel),
+            warm: WarmStarts::default(),
+            contacts: Vec::new(),
+            report: StepReport::default(),
+            next_serial: 0,
+            sleepers: Sleepers::default(),
+            inner_step: 0.0,
         };
-        Ok(World { core, stepper: Box::<TimeStepping>::default(), before: Vec::new(), warm_before: WarmStarts::default(), names: BTreeMap::new() })
+        Ok(World {
+            core,
+            stepper: Box::<TimeStepping>::default(),
+            before: Vec::new(),
+            warm_before: WarmStarts::default(),
+            names: BTreeMap::new(),
+        })
     }
 
     /// Replaces the stepper.
@@ -211,7 +240,14 @@ impl World {
     /// A read-only view, as objects get it.
     pub fn view(&self) -> WorldView<'_> {
         let c = &self.core;
-        WorldView { time: c.time, gravity: c.settings.gravity, implicit: false, x: &c.x, sites: &c.sites, table: &c.table }
+        WorldView {
+            time: c.time,
+            gravity: c.settings.gravity,
+            implicit: false,
+            x: &c.x,
+            sites: &c.sites,
+            table: &c.table,
+        }
     }
 
     /// Ids in the order in which the objects were added.
@@ -297,7 +333,8 @@ impl World {
         core.applied.resize(span.site.end, Wrench::default());
         let serial = core.next_serial;
         core.next_serial += 1;
-        let id = core.table.slots.insert(Entry::new(object, span.clone(), Status { mode, ..Status::default() }, serial));
+        let id =
+            core.table.slots.insert(Entry::new(object, span.clone(), Status { mode, ..Status::default() }, serial));
         core.table.order.push(id);
         core.owners.extend((0..dims.sites).map(|part| Owner { id, part: part as u32, serial }));
         core.motion().refresh_one(id);
@@ -322,7 +359,10 @@ impl World {
         let (dx, dv, ds) = (gone.span.x.len(), gone.span.v.len(), gone.span.site.len());
         for &other in &core.table.order {
             let span = &mut core.table.slots[other].span;
-            if span.x.start >= gone.span.x.end && span.v.start >= gone.span.v.end && span.site.start >= gone.span.site.end {
+            if span.x.start >= gone.span.x.end
+                && span.v.start >= gone.span.v.end
+                && span.site.start >= gone.span.site.end
+            {
                 *span = Span {
                     x: span.x.start - dx..span.x.end - dx,
                     v: span.v.start - dv..span.v.end - dv,
@@ -340,10 +380,31 @@ impl World {
         let c = &self.core;
         World {
             core: Core {
-                table: c.table.clone(), x: c.x.fork(), dof: c.dof, sites: c.sites.clone(), owners: c.owners.clone(), applied: c.applied.clone(), applied_generalized: c.applied_generalized.clone(), implicit: c.implicit, pinned: Default::default(), unpinned: Default::default(),
-                held: c.held.clone(), held_wrenches: c.held_wrenches.clone(), forces: c.forces.clone(), settings: c.settings, time: c.time, frame: c.frame,
-                broad: Box::<SweepAndPrune>::default(), detect_scratch: Scratch::default(), solver: c.solver.fork(), warm: c.warm.clone(),
-                contacts: c.contacts.clone(), report: c.report, next_serial: c.next_serial, sleepers: c.sleepers.clone(), inner_step: c.inner_step,
+                table: c.table.clone(),
+                x: c.x.fork(),
+                dof: c.dof,
+                sites: c.sites.clone(),
+                owners: c.owners.clone(),
+                applied: c.applied.clone(),
+                applied_generalized: c.applied_generalized.clone(),
+                implicit: c.implicit,
+                pinned: Default::default(),
+                unpinned: Default::default(),
+                held: c.held.clone(),
+                held_wrenches: c.held_wrenches.clone(),
+                forces: c.forces.clone(),
+                settings: c.settings,
+                time: c.time,
+                frame: c.frame,
+                broad: Box::<SweepAndPrune>::default(),
+                detect_scratch: Scratch::default(),
+                solver: c.solver.fork(),
+                warm: c.warm.clone(),
+                contacts: c.contacts.clone(),
+                report: c.report,
+                next_serial: c.next_serial,
+                sleepers: c.sleepers.clone(),
+                inner_step: c.inner_step,
             },
             stepper: self.stepper.fork(),
             before: Vec::new(),

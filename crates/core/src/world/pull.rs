@@ -55,7 +55,9 @@ impl World {
         let index = self.part(pull.id, pull.part, &[pull.point, pull.target, Vec3::repeat(pull.frequency)])?;
         self.core.wake(pull.id);
         let entry = &self.core.table.slots[pull.id];
-        let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pull.part)) else { return Ok(Wrench::default()) };
+        let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pull.part)) else {
+            return Ok(Wrench::default());
+        };
         let (site, dof, h) = (self.core.sites[index], entry.span.v.len(), self.core.settings.dt);
         let held = site.pose.rotation * pull.point + site.position();
         let (v, omega) = (site.velocity_at(&held), pull.frequency.max(0.0));
@@ -71,7 +73,14 @@ impl World {
 }
 
 /// Whitened responses to unit impulses at a point, a row of `dof` numbers each.
-fn responses(collidable: &dyn Collidable, part: usize, site: &Site, dof: usize, point: &Vec3, axes: [Vec3; 3]) -> Vec<f64> {
+fn responses(
+    collidable: &dyn Collidable,
+    part: usize,
+    site: &Site,
+    dof: usize,
+    point: &Vec3,
+    axes: [Vec3; 3],
+) -> Vec<f64> {
     let mut y = vec![0.0; 3 * dof];
     collidable.test_impulse(part, site, point, &axes, 1.0, &mut y);
     y

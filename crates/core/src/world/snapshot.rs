@@ -103,7 +103,8 @@ impl World {
 
     /// Puts a saved state back. The world must hold the same objects in the same order.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
-        let (saved, rest): (Snapshot, &[u8]) = postcard::take_from_bytes(bytes).map_err(|e| SnapshotError::Format(e.to_string()))?;
+        let (saved, rest): (Snapshot, &[u8]) =
+            postcard::take_from_bytes(bytes).map_err(|e| SnapshotError::Format(e.to_string()))?;
         if !rest.is_empty() {
             return Err(SnapshotError::Format(format!("{} bytes follow its end", rest.len())));
         }
@@ -162,21 +163,32 @@ impl World {
         if sizes(saved) != [c.x.len(), c.sites.len(), c.sites.len(), c.dof] {
             return Err(SnapshotError::Format("its tables have the wrong lengths".into()));
         }
-        let numbers = saved.x.iter().chain(&saved.applied_generalized).chain(saved.accelerations.iter().flatten()).chain(saved.applied.iter().flatten());
+        let numbers = saved
+            .x
+            .iter()
+            .chain(&saved.applied_generalized)
+            .chain(saved.accelerations.iter().flatten())
+            .chain(saved.applied.iter().flatten());
         let steps = saved.time.is_finite() && saved.inner_step.is_finite() && saved.inner_step >= 0.0;
         let finite = steps && numbers.copied().all(f64::is_finite) && saved.warm.finite();
-        let states = c.table.iter().all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.span.x.clone()])));
+        let states =
+            c.table.iter().all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.span.x.clone()])));
         if !(finite && states) {
             return Err(SnapshotError::NotFinite);
         }
         let mut members: Vec<u32> = saved.groups.iter().flat_map(|g| &g.members).copied().collect();
         members.sort_unstable();
-        let still = saved.objects.iter().flat_map(|o| o.still.from.iter().flatten().chain([&o.still.since])).all(|x| x.is_finite());
+        let still = saved
+            .objects
+            .iter()
+            .flat_map(|o| o.still.from.iter().flatten().chain([&o.still.since]))
+            .all(|x| x.is_finite());
         let asleep = saved.objects.iter().filter(|o| o.asleep).map(|o| o.serial);
         if !(still && saved.groups.iter().all(Group::sound) && asleep.eq(members)) {
             return Err(SnapshotError::Format("its sleepers do not add up".into()));
         }
-        let counts = saved.objects.is_sorted_by(|a, b| a.serial < b.serial) && saved.objects.iter().all(|o| o.serial < saved.next_serial);
+        let counts = saved.objects.is_sorted_by(|a, b| a.serial < b.serial)
+            && saved.objects.iter().all(|o| o.serial < saved.next_serial);
         if counts && saved.next_serial < MOST && saved.frame < MOST as u64 * MOST as u64 && saved.warm.in_order() {
             return Ok(());
         }

@@ -1,6 +1,8 @@
 //! The articulated-body kernel against dense mechanics and closed forms.
 
-use crate::abm_reference::{Kinds, Numbers, bias, drift, jacobian, mass_matrix, moved, poses, random_state, random_tree};
+use crate::abm_reference::{
+    Kinds, Numbers, bias, drift, jacobian, mass_matrix, moved, poses, random_state, random_tree,
+};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use tumble_core::articulated::{Dynamics, forward_dynamics};
 use tumble_core::collide::{Mat3, Pose, Vec3};
@@ -10,7 +12,9 @@ use tumble_core::{Joint, LinkMass, Model, ModelBuilder, Wrench};
 const TREES: [(usize, u64); 9] = [(1, 1), (1, 5), (2, 2), (3, 3), (7, 4), (12, 5), (25, 6), (50, 7), (100, 8)];
 
 fn trees() -> impl Iterator<Item = (Model, u64)> {
-    TREES.iter().flat_map(|&(links, seed)| [Kinds::Hinges, Kinds::All].map(|kinds| (random_tree(links, kinds, seed), seed)))
+    TREES
+        .iter()
+        .flat_map(|&(links, seed)| [Kinds::Hinges, Kinds::All].map(|kinds| (random_tree(links, kinds, seed), seed)))
 }
 
 fn refreshed(model: &Model, seed: u64) -> (Dynamics, Vec<f64>, Vec<f64>) {
@@ -43,7 +47,8 @@ fn accelerations_balance_the_dense_equations_of_motion() {
         let (d, q, v) = refreshed(&model, seed);
         let mut n = Numbers::new(seed + 100);
         let (tau, gravity) = (n.list(d.dof(), 3.0), 9.81 * n.vector());
-        let wrenches: Vec<Wrench> = (0..d.links()).map(|_| Wrench { torque: n.vector(), force: 4.0 * n.vector() }).collect();
+        let wrenches: Vec<Wrench> =
+            (0..d.links()).map(|_| Wrench { torque: n.vector(), force: 4.0 * n.vector() }).collect();
         let mut qdd = vec![0.0; d.dof()];
         d.accelerate_in(&mut d.scratch(), &gravity, &tau, &wrenches, &mut qdd);
         let inertial = mass_matrix(&model, &q) * DVector::from_vec(qdd);
@@ -74,10 +79,15 @@ fn uniform_gravity_is_a_wrench_on_every_link() {
         let (d, q, _) = refreshed(&model, seed);
         let gravity = Vec3::new(1.0, 2.0, -9.0);
         let poses = poses(&model, &q);
-        let weights: Vec<Wrench> = model.links().iter().zip(&poses).map(|(link, pose)| {
-            let force = link.mass.mass * gravity;
-            Wrench { torque: (pose.rotation * link.mass.center).cross(&force), force }
-        }).collect();
+        let weights: Vec<Wrench> = model
+            .links()
+            .iter()
+            .zip(&poses)
+            .map(|(link, pose)| {
+                let force = link.mass.mass * gravity;
+                Wrench { torque: (pose.rotation * link.mass.center).cross(&force), force }
+            })
+            .collect();
         let tau = vec![0.0; d.dof()];
         let (mut a, mut b) = (vec![0.0; d.dof()], vec![0.0; d.dof()]);
         d.accelerate_in(&mut d.scratch(), &gravity, &tau, &[], &mut a);
@@ -98,12 +108,16 @@ fn poses_velocities_and_accelerations_of_links() {
         for i in 0..d.links() {
             let pose = d.link_pose(i);
             assert!((pose.translation.vector - poses[i].translation.vector).norm() < 1e-12);
-            let turned = pose.rotation.to_rotation_matrix().into_inner() - poses[i].rotation.to_rotation_matrix().into_inner();
+            let turned =
+                pose.rotation.to_rotation_matrix().into_inner() - poses[i].rotation.to_rotation_matrix().into_inner();
             assert!(turned.amax() < 1e-12);
             let j = jacobian(&model, &poses, i, &Vec3::zeros());
             let velocity = &j * DVector::from_column_slice(&v);
             let (angular, linear) = d.link_velocity(i);
-            assert!((angular - velocity.fixed_rows::<3>(0)).norm() < 1e-11 && (linear - velocity.fixed_rows::<3>(3)).norm() < 1e-11);
+            assert!(
+                (angular - velocity.fixed_rows::<3>(0)).norm() < 1e-11
+                    && (linear - velocity.fixed_rows::<3>(3)).norm() < 1e-11
+            );
             let a = &j * DVector::from_column_slice(&qdd) + drift(&model, &q, &v, i, &Vec3::zeros());
             let size = a.amax().max(1.0);
             assert!((found[i].0 - a.fixed_rows::<3>(0)).norm() < 1e-10 * size, "{i}: {:?} {a}", found[i]);
@@ -194,7 +208,11 @@ fn a_rod_swings_as_the_closed_form_says() {
     // I q̈ = −m g (l/2) sin q with I = m l²/3.
     let (mass, length) = (2.0, 0.8);
     let moment = mass * length * length / 12.0;
-    let rod = LinkMass { mass, center: Vec3::new(0.0, 0.0, -0.5 * length), inertia: Mat3::from_diagonal(&Vec3::new(moment, moment, 0.0)) };
+    let rod = LinkMass {
+        mass,
+        center: Vec3::new(0.0, 0.0, -0.5 * length),
+        inertia: Mat3::from_diagonal(&Vec3::new(moment, moment, 0.0)),
+    };
     let mut builder = ModelBuilder::new();
     builder.link("rod", None, Joint::revolute(Vec3::y()), Pose::translation(0.0, 0.0, 3.0), rod);
     let model = builder.build().unwrap();
@@ -215,7 +233,14 @@ fn a_free_top_obeys_euler() {
     let model = builder.build().unwrap();
     let (omega, mut qdd) = (Vec3::new(0.3, -2.0, 1.1), [0.0; 6]);
     let v = [omega.x, omega.y, omega.z, 1.0, 2.0, 3.0];
-    forward_dynamics(&mut Dynamics::new(&model), &-Vec3::z(), &[5.0, 6.0, 7.0, 0.0, 0.0, 0.0, 1.0], &v, &[0.0; 6], &mut qdd);
+    forward_dynamics(
+        &mut Dynamics::new(&model),
+        &-Vec3::z(),
+        &[5.0, 6.0, 7.0, 0.0, 0.0, 0.0, 1.0],
+        &v,
+        &[0.0; 6],
+        &mut qdd,
+    );
     let wanted = -omega.cross(&moments.component_mul(&omega)).component_div(&moments);
     assert!((Vec3::new(qdd[0], qdd[1], qdd[2]) - wanted).norm() < 1e-14);
     assert!((Vec3::new(qdd[3], qdd[4], qdd[5]) + Vec3::z()).norm() < 1e-14);
@@ -226,7 +251,11 @@ fn gimbal() -> Model {
     let mut builder = ModelBuilder::new();
     let outer = builder.link("yaw", None, Joint::revolute(Vec3::z()), Pose::identity(), LinkMass::none());
     let middle = builder.link("pitch", Some(outer), Joint::revolute(Vec3::y()), Pose::identity(), LinkMass::none());
-    let body = LinkMass { mass: 1.0, center: Vec3::new(0.1, 0.0, 0.2), inertia: Mat3::from_diagonal(&Vec3::new(0.1, 0.2, 0.3)) };
+    let body = LinkMass {
+        mass: 1.0,
+        center: Vec3::new(0.1, 0.0, 0.2),
+        inertia: Mat3::from_diagonal(&Vec3::new(0.1, 0.2, 0.3)),
+    };
     builder.link("roll", Some(middle), Joint::revolute(Vec3::x()), Pose::identity(), body);
     builder.build().unwrap()
 }
@@ -297,7 +326,13 @@ fn a_ball_joint_moves_as_three_hinges_do() {
     single.refresh(rotation.coords.as_slice(), own.as_slice());
     let wrench = Wrench { torque: Vec3::new(0.4, 0.1, -0.3), force: Vec3::zeros() };
     let (mut qdd, mut out) = ([0.0; 3], [(Vec3::zeros(), Vec3::zeros()); 3]);
-    hinges.accelerate_in(&mut hinges.scratch(), &-Vec3::z(), &[0.0; 3], &[Wrench::default(), Wrench::default(), wrench], &mut qdd);
+    hinges.accelerate_in(
+        &mut hinges.scratch(),
+        &-Vec3::z(),
+        &[0.0; 3],
+        &[Wrench::default(), Wrench::default(), wrench],
+        &mut qdd,
+    );
     hinges.link_accelerations(&qdd, &mut out);
     let wanted = out[2].0;
     single.accelerate_in(&mut single.scratch(), &-Vec3::z(), &[0.0; 3], &[wrench], &mut qdd);
@@ -318,12 +353,14 @@ fn energy_of_the_whitened_velocity_and_power() {
         };
         let energy = kinetic(&d, &v);
         let poses = poses(&model, &q);
-        let links: f64 = (0..d.links()).map(|i| {
-            let (mass, (omega, velocity)) = (&model.links()[i].mass, d.link_velocity(i));
-            let r = poses[i].rotation.to_rotation_matrix().into_inner();
-            let center = velocity + omega.cross(&(r * mass.center));
-            0.5 * mass.mass * center.norm_squared() + 0.5 * omega.dot(&(r * mass.inertia * r.transpose() * omega))
-        }).sum();
+        let links: f64 = (0..d.links())
+            .map(|i| {
+                let (mass, (omega, velocity)) = (&model.links()[i].mass, d.link_velocity(i));
+                let r = poses[i].rotation.to_rotation_matrix().into_inner();
+                let center = velocity + omega.cross(&(r * mass.center));
+                0.5 * mass.mass * center.norm_squared() + 0.5 * omega.dot(&(r * mass.inertia * r.transpose() * omega))
+            })
+            .sum();
         assert!((energy - links).abs() < 1e-12 * links, "{energy} {links}");
         let tau = Numbers::new(seed + 3).list(d.dof(), 1.0);
         let mut qdd = vec![0.0; d.dof()];

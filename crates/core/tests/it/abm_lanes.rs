@@ -60,25 +60,32 @@ fn a_lane_of_far_angles_or_of_gimbal_lock_disturbs_no_other() {
     let mut builder = ModelBuilder::new();
     let outer = builder.link("yaw", None, Joint::revolute(Vec3::z()), Pose::identity(), LinkMass::none());
     let middle = builder.link("pitch", Some(outer), Joint::revolute(Vec3::y()), Pose::identity(), LinkMass::none());
-    let body = LinkMass { mass: 1.0, center: Vec3::new(0.1, 0.0, 0.2), inertia: Mat3::from_diagonal(&Vec3::new(0.1, 0.2, 0.3)) };
+    let body = LinkMass {
+        mass: 1.0,
+        center: Vec3::new(0.1, 0.0, 0.2),
+        inertia: Mat3::from_diagonal(&Vec3::new(0.1, 0.2, 0.3)),
+    };
     builder.link("roll", Some(middle), Joint::revolute(Vec3::x()), Pose::identity(), body);
     let model = builder.build().unwrap();
     let near = [0.1, 3e7, std::f64::consts::FRAC_PI_2, -1e12, 0.4, -0.5, 1.0, 2.0];
     let pitch: Vec<f64> = near.iter().chain(&near.map(|x| 0.3 - x)).copied().collect();
-    let states: Vec<State> = pitch.iter().map(|&pitch| (vec![0.3, pitch, 1.1], vec![1.0, 2.0, 3.0], vec![0.1; 3])).collect();
+    let states: Vec<State> =
+        pitch.iter().map(|&pitch| (vec![0.3, pitch, 1.1], vec![1.0, 2.0, 3.0], vec![0.1; 3])).collect();
     check_all(&model, &states);
 }
 
 /// Floats between two numbers of the same sign, or the sum of their distances to 0.
 fn steps_between(a: f64, b: f64) -> u64 {
-    let key = |x: f64| if x.is_sign_negative() { -((x.to_bits() & (u64::MAX >> 1)) as i64) } else { x.to_bits() as i64 };
+    let key =
+        |x: f64| if x.is_sign_negative() { -((x.to_bits() & (u64::MAX >> 1)) as i64) } else { x.to_bits() as i64 };
     key(a).abs_diff(key(b))
 }
 
 #[test]
 fn sine_and_cosine_are_libms_to_one_step() {
     let mut n = Numbers::new(1);
-    let mut angles: Vec<f64> = [0.0, 1e-300, 1e-9, 0.5, 1e6, 1.000_000_1e6, 1e15, 1e300].into_iter().flat_map(|x| [x, -x]).collect();
+    let mut angles: Vec<f64> =
+        [0.0, 1e-300, 1e-9, 0.5, 1e6, 1.000_000_1e6, 1e15, 1e300].into_iter().flat_map(|x| [x, -x]).collect();
     for size in [1e-3, 0.8, 4.0, 30.0, 1e3, 1e5, 1e6, 1e8] {
         angles.extend(n.list(40_000, size));
     }

@@ -99,10 +99,13 @@ pub fn random_state(model: &Model, seed: u64) -> (Vec<f64>, Vec<f64>) {
 pub fn poses(model: &Model, q: &[f64]) -> Vec<Pose> {
     let mut poses: Vec<Pose> = Vec::new();
     for link in model.links() {
-        let quaternion = |k: usize| UnitQuaternion::from_quaternion(Quaternion::new(q[k + 3], q[k], q[k + 1], q[k + 2]));
+        let quaternion =
+            |k: usize| UnitQuaternion::from_quaternion(Quaternion::new(q[k + 3], q[k], q[k + 1], q[k + 2]));
         let k = link.q;
         let within = match link.joint {
-            Joint::Revolute { axis } => Pose::from_parts(Translation3::identity(), UnitQuaternion::from_scaled_axis(q[k] * axis)),
+            Joint::Revolute { axis } => {
+                Pose::from_parts(Translation3::identity(), UnitQuaternion::from_scaled_axis(q[k] * axis))
+            }
             Joint::Prismatic { axis } => Pose::from_parts((q[k] * axis).into(), UnitQuaternion::identity()),
             Joint::Spherical => Pose::from_parts(Translation3::identity(), quaternion(k)),
             Joint::Floating => Pose::from_parts(Translation3::new(q[k], q[k + 1], q[k + 2]), quaternion(k + 3)),

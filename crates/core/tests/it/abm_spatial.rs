@@ -21,7 +21,9 @@ fn force() -> impl Strategy<Value = Force> {
 }
 
 fn frame() -> impl Strategy<Value = Transform> {
-    (vector(), vector()).prop_map(|(turn, at)| Pose::from_parts(Vec3::from(at).into(), UnitQuaternion::from_scaled_axis(Vec3::from(turn))).into())
+    (vector(), vector()).prop_map(|(turn, at)| {
+        Pose::from_parts(Vec3::from(at).into(), UnitQuaternion::from_scaled_axis(Vec3::from(turn))).into()
+    })
 }
 
 /// Mass, centre and the inertia of three pairs of points about it.
@@ -72,7 +74,11 @@ fn articulated() -> impl Strategy<Value = (ArticulatedInertia, SixSquare)> {
         let dense = a.transpose() * a + 0.1 * SixSquare::identity();
         let block = |i, j| -> Mat3 { dense.fixed_view::<3, 3>(i, j).into_owned() };
         let rows = Matrix::from(block(0, 3).transpose());
-        let inertia = ArticulatedInertia { rotational: block(0, 0).into(), coupling: [rows.x, rows.y, rows.z], mass: block(3, 3).into() };
+        let inertia = ArticulatedInertia {
+            rotational: block(0, 0).into(),
+            coupling: [rows.x, rows.y, rows.z],
+            mass: block(3, 3).into(),
+        };
         (inertia, dense)
     })
 }

@@ -72,7 +72,9 @@ fn set(world: &mut World, change: impl Fn(&mut Settings)) {
 
 fn run(world: &mut World, seconds: f64) {
     let frames = (seconds / world.settings().dt).round() as usize;
-    (0..frames).for_each(|_| { world.step().unwrap(); });
+    (0..frames).for_each(|_| {
+        world.step().unwrap();
+    });
 }
 
 const MOMENTS: [f64; 3] = [1.0, 2.0, 3.0];
@@ -133,7 +135,10 @@ fn it_is_of_fifth_order_on_a_free_and_on_a_driven_body() {
         let (coarse, middle, fine) = (error(1.0 / 16.0), error(1.0 / 32.0), error(1.0 / 64.0));
         let (first, second) = ((coarse.0 / middle.0).log2(), (middle.0 / fine.0).log2());
         println!("driven {driven}: {coarse:?} {middle:?} {fine:?}; orders {first} {second}");
-        assert!((second - 5.0).abs() < 0.3 && fine.0 < 1e-6, "driven {driven}: order {first}, {second} ({coarse:?}, {middle:?}, {fine:?})");
+        assert!(
+            (second - 5.0).abs() < 0.3 && fine.0 < 1e-6,
+            "driven {driven}: order {first}, {second} ({coarse:?}, {middle:?}, {fine:?})"
+        );
     }
 }
 
@@ -141,13 +146,19 @@ fn it_is_of_fifth_order_on_a_free_and_on_a_driven_body() {
 fn tangle(dt: f64, integrator: Integrator) -> Vec<f64> {
     let mut world = world("backtracking", dt);
     set(&mut world, |s| (s.integrator, s.integrator_tolerance) = (integrator, 0.1));
-    let mass = |i: [f64; 3]| LinkMass { mass: 1.0, center: Vec3::new(0.05, 0.1, -0.2), inertia: Mat3::from_diagonal(&(0.02 * Vec3::from(i))) };
+    let mass = |i: [f64; 3]| LinkMass {
+        mass: 1.0,
+        center: Vec3::new(0.05, 0.1, -0.2),
+        inertia: Mat3::from_diagonal(&(0.02 * Vec3::from(i))),
+    };
     let mut builder = ModelBuilder::new();
     let base = builder.link("base", None, Joint::Floating, Pose::identity(), mass([1.0, 2.0, 3.0 - 0.1]));
-    let arm = builder.link("arm", Some(base), Joint::Spherical, Pose::translation(0.1, 0.0, -0.4), mass([2.0, 1.5, 1.0]));
+    let arm =
+        builder.link("arm", Some(base), Joint::Spherical, Pose::translation(0.1, 0.0, -0.4), mass([2.0, 1.5, 1.0]));
     builder.link("hand", Some(arm), Joint::Spherical, Pose::translation(0.0, 0.2, -0.3), mass([1.0, 1.0, 0.5]));
     let spins = [0.5, 1.0, -0.7, 0.1, 0.2, 0.3, -2.0, 0.4, 1.0, 1.5, -1.0, 2.0];
-    let id = world.add(ArticulatedBody::new("tangle", builder.build().unwrap()).with_velocities(&spins).unwrap()).unwrap();
+    let id =
+        world.add(ArticulatedBody::new("tangle", builder.build().unwrap()).with_velocities(&spins).unwrap()).unwrap();
     for _ in 0..(1.0 / dt).round() as usize {
         let report = world.step().unwrap();
         assert!(report.inner_steps <= 1 && report.tries == 1);
@@ -158,7 +169,9 @@ fn tangle(dt: f64, integrator: Integrator) -> Vec<f64> {
 #[test]
 fn it_is_of_fifth_order_on_ball_joints_and_floating_bases() {
     let exact = tangle(1.0 / 4096.0, Integrator::Rk4);
-    let error = |dt: f64| tangle(dt, Integrator::DormandPrince).iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let error = |dt: f64| {
+        tangle(dt, Integrator::DormandPrince).iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
     let (coarse, middle, fine) = (error(1.0 / 32.0), error(1.0 / 64.0), error(1.0 / 128.0));
     let orders = ((coarse / middle).log2(), (middle / fine).log2());
     println!("{coarse:e} {middle:e} {fine:e}: {orders:?}");
@@ -188,13 +201,20 @@ fn it_keeps_angular_momentum_and_energy_of_the_free_body() {
 fn the_error_of_an_oscillator_goes_with_the_tolerance() {
     let at = |tolerance: f64| {
         let mut world = adaptive(1.0 / 10.0, tolerance);
-        let id = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+        let id = world
+            .add(
+                RigidBody::with_mass("ball", sphere(0.1), 1.0)
+                    .unwrap()
+                    .moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros()),
+            )
+            .unwrap();
         world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: 100.0, c: 0.0 }).unwrap();
         let (mut steps, mut worst) = (0, 0.0f64);
         for frame in 1..=100 {
             steps += world.step().unwrap().inner_steps;
             let t = frame as f64 / 10.0;
-            let off = (position(&world, id).x - (10.0 * t).sin()).hypot((velocity(&world, id).x / 10.0) - (10.0 * t).cos());
+            let off =
+                (position(&world, id).x - (10.0 * t).sin()).hypot((velocity(&world, id).x / 10.0) - (10.0 * t).cos());
             worst = worst.max(off);
         }
         (worst, steps)
@@ -205,7 +225,10 @@ fn the_error_of_an_oscillator_goes_with_the_tolerance() {
         let (coarse, fine) = (pair[0], pair[1]);
         // a hundredth of the tolerance: 2.5 times the steps, and with order five a hundredth of the error
         let (gain, steps) = (coarse.0 / fine.0, fine.1 as f64 / coarse.1 as f64);
-        assert!(gain > 40.0 && (2.0..3.0).contains(&steps), "at {tolerance:e}: error {gain} times less in {steps} times the steps");
+        assert!(
+            gain > 40.0 && (2.0..3.0).contains(&steps),
+            "at {tolerance:e}: error {gain} times less in {steps} times the steps"
+        );
         assert!(fine.0 < 200.0 * tolerance, "at {tolerance:e}: error {:e}", fine.0);
     }
 }
@@ -220,7 +243,11 @@ fn forces_are_taken_at_the_time_of_their_stage() {
         let steps = world.step().unwrap().inner_steps;
         let exact = (0.25 * frame as f64).powi(5);
         let off = (velocity(&world, id).x - exact).abs();
-        assert!(off < 1e-14 * exact.max(1.0), "frame {frame} in {steps} steps: momentum {} off by {off:e}", velocity(&world, id).x);
+        assert!(
+            off < 1e-14 * exact.max(1.0),
+            "frame {frame} in {steps} steps: momentum {} off by {off:e}",
+            velocity(&world, id).x
+        );
     }
 }
 
@@ -229,8 +256,11 @@ fn forces_are_taken_at_the_time_of_their_stage() {
 fn strokes_against_a_wall_are_located_within_inner_steps() {
     let mut world = adaptive(0.1, 1e-10);
     let wall = Pose::new(Vec3::new(0.6, 0.0, 0.0), Vec3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
-    world.add_static(RigidBody::fixture("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall)).unwrap();
-    let body = RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().surface(1.0, 0.0).at(Pose::translation(-1.0, 0.0, 0.0));
+    world
+        .add_static(RigidBody::fixture("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall))
+        .unwrap();
+    let body =
+        RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().surface(1.0, 0.0).at(Pose::translation(-1.0, 0.0, 0.0));
     let id = world.add(body).unwrap();
     world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: 50.0, c: 0.0 }).unwrap();
     // x = −cos(5t) up to 0.5 at 5t = 2π/3; then from phase −2π/3 again
@@ -241,7 +271,11 @@ fn strokes_against_a_wall_are_located_within_inner_steps() {
         (strokes, tries) = (strokes + report.impact_passes.min(1), tries.max(report.tries));
         let phase = (5.0 * world.time() + reach) % (2.0 * reach) - reach;
         let off = (position(&world, id).x + phase.cos()).hypot(velocity(&world, id).x / 5.0 - phase.sin());
-        assert!(report.max_penetration <= world.settings().contact_tolerance, "frame {frame}: {:e} m deep", report.max_penetration);
+        assert!(
+            report.max_penetration <= world.settings().contact_tolerance,
+            "frame {frame}: {:e} m deep",
+            report.max_penetration
+        );
         worst = worst.max(off);
     }
     println!("{strokes} strokes, worst {worst:e}, {tries} tries");
@@ -258,8 +292,15 @@ fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
     for tolerance in [1e-3, 1e-6] {
         let mut world = adaptive(0.1, tolerance);
         let wall = Pose::new(Vec3::new(0.6, 0.0, 0.0), Vec3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
-        world.add_static(RigidBody::fixture("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall)).unwrap();
-        let body = RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.25, 0.0, 0.0));
+        world
+            .add_static(
+                RigidBody::fixture("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall),
+            )
+            .unwrap();
+        let body = RigidBody::with_mass("ball", sphere(0.1), 2.0)
+            .unwrap()
+            .surface(1.0, 0.0)
+            .at(Pose::translation(0.25, 0.0, 0.0));
         let id = world.add(body).unwrap();
         world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: -k, c: 0.0 }).unwrap();
         let stroke = 2f64.acosh() / rate;
@@ -273,7 +314,10 @@ fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
         }
         println!("tolerance {tolerance:e}: {strokes} strokes, off by {worst:e}");
         // what is wrong at a stroke grows by up to e^(2·1.317) = 14 until the next
-        assert!(strokes == 2 && worst < 2.0 * tolerance, "tolerance {tolerance:e}: {strokes} strokes, off by {worst:e}");
+        assert!(
+            strokes == 2 && worst < 2.0 * tolerance,
+            "tolerance {tolerance:e}: {strokes} strokes, off by {worst:e}"
+        );
     }
 }
 
@@ -291,7 +335,12 @@ fn balls_strike_where_and_as_they_should() {
     let (xa, xb) = (Vec3::new(0.84, 0.0, 0.0) + va * (1.0 - time), Vec3::new(1.0, 0.12, 0.0) + vb * (1.0 - time));
     // the moment is right to 1e-7 m / 2.4 m/s
     for (id, x, v) in [(a, xa, va), (b, xb, vb)] {
-        assert!((position(&world, id) - x).norm() < 1e-6 && (velocity(&world, id) - v).norm() < 1e-6, "{} with {}", position(&world, id), velocity(&world, id));
+        assert!(
+            (position(&world, id) - x).norm() < 1e-6 && (velocity(&world, id) - v).norm() < 1e-6,
+            "{} with {}",
+            position(&world, id),
+            velocity(&world, id)
+        );
     }
 }
 
@@ -301,7 +350,8 @@ fn a_bouncing_ball_keeps_its_height_and_frames_their_length() {
     let mut world = world("backtracking", 1.0 / 60.0);
     set(&mut world, |s| s.integrator = Integrator::DormandPrince);
     ground(&mut world, 1.0, 0.0);
-    let body = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.0, 0.0, 1.1));
+    let body =
+        RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.0, 0.0, 1.1));
     let id = world.add(body).unwrap();
     let (fall, mut time) = ((2.0 / G).sqrt(), 0.0f64);
     for _ in 0..600 {
@@ -310,7 +360,11 @@ fn a_bouncing_ball_keeps_its_height_and_frames_their_length() {
         assert_eq!(world.time(), time);
         let flight = (time + fall) % (2.0 * fall) - fall;
         let height = 1.1 - 0.5 * G * flight * flight;
-        assert!((position(&world, id).z - height).abs() < 1e-5, "at {time} s: {} m, by hand {height}", position(&world, id).z);
+        assert!(
+            (position(&world, id).z - height).abs() < 1e-5,
+            "at {time} s: {} m, by hand {height}",
+            position(&world, id).z
+        );
     }
 }
 
@@ -320,9 +374,18 @@ fn lively() -> World {
     set(&mut world, |s| s.integrator = Integrator::DormandPrince);
     ground(&mut world, 0.6, 0.3);
     for i in 0..4 {
-        let shape = if i % 2 == 0 { sphere(0.2) } else { tumble_core::collide::Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)).unwrap() };
+        let shape = if i % 2 == 0 {
+            sphere(0.2)
+        } else {
+            tumble_core::collide::Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)).unwrap()
+        };
         let body = RigidBody::with_mass(format!("body{i}"), shape, 1.0 + i as f64).unwrap().surface(0.6, 0.3);
-        let id = world.add(body.at(Pose::translation(0.9 * i as f64, 0.0, 1.0 + 0.2 * i as f64)).moving(Vec3::zeros(), Vec3::new(3.0, 7.0, i as f64))).unwrap();
+        let id = world
+            .add(
+                body.at(Pose::translation(0.9 * i as f64, 0.0, 1.0 + 0.2 * i as f64))
+                    .moving(Vec3::zeros(), Vec3::new(3.0, 7.0, i as f64)),
+            )
+            .unwrap();
         let to = Vec3::new(0.9 * i as f64, 0.3, 1.0);
         world.add(Spring { name: format!("spring{i}"), on: id, to, k: 40.0 * (i + 1) as f64, c: 0.5 }).unwrap();
     }
@@ -333,17 +396,23 @@ fn lively() -> World {
 fn save_restore_run_and_fork_give_the_same_bytes() {
     for frames in [1, 7, 40] {
         let mut first = lively();
-        (0..frames).for_each(|_| { first.step().unwrap(); });
+        (0..frames).for_each(|_| {
+            first.step().unwrap();
+        });
         let saved = first.save();
         let mut forked = first.fork();
         let mut restored = lively();
         restored.restore(&saved).unwrap();
         assert!(restored.save() == saved);
         for frame in 0..40 {
-            let steps: Vec<u32> = [&mut first, &mut forked, &mut restored].into_iter().map(|w| w.step().unwrap().inner_steps).collect();
+            let steps: Vec<u32> =
+                [&mut first, &mut forked, &mut restored].into_iter().map(|w| w.step().unwrap().inner_steps).collect();
             assert_eq!(steps, [steps[0]; 3], "frame {frame} after {frames}");
             assert!(first.save() == forked.save(), "frame {frame} after {frames}: the fork goes another way");
-            assert!(first.save() == restored.save(), "frame {frame} after {frames}: the restored world goes another way");
+            assert!(
+                first.save() == restored.save(),
+                "frame {frame} after {frames}: the restored world goes another way"
+            );
         }
     }
 }
@@ -352,7 +421,9 @@ fn save_restore_run_and_fork_give_the_same_bytes() {
 #[test]
 fn the_inner_step_is_carried_from_frame_to_frame() {
     let mut world = adaptive(1.0 / 60.0, 1e-6);
-    let id = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+    let id = world
+        .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros()))
+        .unwrap();
     world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: 1e4, c: 0.0 }).unwrap();
     let first = world.step().unwrap().inner_steps;
     run(&mut world, 1.0);
@@ -376,9 +447,14 @@ fn a_far_object_changes_nothing_but_the_steps() {
         let id = top(&mut world);
         world.add(Drive(id, torque)).unwrap();
         if crowded {
-            let far = RigidBody::with_mass("far", sphere(0.1), 1.0).unwrap().at(Pose::translation(1000.0, 0.0, 0.0)).moving(Vec3::x(), Vec3::zeros());
+            let far = RigidBody::with_mass("far", sphere(0.1), 1.0)
+                .unwrap()
+                .at(Pose::translation(1000.0, 0.0, 0.0))
+                .moving(Vec3::x(), Vec3::zeros());
             let far = world.add(far).unwrap();
-            world.add(Spring { name: "spring".into(), on: far, to: Vec3::new(1000.0, 1.0, 0.0), k: 2000.0, c: 0.0 }).unwrap();
+            world
+                .add(Spring { name: "spring".into(), on: far, to: Vec3::new(1000.0, 1.0, 0.0), k: 2000.0, c: 0.0 })
+                .unwrap();
         }
         let mut steps = 0;
         (0..120).for_each(|_| steps += world.step().unwrap().inner_steps);
@@ -395,11 +471,14 @@ fn a_far_object_changes_nothing_but_the_steps() {
 #[test]
 fn what_is_led_keeps_its_velocity() {
     let mut world = adaptive(0.1, 1e-8);
-    let led = world.add(RigidBody::new("led", sphere(0.2), 1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS))).unwrap()).unwrap();
+    let led =
+        world.add(RigidBody::new("led", sphere(0.2), 1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS))).unwrap()).unwrap();
     world.set_mode(led, Mode::Kinematic).unwrap();
     let (v, w) = (Vec3::new(0.5, 0.0, 0.2), Vec3::new(0.3, 2.0, -0.4));
     world.set_velocity(led, v, w).unwrap();
-    let ball = world.add(RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().at(Pose::translation(5.0, 0.0, 0.0))).unwrap();
+    let ball = world
+        .add(RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().at(Pose::translation(5.0, 0.0, 0.0)))
+        .unwrap();
     world.add(Spring { name: "spring".into(), on: ball, to: Vec3::new(5.0, 1.0, 0.0), k: 30.0, c: 0.1 }).unwrap();
     run(&mut world, 2.0);
     let site = *world.site(led, 0).unwrap();
@@ -414,7 +493,9 @@ fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
     let mut world = adaptive(1.0 / 60.0, 1e-6);
     let id = world.add(RigidBody::with_mass("calm", sphere(0.1), 1.0).unwrap()).unwrap();
     world.add(Spring { name: "soft".into(), on: id, to: Vec3::x(), k: 1.0, c: 0.0 }).unwrap();
-    let id = world.add(RigidBody::with_mass("wild", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 3.0, 0.0))).unwrap();
+    let id = world
+        .add(RigidBody::with_mass("wild", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 3.0, 0.0)))
+        .unwrap();
     world.add(Spring { name: "stiff".into(), on: id, to: Vec3::new(0.0, 3.0, 0.0), k: 1e18, c: 0.0 }).unwrap();
     let before = world.save();
     let error = world.step().unwrap_err();
@@ -423,7 +504,9 @@ fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
     // a blow that no step is short enough for
     let mut world = adaptive(1.0 / 60.0, 1e-6);
     let id = world.add(RigidBody::with_mass("struck", sphere(0.1), 1.0).unwrap()).unwrap();
-    world.add(Drive(id, |t, _| (if t > 0.009 { Vec3::new(1e20, 0.0, 0.0) } else { Vec3::zeros() }, Vec3::zeros()))).unwrap();
+    world
+        .add(Drive(id, |t, _| (if t > 0.009 { Vec3::new(1e20, 0.0, 0.0) } else { Vec3::zeros() }, Vec3::zeros())))
+        .unwrap();
     let error = world.step().unwrap_err();
     let StepError::Tolerance { object, time, step, .. } = &error else { panic!("{error}") };
     assert!(object == "struck" && (time - 0.009).abs() < 1e-9 && *step <= 1e-12 / 60.0, "{error}");
@@ -436,6 +519,7 @@ fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
 
 #[test]
 fn the_tolerance_has_a_range() {
-    let refused = |tolerance: f64| World::new(Settings { integrator_tolerance: tolerance, ..Settings::default() }).is_err();
+    let refused =
+        |tolerance: f64| World::new(Settings { integrator_tolerance: tolerance, ..Settings::default() }).is_err();
     assert!(refused(0.9e-14) && refused(0.11) && refused(f64::NAN) && !refused(1e-14) && !refused(0.1));
 }

@@ -28,7 +28,8 @@ fn all(seed: u64) -> (Random, Vec<Both>) {
         let (mut dynamics, mut kin) = (Dynamics::new(&model), Kinematics::new(&model));
         dynamics.refresh(&q, &v);
         kin.refresh(&model, &q, &v);
-        let wrenches = model.links().iter().map(|_| Wrench { torque: random.vector(1.0), force: random.vector(2.0) }).collect();
+        let wrenches =
+            model.links().iter().map(|_| Wrench { torque: random.vector(1.0), force: random.vector(2.0) }).collect();
         made.push(Both { dynamics, kin, work: InverseDynamics::new(&model), model, q, v, wrenches });
     }
     (random, made)

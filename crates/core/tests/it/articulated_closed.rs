@@ -26,7 +26,8 @@ fn one(joint: Joint, placement: Pose, mass: LinkMass) -> Model {
 #[test]
 fn a_pendulum_takes_the_torque_of_its_equation() {
     let (m, l, i) = (2.0, 0.7, 0.3);
-    let rod = LinkMass { mass: m, center: Vec3::new(0.0, 0.0, -l), inertia: Mat3::from_diagonal(&Vec3::new(0.1, i, 0.2)) };
+    let rod =
+        LinkMass { mass: m, center: Vec3::new(0.0, 0.0, -l), inertia: Mat3::from_diagonal(&Vec3::new(0.1, i, 0.2)) };
     let model = one(Joint::revolute(Vec3::new(0.0, 5.0, 0.0)), Pose::translation(3.0, -1.0, 2.0), rod);
     for (q, v, a) in [(0.0f64, 0.0, 0.0), (0.4, 1.0, -2.0), (2.9, -7.0, 3.0)] {
         let tau = torques(&model, &DOWN, &[q], &[v], &[a]);
@@ -94,7 +95,9 @@ fn a_top_precesses_steadily_without_torque() {
     let spin_total = (m * G * l + i1 * precession * precession * tilt.cos()) / (i3 * precession);
     let spin = spin_total - precession * tilt.cos();
     for (azimuth, phase) in [(0.0, 0.0), (0.9, 2.2), (-2.0, 5.0f64)] {
-        let turn = Quat::from_scaled_axis(Vec3::z() * azimuth) * Quat::from_scaled_axis(Vec3::y() * tilt) * Quat::from_scaled_axis(Vec3::z() * phase);
+        let turn = Quat::from_scaled_axis(Vec3::z() * azimuth)
+            * Quat::from_scaled_axis(Vec3::y() * tilt)
+            * Quat::from_scaled_axis(Vec3::z() * phase);
         let (s, c) = phase.sin_cos();
         let across = precession * tilt.sin();
         // Body components of the angular velocity and their rates, from R = Rz(Ωt)·Ry(θ)·Rz(ψt).
@@ -119,7 +122,8 @@ fn a_floating_link_is_a_rigid_body() {
     for _ in 0..20 {
         let (q, v) = random_state(&mut random, &model, 3.0);
         let a = random.numbers(6, 5.0);
-        let r = Quat::from_quaternion(nalgebra::Quaternion::new(q[6], q[3], q[4], q[5])).to_rotation_matrix().into_inner();
+        let r =
+            Quat::from_quaternion(nalgebra::Quaternion::new(q[6], q[3], q[4], q[5])).to_rotation_matrix().into_inner();
         let (w, dw, dv) = (Vec3::from_column_slice(&v), Vec3::from_column_slice(&a), Vec3::from_column_slice(&a[3..]));
         let (c, inertia) = (r * body.center, r * body.inertia * r.transpose());
         let force = body.mass * (dv + dw.cross(&c) + w.cross(&w.cross(&c)) - DOWN);
@@ -149,7 +153,8 @@ fn a_held_tree_hangs_on_its_root() {
 #[test]
 fn a_folded_link_is_a_hinged_one_that_does_not_turn() {
     let mut random = Random(10);
-    let (poses, masses) = ([random.pose(0.5), random.pose(0.5), random.pose(0.5)], [random.mass(), random.mass(), random.mass()]);
+    let (poses, masses) =
+        ([random.pose(0.5), random.pose(0.5), random.pose(0.5)], [random.mass(), random.mass(), random.mass()]);
     let build = |middle: Joint| {
         let mut builder = ModelBuilder::new();
         let a = builder.link("a", None, Joint::Spherical, poses[0], masses[0]);
@@ -177,7 +182,13 @@ fn stacked_sliders_have_a_mass_matrix_of_partial_sums() {
     let mut builder = ModelBuilder::new();
     let mut parent = None;
     for (k, m) in [1.0, 2.0, 4.0].into_iter().enumerate() {
-        parent = Some(builder.link(format!("{k}"), parent, Joint::prismatic(Vec3::x()), Pose::translation(0.0, 0.3, 0.0), LinkMass::point(m, Vec3::y())));
+        parent = Some(builder.link(
+            format!("{k}"),
+            parent,
+            Joint::prismatic(Vec3::x()),
+            Pose::translation(0.0, 0.3, 0.0),
+            LinkMass::point(m, Vec3::y()),
+        ));
     }
     let model = builder.build().unwrap();
     let mut m = [f64::NAN; 9];
@@ -205,5 +216,8 @@ fn a_pulled_arm_needs_the_moments_of_the_pull() {
     let elbow = Vec3::new(0.4 * 0.5f64.cos(), 0.4 * 0.5f64.sin(), 0.0);
     let hand = elbow + Vec3::new(0.3 * (-0.6f64).cos(), 0.3 * (-0.6f64).sin(), 0.0);
     let moment = |from: Vec3| -(hand - from).cross(&pull).z - 0.7;
-    assert!((DVector::from_row_slice(&tau) - DVector::from_row_slice(&[moment(Vec3::zeros()), moment(elbow), -0.7])).norm() < 1e-15);
+    assert!(
+        (DVector::from_row_slice(&tau) - DVector::from_row_slice(&[moment(Vec3::zeros()), moment(elbow), -0.7])).norm()
+            < 1e-15
+    );
 }

@@ -3,7 +3,10 @@
 use crate::articulated_world::{adaptive, hinged, loose_chain, rod, run, world};
 use crate::common::{ground, sphere};
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
-use tumble_core::{ArticulatedBody, Collider, Freedom, Integrator, Joint, LinkMass, Material, ModelBuilder, ObjectId, RigidBody, Settings, World};
+use tumble_core::{
+    ArticulatedBody, Collider, Freedom, Integrator, Joint, LinkMass, Material, ModelBuilder, ObjectId, RigidBody,
+    Settings, World,
+};
 
 /// A box that is thrown at the floor: a rigid body, or a floating link with nothing on it.
 fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
@@ -14,8 +17,17 @@ fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
     let (v, w) = (Vec3::new(0.5, 0.2, -1.0), Vec3::new(1.0, 2.0, 3.0));
     let id = if articulated {
         let mut builder = ModelBuilder::new();
-        builder.link("box", None, Joint::Floating, Pose::identity(), LinkMass { mass: 2.0, center: Vec3::zeros(), inertia: *solid.inertia() });
-        let mut body = ArticulatedBody::new("box", builder.build().unwrap()).at(pose).with_velocities(&[w.x, w.y, w.z, v.x, v.y, v.z]).unwrap();
+        builder.link(
+            "box",
+            None,
+            Joint::Floating,
+            Pose::identity(),
+            LinkMass { mass: 2.0, center: Vec3::zeros(), inertia: *solid.inertia() },
+        );
+        let mut body = ArticulatedBody::new("box", builder.build().unwrap())
+            .at(pose)
+            .with_velocities(&[w.x, w.y, w.z, v.x, v.y, v.z])
+            .unwrap();
         let mut collider = Collider::new(shape, Pose::identity());
         collider.material = Material { restitution: 0.6, friction: 0.5 };
         body.add_collider("box", collider).unwrap();
@@ -37,7 +49,8 @@ fn a_floating_link_and_a_rigid_body_are_the_same_thing() {
         }
         assert_eq!(passes[0], passes[1]);
         let [a, b] = [0, 1].map(|i| *pair[i].0.site(pair[i].1, 0).unwrap());
-        worst_place = worst_place.max((a.position() - b.position()).norm()).max(a.pose.rotation.angle_to(&b.pose.rotation));
+        worst_place =
+            worst_place.max((a.position() - b.position()).norm()).max(a.pose.rotation.angle_to(&b.pose.rotation));
         let [a, b] = [0, 1].map(|i| pair[i].0.momentum());
         worst_impulse = worst_impulse.max((a.linear - b.linear).norm()).max((a.angular - b.angular).norm());
         impacts += (passes[0] > 0) as u32;
@@ -51,7 +64,8 @@ fn a_floating_link_and_a_rigid_body_are_the_same_thing() {
 fn the_same_contact_gives_the_same_impulse() {
     // both are set down on the same state, a hair into the floor: one frame, an impact with friction
     let [a, b] = [false, true].map(|articulated| {
-        let (mut world, id) = thrown(world(1.0 / 240.0, "time_stepping", Integrator::Verlet), articulated, -0.6 + 0.352);
+        let (mut world, id) =
+            thrown(world(1.0 / 240.0, "time_stepping", Integrator::Verlet), articulated, -0.6 + 0.352);
         world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
         if articulated {
             let mut x = world.state_of(id).unwrap().to_vec();
@@ -122,7 +136,10 @@ fn a_chain_drapes_over_a_sphere() {
 fn pendulums(mut world: World, angle: f64) -> World {
     for (name, x, q) in [("left", -0.05, angle), ("right", 0.05, 0.0)] {
         let bob = LinkMass { inertia: 1e-3 * Mat3::identity(), ..LinkMass::point(1.0, Vec3::new(0.0, 0.0, -0.5)) };
-        let mut body = ArticulatedBody::new(name, hinged(1, 0.5, bob)).at(Pose::translation(x, 0.0, 0.0)).with_positions(&[q]).unwrap();
+        let mut body = ArticulatedBody::new(name, hinged(1, 0.5, bob))
+            .at(Pose::translation(x, 0.0, 0.0))
+            .with_positions(&[q])
+            .unwrap();
         let mut ball = Collider::new(sphere(0.05), Pose::translation(0.0, 0.0, -0.5));
         ball.material = Material { restitution: 1.0, friction: 0.0 };
         body.add_collider("link 0", ball).unwrap();
@@ -171,7 +188,10 @@ fn folding(own: bool, apart: bool) -> (World, ObjectId) {
 fn links_meet_their_own_kind_unless_they_are_kept_apart() {
     let (world, id) = folding(true, false);
     let (q, contacts) = (world.state_of(id).unwrap()[2], world.contacts().len());
-    assert!(contacts > 0 && world.contacts().iter().all(|c| c.part_a.abs_diff(c.part_b) == 2), "first against last, not neighbours");
+    assert!(
+        contacts > 0 && world.contacts().iter().all(|c| c.part_a.abs_diff(c.part_b) == 2),
+        "first against last, not neighbours"
+    );
     assert!(q > 1.5 && q < 2.98, "stopped by the first link at {q} rad");
     for (own, apart) in [(false, false), (true, true)] {
         let (world, id) = folding(own, apart);
@@ -187,12 +207,18 @@ fn a_ball_at_rest_on_a_held_arm_loads_its_joint() {
     let plate = LinkMass { mass: 1.0, center: Vec3::new(0.2, 0.0, 0.0), inertia: 0.01 * Mat3::identity() };
     builder.link("plate", None, Joint::revolute(Vec3::y()), Pose::translation(0.0, 0.0, 1.0), plate);
     let mut body = ArticulatedBody::new("table", builder.build().unwrap());
-    body.add_collider("plate", Collider::new(Shape::cuboid(Vec3::new(0.2, 0.2, 0.01)).unwrap(), Pose::translation(0.2, 0.0, 0.0))).unwrap();
+    body.add_collider(
+        "plate",
+        Collider::new(Shape::cuboid(Vec3::new(0.2, 0.2, 0.01)).unwrap(), Pose::translation(0.2, 0.0, 0.0)),
+    )
+    .unwrap();
     // weights at 0.2 and 0.3 m: 9.81·(0.2 + 0.3) = 4.905 N·m
     let hold = |friction| Freedom { friction, ..Freedom::default() };
     body.set_freedom(0, hold(4.95)).unwrap();
     let table = world.add(body).unwrap();
-    let cube = RigidBody::with_mass("cube", Shape::cuboid(Vec3::repeat(0.05)).unwrap(), 1.0).unwrap().at(Pose::translation(0.3, 0.0, 1.06));
+    let cube = RigidBody::with_mass("cube", Shape::cuboid(Vec3::repeat(0.05)).unwrap(), 1.0)
+        .unwrap()
+        .at(Pose::translation(0.3, 0.0, 1.06));
     world.add(cube).unwrap();
     run(&mut world, 3.0);
     assert!(world.state_of(table).unwrap()[0].abs() < 1e-6, "{:?}", world.state_of(table));
@@ -240,7 +266,11 @@ fn a_link_is_kept_apart_from_the_base_it_does_not_hang_on() {
             body.keep_apart("link 1", "stand").unwrap();
         }
         world.add(body).unwrap();
-        let met = (0..480).filter(|_| world.step().unwrap().max_penetration > 0.0 || world.contacts().iter().any(|c| c.impulse.norm() > 0.0)).count();
+        let met = (0..480)
+            .filter(|_| {
+                world.step().unwrap().max_penetration > 0.0 || world.contacts().iter().any(|c| c.impulse.norm() > 0.0)
+            })
+            .count();
         assert_eq!(met > 0, !apart);
     }
 }

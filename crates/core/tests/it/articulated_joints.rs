@@ -3,7 +3,10 @@
 use crate::articulated_world::{adaptive, chain, hinged, rod, run, world};
 use std::sync::Arc;
 use tumble_core::collide::{Mat3, Pose, Vec3};
-use tumble_core::{ArticulatedBody, Coupling, Drive, Freedom, Integrator, Joint, LinkMass, ModelBuilder, Playback, Settings, Spring, StepError, World};
+use tumble_core::{
+    ArticulatedBody, Coupling, Drive, Freedom, Integrator, Joint, LinkMass, ModelBuilder, Playback, Settings, Spring,
+    StepError, World,
+};
 
 /// No gravity, and one rod of 1 kg and 0.6 m: its moment of inertia about the joint is 0.12 kg·m².
 fn arm(stepper: &str, freedom: Freedom) -> World {
@@ -50,7 +53,10 @@ fn a_limit_is_found_in_time_by_backtracking() {
             worst = worst.max(0.3 - state(&world)[0]);
         }
         let rest = state(&world);
-        assert!(worst < 1e-6 && (rest[0] - 0.3).abs() < 1e-6 && rest[1].abs() < 1e-6, "{integrator:?}: {worst:.1e}, at rest {rest:?}");
+        assert!(
+            worst < 1e-6 && (rest[0] - 0.3).abs() < 1e-6 && rest[1].abs() < 1e-6,
+            "{integrator:?}: {worst:.1e}, at rest {rest:?}"
+        );
     }
 }
 
@@ -90,7 +96,13 @@ fn damping_decays_and_a_spring_swings() {
     run(&mut world, 0.1);
     assert!(state(&world)[1].abs() < 1e-9, "stiff damping stops and does not explode");
     // a spring of k = 0.12·(2π)² swings once a second
-    let mut world = arm("time_stepping", Freedom { spring: Some(Spring { stiffness: 0.12 * 4.0 * std::f64::consts::PI.powi(2), rest: 0.2 }), ..Freedom::default() });
+    let mut world = arm(
+        "time_stepping",
+        Freedom {
+            spring: Some(Spring { stiffness: 0.12 * 4.0 * std::f64::consts::PI.powi(2), rest: 0.2 }),
+            ..Freedom::default()
+        },
+    );
     let start = world.energy().total();
     run(&mut world, 3.5);
     assert!((state(&world)[0] - 0.4).abs() < 1e-4, "{}", state(&world)[0]);
@@ -110,7 +122,11 @@ fn dry_friction_holds_up_to_its_torque_and_slows_by_it() {
         // ω̇ = −0.06/0.12: stops from 1 rad/s after 2 s and 1 rad
         world.write_state_of(id, &[0.0, 1.0]).unwrap();
         run(&mut world, 3.0);
-        assert!((state(&world)[0] - 1.0).abs() < 1e-4 && state(&world)[1].abs() < 1e-9, "{stepper}: {:?}", state(&world));
+        assert!(
+            (state(&world)[0] - 1.0).abs() < 1e-4 && state(&world)[1].abs() < 1e-9,
+            "{stepper}: {:?}",
+            state(&world)
+        );
     }
 }
 
@@ -118,13 +134,21 @@ fn dry_friction_holds_up_to_its_torque_and_slows_by_it() {
 fn drives_hold_turn_and_keep_to_their_torque() {
     for stepper in ["time_stepping", "backtracking"] {
         // gravity off: a position drive comes to its target, stiff or soft
-        let position = Drive::Position { stiffness: 30.0, damping: 4.0, target: 0.7, velocity: 0.0, limit: f64::INFINITY };
+        let position =
+            Drive::Position { stiffness: 30.0, damping: 4.0, target: 0.7, velocity: 0.0, limit: f64::INFINITY };
         let mut world = arm(stepper, Freedom { drive: position, ..Freedom::default() });
         run(&mut world, 4.0);
         assert!((state(&world)[0] - 0.7).abs() < 1e-6, "{stepper}: {:?}", state(&world));
-        let mut world = arm(stepper, Freedom { drive: Drive::Velocity { target: 0.5, limit: f64::INFINITY }, ..Freedom::default() });
+        let mut world = arm(
+            stepper,
+            Freedom { drive: Drive::Velocity { target: 0.5, limit: f64::INFINITY }, ..Freedom::default() },
+        );
         run(&mut world, 2.0);
-        assert!((state(&world)[1] - 0.5).abs() < 1e-9 && (state(&world)[0] - 1.0).abs() < 3e-3, "{stepper}: {:?}", state(&world));
+        assert!(
+            (state(&world)[1] - 0.5).abs() < 1e-9 && (state(&world)[0] - 1.0).abs() < 3e-3,
+            "{stepper}: {:?}",
+            state(&world)
+        );
         // 0.06 N·m on 0.12 kg·m² for one second are 0.5 rad/s, whatever is asked for
         for drive in [
             Drive::Velocity { target: 9.0, limit: 0.06 },
@@ -146,11 +170,17 @@ fn drives_hold_turn_and_keep_to_their_torque() {
 #[test]
 fn a_recorded_motion_is_followed_exactly() {
     let times: Vec<f64> = (0..=50).map(|i| 0.04 * i as f64).collect();
-    let wave = Arc::new(Playback::repeating(times.clone(), times.iter().map(|t| (std::f64::consts::PI * t).sin()).collect()).unwrap());
+    let wave = Arc::new(
+        Playback::repeating(times.clone(), times.iter().map(|t| (std::f64::consts::PI * t).sin()).collect()).unwrap(),
+    );
     for stepper in ["time_stepping", "backtracking"] {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
         let mut body = chain(2, 0.0);
-        body.set_freedom(0, Freedom { drive: Drive::Playback { motion: wave.clone(), limit: f64::INFINITY }, ..Freedom::default() }).unwrap();
+        body.set_freedom(
+            0,
+            Freedom { drive: Drive::Playback { motion: wave.clone(), limit: f64::INFINITY }, ..Freedom::default() },
+        )
+        .unwrap();
         world.add(body).unwrap();
         let mut worst: f64 = 0.0;
         for _ in 0..240 * 3 {
@@ -189,7 +219,11 @@ fn gimbals(middle: f64) -> ArticulatedBody {
     let mut builder = ModelBuilder::new();
     let outer = builder.link("outer", None, Joint::revolute(Vec3::z()), Pose::identity(), LinkMass::none());
     let inner = builder.link("inner", Some(outer), Joint::revolute(Vec3::y()), Pose::identity(), LinkMass::none());
-    let top = LinkMass { mass: 1.0, center: Vec3::new(0.0, 0.0, 0.1), inertia: Mat3::from_diagonal(&Vec3::new(0.01, 0.01, 0.02)) };
+    let top = LinkMass {
+        mass: 1.0,
+        center: Vec3::new(0.0, 0.0, 0.1),
+        inertia: Mat3::from_diagonal(&Vec3::new(0.01, 0.01, 0.02)),
+    };
     builder.link("top", Some(inner), Joint::revolute(Vec3::x()), Pose::identity(), top);
     ArticulatedBody::new("gimbals", builder.build().unwrap()).with_positions(&[0.0, middle, 0.0]).unwrap()
 }
@@ -217,10 +251,16 @@ fn a_stack_of_hinges_is_a_ball_joint_away_from_its_lock() {
     let a = stacked.add(gimbals(0.3).with_velocities(&[1.0, 0.5, 2.0]).unwrap()).unwrap();
     let site = *stacked.site(a, 2).unwrap();
     let mut builder = ModelBuilder::new();
-    let top = LinkMass { mass: 1.0, center: Vec3::new(0.0, 0.0, 0.1), inertia: Mat3::from_diagonal(&Vec3::new(0.01, 0.01, 0.02)) };
+    let top = LinkMass {
+        mass: 1.0,
+        center: Vec3::new(0.0, 0.0, 0.1),
+        inertia: Mat3::from_diagonal(&Vec3::new(0.01, 0.01, 0.02)),
+    };
     builder.link("top", None, Joint::Spherical, Pose::identity(), top);
     let spin = site.pose.rotation.inverse_transform_vector(&site.angular_velocity);
-    let body = ArticulatedBody::new("top", builder.build().unwrap()).with_positions(site.pose.rotation.coords.as_slice()).unwrap();
+    let body = ArticulatedBody::new("top", builder.build().unwrap())
+        .with_positions(site.pose.rotation.coords.as_slice())
+        .unwrap();
     let mut whole = adaptive(1.0 / 60.0, 1e-10);
     let b = whole.add(body.with_velocities(spin.as_slice()).unwrap()).unwrap();
     for _ in 0..30 {
@@ -240,7 +280,10 @@ fn rubbish_is_told() {
         Freedom { friction: f64::NAN, ..Freedom::default() },
         Freedom { limits: Some([1.0, -1.0]), ..Freedom::default() },
         Freedom { drive: Drive::Velocity { target: 1.0, limit: -1.0 }, ..Freedom::default() },
-        Freedom { drive: Drive::Position { stiffness: 0.0, damping: 0.0, target: 0.0, velocity: 0.0, limit: 1.0 }, ..Freedom::default() },
+        Freedom {
+            drive: Drive::Position { stiffness: 0.0, damping: 0.0, target: 0.0, velocity: 0.0, limit: 1.0 },
+            ..Freedom::default()
+        },
     ];
     for freedom in wrong {
         let error = body.set_freedom(1, freedom.clone()).unwrap_err().to_string();

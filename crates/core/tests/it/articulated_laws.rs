@@ -25,7 +25,8 @@ fn cases(seed: u64) -> Vec<Case> {
     let make = |model: Model| {
         let (q, v) = random_state(&mut random, &model, 1.0);
         let qdd = random.numbers(model.dof(), 3.0);
-        let wrenches = model.links().iter().map(|_| Wrench { torque: random.vector(1.0), force: random.vector(2.0) }).collect();
+        let wrenches =
+            model.links().iter().map(|_| Wrench { torque: random.vector(1.0), force: random.vector(2.0) }).collect();
         let mut kin = Kinematics::new(&model);
         kin.refresh(&model, &q, &v);
         Case { kin, work: InverseDynamics::new(&model), model, q, v, qdd, wrenches }
@@ -85,13 +86,18 @@ fn rotation(kin: &Kinematics, i: usize) -> Mat3 {
 fn velocities_of_links_are_the_rates_of_their_poses() {
     for case in cases(1) {
         let still = vec![0.0; case.model.dof()];
-        let places = |kin: &Kinematics| kin.links().iter().flat_map(|l| l.pose.translation.vector.data.0[0]).collect::<Vec<f64>>();
+        let places = |kin: &Kinematics| {
+            kin.links().iter().flat_map(|l| l.pose.translation.vector.data.0[0]).collect::<Vec<f64>>()
+        };
         let expected: Vec<f64> = case.kin.links().iter().flat_map(|l| l.linear.data.0[0]).collect();
         assert!(apart(&case.rate(&still, places), &expected) < 1e-9);
-        let turns = |kin: &Kinematics| (0..kin.links().len()).flat_map(|i| rotation(kin, i).data.0.concat()).collect::<Vec<f64>>();
+        let turns = |kin: &Kinematics| {
+            (0..kin.links().len()).flat_map(|i| rotation(kin, i).data.0.concat()).collect::<Vec<f64>>()
+        };
         // dR/dt = ω × R
-        let expected: Vec<f64> =
-            (0..case.model.links().len()).flat_map(|i| (case.kin.links()[i].angular.cross_matrix() * rotation(&case.kin, i)).data.0.concat()).collect();
+        let expected: Vec<f64> = (0..case.model.links().len())
+            .flat_map(|i| (case.kin.links()[i].angular.cross_matrix() * rotation(&case.kin, i)).data.0.concat())
+            .collect();
         assert!(apart(&case.rate(&still, turns), &expected) < 1e-9);
     }
 }
@@ -118,7 +124,8 @@ fn accelerations_are_the_rates_of_link_velocities_and_j_qdd_plus_bias() {
         let mut jacobian = vec![f64::NAN; 6 * dof];
         for i in 0..count {
             link_jacobian(&case.model, &case.kin, i, &mut jacobian);
-            let sum = DMatrix::from_row_slice(6, dof, &jacobian) * DVector::from_column_slice(&case.qdd) + DVector::from_vec(flat(&without[i..=i]));
+            let sum = DMatrix::from_row_slice(6, dof, &jacobian) * DVector::from_column_slice(&case.qdd)
+                + DVector::from_vec(flat(&without[i..=i]));
             assert!(apart(sum.as_slice(), &flat(&with[i..=i])) < 1e-12);
         }
     }
@@ -139,7 +146,8 @@ fn jacobians_are_the_derivatives_of_poses() {
             let mut unit = Case { v: vec![0.0; dof], ..case.clone() };
             unit.v[k] = 1.0;
             let still = vec![0.0; dof];
-            let moved = unit.rate(&still, |kin| kin.links()[i].pose.transform_point(&point.into()).coords.data.0[0].to_vec());
+            let moved =
+                unit.rate(&still, |kin| kin.links()[i].pose.transform_point(&point.into()).coords.data.0[0].to_vec());
             assert!(apart(&column(&three, dof, k), &moved) < 1e-9);
             let origin = unit.rate(&still, |kin| kin.links()[i].pose.translation.vector.data.0[0].to_vec());
             assert!(apart(&column(&six, dof, k)[3..], &origin) < 1e-9);
@@ -168,12 +176,14 @@ fn the_mass_matrix_is_that_of_the_kinetic_energy() {
             let place = |(l, k): (&Link, &LinkMotion)| k.pose.transform_point(&l.mass.center.into()).coords.data.0[0];
             case.model.links().iter().zip(kin.links()).flat_map(place).collect()
         });
-        let spins = case.rate(&still, |kin| (0..kin.links().len()).flat_map(|i| rotation(kin, i).data.0.concat()).collect());
+        let spins =
+            case.rate(&still, |kin| (0..kin.links().len()).flat_map(|i| rotation(kin, i).data.0.concat()).collect());
         let mut kinetic = 0.0;
         for (i, link) in case.model.links().iter().enumerate() {
             let turned = rotation(&case.kin, i).transpose() * Mat3::from_column_slice(&spins[9 * i..]);
             let w = Vec3::new(turned[(2, 1)], turned[(0, 2)], turned[(1, 0)]);
-            kinetic += 0.5 * link.mass.mass * Vec3::from_column_slice(&centers[3 * i..]).norm_squared() + 0.5 * w.dot(&(link.mass.inertia * w));
+            kinetic += 0.5 * link.mass.mass * Vec3::from_column_slice(&centers[3 * i..]).norm_squared()
+                + 0.5 * w.dot(&(link.mass.inertia * w));
         }
         assert!((half / kinetic - 1.0).abs() < 1e-9, "{half} {kinetic}");
         let told = energy(&case.model, &case.kin, &G).kinetic;
@@ -216,7 +226,13 @@ fn energy_changes_by_the_power_of_the_torques() {
         let (qdd, wrenches) = (case.qdd.clone(), case.wrenches.clone());
         let tau = case.torques(&G, &qdd, &wrenches);
         let mut power: f64 = tau.iter().zip(&case.v).map(|(t, v)| t * v).sum();
-        power += case.kin.links().iter().zip(&wrenches).map(|(l, w)| l.angular.dot(&w.torque) + l.linear.dot(&w.force)).sum::<f64>();
+        power += case
+            .kin
+            .links()
+            .iter()
+            .zip(&wrenches)
+            .map(|(l, w)| l.angular.dot(&w.torque) + l.linear.dot(&w.force))
+            .sum::<f64>();
         let rate = case.rate(&qdd, |kin| vec![energy(&case.model, kin, &G).total()]);
         assert!(apart(&[power], &rate) < 1e-8, "{power} {}", rate[0]);
     }
@@ -256,11 +272,15 @@ fn the_center_of_mass_moves_with_its_velocity_and_carries_the_linear_momentum() 
         let (_, velocity) = center_of_mass(&case.model, &case.kin).unwrap();
         let rate = case.rate(&vec![0.0; case.model.dof()], |kin| {
             let mass: f64 = case.model.links().iter().map(|l| l.mass.mass).sum();
-            let weigh = |(l, k): (&Link, &LinkMotion)| l.mass.mass / mass * k.pose.transform_point(&l.mass.center.into()).coords;
+            let weigh = |(l, k): (&Link, &LinkMotion)| {
+                l.mass.mass / mass * k.pose.transform_point(&l.mass.center.into()).coords
+            };
             case.model.links().iter().zip(kin.links()).map(weigh).sum::<Vec3>().data.0[0].to_vec()
         });
         assert!(apart(velocity.as_slice(), &rate) < 1e-9);
-        assert!((momentum(&case.model, &case.kin).linear - case.model.mass() * velocity).norm() < 1e-12 * case.model.mass());
+        assert!(
+            (momentum(&case.model, &case.kin).linear - case.model.mass() * velocity).norm() < 1e-12 * case.model.mass()
+        );
     }
 }
 
@@ -275,7 +295,12 @@ fn the_torque_of_gravity_is_the_slope_of_the_potential() {
             case.v = vec![0.0; dof];
             case.v[k] = 1.0;
             let slope = case.rate(&vec![0.0; dof], |kin| vec![energy(&case.model, kin, &G).potential]);
-            assert!((tau[k] - slope[0]).abs() < 1e-8 * tau.iter().fold(1.0f64, |m, t| m.max(t.abs())), "{k}: {} {}", tau[k], slope[0]);
+            assert!(
+                (tau[k] - slope[0]).abs() < 1e-8 * tau.iter().fold(1.0f64, |m, t| m.max(t.abs())),
+                "{k}: {} {}",
+                tau[k],
+                slope[0]
+            );
         }
     }
 }
@@ -301,7 +326,9 @@ fn positions_integrate_along_the_exponential_of_a_constant_turn() {
             let Some(k) = link.joint.quaternion() else { continue };
             let turn = |q: &[f64]| {
                 let x = &q[link.q + k..];
-                Quat::from_quaternion(nalgebra::Quaternion::new(x[3], x[0], x[1], x[2])).to_rotation_matrix().into_inner()
+                Quat::from_quaternion(nalgebra::Quaternion::new(x[3], x[0], x[1], x[2]))
+                    .to_rotation_matrix()
+                    .into_inner()
             };
             let w = Vec3::from_column_slice(&v[link.v..]) * 0.7;
             let expected = if k == 0 { turn(&case.q) * exponential(w) } else { exponential(w) * turn(&case.q) };

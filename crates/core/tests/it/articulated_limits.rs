@@ -32,7 +32,9 @@ fn links_that_swing_about_each_other_keep_to_their_limits() {
             let x = world.state_of(id).unwrap();
             worst = x[1..6].iter().fold(worst, |worst, q| worst.max(q.abs() - 0.4));
         }
-        println!("at {rate} Hz: past a limit by {worst:.1e} rad; energy at most {highest:.3} J, at the start {start:.3} J");
+        println!(
+            "at {rate} Hz: past a limit by {worst:.1e} rad; energy at most {highest:.3} J, at the start {start:.3} J"
+        );
         assert!(worst <= 1e-6, "at {rate} Hz a limit is passed by {worst:e} rad");
     }
 }

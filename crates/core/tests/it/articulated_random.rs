@@ -93,8 +93,15 @@ pub fn random_tree(random: &mut Random, count: usize, floating: bool, kinds: Kin
 
 /// A universal joint of three hinges through one point, the first two on massless links; far from gimbal lock while the second stays near zero.
 fn stack(random: &mut Random, builder: &mut ModelBuilder, i: usize, parent: usize) -> usize {
-    let at = builder.link(format!("link {i}"), Some(parent), Joint::revolute(Vec3::z()), random.pose(0.4), LinkMass::none());
-    let at = builder.link(format!("link {}", i + 1), Some(at), Joint::revolute(Vec3::y()), Pose::identity(), LinkMass::none());
+    let at =
+        builder.link(format!("link {i}"), Some(parent), Joint::revolute(Vec3::z()), random.pose(0.4), LinkMass::none());
+    let at = builder.link(
+        format!("link {}", i + 1),
+        Some(at),
+        Joint::revolute(Vec3::y()),
+        Pose::identity(),
+        LinkMass::none(),
+    );
     builder.link(format!("link {}", i + 2), Some(at), Joint::revolute(Vec3::x()), Pose::identity(), random.mass());
     i + 3
 }

@@ -57,7 +57,9 @@ fn a_point_and_a_rod_swing_with_their_periods_at_any_amplitude() {
     for (mass, w) in [(bob, (G / length).sqrt()), (rod(2.0, length), (1.5 * G / length).sqrt())] {
         for amplitude in [0.005, 1.0, FRAC_PI_2, 3.0] {
             let mut world = adaptive(1.0 / 240.0, 1e-9);
-            world.add(ArticulatedBody::new("swing", hinged(1, length, mass)).with_positions(&[amplitude]).unwrap()).unwrap();
+            world
+                .add(ArticulatedBody::new("swing", hinged(1, length, mass)).with_positions(&[amplitude]).unwrap())
+                .unwrap();
             let (got, want) = (mean_period(&mut world, 12.0), period(w, amplitude));
             assert!((got / want - 1.0).abs() < 1e-6, "amplitude {amplitude}: {got} s, wanted {want} s");
         }
@@ -73,7 +75,13 @@ fn a_double_pendulum_has_its_two_modes() {
         let second = (1.5 - 4.0 * x / 3.0) / (0.5 * x);
         let mut world = adaptive(1.0 / 240.0, 1e-12);
         let small = 5e-4;
-        world.add(ArticulatedBody::new("two", hinged(2, length, rod(1.0, length))).with_positions(&[small, small * (second - 1.0)]).unwrap()).unwrap();
+        world
+            .add(
+                ArticulatedBody::new("two", hinged(2, length, rod(1.0, length)))
+                    .with_positions(&[small, small * (second - 1.0)])
+                    .unwrap(),
+            )
+            .unwrap();
         let (got, want) = (mean_period(&mut world, 8.0), 2.0 * PI / (x * G / length).sqrt());
         assert!((got / want - 1.0).abs() < 1e-6, "mode {sign}: {got} s, wanted {want} s");
     }
@@ -84,7 +92,16 @@ fn a_cone_is_swung_at_its_own_pace() {
     // a bob on a ball joint goes round at a constant angle with Ω² = g/(l·cos θ)
     let (length, angle) = (0.5, 0.8_f64);
     let mut builder = ModelBuilder::new();
-    builder.link("bob", None, Joint::Spherical, Pose::identity(), LinkMass { inertia: 1e-9 * nalgebra::Matrix3::identity(), ..LinkMass::point(1.0, Vec3::new(0.0, 0.0, -length)) });
+    builder.link(
+        "bob",
+        None,
+        Joint::Spherical,
+        Pose::identity(),
+        LinkMass {
+            inertia: 1e-9 * nalgebra::Matrix3::identity(),
+            ..LinkMass::point(1.0, Vec3::new(0.0, 0.0, -length))
+        },
+    );
     let pace = (G / (length * angle.cos())).sqrt();
     let turn = Vec3::new(-0.5 * angle, 0.0, 0.0);
     let q = nalgebra::UnitQuaternion::from_scaled_axis(2.0 * turn);

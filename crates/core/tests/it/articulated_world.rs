@@ -1,12 +1,18 @@
 //! What tests of articulated bodies in a world share.
 
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
-use tumble_core::{ArticulatedBody, Collider, Integrator, Joint, LinkMass, Model, ModelBuilder, Settings, World, stepper_by_name};
+use tumble_core::{
+    ArticulatedBody, Collider, Integrator, Joint, LinkMass, Model, ModelBuilder, Settings, World, stepper_by_name,
+};
 
 /// A uniform thin rod of `length` m along −z from its joint.
 pub fn rod(mass: f64, length: f64) -> LinkMass {
     let i = mass * length * length / 12.0;
-    LinkMass { mass, center: Vec3::new(0.0, 0.0, -0.5 * length), inertia: Mat3::from_diagonal(&Vec3::new(i, i, 1e-3 * i)) }
+    LinkMass {
+        mass,
+        center: Vec3::new(0.0, 0.0, -0.5 * length),
+        inertia: Mat3::from_diagonal(&Vec3::new(i, i, 1e-3 * i)),
+    }
 }
 
 /// Equal links hung one on another by hinges about y, each `length` m below the one before; `link 0` is the first.
@@ -38,7 +44,13 @@ pub fn loose_chain(links: usize, center: Vec3, friction: f64) -> ArticulatedBody
     let mut parent = None;
     for i in 0..links {
         let (joint, x) = if i == 0 { (Joint::Floating, 0.0) } else { (Joint::Spherical, length) };
-        parent = Some(builder.link(format!("link {i}"), parent, joint, Pose::translation(x, 0.0, 0.0), unit.seen_from(&along)));
+        parent = Some(builder.link(
+            format!("link {i}"),
+            parent,
+            joint,
+            Pose::translation(x, 0.0, 0.0),
+            unit.seen_from(&along),
+        ));
     }
     let start = Pose::translation(center.x - 0.5 * links as f64 * length, center.y, center.z);
     let mut body = ArticulatedBody::new("chain", builder.build().unwrap()).at(start);

@@ -36,10 +36,15 @@ fn end(site: &Site, x: f64) -> (Vec3, Vec3) {
 
 impl Constraint for Pin {
     fn rows(&self, _me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
-        let of = |part: Result<ObjectId, Vec3>, x: f64| part.map_or_else(|p| (p, Vec3::zeros()), |id| end(view.site(id, 0).unwrap(), x));
+        let of = |part: Result<ObjectId, Vec3>, x: f64| {
+            part.map_or_else(|p| (p, Vec3::zeros()), |id| end(view.site(id, 0).unwrap(), x))
+        };
         let ((a, a_turning), (b, b_turning)) = (of(self.a, HALF), of(self.b, -HALF));
         for k in 0..3 {
-            let target = RowTarget { bias_acceleration: (b_turning - a_turning)[k], ..RowTarget::new(RowSet::Equality, (b - a)[k]) };
+            let target = RowTarget {
+                bias_acceleration: (b_turning - a_turning)[k],
+                ..RowTarget::new(RowSet::Equality, (b - a)[k])
+            };
             out.row(target);
             for (part, p, sign) in [(self.a, a, -1.0), (self.b, b, 1.0)] {
                 if let Ok(id) = part {
@@ -60,7 +65,8 @@ fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (Wo
     for i in 0..count {
         let angle = turn * (i as f64 + 0.5) - 0.5 * std::f64::consts::PI;
         let mass = if i + 1 == count { 0.5 * heavy } else { 0.5 };
-        let body = RigidBody::with_mass(format!("bar{i}"), Shape::cuboid(Vec3::new(HALF, 0.02, 0.02)).unwrap(), mass).unwrap();
+        let body =
+            RigidBody::with_mass(format!("bar{i}"), Shape::cuboid(Vec3::new(HALF, 0.02, 0.02)).unwrap(), mass).unwrap();
         let at = Pose::new(Vec3::new(radius * angle.sin(), 0.0, -radius * angle.cos()), Vec3::new(0.0, -angle, 0.0));
         bars.push(world.add(body.at(at).moving(Vec3::new(0.0, 0.3 * angle.cos(), 0.0), Vec3::zeros())).unwrap());
         world.set_collidable(bars[i], false).unwrap();
@@ -84,7 +90,9 @@ fn apart(world: &World, bars: &[ObjectId]) -> f64 {
 
 #[test]
 fn a_closed_chain_of_twenty_bars_swings_with_its_pins_solved() {
-    for (stepper, pins, heavy) in [("time_stepping", 1, 1.0), ("time_stepping", 2, 1.0), ("time_stepping", 1, 1000.0), ("backtracking", 1, 1.0)] {
+    for (stepper, pins, heavy) in
+        [("time_stepping", 1, 1.0), ("time_stepping", 2, 1.0), ("time_stepping", 1, 1000.0), ("backtracking", 1, 1.0)]
+    {
         let (mut world, bars) = festoon(stepper, 1.0 / 240.0, 20, pins, heavy);
         assert!(apart(&world, &bars) < 1e-12);
         let (mut residual, mut gap, mut unconverged, start) = (0.0f64, 0.0f64, 0, world.energy().total());
@@ -95,7 +103,9 @@ fn a_closed_chain_of_twenty_bars_swings_with_its_pins_solved() {
             gap = gap.max(apart(&world, &bars));
         }
         let lost = world.energy().total() - start;
-        println!("{stepper}, {pins} a joint, {heavy}: residual {residual:.1e} m/s, pins apart {gap:.1e} m, energy {lost:.1e} J");
+        println!(
+            "{stepper}, {pins} a joint, {heavy}: residual {residual:.1e} m/s, pins apart {gap:.1e} m, energy {lost:.1e} J"
+        );
         assert!(residual < 1e-9 && unconverged == 0, "{stepper}: residual {residual:e}, {unconverged} unconverged");
         // backtracking projects when the next step begins: until then a fall of ½·h²·2g is left
         let bound = if stepper == "time_stepping" { 1e-5 } else { G / (240.0 * 240.0) };

@@ -61,9 +61,15 @@ impl FourBar {
     pub fn new(stepper: &str, dt: f64) -> FourBar {
         let mut world = world(stepper, dt);
         let (a, b) = pins(1.9);
-        let bars = [("crank", Vec3::zeros(), a), ("coupler", a, b), ("rocker", b, GROUND)].map(|(name, from, to)| world.add(bar(name, from, to)).unwrap());
+        let bars = [("crank", Vec3::zeros(), a), ("coupler", a, b), ("rocker", b, GROUND)]
+            .map(|(name, from, to)| world.add(bar(name, from, to)).unwrap());
         let [crank, coupler, rocker] = bars;
-        for (name, one, other, p) in [("o", crank, None, Vec3::zeros()), ("a", coupler, Some(crank), a), ("b", coupler, Some(rocker), b), ("c", rocker, None, GROUND)] {
+        for (name, one, other, p) in [
+            ("o", crank, None, Vec3::zeros()),
+            ("a", coupler, Some(crank), a),
+            ("b", coupler, Some(rocker), b),
+            ("c", rocker, None, GROUND),
+        ] {
             hinge(&mut world, name, one, other, p, AXIS);
         }
         let start = world.energy().total();
@@ -125,7 +131,12 @@ fn a_four_bar_linkage_stays_closed_for_a_minute_and_keeps_its_energy() {
         assert!(worst.gap < 3e-9, "{stepper}: pins are {:e} m apart", worst.gap);
         assert!(worst.off < 1e-6, "{stepper}: the coupler is {:e} m off the closed form", worst.off);
         // of second order, and no part of it adds up: less at the end of the minute than within a turn
-        assert!(worst.energy < 5e-3 * worst.kinetic, "{stepper}: energy is off by {:e} J of {} J", worst.energy, worst.kinetic);
+        assert!(
+            worst.energy < 5e-3 * worst.kinetic,
+            "{stepper}: energy is off by {:e} J of {} J",
+            worst.energy,
+            worst.kinetic
+        );
         assert!(worst.lost.abs() < 5e-4 * worst.kinetic, "{stepper}: {:e} J of {} J lost", worst.lost, worst.kinetic);
         assert!(worst.residual < 1e-9, "{stepper}: residual {:e} m/s", worst.residual);
     }
@@ -161,7 +172,9 @@ fn engine(world: &mut World, crank: ObjectId) -> ObjectId {
     let piston = world.add(slug).unwrap();
     hinge(world, "crank pin", rod, Some(crank), pin, AXIS);
     hinge(world, "gudgeon pin", piston, Some(rod), gudgeon, AXIS);
-    world.add(Closure::slider_at("cylinder", world, Some((piston, 0)), None, Vec3::zeros(), Vec3::x()).unwrap()).unwrap();
+    world
+        .add(Closure::slider_at("cylinder", world, Some((piston, 0)), None, Vec3::zeros(), Vec3::x()).unwrap())
+        .unwrap();
     piston
 }
 
@@ -170,7 +183,12 @@ fn a_slider_crank_follows_its_closed_form() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / RATE);
         let flung = Vec3::new(0.0, -20.0, 0.0);
-        let crank = world.add(bar("crank", Vec3::zeros(), Vec3::new(CRANK, 0.0, 0.0)).moving(flung.cross(&Vec3::new(0.5 * CRANK, 0.0, 0.0)), flung)).unwrap();
+        let crank = world
+            .add(
+                bar("crank", Vec3::zeros(), Vec3::new(CRANK, 0.0, 0.0))
+                    .moving(flung.cross(&Vec3::new(0.5 * CRANK, 0.0, 0.0)), flung),
+            )
+            .unwrap();
         hinge(&mut world, "main bearing", crank, None, Vec3::zeros(), AXIS);
         let piston_id = engine(&mut world, crank);
         let (mut worst, mut turns, mut last) = (0.0f64, 0.0, 0.0);
@@ -222,7 +240,12 @@ fn steps_that_are_too_long_leave_the_linkage_closed() {
         let worst = run(&mut FourBar::new(stepper, 1.0 / 60.0), 60.0);
         println!("{stepper}, 60 s at 60 Hz: {worst:?}");
         assert!(worst.gap < 3e-9 && worst.off < 1e-6, "{stepper}: {worst:?}");
-        assert!(worst.energy < 0.5 * worst.kinetic, "{stepper}: energy is off by {} J of {} J", worst.energy, worst.kinetic);
+        assert!(
+            worst.energy < 0.5 * worst.kinetic,
+            "{stepper}: energy is off by {} J of {} J",
+            worst.energy,
+            worst.kinetic
+        );
     }
 }
 
@@ -237,7 +260,9 @@ fn a_linkage_that_strikes_the_ground_stays_closed_and_out_of_it() {
                 (body.kind, body.meets) = (CollisionKind::new(1).unwrap(), CollisionKind::default().bit());
                 (body.material.restitution, body.material.friction) = (restitution, friction);
             }
-            let floor = RigidBody::fixture("floor", Shape::half_space()).surface(restitution, friction).at(Pose::translation(0.0, 0.0, -0.12));
+            let floor = RigidBody::fixture("floor", Shape::half_space())
+                .surface(restitution, friction)
+                .at(Pose::translation(0.0, 0.0, -0.12));
             linkage.world.add_static(floor).unwrap();
             let (mut gap, mut deep, mut energy, mut touched) = (0.0f64, 0.0f64, f64::MIN, 0);
             for _ in 0..(10.0 * RATE) as usize {
@@ -246,7 +271,9 @@ fn a_linkage_that_strikes_the_ground_stays_closed_and_out_of_it() {
                 energy = energy.max(linkage.world.energy().total() - linkage.start);
                 touched += linkage.world.contacts().iter().any(|c| c.impulse.norm() > 0.0) as u32;
             }
-            println!("{stepper}, e = {restitution}, μ = {friction}: gap {gap:.1e} m, {deep:.1e} m deep, energy gained {energy:.1e} J, {touched} frames on the ground");
+            println!(
+                "{stepper}, e = {restitution}, μ = {friction}: gap {gap:.1e} m, {deep:.1e} m deep, energy gained {energy:.1e} J, {touched} frames on the ground"
+            );
             assert!(touched > 5, "{stepper}: it reaches the ground");
             assert!(gap < 1e-6, "{stepper}: pins are {gap:e} m apart");
             assert!(deep < 1e-4, "{stepper}: {deep:e} m deep");
@@ -277,7 +304,9 @@ fn joints_that_cannot_close_do_not_open_others() {
 fn a_linkage_restored_from_a_snapshot_goes_on_with_the_same_bits() {
     for stepper in STEPPERS {
         let mut first = FourBar::new(stepper, 1.0 / RATE).world;
-        (0..100).for_each(|_| { first.step().unwrap(); });
+        (0..100).for_each(|_| {
+            first.step().unwrap();
+        });
         let saved = first.save();
         let mut second = FourBar::new(stepper, 1.0 / RATE).world;
         second.restore(&saved).unwrap();

@@ -22,7 +22,10 @@ fn chain(name: &str, bars: &[usize]) -> ArticulatedBody {
         let like = bar("like", Vec3::zeros(), LENGTHS[k] * Vec3::x());
         let mass = LinkMass { mass: like.mass(), center: 0.5 * LENGTHS[k] * Vec3::x(), inertia: *like.inertia() };
         parent = Some(builder.link(format!("bar {k}"), parent, Joint::revolute(AXIS), Pose::from(reach), mass));
-        (reach, last) = (LENGTHS[k] * Vec3::x(), { q.push(angles[k] - last); angles[k] });
+        (reach, last) = (LENGTHS[k] * Vec3::x(), {
+            q.push(angles[k] - last);
+            angles[k]
+        });
     }
     ArticulatedBody::new(name, builder.build().unwrap()).with_positions(&q).unwrap()
 }
@@ -74,7 +77,9 @@ fn a_linkage_cut_open_anywhere_moves_the_same() {
                 energy = energy.max(lost.abs());
                 kinetic = kinetic.max(open.world.energy().kinetic);
             }
-            println!("{stepper}, {name}: gap {gap:.1e} m, rocker off by {off:.1e} rad, energy by {energy:.1e} J ({lost:.1e} at the end) of {kinetic:.3} J");
+            println!(
+                "{stepper}, {name}: gap {gap:.1e} m, rocker off by {off:.1e} rad, energy by {energy:.1e} J ({lost:.1e} at the end) of {kinetic:.3} J"
+            );
             assert!(gap < 2e-9, "{stepper}, {name}: {gap:e} m");
             assert!(off < 1e-6, "{stepper}, {name}: the rocker is {off:e} rad off the closed form");
             assert!(energy < 5e-3 * kinetic, "{stepper}, {name}: energy is off by {energy:e} J of {kinetic} J");
@@ -94,7 +99,8 @@ fn a_chain_closed_at_its_end_and_three_joined_bars_are_the_same_machine() {
             for _ in 0..(0.5 * rate) as usize {
                 bars.world.step().unwrap();
                 chain.world.step().unwrap();
-                let rotations = [(&bars.world, bars.bars[0], 0), (&chain.world, chain.crank.0, 0)].map(|(w, id, part)| w.site(id, part).unwrap().pose.rotation);
+                let rotations = [(&bars.world, bars.bars[0], 0), (&chain.world, chain.crank.0, 0)]
+                    .map(|(w, id, part)| w.site(id, part).unwrap().pose.rotation);
                 worst = worst.max(rotations[0].angle_to(&rotations[1]));
             }
             worst

@@ -61,7 +61,9 @@ fn a_hinged_bar_swings_with_the_period_of_the_elliptic_integral() {
             let exact = period(length, amplitude);
             let [coarse, fine] = [240.0, 480.0].map(|rate| measured(stepper, rate, amplitude) / exact - 1.0);
             let extrapolated = (4.0 * fine - coarse) / 3.0;
-            println!("{stepper}, {amplitude} rad: period off by {coarse:.3e} at 240 Hz, {fine:.3e} at 480 Hz, {extrapolated:.1e} extrapolated");
+            println!(
+                "{stepper}, {amplitude} rad: period off by {coarse:.3e} at 240 Hz, {fine:.3e} at 480 Hz, {extrapolated:.1e} extrapolated"
+            );
             assert!(coarse.abs() < bound, "{stepper}, {amplitude} rad: {coarse:e}");
             // second order: a quarter at half the step, and next to nothing when that is taken off
             assert!((coarse / fine - 4.0).abs() < 0.1, "{stepper}, {amplitude} rad: {coarse:e} then {fine:e}");
@@ -84,21 +86,32 @@ fn sum(boxes: &[(f64, Vec3, Vec3)]) -> (f64, Vec3, Mat3) {
 
 #[test]
 fn a_weld_of_two_bodies_is_one_body() {
-    let boxes = [(1.0, Vec3::new(0.3, 0.1, 0.05), Vec3::zeros()), (0.4, Vec3::new(0.1, 0.2, 0.15), Vec3::new(0.3, 0.2, 0.1))];
+    let boxes =
+        [(1.0, Vec3::new(0.3, 0.1, 0.05), Vec3::zeros()), (0.4, Vec3::new(0.1, 0.2, 0.15), Vec3::new(0.3, 0.2, 0.1))];
     let (mass, center, inertia) = sum(&boxes);
     let spin = Vec3::new(1.0, 3.0, -2.0);
     let push = Vec3::new(0.5, -0.2, 3.0);
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
-        let ids: Vec<ObjectId> = boxes.iter().enumerate().map(|(i, &(m, half, c))| {
-            let mut body = RigidBody::with_mass(format!("box {i}"), Shape::cuboid(half).unwrap(), m).unwrap().at(Pose::from(c));
-            body.meets = 0;
-            world.add(body.moving(push + spin.cross(&(c - center)), spin)).unwrap()
-        }).collect();
-        let weld = Closure::weld_at("weld", &world, Some((ids[0], 0)), Some((ids[1], 0)), Vec3::new(0.3, 0.1, 0.05)).unwrap();
+        let ids: Vec<ObjectId> = boxes
+            .iter()
+            .enumerate()
+            .map(|(i, &(m, half, c))| {
+                let mut body = RigidBody::with_mass(format!("box {i}"), Shape::cuboid(half).unwrap(), m)
+                    .unwrap()
+                    .at(Pose::from(c));
+                body.meets = 0;
+                world.add(body.moving(push + spin.cross(&(c - center)), spin)).unwrap()
+            })
+            .collect();
+        let weld =
+            Closure::weld_at("weld", &world, Some((ids[0], 0)), Some((ids[1], 0)), Vec3::new(0.3, 0.1, 0.05)).unwrap();
         let weld = world.add(weld).unwrap();
         let about_center = |world: &World| {
-            let (m, c) = (world.momentum(), ids.iter().zip(&boxes).map(|(id, b)| b.0 * position(world, *id)).sum::<Vec3>() / mass);
+            let (m, c) = (
+                world.momentum(),
+                ids.iter().zip(&boxes).map(|(id, b)| b.0 * position(world, *id)).sum::<Vec3>() / mass,
+            );
             (c, m.linear, m.angular - c.cross(&m.linear))
         };
         let (start, energy) = (about_center(&world), world.energy().total());
@@ -118,7 +131,9 @@ fn a_weld_of_two_bodies_is_one_body() {
             kept = kept.max((world.energy().total() - energy).abs() / spun);
         }
         let misfit = world.get::<Closure>(weld).unwrap().misfit(&world.view()).unwrap();
-        println!("{stepper}: centre off by {fall:.1e} m, L by {angular:.1e}, ω by {inertial:.1e} rad/s, energy by {kept:.1e} of the spin, {misfit:?}");
+        println!(
+            "{stepper}: centre off by {fall:.1e} m, L by {angular:.1e}, ω by {inertial:.1e} rad/s, energy by {kept:.1e} of the spin, {misfit:?}"
+        );
         assert!(fall < 1e-9, "{stepper}: the centre leaves the parabola by {fall:e} m");
         // impulses keep it; moving the bodies together, with their momenta held, is of third order in a step
         assert!(angular < 1e-5, "{stepper}: angular momentum changes by {angular:e}");
@@ -159,7 +174,10 @@ fn more_hinges_than_needed_swing_a_door_as_one_does() {
                 drift = drift.max((three.energy().total() - energy).abs());
                 least = least.min(position(&three, b).x);
             }
-            println!("{stepper}, {solver}: {apart:.1e} m from the door with one hinge in 20 s, energy off by {drift:.1e} J of {:.1}", 0.5 * 10.0 * 2.56);
+            println!(
+                "{stepper}, {solver}: {apart:.1e} m from the door with one hinge in 20 s, energy off by {drift:.1e} J of {:.1}",
+                0.5 * 10.0 * 2.56
+            );
             assert!(least < -0.5, "{stepper}, {solver}: it turns");
             assert!(apart < 1e-5, "{stepper}, {solver}: {apart:e} m from the door on one hinge");
             assert!(drift < 0.1, "{stepper}, {solver}: energy off by {drift:e} J");
@@ -171,13 +189,19 @@ fn more_hinges_than_needed_swing_a_door_as_one_does() {
 fn where_a_side_is_gone_or_not_alive_nothing_is_held() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
-        let post = world.add_static(RigidBody::fixture("post", sphere(0.1)).at(Pose::translation(0.0, 0.0, 1.0))).unwrap();
-        let ball = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.5))).unwrap();
-        let joint = Closure::weld_at("weld", &world, Some((ball, 0)), Some((post, 0)), Vec3::new(0.0, 0.0, 0.7)).unwrap();
+        let post =
+            world.add_static(RigidBody::fixture("post", sphere(0.1)).at(Pose::translation(0.0, 0.0, 1.0))).unwrap();
+        let ball = world
+            .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.5)))
+            .unwrap();
+        let joint =
+            Closure::weld_at("weld", &world, Some((ball, 0)), Some((post, 0)), Vec3::new(0.0, 0.0, 0.7)).unwrap();
         let joint = world.add(joint).unwrap();
         let falls = |world: &mut World| {
             let before = position(world, ball).z;
-            (0..24).for_each(|_| { world.step().unwrap(); });
+            (0..24).for_each(|_| {
+                world.step().unwrap();
+            });
             before - position(world, ball).z
         };
         assert!(falls(&mut world).abs() < 1e-9, "{stepper}: it hangs");
@@ -197,12 +221,26 @@ fn closures_that_cannot_be_are_refused() {
     let (here, side) = (Vec3::zeros(), Some((ball, 0)));
     assert_eq!(Closure::point_at("j", &world, None, None, here).unwrap_err(), ClosureError::NoPart("j".into()));
     assert_eq!(Closure::point_at("j", &world, side, side, here).unwrap_err(), ClosureError::SamePart("j".into()));
-    assert_eq!(Closure::point_at("j", &world, Some((ball, 3)), None, here).unwrap_err(), ClosureError::Gone { name: "j".into(), part: 3 });
-    assert_eq!(Closure::point_at("j", &world, side, None, Vec3::new(f64::NAN, 0.0, 0.0)).unwrap_err(), ClosureError::NotFinite("j".into()));
-    assert_eq!(Closure::hinge_at("j", &world, side, None, here, Vec3::zeros()).unwrap_err(), ClosureError::Axis("j".into()));
-    let wrong = Closure::new("j", ClosureKind::Weld, Anchor::on(ball, 3, Pose::identity()), Anchor::world(Pose::identity())).unwrap();
+    assert_eq!(
+        Closure::point_at("j", &world, Some((ball, 3)), None, here).unwrap_err(),
+        ClosureError::Gone { name: "j".into(), part: 3 }
+    );
+    assert_eq!(
+        Closure::point_at("j", &world, side, None, Vec3::new(f64::NAN, 0.0, 0.0)).unwrap_err(),
+        ClosureError::NotFinite("j".into())
+    );
+    assert_eq!(
+        Closure::hinge_at("j", &world, side, None, here, Vec3::zeros()).unwrap_err(),
+        ClosureError::Axis("j".into())
+    );
+    let wrong =
+        Closure::new("j", ClosureKind::Weld, Anchor::on(ball, 3, Pose::identity()), Anchor::world(Pose::identity()))
+            .unwrap();
     world.add(wrong).unwrap();
-    assert_eq!(world.step().unwrap_err().to_string(), "constraint 'j': 'ball' has no part 3 that answers impulses, or the row names a third object");
+    assert_eq!(
+        world.step().unwrap_err().to_string(),
+        "constraint 'j': 'ball' has no part 3 that answers impulses, or the row names a third object"
+    );
 }
 
 #[test]
@@ -210,13 +248,25 @@ fn a_joint_that_starts_open_closes_at_the_recovery_speed() {
     // 0.3 m apart at 3 m/s: 0.1 s; then it stays, and nothing has gained speed
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));
-        let ball = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.3, 0.0, 0.0))).unwrap();
-        let joint = Closure::new("joint", ClosureKind::Weld, Anchor::on(ball, 0, Pose::identity()), Anchor::world(Pose::identity())).unwrap();
+        let ball = world
+            .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.3, 0.0, 0.0)))
+            .unwrap();
+        let joint = Closure::new(
+            "joint",
+            ClosureKind::Weld,
+            Anchor::on(ball, 0, Pose::identity()),
+            Anchor::world(Pose::identity()),
+        )
+        .unwrap();
         world.add(joint).unwrap();
         for frame in 1..=30 {
             world.step().unwrap();
             let left = (0.3 - 3.0 * frame as f64 / 240.0).max(0.0);
-            assert!((position(&world, ball).x - left).abs() < 1e-8, "{stepper}, frame {frame}: {} m, by hand {left}", position(&world, ball).x);
+            assert!(
+                (position(&world, ball).x - left).abs() < 1e-8,
+                "{stepper}, frame {frame}: {} m, by hand {left}",
+                position(&world, ball).x
+            );
             assert!(velocity(&world, ball).norm() < 1e-9, "{stepper}");
         }
     }
@@ -229,7 +279,9 @@ fn hinged_boxes_come_to_rest_on_the_ground() {
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.0, 0.5);
         let ids = [-0.2, 0.2].map(|x| {
-            let body = RigidBody::with_mass(format!("box at {x}"), Shape::cuboid(Vec3::new(0.18, 0.1, 0.05)).unwrap(), 1.0).unwrap();
+            let body =
+                RigidBody::with_mass(format!("box at {x}"), Shape::cuboid(Vec3::new(0.18, 0.1, 0.05)).unwrap(), 1.0)
+                    .unwrap();
             world.add(body.at(Pose::translation(x, 0.0, 0.3)).surface(0.0, 0.5)).unwrap()
         });
         let joint = hinge(&mut world, "hinge", ids[0], Some(ids[1]), Vec3::new(0.0, 0.0, 0.3), Vec3::y());
@@ -239,7 +291,11 @@ fn hinged_boxes_come_to_rest_on_the_ground() {
             let now = world.get::<Closure>(joint).unwrap().misfit(&world.view()).unwrap();
             worst = Misfit { distance: worst.distance.max(now.distance), angle: worst.angle.max(now.angle) };
         }
-        println!("{stepper}: {worst:?}, {:e} deep, heights {:?}", world.report().max_penetration, ids.map(|id| position(&world, id).z));
+        println!(
+            "{stepper}: {worst:?}, {:e} deep, heights {:?}",
+            world.report().max_penetration,
+            ids.map(|id| position(&world, id).z)
+        );
         assert!(worst.distance < 1e-6 && worst.angle < 1e-6, "{stepper}: {worst:?}");
         for id in ids {
             assert!((position(&world, id).z - 0.05).abs() < 1e-6, "{stepper}: at {} m", position(&world, id).z);

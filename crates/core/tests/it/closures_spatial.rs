@@ -62,7 +62,15 @@ fn bennett(stepper: &str, first: f64) -> Bennett {
     let hinges = (0..4).map(|bar| {
         let joint = &frames[bar];
         let (one, other) = ((bars[bar], 0), (bars[(bar + 3) % 4], 0));
-        let hinge = Closure::hinge_at(format!("hinge {bar}"), &world, Some(one), Some(other), joint.translation.vector, joint.rotation * Vec3::z()).unwrap();
+        let hinge = Closure::hinge_at(
+            format!("hinge {bar}"),
+            &world,
+            Some(one),
+            Some(other),
+            joint.translation.vector,
+            joint.rotation * Vec3::z(),
+        )
+        .unwrap();
         world.add(hinge).unwrap()
     });
     let hinges = hinges.collect();
@@ -95,12 +103,17 @@ fn bennetts_linkage_moves_as_its_closed_form_says() {
             let angles = [0, 1, 2, 3].map(|bar| linkage.angle(bar));
             // tan(θ/2) may be anything, its sine and cosine not
             let wrong = |one: f64, other: f64| (one - other).sin().abs();
-            off = off.max(wrong(angles[1], second_angle(angles[0]))).max(wrong(angles[2], -angles[0])).max(wrong(angles[3], -angles[1]));
+            off = off
+                .max(wrong(angles[1], second_angle(angles[0])))
+                .max(wrong(angles[2], -angles[0]))
+                .max(wrong(angles[3], -angles[1]));
             range = (range.0.min(angles[0]), range.1.max(angles[0]));
             energy = energy.max((linkage.world.energy().total() - start).abs());
             kinetic = kinetic.max(linkage.world.energy().kinetic);
         }
-        println!("{stepper}: {gap:?}, angles off by {off:.1e} rad, energy by {energy:.1e} of {kinetic:.2} J, first angle {range:?}");
+        println!(
+            "{stepper}: {gap:?}, angles off by {off:.1e} rad, energy by {energy:.1e} of {kinetic:.2} J, first angle {range:?}"
+        );
         assert!(range.1 - range.0 > 1.0, "{stepper}: it moves, {range:?}");
         assert!(gap.distance < 1e-6 && gap.angle < 1e-6, "{stepper}: {gap:?}");
         assert!(off < 1e-6, "{stepper}: angles are {off:e} rad off the closed form");

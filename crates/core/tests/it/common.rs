@@ -48,7 +48,8 @@ pub fn slide(stepper: &str, solver: &str, dt: f64) -> (f64, f64, f64) {
     world.set_solver(solver::by_name(solver).unwrap());
     ground(&mut world, 0.0, 0.5);
     let body = RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.5);
-    let id = world.add(body.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(5.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+    let id =
+        world.add(body.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(5.0, 0.0, 0.0), Vec3::zeros())).unwrap();
     let (mut stop, mut gap) = (f64::NAN, 0.0f64);
     for _ in 0..(1.5 / dt) as usize {
         let (before, start) = (velocity(&world, id).x, world.time());

@@ -63,11 +63,21 @@ fn alone(shape: Shape, rate: f64, spin: Vec3, restitution: f64, friction: f64) -
 fn a_body_that_spins_in_an_elastic_room_keeps_its_energy() {
     // rows of the start of the step, pushed at the moment of impact: the capsule gained 321 % in 60 s at 240 Hz, 18 % at 960 Hz, and long boxes without end
     for (name, shape) in shapes() {
-        for (spin, rate) in [([3.0, 8.0, 5.0], 240.0), ([0.0, 20.0, 0.0], 240.0), ([15.0, 2.0, 30.0], 240.0), ([15.0, 2.0, 30.0], 960.0)] {
+        for (spin, rate) in [
+            ([3.0, 8.0, 5.0], 240.0),
+            ([0.0, 20.0, 0.0], 240.0),
+            ([15.0, 2.0, 30.0], 240.0),
+            ([15.0, 2.0, 30.0], 960.0),
+        ] {
             let swing = watch(&mut alone(shape.clone(), rate, Vec3::from(spin), 1.0, 0.0), 60.0);
             println!("{name} {spin:?} at {rate} Hz: {:+e} to {:+e}, {} passes", swing.least, swing.most, swing.passes);
             assert!(swing.passes > 100, "{name}: {} passes", swing.passes);
-            assert!(swing.most < 1e-9 && swing.least > -1e-9, "{name} {spin:?} at {rate} Hz: energy from {:+e} to {:+e}", swing.least, swing.most);
+            assert!(
+                swing.most < 1e-9 && swing.least > -1e-9,
+                "{name} {spin:?} at {rate} Hz: energy from {:+e} to {:+e}",
+                swing.least,
+                swing.most
+            );
         }
     }
 }
@@ -77,9 +87,16 @@ fn a_body_that_loses_a_little_at_every_wall_gains_at_none() {
     for (name, shape) in shapes() {
         for (restitution, friction) in [(0.9, 0.0), (0.8, 0.3), (1.0, 0.3)] {
             let swing = watch(&mut alone(shape.clone(), 240.0, Vec3::new(3.0, 8.0, 5.0), restitution, friction), 20.0);
-            println!("{name} e {restitution} mu {friction}: {:+e} to {:+e}, jump {:e}, {} passes", swing.least, swing.most, swing.jump, swing.passes);
+            println!(
+                "{name} e {restitution} mu {friction}: {:+e} to {:+e}, jump {:e}, {} passes",
+                swing.least, swing.most, swing.jump, swing.passes
+            );
             assert!(swing.passes > 10 && swing.least < -0.5, "{name}: {} passes, {:+e}", swing.passes, swing.least);
-            assert!(swing.jump < 1e-12, "{name}, e = {restitution}, mu = {friction}: a step added {:e} of the energy", swing.jump);
+            assert!(
+                swing.jump < 1e-12,
+                "{name}, e = {restitution}, mu = {friction}: a step added {:e} of the energy",
+                swing.jump
+            );
         }
     }
 }
@@ -93,11 +110,18 @@ fn bodies_that_strike_each_other_and_the_walls_keep_their_energy() {
             let (x, y) = ((i % 2) as f64 - 0.5, (i / 2) as f64 / 2.0 - 0.5);
             let body = RigidBody::with_mass(format!("{name} {i}"), shape, 1.0 + i as f64).unwrap().surface(1.0, 0.0);
             let spin = Vec3::new(5.0 - i as f64, 8.0, 3.0 + i as f64);
-            world.add(body.at(Pose::translation(0.6 * x, 0.7 * y, 0.1 * x)).moving(Vec3::new(-x, 0.7 * y, 0.4), spin)).unwrap();
+            world
+                .add(body.at(Pose::translation(0.6 * x, 0.7 * y, 0.1 * x)).moving(Vec3::new(-x, 0.7 * y, 0.4), spin))
+                .unwrap();
         }
         let swing = watch(&mut world, 60.0);
         println!("{count} bodies: {:+e} to {:+e}, {} passes", swing.least, swing.most, swing.passes);
-        assert!(swing.passes > 200 && swing.most.max(-swing.least) < 1e-9, "{count} bodies: {:+e} to {:+e}", swing.least, swing.most);
+        assert!(
+            swing.passes > 200 && swing.most.max(-swing.least) < 1e-9,
+            "{count} bodies: {:+e} to {:+e}",
+            swing.least,
+            swing.most
+        );
     }
 }
 
@@ -106,7 +130,8 @@ fn a_body_that_bounces_on_the_ground_keeps_its_energy() {
     for (name, shape) in shapes() {
         let mut world = world("time_stepping", 1.0 / 240.0);
         ground(&mut world, 1.0, 0.0);
-        let body = RigidBody::with_mass("body", shape, 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.0, 0.0, 1.0));
+        let body =
+            RigidBody::with_mass("body", shape, 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.0, 0.0, 1.0));
         world.add(body.moving(Vec3::zeros(), Vec3::new(3.0, 8.0, 5.0))).unwrap();
         let start = world.energy().total();
         let (mut most, mut least, mut passes): (f64, f64, u32) = (0.0, 0.0, 0);
@@ -131,7 +156,8 @@ fn a_free_body_of_three_moments_keeps_energy_and_angular_momentum() {
         let (energy, momentum) = (world.energy().kinetic, world.momentum().angular);
         for _ in 0..60 * 20 {
             world.step().unwrap();
-            let (e, l) = (world.energy().kinetic / energy - 1.0, (world.momentum().angular - momentum).norm() / momentum.norm());
+            let (e, l) =
+                (world.energy().kinetic / energy - 1.0, (world.momentum().angular - momentum).norm() / momentum.norm());
             assert!(e.abs() < 1e-12 && l < 1e-12, "{stepper}: energy off by {e:e}, angular momentum by {l:e}");
         }
     }

@@ -47,13 +47,26 @@ fn the_default_integrator_keeps_the_energy_of_the_free_body() {
 /// Orientation at 2 s against steps 64 times shorter: the order of each integrator.
 #[test]
 fn integrators_converge_at_their_order() {
-    for (integrator, order) in [(Integrator::ExplicitEuler, 1.0), (Integrator::SymplecticEuler, 1.0), (Integrator::Verlet, 2.0), (Integrator::Rk4, 4.0)] {
+    for (integrator, order) in [
+        (Integrator::ExplicitEuler, 1.0),
+        (Integrator::SymplecticEuler, 1.0),
+        (Integrator::Verlet, 2.0),
+        (Integrator::Rk4, 4.0),
+    ] {
         let at = |dt: f64| {
             let (mut world, id) = tumbling(integrator, "backtracking", dt);
-            (0..(2.0 / dt).round() as usize).for_each(|_| { world.step().unwrap(); });
+            (0..(2.0 / dt).round() as usize).for_each(|_| {
+                world.step().unwrap();
+            });
             world.site(id, 0).unwrap().pose.rotation
         };
-        let reference = { let (mut w, id) = tumbling(Integrator::Rk4, "backtracking", 1.0 / 3840.0); (0..7680).for_each(|_| { w.step().unwrap(); }); w.site(id, 0).unwrap().pose.rotation };
+        let reference = {
+            let (mut w, id) = tumbling(Integrator::Rk4, "backtracking", 1.0 / 3840.0);
+            (0..7680).for_each(|_| {
+                w.step().unwrap();
+            });
+            w.site(id, 0).unwrap().pose.rotation
+        };
         let (coarse, fine) = (at(1.0 / 120.0).angle_to(&reference), at(1.0 / 240.0).angle_to(&reference));
         let measured = (coarse / fine).log2();
         assert!((measured - order).abs() < 0.35, "{integrator:?}: order {measured} ({coarse:e} to {fine:e})");
@@ -64,8 +77,14 @@ fn integrators_converge_at_their_order() {
 fn a_thrown_body_follows_the_parabola() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
-        let ball = world.add(RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().moving(Vec3::new(3.0, 0.0, 4.0), Vec3::zeros())).unwrap();
-        (0..60).for_each(|_| { world.step().unwrap(); });
+        let ball = world
+            .add(
+                RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().moving(Vec3::new(3.0, 0.0, 4.0), Vec3::zeros()),
+            )
+            .unwrap();
+        (0..60).for_each(|_| {
+            world.step().unwrap();
+        });
         let expected = Vec3::new(3.0, 0.0, 4.0 - 0.5 * G);
         assert!((position(&world, ball) - expected).norm() < 1e-12, "{stepper}: {}", position(&world, ball));
     }
@@ -79,7 +98,9 @@ fn damping_is_exponential() {
     let mut body = RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().moving(Vec3::x(), Vec3::z());
     (body.linear_damping, body.angular_damping) = (0.7, 0.3);
     let id = world.add(body).unwrap();
-    (0..480).for_each(|_| { world.step().unwrap(); });
+    (0..480).for_each(|_| {
+        world.step().unwrap();
+    });
     assert!((velocity(&world, id).x - (-1.4f64).exp()).abs() < 1e-10);
     assert!((world.site(id, 0).unwrap().angular_velocity.z - (-0.6f64).exp()).abs() < 1e-10);
 }
@@ -119,7 +140,8 @@ fn forces_are_taken_at_each_stage_so_a_spring_keeps_its_energy() {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));
         let settings = Settings { integrator, ..*world.settings() };
         world.set_settings(settings).unwrap();
-        let body = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros());
+        let body =
+            RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros());
         let id = world.add(body).unwrap();
         world.add(Spring(id, 100.0)).unwrap();
         let mut worst = 0.0f64;

@@ -27,8 +27,17 @@ fn on_slope(stepper: &str, angle: f64, friction: f64, seconds: f64) -> (World, O
     let mut world = world(stepper, 1.0 / 240.0);
     slope(&mut world, angle, friction);
     let turn = Pose::rotation(Vec3::new(0.0, angle, 0.0));
-    let id = world.add(RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, friction).at(turn * Pose::translation(0.0, 0.0, 0.1))).unwrap();
-    (0..(seconds * 240.0) as usize).for_each(|_| { world.step().unwrap(); });
+    let id = world
+        .add(
+            RigidBody::with_mass("box", cube(0.2), 1.0)
+                .unwrap()
+                .surface(0.0, friction)
+                .at(turn * Pose::translation(0.0, 0.0, 0.1)),
+        )
+        .unwrap();
+    (0..(seconds * 240.0) as usize).for_each(|_| {
+        world.step().unwrap();
+    });
     (world, id)
 }
 
@@ -38,12 +47,19 @@ fn a_box_on_a_slope_sticks_if_and_only_if_friction_holds_it() {
         for degrees in [10.0f64, 20.0, 30.0] {
             let angle = degrees.to_radians();
             let (world, id) = on_slope(stepper, angle, angle.tan() * 1.001, 1.0);
-            assert!(velocity(&world, id).norm() < 1e-6, "{stepper} {degrees}: creeps at {}", velocity(&world, id).norm());
+            assert!(
+                velocity(&world, id).norm() < 1e-6,
+                "{stepper} {degrees}: creeps at {}",
+                velocity(&world, id).norm()
+            );
             let mu = angle.tan() * 0.8;
             let (world, id) = on_slope(stepper, angle, mu, 1.0);
             let expected = G * (angle.sin() - mu * angle.cos());
             let speed = velocity(&world, id).norm();
-            assert!((speed / expected - 1.0).abs() < 1e-6, "{stepper} {degrees}: {speed} m/s after 1 s, expected {expected}");
+            assert!(
+                (speed / expected - 1.0).abs() < 1e-6,
+                "{stepper} {degrees}: {speed} m/s after 1 s, expected {expected}"
+            );
         }
     }
 }
@@ -53,7 +69,9 @@ fn a_resting_box_does_not_creep_on_a_20_degree_slope() {
     for stepper in STEPPERS {
         let (mut world, id) = on_slope(stepper, 20f64.to_radians(), 0.5, 1.0);
         let start = position(&world, id);
-        (0..960).for_each(|_| { world.step().unwrap(); });
+        (0..960).for_each(|_| {
+            world.step().unwrap();
+        });
         let creep = (position(&world, id) - start).norm() / 4.0;
         assert!(creep < 1e-6, "{stepper}: creeps at {creep:e} m/s");
     }
@@ -65,8 +83,12 @@ fn a_sliding_sphere_ends_rolling_at_five_sevenths() {
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.0, 0.3);
         let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(0.0, 0.3);
-        let id = world.add(ball.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(3.0, 0.0, 0.0), Vec3::zeros())).unwrap();
-        (0..480).for_each(|_| { world.step().unwrap(); });
+        let id = world
+            .add(ball.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(3.0, 0.0, 0.0), Vec3::zeros()))
+            .unwrap();
+        (0..480).for_each(|_| {
+            world.step().unwrap();
+        });
         let site = world.site(id, 0).unwrap();
         assert!((site.velocity.x / (15.0 / 7.0) - 1.0).abs() < 1e-6, "{stepper}: {} m/s", site.velocity.x);
         assert!((site.angular_velocity.y * 0.1 / site.velocity.x - 1.0).abs() < 1e-6, "{stepper}: does not roll");
@@ -80,8 +102,12 @@ fn a_spinning_sphere_does_not_sink() {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.0);
         let ball = RigidBody::with_mass("ball", sphere(0.5), 1.0).unwrap().surface(0.0, 0.0);
-        let id = world.add(ball.at(Pose::translation(0.0, 0.0, 0.5)).moving(Vec3::zeros(), Vec3::new(20.0, 0.0, 3.0))).unwrap();
-        (0..300).for_each(|_| { world.step().unwrap(); });
+        let id = world
+            .add(ball.at(Pose::translation(0.0, 0.0, 0.5)).moving(Vec3::zeros(), Vec3::new(20.0, 0.0, 3.0)))
+            .unwrap();
+        (0..300).for_each(|_| {
+            world.step().unwrap();
+        });
         assert!((position(&world, id).z - 0.5).abs() < 1e-8, "{stepper}: centre at {}", position(&world, id).z);
         assert!((world.site(id, 0).unwrap().angular_velocity.x - 20.0).abs() < 1e-9);
     }

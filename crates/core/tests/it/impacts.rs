@@ -11,7 +11,9 @@ fn first_bounce(stepper: &str, e: f64, dt: f64) -> f64 {
     let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(e, 0.0);
     let id = world.add(ball.at(Pose::translation(0.0, 0.0, 1.1))).unwrap();
     let fall = (2.0 / G).sqrt();
-    (0..((fall + 0.05) / dt) as usize).for_each(|_| { world.step().unwrap(); });
+    (0..((fall + 0.05) / dt) as usize).for_each(|_| {
+        world.step().unwrap();
+    });
     let (v, z) = (velocity(&world, id).z, position(&world, id).z - 0.1);
     (v * v + 2.0 * G * z).max(0.0).sqrt() / (2.0 * G).sqrt()
 }
@@ -56,12 +58,24 @@ fn a_bouncing_ball_comes_to_rest_when_the_series_says() {
 /// A row of balls on a frictionless line without gravity.
 fn cradle(stepper: &str, masses: &[f64], speeds: &[f64], gap: f64) -> Vec<f64> {
     let mut world = no_gravity(world(stepper, 1.0 / 240.0));
-    let ids: Vec<ObjectId> = masses.iter().zip(speeds).enumerate().map(|(i, (m, v))| {
-        let shift = if *v > 0.0 { -gap } else { 0.0 };
-        let ball = RigidBody::with_mass(format!("ball{i}"), sphere(0.5), *m).unwrap().surface(1.0, 0.0);
-        world.add(ball.at(Pose::translation(i as f64 + shift, 0.0, 0.0)).moving(Vec3::new(*v, 0.0, 0.0), Vec3::zeros())).unwrap()
-    }).collect();
-    (0..120).for_each(|_| { world.step().unwrap(); });
+    let ids: Vec<ObjectId> = masses
+        .iter()
+        .zip(speeds)
+        .enumerate()
+        .map(|(i, (m, v))| {
+            let shift = if *v > 0.0 { -gap } else { 0.0 };
+            let ball = RigidBody::with_mass(format!("ball{i}"), sphere(0.5), *m).unwrap().surface(1.0, 0.0);
+            world
+                .add(
+                    ball.at(Pose::translation(i as f64 + shift, 0.0, 0.0))
+                        .moving(Vec3::new(*v, 0.0, 0.0), Vec3::zeros()),
+                )
+                .unwrap()
+        })
+        .collect();
+    (0..120).for_each(|_| {
+        world.step().unwrap();
+    });
     ids.iter().map(|id| velocity(&world, *id).x).collect()
 }
 
@@ -69,9 +83,15 @@ fn cradle(stepper: &str, masses: &[f64], speeds: &[f64], gap: f64) -> Vec<f64> {
 fn a_shock_passes_along_newtons_cradle() {
     for stepper in STEPPERS {
         let out = cradle(stepper, &[1.0; 5], &[1.0, 0.0, 0.0, 0.0, 0.0], 0.1);
-        assert!(out.iter().zip([0.0, 0.0, 0.0, 0.0, 1.0]).all(|(v, e)| (v - e).abs() < 1e-9), "{stepper}: one in: {out:?}");
+        assert!(
+            out.iter().zip([0.0, 0.0, 0.0, 0.0, 1.0]).all(|(v, e)| (v - e).abs() < 1e-9),
+            "{stepper}: one in: {out:?}"
+        );
         let out = cradle(stepper, &[1.0; 5], &[1.0, 1.0, 0.0, 0.0, 0.0], 0.1);
-        assert!(out.iter().zip([0.0, 0.0, 0.0, 1.0, 1.0]).all(|(v, e)| (v - e).abs() < 1e-9), "{stepper}: two in: {out:?}");
+        assert!(
+            out.iter().zip([0.0, 0.0, 0.0, 1.0, 1.0]).all(|(v, e)| (v - e).abs() < 1e-9),
+            "{stepper}: two in: {out:?}"
+        );
     }
 }
 
@@ -109,7 +129,9 @@ fn break_shot(stepper: &str, dt: f64) -> (World, Vec3, f64) {
 fn a_billiards_break_keeps_momentum_and_energy() {
     for (stepper, energy_bound) in [("backtracking", 1e-6), ("time_stepping", 1e-6)] {
         let (mut world, p0, e0) = break_shot(stepper, 1.0 / 240.0);
-        (0..36).for_each(|_| { world.step().unwrap(); });
+        (0..36).for_each(|_| {
+            world.step().unwrap();
+        });
         let p = world.momentum().linear - p0;
         let moved = world.ids().iter().filter(|id| velocity(&world, **id).norm() > 0.01).count();
         let (dp, de) = (p.x.hypot(p.y) / p0.norm(), (world.energy().kinetic / e0 - 1.0).abs());

@@ -127,7 +127,10 @@ fn a_swing_ends_at_its_stop() {
             }
         }
         let energy = world.energy().total();
-        println!("{integrator:?}: struck {struck}, furthest {furthest}, energy {:e} off, {tries} tries", energy / stop_energy - 1.0);
+        println!(
+            "{integrator:?}: struck {struck}, furthest {furthest}, energy {:e} off, {tries} tries",
+            energy / stop_energy - 1.0
+        );
         assert!(struck == 1 && furthest < 0.5 + 1e-6, "{integrator:?}: struck {struck} times, came to {furthest} rad");
         // 1e-6 rad are g·sin θ·1e-6 J at the stop; the energy of the leapfrog swings by h²/8·(g·sin θ)² about that
         let slope = G * 0.5f64.sin();
@@ -141,7 +144,8 @@ fn a_swing_ends_at_its_stop() {
 fn what_is_pressed_against_a_stop_rests_there() {
     for integrator in BOTH {
         // it falls over from 0.1 rad: e^{√g·t}
-        let (mut world, id) = with(integrator, Pendulum { angle: 0.1, rate: 0.0, pull: -G, stops: [-2.0, 1.2], located: true });
+        let (mut world, id) =
+            with(integrator, Pendulum { angle: 0.1, rate: 0.0, pull: -G, stops: [-2.0, 1.2], located: true });
         let mut arrived = None;
         for frame in 0..240 {
             let report = *world.step().unwrap();
@@ -151,7 +155,10 @@ fn what_is_pressed_against_a_stop_rests_there() {
             if gap < 1e-6 && arrived.is_none() {
                 arrived = Some(frame);
             } else if let Some(first) = arrived {
-                assert!(gap < 1e-6 && rate.abs() < 1e-9, "{integrator:?}: frame {frame}, {first} was the stroke: {gap:e} rad from it with {rate:e} rad/s");
+                assert!(
+                    gap < 1e-6 && rate.abs() < 1e-9,
+                    "{integrator:?}: frame {frame}, {first} was the stroke: {gap:e} rad from it with {rate:e} rad/s"
+                );
                 assert!(report.tries <= 2, "{integrator:?}: frame {frame}: {} tries", report.tries);
             }
         }
@@ -164,13 +171,17 @@ fn what_is_pressed_against_a_stop_rests_there() {
 #[test]
 fn a_stop_acts_when_it_is_reached_and_not_before() {
     for integrator in BOTH {
-        let (mut world, id) = with(integrator, Pendulum { angle: 0.0, rate: 5.0, pull: 0.0, stops: [-1.0, 0.21], located: true });
+        let (mut world, id) =
+            with(integrator, Pendulum { angle: 0.0, rate: 5.0, pull: 0.0, stops: [-1.0, 0.21], located: true });
         // 0.042 s: two frames and a half
         for frame in 1..=4 {
             world.step().unwrap();
             let (x, free) = (world.state_of(id).unwrap(), frame <= 2);
             let expected = if free { [5.0 * frame as f64 / 60.0, 5.0] } else { [0.21, 0.0] };
-            assert!((x[0] - expected[0]).abs() <= 1.0e-7 && (x[1] - expected[1]).abs() < 1e-12, "{integrator:?}: frame {frame}: {x:?}");
+            assert!(
+                (x[0] - expected[0]).abs() <= 1.0e-7 && (x[1] - expected[1]).abs() < 1e-12,
+                "{integrator:?}: frame {frame}: {x:?}"
+            );
         }
     }
 }
@@ -179,7 +190,8 @@ fn a_stop_acts_when_it_is_reached_and_not_before() {
 #[test]
 fn a_stop_that_is_not_told_acts_ahead() {
     for integrator in BOTH {
-        let (mut world, id) = with(integrator, Pendulum { angle: 0.0, rate: 5.0, pull: 0.0, stops: [-1.0, 0.21], located: false });
+        let (mut world, id) =
+            with(integrator, Pendulum { angle: 0.0, rate: 5.0, pull: 0.0, stops: [-1.0, 0.21], located: false });
         for _ in 0..6 {
             world.step().unwrap();
         }
@@ -192,7 +204,8 @@ fn a_stop_that_is_not_told_acts_ahead() {
 #[test]
 fn a_start_beyond_a_stop_is_recovered_from() {
     for integrator in BOTH {
-        let (mut world, id) = with(integrator, Pendulum { angle: 0.5, rate: 0.0, pull: 0.0, stops: [-1.0, 0.4], located: true });
+        let (mut world, id) =
+            with(integrator, Pendulum { angle: 0.5, rate: 0.0, pull: 0.0, stops: [-1.0, 0.4], located: true });
         for _ in 0..6 {
             let report = world.step().unwrap();
             assert!(report.tries < 10);
@@ -205,7 +218,10 @@ fn a_start_beyond_a_stop_is_recovered_from() {
 
 #[test]
 fn a_gap_that_is_no_number_is_an_error() {
-    let (mut world, _) = with(Integrator::Verlet, Pendulum { angle: 0.0, rate: 0.0, pull: 0.0, stops: [f64::NEG_INFINITY, 1.0], located: true });
+    let (mut world, _) = with(
+        Integrator::Verlet,
+        Pendulum { angle: 0.0, rate: 0.0, pull: 0.0, stops: [f64::NEG_INFINITY, 1.0], located: true },
+    );
     assert!(matches!(world.step().unwrap_err(), StepError::Row { object, .. } if object == "pendulum"));
 }
 
@@ -216,7 +232,12 @@ fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
     for integrator in BOTH {
         let mut world = world("backtracking", 1.0 / 240.0);
         world.set_settings(Settings { integrator, ..*world.settings() }).unwrap();
-        let mut body = ArticulatedBody::new("chain", crate::articulated_world::hinged(2, 0.2, crate::articulated_world::rod(1.0, 0.2))).with_positions(&[0.8, -0.3]).unwrap();
+        let mut body = ArticulatedBody::new(
+            "chain",
+            crate::articulated_world::hinged(2, 0.2, crate::articulated_world::rod(1.0, 0.2)),
+        )
+        .with_positions(&[0.8, -0.3])
+        .unwrap();
         body.set_freedom(0, Freedom { limits: Some([0.6, 2.0]), ..Freedom::default() }).unwrap();
         let id = world.add(body).unwrap();
         let (mut arrived, mut swing, mut off, mut drift, mut tries) = (None, [f64::MAX, f64::MIN], 0.0f64, 0.0f64, 0);
@@ -236,6 +257,9 @@ fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
         println!("{integrator:?}: arrived {arrived:?}, off {off:e}, swing {swing:?}, drift {drift:e}, {tries} tries");
         // 0.28 J go to and fro in the swing
         assert!(arrived.is_some() && swing[1] - swing[0] > 1.0, "{integrator:?}: {arrived:?}, {swing:?}");
-        assert!(off < 1e-9 && drift < 2e-4 && tries == 1, "{integrator:?}: {off:e} rad off the stop, energy off by {drift:e} J, {tries} tries");
+        assert!(
+            off < 1e-9 && drift < 2e-4 && tries == 1,
+            "{integrator:?}: {off:e} rad off the stop, energy off by {drift:e} J, {tries} tries"
+        );
     }
 }

@@ -59,7 +59,10 @@ fn a_mesh_box_rests_on_another_however_it_lies() {
                 ground(&mut world, 0.0, 0.5);
                 let lower = add(&mut world, "lower", &mesh_cube(0.5), Pose::translation(0.0, 0.0, 0.25));
                 let height = 0.5 + if upper.bounding_radius() > 0.2 { 0.25 } else { 0.1 };
-                let pose = Pose::from_parts(Vec3::new(shift, 0.6 * shift, height).into(), Quat::from_scaled_axis(Vec3::z() * yaw));
+                let pose = Pose::from_parts(
+                    Vec3::new(shift, 0.6 * shift, height).into(),
+                    Quat::from_scaled_axis(Vec3::z() * yaw),
+                );
                 let upper = add(&mut world, "upper", &upper, pose);
                 run(&mut world, 2.0);
                 for id in [lower, upper] {
@@ -77,7 +80,10 @@ fn a_mesh_box_rests_on_another_however_it_lies() {
 #[test]
 fn a_cylinder_stands_and_rolls_on_a_block() {
     for stepper in STEPPERS {
-        for block in [Shape::cuboid(Vec3::new(5.0, 1.0, 0.1)).unwrap(), Shape::mesh(TriMesh::box_(Vec3::new(5.0, 1.0, 0.1)), &TreeSettings::octree()).unwrap().0] {
+        for block in [
+            Shape::cuboid(Vec3::new(5.0, 1.0, 0.1)).unwrap(),
+            Shape::mesh(TriMesh::box_(Vec3::new(5.0, 1.0, 0.1)), &TreeSettings::octree()).unwrap().0,
+        ] {
             let mut world = world(stepper, 1.0 / 60.0);
             world.add_static(RigidBody::fixture("floor", block).surface(0.0, 0.5)).unwrap();
             let shape = Shape::cylinder(0.1, 0.2).unwrap();
@@ -93,7 +99,11 @@ fn a_cylinder_stands_and_rolls_on_a_block() {
             assert!((site.pose.rotation * Vec3::z()).z > 1.0 - 1e-6, "{stepper}: {:?}", site.pose);
             let site = world.site(rolling, 0).unwrap();
             let off = site.position() - Vec3::new(0.0, 0.0, 0.2);
-            assert!(off.norm() < 2e-3 && (site.velocity - Vec3::x()).norm() < 2e-3, "{stepper}: {off:?} {:?}", site.velocity);
+            assert!(
+                off.norm() < 2e-3 && (site.velocity - Vec3::x()).norm() < 2e-3,
+                "{stepper}: {off:?} {:?}",
+                site.velocity
+            );
         }
     }
 }

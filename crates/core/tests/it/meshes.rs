@@ -29,7 +29,9 @@ fn falls(mode: ContactMode, rest: f64, name: &str, mesh: &TriMesh, turn: Vec3, h
     for stepper in STEPPERS {
         let mut fastest = 0.0f64;
         let (shape, _) = Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap();
-        let (error, Shape::Mesh(solid)) = (shape.tree().unwrap().outward_error(), &shape) else { unreachable!("made as a mesh") };
+        let (error, Shape::Mesh(solid)) = (shape.tree().unwrap().outward_error(), &shape) else {
+            unreachable!("made as a mesh")
+        };
         let corners = solid.mesh().vertices.clone();
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.2, 0.6);
@@ -46,13 +48,24 @@ fn falls(mode: ContactMode, rest: f64, name: &str, mesh: &TriMesh, turn: Vec3, h
                 there = site.position();
                 continue;
             }
-            let speed = corners.iter().map(|c| site.velocity_at(&(site.position() + site.pose.rotation * c)).norm()).fold(0.0, f64::max);
+            let speed = corners
+                .iter()
+                .map(|c| site.velocity_at(&(site.position() + site.pose.rotation * c)).norm())
+                .fold(0.0, f64::max);
             fastest = fastest.max(speed);
             assert!(speed < rest, "{stepper}, {mode:?}: '{name}' moves at {speed} m/s after {} s", world.time());
-            assert!((site.position() - there).norm() < 5e-4, "{stepper}: '{name}' wandered by {} m", (site.position() - there).norm());
+            assert!(
+                (site.position() - there).norm() < 5e-4,
+                "{stepper}: '{name}' wandered by {} m",
+                (site.position() - there).norm()
+            );
         }
         println!("{stepper}, {mode:?}: '{name}' at rest moves at {fastest:.1e} m/s; deepest {deepest:.1e} m");
-        assert!(touched > frames / 2 && position(&world, id).z > 0.0, "{stepper}: '{name}' is at {}", position(&world, id));
+        assert!(
+            touched > frames / 2 && position(&world, id).z > 0.0,
+            "{stepper}: '{name}' is at {}",
+            position(&world, id)
+        );
         assert!(deepest < error, "{stepper}: '{name}' was {deepest} m deep, its tree's error is {error} m");
         assert!(world.energy().kinetic < 1e-5 * world.get::<RigidBody>(id).unwrap().mass() * G * height);
     }
@@ -64,7 +77,13 @@ const ASKEW: Vec3 = Vec3::new(0.3, 0.2, 0.1);
 fn public(file: &str) -> Option<TriMesh> {
     let Some(folder) = folder() else {
         // past the harness, which keeps what passing tests print
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set\n", env!("CARGO_MANIFEST_DIR")));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!(
+                "\nSKIPPED: no shared/meshes above {} and TUMBLE_MESHES is not set\n",
+                env!("CARGO_MANIFEST_DIR")
+            ),
+        );
         return None;
     };
     let path = folder.join(file);

@@ -22,7 +22,17 @@ impl Led {
     /// Hung up in a zigzag of `angle` from −z, and pinned to the hand where it ends.
     fn new(stepper: &str, links: usize, angle: f64) -> Led {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
-        let q: Vec<f64> = (0..links).map(|i| if i == 0 { angle } else if i % 2 == 1 { -2.0 * angle } else { 2.0 * angle }).collect();
+        let q: Vec<f64> = (0..links)
+            .map(|i| {
+                if i == 0 {
+                    angle
+                } else if i % 2 == 1 {
+                    -2.0 * angle
+                } else {
+                    2.0 * angle
+                }
+            })
+            .collect();
         let chain = ArticulatedBody::new("chain", hinged(links, LENGTH, rod(1.0, LENGTH))).with_positions(&q).unwrap();
         let chain = world.add(chain).unwrap();
         let last = world.site(chain, links - 1).unwrap().pose;
@@ -83,11 +93,21 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
                 let bent = (end.rotation * -Vec3::z()).angle(&Vec3::new(hand.x, 0.0, hand.z));
                 let (back, _) = led.lead(-speed * along, 2.0);
                 let (rest, _) = led.lead(Vec3::zeros(), 0.5);
-                println!("{name}: {across:.1} rad/s across, {out:.2} out, {back:.1} back; lags {misfit:.6} m, {:.1e} off, {bent:.1e} rad; closed to {:.1e} m, {rest:.1e} rad/s", misfit - expected, led.misfit());
+                println!(
+                    "{name}: {across:.1} rad/s across, {out:.2} out, {back:.1} back; lags {misfit:.6} m, {:.1e} off, {bent:.1e} rad; closed to {:.1e} m, {rest:.1e} rad/s",
+                    misfit - expected,
+                    led.misfit()
+                );
                 // across the plane nothing is in reach from the start: there the chain is still coming to lie straight
                 let straight = if along.y == 0.0 { 4.0 * speed / LENGTH } else { crossing(links) };
-                assert!(across < crossing(links) && back < crossing(links) && out < straight, "{name}: {across}, {out}, {back} rad/s");
-                assert!((misfit - expected).abs() < 1e-3 && bent < 3e-2, "{name}: {misfit} m for {expected} m, bent by {bent} rad");
+                assert!(
+                    across < crossing(links) && back < crossing(links) && out < straight,
+                    "{name}: {across}, {out}, {back} rad/s"
+                );
+                assert!(
+                    (misfit - expected).abs() < 1e-3 && bent < 3e-2,
+                    "{name}: {misfit} m for {expected} m, bent by {bent} rad"
+                );
                 assert!(reported.closure == led.closure && reported.distance == misfit, "{name}: {reported:?}");
                 assert!(led.misfit() < 2e-9, "{name}: open by {:e} m", led.misfit());
             }
@@ -100,7 +120,9 @@ fn rigid_bars_pinned_in_a_row_share_what_is_out_of_reach() {
     for stepper in STEPPERS {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
         let bar = |i: usize| {
-            let mut body = RigidBody::with_mass(format!("bar {i}"), Shape::cuboid(Vec3::new(0.1, 0.01, 0.01)).unwrap(), 1.0).unwrap();
+            let mut body =
+                RigidBody::with_mass(format!("bar {i}"), Shape::cuboid(Vec3::new(0.1, 0.01, 0.01)).unwrap(), 1.0)
+                    .unwrap();
             body.meets = 0;
             body.at(Pose::translation(0.1 + 0.2 * i as f64, 0.0, 0.0))
         };
@@ -109,19 +131,32 @@ fn rigid_bars_pinned_in_a_row_share_what_is_out_of_reach() {
         hand.meets = 0;
         let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
         let parts = [None, Some((bars[0], 0)), Some((bars[1], 0)), Some((bars[2], 0)), Some((hand, 0))];
-        let pins: Vec<ObjectId> = (0..4).map(|i| {
-            let pin = Closure::point_at(format!("pin {i}"), &world, parts[i], parts[i + 1], Vec3::new(0.2 * i as f64, 0.0, 0.0)).unwrap();
-            world.add(pin).unwrap()
-        }).collect();
+        let pins: Vec<ObjectId> = (0..4)
+            .map(|i| {
+                let pin = Closure::point_at(
+                    format!("pin {i}"),
+                    &world,
+                    parts[i],
+                    parts[i + 1],
+                    Vec3::new(0.2 * i as f64, 0.0, 0.0),
+                )
+                .unwrap();
+                world.add(pin).unwrap()
+            })
+            .collect();
         let (mut fastest, mut said): (f64, f64) = (0.0, 0.0);
         for velocity in [0.5, -0.5, 0.0] {
             for _ in 0..240 {
                 world.set_velocity(hand, Vec3::new(velocity, 0.0, 0.0), Vec3::zeros()).unwrap();
                 said = said.max(world.step().unwrap().out_of_reach.map_or(0.0, |o| o.distance));
-                fastest = bars.iter().map(|id| world.site(*id, 0).unwrap().angular_velocity.norm()).fold(fastest, f64::max);
+                fastest =
+                    bars.iter().map(|id| world.site(*id, 0).unwrap().angular_velocity.norm()).fold(fastest, f64::max);
             }
         }
-        let open = pins.iter().map(|id| world.get::<Closure>(*id).unwrap().misfit(&world.view()).unwrap().distance).fold(0.0, f64::max);
+        let open = pins
+            .iter()
+            .map(|id| world.get::<Closure>(*id).unwrap().misfit(&world.view()).unwrap().distance)
+            .fold(0.0, f64::max);
         assert!(fastest < 2.0 * (4.0 * 0.5 * 240.0 / 0.2f64).sqrt(), "{stepper}: {fastest} rad/s");
         assert!(said > 0.5 / 4.0 - 1e-3 && said < 0.5, "{stepper}: {said} m is said, of 0.5 m shared by four pins");
         assert!(open < 1e-7, "{stepper}: {open:e} m are open");

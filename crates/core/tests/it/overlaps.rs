@@ -58,8 +58,16 @@ fn cubes_of_meshes_come_apart() {
     let (cube, block) = (mesh_cube(), cube(1.0));
     for b in [&cube, &block] {
         for overlap in [1e-3, 0.01, 0.02, 0.05, 0.2, 0.5] {
-            for (shift, yaw) in [(Vec3::zeros(), 0.0), (Vec3::new(0.0, 0.01, 0.0), 0.0), (Vec3::new(0.0, 0.1, 0.03), 0.0), (Vec3::zeros(), 0.05)] {
-                let off = Pose::from_parts((Vec3::x() * (1.0 - overlap) + shift).into(), Quat::from_scaled_axis(Vec3::z() * yaw));
+            for (shift, yaw) in [
+                (Vec3::zeros(), 0.0),
+                (Vec3::new(0.0, 0.01, 0.0), 0.0),
+                (Vec3::new(0.0, 0.1, 0.03), 0.0),
+                (Vec3::zeros(), 0.05),
+            ] {
+                let off = Pose::from_parts(
+                    (Vec3::x() * (1.0 - overlap) + shift).into(),
+                    Quat::from_scaled_axis(Vec3::z() * yaw),
+                );
                 come_apart(&format!("{overlap} {shift:?} {yaw}"), [&cube, b], off, cubes_are_apart);
             }
         }
@@ -95,7 +103,9 @@ fn ten_cubes_of_meshes_that_overlap_stand_at_the_end() {
     for stepper in STEPPERS {
         let (mut world, shape) = (world(stepper, 1.0 / 240.0), mesh_cube());
         ground(&mut world, 0.0, 0.5);
-        let ids: Vec<_> = (0..10).map(|i| add(&mut world, &format!("box{i}"), &shape, Pose::translation(0.0, 0.0, 0.5 + 0.98 * i as f64))).collect();
+        let ids: Vec<_> = (0..10)
+            .map(|i| add(&mut world, &format!("box{i}"), &shape, Pose::translation(0.0, 0.0, 0.5 + 0.98 * i as f64)))
+            .collect();
         (0..480).for_each(|_| {
             world.step().unwrap();
         });
@@ -113,7 +123,10 @@ fn a_press_does_not_trap_a_cube() {
         let (mut world, shape) = (world(stepper, 1.0 / 60.0), mesh_cube());
         let a = add(&mut world, "free", &shape, Pose::identity());
         world.add_static(RigidBody::fixture("under", shape.clone()).at(Pose::translation(0.0, 0.0, -1.0))).unwrap();
-        let press = RigidBody::with_mass("press", shape.clone(), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 1.2)).moving(-Vec3::z(), Vec3::zeros());
+        let press = RigidBody::with_mass("press", shape.clone(), 1.0)
+            .unwrap()
+            .at(Pose::translation(0.0, 0.0, 1.2))
+            .moving(-Vec3::z(), Vec3::zeros());
         let k = world.add_boxed(Box::new(press), Mode::Kinematic).unwrap();
         (0..240).for_each(|_| {
             world.step().unwrap();
@@ -136,7 +149,8 @@ fn fast_cubes_do_not_go_through_a_thin_plate() {
             });
             let mut world = no_gravity(world("time_stepping", 1.0 / 240.0));
             world.add_static(RigidBody::fixture("plate", plate.clone())).unwrap();
-            let body = RigidBody::with_mass("cube", cube.clone(), 1.0).unwrap().at(Pose::new(Vec3::new(0.1, 0.07, 3.0), turn));
+            let body =
+                RigidBody::with_mass("cube", cube.clone(), 1.0).unwrap().at(Pose::new(Vec3::new(0.1, 0.07, 3.0), turn));
             let id = world.add(body.moving(Vec3::z() * -speed, Vec3::zeros())).unwrap();
             for _ in 0..(6.0 / speed * 240.0) as usize + 3 {
                 world.step().unwrap();

@@ -1,7 +1,9 @@
 //! A hand that pulls: laws of the damped spring, whatever is pulled.
 
 use tumble_core::collide::{Pose, Shape, Vec3};
-use tumble_core::{ArticulatedBody, Collider, Joint, LinkMass, ModelBuilder, ObjectId, Pull, RigidBody, Settings, World};
+use tumble_core::{
+    ArticulatedBody, Collider, Joint, LinkMass, ModelBuilder, ObjectId, Pull, RigidBody, Settings, World,
+};
 
 const OMEGA: f64 = 10.0;
 
@@ -70,7 +72,8 @@ fn a_pull_is_stable_at_any_length_of_the_step() {
     for dt in [0.001, 1.0 / 60.0, 0.1, 1.0] {
         let mut world = world(0.0, dt);
         let id = crate_of(&mut world, 2.0);
-        let pull = Pull { id, part: 0, point: Vec3::new(0.3, 0.0, 0.0), target: Vec3::new(0.0, 2.0, 5.0), frequency: OMEGA };
+        let pull =
+            Pull { id, part: 0, point: Vec3::new(0.3, 0.0, 0.0), target: Vec3::new(0.0, 2.0, 5.0), frequency: OMEGA };
         drag(&mut world, &pull, 200.0 * dt.max(0.05));
         let left = (pull.target - held(&world, &pull)).norm();
         assert!(left < 1e-3, "dt {dt}: {left} m left");
@@ -95,12 +98,14 @@ fn a_pendulum_swings_to_the_hand_in_the_plane_in_which_it_can() {
     // hinged about y at the origin, the bob 0.5 m below; the hand is 30 degrees off the plane and farther out: the nearest direction in the plane wins
     let mut world = world(0.0, 1.0 / 240.0);
     let mut builder = ModelBuilder::new();
-    let bob = LinkMass { inertia: 1e-3 * nalgebra::Matrix3::identity(), ..LinkMass::point(1.0, Vec3::new(0.0, 0.0, -0.5)) };
+    let bob =
+        LinkMass { inertia: 1e-3 * nalgebra::Matrix3::identity(), ..LinkMass::point(1.0, Vec3::new(0.0, 0.0, -0.5)) };
     builder.link("rod", None, Joint::revolute(Vec3::y()), Pose::identity(), bob);
     let mut body = ArticulatedBody::new("pendulum", builder.build().unwrap());
     body.add_collider("rod", Collider::new(Shape::sphere(0.05).unwrap(), Pose::translation(0.0, 0.0, -0.5))).unwrap();
     let id = world.add(body).unwrap();
-    let pull = Pull { id, part: 0, point: Vec3::new(0.0, 0.0, -0.5), target: Vec3::new(0.7, 0.4, -0.7), frequency: OMEGA };
+    let pull =
+        Pull { id, part: 0, point: Vec3::new(0.0, 0.0, -0.5), target: Vec3::new(0.7, 0.4, -0.7), frequency: OMEGA };
     drag(&mut world, &pull, 5.0);
     let point = held(&world, &pull);
     let side = 0.5 * 0.5f64.sqrt();

@@ -39,7 +39,11 @@ fn a_box_on_a_plate_that_starts_to_rise_is_not_thrown_off() {
             let v = if frame < 20 { 0.0 } else { 1.0 };
             world.set_velocity(plate, Vec3::new(0.0, 0.0, v), Vec3::zeros()).unwrap();
             world.step().unwrap();
-            assert!(gap(&world, body, plate).abs() < 1e-6, "{stepper} frame {frame}: {} m above the plate", gap(&world, body, plate));
+            assert!(
+                gap(&world, body, plate).abs() < 1e-6,
+                "{stepper} frame {frame}: {} m above the plate",
+                gap(&world, body, plate)
+            );
         }
         assert!((velocity(&world, body).z - 1.0).abs() < 1e-9, "{stepper}");
     }
@@ -51,7 +55,10 @@ fn a_ball_that_starts_inside_a_rising_plate_ends_on_it() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         let plate = led_plate(&mut world);
-        let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, 0.199));
+        let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0)
+            .unwrap()
+            .surface(0.0, 0.5)
+            .at(Pose::translation(0.0, 0.0, 0.199));
         let ball = world.add(ball.moving(Vec3::z(), Vec3::zeros())).unwrap();
         world.set_velocity(plate, Vec3::z(), Vec3::zeros()).unwrap();
         world.step().unwrap();
@@ -65,16 +72,24 @@ fn a_body_that_lands_elsewhere_does_not_lift_a_box_off_a_led_plate() {
     for stepper in STEPPERS {
         for v in [0.0, 0.5] {
             let mut world = world(stepper, 1.0 / 60.0);
-            world.add_static(RigidBody::fixture("ground", Shape::half_space()).at(Pose::translation(0.0, 0.0, -1.0))).unwrap();
+            world
+                .add_static(RigidBody::fixture("ground", Shape::half_space()).at(Pose::translation(0.0, 0.0, -1.0)))
+                .unwrap();
             let plate = led_plate(&mut world);
             let body = box_on_plate(&mut world);
-            let tumbler = RigidBody::with_mass("tumbler", Shape::cuboid(Vec3::new(0.1, 0.2, 0.15)).unwrap(), 1.0).unwrap().surface(0.2, 0.5);
+            let tumbler = RigidBody::with_mass("tumbler", Shape::cuboid(Vec3::new(0.1, 0.2, 0.15)).unwrap(), 1.0)
+                .unwrap()
+                .surface(0.2, 0.5);
             let tumbler = tumbler.at(Pose::translation(4.0, 0.0, 0.0)).moving(Vec3::zeros(), Vec3::new(3.0, 2.0, 1.0));
             let tumbler = world.add(tumbler).unwrap();
             world.set_velocity(plate, Vec3::new(0.0, 0.0, v), Vec3::zeros()).unwrap();
             for frame in 0..90 {
                 world.step().unwrap();
-                assert!(gap(&world, body, plate).abs() < 1e-6, "{stepper} {v} m/s frame {frame}: {} m", gap(&world, body, plate));
+                assert!(
+                    gap(&world, body, plate).abs() < 1e-6,
+                    "{stepper} {v} m/s frame {frame}: {} m",
+                    gap(&world, body, plate)
+                );
             }
             assert!(position(&world, tumbler).z < -0.7, "{stepper}: the tumbler has landed");
         }
@@ -94,12 +109,19 @@ fn a_fast_off_centre_hit_goes_along_the_line_of_centres_at_impact() {
     for stepper in STEPPERS {
         for v in [10.0, 30.0, 60.0] {
             let mut world = no_gravity(world(stepper, 1.0 / 60.0));
-            let near = if stepper == "backtracking" { world.settings().contact_tolerance } else { world.settings().drift_tolerance };
+            let near = if stepper == "backtracking" {
+                world.settings().contact_tolerance
+            } else {
+                world.settings().drift_tolerance
+            };
             let striker = billiard(&mut world, "striker", [0.0; 3], v);
             let struck = billiard(&mut world, "struck", [0.095, b, 0.0], 0.0);
-            (0..3).for_each(|_| { world.step().unwrap(); });
+            (0..3).for_each(|_| {
+                world.step().unwrap();
+            });
             let (a, c) = (velocity(&world, striker), velocity(&world, struck));
-            let off = (c - v * cos * Vec3::new(cos, sin, 0.0)).norm().max((a - v * sin * Vec3::new(sin, -cos, 0.0)).norm());
+            let off =
+                (c - v * cos * Vec3::new(cos, sin, 0.0)).norm().max((a - v * sin * Vec3::new(sin, -cos, 0.0)).norm());
             assert!(off < v * sin / cos * near / d, "{stepper} at {v} m/s: {off:e} m/s off: {a:?} {c:?}");
             assert!((a + c - Vec3::new(v, 0.0, 0.0)).norm() < 1e-12 * v, "{stepper}: momentum");
             assert!((a.norm_squared() + c.norm_squared() - v * v).abs() < 1e-12 * v * v, "{stepper}: energy");
@@ -114,9 +136,15 @@ fn a_ball_that_misses_by_23_mm_strikes_nothing() {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         let a = billiard(&mut world, "flies", [0.0; 3], 10.0);
         let b = billiard(&mut world, "rests", [0.15, 0.08, 0.0], 0.0);
-        (0..3).for_each(|_| { world.step().unwrap(); });
+        (0..3).for_each(|_| {
+            world.step().unwrap();
+        });
         assert_eq!(velocity(&world, a), Vec3::new(10.0, 0.0, 0.0), "{stepper}");
-        assert_eq!((velocity(&world, b), position(&world, b)), (Vec3::zeros(), Vec3::new(0.15, 0.08, 0.0)), "{stepper}");
+        assert_eq!(
+            (velocity(&world, b), position(&world, b)),
+            (Vec3::zeros(), Vec3::new(0.15, 0.08, 0.0)),
+            "{stepper}"
+        );
         assert!((position(&world, a) - Vec3::new(0.5, 0.0, 0.0)).norm() < 1e-15, "{stepper}");
     }
 }
@@ -127,12 +155,16 @@ fn a_frozen_table_that_was_spinning_does_not_drag_what_lies_on_it() {
     for stepper in STEPPERS {
         for spin in [Vec3::zeros(), Vec3::new(10.0, 0.0, 0.0), Vec3::new(0.0, 0.0, 10.0)] {
             let mut world = world(stepper, 1.0 / 60.0);
-            let table = RigidBody::with_mass("table", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap(), 10.0).unwrap().surface(0.0, 0.3);
+            let table = RigidBody::with_mass("table", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap(), 10.0)
+                .unwrap()
+                .surface(0.0, 0.3);
             let table = world.add(table.moving(Vec3::zeros(), spin)).unwrap();
             world.set_mode(table, Mode::Static).unwrap();
             let body = RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.3);
             let body = world.add(body.at(Pose::translation(0.6, 0.0, 0.2))).unwrap();
-            (0..30).for_each(|_| { world.step().unwrap(); });
+            (0..30).for_each(|_| {
+                world.step().unwrap();
+            });
             let moved = (position(&world, body) - Vec3::new(0.6, 0.0, 0.2)).norm();
             assert!(moved < 1e-9 && velocity(&world, body).norm() < 1e-9, "{stepper} {spin:?}: moved by {moved:e} m");
             assert!(world.site(table, 0).unwrap().pose == Pose::identity(), "{stepper}: the table turned");
@@ -145,16 +177,25 @@ fn shock(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: f64) -> [(f64,
     let mut world = no_gravity(world(stepper, dt));
     let second = 2.0 * R + gaps[0];
     let x = [0.0, second, second + 2.0 * R + gaps[1]];
-    let ids = [0, 1, 2].map(|i| billiard(&mut world, &format!("ball{i}"), [x[i], 0.0, 0.0], if i == 0 { v } else { 0.0 }));
-    (0..(seconds / dt).round() as usize).for_each(|_| { world.step().unwrap(); });
+    let ids =
+        [0, 1, 2].map(|i| billiard(&mut world, &format!("ball{i}"), [x[i], 0.0, 0.0], if i == 0 { v } else { 0.0 }));
+    (0..(seconds / dt).round() as usize).for_each(|_| {
+        world.step().unwrap();
+    });
     ids.map(|id| (velocity(&world, id).x, position(&world, id).x))
 }
 
 fn assert_shock_passed(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: f64) {
     // Equal masses, e = 1, head on: each impact hands the velocity on. 0, 0, v; the balls stop a gap further, in order; the last flies for what is left.
     let out = shock(stepper, dt, v, gaps, seconds);
-    assert!(out.iter().zip([0.0, 0.0, v]).all(|(o, v)| (o.0 - v).abs() < 1e-9), "{stepper} dt {dt:.4} v {v}: (v, x) {out:?}");
-    assert!(out[0].1 + 2.0 * R < out[1].1 + 1e-6 && out[1].1 + 2.0 * R < out[2].1 + 1e-6, "{stepper} dt {dt:.4}: out of order {out:?}");
+    assert!(
+        out.iter().zip([0.0, 0.0, v]).all(|(o, v)| (o.0 - v).abs() < 1e-9),
+        "{stepper} dt {dt:.4} v {v}: (v, x) {out:?}"
+    );
+    assert!(
+        out[0].1 + 2.0 * R < out[1].1 + 1e-6 && out[1].1 + 2.0 * R < out[2].1 + 1e-6,
+        "{stepper} dt {dt:.4}: out of order {out:?}"
+    );
 }
 
 #[test]
@@ -179,20 +220,30 @@ fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         let lying = Pose::rotation(Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
-        world.add_static(RigidBody::fixture("capsule", Shape::capsule(0.1, 5.0).unwrap()).surface(0.0, 0.0).at(lying)).unwrap();
+        world
+            .add_static(RigidBody::fixture("capsule", Shape::capsule(0.1, 5.0).unwrap()).surface(0.0, 0.0).at(lying))
+            .unwrap();
         let ball = sliding_ball(&mut world, 0.0);
         for frame in 0..60 {
             world.step().unwrap();
-            assert!((weight_carried(&world, ball) - G).abs() < 1e-9, "{stepper} frame {frame}: {} N", weight_carried(&world, ball));
+            assert!(
+                (weight_carried(&world, ball) - G).abs() < 1e-9,
+                "{stepper} frame {frame}: {} N",
+                weight_carried(&world, ball)
+            );
         }
         let off = (position(&world, ball) - Vec3::new(0.75, 0.0, 0.2)).norm();
-        assert!(off < 1e-9 && (velocity(&world, ball) - Vec3::new(3.0, 0.0, 0.0)).norm() < 1e-9, "{stepper}: {off:e} m off");
+        assert!(
+            off < 1e-9 && (velocity(&world, ball) - Vec3::new(3.0, 0.0, 0.0)).norm() < 1e-9,
+            "{stepper}: {off:e} m off"
+        );
     }
 }
 
 /// 1 kg without friction at 3 m/s along x, its lowest point at z = 0.1.
 fn sliding_ball(world: &mut World, x: f64) -> ObjectId {
-    let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(0.0, 0.0).at(Pose::translation(x, 0.0, 0.2));
+    let ball =
+        RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(0.0, 0.0).at(Pose::translation(x, 0.0, 0.2));
     world.add(ball.moving(Vec3::new(3.0, 0.0, 0.0), Vec3::zeros())).unwrap()
 }
 
@@ -209,17 +260,31 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
     let h = 1.0 / 240.0;
     for stepper in STEPPERS {
         let mut world = world(stepper, h);
-        world.add_static(RigidBody::fixture("table", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.0)).unwrap();
+        world
+            .add_static(RigidBody::fixture("table", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.0))
+            .unwrap();
         let ball = sliding_ball(&mut world, 1.0 - 60.5 * 3.0 * h);
         for frame in 0..120 {
             world.step().unwrap();
             let wanted = if frame < 60 { G } else { 0.0 };
-            assert!(frame == 60 || (weight_carried(&world, ball) - wanted).abs() < 1e-9, "{stepper} frame {frame}: {} N", weight_carried(&world, ball));
+            assert!(
+                frame == 60 || (weight_carried(&world, ball) - wanted).abs() < 1e-9,
+                "{stepper} frame {frame}: {} N",
+                weight_carried(&world, ball)
+            );
         }
         let (v, t) = (velocity(&world, ball), 59.5 * h);
-        assert!((v.x - 3.0).abs() < 1e-9 && (v.z + G * t).abs() <= 0.5 * G * h + 1e-9, "{stepper}: {v:?}, vz should be {}", -G * t);
+        assert!(
+            (v.x - 3.0).abs() < 1e-9 && (v.z + G * t).abs() <= 0.5 * G * h + 1e-9,
+            "{stepper}: {v:?}, vz should be {}",
+            -G * t
+        );
         let z = 0.2 - 0.5 * G * t * t;
-        assert!((position(&world, ball).z - z).abs() <= 0.5 * G * h * (t + h), "{stepper}: {} against {z}", position(&world, ball).z);
+        assert!(
+            (position(&world, ball).z - z).abs() <= 0.5 * G * h * (t + h),
+            "{stepper}: {} against {z}",
+            position(&world, ball).z
+        );
     }
 }
 
@@ -281,7 +346,9 @@ fn energy_never_grows_in_impacts_with_friction_whether_or_not_something_is_led_f
                 let s = seed as f64;
                 let mut world = no_gravity(world(stepper, 1.0 / 240.0));
                 ground(&mut world, 1.0, 1.0);
-                let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(0.5, 0.02, 0.02)).unwrap(), 1.0).unwrap().surface(1.0, 1.0);
+                let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(0.5, 0.02, 0.02)).unwrap(), 1.0)
+                    .unwrap()
+                    .surface(1.0, 1.0);
                 let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6), Vec3::new(0.0, 0.2 + 0.03 * s, 0.0));
                 let rod = world.add(rod.at(pose).moving(Vec3::new(6.0 - 0.3 * s, 0.0, -2.0), Vec3::zeros())).unwrap();
                 if led {
@@ -306,24 +373,35 @@ fn a_ball_that_bounces_far_away_does_not_change_one_bit_of_a_stack() {
     let run = |far: bool| -> Vec<Vec<u64>> {
         let mut world = world("time_stepping", 1.0 / 60.0);
         ground(&mut world, 1.0, 0.5);
-        let boxes: Vec<ObjectId> = (0..8).map(|i| {
-            let body = RigidBody::with_mass(format!("box{i}"), cube(0.5), 1.0).unwrap().surface(0.0, 0.5);
-            world.add(body.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
-        }).collect();
+        let boxes: Vec<ObjectId> = (0..8)
+            .map(|i| {
+                let body = RigidBody::with_mass(format!("box{i}"), cube(0.5), 1.0).unwrap().surface(0.0, 0.5);
+                world.add(body.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
+            })
+            .collect();
         if far {
-            let ball = RigidBody::with_mass("far", sphere(0.1), 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(30.0, 0.0, 0.3));
+            let ball = RigidBody::with_mass("far", sphere(0.1), 1.0)
+                .unwrap()
+                .surface(1.0, 0.0)
+                .at(Pose::translation(30.0, 0.0, 0.3));
             world.add(ball.moving(Vec3::new(0.0, 0.0, -3.0), Vec3::zeros())).unwrap();
         }
         let mut passes = 0;
-        let frames = (0..120).map(|_| {
-            passes += world.step().unwrap().impact_passes;
-            boxes.iter().flat_map(|id| world.state_of(*id).unwrap().iter().map(|x| x.to_bits())).collect()
-        }).collect();
+        let frames = (0..120)
+            .map(|_| {
+                passes += world.step().unwrap().impact_passes;
+                boxes.iter().flat_map(|id| world.state_of(*id).unwrap().iter().map(|x| x.to_bits())).collect()
+            })
+            .collect();
         assert_eq!(passes > 0, far, "only the ball bounces");
         frames
     };
     let (alone, with_ball) = (run(false), run(true));
     for (frame, (a, b)) in alone.iter().zip(&with_ball).enumerate() {
-        assert!(a == b, "frame {frame}: {} numbers of the stack differ", a.iter().zip(b).filter(|(a, b)| a != b).count());
+        assert!(
+            a == b,
+            "frame {frame}: {} numbers of the stack differ",
+            a.iter().zip(b).filter(|(a, b)| a != b).count()
+        );
     }
 }

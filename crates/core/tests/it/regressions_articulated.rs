@@ -9,7 +9,8 @@ use tumble_core::*;
 /// A floating chain of capsules that bounce and do not rub, whose links do not meet each other, moving anyhow.
 fn elastic_chain(links: usize) -> ArticulatedBody {
     let model = loose_chain(links, Vec3::zeros(), 0.0).model().clone();
-    let velocities: Vec<f64> = (0..model.dof()).map(|i| ((i * 7 + 3) % 5) as f64 - 2.0 + 0.3 * i as f64 / model.dof() as f64).collect();
+    let velocities: Vec<f64> =
+        (0..model.dof()).map(|i| ((i * 7 + 3) % 5) as f64 - 2.0 + 0.3 * i as f64 / model.dof() as f64).collect();
     let mut body = ArticulatedBody::new("chain", model).at(Pose::translation(-0.05 * links as f64, 0.0, 0.0));
     body.self_collision = false;
     for i in 0..links {
@@ -30,7 +31,9 @@ fn a_chain_that_bounces_in_a_box_gains_no_energy() {
         for (k, (x, y)) in turns.into_iter().enumerate() {
             let rotation = Pose::rotation(Vec3::new(x, y, 0.0)).rotation;
             let wall = RigidBody::fixture(format!("wall{k}"), Shape::half_space()).surface(1.0, 0.0);
-            world.add_static(wall.at(Pose::from_parts((rotation * Vec3::new(0.0, 0.0, -0.6)).into(), rotation))).unwrap();
+            world
+                .add_static(wall.at(Pose::from_parts((rotation * Vec3::new(0.0, 0.0, -0.6)).into(), rotation)))
+                .unwrap();
         }
         world.add(elastic_chain(links)).unwrap();
         let start = world.energy().kinetic;
@@ -100,11 +103,16 @@ fn a_box_on_a_turning_arm_that_is_led_stays_on_its_circle() {
 fn a_floating_chain_that_is_struck_keeps_its_linear_momentum() {
     // displacing links with their joint rates held, and scaling those for the energy, lost 0.43 of 5 N·s in two impacts
     let mut world = no_gravity(world(1.0 / 240.0, "time_stepping", Integrator::Verlet));
-    let mass = LinkMass { mass: 1.0, center: Vec3::new(0.02, 0.0, -0.15), inertia: Mat3::from_diagonal(&Vec3::new(0.008, 0.008, 0.002)) };
+    let mass = LinkMass {
+        mass: 1.0,
+        center: Vec3::new(0.02, 0.0, -0.15),
+        inertia: Mat3::from_diagonal(&Vec3::new(0.008, 0.008, 0.002)),
+    };
     let mut builder = ModelBuilder::new();
     let mut parent = None;
     for i in 0..3 {
-        let (joint, z) = if i == 0 { (Joint::Floating, 0.0) } else { (Joint::revolute(Vec3::new(0.2 * i as f64, 1.0, 0.1)), -0.3) };
+        let (joint, z) =
+            if i == 0 { (Joint::Floating, 0.0) } else { (Joint::revolute(Vec3::new(0.2 * i as f64, 1.0, 0.1)), -0.3) };
         parent = Some(builder.link(format!("link {i}"), parent, joint, Pose::translation(0.0, 0.0, z), mass));
     }
     let mut body = ArticulatedBody::new("chain", builder.build().unwrap());

@@ -39,7 +39,10 @@ impl Constraint for AlongX {
 }
 
 fn unit_ball(world: &mut World, name: &str, at: [f64; 3], v: [f64; 3]) -> ObjectId {
-    let ball = RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(0.0, 0.0).at(Pose::translation(at[0], at[1], at[2]));
+    let ball = RigidBody::with_mass(name, sphere(0.1), 1.0)
+        .unwrap()
+        .surface(0.0, 0.0)
+        .at(Pose::translation(at[0], at[1], at[2]));
     world.add(ball.moving(Vec3::from(v), Vec3::zeros())).unwrap()
 }
 
@@ -76,7 +79,10 @@ fn a_motor_of_6_newtons_gives_its_impulse_whatever_bounces_elsewhere() {
             let target = RowTarget { velocity: 100.0, ..RowTarget::new(RowSet::Interval { lo: -6.0, hi: 6.0 }, 0.0) };
             world.add(AlongX { body: ball, target }).unwrap();
             ground(&mut world, 1.0, 0.0);
-            let far = RigidBody::with_mass("far", sphere(0.1), 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.0, 0.0, 0.15));
+            let far = RigidBody::with_mass("far", sphere(0.1), 1.0)
+                .unwrap()
+                .surface(1.0, 0.0)
+                .at(Pose::translation(0.0, 0.0, 0.15));
             let down = Vec3::new(0.0, 0.0, if bounces { -6.0 } else { 0.0 });
             let far = world.add(far.moving(down, Vec3::zeros())).unwrap();
             world.step().unwrap();
@@ -121,7 +127,9 @@ fn a_snapshot_with_a_hostile_counter_is_refused_and_objects_can_still_be_added()
             refused += 1;
             assert_eq!(bits(&world), before, "byte {at}: refused, and yet changed");
         }
-        let added = world.add(RigidBody::with_mass("more", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 0.0, 0.0))).unwrap();
+        let added = world
+            .add(RigidBody::with_mass("more", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 0.0, 0.0)))
+            .unwrap();
         let _ = world.step(); // a state of 1e300 may end in an error, never in a panic
         world.remove(added).unwrap();
         world.restore(&saved).unwrap();
@@ -169,12 +177,17 @@ fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
             let rests = unit_ball(&mut world, "rests", [0.0, 0.0, 0.1], [0.0; 3]);
             let light = RigidBody::with_mass("light", sphere(0.1), 1e-3).unwrap().at(Pose::translation(5.0, 0.0, 5.0));
             let light = world.add(light).unwrap();
-            (0..10).for_each(|_| { world.step().unwrap(); });
+            (0..10).for_each(|_| {
+                world.step().unwrap();
+            });
             let before = (bits(&world), world.time().to_bits(), world.frame());
             world.apply_force(light, 0, Vec3::new(1e308, 0.0, 0.0), &Vec3::new(5.0, 0.0, 5.0)).unwrap();
             assert!(matches!(world.step(), Err(StepError::NotFinite { .. })), "{failing}");
             assert_eq!((bits(&world), world.time().to_bits(), world.frame()), before, "{failing}");
-            assert!((velocity(&world, light).z + 10.0 * G * h).abs() < 1e-12, "{failing}: the sites are those of the state");
+            assert!(
+                (velocity(&world, light).z + 10.0 * G * h).abs() < 1e-12,
+                "{failing}: the sites are those of the state"
+            );
             world.step().unwrap();
             assert!((position(&world, rests).z - 0.1).abs() < 1e-9, "{failing}: still rests");
             world.remove(light).unwrap();
@@ -182,7 +195,11 @@ fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
             world.set_velocity(rests, Vec3::zeros(), Vec3::zeros()).unwrap();
             world.set_stepper(stepper_by_name(next).unwrap());
             world.step().unwrap();
-            assert!((velocity(&world, rests).z + G * h).abs() < 1e-12, "{failing} then {next}: {}", velocity(&world, rests).z / h);
+            assert!(
+                (velocity(&world, rests).z + G * h).abs() < 1e-12,
+                "{failing} then {next}: {}",
+                velocity(&world, rests).z / h
+            );
             assert!((position(&world, rests).z - (5.0 - 0.5 * G * h * h)).abs() < 1e-12, "{failing} then {next}");
         }
     }
@@ -211,7 +228,11 @@ fn a_velocity_that_is_not_finite_is_no_state() {
         let light = world.add(RigidBody::with_mass("light", sphere(0.1), 1e-3).unwrap()).unwrap();
         world.apply_force(light, 0, Vec3::new(1e308, 0.0, 0.0), &Vec3::zeros()).unwrap();
         let outcome = world.step().copied();
-        assert!(outcome.is_err() || velocity(&world, light).norm().is_finite(), "{stepper}: {outcome:?}, v = {:?}", velocity(&world, light));
+        assert!(
+            outcome.is_err() || velocity(&world, light).norm().is_finite(),
+            "{stepper}: {outcome:?}, v = {:?}",
+            velocity(&world, light)
+        );
     }
 }
 
@@ -256,7 +277,8 @@ impl Constraint for Pin {
         let p = site.position() + arm;
         let centripetal = spin.cross(&spin.cross(&arm));
         for k in 0..3 {
-            let target = RowTarget { bias_acceleration: centripetal[k], ..RowTarget::new(RowSet::Equality, (p - END)[k]) };
+            let target =
+                RowTarget { bias_acceleration: centripetal[k], ..RowTarget::new(RowSet::Equality, (p - END)[k]) };
             out.row(target).on_point(self.0, 0, &p, &Vec3::ith(k, 1.0), 1.0);
         }
     }
@@ -289,7 +311,10 @@ fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
         worst.drift = worst.drift.max((p - END).norm());
         worst.speed = worst.speed.max(site.velocity_at(&p).norm());
     }
-    println!("{stepper} at {dt:.6} s: energy off by {:.3e}, drift {:.3e} m, pin speed {:.3e} m/s", worst.energy, worst.drift, worst.speed);
+    println!(
+        "{stepper} at {dt:.6} s: energy off by {:.3e}, drift {:.3e} m, pin speed {:.3e} m/s",
+        worst.energy, worst.drift, worst.speed
+    );
     worst
 }
 

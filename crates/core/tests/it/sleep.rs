@@ -14,7 +14,9 @@ fn sleepy(stepper: &str) -> World {
 }
 
 fn run(world: &mut World, frames: usize) {
-    (0..frames).for_each(|_| { world.step().unwrap(); });
+    (0..frames).for_each(|_| {
+        world.step().unwrap();
+    });
 }
 
 fn bits(world: &World) -> Vec<u64> {
@@ -45,7 +47,10 @@ fn a_stack_falls_asleep_and_costs_nothing() {
     for stepper in STEPPERS {
         let (mut world, _) = bed(stepper);
         let (state, energy) = (bits(&world), world.energy());
-        assert!(energy.kinetic == 0.0 && (energy.potential - 10.0 * G * (0.25 + 0.75 + 1.25)).abs() < 1e-3, "{energy:?}: sleepers keep their energy");
+        assert!(
+            energy.kinetic == 0.0 && (energy.potential - 10.0 * G * (0.25 + 0.75 + 1.25)).abs() < 1e-3,
+            "{energy:?}: sleepers keep their energy"
+        );
         run(&mut world, 60);
         assert_eq!(bits(&world), state, "{stepper}: sleepers stay where they are");
         assert_eq!((world.report().contacts, world.report().iterations, world.report().asleep), (0, 0, 3), "{stepper}");
@@ -61,8 +66,12 @@ fn a_strike_on_sleepers_is_the_same_bits_as_on_the_waking() {
             let settings = Settings { sleep, ..*world.settings() };
             world.set_settings(settings).unwrap();
             let ball = |name: String| RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(1.0, 0.3);
-            let ids: Vec<ObjectId> = (0..5).map(|i| world.add(ball(format!("ball{i}")).at(Pose::translation(0.2 * i as f64, 0.0, 0.0))).unwrap()).collect();
-            world.add(ball("striker".into()).at(Pose::translation(-2.1, 0.02, 0.0)).moving(Vec3::x(), Vec3::zeros())).unwrap();
+            let ids: Vec<ObjectId> = (0..5)
+                .map(|i| world.add(ball(format!("ball{i}")).at(Pose::translation(0.2 * i as f64, 0.0, 0.0))).unwrap())
+                .collect();
+            world
+                .add(ball("striker".into()).at(Pose::translation(-2.1, 0.02, 0.0)).moving(Vec3::x(), Vec3::zeros()))
+                .unwrap();
             (world, ids)
         };
         let ((mut sleeping, ids), (mut waking, _)) = (cradle(Some(Sleep::default())), cradle(None));
@@ -110,7 +119,9 @@ fn whatever_is_done_to_a_sleeper_wakes_its_island() {
         }),
         ("the ground goes", |w, _| drop(w.remove(w.find("ground").unwrap()).unwrap())),
         ("one of them goes", |w, ids| drop(w.remove(ids[0]).unwrap())),
-        ("the ground is put lower", |w, _| w.set_pose(w.find("ground").unwrap(), Pose::translation(0.0, 0.0, -1.0)).unwrap()),
+        ("the ground is put lower", |w, _| {
+            w.set_pose(w.find("ground").unwrap(), Pose::translation(0.0, 0.0, -1.0)).unwrap()
+        }),
     ];
     for stepper in STEPPERS {
         for (name, deed) in deeds {
@@ -127,18 +138,31 @@ fn whatever_is_done_to_a_sleeper_wakes_its_island() {
 fn what_is_led_wakes_those_it_carries_or_strikes() {
     for stepper in STEPPERS {
         let mut world = sleepy(stepper);
-        let lift = world.add_boxed(Box::new(RigidBody::with_mass("lift", cube(1.0), 1.0).unwrap().surface(0.0, 0.5)), Mode::Kinematic).unwrap();
+        let lift = world
+            .add_boxed(
+                Box::new(RigidBody::with_mass("lift", cube(1.0), 1.0).unwrap().surface(0.0, 0.5)),
+                Mode::Kinematic,
+            )
+            .unwrap();
         let cargo = RigidBody::with_mass("cargo", cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
         let cargo = world.add(cargo.at(Pose::translation(0.0, 0.0, 0.75))).unwrap();
         run(&mut world, 60);
         assert!(world.asleep(cargo), "{stepper}");
         world.set_velocity(lift, Vec3::new(0.0, 0.0, 0.5), Vec3::zeros()).unwrap();
         run(&mut world, 60);
-        assert!(!world.asleep(cargo) && (position(&world, cargo).z - 1.25).abs() < 1e-3, "{stepper}: {}", position(&world, cargo));
+        assert!(
+            !world.asleep(cargo) && (position(&world, cargo).z - 1.25).abs() < 1e-3,
+            "{stepper}: {}",
+            position(&world, cargo)
+        );
         world.set_velocity(lift, Vec3::zeros(), Vec3::zeros()).unwrap();
         run(&mut world, 90);
         assert!(world.asleep(cargo), "{stepper}: not asleep again");
-        let pusher = RigidBody::with_mass("pusher", cube(0.4), 1.0).unwrap().at(Pose::translation(-3.0, 0.0, position(&world, cargo).z));
+        let pusher = RigidBody::with_mass("pusher", cube(0.4), 1.0).unwrap().at(Pose::translation(
+            -3.0,
+            0.0,
+            position(&world, cargo).z,
+        ));
         let pusher = world.add_boxed(Box::new(pusher), Mode::Kinematic).unwrap();
         world.set_velocity(pusher, Vec3::new(2.0, 0.0, 0.0), Vec3::zeros()).unwrap();
         run(&mut world, 75);
@@ -189,7 +213,10 @@ fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
         let ((slept, x), (never, waking)) = (blown(Some(Sleep::default())), blown(None));
         assert!(slept && !never, "{stepper}");
         // 80 N against μ·m·g = 49 N for a second; a gust that begins within a step may find the friction of its start for all of it: μ·g·h for a second
-        assert!((waking - 0.5 * (8.0 - 0.5 * G)).abs() < 1.2 * 0.5 * G * H && (x - waking).abs() < 1e-6, "{stepper}: {x} m, and {waking} m without sleep");
+        assert!(
+            (waking - 0.5 * (8.0 - 0.5 * G)).abs() < 1.2 * 0.5 * G * H && (x - waking).abs() < 1e-6,
+            "{stepper}: {x} m, and {waking} m without sleep"
+        );
     }
 }
 
@@ -201,9 +228,13 @@ fn what_pauses_or_creeps_stays_awake() {
         ground(&mut world, 0.0, 0.5);
         let bob = RigidBody::with_mass("bob", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 0.3, 2.0));
         let bob = world.add(bob).unwrap();
-        let hinge = Closure::hinge_at("hinge", &world, Some((bob, 0)), None, Vec3::new(5.0, 0.0, 3.0), Vec3::x()).unwrap();
+        let hinge =
+            Closure::hinge_at("hinge", &world, Some((bob, 0)), None, Vec3::new(5.0, 0.0, 3.0), Vec3::x()).unwrap();
         world.add(hinge).unwrap();
-        let roller = RigidBody::with_mass("roller", sphere(0.2), 1.0).unwrap().surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, 0.2));
+        let roller = RigidBody::with_mass("roller", sphere(0.2), 1.0)
+            .unwrap()
+            .surface(0.0, 0.5)
+            .at(Pose::translation(0.0, 0.0, 0.2));
         let roller = world.add(roller.moving(Vec3::new(1e-3, 0.0, 0.0), Vec3::new(0.0, 1e-3 / 0.2, 0.0))).unwrap();
         for _ in 0..300 {
             run(&mut world, 1);
@@ -220,9 +251,21 @@ fn joints_hold_an_island_together() {
     let mut above: Option<(ObjectId, usize)> = None;
     let mut ids = Vec::new();
     for i in 0..4 {
-        let rod = RigidBody::with_mass(format!("rod{i}"), cube(0.2), 1.0).unwrap().at(Pose::translation(0.0, 0.0, -0.5 * i as f64));
+        let rod = RigidBody::with_mass(format!("rod{i}"), cube(0.2), 1.0).unwrap().at(Pose::translation(
+            0.0,
+            0.0,
+            -0.5 * i as f64,
+        ));
         let id = world.add(rod).unwrap();
-        let pin = Closure::hinge_at(format!("pin{i}"), &world, Some((id, 0)), above, Vec3::new(0.0, 0.0, 0.25 - 0.5 * i as f64), Vec3::y()).unwrap();
+        let pin = Closure::hinge_at(
+            format!("pin{i}"),
+            &world,
+            Some((id, 0)),
+            above,
+            Vec3::new(0.0, 0.0, 0.25 - 0.5 * i as f64),
+            Vec3::y(),
+        )
+        .unwrap();
         world.add(pin).unwrap();
         above = Some((id, 0));
         ids.push(id);

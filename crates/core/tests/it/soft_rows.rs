@@ -43,7 +43,8 @@ impl Constraint for Drive {
 }
 
 fn ball(world: &mut World, mass: f64, v: f64) -> ObjectId {
-    let ball = RigidBody::with_mass("ball", sphere(0.1), mass).unwrap().surface(0.0, 0.0).at(Pose::translation(0.0, 0.0, 0.0));
+    let ball =
+        RigidBody::with_mass("ball", sphere(0.1), mass).unwrap().surface(0.0, 0.0).at(Pose::translation(0.0, 0.0, 0.0));
     world.add(ball.moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
 }
 
@@ -61,7 +62,10 @@ fn a_drive_gives_the_velocity_found_by_hand() {
                 let q = 0.5 * h * v;
                 let expected = (m * v + h * stiffness * (place - q)) / (m + h * (damping + h * stiffness));
                 let got = velocity(&world, body).x;
-                assert!((got - expected).abs() < 1e-12, "{stepper} {set:?} {stiffness} {damping}: {got}, by hand {expected}");
+                assert!(
+                    (got - expected).abs() < 1e-12,
+                    "{stepper} {set:?} {stiffness} {damping}: {got}, by hand {expected}"
+                );
             }
         }
     }
@@ -91,7 +95,10 @@ fn a_spring_takes_no_part_in_an_impact() {
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, h));
         let at = |name: &str, x: f64, v: f64| {
-            let ball = RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(x, 0.0, 0.0));
+            let ball = RigidBody::with_mass(name, sphere(0.1), 1.0)
+                .unwrap()
+                .surface(1.0, 0.0)
+                .at(Pose::translation(x, 0.0, 0.0));
             ball.moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())
         };
         let held = world.add(at("held", 0.0, 0.0)).unwrap();
@@ -130,7 +137,10 @@ fn a_compliance_that_is_none_is_refused() {
             let body = ball(&mut world, 1.0, 0.0);
             world.add(Row(body, compliance)).unwrap();
             let error = world.step().unwrap_err().to_string();
-            assert!(error.contains("compliance") && error.contains(&format!("{compliance}")) && error.contains("'row'"), "{error}");
+            assert!(
+                error.contains("compliance") && error.contains(&format!("{compliance}")) && error.contains("'row'"),
+                "{error}"
+            );
         }
     }
 }

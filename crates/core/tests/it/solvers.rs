@@ -37,14 +37,22 @@ fn five_boxes_stand_with_every_solver() {
             let mut world = world(stepper, 1.0 / 60.0);
             set(&mut world, solver);
             ground(&mut world, 0.0, 0.5);
-            let ids: Vec<ObjectId> = (0..5).map(|i| {
-                let body = RigidBody::with_mass(format!("box{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
-                world.add(body.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
-            }).collect();
-            (0..60).for_each(|_| { world.step().unwrap(); });
+            let ids: Vec<ObjectId> = (0..5)
+                .map(|i| {
+                    let body = RigidBody::with_mass(format!("box{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
+                    world.add(body.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
+                })
+                .collect();
+            (0..60).for_each(|_| {
+                world.step().unwrap();
+            });
             for (i, id) in ids.iter().enumerate() {
                 let off = (position(&world, *id) - Vec3::new(0.0, 0.0, 0.25 + 0.5 * i as f64)).norm();
-                assert!(off < 1e-4 && velocity(&world, *id).norm() < 1e-3, "{stepper}, {solver}: box {i} is {off} m off at {} m/s", velocity(&world, *id).norm());
+                assert!(
+                    off < 1e-4 && velocity(&world, *id).norm() < 1e-3,
+                    "{stepper}, {solver}: box {i} is {off} m off at {} m/s",
+                    velocity(&world, *id).norm()
+                );
             }
         }
     }
@@ -53,13 +61,23 @@ fn five_boxes_stand_with_every_solver() {
 /// A frictionless pile in mid-fall: 20 spheres and boxes pressed against each other and the ground.
 fn pile(stepper: &str) -> World {
     let mut world = world(stepper, 1.0 / 240.0);
-    world.set_settings(Settings { accuracy: Accuracy { sweeps: 200_000, relaxations: u32::MAX, tolerance: 1e-12 }, ..*world.settings() }).unwrap();
+    world
+        .set_settings(Settings {
+            accuracy: Accuracy { sweeps: 200_000, relaxations: u32::MAX, tolerance: 1e-12 },
+            ..*world.settings()
+        })
+        .unwrap();
     ground(&mut world, 0.0, 0.0);
     for i in 0..20 {
         let (x, y, z) = (0.19 * (i % 2) as f64, 0.19 * ((i / 2) % 2) as f64, 0.1 + 0.195 * (i / 4) as f64);
         let shape = if i % 3 == 0 { sphere(0.1) } else { cube(0.19) };
         let body = RigidBody::with_mass(format!("body{i}"), shape, 1.0 + 0.1 * i as f64).unwrap().surface(0.0, 0.0);
-        world.add(body.at(Pose::translation(x, y, z)).moving(Vec3::new(0.2 - 0.4 * (i % 2) as f64, 0.1 * (i % 3) as f64, -1.0), Vec3::zeros())).unwrap();
+        world
+            .add(
+                body.at(Pose::translation(x, y, z))
+                    .moving(Vec3::new(0.2 - 0.4 * (i % 2) as f64, 0.1 * (i % 3) as f64, -1.0), Vec3::zeros()),
+            )
+            .unwrap();
     }
     world
 }

@@ -7,17 +7,21 @@ use tumble_core::*;
 fn stack(stepper: &str, n: usize, dt: f64) -> (World, Vec<ObjectId>) {
     let mut world = world(stepper, dt);
     ground(&mut world, 0.0, 0.5);
-    let ids = (0..n).map(|i| {
-        let cube = RigidBody::with_mass(format!("box{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
-        world.add(cube.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
-    }).collect();
+    let ids = (0..n)
+        .map(|i| {
+            let cube = RigidBody::with_mass(format!("box{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
+            world.add(cube.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
+        })
+        .collect();
     (world, ids)
 }
 
 #[test]
 fn ten_boxes_stand_for_a_minute() {
     let (mut world, ids) = stack("time_stepping", 10, 1.0 / 60.0);
-    (0..3600).for_each(|_| { world.step().unwrap(); });
+    (0..3600).for_each(|_| {
+        world.step().unwrap();
+    });
     for (i, id) in ids.iter().enumerate() {
         let p = position(&world, *id);
         let off = (p - tumble_core::collide::Vec3::new(0.0, 0.0, 0.25 + 0.5 * i as f64)).norm();
@@ -43,7 +47,9 @@ fn ten_boxes_stand_in_the_backtracking_stepper_with_few_tries() {
 fn contact_forces_of_a_resting_box_carry_its_weight() {
     for stepper in STEPPERS {
         let (mut world, _) = stack(stepper, 1, 1.0 / 60.0);
-        (0..30).for_each(|_| { world.step().unwrap(); });
+        (0..30).for_each(|_| {
+            world.step().unwrap();
+        });
         let force: f64 = world.contacts().iter().map(|c| c.force.z.abs()).sum();
         assert!((force / (10.0 * G) - 1.0).abs() < 1e-6, "{stepper}: {force} N");
     }

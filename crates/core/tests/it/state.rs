@@ -17,7 +17,9 @@ fn messy(stepper: &str) -> World {
 }
 
 fn run(world: &mut World, frames: usize) {
-    (0..frames).for_each(|_| { world.step().unwrap(); });
+    (0..frames).for_each(|_| {
+        world.step().unwrap();
+    });
 }
 
 fn bits(world: &World) -> Vec<u64> {
@@ -80,7 +82,9 @@ fn objects_come_and_go_in_mid_run() {
     world.remove(gone).unwrap();
     assert!(world.object(gone).is_none() && world.site(gone, 0).is_none());
     assert!(matches!(world.set_mode(gone, Mode::Static), Err(WorldError::Stale)));
-    let added = world.add(RigidBody::with_mass("late", sphere(0.1), 1.0).unwrap().at(Pose::translation(3.0, 0.0, 1.0))).unwrap();
+    let added = world
+        .add(RigidBody::with_mass("late", sphere(0.1), 1.0).unwrap().at(Pose::translation(3.0, 0.0, 1.0)))
+        .unwrap();
     assert_ne!(gone, added);
     run(&mut world, 120);
     assert!((position(&world, added).z - 0.1).abs() < 1e-6, "the late one landed");
@@ -97,9 +101,20 @@ fn bodies_that_came_and_went_leave_no_trace_in_a_fork() {
         for frame in 0..60 {
             if frame % 5 == 0 {
                 let gone = world.find(&format!("body{}", frame / 5)).unwrap();
-                if frame % 10 == 0 { world.remove(gone).map(drop).unwrap() } else { world.set_collidable(gone, false).unwrap() }
+                if frame % 10 == 0 {
+                    world.remove(gone).map(drop).unwrap()
+                } else {
+                    world.set_collidable(gone, false).unwrap()
+                }
                 let place = Pose::translation(0.1 * (frame % 3) as f64, 0.0, 1.0 + 0.1 * frame as f64);
-                world.add(RigidBody::with_mass(format!("late{frame}"), cube(0.3), 2.0).unwrap().surface(0.2, 0.4).at(place)).unwrap();
+                world
+                    .add(
+                        RigidBody::with_mass(format!("late{frame}"), cube(0.3), 2.0)
+                            .unwrap()
+                            .surface(0.2, 0.4)
+                            .at(place),
+                    )
+                    .unwrap();
                 copies = vec![world.fork(), world.fork()];
                 let saved = world.save();
                 run(&mut copies[1], 1);
@@ -125,7 +140,8 @@ fn a_kinematic_body_follows_its_motion_and_pushes() {
         let pusher = world.add(pusher).unwrap();
         world.set_mode(pusher, Mode::Kinematic).unwrap();
         world.set_velocity(pusher, Vec3::new(2.0, 0.0, 0.0), Vec3::zeros()).unwrap();
-        let ball = RigidBody::with_mass("box", cube(0.2), 3.0).unwrap().surface(0.0, 0.0).at(Pose::translation(0.0, 0.0, 0.1));
+        let ball =
+            RigidBody::with_mass("box", cube(0.2), 3.0).unwrap().surface(0.0, 0.0).at(Pose::translation(0.0, 0.0, 0.1));
         let ball = world.add(ball).unwrap();
         run(&mut world, 60);
         assert!((position(&world, pusher).x - 1.0).abs() < 1e-9, "{stepper}: pusher at {}", position(&world, pusher).x);
@@ -134,7 +150,10 @@ fn a_kinematic_body_follows_its_motion_and_pushes() {
         world.move_to(pusher, target).unwrap();
         run(&mut world, 1);
         let reached = world.site(pusher, 0).unwrap().pose;
-        assert!((reached.inverse() * target).translation.vector.norm() < 1e-12 && reached.rotation.angle_to(&target.rotation) < 1e-7);
+        assert!(
+            (reached.inverse() * target).translation.vector.norm() < 1e-12
+                && reached.rotation.angle_to(&target.rotation) < 1e-7
+        );
     }
 }
 
@@ -142,7 +161,9 @@ fn a_kinematic_body_follows_its_motion_and_pushes() {
 fn switches_take_a_body_out_and_back_in() {
     let mut world = world("time_stepping", 1.0 / 60.0);
     ground(&mut world, 0.0, 0.5);
-    let id = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.1))).unwrap();
+    let id = world
+        .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.1)))
+        .unwrap();
     world.set_collidable(id, false).unwrap();
     run(&mut world, 60);
     assert!((position(&world, id).z - (0.1 - 0.5 * G)).abs() < 1e-9, "falls through");
@@ -185,7 +206,11 @@ fn kinds_that_do_not_meet_pass_through_each_other() {
         world.add(body.at(Pose::translation(x, 0.0, 0.0)).moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
     };
     let solid = CollisionKind::default();
-    let ids = [add("a", -2.0, 1.0, solid, !ghost.bit()), add("ghost", 0.0, 0.0, ghost, u64::MAX), add("b", 2.0, -1.0, solid, u64::MAX)];
+    let ids = [
+        add("a", -2.0, 1.0, solid, !ghost.bit()),
+        add("ghost", 0.0, 0.0, ghost, u64::MAX),
+        add("b", 2.0, -1.0, solid, u64::MAX),
+    ];
     run(&mut world, 180);
     // b meets the ghost at t = 1 s, x = 1 and stops; the ghost flies off at -1 m/s through a; a meets b at t = 2 s, x = 0 and stops.
     let x: Vec<f64> = ids.iter().map(|id| position(&world, *id).x).collect();

@@ -10,8 +10,11 @@ fn a_standing_cylinder_does_not_creep() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         let block = Shape::cuboid(Vec3::new(0.5, 0.5, 0.1)).unwrap();
-        world.add_static(RigidBody::fixture("block", block).surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, -0.1))).unwrap();
-        let cylinder = RigidBody::with_mass("cylinder", Shape::cylinder(0.05, 0.15).unwrap(), 1.0).unwrap().surface(0.0, 0.5);
+        world
+            .add_static(RigidBody::fixture("block", block).surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, -0.1)))
+            .unwrap();
+        let cylinder =
+            RigidBody::with_mass("cylinder", Shape::cylinder(0.05, 0.15).unwrap(), 1.0).unwrap().surface(0.0, 0.5);
         let id = world.add(cylinder.at(Pose::translation(0.03, 0.02, 0.15))).unwrap();
         let start = position(&world, id);
         for _ in 0..480 {
@@ -42,7 +45,12 @@ fn meshes_that_fly_at_each_other_bounce() {
     let (mut world, [a, b]) = fly(0.03);
     for _ in 0..6 {
         world.step().unwrap();
-        assert!(position(&world, a).x < position(&world, b).x, "A is at {}, B at {}", position(&world, a), position(&world, b));
+        assert!(
+            position(&world, a).x < position(&world, b).x,
+            "A is at {}, B at {}",
+            position(&world, a),
+            position(&world, b)
+        );
     }
     let (va, vb) = (velocity(&world, a), velocity(&world, b));
     assert!(va.x < 0.0 && vb.x > 0.0, "A leaves at {va}, B at {vb}");
@@ -54,7 +62,9 @@ fn meshes_that_fly_at_each_other_bounce() {
 #[test]
 fn meshes_that_fly_past_each_other_are_left_alone() {
     let (mut world, [a, b]) = fly(0.22);
-    (0..6).for_each(|_| { world.step().unwrap(); });
+    (0..6).for_each(|_| {
+        world.step().unwrap();
+    });
     assert_eq!((velocity(&world, a), velocity(&world, b)), (Vec3::new(50.0, 0.0, 0.0), Vec3::new(-50.0, 0.0, 0.0)));
     assert!(position(&world, a).x > 3.9 && position(&world, b).x < -3.9);
 }

@@ -46,7 +46,11 @@ pub fn run(options: &Options) -> Result<(), Failure> {
             Some(LinkEvent::Opened) => {}
             Some(LinkEvent::Closed(why)) => {
                 if expected > 0 {
-                    return Err(format!("facet {}: the server is gone ({why:?}) after frame {expected}", options.facet).into());
+                    return Err(format!(
+                        "facet {}: the server is gone ({why:?}) after frame {expected}",
+                        options.facet
+                    )
+                    .into());
                 }
             }
             Some(LinkEvent::Message) => {
@@ -57,7 +61,10 @@ pub fn run(options: &Options) -> Result<(), Failure> {
                         let whole = message.len() == options.bytes && word(&message[message.len() - 8..], 0) == frame;
                         faults += u64::from(!whole) + u64::from(frame != expected);
                         expected = frame + 1;
-                        link.send(Delivery::Reliable, &words(&[READY, frame, now.saturating_sub(word(&message, 2)), faults]))?;
+                        link.send(
+                            Delivery::Reliable,
+                            &words(&[READY, frame, now.saturating_sub(word(&message, 2)), faults]),
+                        )?;
                     }
                     PRESENT => {
                         link.send(Delivery::Reliable, &words(&[PRESENTED, frame, now]))?;

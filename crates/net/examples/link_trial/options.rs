@@ -62,10 +62,19 @@ impl Options {
         while let Some(word) = words.next() {
             let value = words.next().ok_or_else(|| format!("{word} needs a value\n{USAGE}"))?;
             let share = || {
-                value.parse::<f64>().ok().filter(|x| (0.0..=1.0).contains(x)).ok_or_else(|| format!("{word} {value}: a share of 0 to 1"))
+                value
+                    .parse::<f64>()
+                    .ok()
+                    .filter(|x| (0.0..=1.0).contains(x))
+                    .ok_or_else(|| format!("{word} {value}: a share of 0 to 1"))
             };
-            let ms =
-                || value.parse::<f64>().ok().filter(|x| (0.0..=1e4).contains(x)).ok_or_else(|| format!("{word} {value}: milliseconds"));
+            let ms = || {
+                value
+                    .parse::<f64>()
+                    .ok()
+                    .filter(|x| (0.0..=1e4).contains(x))
+                    .ok_or_else(|| format!("{word} {value}: milliseconds"))
+            };
             match word.as_str() {
                 "--role" => {
                     o.role = match value.as_str() {

@@ -42,8 +42,11 @@ type Backs = Mutex<BTreeMap<SocketAddr, Arc<UdpSocket>>>;
 /// Until it is killed.
 pub fn run(options: &Options) -> Result<(), Failure> {
     let server = options.address;
-    let relay =
-        Arc::new(Relay { network: Mutex::new(Network::new(options.seed, options.faults)), earlier: Condvar::new(), start: Instant::now() });
+    let relay = Arc::new(Relay {
+        network: Mutex::new(Network::new(options.seed, options.faults)),
+        earlier: Condvar::new(),
+        start: Instant::now(),
+    });
     let front = Arc::new(UdpSocket::bind(options.listen)?);
     let backs: Arc<Backs> = Arc::default();
     {
@@ -55,7 +58,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         let (length, from) = front.recv_from(&mut buffer)?;
         let mut known = backs.lock().unwrap_or_else(PoisonError::into_inner);
         if !known.contains_key(&from) && known.len() < MAX_FACETS {
-            let any: SocketAddr = if server.ip().is_loopback() { ([127, 0, 0, 1], 0).into() } else { ([0, 0, 0, 0], 0).into() };
+            let any: SocketAddr =
+                if server.ip().is_loopback() { ([127, 0, 0, 1], 0).into() } else { ([0, 0, 0, 0], 0).into() };
             let back = Arc::new(UdpSocket::bind(any)?);
             known.insert(from, back.clone());
             let relay = relay.clone();

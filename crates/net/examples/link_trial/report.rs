@@ -24,13 +24,17 @@ pub struct Figures {
 
 fn row(what: &str, samples: &mut [u64]) {
     samples.sort_unstable();
-    let at = |q: f64| samples.get((samples.len().saturating_sub(1) as f64 * q) as usize).map_or(0.0, |ns| *ns as f64 / 1e3);
+    let at =
+        |q: f64| samples.get((samples.len().saturating_sub(1) as f64 * q) as usize).map_or(0.0, |ns| *ns as f64 / 1e3);
     println!("| {what} | {:.0} | {:.0} | {:.0} | {:.0} |", at(0.5), at(0.99), at(0.999), at(1.0));
 }
 
 pub fn print(options: &Options, figures: &mut Figures, bytes: u64, counters: &[LinkCounters]) -> Result<(), Failure> {
     let states = options.frames * u64::from(options.facets) * options.bytes as u64;
-    println!("{} frames of {} bytes to {} facets at {} Hz", options.frames, options.bytes, options.facets, options.rate);
+    println!(
+        "{} frames of {} bytes to {} facets at {} Hz",
+        options.frames, options.bytes, options.facets, options.rate
+    );
     println!("| microseconds | p50 | p99 | p99.9 | most |\n|---|---|---|---|---|");
     row("state to facet", &mut figures.state_ns);
     row("state to all ready", &mut figures.ready_ns);

@@ -98,10 +98,16 @@ impl Run {
                 }
                 Some((facet, event)) => {
                     let what = (word(&self.message, 0), word(&self.message, 1));
-                    return Err(format!("frame {frame}: facet {facet}: {event:?} {what:?} instead of {:?}", (kind, frame)).into());
+                    return Err(format!(
+                        "frame {frame}: facet {facet}: {event:?} {what:?} instead of {:?}",
+                        (kind, frame)
+                    )
+                    .into());
                 }
                 None if Instant::now() > end => {
-                    return Err(format!("frame {frame}: {} of {} facets answered", replies.len(), self.all.len()).into());
+                    return Err(
+                        format!("frame {frame}: {} of {} facets answered", replies.len(), self.all.len()).into()
+                    );
                 }
                 None => {}
             }
@@ -110,6 +116,10 @@ impl Run {
     }
 
     fn bytes(&self) -> u64 {
-        self.all.iter().map(|facet| self.link.counters(*facet)).map(|counters| counters.bytes_in + counters.bytes_out).sum()
+        self.all
+            .iter()
+            .map(|facet| self.link.counters(*facet))
+            .map(|counters| counters.bytes_in + counters.bytes_out)
+            .sum()
     }
 }

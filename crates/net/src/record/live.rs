@@ -3,9 +3,9 @@
 //! The scene goes to a viewer when it comes, poses go with every frame. Each viewer has a queue of [`BACKLOG`] messages; where it is full, the oldest is
 //! dropped, so nobody who watches delays anybody. Nothing that a viewer sends is read but which topics it wants.
 
+use super::error::Result;
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
 use super::schemas::{TOPIC_SCENE, TOPIC_TRANSFORMS};
-use super::error::Result;
 use super::{MAX_TIME_S, RecordError};
 use crate::world::{entities, names, poses};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
@@ -50,10 +50,26 @@ impl Live {
     /// The address is taken or not this machine's.
     pub fn start(at: SocketAddr, name: &str) -> Result<Live> {
         let (context, wanted) = (Context::new(), Arc::new(Newcomers::default()));
-        let server = WebSocketServer::new().name(name).bind(at.ip().to_string(), at.port()).context(&context).message_backlog_size(BACKLOG).listener(wanted.clone());
-        let server = server.start_blocking().map_err(|e| RecordError::input(format!("the viewers' address {at}"), e.to_string()))?;
-        let (scene, transforms) = (context.channel_builder(TOPIC_SCENE).build(), context.channel_builder(TOPIC_TRANSFORMS).build());
-        Ok(Live { server: Some(server), scene, transforms, message: FrameTransforms::default(), names: Vec::new(), wanted, _context: context })
+        let server = WebSocketServer::new()
+            .name(name)
+            .bind(at.ip().to_string(), at.port())
+            .context(&context)
+            .message_backlog_size(BACKLOG)
+            .listener(wanted.clone());
+        let server = server
+            .start_blocking()
+            .map_err(|e| RecordError::input(format!("the viewers' address {at}"), e.to_string()))?;
+        let (scene, transforms) =
+            (context.channel_builder(TOPIC_SCENE).build(), context.channel_builder(TOPIC_TRANSFORMS).build());
+        Ok(Live {
+            server: Some(server),
+            scene,
+            transforms,
+            message: FrameTransforms::default(),
+            names: Vec::new(),
+            wanted,
+            _context: context,
+        })
     }
 
     /// The port; that is another than was asked for where this was 0.

@@ -52,7 +52,10 @@ impl<L: ServerLink> Server<L> {
         while !self.session.complete() {
             let left = until.saturating_sub(self.now());
             if left.is_zero() {
-                return Err(SessionError::Missing(self.session.absent().into_iter().map(str::to_owned).collect(), timeout));
+                return Err(SessionError::Missing(
+                    self.session.absent().into_iter().map(str::to_owned).collect(),
+                    timeout,
+                ));
             }
             self.turn(left.min(Duration::from_millis(20)))?;
         }

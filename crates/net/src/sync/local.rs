@@ -1,6 +1,9 @@
 //! The transport within one process: queues behind a lock. Nothing is lost, so it is the reference for the others.
 
-use super::transport::{Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES, Message, ServerLink};
+use super::transport::{
+    Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES,
+    MAX_QUEUED_BYTES, Message, ServerLink,
+};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -58,8 +61,11 @@ impl Hub {
         let n = facets.min(MAX_FACETS);
         let counters = || vec![LinkCounters::default(); n];
         let wires = Wires {
-            facets: vec![0; n], open: vec![false; n], up: Queue { items: VecDeque::new(), counters: counters() },
-            down: (0..n).map(|_| Queue { items: VecDeque::new(), counters: counters() }).collect(), server: 0,
+            facets: vec![0; n],
+            open: vec![false; n],
+            up: Queue { items: VecDeque::new(), counters: counters() },
+            down: (0..n).map(|_| Queue { items: VecDeque::new(), counters: counters() }).collect(),
+            server: 0,
         };
         Hub(Arc::new(Shared { wires: Mutex::new(wires), bell: Condvar::new() }))
     }
@@ -120,7 +126,11 @@ impl Wires {
 
     /// Puts a message into a queue.
     fn post(&mut self, k: usize, up: bool, delivery: Delivery, bytes: &[u8]) -> bool {
-        let (sender, queue) = if up { (&mut self.down[k].counters[k], &mut self.up) } else { (&mut self.up.counters[k], &mut self.down[k]) };
+        let (sender, queue) = if up {
+            (&mut self.down[k].counters[k], &mut self.up)
+        } else {
+            (&mut self.up.counters[k], &mut self.down[k])
+        };
         if !self.open[k] || bytes.is_empty() || bytes.len() > MAX_MESSAGE_BYTES {
             sender.unsent += 1;
             return false;
@@ -132,14 +142,21 @@ impl Wires {
             queue.items.retain(|item| item.facet as usize != k || item.delivery != Delivery::Newest);
             sender.superseded += (before - queue.items.len()) as u64;
         }
-        let waiting: usize = queue.items.iter().filter(|item| item.facet as usize == k).map(|item| item.bytes.len()).sum();
+        let waiting: usize =
+            queue.items.iter().filter(|item| item.facet as usize == k).map(|item| item.bytes.len()).sum();
         if waiting + bytes.len() > MAX_QUEUED_BYTES {
-            let (server, facet) = if up { (Closed::ByPeer, Closed::Overrun) } else { (Closed::Overrun, Closed::ByPeer) };
+            let (server, facet) =
+                if up { (Closed::ByPeer, Closed::Overrun) } else { (Closed::Overrun, Closed::ByPeer) };
             self.close(k, server, facet);
             self.try_open(k);
             return false;
         }
-        queue.items.push_back(Item { facet: k as FacetNumber, event: LinkEvent::Message, delivery, bytes: bytes.to_vec() });
+        queue.items.push_back(Item {
+            facet: k as FacetNumber,
+            event: LinkEvent::Message,
+            delivery,
+            bytes: bytes.to_vec(),
+        });
         true
     }
 }
@@ -168,12 +185,18 @@ fn received(counters: &mut LinkCounters, item: &Item) {
 impl ServerLink for LocalServer {
     fn send(&mut self, to: FacetNumber, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
         let mut wires = lock(&self.shared);
-        let sent = wires.server == self.made && (to as usize) < wires.open.len() && wires.post(to as usize, false, delivery, message);
+        let sent = wires.server == self.made
+            && (to as usize) < wires.open.len()
+            && wires.post(to as usize, false, delivery, message);
         self.shared.bell.notify_all();
         Ok(sent)
     }
 
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
+    fn recv(
+        &mut self,
+        timeout: Duration,
+        message: &mut Vec<u8>,
+    ) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
         message.clear();
         let item = wait(&self.shared, timeout, |wires| {
             let item = if wires.server == self.made { wires.up.items.pop_front()? } else { return None };

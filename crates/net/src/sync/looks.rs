@@ -118,7 +118,9 @@ fn get_shape(rest: &mut Bytes<'_>, base: &World) -> Result<Shape, Fault> {
             let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
             // it is drawn and meets nothing: the coarsest tree will do
             let shape = Shape::mesh(mesh, &TreeSettings { depth: 1, ..TreeSettings::octree() }).map(|(shape, _)| shape);
-            return shape.map_err(|why| Fault::Unfit(format!("a mesh of {vertices} vertices and {triangles} triangles: {why}")));
+            return shape.map_err(|why| {
+                Fault::Unfit(format!("a mesh of {vertices} vertices and {triangles} triangles: {why}"))
+            });
         }
         _ => return Err(Fault::Malformed("a shape that there is not")),
     };
@@ -128,7 +130,9 @@ fn get_shape(rest: &mut Bytes<'_>, base: &World) -> Result<Shape, Fault> {
 fn mesh_of(base: &World, name: &str, index: usize) -> Result<Shape, Fault> {
     let object = base.find(name).and_then(|id| base.object(id));
     let visual = object.and_then(|o| o.renderable()).and_then(|r| r.visuals().get(index));
-    visual.map(|v| v.shape.clone()).ok_or_else(|| Fault::Unfit(format!("picture {index} of '{name}', which the scene has not")))
+    visual
+        .map(|v| v.shape.clone())
+        .ok_or_else(|| Fault::Unfit(format!("picture {index} of '{name}', which the scene has not")))
 }
 
 fn get_mesh(rest: &mut Bytes<'_>) -> Result<TriMesh, Fault> {

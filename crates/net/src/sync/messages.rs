@@ -97,7 +97,8 @@ impl Done {
     pub fn read(payload: &[u8]) -> Result<Done, Fault> {
         let mut rest = Bytes(payload);
         let (hash, image, took_us) = (rest.array()?, rest.array()?, rest.u32()?);
-        let (input_us, heard_us, at_us) = (Some(rest.u32()?).filter(|us| *us < u32::MAX), Some(rest.u64()?).filter(|us| *us < u64::MAX), rest.u64()?);
+        let (input_us, heard_us, at_us) =
+            (Some(rest.u32()?).filter(|us| *us < u32::MAX), Some(rest.u64()?).filter(|us| *us < u64::MAX), rest.u64()?);
         let done = Done { hash, image, took_us, input_us, heard_us, at_us };
         rest.end()?;
         Ok(done)
@@ -128,7 +129,14 @@ pub struct FacetCounts {
 impl FacetCounts {
     fn fields(&mut self) -> [&mut u64; 8] {
         [
-            &mut self.shown, &mut self.missing, &mut self.duplicate, &mut self.stale, &mut self.torn, &mut self.early, &mut self.refused, &mut self.lost,
+            &mut self.shown,
+            &mut self.missing,
+            &mut self.duplicate,
+            &mut self.stale,
+            &mut self.torn,
+            &mut self.early,
+            &mut self.refused,
+            &mut self.lost,
         ]
     }
 

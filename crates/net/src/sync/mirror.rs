@@ -42,7 +42,18 @@ impl Mirror {
     /// `base`: the world as the scene file makes it.
     pub fn new(base: World) -> Mirror {
         let world = base.fork();
-        Mirror { base, world, slots: Vec::new(), moving: 0, poses: Vec::new(), revision: None, viewer: Viewer::default(), frame: 0, table: [0; 16], scratch: Drawn::default() }
+        Mirror {
+            base,
+            world,
+            slots: Vec::new(),
+            moving: 0,
+            poses: Vec::new(),
+            revision: None,
+            viewer: Viewer::default(),
+            frame: 0,
+            table: [0; 16],
+            scratch: Drawn::default(),
+        }
     }
 
     /// What is to be drawn.
@@ -71,7 +82,8 @@ impl Mirror {
     /// [`Fault::Malformed`], [`Fault::Unfit`]; nothing has changed then.
     pub fn apply_snapshot(&mut self, payload: &[u8]) -> Result<(), Fault> {
         let snapshot = Snapshot::parse(payload)?;
-        let (mut world, mut names, mut slots) = (self.base.fork(), BTreeSet::new(), Vec::with_capacity(snapshot.entries.len()));
+        let (mut world, mut names, mut slots) =
+            (self.base.fork(), BTreeSet::new(), Vec::with_capacity(snapshot.entries.len()));
         let mut viewers = 0;
         for entry in &snapshot.entries {
             if !names.insert(entry.name) {
@@ -79,11 +91,15 @@ impl Mirror {
             }
             viewers += usize::from(entry.kind == EntryKind::Viewer);
         }
-        if viewers != 1 || snapshot.entries.last().is_none_or(|e| e.kind != EntryKind::Viewer || e.name != VIEWER_NAME) {
+        if viewers != 1 || snapshot.entries.last().is_none_or(|e| e.kind != EntryKind::Viewer || e.name != VIEWER_NAME)
+        {
             return Err(Fault::Malformed("a list that does not end with its one viewer"));
         }
         for &id in self.base.ids() {
-            let absent = self.base.object(id).is_some_and(|o| !names.contains(o.name()) && (has_parts(&self.base, id) || o.net_sync().is_some()));
+            let absent = self
+                .base
+                .object(id)
+                .is_some_and(|o| !names.contains(o.name()) && (has_parts(&self.base, id) || o.net_sync().is_some()));
             if absent {
                 let _ = world.remove(id);
             }
@@ -191,7 +207,8 @@ impl Mirror {
 
     /// Hands the objects their messages: all of them, or none.
     fn tell(&mut self, told: &[(ObjectId, &[u8])]) -> Result<(), Fault> {
-        let before: Vec<Vec<f64>> = told.iter().map(|(id, _)| self.world.state_of(*id).unwrap_or_default().to_vec()).collect();
+        let before: Vec<Vec<f64>> =
+            told.iter().map(|(id, _)| self.world.state_of(*id).unwrap_or_default().to_vec()).collect();
         for (done, (id, data)) in told.iter().enumerate() {
             if let Err(why) = self.world.read_data(*id, data) {
                 for ((id, _), x) in told[..done].iter().zip(&before) {
@@ -232,7 +249,8 @@ impl Mirror {
             });
             return;
         }
-        let sites = self.world.view().span(id).and_then(|span| self.world.sites().get(span.site.clone())).unwrap_or_default();
+        let sites =
+            self.world.view().span(id).and_then(|span| self.world.sites().get(span.site.clone())).unwrap_or_default();
         sites.iter().for_each(|site| drawn.pose(&site.pose));
     }
 

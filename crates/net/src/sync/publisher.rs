@@ -80,7 +80,16 @@ pub struct Publisher {
 impl Publisher {
     /// `base`: the world as the scene file makes it, before the first step. `revision`: number before the first list's (it wraps).
     pub fn new(base: &World, exact: bool, revision: u32) -> Publisher {
-        Publisher { exact, base: base.fork(), ids: Vec::new(), rows: Vec::new(), revision, snapshot: Arc::default(), table: [0; 16], scratch: Drawn::default() }
+        Publisher {
+            exact,
+            base: base.fork(),
+            ids: Vec::new(),
+            rows: Vec::new(),
+            revision,
+            snapshot: Arc::default(),
+            table: [0; 16],
+            scratch: Drawn::default(),
+        }
     }
 
     /// Payload of SNAPSHOT, of the last [`publish`](Self::publish); empty before the first.
@@ -127,7 +136,8 @@ impl Publisher {
         let same = |row: &Row| {
             let Some(status) = world.status(row.id) else { return false };
             let fixed = status.mode == Mode::Static;
-            fixed == row.fixed && (!row.still || status.alive == row.alive && poses(world, row.id).eq(row.poses.iter().copied()))
+            fixed == row.fixed
+                && (!row.still || status.alive == row.alive && poses(world, row.id).eq(row.poses.iter().copied()))
         };
         world.ids() == self.ids && self.rows.iter().all(same)
     }
@@ -177,10 +187,26 @@ impl Publisher {
             if described {
                 put_looks(&mut body, object.renderable().map_or(&[], |r| r.visuals()), &self.base);
             }
-            let entry = Entry { name, kind: row.kind, alive: row.alive, still: row.still, described, parts: row.parts as u16, body: &body };
+            let entry = Entry {
+                name,
+                kind: row.kind,
+                alive: row.alive,
+                still: row.still,
+                described,
+                parts: row.parts as u16,
+                body: &body,
+            };
             entry.write(&mut out);
         }
-        let viewer = Entry { name: VIEWER_NAME, kind: EntryKind::Viewer, alive: true, still: false, described: false, parts: 0, body: &[] };
+        let viewer = Entry {
+            name: VIEWER_NAME,
+            kind: EntryKind::Viewer,
+            alive: true,
+            still: false,
+            described: false,
+            parts: 0,
+            body: &[],
+        };
         viewer.write(&mut out);
         fits("bytes of a snapshot", out.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
         (self.table, self.scratch) = drawn.hash();
@@ -190,7 +216,13 @@ impl Publisher {
 }
 
 /// One object's body, and what of it will be seen.
-fn put_row(out: &mut Vec<u8>, row: &Row, world: &World, drawn: &mut Drawn, saturated: &mut u32) -> Result<(), PublishError> {
+fn put_row(
+    out: &mut Vec<u8>,
+    row: &Row,
+    world: &World,
+    drawn: &mut Drawn,
+    saturated: &mut u32,
+) -> Result<(), PublishError> {
     let start = out.len();
     if row.kind == EntryKind::Exact {
         world.get_data(row.id, out);

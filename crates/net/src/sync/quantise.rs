@@ -83,8 +83,20 @@ fn unpack(packed: u64) -> Option<Quat> {
     let largest = rest.sqrt();
     // chosen and not stored: a vector that is written in parts and read whole stalls
     let x = if left_out == 0 { largest } else { a };
-    let y = if left_out == 0 { a } else if left_out == 1 { largest } else { b };
-    let z = if left_out < 2 { b } else if left_out == 2 { largest } else { d };
+    let y = if left_out == 0 {
+        a
+    } else if left_out == 1 {
+        largest
+    } else {
+        b
+    };
+    let z = if left_out < 2 {
+        b
+    } else if left_out == 2 {
+        largest
+    } else {
+        d
+    };
     let w = if left_out == 3 { largest } else { d };
     (left_out < 4).then(|| Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)))
 }

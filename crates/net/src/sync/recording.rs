@@ -58,11 +58,27 @@ impl SessionRecorder {
     ///
     /// # Errors
     /// As [`Recorder::create`].
-    pub fn create(path: impl AsRef<Path>, name: &str, scene: [u8; 32], world: &World, every: u32, options: RecorderOptions) -> Result<SessionRecorder, RecordError> {
+    pub fn create(
+        path: impl AsRef<Path>,
+        name: &str,
+        scene: [u8; 32],
+        world: &World,
+        every: u32,
+        options: RecorderOptions,
+    ) -> Result<SessionRecorder, RecordError> {
         let all = entities(world);
         let names = all.iter().map(|e| e.name.clone()).collect();
         let recorder = Recorder::create(path, name, &all, options)?;
-        Ok(SessionRecorder { recorder, every: every.max(1), count: 0, waiting: None, notes: Vec::new(), list: None, names, scene })
+        Ok(SessionRecorder {
+            recorder,
+            every: every.max(1),
+            count: 0,
+            waiting: None,
+            notes: Vec::new(),
+            list: None,
+            names,
+            scene,
+        })
     }
 
     /// Records the frame published last: [`ServerSession::recorded`](super::ServerSession::recorded) of the world as it was then, with
@@ -102,10 +118,13 @@ impl SessionRecorder {
     /// Records what happened: inputs and answers.
     pub fn events(&mut self, events: &[ServerEvent]) {
         for event in events {
-            let head = |kind, facet: FacetNumber, frame| Header { kind, run: 0, join: facet as u64, frame, time_s: 0.0 };
+            let head =
+                |kind, facet: FacetNumber, frame| Header { kind, run: 0, join: facet as u64, frame, time_s: 0.0 };
             let note = match event {
                 ServerEvent::Input(facet, input) => message(&head(Kind::Input, *facet, 0), |out| input.write(out)),
-                ServerEvent::Presented(facet, frame, done, _) => message(&head(Kind::Presented, *facet, *frame), |out| done.write(out)),
+                ServerEvent::Presented(facet, frame, done, _) => {
+                    message(&head(Kind::Presented, *facet, *frame), |out| done.write(out))
+                }
                 _ => continue,
             };
             if self.notes.len() + note.len() <= MAX_STATE_BYTES / 4 {
@@ -148,7 +167,9 @@ pub enum ReplayError {
     #[error(transparent)]
     Record(#[from] RecordError),
     /// A recording, and of no session.
-    #[error("frame {0} of the recording is no frame of a session ({1}); record one with `[recording]` in the cave file")]
+    #[error(
+        "frame {0} of the recording is no frame of a session ({1}); record one with `[recording]` in the cave file"
+    )]
     Frame(u64, Fault),
     /// Of another scene.
     #[error("the recording is of a scene with the hash {theirs}; this scene has {ours}")]

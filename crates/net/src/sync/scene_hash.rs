@@ -29,7 +29,8 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
                 other => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
             }
             // a texture by its file's name: the folder is another one on another machine
-            let texture = visual.look.texture.as_deref().and_then(|path| path.file_name()).map(|name| Path::new(name).into());
+            let texture =
+                visual.look.texture.as_deref().and_then(|path| path.file_name()).map(|name| Path::new(name).into());
             out.extend(format!("{:?}", Look { texture, ..visual.look.clone() }).bytes());
         }
         hasher.update(&(out.len() as u64).to_le_bytes());

@@ -23,7 +23,8 @@ pub struct Weather {
 
 impl Weather {
     /// At once, and all of it.
-    pub const CLEAR: Weather = Weather { loss: 0.0, duplication: 0.0, reordering: 0.0, corruption: 0.0, delay: [Duration::ZERO; 2] };
+    pub const CLEAR: Weather =
+        Weather { loss: 0.0, duplication: 0.0, reordering: 0.0, corruption: 0.0, delay: [Duration::ZERO; 2] };
 }
 
 /// Where a message goes: to the server, or to a facet.
@@ -63,7 +64,14 @@ pub struct Network {
 impl Network {
     /// The same seed and the same calls give the same deliveries.
     pub fn new(seed: u64, weather: Weather) -> Network {
-        Network { dice: super::facet::mixed(seed) | 1, weather, parted: Vec::new(), under_way: BTreeMap::new(), count: 0, damage: Damage::default() }
+        Network {
+            dice: super::facet::mixed(seed) | 1,
+            weather,
+            parted: Vec::new(),
+            under_way: BTreeMap::new(),
+            count: 0,
+            damage: Damage::default(),
+        }
     }
 
     /// Changes the weather for what is sent from now on.

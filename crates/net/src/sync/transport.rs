@@ -83,7 +83,8 @@ pub trait ServerLink {
         Ok(sent)
     }
     /// Waits at most `timeout` for something from any facet. `message` is cleared, and filled on [`LinkEvent::Message`]. `None`: time is over.
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError>;
+    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>)
+    -> Result<Option<(FacetNumber, LinkEvent)>, LinkError>;
     /// Ends a facet's connection; it may come back. What was sent before need not arrive. `recv` reports `Closed(ByUs)` if there was one.
     fn close(&mut self, facet: FacetNumber);
     /// What happened on a facet's connections so far.
@@ -189,7 +190,14 @@ pub enum Refused {
 impl Refused {
     /// All of them, in the order of [`LinkCounters::refused`].
     pub const ALL: [Refused; 8] = [
-        Refused::Truncated, Refused::Oversize, Refused::Foreign, Refused::Forged, Refused::Replayed, Refused::Stale, Refused::Torn, Refused::Stranger,
+        Refused::Truncated,
+        Refused::Oversize,
+        Refused::Foreign,
+        Refused::Forged,
+        Refused::Replayed,
+        Refused::Stale,
+        Refused::Torn,
+        Refused::Stranger,
     ];
 
     /// In lower case, as reports print it.

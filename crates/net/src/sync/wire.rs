@@ -67,8 +67,19 @@ pub enum Kind {
 
 impl Kind {
     const ALL: [Kind; 13] = [
-        Kind::Join, Kind::Refused, Kind::Snapshot, Kind::State, Kind::Ready, Kind::Present, Kind::Presented, Kind::Resync, Kind::Rejoin, Kind::Beat,
-        Kind::End, Kind::Leave, Kind::Input,
+        Kind::Join,
+        Kind::Refused,
+        Kind::Snapshot,
+        Kind::State,
+        Kind::Ready,
+        Kind::Present,
+        Kind::Presented,
+        Kind::Resync,
+        Kind::Rejoin,
+        Kind::Beat,
+        Kind::End,
+        Kind::Leave,
+        Kind::Input,
     ];
 }
 
@@ -176,8 +187,13 @@ pub fn open(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
     if rest.array()? != hash_of(bytes) {
         return Err(Fault::Torn);
     }
-    let kind = Kind::ALL.into_iter().find(|k| *k as u8 == kind).filter(|_| zero == 0).ok_or(Fault::Malformed("a kind that there is not"))?;
-    let header = Header { kind, run: numbers[0], join: numbers[1], frame: numbers[2], time_s: f64::from_bits(numbers[3]) };
+    let kind = Kind::ALL
+        .into_iter()
+        .find(|k| *k as u8 == kind)
+        .filter(|_| zero == 0)
+        .ok_or(Fault::Malformed("a kind that there is not"))?;
+    let header =
+        Header { kind, run: numbers[0], join: numbers[1], frame: numbers[2], time_s: f64::from_bits(numbers[3]) };
     if !header.time_s.is_finite() {
         return Err(Fault::Malformed("a time that is not finite"));
     }

@@ -39,12 +39,20 @@ targets! {
 /// A seed that is refused at its first bytes, as one of an older version is, leads nowhere.
 #[test]
 fn seeds_are_of_the_versions_of_today() {
-    let seed = |name: &str| std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds").join(name)).unwrap();
+    let seed =
+        |name: &str| std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds").join(name)).unwrap();
     assert!(wire::open(&seed("netsync_frame/message")).is_ok());
-    assert!(Snapshot::parse(&seed("netsync_frame/snapshot")).is_ok() && Viewer::read(&seed("netsync_frame/viewer")).is_ok());
+    assert!(
+        Snapshot::parse(&seed("netsync_frame/snapshot")).is_ok() && Viewer::read(&seed("netsync_frame/viewer")).is_ok()
+    );
     assert!(Join::read(&seed("netsync_frame/join")).is_ok() && Input::read(&seed("netsync_frame/input")).is_ok());
-    assert!(Done::read(&seed("netsync_frame/done")).is_ok() && FacetCounts::read(&seed("netsync_frame/counts")).is_ok());
-    assert!(Snapshot::parse(&seed("netsync_mirror/snapshot")).is_ok() && Snapshot::parse(&seed("netsync_mirror/snapshot_guests")).is_ok());
+    assert!(
+        Done::read(&seed("netsync_frame/done")).is_ok() && FacetCounts::read(&seed("netsync_frame/counts")).is_ok()
+    );
+    assert!(
+        Snapshot::parse(&seed("netsync_mirror/snapshot")).is_ok()
+            && Snapshot::parse(&seed("netsync_mirror/snapshot_guests")).is_ok()
+    );
     assert!(take_apart(&seed("netsync_recording/frame")).is_ok());
     for name in ["ack", "close", "fragment", "newest", "parity"] {
         assert!(frames::parse(&seed(&format!("udp_packet/{name}"))).is_some_and(|frames| !frames.is_empty()), "{name}");

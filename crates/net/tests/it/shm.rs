@@ -28,7 +28,9 @@ impl Cave {
         let server = ShmServer::new(&run_name(test), count).unwrap();
         let facets = (0..count).map(|facet| ShmFacet::new(&run_name(test), facet).unwrap()).collect();
         let mut cave = Cave { server, facets, at_server: Vec::new(), at_facet: vec![Vec::new(); usize::from(count)] };
-        cave.until(|cave| cave.at_server.len() == usize::from(count) && cave.at_facet.iter().all(|events| events.len() == 1));
+        cave.until(|cave| {
+            cave.at_server.len() == usize::from(count) && cave.at_facet.iter().all(|events| events.len() == 1)
+        });
         assert!(cave.at_server.drain(..).all(|(_, event, _)| event == LinkEvent::Opened));
         assert!(cave.at_facet.iter_mut().all(|events| events.pop() == Some((LinkEvent::Opened, Vec::new()))));
         cave
@@ -71,10 +73,16 @@ fn messages_of_all_lengths_arrive_whole_and_in_order_both_ways() {
     }
     cave.until(|cave| cave.at_server.len() == 7 && cave.at_facet.iter().all(|events| events.len() == 7));
     for (k, length) in lengths.into_iter().enumerate() {
-        assert!(cave.at_facet.iter().all(|events| events[k] == (LinkEvent::Message, message(k as u64, length))), "{length} bytes down");
+        assert!(
+            cave.at_facet.iter().all(|events| events[k] == (LinkEvent::Message, message(k as u64, length))),
+            "{length} bytes down"
+        );
         assert!(cave.at_server[k] == (1, LinkEvent::Message, message(k as u64 + 100, length)), "{length} bytes up");
     }
-    assert!(!cave.server.send(0, Delivery::Reliable, &[]).unwrap() && !cave.server.send(2, Delivery::Reliable, &[1]).unwrap());
+    assert!(
+        !cave.server.send(0, Delivery::Reliable, &[]).unwrap()
+            && !cave.server.send(2, Delivery::Reliable, &[1]).unwrap()
+    );
 }
 
 /// The buffer holds eight; three hundred were sent, most of them for others, before the slow one looks in.
@@ -91,11 +99,19 @@ fn a_facet_that_looks_in_late_asks_for_what_it_missed() {
         assert!(cave.facets[1].send(Delivery::Reliable, &message(k, 50)).unwrap());
     }
     cave.until(|cave| {
-        cave.at_facet[2].len() == 300 && cave.at_facet[1].len() == 100 && cave.at_facet[0].len() == 100 && cave.at_server.len() == 20
+        cave.at_facet[2].len() == 300
+            && cave.at_facet[1].len() == 100
+            && cave.at_facet[0].len() == 100
+            && cave.at_server.len() == 20
     });
     for facet in 0..3 {
         let step = if facet == 2 { 1 } else { 3 };
-        assert!(cave.at_facet[facet].iter().enumerate().all(|(k, got)| *got == (LinkEvent::Message, message(step * k as u64, 1000))));
+        assert!(
+            cave.at_facet[facet]
+                .iter()
+                .enumerate()
+                .all(|(k, got)| *got == (LinkEvent::Message, message(step * k as u64, 1000)))
+        );
     }
     assert!(cave.at_server.iter().enumerate().all(|(k, got)| *got == (1, LinkEvent::Message, message(k as u64, 50))));
     assert!(cave.server.counters(0).repeated > 100 && cave.server.counters(1).repeated > 100);
@@ -122,7 +138,10 @@ fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
         cave.look_in_on(1);
         assert!(Instant::now() < end);
     }
-    assert_eq!(cave.at_server.pop().map(|(facet, event, _)| (facet, event)), Some((0, LinkEvent::Closed(Closed::Silent))));
+    assert_eq!(
+        cave.at_server.pop().map(|(facet, event, _)| (facet, event)),
+        Some((0, LinkEvent::Closed(Closed::Silent)))
+    );
     cave.until(|cave| cave.at_server.len() == 1 && cave.at_facet[0].len() == 2);
     let events: Vec<_> = cave.at_facet[0].drain(..).map(|(event, _)| event).collect();
     assert_eq!(events, [LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened]);
@@ -136,7 +155,10 @@ fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
     }
     cave.until(|cave| cave.at_facet.iter().all(|events| events.len() == 2));
     for events in &cave.at_facet {
-        assert_eq!(events.iter().map(|(event, _)| *event).collect::<Vec<_>>(), [LinkEvent::Closed(Closed::Silent), LinkEvent::Opened]);
+        assert_eq!(
+            events.iter().map(|(event, _)| *event).collect::<Vec<_>>(),
+            [LinkEvent::Closed(Closed::Silent), LinkEvent::Opened]
+        );
     }
 }
 
@@ -151,7 +173,10 @@ fn silence_is_as_long_as_was_said() {
         usual.look_in_on_server();
         assert!(Instant::now() < end && usual.at_server.is_empty());
     }
-    assert_eq!(short.at_server.pop().map(|(facet, event, _)| (facet, event)), Some((0, LinkEvent::Closed(Closed::Silent))));
+    assert_eq!(
+        short.at_server.pop().map(|(facet, event, _)| (facet, event)),
+        Some((0, LinkEvent::Closed(Closed::Silent)))
+    );
 }
 
 #[test]
@@ -160,7 +185,10 @@ fn a_server_started_again_in_the_same_run_is_found() {
     cave.server = ShmServer::new(&run_name("again"), 2).unwrap();
     cave.until(|cave| cave.at_server.len() == 2 && cave.at_facet.iter().all(|events| events.len() == 2));
     for events in &cave.at_facet {
-        assert_eq!(events.iter().map(|(event, _)| *event).collect::<Vec<_>>(), [LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened]);
+        assert_eq!(
+            events.iter().map(|(event, _)| *event).collect::<Vec<_>>(),
+            [LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened]
+        );
     }
 }
 

@@ -13,7 +13,8 @@ pub const SERVER: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(std::net::Ip
 pub const KEY: [u8; 32] = [7; 32];
 
 /// 5 % loss each way, 10 % overtake, 2 % come twice; a millisecond one way.
-pub const BAD: Faults = Faults { loss: 0.05, reorder: 0.10, duplicate: 0.02, flip: 0.0, cut: 0.0, delay_s: 0.001, jitter_s: 0.0 };
+pub const BAD: Faults =
+    Faults { loss: 0.05, reorder: 0.10, duplicate: 0.02, flip: 0.0, cut: 0.0, delay_s: 0.001, jitter_s: 0.0 };
 
 pub fn facet_address(facet: FacetNumber) -> SocketAddr {
     ([10, 0, 1, facet as u8], 9000).into()
@@ -32,12 +33,27 @@ pub struct Cave {
 impl Cave {
     pub fn new(facets: FacetNumber, seed: u64, faults: Faults, numbering: Numbering) -> Cave {
         let timing = Timing::default();
-        let server = ServerMachine::new(ServerSettings { facets, timing, numbering }, SharedKey::new(KEY), Entropy::seeded(seed));
+        let server = ServerMachine::new(
+            ServerSettings { facets, timing, numbering },
+            SharedKey::new(KEY),
+            Entropy::seeded(seed),
+        );
         let facet = |facet| {
             let settings = FacetSettings { facet, server: SERVER, timing, numbering };
-            FacetMachine::new(Duration::ZERO, settings, SharedKey::new(KEY), Entropy::seeded(seed + 1 + u64::from(facet)))
+            FacetMachine::new(
+                Duration::ZERO,
+                settings,
+                SharedKey::new(KEY),
+                Entropy::seeded(seed + 1 + u64::from(facet)),
+            )
         };
-        Cave { now: Duration::ZERO, server, facets: (0..facets).map(facet).collect(), network: Network::new(seed, faults), recorded: None }
+        Cave {
+            now: Duration::ZERO,
+            server,
+            facets: (0..facets).map(facet).collect(),
+            network: Network::new(seed, faults),
+            recorded: None,
+        }
     }
 
     pub fn transmit(&mut self) {
@@ -55,7 +71,10 @@ impl Cave {
     pub fn advance(&mut self, until: Duration) {
         self.transmit();
         let wakes = self.facets.iter().map(FacetMachine::wake).chain(self.server.wake()).chain(self.network.next());
-        self.now = wakes.min().unwrap_or(until).clamp(self.now + Duration::from_micros(1), until.max(self.now + Duration::from_micros(1)));
+        self.now = wakes
+            .min()
+            .unwrap_or(until)
+            .clamp(self.now + Duration::from_micros(1), until.max(self.now + Duration::from_micros(1)));
         while let Some((from, to, datagram)) = self.network.receive(self.now) {
             if to == SERVER {
                 self.server.receive(self.now, from, &datagram);
@@ -72,7 +91,8 @@ impl Cave {
         while server < self.facets.len() || facets < self.facets.len() {
             assert!(self.now < Duration::from_secs(20), "{server} and {facets} connected in 20 s");
             self.advance(self.now + Duration::from_millis(10));
-            server += std::iter::from_fn(|| self.server.poll()).filter(|(_, event, _)| *event == LinkEvent::Opened).count();
+            server +=
+                std::iter::from_fn(|| self.server.poll()).filter(|(_, event, _)| *event == LinkEvent::Opened).count();
             for facet in &mut self.facets {
                 facets += std::iter::from_fn(|| facet.poll()).filter(|(event, _)| *event == LinkEvent::Opened).count();
             }
@@ -210,10 +230,16 @@ fn a_server_or_facet_started_again_is_found_within_a_second() {
     let timing = Timing::default();
     let settings = ServerSettings { facets: 1, timing, numbering: Numbering::default() };
     cave.server = ServerMachine::new(settings, SharedKey::new(KEY), Entropy::seeded(99));
-    assert_eq!(run_for(&mut cave, 1.0), (vec![LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened], vec![LinkEvent::Opened]));
+    assert_eq!(
+        run_for(&mut cave, 1.0),
+        (vec![LinkEvent::Closed(Closed::ByPeer), LinkEvent::Opened], vec![LinkEvent::Opened])
+    );
     let settings = FacetSettings { facet: 0, server: SERVER, timing, numbering: Numbering::default() };
     cave.facets[0] = FacetMachine::new(cave.now, settings, SharedKey::new(KEY), Entropy::seeded(98));
-    assert_eq!(run_for(&mut cave, 1.0), (vec![LinkEvent::Opened], vec![LinkEvent::Closed(Closed::Replaced), LinkEvent::Opened]));
+    assert_eq!(
+        run_for(&mut cave, 1.0),
+        (vec![LinkEvent::Opened], vec![LinkEvent::Closed(Closed::Replaced), LinkEvent::Opened])
+    );
     let now = cave.now;
     let network = &mut cave.network;
     cave.server.close(now, 0, &mut |to, datagram| network.send(now, SERVER, to, datagram));

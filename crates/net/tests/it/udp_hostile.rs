@@ -12,7 +12,8 @@ use tumble_net::sync::udp::server::ServerSettings;
 use tumble_net::sync::udp::session::Session;
 use tumble_net::sync::udp::*;
 
-const QUIET: Faults = Faults { loss: 0.0, reorder: 0.0, duplicate: 0.0, flip: 0.0, cut: 0.0, delay_s: 0.001, jitter_s: 0.0 };
+const QUIET: Faults =
+    Faults { loss: 0.0, reorder: 0.0, duplicate: 0.0, flip: 0.0, cut: 0.0, delay_s: 0.001, jitter_s: 0.0 };
 
 /// Sets the checksum as a forger would, who knows the format and not the key. By CRC-32's definition, bit by bit.
 fn mend(datagram: &mut [u8]) {
@@ -164,7 +165,11 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
     Hello { nonce: [1; 32], facet: 6, cookie: [0; 32], doubted: 0 }.write(Kind::Hello, &handshake, &mut datagram);
     server.receive(now, SERVER, &datagram);
     assert_eq!(server.strangers().refused_for(Refused::Stranger), 1);
-    Hello { nonce: [1; 32], facet: 0, cookie: [0; 32], doubted: 0 }.write(Kind::Hello, &Handshake::new(&SharedKey::new([8; 32])), &mut datagram);
+    Hello { nonce: [1; 32], facet: 0, cookie: [0; 32], doubted: 0 }.write(
+        Kind::Hello,
+        &Handshake::new(&SharedKey::new([8; 32])),
+        &mut datagram,
+    );
     server.receive(now, SERVER, &datagram);
     assert_eq!(server.strangers().refused_for(Refused::Forged), 1);
     server.transmit(now, &mut |_, _| panic!("an answer to a machine without the key"));
@@ -195,7 +200,10 @@ fn a_recorded_handshake_sent_again_does_not_touch_a_live_session() {
             cave.advance(end);
         }
         assert_eq!(cave.facets[0].poll(), Some((LinkEvent::Message, bytes)));
-        assert_eq!((cave.server.poll(), cave.server.counters(0).opened, cave.facets[0].counters().opened), (None, 1, 1));
+        assert_eq!(
+            (cave.server.poll(), cave.server.counters(0).opened, cave.facets[0].counters().opened),
+            (None, 1, 1)
+        );
     }
 }
 
@@ -210,13 +218,17 @@ fn another_server_with_the_key_ends_no_session() {
     let settings = ServerSettings { facets: 1, timing: Timing::default(), numbering: Numbering::default() };
     let mut other = ServerMachine::new(settings, SharedKey::new(KEY), Entropy::seeded(77));
     let seen = cave.recorded.take().unwrap();
-    let session = seen.iter().filter_map(|d| packet::parse(d).ok()).find(|header| header.kind == Kind::Data).unwrap().session;
+    let session =
+        seen.iter().filter_map(|d| packet::parse(d).ok()).find(|header| header.kind == Kind::Data).unwrap().session;
     for datagram in &seen {
         other.receive(cave.now, facet_address(0), datagram);
     }
     let mut answers = Vec::new();
     other.transmit(cave.now, &mut |_, answer| answers.push(answer.to_vec()));
-    assert!(answers.iter().all(|answer| packet::parse(answer).unwrap().kind == Kind::Challenge), "Data is not answered");
+    assert!(
+        answers.iter().all(|answer| packet::parse(answer).unwrap().kind == Kind::Challenge),
+        "Data is not answered"
+    );
     // and what a server once said of a session that it does not know: kind 5
     let mut unknown = Vec::new();
     packet::begin(&mut unknown, Header { kind: Kind::Data, session, sequence: 0 });
@@ -277,12 +289,16 @@ fn late_packets_of_a_session_that_is_over_are_no_refusals() {
     cave.server.close(cave.now, 0, &mut |_, _| {});
     let late = cave.recorded.take().unwrap();
     assert!(!late.is_empty());
-    let receive = |cave: &mut Cave| late.iter().for_each(|datagram| cave.server.receive(cave.now, facet_address(0), datagram));
+    let receive =
+        |cave: &mut Cave| late.iter().for_each(|datagram| cave.server.receive(cave.now, facet_address(0), datagram));
     receive(&mut cave);
     assert_eq!(cave.server.strangers().refused, [0; Refused::ALL.len()]);
     receive(&mut cave);
     assert_eq!(cave.server.strangers().refused_for(Refused::Replayed), late.len() as u64);
-    assert!(std::iter::from_fn(|| cave.server.poll()).all(|(_, event, _)| event == LinkEvent::Closed(Closed::ByUs)), "nothing of it is taken");
+    assert!(
+        std::iter::from_fn(|| cave.server.poll()).all(|(_, event, _)| event == LinkEvent::Closed(Closed::ByUs)),
+        "nothing of it is taken"
+    );
 }
 
 /// Resident memory of this process, bytes.
@@ -299,7 +315,8 @@ fn a_million_random_packets_per_parser_full_length() {
     cave.connect();
     let agreed = Agreement { session: 1, facet: 0, facet_nonce: [1; 32], server_nonce: [2; 32] };
     let shared = SharedKey::new(KEY);
-    let session = |side| Session::new(Duration::ZERO, &shared, agreed, side, SERVER, Timing::default(), Numbering::default());
+    let session =
+        |side| Session::new(Duration::ZERO, &shared, agreed, side, SERVER, Timing::default(), Numbering::default());
     let mut victim = session(Side::Server);
     let mut seal = Seal::new(&shared, &agreed, Side::Facet, 0);
     let handshake = Handshake::new(&shared);
@@ -325,7 +342,13 @@ fn a_million_random_packets_per_parser_full_length() {
             }
             if round == 0 && noise.len() >= 33 && noise.len() <= 1200 {
                 let length = (noise.len() as u16).to_le_bytes();
-                noise[..5].copy_from_slice(&[0x74, 0xdb, packet::VERSION << 4 | (1 + k % 6) as u8, length[0], length[1]]);
+                noise[..5].copy_from_slice(&[
+                    0x74,
+                    0xdb,
+                    packet::VERSION << 4 | (1 + k % 6) as u8,
+                    length[0],
+                    length[1],
+                ]);
                 mend(&mut noise);
             }
         }

@@ -23,7 +23,8 @@ fn sockets_on_loopback_carry_long_and_short_messages_both_ways() {
     let mut lent = Message::default();
     let mut opened = 0;
     until(|| {
-        opened += u8::from(server.recv(wait, &mut message).unwrap().is_some_and(|(_, event)| event == LinkEvent::Opened));
+        opened +=
+            u8::from(server.recv(wait, &mut message).unwrap().is_some_and(|(_, event)| event == LinkEvent::Opened));
         opened == 2
     });
     for facet in &mut facets {

@@ -37,7 +37,10 @@ pub(super) fn simplified(mesh: &MeshData) -> MeshData {
     let corners = mesh.indices.chunks_exact(3).map(|t| [of[t[0] as usize], of[t[1] as usize], of[t[2] as usize]]);
     let triangles: Vec<[u32; 3]> = corners.filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]).collect();
     // flat faces, so that it shows how few there are
-    MeshData::from_triangles(&positions, &triangles, 0.0).ok().filter(|m| !m.indices.is_empty()).unwrap_or_else(|| mesh.clone())
+    MeshData::from_triangles(&positions, &triangles, 0.0)
+        .ok()
+        .filter(|m| !m.indices.is_empty())
+        .unwrap_or_else(|| mesh.clone())
 }
 
 /// The edges of a mesh between faces that are not in one plane, each once.
@@ -51,7 +54,10 @@ pub(super) fn edges(mesh: &MeshData) -> Vec<[[f32; 3]; 2]> {
         for k in 0..3 {
             let (a, b) = (bits(&p[k]), bits(&p[(k + 1) % 3]));
             let edge = if a < b { [a, b] } else { [b, a] };
-            faces.entry(edge).and_modify(|(other, sharp)| *sharp |= other.dot(&normal) < FLAT_COS).or_insert((normal, false));
+            faces
+                .entry(edge)
+                .and_modify(|(other, sharp)| *sharp |= other.dot(&normal) < FLAT_COS)
+                .or_insert((normal, false));
         }
     }
     let mut seen: BTreeMap<[[u32; 3]; 2], u32> = BTreeMap::new();
@@ -74,7 +80,13 @@ pub(super) fn draw_edges(list: &mut DrawList, edges: &[[[f32; 3]; 2]], pose: &Is
 }
 
 /// The balls of a level; a branch that ended before it shows its leaf. `None` where there is no tree.
-pub(super) fn draw_balls(list: &mut DrawList, shape: &Shape, level: u32, pose: &Pose, material: Material) -> Option<()> {
+pub(super) fn draw_balls(
+    list: &mut DrawList,
+    shape: &Shape,
+    level: u32,
+    pose: &Pose,
+    material: Material,
+) -> Option<()> {
     let tree: &SphereTree = shape.tree()?;
     for node in tree.nodes().iter().filter(|n| n.level == level || (n.is_leaf() && n.level < level)) {
         let center = pose * Point3::from(node.center);

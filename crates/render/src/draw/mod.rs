@@ -11,7 +11,9 @@ pub use overlay::{DebugDraw, UnknownOverlay};
 pub use tree::{UpAxis, tree_over_mesh};
 pub use views::{NamedView, UnknownView};
 
-use crate::{Camera, DebugStyle, DrawList, Ground, Image, Light, Material, MeshData, MeshId, Pattern, RenderError, Sky, Texture};
+use crate::{
+    Camera, DebugStyle, DrawList, Ground, Image, Light, Material, MeshData, MeshId, Pattern, RenderError, Sky, Texture,
+};
 use nalgebra::{Isometry3, Point3, Vector3};
 use overlay::{islands, resting};
 use std::collections::BTreeMap;
@@ -83,7 +85,10 @@ impl Drawing {
             near_m: c.near_m as f32,
             far_m: c.far_m as f32,
         });
-        let mesh_files = scene.meshes.iter().filter_map(|m| if let MeshSource::File { path, .. } = &m.source { Some(path.clone()) } else { None });
+        let mesh_files = scene
+            .meshes
+            .iter()
+            .filter_map(|m| if let MeshSource::File { path, .. } = &m.source { Some(path.clone()) } else { None });
         Drawing {
             meshes: BTreeMap::new(),
             edges: BTreeMap::new(),
@@ -112,7 +117,9 @@ impl Drawing {
                 continue;
             }
             for mount in object.light().map_or(&[][..], |l| l.lights()) {
-                list.lights.extend(world.site(id, mount.part).map(|site| views::carried_light(mount, &(site.pose * mount.pose))));
+                list.lights.extend(
+                    world.site(id, mount.part).map(|site| views::carried_light(mount, &(site.pose * mount.pose))),
+                );
             }
             let tint = tints.as_ref().and_then(|tints| tints.get(&id)).copied();
             for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
@@ -126,7 +133,15 @@ impl Drawing {
         Ok(list)
     }
 
-    fn place(&mut self, list: &mut DrawList, placed: &mut Placed, name: &str, visual: &Visual, pose: &Pose, tint: Option<[f32; 3]>) -> Result<(), RenderError> {
+    fn place(
+        &mut self,
+        list: &mut DrawList,
+        placed: &mut Placed,
+        name: &str,
+        visual: &Visual,
+        pose: &Pose,
+        tint: Option<[f32; 3]>,
+    ) -> Result<(), RenderError> {
         let detail = self.detail.unwrap_or(visual.look.detail);
         let mut material = match tint {
             Some(color) => Material::matte(color),
@@ -146,7 +161,12 @@ impl Drawing {
             return self.place_edges(list, visual, pose, material.color);
         }
         if let Shape::Sphere { radius } = visual.shape {
-            list.add_sphere(Point3::from(small(&pose.translation.vector)), radius as f32, pose.rotation.cast(), material);
+            list.add_sphere(
+                Point3::from(small(&pose.translation.vector)),
+                radius as f32,
+                pose.rotation.cast(),
+                material,
+            );
             return Ok(());
         }
         let simple = detail == Detail::Simplified;
@@ -187,7 +207,13 @@ impl Drawing {
 
 impl Drawing {
     /// A wireframe: rings around a ball, else the edges of the mesh.
-    fn place_edges(&mut self, list: &mut DrawList, visual: &Visual, pose: &Pose, color: [f32; 3]) -> Result<(), RenderError> {
+    fn place_edges(
+        &mut self,
+        list: &mut DrawList,
+        visual: &Visual,
+        pose: &Pose,
+        color: [f32; 3],
+    ) -> Result<(), RenderError> {
         let pose: Isometry3<f32> = pose.cast();
         if let Shape::Sphere { radius } = visual.shape {
             list.wire_sphere(pose.translation.vector.into(), radius as f32, DebugStyle::new(color).width(1.5));
@@ -210,15 +236,23 @@ impl Drawing {
     fn unwrapped(&mut self, shape: &Shape) -> Option<Result<MeshData, RenderError>> {
         let Shape::Mesh(mesh) = shape else { return None };
         let mesh = mesh.mesh();
-        let files = self.unwrapped.get_or_insert_with(|| self.mesh_files.iter().filter_map(|path| Unwrapped::load(path)).collect());
+        let files = self
+            .unwrapped
+            .get_or_insert_with(|| self.mesh_files.iter().filter_map(|path| Unwrapped::load(path)).collect());
         let places = files.iter().find_map(|file| file.places_of(&mesh.triangles))?;
         Some(MeshData::from_unwrapped(&positions(mesh), &mesh.triangles, places, CREASE_RAD))
     }
 
     /// The texture of a look in the list, its file read when it is first met.
-    fn texture(&mut self, list: &mut DrawList, placed: &mut Placed, look: &Look) -> Result<Option<Texture>, RenderError> {
+    fn texture(
+        &mut self,
+        list: &mut DrawList,
+        placed: &mut Placed,
+        look: &Look,
+    ) -> Result<Option<Texture>, RenderError> {
         let Some(path) = &look.texture else { return Ok(None) };
-        let repeat_m = look.properties.iter().find(|(name, _)| name == "scale_m").map_or(1.0, |(_, value)| *value as f32);
+        let repeat_m =
+            look.properties.iter().find(|(name, _)| name == "scale_m").map_or(1.0, |(_, value)| *value as f32);
         let id = match placed.textures.get(path) {
             Some(id) => *id,
             None => {
@@ -251,7 +285,11 @@ fn mesh_of(shape: &Shape) -> Result<MeshData, RenderError> {
             let half = small(half_extents);
             let (half, radius) = ([half.x, half.y, half.z], ROUNDING * half.min());
             // on long thin boxes the rounding would be finer than a pixel, and glitter
-            if radius < 0.2 * ROUNDING * half[0].max(half[1]).max(half[2]) { MeshData::cuboid(half) } else { MeshData::rounded_cuboid(half, radius, 2) }
+            if radius < 0.2 * ROUNDING * half[0].max(half[1]).max(half[2]) {
+                MeshData::cuboid(half)
+            } else {
+                MeshData::rounded_cuboid(half, radius, 2)
+            }
         }
         Shape::Capsule { radius, half_length } => MeshData::capsule(*radius as f32, *half_length as f32, 32),
         Shape::Cylinder(c) => MeshData::cylinder(c.radius() as f32, c.half_length() as f32, 48),
@@ -276,10 +314,18 @@ fn light(spec: &LightSpec) -> Light {
     let (color, intensity, casts_shadow) = (spec.color.map(|c| c as f32), spec.intensity as f32, spec.casts_shadow);
     match spec.kind {
         LightKind::Directional { direction } => Light::Directional {
-            direction: Vector3::from(direction.map(|c| c as f32)), color, intensity: LIGHT * intensity, angular_radius_rad: 0.02, casts_shadow,
+            direction: Vector3::from(direction.map(|c| c as f32)),
+            color,
+            intensity: LIGHT * intensity,
+            angular_radius_rad: 0.02,
+            casts_shadow,
         },
         LightKind::Point { position_m } => Light::Point {
-            position: Point3::from(position_m.map(|c| c as f32)), color, intensity: LIGHT * intensity, radius_m: 0.1, casts_shadow,
+            position: Point3::from(position_m.map(|c| c as f32)),
+            color,
+            intensity: LIGHT * intensity,
+            radius_m: 0.1,
+            casts_shadow,
         },
     }
 }

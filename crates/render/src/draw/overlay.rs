@@ -33,7 +33,9 @@ pub struct DebugDraw {
 
 /// A word that names no overlay.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL or all, with commas between them")]
+#[error(
+    "no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL or all, with commas between them"
+)]
 pub struct UnknownOverlay(String);
 
 impl FromStr for DebugDraw {
@@ -51,7 +53,17 @@ impl FromStr for DebugDraw {
                 "frames" => draw.frames = true,
                 "islands" => draw.islands = true,
                 "resting" => draw.resting = true,
-                "all" => draw = DebugDraw { contacts: true, normals: true, velocities: true, forces: true, joints: true, frames: true, ..draw },
+                "all" => {
+                    draw = DebugDraw {
+                        contacts: true,
+                        normals: true,
+                        velocities: true,
+                        forces: true,
+                        joints: true,
+                        frames: true,
+                        ..draw
+                    }
+                }
                 other => {
                     let level = other.strip_prefix("tree=").and_then(|n| n.parse().ok());
                     draw.tree_level = Some(level.ok_or_else(|| UnknownOverlay(other.to_string()))?);
@@ -70,7 +82,14 @@ const NORMAL: f32 = 0.4;
 const LOOK_AHEAD: f64 = 0.1;
 
 /// Neighbouring balls of a tree take these in turn, so that each is told from the next.
-pub(super) const SHELL_COLORS: [[f32; 3]; 6] = [[0.95, 0.45, 0.10], [0.10, 0.55, 0.95], [0.95, 0.80, 0.10], [0.60, 0.25, 0.85], [0.15, 0.75, 0.40], [0.90, 0.20, 0.40]];
+pub(super) const SHELL_COLORS: [[f32; 3]; 6] = [
+    [0.95, 0.45, 0.10],
+    [0.10, 0.55, 0.95],
+    [0.95, 0.80, 0.10],
+    [0.60, 0.25, 0.85],
+    [0.15, 0.75, 0.40],
+    [0.90, 0.20, 0.40],
+];
 
 impl DebugDraw {
     pub(super) fn draw(&self, world: &World, list: &mut DrawList) {
@@ -83,7 +102,11 @@ impl DebugDraw {
                 list.point(point, DebugStyle::new([1.0, 0.85, 0.1]).width(8.0).on_top());
             }
             if self.normals {
-                list.arrow(point, toward * NORMAL * size * small(&contact.normal), DebugStyle::new([0.05, 0.35, 1.0]).width(3.0).on_top());
+                list.arrow(
+                    point,
+                    toward * NORMAL * size * small(&contact.normal),
+                    DebugStyle::new([0.05, 0.35, 1.0]).width(3.0).on_top(),
+                );
             }
             if self.forces && largest > 0.0 {
                 let force = contact.force / largest;
@@ -93,7 +116,11 @@ impl DebugDraw {
         }
         for &id in world.ids().iter().filter(|_| self.velocities) {
             let Some(site) = world.site(id, 0).filter(|s| s.velocity.norm() > 1e-3) else { continue };
-            list.arrow(Point3::from(small(&site.position())), small(&(LOOK_AHEAD * site.velocity)), DebugStyle::new([0.1, 0.9, 0.3]).width(3.0).on_top());
+            list.arrow(
+                Point3::from(small(&site.position())),
+                small(&(LOOK_AHEAD * site.velocity)),
+                DebugStyle::new([0.1, 0.9, 0.3]).width(3.0).on_top(),
+            );
         }
         if self.frames {
             frames(world, list, 0.3 * size);
@@ -139,7 +166,8 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
         if let Some(body) = world.get::<ArticulatedBody>(id) {
             for (link, l) in body.model().links().iter().enumerate() {
                 let Some(site) = world.site(id, link) else { continue };
-                let (at, along) = (Point3::from(small(&site.position())), |axis: &Vec3| Some(small(&(site.pose.rotation * axis))));
+                let (at, along) =
+                    (Point3::from(small(&site.position())), |axis: &Vec3| Some(small(&(site.pose.rotation * axis))));
                 match &l.joint {
                     Joint::Revolute { axis } => joint(at, along(axis), HINGE),
                     Joint::Prismatic { axis } => joint(at, along(axis), SLIDER),
@@ -175,8 +203,10 @@ pub(super) fn islands(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
         Some((a.part?.0, b.part?.0))
     });
     let contacts = world.contacts().iter().filter(|c| c.gap <= 1e-3 || c.force.norm() > 0.0).map(|c| (c.a, c.b));
-    let pairs: Vec<(ObjectId, ObjectId)> = contacts.chain(closures).filter(|(a, b)| moves(*a) && moves(*b) && a != b).collect();
-    let mut root: BTreeMap<ObjectId, ObjectId> = world.ids().iter().filter(|id| moves(**id)).map(|&id| (id, id)).collect();
+    let pairs: Vec<(ObjectId, ObjectId)> =
+        contacts.chain(closures).filter(|(a, b)| moves(*a) && moves(*b) && a != b).collect();
+    let mut root: BTreeMap<ObjectId, ObjectId> =
+        world.ids().iter().filter(|id| moves(**id)).map(|&id| (id, id)).collect();
     fn find(root: &BTreeMap<ObjectId, ObjectId>, mut id: ObjectId) -> ObjectId {
         while root[&id] != id {
             id = root[&id];
@@ -233,11 +263,17 @@ fn trees(world: &World, list: &mut DrawList, level: u32) {
     for &id in world.ids() {
         let Some(collidable) = world.object(id).and_then(|o| o.collidable()) else { continue };
         for part in 0..collidable.parts() {
-            let (Some(site), Some(tree)) = (world.site(id, part), collidable.shape(part).and_then(Shape::tree)) else { continue };
+            let (Some(site), Some(tree)) = (world.site(id, part), collidable.shape(part).and_then(Shape::tree)) else {
+                continue;
+            };
             let shown = tree.nodes().iter().filter(|n| n.level == level || (n.is_leaf() && n.level < level));
             for (node, color) in shown.zip(SHELL_COLORS.iter().cycle()) {
                 let center = site.pose * nalgebra::Point3::from(node.center);
-                list.shell(Point3::from(small(&center.coords)), node.radius as f32, DebugStyle::new(*color).opacity(0.6));
+                list.shell(
+                    Point3::from(small(&center.coords)),
+                    node.radius as f32,
+                    DebugStyle::new(*color).opacity(0.6),
+                );
             }
         }
     }

@@ -32,7 +32,12 @@ pub(super) fn of_look(look: &Look, name: &str) -> Material {
 
 /// The material of a look in a scene file.
 pub(super) fn of_spec(look: &tumble_scene::Look) -> Material {
-    let numbers = Numbers { second: look.second_color.map(|c| c as f32), scale_m: look.pattern_scale_m as f32, offset_m: look.pattern_offset_m as f32, name: "" };
+    let numbers = Numbers {
+        second: look.second_color.map(|c| c as f32),
+        scale_m: look.pattern_scale_m as f32,
+        offset_m: look.pattern_offset_m as f32,
+        name: "",
+    };
     Material {
         color: look.color.map(|c| c as f32),
         roughness: look.roughness as f32,

@@ -39,10 +39,18 @@ pub fn tree_over_mesh(mesh: &TriMesh, tree: &SphereTree, level: u32, up: UpAxis)
     let positions: Vec<[f32; 3]> = mesh.vertices.iter().map(|v| place(v).into()).collect();
     let mut list = DrawList::default();
     let id = list.add_mesh(MeshData::from_triangles(&positions, &mesh.triangles, CREASE_RAD)?);
-    list.add_instance(id, Isometry3::identity(), Material { color: [0.75, 0.76, 0.78], roughness: 0.6, ..Material::default() });
+    list.add_instance(
+        id,
+        Isometry3::identity(),
+        Material { color: [0.75, 0.76, 0.78], roughness: 0.6, ..Material::default() },
+    );
     list.lights.push(Light::sun(Vector3::new(0.4, 0.7, -1.0), 2.5));
     for (node, color) in tree.at_level(level).zip(SHELL_COLORS.iter().cycle()) {
-        list.shell(Point3::from(place(&node.center)), (node.radius * scale) as f32, DebugStyle::new(*color).opacity(0.6));
+        list.shell(
+            Point3::from(place(&node.center)),
+            (node.radius * scale) as f32,
+            DebugStyle::new(*color).opacity(0.6),
+        );
     }
     list.sky.backdrop = Some([1.0; 3]);
     list.camera = list.framing_camera(Vector3::new(-0.3, 1.0, -0.35)).with_fov(LENS_RAD);

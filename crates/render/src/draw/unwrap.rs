@@ -18,7 +18,8 @@ pub(super) struct Unwrapped {
 impl Unwrapped {
     /// Of an OBJ file; none of another one, or where a corner has no place.
     pub fn load(path: &Path) -> Option<Unwrapped> {
-        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) || path.metadata().ok()?.len() > MOST_BYTES {
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) || path.metadata().ok()?.len() > MOST_BYTES
+        {
             return None;
         }
         Unwrapped::parse(&text_of(&std::fs::read(path).ok()?).ok()?)
@@ -39,7 +40,9 @@ impl Unwrapped {
                     known.push([number()?, number().unwrap_or(0.0)]);
                 }
                 Some("f") => {
-                    let corners = words.take_while(|w| !w.starts_with('#')).map(|word| corner(word, vertices.len() as i64, &known));
+                    let corners = words
+                        .take_while(|w| !w.starts_with('#'))
+                        .map(|word| corner(word, vertices.len() as i64, &known));
                     faces.push(corners.collect::<Option<Vec<(u32, [f32; 2])>>>()?);
                 }
                 _ => {}
@@ -47,7 +50,8 @@ impl Unwrapped {
         }
         let (mut out, mut cutter) = (Unwrapped { triangles: Vec::new(), places: Vec::new() }, FaceCutter::default());
         for corners in faces {
-            let points: Vec<Vec3> = corners.iter().map(|c| vertices.get(c.0 as usize).copied()).collect::<Option<_>>()?;
+            let points: Vec<Vec3> =
+                corners.iter().map(|c| vertices.get(c.0 as usize).copied()).collect::<Option<_>>()?;
             for triangle in cutter.cut(&points).ok()? {
                 out.triangles.push(triangle.map(|k| corners[k].0));
                 out.places.push(triangle.map(|k| corners[k].1));

@@ -36,7 +36,11 @@ impl DrawList {
             let Some(object) = world.object(id).filter(|_| world.status(id).is_some_and(|s| s.alive)) else { continue };
             for mount in object.camera().map_or(&[][..], |c| c.cameras()) {
                 let Some(site) = world.site(id, mount.part) else { continue };
-                let name = if mount.name.is_empty() { object.name().to_string() } else { format!("{}/{}", object.name(), mount.name) };
+                let name = if mount.name.is_empty() {
+                    object.name().to_string()
+                } else {
+                    format!("{}/{}", object.name(), mount.name)
+                };
                 out.push(NamedView { name, camera: seen_from(mount, &(site.pose * mount.pose)) });
             }
         }
@@ -51,7 +55,12 @@ impl DrawList {
         let views = self.views(world);
         match views.iter().find(|view| view.name == name) {
             Some(view) => self.camera = view.camera,
-            None => return Err(UnknownView { name: name.to_string(), known: views.into_iter().map(|view| view.name).collect() }),
+            None => {
+                return Err(UnknownView {
+                    name: name.to_string(),
+                    known: views.into_iter().map(|view| view.name).collect(),
+                });
+            }
         }
         Ok(())
     }
@@ -71,9 +80,22 @@ fn seen_from(mount: &CameraMount, pose: &Pose) -> Camera {
 
 /// A light that an object carries, where it is now.
 pub(super) fn carried_light(mount: &LightMount, pose: &Pose) -> Light {
-    let (color, intensity, casts_shadow) = (mount.color.map(|c| c as f32), LIGHT * mount.intensity as f32, mount.casts_shadow);
+    let (color, intensity, casts_shadow) =
+        (mount.color.map(|c| c as f32), LIGHT * mount.intensity as f32, mount.casts_shadow);
     match mount.spread {
-        Spread::Directional => Light::Directional { direction: small(&(pose.rotation * Vector3::x())), color, intensity, angular_radius_rad: 0.02, casts_shadow },
-        Spread::Point { radius } => Light::Point { position: Point3::from(small(&pose.translation.vector)), color, intensity, radius_m: radius as f32, casts_shadow },
+        Spread::Directional => Light::Directional {
+            direction: small(&(pose.rotation * Vector3::x())),
+            color,
+            intensity,
+            angular_radius_rad: 0.02,
+            casts_shadow,
+        },
+        Spread::Point { radius } => Light::Point {
+            position: Point3::from(small(&pose.translation.vector)),
+            color,
+            intensity,
+            radius_m: radius as f32,
+            casts_shadow,
+        },
     }
 }

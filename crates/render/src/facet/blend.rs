@@ -25,7 +25,9 @@ impl Blend {
         let mut reader = decoder.read_info().map_err(|e| fail(format!("the blend mask is no PNG: {e}")))?;
         let (w, h) = (reader.info().width, reader.info().height);
         if (w, h) != (width, height) || w > MAX_SIDE || h > MAX_SIDE {
-            return Err(fail(format!("the blend mask is {w} x {h} pixels, and the facet's picture {width} x {height}")));
+            return Err(fail(format!(
+                "the blend mask is {w} x {h} pixels, and the facet's picture {width} x {height}"
+            )));
         }
         let size = reader.output_buffer_size().ok_or_else(|| fail("the blend mask is too large".into()))?;
         let mut bytes = vec![0; size];

@@ -31,7 +31,11 @@ impl FromStr for CalibrationPattern {
     type Err = String;
 
     fn from_str(word: &str) -> Result<Self, String> {
-        NAMES.iter().find(|(name, _)| *name == word).map(|(_, pattern)| *pattern).ok_or_else(|| "wanted grid, corners, colours or name".into())
+        NAMES
+            .iter()
+            .find(|(name, _)| *name == word)
+            .map(|(_, pattern)| *pattern)
+            .ok_or_else(|| "wanted grid, corners, colours or name".into())
     }
 }
 
@@ -53,7 +57,12 @@ const YELLOW: [u8; 4] = [255, 220, 64, 255];
 /// The pattern on a facet: both eyes where it is in stereo (each says which it is), mirrored as the facet is, not bent or darkened.
 pub fn calibration_picture(cave: &Cave, facet: &Facet, pattern: CalibrationPattern) -> Image {
     let screen = &cave.screens[facet.screen];
-    let eyes = facet.stereo.sides().iter().map(|side| flipped(one_eye(cave, facet, screen, pattern, *side), facet.flip)).collect();
+    let eyes = facet
+        .stereo
+        .sides()
+        .iter()
+        .map(|side| flipped(one_eye(cave, facet, screen, pattern, *side), facet.flip))
+        .collect();
     combined(eyes, facet.stereo)
 }
 
@@ -81,7 +90,11 @@ fn grid(image: &mut Image, screen: &Screen) {
             let off = [f64::from(x) + 0.5 - middle[0], f64::from(y) + 0.5 - middle[1]];
             let [mx, my] = [off[0] / per_metre[0], off[1] / per_metre[1]];
             // distance in pixels from the nearest line of a spacing
-            let near = |spacing: f64| (0..2).map(|k| (off[k] - (off[k] / per_metre[k] / spacing).round() * spacing * per_metre[k]).abs()).fold(f64::MAX, f64::min);
+            let near = |spacing: f64| {
+                (0..2)
+                    .map(|k| (off[k] - (off[k] / per_metre[k] / spacing).round() * spacing * per_metre[k]).abs())
+                    .fold(f64::MAX, f64::min)
+            };
             let (fine, coarse) = (near(0.1), near(0.5));
             let ring = (mx.hypot(my) - circle).abs() * per_metre[0].min(per_metre[1]);
             let diagonal = (off[0] * middle[1]).abs() - (off[1] * middle[0]).abs();
@@ -119,7 +132,9 @@ fn corners(image: &mut Image, screen: &Screen) {
     for (name, place, right, low, color) in named {
         rect(image, if right { w - arm } else { 0 }, if low { h - thick } else { 0 }, arm, thick, color);
         rect(image, if right { w - thick } else { 0 }, if low { h - arm } else { 0 }, thick, arm, color);
-        for (line, text) in [name.to_owned(), format!("{:.3} {:.3} {:.3} M", place.x, place.y, place.z)].iter().enumerate() {
+        for (line, text) in
+            [name.to_owned(), format!("{:.3} {:.3} {:.3} M", place.x, place.y, place.z)].iter().enumerate()
+        {
             let inset = 4 * thick;
             let x = if right { w - inset - text_width(text, scale) } else { inset };
             let down = inset + 10 * scale * line as i64;
@@ -133,7 +148,16 @@ fn corners(image: &mut Image, screen: &Screen) {
 fn colours(image: &mut Image) {
     let (w, h) = (i64::from(image.width), i64::from(image.height));
     let full = |r: u8, g: u8, b: u8| [255 * r, 255 * g, 255 * b, 255];
-    let bars = [full(1, 1, 1), full(1, 1, 0), full(0, 1, 1), full(0, 1, 0), full(1, 0, 1), full(1, 0, 0), full(0, 0, 1), full(0, 0, 0)];
+    let bars = [
+        full(1, 1, 1),
+        full(1, 1, 0),
+        full(0, 1, 1),
+        full(0, 1, 0),
+        full(1, 0, 1),
+        full(1, 0, 0),
+        full(0, 0, 1),
+        full(0, 0, 0),
+    ];
     for (i, color) in bars.iter().enumerate() {
         let (from, to) = (w * i as i64 / 8, w * (i as i64 + 1) / 8);
         rect(image, from, 0, to - from, h / 3, *color);

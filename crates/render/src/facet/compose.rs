@@ -11,7 +11,10 @@ pub(crate) fn blank(width: u32, height: u32, color: [u8; 4]) -> Image {
 
 /// Copies `from` into `into` with its top left corner at `x`, `y`; what would stick out is cut off.
 pub(crate) fn paste(into: &mut Image, from: &Image, x: u32, y: u32) {
-    let (w, h) = (from.width.min(into.width.saturating_sub(x)) as usize, from.height.min(into.height.saturating_sub(y)) as usize);
+    let (w, h) = (
+        from.width.min(into.width.saturating_sub(x)) as usize,
+        from.height.min(into.height.saturating_sub(y)) as usize,
+    );
     for row in 0..h {
         let source = 4 * row * from.width as usize;
         let target = 4 * ((y as usize + row) * into.width as usize + x as usize);

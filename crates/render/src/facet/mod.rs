@@ -14,8 +14,8 @@ mod warp;
 
 pub use blend::Blend;
 pub(crate) use blend::encoded;
-pub(crate) use compose::blank;
 pub use calibration::{CalibrationPattern, calibration_picture};
+pub(crate) use compose::blank;
 pub use perspective::FacetView;
 pub use unfold::{Tile, unfold};
 pub use view::{CaveView, RIM_PX};

@@ -19,8 +19,8 @@
 //!
 //! With square corners `v·r = 0` and this is Kooima's frustum: left = l_x near / d and so on.
 
-use crate::viewpoint::{Lens, Part, Viewpoint};
 use crate::RenderError;
+use crate::viewpoint::{Lens, Part, Viewpoint};
 use nalgebra::{Matrix2, Matrix4, Point3, RowVector4, Vector2, Vector3};
 
 /// The view of one eye through one screen, in double precision.
@@ -39,20 +39,36 @@ impl FacetView {
     ///
     /// # Errors
     /// [`RenderError::BadValue`]: a screen without area, an eye that is not in front of it, numbers that are not finite, or depths out of order.
-    pub fn new(eye: Point3<f64>, [a, b, c]: [Point3<f64>; 3], near_m: f64, far_m: f64) -> Result<FacetView, RenderError> {
+    pub fn new(
+        eye: Point3<f64>,
+        [a, b, c]: [Point3<f64>; 3],
+        near_m: f64,
+        far_m: f64,
+    ) -> Result<FacetView, RenderError> {
         let finite = eye.iter().chain(a.iter()).chain(b.iter()).chain(c.iter()).all(|x| x.is_finite());
         check(finite, "corners", format!("{a} {b} {c} seen from {eye}"), "finite numbers")?;
-        check(near_m > 0.0 && far_m > near_m && far_m.is_finite(), "near_m", format!("{near_m} (far_m {far_m})"), "above 0 and less than far_m")?;
+        check(
+            near_m > 0.0 && far_m > near_m && far_m.is_finite(),
+            "near_m",
+            format!("{near_m} (far_m {far_m})"),
+            "above 0 and less than far_m",
+        )?;
         let (u, v) = (b - a, c - a);
         let area = u.cross(&v).norm();
-        check(area > 1e-9 * u.norm() * v.norm() && area > 0.0, "corners", format!("{a} {b} {c}"), "three corners of a rectangle")?;
+        check(
+            area > 1e-9 * u.norm() * v.norm() && area > 0.0,
+            "corners",
+            format!("{a} {b} {c}"),
+            "three corners of a rectangle",
+        )?;
         let (right, normal) = (u / u.norm(), u.cross(&v) / area);
         let up = normal.cross(&right);
         let d = (eye - a).dot(&normal);
         check(d > 0.0, "eye", format!("{eye}, {d} m in front of the screen"), "a point in front of the screen")?;
         let view = view_matrix(&right, &up, &normal, &eye);
         let m = Matrix2::new(u.norm(), v.dot(&right), 0.0, v.dot(&up));
-        let inverse = m.try_inverse().ok_or_else(|| bad("corners", format!("{a} {b} {c}"), "three corners of a rectangle"))?;
+        let inverse =
+            m.try_inverse().ok_or_else(|| bad("corners", format!("{a} {b} {c}"), "three corners of a rectangle"))?;
         let l = Vector2::new((a - eye).dot(&right), (a - eye).dot(&up));
         let scale = inverse * (2.0 * d);
         let offset = inverse * l * 2.0 + Vector2::repeat(1.0);
@@ -71,7 +87,9 @@ impl FacetView {
     pub fn part(mut self, width: u32, height: u32, rim_px: u32) -> FacetView {
         let [wide, high, right, down] = self.plane;
         // a quarter of a pixel keeps screens that start at halves from rounding apart
-        let number = |at: f64, length: f64, pixels: u32| (at / length * f64::from(pixels) + 0.25).floor().clamp(-1e6, 1e6) as i32;
+        let number = |at: f64, length: f64, pixels: u32| {
+            (at / length * f64::from(pixels) + 0.25).floor().clamp(-1e6, 1e6) as i32
+        };
         self.part = Some(Part { first_pixel: [number(right, wide, width), number(down, high, height)], rim_px });
         self
     }

@@ -23,11 +23,14 @@ type Placed = Vec<Option<([f64; 2], [f64; 2])>>;
 
 /// The size of the picture, at most `most` pixels each way, and the facets' tiles, one for each screen that has a facet.
 pub fn unfold(cave: &Cave, most: [u32; 2]) -> ([u32; 2], Vec<Tile>) {
-    let facets: Vec<usize> = (0..cave.facets.len()).filter(|&i| cave.facets[..i].iter().all(|f| f.screen != cave.facets[i].screen)).collect();
+    let facets: Vec<usize> = (0..cave.facets.len())
+        .filter(|&i| cave.facets[..i].iter().all(|f| f.screen != cave.facets[i].screen))
+        .collect();
     let placed = lay(cave, &facets);
     let boxes: Vec<_> = facets.iter().filter_map(|&i| Some((i, placed[cave.facets[i].screen]?))).collect();
     let least: [f64; 2] = std::array::from_fn(|k| boxes.iter().map(|(_, (at, _))| at[k]).fold(f64::MAX, f64::min));
-    let greatest: [f64; 2] = std::array::from_fn(|k| boxes.iter().map(|(_, (at, size))| at[k] + size[k]).fold(f64::MIN, f64::max));
+    let greatest: [f64; 2] =
+        std::array::from_fn(|k| boxes.iter().map(|(_, (at, size))| at[k] + size[k]).fold(f64::MIN, f64::max));
     let extent: [f64; 2] = std::array::from_fn(|k| greatest[k] - least[k]);
     // the largest at which the rounded size fits: what is unfolded into its own size is the same
     let fitting = |k: usize| (f64::from(most[k]) + 0.499) / extent[k];
@@ -55,7 +58,8 @@ fn lay(cave: &Cave, facets: &[usize]) -> Placed {
         let Some((at, own)) = placed[screen] else { continue };
         for gap in &neighbours {
             let (mine, other) = if gap.first.0 == screen { (gap.first, gap.second) } else { (gap.second, gap.first) };
-            if mine.0 != screen || placed[other.0].is_some() || !drawn.contains(&other.0) || (mine.1 + 2) % 4 != other.1 {
+            if mine.0 != screen || placed[other.0].is_some() || !drawn.contains(&other.0) || (mine.1 + 2) % 4 != other.1
+            {
                 continue;
             }
             let its = size(other.0);

@@ -37,7 +37,8 @@ impl CaveView {
     /// [`RenderError::File`] and others for warps and blends that cannot be read or do not fit.
     pub fn new(cave: Cave, scene: &SceneFile) -> Result<CaveView, RenderError> {
         let place = scene.cave.unwrap_or_else(|| default_place(&cave, scene));
-        let warps = cave.facets.iter().map(|f| f.warp_file.as_deref().map(Warp::load).transpose()).collect::<Result<_, _>>()?;
+        let warps =
+            cave.facets.iter().map(|f| f.warp_file.as_deref().map(Warp::load).transpose()).collect::<Result<_, _>>()?;
         let blend = |f: &Facet| f.blend_file.as_deref().map(|path| Blend::load(path, f.size_px)).transpose();
         let blends = cave.facets.iter().map(blend).collect::<Result<_, _>>()?;
         let mut view = CaveView { cave, place, warps, blends, finishes: Vec::new() };
@@ -111,7 +112,8 @@ impl CaveView {
             };
             let begin = (i == 0).then_some([0, 0, 0, 255]);
             // each eye by itself: mirroring the whole would give each the other's half
-            let placed = Placed { whole_px: facet.whole_px(), at_px, begin, flip: facet.flip, channels, finish: finish.clone() };
+            let placed =
+                Placed { whole_px: facet.whole_px(), at_px, begin, flip: facet.flip, channels, finish: finish.clone() };
             renderer.draw_placed(stage, &self.eye(facet, *side)?.part(w, h, RIM_PX), [w, h], &placed)?;
         }
         Ok(())
@@ -121,10 +123,17 @@ impl CaveView {
     ///
     /// # Errors
     /// As [`Renderer::render_from`].
-    pub fn draw_in_memory(&self, renderer: &mut Renderer, list: &DrawList, facet: &Facet) -> Result<Image, RenderError> {
+    pub fn draw_in_memory(
+        &self,
+        renderer: &mut Renderer,
+        list: &DrawList,
+        facet: &Facet,
+    ) -> Result<Image, RenderError> {
         let index = self.index(facet);
         let [w, h] = facet.size_px;
-        let one = |side: &f64| -> Result<Image, RenderError> { renderer.render_from(&self.eye(facet, *side)?.part(w, h, RIM_PX), list, w, h) };
+        let one = |side: &f64| -> Result<Image, RenderError> {
+            renderer.render_from(&self.eye(facet, *side)?.part(w, h, RIM_PX), list, w, h)
+        };
         let mut eyes = facet.stereo.sides().iter().map(one).collect::<Result<Vec<_>, _>>()?;
         if let Some(warp) = index.and_then(|i| self.warps[i].as_ref()) {
             eyes = eyes.iter().map(|eye| warp.apply(eye)).collect();
@@ -139,7 +148,12 @@ impl CaveView {
     ///
     /// # Errors
     /// As [`Renderer::render_from`].
-    pub fn draw_unfolded(&self, renderer: &mut Renderer, list: &DrawList, most: [u32; 2]) -> Result<Image, RenderError> {
+    pub fn draw_unfolded(
+        &self,
+        renderer: &mut Renderer,
+        list: &DrawList,
+        most: [u32; 2],
+    ) -> Result<Image, RenderError> {
         let stage = renderer.stage(list)?;
         self.draw_unfolded_on_device(renderer, &stage, most)?;
         renderer.read()
@@ -149,12 +163,23 @@ impl CaveView {
     ///
     /// # Errors
     /// As [`Renderer::draw_stage`].
-    pub fn draw_unfolded_on_device(&self, renderer: &mut Renderer, stage: &Stage, most: [u32; 2]) -> Result<(), RenderError> {
+    pub fn draw_unfolded_on_device(
+        &self,
+        renderer: &mut Renderer,
+        stage: &Stage,
+        most: [u32; 2],
+    ) -> Result<(), RenderError> {
         let (whole_px, tiles) = unfold(&self.cave, most);
         for (i, Tile { facet, position_px, size_px: [w, h] }) in tiles.into_iter().enumerate() {
             let begin = (i == 0).then_some(BACKGROUND);
-            let placed = Placed { whole_px, at_px: position_px, begin, flip: Flip::None, channels: [true; 3], finish: None };
-            renderer.draw_placed(stage, &self.eye(&self.cave.facets[facet], 0.0)?.part(w, h, RIM_PX), [w, h], &placed)?;
+            let placed =
+                Placed { whole_px, at_px: position_px, begin, flip: Flip::None, channels: [true; 3], finish: None };
+            renderer.draw_placed(
+                stage,
+                &self.eye(&self.cave.facets[facet], 0.0)?.part(w, h, RIM_PX),
+                [w, h],
+                &placed,
+            )?;
         }
         Ok(())
     }
@@ -167,7 +192,8 @@ impl CaveView {
     fn finish(&self, index: usize) -> Option<Arc<Finish>> {
         let size = self.cave.facets[index].size_px;
         let small = |place: [f64; 2]| place.map(|p| p as f32);
-        let warp = self.warps[index].as_ref().map(|warp| warp.sources(size).into_iter().map(|from| from.map(small)).collect());
+        let warp =
+            self.warps[index].as_ref().map(|warp| warp.sources(size).into_iter().map(|from| from.map(small)).collect());
         let shares = self.blends[index].as_ref().map(Blend::bytes);
         (warp.is_some() || shares.is_some()).then(|| Arc::new(Finish { size, warp, shares }))
     }

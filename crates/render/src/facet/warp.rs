@@ -57,7 +57,8 @@ impl Warp {
     /// # Errors
     /// What is wrong, with the line.
     pub fn from_obj(bytes: &[u8]) -> Result<Warp, String> {
-        let text = std::str::from_utf8(bytes).map_err(|e| format!("the warp grid is neither PFM nor text (byte {})", e.valid_up_to()))?;
+        let text = std::str::from_utf8(bytes)
+            .map_err(|e| format!("the warp grid is neither PFM nor text (byte {})", e.valid_up_to()))?;
         let (mut places, mut sources, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
         for (number, line) in text.lines().enumerate() {
             let at = |what: String| format!("line {}: {what}", number + 1);
@@ -66,7 +67,10 @@ impl Warp {
                 Some("v") => places.push(pair(words).ok_or_else(|| at(wanted("v x y")))?),
                 Some("vt") => sources.push(pair(words).ok_or_else(|| at(wanted("vt u v")))?),
                 Some("f") => {
-                    let corners = words.map(|word| corner(word, &places, &sources)).collect::<Result<Vec<Corner>, String>>().map_err(at)?;
+                    let corners = words
+                        .map(|word| corner(word, &places, &sources))
+                        .collect::<Result<Vec<Corner>, String>>()
+                        .map_err(at)?;
                     if corners.len() < 3 {
                         return Err(at(format!("a face of {} corners, wanted at least 3", corners.len())));
                     }
@@ -104,7 +108,9 @@ impl Warp {
         let mut triangles = Vec::new();
         for y in 0..h - 1 {
             for x in 0..w - 1 {
-                if let (Some(a), Some(b), Some(c), Some(d)) = (node(x, y), node(x + 1, y), node(x + 1, y + 1), node(x, y + 1)) {
+                if let (Some(a), Some(b), Some(c), Some(d)) =
+                    (node(x, y), node(x + 1, y), node(x + 1, y + 1), node(x, y + 1))
+                {
                     triangles.extend([[a, b, c], [a, c, d]]);
                 }
             }
@@ -123,7 +129,9 @@ impl Warp {
         };
         let covers: f64 = triangles.iter().map(|t| side(t, 0) * side(t, 1)).sum();
         if covers > MOST_COVERS {
-            return Err(format!("the triangles of the warp grid cover the picture {covers:.0} times over; wanted triangles side by side, and at most {MOST_COVERS} times"));
+            return Err(format!(
+                "the triangles of the warp grid cover the picture {covers:.0} times over; wanted triangles side by side, and at most {MOST_COVERS} times"
+            ));
         }
         Ok(Warp { triangles })
     }
@@ -151,16 +159,25 @@ impl Warp {
                 continue;
             }
             let span = |k: usize, most: usize| {
-                let (low, high) = (p.iter().map(|c| c[k]).fold(f64::MAX, f64::min), p.iter().map(|c| c[k]).fold(f64::MIN, f64::max));
-                ((low - 0.5).ceil().clamp(0.0, most as f64) as usize, ((high - 0.5).floor() + 1.0).clamp(0.0, most as f64) as usize)
+                let (low, high) =
+                    (p.iter().map(|c| c[k]).fold(f64::MAX, f64::min), p.iter().map(|c| c[k]).fold(f64::MIN, f64::max));
+                (
+                    (low - 0.5).ceil().clamp(0.0, most as f64) as usize,
+                    ((high - 0.5).floor() + 1.0).clamp(0.0, most as f64) as usize,
+                )
             };
             let ((x0, x1), (y0, y1)) = (span(0, w), span(1, h));
             for y in y0..y1 {
                 for x in x0..x1 {
                     let middle = [x as f64 + 0.5, y as f64 + 0.5];
-                    let share = [cross(middle, p[1], p[2]) / area, cross(p[0], middle, p[2]) / area, cross(p[0], p[1], middle) / area];
+                    let share = [
+                        cross(middle, p[1], p[2]) / area,
+                        cross(p[0], middle, p[2]) / area,
+                        cross(p[0], p[1], middle) / area,
+                    ];
                     if share.iter().all(|s| *s >= -1e-9) {
-                        let source: [f64; 2] = std::array::from_fn(|k| (0..3).map(|i| share[i] * triangle[i].1[k]).sum());
+                        let source: [f64; 2] =
+                            std::array::from_fn(|k| (0..3).map(|i| share[i] * triangle[i].1[k]).sum());
                         out[y * w + x] = Some([source[0] * w as f64 - 0.5, (1.0 - source[1]) * h as f64 - 0.5]);
                     }
                 }
@@ -186,8 +203,14 @@ fn sample(image: &Image, x: f64, y: f64) -> [u8; 4] {
     }
     let (x0, y0) = (x.floor(), y.floor());
     let (sx, sy) = ((x - x0) as f32, (y - y0) as f32);
-    let taps = [(at(x0, y0), (1.0 - sx) * (1.0 - sy)), (at(x0 + 1.0, y0), sx * (1.0 - sy)), (at(x0, y0 + 1.0), (1.0 - sx) * sy), (at(x0 + 1.0, y0 + 1.0), sx * sy)];
-    let light = |k: usize| taps.iter().map(|(i, weight)| weight * linear(f32::from(image.rgba[i + k]) / 255.0)).sum::<f32>();
+    let taps = [
+        (at(x0, y0), (1.0 - sx) * (1.0 - sy)),
+        (at(x0 + 1.0, y0), sx * (1.0 - sy)),
+        (at(x0, y0 + 1.0), (1.0 - sx) * sy),
+        (at(x0 + 1.0, y0 + 1.0), sx * sy),
+    ];
+    let light =
+        |k: usize| taps.iter().map(|(i, weight)| weight * linear(f32::from(image.rgba[i + k]) / 255.0)).sum::<f32>();
     [encoded(light(0)), encoded(light(1)), encoded(light(2)), 255]
 }
 
@@ -206,8 +229,13 @@ fn corner(word: &str, places: &[[f64; 2]], sources: &[[f64; 2]]) -> Result<Corne
     let place = parts.next().unwrap_or("");
     let source = parts.next().filter(|s| !s.is_empty()).unwrap_or(place);
     let pick = |digits: &str, of: &[[f64; 2]], what: &str| {
-        let index = digits.parse::<i64>().ok().and_then(|i| usize::try_from(if i < 0 { of.len() as i64 + i } else { i - 1 }).ok());
-        index.and_then(|i| of.get(i).copied()).ok_or_else(|| format!("the corner `{word}` names no `{what}` above it, of which there are {}", of.len()))
+        let index = digits
+            .parse::<i64>()
+            .ok()
+            .and_then(|i| usize::try_from(if i < 0 { of.len() as i64 + i } else { i - 1 }).ok());
+        index
+            .and_then(|i| of.get(i).copied())
+            .ok_or_else(|| format!("the corner `{word}` names no `{what}` above it, of which there are {}", of.len()))
     };
     Ok((pick(place, places, "v")?, pick(source, sources, "vt")?))
 }
@@ -220,17 +248,37 @@ fn pfm_header(bytes: &[u8]) -> Result<(PfmHeader, &[u8]), String> {
     let mut words = Vec::new();
     let mut at = 0;
     while words.len() < 4 {
-        let start = at + bytes[at..].iter().take(64).position(|b| !b.is_ascii_whitespace()).ok_or("the header of the PFM file is cut off")?;
-        let length = bytes[start..].iter().take(64).position(u8::is_ascii_whitespace).ok_or("the header of the PFM file is cut off")?;
-        words.push(std::str::from_utf8(&bytes[start..start + length]).map_err(|_| "the header of the PFM file is no text")?);
+        let start = at
+            + bytes[at..]
+                .iter()
+                .take(64)
+                .position(|b| !b.is_ascii_whitespace())
+                .ok_or("the header of the PFM file is cut off")?;
+        let length = bytes[start..]
+            .iter()
+            .take(64)
+            .position(u8::is_ascii_whitespace)
+            .ok_or("the header of the PFM file is cut off")?;
+        words.push(
+            std::str::from_utf8(&bytes[start..start + length]).map_err(|_| "the header of the PFM file is no text")?,
+        );
         at = start + length;
     }
     if words[0] != "PF" {
         return Err(format!("the PFM file is of kind {}, wanted PF (three floats)", words[0]));
     }
-    let side = |word: &str| word.parse::<usize>().ok().filter(|n| (2..=1024).contains(n)).ok_or_else(|| format!("the PFM grid has the side {word}, wanted 2 to 1024"));
+    let side = |word: &str| {
+        word.parse::<usize>()
+            .ok()
+            .filter(|n| (2..=1024).contains(n))
+            .ok_or_else(|| format!("the PFM grid has the side {word}, wanted 2 to 1024"))
+    };
     let size = [side(words[1])?, side(words[2])?];
-    let scale: f64 = words[3].parse().ok().filter(|s: &f64| s.is_finite() && *s != 0.0).ok_or_else(|| format!("the PFM scale is {}, wanted a number", words[3]))?;
+    let scale: f64 = words[3]
+        .parse()
+        .ok()
+        .filter(|s: &f64| s.is_finite() && *s != 0.0)
+        .ok_or_else(|| format!("the PFM scale is {}, wanted a number", words[3]))?;
     let data = &bytes[at + 1..];
     let wanted = 12 * size[0] * size[1];
     if data.len() < wanted {

@@ -42,7 +42,11 @@ pub fn seen(balls: &[Ball], ranges: impl Iterator<Item = Range<u32>>, eye: &Eye,
             }
         }
     }
-    outlines.iter().filter(|(_, outline)| outline.as_ref().is_none_or(|o| !map.hides(o))).map(|(number, _)| *number).collect()
+    outlines
+        .iter()
+        .filter(|(_, outline)| outline.as_ref().is_none_or(|o| !map.hides(o)))
+        .map(|(number, _)| *number)
+        .collect()
 }
 
 /// What of a point of view places balls.
@@ -80,13 +84,20 @@ impl Picture<'_> {
     fn of(eye: &Eye) -> Picture<'_> {
         let rows = eye.pixel_rows();
         let product = |i: usize, j: usize| rows[i].xyz().dot(&rows[j].xyz());
-        Picture { eye, rows, products: [product(0, 0), product(0, 1), product(1, 1), product(0, 2), product(1, 2), product(2, 2)], sides: eye.sides() }
+        Picture {
+            eye,
+            rows,
+            products: [product(0, 0), product(0, 1), product(1, 1), product(0, 2), product(1, 2), product(2, 2)],
+            sides: eye.sides(),
+        }
     }
 
     fn place(&self, (center, radius): &Ball) -> Place {
         let (eye, c, r) = (self.eye, center.coords.cast::<f64>(), f64::from(*radius));
         let depth = eye.view_depth(&c);
-        if (eye.perspective && depth + r <= 0.0) || self.sides.iter().any(|side| side.xyz().dot(&c) + side.w < -1.001 * r) {
+        if (eye.perspective && depth + r <= 0.0)
+            || self.sides.iter().any(|side| side.xyz().dot(&c) + side.w < -1.001 * r)
+        {
             return Place::Outside;
         }
         let [near, far] = [depth - r, depth + r].map(|s| eye.depth_at(s));
@@ -102,7 +113,11 @@ impl Picture<'_> {
         }
         let per = 1.0 / q;
         let middle = [(x * w - xw) * per, (y * w - yw) * per];
-        let shape = [middle[0] * middle[0] - (x * x - xx) * per, middle[0] * middle[1] - (x * y - xy) * per, middle[1] * middle[1] - (y * y - yy) * per];
+        let shape = [
+            middle[0] * middle[0] - (x * x - xx) * per,
+            middle[0] * middle[1] - (x * y - xy) * per,
+            middle[1] * middle[1] - (y * y - yy) * per,
+        ];
         if !middle.iter().chain(&shape).all(|x| x.is_finite()) {
             return Place::Around;
         }
@@ -142,7 +157,14 @@ impl Map {
         let (columns, rows) = (width.div_ceil(cell), height.div_ceil(cell));
         // in the middle, or 1/8 from the edge; the rest is for rounding
         let inset = if samples == 1 { 0.4 } else { 0.1 };
-        Map { per_cell: 1.0 / cell as f64, cell: cell as f64, columns, rows, inset, depths: vec![f32::INFINITY; columns * rows] }
+        Map {
+            per_cell: 1.0 / cell as f64,
+            cell: cell as f64,
+            columns,
+            rows,
+            inset,
+            depths: vec![f32::INFINITY; columns * rows],
+        }
     }
 
     /// Numbers of the cells of which samples may lie between two places, and perhaps one more.

@@ -51,7 +51,8 @@ impl Eye {
         let (moving_origin, moving_dir) = if perspective { ([none; 2], [ex, ey]) } else { ([ex, ey], [none; 2]) };
         let mut reversed = p;
         reversed.set_row(2, &(p.row(3) - p.row(2)));
-        let depth = if perspective { [1.0 + p[(2, 2)], -p[(2, 3)], 1.0, 0.0] } else { [p[(2, 2)], 1.0 - p[(2, 3)], 0.0, 1.0] };
+        let depth =
+            if perspective { [1.0 + p[(2, 2)], -p[(2, 3)], 1.0, 0.0] } else { [p[(2, 2)], 1.0 - p[(2, 3)], 0.0, 1.0] };
         Eye {
             clip_from_world: reversed * view,
             depth,
@@ -70,7 +71,8 @@ impl Eye {
     pub fn numbered(mut self, part: &Part) -> Self {
         // far from 0, so that numbers stay positive; a multiple of the tiles of noise
         let number = |first: i32| f64::from((first - part.rim_px as i32 + 65_536).rem_euclid(131_072));
-        self.grid = [number(part.first_pixel[0]), number(part.first_pixel[1]), f64::from(part.rim_px.saturating_sub(3))];
+        self.grid =
+            [number(part.first_pixel[0]), number(part.first_pixel[1]), f64::from(part.rim_px.saturating_sub(3))];
         self
     }
 
@@ -79,12 +81,16 @@ impl Eye {
         let at: Vector3<f32> = self.origin[0].cast();
         let ahead: Vector3<f32> = self.clip_from_world.row(3).transpose().xyz().cast();
         let sides = self.sides();
-        let beside = |c: &Point3<f32>, r: f32| sides.iter().any(|side| side.dot(&c.cast().to_homogeneous()) < -1.001 * f64::from(r));
+        let beside = |c: &Point3<f32>, r: f32| {
+            sides.iter().any(|side| side.dot(&c.cast().to_homogeneous()) < -1.001 * f64::from(r))
+        };
         self.perspective
             && balls.any(|(center, radius)| {
                 let to = center.coords - at;
                 // a little more than the shaders' own bounds
-                (to.norm_squared() < 2.1 * radius * radius || (to.dot(&ahead).abs() < 3.0 * radius && to.norm() < 1e6 * radius)) && !beside(center, *radius)
+                (to.norm_squared() < 2.1 * radius * radius
+                    || (to.dot(&ahead).abs() < 3.0 * radius && to.norm() < 1e6 * radius))
+                    && !beside(center, *radius)
             })
     }
 
@@ -172,7 +178,13 @@ pub fn sphere(s: &Sphere, out: &mut Vec<u32>) {
     let (c, q, m) = (s.center, s.orientation.coords, &s.material);
     let (_, other, size) = m.pattern.packed();
     let ([r, g, b], [or, og, ob]) = (linear3(m.color), linear3(other));
-    let pair = |low: f32, high: f32| [low, high].map(|x| (x.clamp(0.0, 1.0) * 65_535.0).round() as u32).into_iter().rev().fold(0, |word, half| word << 16 | half);
+    let pair = |low: f32, high: f32| {
+        [low, high]
+            .map(|x| (x.clamp(0.0, 1.0) * 65_535.0).round() as u32)
+            .into_iter()
+            .rev()
+            .fold(0, |word, half| word << 16 | half)
+    };
     out.extend([c.x, c.y, c.z, s.radius].map(f32::to_bits));
     out.extend([pair(r, g), pair(b, m.roughness), pair(or, og), pair(ob, m.metallic)]);
     // a sphere wears its texture once around

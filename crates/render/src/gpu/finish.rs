@@ -12,7 +12,10 @@ use crate::RenderError;
 use std::sync::Arc;
 use tumble_scene::cave::Flip;
 use wgpu::util::{DeviceExt, TextureDataOrder};
-use wgpu::{BindGroupLayout, BindingResource, ColorWrites, RenderPipeline, Texture, TextureFormat, TextureView, TextureViewDescriptor};
+use wgpu::{
+    BindGroupLayout, BindingResource, ColorWrites, RenderPipeline, Texture, TextureFormat, TextureView,
+    TextureViewDescriptor,
+};
 
 const FINISH_WGSL: &str = include_str!("../shaders/finish.wgsl");
 /// Most finishes whose textures are kept.
@@ -59,19 +62,35 @@ const CHANNELS: [[bool; 3]; 3] = [[true; 3], [true, false, false], [false, true,
 impl Finisher {
     pub fn new(gpu: &Gpu) -> Self {
         let device = &gpu.device;
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        };
         let numbers = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Float { filterable: false },
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled: false,
         };
-        let place = wgpu::BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: None };
+        let place = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
         let entries = [entry(0, place), entry(1, numbers), entry(2, numbers), entry(3, numbers)];
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("finish"), entries: &entries });
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("finish"), source: wgpu::ShaderSource::Wgsl(FINISH_WGSL.into()) });
+        let layout = device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("finish"), entries: &entries });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("finish"),
+            source: wgpu::ShaderSource::Wgsl(FINISH_WGSL.into()),
+        });
         let pipelines = CHANNELS.map(|channels| pipeline(device, &layout, &module, channels));
         // no warp, and a mask that keeps all light
-        let nothing = [upload(gpu, [1, 1], TextureFormat::Rg32Float, &[0; 8]), upload(gpu, [1, 1], TextureFormat::Rgba8Unorm, &[255; 4])];
+        let nothing = [
+            upload(gpu, [1, 1], TextureFormat::Rg32Float, &[0; 8]),
+            upload(gpu, [1, 1], TextureFormat::Rgba8Unorm, &[255; 4]),
+        ];
         Finisher { layout, pipelines, nothing, known: Vec::new(), whole: None }
     }
 
@@ -86,7 +105,14 @@ impl Finisher {
     }
 
     /// Puts the picture of the targets into its place; the whole.
-    pub fn place(&mut self, gpu: &Gpu, from: &Targets, rim: u32, size: [u32; 2], placed: &Placed) -> Result<Texture, RenderError> {
+    pub fn place(
+        &mut self,
+        gpu: &Gpu,
+        from: &Targets,
+        rim: u32,
+        size: [u32; 2],
+        placed: &Placed,
+    ) -> Result<Texture, RenderError> {
         let whole = self.whole(gpu, placed.whole_px);
         let target = whole.create_view(&TextureViewDescriptor::default());
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
@@ -102,9 +128,17 @@ impl Finisher {
                 BindingResource::TextureView(&views[1]),
             ];
             let inputs = bind(gpu, &self.layout, &entries);
-            let attachment = wgpu::RenderPassColorAttachment { view: &target, depth_slice: None, resolve_target: None, ops: wgpu::Operations { load, store: wgpu::StoreOp::Store } };
-            let mut pass =
-                encoder.begin_render_pass(&wgpu::RenderPassDescriptor { label: Some("finish"), color_attachments: &[Some(attachment)], ..Default::default() });
+            let attachment = wgpu::RenderPassColorAttachment {
+                view: &target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+            };
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("finish"),
+                color_attachments: &[Some(attachment)],
+                ..Default::default()
+            });
             if !plain {
                 let which = CHANNELS.iter().position(|c| *c == placed.channels).unwrap_or(0);
                 pass.set_pipeline(&self.pipelines[which]);
@@ -141,7 +175,8 @@ impl Finisher {
             let bytes: Vec<u8> = shares.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
             upload(gpu, finish.size, TextureFormat::Rgba8Unorm, &bytes)
         });
-        let views = [warp.unwrap_or_else(|| self.nothing[0].clone()), shares.unwrap_or_else(|| self.nothing[1].clone())];
+        let views =
+            [warp.unwrap_or_else(|| self.nothing[0].clone()), shares.unwrap_or_else(|| self.nothing[1].clone())];
         if self.known.len() >= MOST_KEPT {
             self.known.remove(0);
         }
@@ -165,8 +200,19 @@ fn linear_color([r, g, b, a]: [u8; 4]) -> wgpu::Color {
 }
 
 /// The middle of a picture into a place of another; what would stick out is cut off.
-fn copy(encoder: &mut wgpu::CommandEncoder, from: &Texture, rim: u32, [w, h]: [u32; 2], into: &Texture, [x, y]: [u32; 2]) {
-    let size = wgpu::Extent3d { width: w.min(into.width().saturating_sub(x)), height: h.min(into.height().saturating_sub(y)), depth_or_array_layers: 1 };
+fn copy(
+    encoder: &mut wgpu::CommandEncoder,
+    from: &Texture,
+    rim: u32,
+    [w, h]: [u32; 2],
+    into: &Texture,
+    [x, y]: [u32; 2],
+) {
+    let size = wgpu::Extent3d {
+        width: w.min(into.width().saturating_sub(x)),
+        height: h.min(into.height().saturating_sub(y)),
+        depth_or_array_layers: 1,
+    };
     let source = wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x: rim, y: rim, z: 0 }, ..from.as_image_copy() };
     let target = wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z: 0 }, ..into.as_image_copy() };
     encoder.copy_texture_to_texture(source, target, size);
@@ -184,11 +230,22 @@ pub(super) fn upload(gpu: &Gpu, [width, height]: [u32; 2], format: TextureFormat
         usage: wgpu::TextureUsages::TEXTURE_BINDING,
         view_formats: &[],
     };
-    gpu.device.create_texture_with_data(&gpu.queue, &descriptor, TextureDataOrder::LayerMajor, bytes).create_view(&TextureViewDescriptor::default())
+    gpu.device
+        .create_texture_with_data(&gpu.queue, &descriptor, TextureDataOrder::LayerMajor, bytes)
+        .create_view(&TextureViewDescriptor::default())
 }
 
-fn pipeline(device: &wgpu::Device, layout: &BindGroupLayout, module: &wgpu::ShaderModule, [red, green, blue]: [bool; 3]) -> RenderPipeline {
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some("finish"), bind_group_layouts: &[Some(layout)], immediate_size: 0 });
+fn pipeline(
+    device: &wgpu::Device,
+    layout: &BindGroupLayout,
+    module: &wgpu::ShaderModule,
+    [red, green, blue]: [bool; 3],
+) -> RenderPipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("finish"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
     let mut write_mask = ColorWrites::empty();
     write_mask.set(ColorWrites::RED, red);
     write_mask.set(ColorWrites::GREEN, green);
@@ -197,7 +254,12 @@ fn pipeline(device: &wgpu::Device, layout: &BindGroupLayout, module: &wgpu::Shad
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some("finish"),
         layout: Some(&layout),
-        vertex: wgpu::VertexState { module, entry_point: Some("vs_place"), compilation_options: Default::default(), buffers: &[] },
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("vs_place"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
         primitive: Default::default(),
         depth_stencil: None,
         multisample: Default::default(),

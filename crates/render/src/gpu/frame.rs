@@ -22,12 +22,23 @@ pub struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    pub fn new(gpu: &Gpu, pipelines: &Pipelines, stage: &'a Stage, maps: &ShadowMaps, targets: &'a Targets, lens: &Lens) -> Result<Self, RenderError> {
+    pub fn new(
+        gpu: &Gpu,
+        pipelines: &Pipelines,
+        stage: &'a Stage,
+        maps: &ShadowMaps,
+        targets: &'a Targets,
+        lens: &Lens,
+    ) -> Result<Self, RenderError> {
         let alone = Eye::new(&lens.view, &lens.projection, targets.width, targets.height);
         let eye = lens.part.iter().fold(alone, |eye, part| eye.numbered(part));
         let reach = uniform_buffer(gpu, &[stage.reach, 0.0, 0.0, 0.0], "occlusion")?;
         let bind_occlusion = |raw: &TextureView| {
-            let entries = [BindingResource::TextureView(&targets.view_depth), reach.as_entire_binding(), BindingResource::TextureView(raw)];
+            let entries = [
+                BindingResource::TextureView(&targets.view_depth),
+                reach.as_entire_binding(),
+                BindingResource::TextureView(raw),
+            ];
             bind(gpu, &pipelines.occlusion_layout, &entries)
         };
         let scene_entries = [
@@ -57,14 +68,24 @@ impl<'a> Frame<'a> {
         if occlusion || variant.depth_first() {
             let ids = variant.depth_first().then_some(&self.targets.ids);
             let mut pass = match ids {
-                Some(ids) => color_pass(encoder, "view depth", ids, None, Some(cleared(&self.targets.view_depth, wgpu::StoreOp::Store))),
+                Some(ids) => color_pass(
+                    encoder,
+                    "view depth",
+                    ids,
+                    None,
+                    Some(cleared(&self.targets.view_depth, wgpu::StoreOp::Store)),
+                ),
                 None => depth_pass(encoder, "view depth", &self.targets.view_depth),
             };
             pass.set_bind_group(0, &self.view, &[]);
             if variant.spheres_first() {
                 self.stage.draw_sphere_depth(&mut pass, &pipelines.ids, &self.choice);
             } else {
-                self.stage.draw_view_depth(&mut pass, if ids.is_some() { &pipelines.ids } else { &pipelines.depth }, &self.choice);
+                self.stage.draw_view_depth(
+                    &mut pass,
+                    if ids.is_some() { &pipelines.ids } else { &pipelines.depth },
+                    &self.choice,
+                );
             }
         }
         if occlusion {
@@ -79,7 +100,10 @@ impl<'a> Frame<'a> {
     /// Occlusion from depth, and its blur.
     fn draw_occlusion(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines) {
         let t = self.targets;
-        for (pipeline, target, inputs) in [(&pipelines.occlusion, &t.occlusion_raw, &self.occlusion_raw), (&pipelines.blur, &t.occlusion, &self.occlusion_blur)] {
+        for (pipeline, target, inputs) in [
+            (&pipelines.occlusion, &t.occlusion_raw, &self.occlusion_raw),
+            (&pipelines.blur, &t.occlusion, &self.occlusion_blur),
+        ] {
             let mut pass = color_pass(encoder, "occlusion", target, None, None);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &self.view, &[]);
@@ -91,12 +115,15 @@ impl<'a> Frame<'a> {
     fn picture_pass<'e>(&self, encoder: &'e mut CommandEncoder) -> RenderPass<'e> {
         let t = self.targets;
         match &t.samples {
-            Some((color, depth)) => color_pass(encoder, "picture", color, Some(&t.picture), Some(cleared(depth, wgpu::StoreOp::Discard))),
+            Some((color, depth)) => {
+                color_pass(encoder, "picture", color, Some(&t.picture), Some(cleared(depth, wgpu::StoreOp::Discard)))
+            }
             None => {
                 // all depth is there already and only read, or that of the spheres is and the rest is added
                 let added = wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Discard };
                 let depth_ops = self.stage.variant.spheres_first().then_some(added);
-                let depth = wgpu::RenderPassDepthStencilAttachment { view: &t.view_depth, depth_ops, stencil_ops: None };
+                let depth =
+                    wgpu::RenderPassDepthStencilAttachment { view: &t.view_depth, depth_ops, stencil_ops: None };
                 color_pass(encoder, "picture", &t.picture, None, Some(depth))
             }
         }
@@ -105,13 +132,21 @@ impl<'a> Frame<'a> {
 
 /// Resources in the order of a layout's bindings.
 pub fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, resources: &[BindingResource]) -> BindGroup {
-    let entries: Vec<_> = resources.iter().enumerate().map(|(i, resource)| BindGroupEntry { binding: i as u32, resource: resource.clone() }).collect();
+    let entries: Vec<_> = resources
+        .iter()
+        .enumerate()
+        .map(|(i, resource)| BindGroupEntry { binding: i as u32, resource: resource.clone() })
+        .collect();
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }
 
 /// A pass that draws depth alone.
 pub fn depth_pass<'e>(encoder: &'e mut CommandEncoder, label: &str, depth: &TextureView) -> RenderPass<'e> {
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor { label: Some(label), depth_stencil_attachment: Some(cleared(depth, wgpu::StoreOp::Store)), ..Default::default() })
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        depth_stencil_attachment: Some(cleared(depth, wgpu::StoreOp::Store)),
+        ..Default::default()
+    })
 }
 
 /// A pass that begins black.
@@ -125,10 +160,19 @@ pub fn color_pass<'e>(
     let store = if resolve.is_some() { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store };
     let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store };
     let attachment = wgpu::RenderPassColorAttachment { view: target, depth_slice: None, resolve_target: resolve, ops };
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor { label: Some(label), color_attachments: &[Some(attachment)], depth_stencil_attachment: depth, ..Default::default() })
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &[Some(attachment)],
+        depth_stencil_attachment: depth,
+        ..Default::default()
+    })
 }
 
 /// Depth cleared to the far plane.
 fn cleared(view: &TextureView, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {
-    wgpu::RenderPassDepthStencilAttachment { view, depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store }), stencil_ops: None }
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store }),
+        stencil_ops: None,
+    }
 }

@@ -47,7 +47,8 @@ impl MeshBuffers {
     pub(crate) fn new(gpu: &Gpu, mesh: &MeshData) -> Result<Self, RenderError> {
         let place = |i: usize| mesh.unwrapped.get(i).copied().unwrap_or_default();
         let corners = mesh.positions.iter().zip(&mesh.normals).enumerate();
-        let vertices: Vec<f32> = corners.flat_map(|(i, (p, n))| p.iter().chain(n).copied().chain(place(i)).collect::<Vec<_>>()).collect();
+        let vertices: Vec<f32> =
+            corners.flat_map(|(i, (p, n))| p.iter().chain(n).copied().chain(place(i)).collect::<Vec<_>>()).collect();
         Ok(MeshBuffers {
             vertices: vertex_buffer(gpu, &vertices, "mesh vertices")?,
             indices: buffer(gpu, bytemuck::cast_slice(&mesh.indices), BufferUsages::INDEX, "mesh indices")?,
@@ -75,7 +76,12 @@ pub fn buffer(gpu: &Gpu, bytes: &[u8], usage: BufferUsages, what: &'static str) 
     let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
     // not mapped: on a lost device that would be a panic and no error
     let size = contents.len() as u64;
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(what), size, usage: usage | BufferUsages::COPY_DST, mapped_at_creation: false });
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(what),
+        size,
+        usage: usage | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
     gpu.queue.write_buffer(&buffer, 0, contents);
     Ok(buffer)
 }

@@ -4,7 +4,10 @@
 use super::data::{BALL_WORDS, CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
 use crate::{DrawList, Light, Settings, Shadows};
 use std::collections::BTreeMap;
-use wgpu::{BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline, ShaderModule, ShaderStages, TextureFormat, VertexFormat};
+use wgpu::{
+    BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline,
+    ShaderModule, ShaderStages, TextureFormat, VertexFormat,
+};
 
 /// The picture: linear in the shader, sRGB in memory, averaged in linear light.
 pub const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
@@ -65,7 +68,14 @@ impl Variant {
     pub fn new(list: &DrawList, shadows: Shadows, occlusion: bool) -> Self {
         let Settings { samples, reflections, .. } = list.settings;
         let one_sun = !reflections && matches!(list.lights[..], [Light::Directional { .. }]);
-        Variant { samples, shadows: shadows.number(), occlusion, softbox: list.sky.softbox > 0.0 && reflections, reflections, one_sun }
+        Variant {
+            samples,
+            shadows: shadows.number(),
+            occlusion,
+            softbox: list.sky.softbox > 0.0 && reflections,
+            reflections,
+            one_sun,
+        }
     }
 
     /// With one sample the nearest depth is drawn first, and only what is nearest is lit.
@@ -107,7 +117,11 @@ impl Pipelines {
     /// `sample_masks`: whether shaders can write which samples of a pixel they cover.
     pub fn new(device: &Device, sample_masks: bool) -> Self {
         // OpenGL has no interpolation without perspective; where it is asked for w is 1, and it is the same
-        let common = if sample_masks { PICTURE_WGSL.to_owned() } else { PICTURE_WGSL.replace("@interpolate(linear)", "@interpolate(perspective)") };
+        let common = if sample_masks {
+            PICTURE_WGSL.to_owned()
+        } else {
+            PICTURE_WGSL.replace("@interpolate(linear)", "@interpolate(perspective)")
+        };
         let view_layout = layout(device, "view", &[uniform(0)]);
         let scene_layout = layout(
             device,
@@ -132,10 +146,17 @@ impl Pipelines {
             ],
         );
         let filtered = wgpu::TextureSampleType::Float { filterable: true };
-        let albedo = [texture(0, filtered, wgpu::TextureViewDimension::D2), entry(1, BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
+        let albedo = [
+            texture(0, filtered, wgpu::TextureViewDimension::D2),
+            entry(1, BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+        ];
         let texture_layout = layout(device, "texture", &albedo);
         let pixels = shader(device, "picture", &[&common, EDGE_PIXELS_WGSL].concat());
-        let samples = if sample_masks { shader(device, "picture", &[&common, EDGE_SAMPLES_WGSL].concat()) } else { pixels.clone() };
+        let samples = if sample_masks {
+            shader(device, "picture", &[&common, EDGE_SAMPLES_WGSL].concat())
+        } else {
+            pixels.clone()
+        };
         let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
         let depth_only = [Some(&view_layout)];
         let screen = [Some(&view_layout), Some(&occlusion_layout)];
@@ -144,10 +165,28 @@ impl Pipelines {
             plan.build(device, &pixels, &depth_only)
         };
         let picture = [Some(&view_layout), Some(&scene_layout), Some(&texture_layout)];
-        let mesh_first = Plan { vs: "vs_mesh_depth", fs: Some("fs_nothing"), input: Input::Mesh, color: Some(COLOR), depth: Some(WRITE), blend: None, samples: 1, constants: &[] };
+        let mesh_first = Plan {
+            vs: "vs_mesh_depth",
+            fs: Some("fs_nothing"),
+            input: Input::Mesh,
+            color: Some(COLOR),
+            depth: Some(WRITE),
+            blend: None,
+            samples: 1,
+            constants: &[],
+        };
         let (mesh, no_id) = ("vs_mesh_depth", Some("fs_no_id"));
         let whole = |fs| {
-            let plan = Plan { vs: "vs_whole", fs: Some(fs), input: Input::None, color: Some(OCCLUSION), depth: None, blend: None, samples: 1, constants: &[] };
+            let plan = Plan {
+                vs: "vs_whole",
+                fs: Some(fs),
+                input: Input::None,
+                color: Some(OCCLUSION),
+                depth: None,
+                blend: None,
+                samples: 1,
+                constants: &[],
+            };
             plan.build(device, &occlusion, &screen)
         };
         Pipelines {
@@ -231,8 +270,21 @@ impl Pipelines {
             ("REFLECTIONS", flag(variant.reflections)),
             ("ONE_SUN", flag(variant.one_sun)),
         ];
-        let plan = Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: variant.samples, constants: &constants };
-        plan.build(device, &self.modules[usize::from(first)], &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)])
+        let plan = Plan {
+            vs,
+            fs: Some(fs),
+            input,
+            color: Some(COLOR),
+            depth: Some(depth),
+            blend,
+            samples: variant.samples,
+            constants: &constants,
+        };
+        plan.build(
+            device,
+            &self.modules[usize::from(first)],
+            &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)],
+        )
     }
 }
 
@@ -279,28 +331,54 @@ struct Plan<'a> {
 
 impl Plan<'_> {
     fn build(&self, device: &Device, module: &ShaderModule, layouts: &[Option<&BindGroupLayout>]) -> RenderPipeline {
-        let pipeline_layout =
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some(self.vs), bind_group_layouts: layouts, immediate_size: 0 });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(self.vs),
+            bind_group_layouts: layouts,
+            immediate_size: 0,
+        });
         let vertex = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 8 => Float32x3];
         let rows = attributes(if self.input == Input::Mesh { 2 } else { 0 }, self.input.floats());
-        let per_instance = wgpu::VertexBufferLayout { array_stride: 4 * self.input.floats(), step_mode: wgpu::VertexStepMode::Instance, attributes: &rows };
-        let per_vertex = wgpu::VertexBufferLayout { array_stride: 36, step_mode: wgpu::VertexStepMode::Vertex, attributes: &vertex };
+        let per_instance = wgpu::VertexBufferLayout {
+            array_stride: 4 * self.input.floats(),
+            step_mode: wgpu::VertexStepMode::Instance,
+            attributes: &rows,
+        };
+        let per_vertex =
+            wgpu::VertexBufferLayout { array_stride: 36, step_mode: wgpu::VertexStepMode::Vertex, attributes: &vertex };
         let buffers = match self.input {
             Input::None => vec![],
             Input::Mesh => vec![Some(per_vertex), Some(per_instance)],
             Input::Sphere | Input::Capsule | Input::Stroke => vec![Some(per_instance)],
-            Input::Ball => vec![Some(wgpu::VertexBufferLayout { array_stride: 4 * BALL_WORDS, step_mode: wgpu::VertexStepMode::Instance, attributes: &BALL })],
-            Input::Range => vec![Some(wgpu::VertexBufferLayout { array_stride: 8, step_mode: wgpu::VertexStepMode::Instance, attributes: &RANGE })],
+            Input::Ball => vec![Some(wgpu::VertexBufferLayout {
+                array_stride: 4 * BALL_WORDS,
+                step_mode: wgpu::VertexStepMode::Instance,
+                attributes: &BALL,
+            })],
+            Input::Range => vec![Some(wgpu::VertexBufferLayout {
+                array_stride: 8,
+                step_mode: wgpu::VertexStepMode::Instance,
+                attributes: &RANGE,
+            })],
         };
         let strip = matches!(self.input, Input::Sphere | Input::Ball | Input::Capsule | Input::Stroke);
-        let write_mask = if self.fs == Some("fs_nothing") { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
+        let write_mask =
+            if self.fs == Some("fs_nothing") { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
         let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask })];
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.fs.unwrap_or(self.vs)),
             layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState { module, entry_point: Some(self.vs), compilation_options: Default::default(), buffers: &buffers },
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some(self.vs),
+                compilation_options: Default::default(),
+                buffers: &buffers,
+            },
             primitive: wgpu::PrimitiveState {
-                topology: if strip { wgpu::PrimitiveTopology::TriangleStrip } else { wgpu::PrimitiveTopology::TriangleList },
+                topology: if strip {
+                    wgpu::PrimitiveTopology::TriangleStrip
+                } else {
+                    wgpu::PrimitiveTopology::TriangleList
+                },
                 // of the boxes around capsules the far sides are drawn
                 cull_mode: (self.input == Input::Capsule).then_some(wgpu::Face::Front),
                 ..Default::default()
@@ -310,13 +388,20 @@ impl Plan<'_> {
                 depth_write_enabled: Some(depth.write),
                 depth_compare: Some(depth.compare),
                 stencil: Default::default(),
-                bias: wgpu::DepthBiasState { constant: 64 * depth.bias, slope_scale: 2.0 * depth.bias as f32, clamp: 0.0 },
+                bias: wgpu::DepthBiasState {
+                    constant: 64 * depth.bias,
+                    slope_scale: 2.0 * depth.bias as f32,
+                    clamp: 0.0,
+                },
             }),
             multisample: wgpu::MultisampleState { count: self.samples, ..Default::default() },
             fragment: self.fs.map(|fs| wgpu::FragmentState {
                 module,
                 entry_point: Some(fs),
-                compilation_options: wgpu::PipelineCompilationOptions { constants: self.constants, ..Default::default() },
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: self.constants,
+                    ..Default::default()
+                },
                 targets: if self.color.is_some() { &targets } else { &[] },
             }),
             multiview_mask: None,
@@ -326,7 +411,8 @@ impl Plan<'_> {
 }
 
 const BALL: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![0 => Float32x4, 1 => Uint32];
-const RANGE: [wgpu::VertexAttribute; 1] = [wgpu::VertexAttribute { format: VertexFormat::Uint32x2, offset: 0, shader_location: 0 }];
+const RANGE: [wgpu::VertexAttribute; 1] =
+    [wgpu::VertexAttribute { format: VertexFormat::Uint32x2, offset: 0, shader_location: 0 }];
 
 impl Input {
     fn floats(self) -> u64 {
@@ -342,11 +428,20 @@ impl Input {
 
 /// As many vec4 attributes as fill `floats`, from location `first` on.
 fn attributes(first: u32, floats: u64) -> Vec<wgpu::VertexAttribute> {
-    (0..floats / 4).map(|i| wgpu::VertexAttribute { format: VertexFormat::Float32x4, offset: 16 * i, shader_location: first + i as u32 }).collect()
+    (0..floats / 4)
+        .map(|i| wgpu::VertexAttribute {
+            format: VertexFormat::Float32x4,
+            offset: 16 * i,
+            shader_location: first + i as u32,
+        })
+        .collect()
 }
 
 fn shader(device: &Device, label: &str, source: &str) -> ShaderModule {
-    device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) })
+    device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    })
 }
 
 fn layout(device: &Device, label: &str, entries: &[BindGroupLayoutEntry]) -> BindGroupLayout {
@@ -358,9 +453,16 @@ fn entry(binding: u32, ty: BindingType) -> BindGroupLayoutEntry {
 }
 
 fn uniform(binding: u32) -> BindGroupLayoutEntry {
-    entry(binding, BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: None })
+    entry(
+        binding,
+        BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: None },
+    )
 }
 
-fn texture(binding: u32, sample_type: wgpu::TextureSampleType, view_dimension: wgpu::TextureViewDimension) -> BindGroupLayoutEntry {
+fn texture(
+    binding: u32,
+    sample_type: wgpu::TextureSampleType,
+    view_dimension: wgpu::TextureViewDimension,
+) -> BindGroupLayoutEntry {
     entry(binding, BindingType::Texture { sample_type, view_dimension, multisampled: false })
 }

@@ -10,7 +10,12 @@ use crate::{DrawList, Light, MAX_LIGHTS, MAX_SHADOWS};
 /// The views of the lights that throw shadows, with the light's number, in the list's order: one or six layers of the shadow maps each, as many as fit.
 pub fn shadow_eyes(list: &DrawList, seen: Option<&Bounds>) -> Vec<(usize, Eye)> {
     let Some(seen) = seen else { return Vec::new() };
-    let each = list.lights.iter().enumerate().map(|(i, light)| (i, shadow::eyes_of(light, list, seen))).filter(|(_, eyes)| !eyes.is_empty());
+    let each = list
+        .lights
+        .iter()
+        .enumerate()
+        .map(|(i, light)| (i, shadow::eyes_of(light, list, seen)))
+        .filter(|(_, eyes)| !eyes.is_empty());
     let mut out = Vec::new();
     for (i, eyes) in each.take(MAX_SHADOWS) {
         if out.len() + eyes.len() <= MAX_LAYERS {
@@ -34,7 +39,12 @@ pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>, part: bool) -> f3
 /// Middle x and y of the floor, its reach and its height.
 pub fn floor(list: &DrawList, seen: Option<&Bounds>) -> [f32; 4] {
     let middle = seen.map_or([0.0; 2], |b| ball_of(b).0.xy().into());
-    [middle[0], middle[1], list.ground.as_ref().map_or(1.0, |g| g.reach_m), list.ground.as_ref().map_or(0.0, |g| g.height_m)]
+    [
+        middle[0],
+        middle[1],
+        list.ground.as_ref().map_or(1.0, |g| g.reach_m),
+        list.ground.as_ref().map_or(0.0, |g| g.height_m),
+    ]
 }
 
 /// Linear radiance that comes back from below, in units of the ambient factor: a floor returns its colour times the light that falls on it
@@ -86,7 +96,9 @@ pub fn floats(list: &DrawList, seen: Option<&Bounds>, shadows: &[(usize, Eye)]) 
 
 fn push_light(light: &Light, [layer, layers]: [f32; 2], out: &mut Vec<f32>) {
     let (at, kind, color, intensity, size) = match light {
-        Light::Directional { direction, color, intensity, angular_radius_rad, .. } => (-direction.normalize(), 0.0, color, intensity, angular_radius_rad),
+        Light::Directional { direction, color, intensity, angular_radius_rad, .. } => {
+            (-direction.normalize(), 0.0, color, intensity, angular_radius_rad)
+        }
         Light::Point { position, color, intensity, radius_m, .. } => (position.coords, 1.0, color, intensity, radius_m),
     };
     let [r, g, b] = linear3(*color).map(|c| c * intensity);

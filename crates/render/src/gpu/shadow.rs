@@ -9,7 +9,9 @@ use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 /// The views of a light onto what throws shadows near the `seen` box: one, or six of a lamp amid it where shadows are soft, or none.
 pub fn eyes_of(light: &Light, list: &DrawList, seen: &Bounds) -> Vec<Eye> {
     let size = list.settings.shadow_map_size;
-    let Some(casters) = union(list.casters_near(seen).map(|c| c.2)).filter(|_| light.casts_shadow()) else { return Vec::new() };
+    let Some(casters) = union(list.casters_near(seen).map(|c| c.2)).filter(|_| light.casts_shadow()) else {
+        return Vec::new();
+    };
     match light {
         Light::Directional { direction, .. } => vec![sun(direction, list, seen, &casters, size)],
         Light::Point { position, radius_m, .. } => match lamp(position, &casters, size) {
@@ -72,10 +74,22 @@ fn lamp(position: &Point3<f32>, casters: &Bounds, size: u32) -> Option<Eye> {
     };
     let ((sx, cx), (sy, cy)) = (row(0), row(1));
     let projection = Matrix4::new(
-        sx, 0.0, cx, 0.0, //
-        0.0, sy, cy, 0.0, //
-        0.0, 0.0, far / (near - far), near * far / (near - far), //
-        0.0, 0.0, -1.0, 0.0,
+        sx,
+        0.0,
+        cx,
+        0.0, //
+        0.0,
+        sy,
+        cy,
+        0.0, //
+        0.0,
+        0.0,
+        far / (near - far),
+        near * far / (near - far), //
+        0.0,
+        0.0,
+        -1.0,
+        0.0,
     );
     Some(Eye::new(&view.cast(), &projection.cast(), size, size))
 }
@@ -89,10 +103,22 @@ fn lamp_amid(position: &Point3<f32>, radius: f32, casters: &Bounds, size: u32) -
     let near = radius.max(1e-3 * far).min(0.5 * far);
     let t = 1.0 / CUBE_TANGENT;
     let projection = Matrix4::new(
-        t, 0.0, 0.0, 0.0, //
-        0.0, t, 0.0, 0.0, //
-        0.0, 0.0, far / (near - far), near * far / (near - far), //
-        0.0, 0.0, -1.0, 0.0,
+        t,
+        0.0,
+        0.0,
+        0.0, //
+        0.0,
+        t,
+        0.0,
+        0.0, //
+        0.0,
+        0.0,
+        far / (near - far),
+        near * far / (near - far), //
+        0.0,
+        0.0,
+        -1.0,
+        0.0,
     );
     let sides = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
     let view = |forward: Vector3<f32>| {

@@ -44,7 +44,8 @@ impl Spheres {
         let (groups, order) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow));
         let balls: Vec<Ball> = order.iter().map(|&i| (list.spheres[i].center, list.spheres[i].radius)).collect();
         let ranges: Vec<u32> = groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
-        let whole = if gpu.choosy || balls.is_empty() { None } else { Some(ball_buffer(gpu, &balls, 0..balls.len() as u32)?) };
+        let whole =
+            if gpu.choosy || balls.is_empty() { None } else { Some(ball_buffer(gpu, &balls, 0..balls.len() as u32)?) };
         Ok(Spheres {
             looks: looks(gpu, list, &order)?,
             ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), BufferUsages::VERTEX, "sphere groups")?,
@@ -59,7 +60,11 @@ impl Spheres {
     pub(super) fn choose(&self, gpu: &Gpu, eye: &Eye, which: Which) -> Result<Choice, RenderError> {
         let of = |same: &Same| if which == Which::All { same.all.clone() } else { same.casters.clone() };
         if let Some(whole) = &self.whole {
-            return Ok(Choice { balls: whole.clone(), ranges: self.groups.iter().map(of).collect(), near: eye.near_any(self.balls.iter()) });
+            return Ok(Choice {
+                balls: whole.clone(),
+                ranges: self.groups.iter().map(of).collect(),
+                near: eye.near_any(self.balls.iter()),
+            });
         }
         let samples = if which == Which::All { self.samples } else { 1 };
         let chosen = seen(&self.balls, self.groups.iter().map(of), eye, samples);
@@ -89,5 +94,10 @@ fn looks(gpu: &Gpu, list: &DrawList, order: &[usize]) -> Result<TextureView, Ren
     let mut words = Vec::with_capacity(rows * row);
     order.iter().for_each(|&i| data::sphere(&list.spheres[i], &mut words));
     words.resize(rows * row, 0);
-    Ok(super::finish::upload(gpu, [row as u32 / 4, rows as u32], wgpu::TextureFormat::Rgba32Uint, bytemuck::cast_slice(&words)))
+    Ok(super::finish::upload(
+        gpu,
+        [row as u32 / 4, rows as u32],
+        wgpu::TextureFormat::Rgba32Uint,
+        bytemuck::cast_slice(&words),
+    ))
 }

@@ -69,7 +69,16 @@ pub struct Batch {
 impl Stage {
     /// `seen`: what shadows, floor and occlusion are fitted to; `part`: whether that is all there is.
     #[allow(clippy::too_many_arguments)]
-    pub(super) fn new(gpu: &Gpu, pipelines: &mut Pipelines, meshes: &mut MeshCache, textures: Textures, list: &DrawList, seen: Option<&Bounds>, part: bool, serial: u64) -> Result<Self, RenderError> {
+    pub(super) fn new(
+        gpu: &Gpu,
+        pipelines: &mut Pipelines,
+        meshes: &mut MeshCache,
+        textures: Textures,
+        list: &DrawList,
+        seen: Option<&Bounds>,
+        part: bool,
+        serial: u64,
+    ) -> Result<Self, RenderError> {
         let s = &list.settings;
         let shadows = if s.shadows == Shadows::Off { Vec::new() } else { scene::shadow_eyes(list, seen) };
         let reach = scene::occlusion_reach(list, seen, part);
@@ -84,9 +93,17 @@ impl Stage {
             variant: Variant::new(list, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0),
             shadow_map_size: s.shadow_map_size,
             reach,
-            shadow_views: shadows.iter().map(|(_, eye)| Ok((bind_view(gpu, pipelines, eye)?, spheres.choose(gpu, eye, Which::Casters)?))).collect::<Result<_, RenderError>>()?,
+            shadow_views: shadows
+                .iter()
+                .map(|(_, eye)| Ok((bind_view(gpu, pipelines, eye)?, spheres.choose(gpu, eye, Which::Casters)?)))
+                .collect::<Result<_, RenderError>>()?,
             scene: uniform_buffer(gpu, &scene::floats(list, seen, &shadows), "scene")?,
-            shells: list.debug_spheres.iter().filter(|s| s.look == SphereStyle::Shell && s.radius > 0.0).cloned().collect(),
+            shells: list
+                .debug_spheres
+                .iter()
+                .filter(|s| s.look == SphereStyle::Shell && s.radius > 0.0)
+                .cloned()
+                .collect(),
             groups,
             instances,
             ground: ground(gpu, list, seen)?,
@@ -107,7 +124,13 @@ impl Stage {
         let meshes = self.groups.iter().map(|g| (Pass::Mesh, g.same.surface));
         let spheres = self.spheres.groups.iter().map(|g| (Pass::Sphere, g.surface));
         let capsules = self.capsule_groups.iter().map(|g| (Pass::Capsule, g.surface));
-        fixed.into_iter().chain(ground).chain(meshes).chain(spheres).chain(capsules).map(|(pass, surface)| (pass, surface, self.variant))
+        fixed
+            .into_iter()
+            .chain(ground)
+            .chain(meshes)
+            .chain(spheres)
+            .chain(capsules)
+            .map(|(pass, surface)| (pass, surface, self.variant))
     }
 
     /// One depth map per shadow.
@@ -137,20 +160,32 @@ impl Stage {
         }
     }
 
-    fn draw_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], choice: &Choice, which: impl Fn(&Same) -> Range<u32>) {
+    fn draw_depth(
+        &self,
+        pass: &mut RenderPass,
+        by: &[RenderPipeline; 5],
+        choice: &Choice,
+        which: impl Fn(&Same) -> Range<u32>,
+    ) {
         pass.set_pipeline(&by[1]);
         self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, which(&g.same)));
         if !self.capsule_groups.is_empty() {
             pass.set_pipeline(&by[4]);
             pass.set_vertex_buffer(0, self.capsules.slice(..));
-            self.capsule_groups.iter().map(&which).filter(|range| !range.is_empty()).for_each(|range| pass.draw(0..14, range));
+            self.capsule_groups
+                .iter()
+                .map(&which)
+                .filter(|range| !range.is_empty())
+                .for_each(|range| pass.draw(0..14, range));
         }
         self.draw_sphere_depth(pass, by, choice);
     }
 
     /// Everything in colour, with the view's own shells.
     pub(super) fn draw_picture(&self, pass: &mut RenderPass, pipelines: &Pipelines, choice: &Choice, shells: &Batch) {
-        let select = |pass: &mut RenderPass, which, surface| pipelines.of((which, surface, self.variant)).map(|p| pass.set_pipeline(p)).is_some();
+        let select = |pass: &mut RenderPass, which, surface| {
+            pipelines.of((which, surface, self.variant)).map(|p| pass.set_pipeline(p)).is_some()
+        };
         self.draw_spheres(pass, choice, &select);
         pass.set_bind_group(2, &self.textures.white, &[]);
         if self.variant.spheres_first() && !self.groups.is_empty() {
@@ -180,7 +215,9 @@ impl Stage {
         if select(pass, Pass::Sky, 0) {
             pass.draw(0..3, 0..1);
         }
-        for (which, batch) in [(Pass::Line, &self.strokes[0]), (Pass::Shell, shells), (Pass::LineOnTop, &self.strokes[1])] {
+        for (which, batch) in
+            [(Pass::Line, &self.strokes[0]), (Pass::Shell, shells), (Pass::LineOnTop, &self.strokes[1])]
+        {
             if batch.count > 0 && select(pass, which, 0) {
                 pass.set_vertex_buffer(0, batch.buffer.slice(..));
                 pass.draw(0..4, 0..batch.count);
@@ -189,7 +226,12 @@ impl Stage {
     }
 
     /// Each with its surface: by squares, or all of a surface at once where the nearest is known.
-    fn draw_spheres(&self, pass: &mut RenderPass, choice: &Choice, select: &impl Fn(&mut RenderPass, Pass, u32) -> bool) {
+    fn draw_spheres(
+        &self,
+        pass: &mut RenderPass,
+        choice: &Choice,
+        select: &impl Fn(&mut RenderPass, Pass, u32) -> bool,
+    ) {
         for (i, same) in self.spheres.groups.iter().enumerate() {
             pass.set_bind_group(2, self.textures.of(same.texture), &[]);
             if !select(pass, Pass::Sphere, same.surface) {
@@ -207,7 +249,8 @@ impl Stage {
 
     /// Shells from back to front, so that they blend the right way.
     pub(super) fn shells_from(&self, gpu: &Gpu, view: &nalgebra::Matrix4<f32>) -> Result<Batch, RenderError> {
-        let mut shells: Vec<(f32, &DebugSphere)> = self.shells.iter().map(|s| (view.transform_point(&s.center).z, s)).collect();
+        let mut shells: Vec<(f32, &DebugSphere)> =
+            self.shells.iter().map(|s| (view.transform_point(&s.center).z, s)).collect();
         shells.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut floats = Vec::new();
         shells.iter().for_each(|(_, s)| data::shell(s, &mut floats));
@@ -242,25 +285,37 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
     let kind = |i: usize| (items[i].mesh, items[i].material.surface(), items[i].material.texture.map(|t| t.id));
     order.sort_by_key(|&i| (kind(i), !items[i].casts_shadow, i));
     let mut floats = Vec::with_capacity(data::INSTANCE_FLOATS as usize * items.len());
-    order.iter().for_each(|&i| data::instance(&items[i], !list.meshes[items[i].mesh.0].unwrapped.is_empty(), &mut floats));
+    order
+        .iter()
+        .for_each(|&i| data::instance(&items[i], !list.meshes[items[i].mesh.0].unwrapped.is_empty(), &mut floats));
     let mut groups = Vec::new();
     for (same, first) in runs(&order, kind, |i| items[i].casts_shadow) {
-        groups.push(Group { mesh: meshes[items[first].mesh.0].clone(), same: Same { surface: kind(first).1, texture: kind(first).2, ..same } });
+        groups.push(Group {
+            mesh: meshes[items[first].mesh.0].clone(),
+            same: Same { surface: kind(first).1, texture: kind(first).2, ..same },
+        });
     }
     Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
 }
 
 /// Spheres or capsules by surface, and in which order.
 pub(super) fn group_items<T>(items: &[T], kind: impl Fn(&T) -> (&Material, bool)) -> (Vec<Same>, Vec<usize>) {
-    let kinds: Vec<_> = items.iter().map(kind).map(|(m, casts)| ((m.surface(), m.texture.map(|t| t.id)), casts)).collect();
+    let kinds: Vec<_> =
+        items.iter().map(kind).map(|(m, casts)| ((m.surface(), m.texture.map(|t| t.id)), casts)).collect();
     let mut order: Vec<usize> = (0..items.len()).collect();
     order.sort_by_key(|&i| (kinds[i].0, !kinds[i].1, i));
-    let groups = runs(&order, |i| kinds[i].0, |i| kinds[i].1).map(|(same, first)| Same { surface: kinds[first].0.0, texture: kinds[first].0.1, ..same }).collect();
+    let groups = runs(&order, |i| kinds[i].0, |i| kinds[i].1)
+        .map(|(same, first)| Same { surface: kinds[first].0.0, texture: kinds[first].0.1, ..same })
+        .collect();
     (groups, order)
 }
 
 /// Runs of one kind in an order that has those that cast first in each; with the first item of each.
-fn runs<K: PartialEq>(order: &[usize], kind: impl Fn(usize) -> K, casts: impl Fn(usize) -> bool) -> impl Iterator<Item = (Same, usize)> {
+fn runs<K: PartialEq>(
+    order: &[usize],
+    kind: impl Fn(usize) -> K,
+    casts: impl Fn(usize) -> bool,
+) -> impl Iterator<Item = (Same, usize)> {
     let mut start = 0;
     order.chunk_by(move |&a, &b| kind(a) == kind(b)).map(move |run| {
         let casting = run.iter().filter(|&&i| casts(i)).count() as u32;
@@ -279,10 +334,19 @@ fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<Gr
     let mut quad = MeshData::ground_quad(reach);
     quad.positions.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, ground.height_m]);
     let mut floats = Vec::new();
-    let placed =
-        Instance { mesh: MeshId(0), pose: nalgebra::Isometry3::identity(), scale: nalgebra::Vector3::repeat(1.0), material: ground.material, casts_shadow: false };
+    let placed = Instance {
+        mesh: MeshId(0),
+        pose: nalgebra::Isometry3::identity(),
+        scale: nalgebra::Vector3::repeat(1.0),
+        material: ground.material,
+        casts_shadow: false,
+    };
     data::instance(&placed, false, &mut floats);
-    Ok(Some((MeshBuffers::new(gpu, &quad)?, vertex_buffer(gpu, &floats, "ground")?, (ground.material.surface(), ground.material.texture.map(|t| t.id)))))
+    Ok(Some((
+        MeshBuffers::new(gpu, &quad)?,
+        vertex_buffer(gpu, &floats, "ground")?,
+        (ground.material.surface(), ground.material.texture.map(|t| t.id)),
+    )))
 }
 
 fn stroke_batch(gpu: &Gpu, list: &DrawList, on_top: bool) -> Result<Batch, RenderError> {

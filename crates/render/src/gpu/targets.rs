@@ -34,7 +34,8 @@ impl Targets {
         Targets {
             width,
             height,
-            samples: (samples > 1).then(|| (whole(make("samples", samples, COLOR, DRAW)), whole(make("depth", samples, DEPTH, DRAW)))),
+            samples: (samples > 1)
+                .then(|| (whole(make("samples", samples, COLOR, DRAW)), whole(make("depth", samples, DEPTH, DRAW)))),
             picture: resolved.create_view(&TextureViewDescriptor::default()),
             view_depth: whole(make("view depth", 1, DEPTH, LOOK)),
             ids: whole(texture(device, "ids", if samples > 1 { [1, 1, 1] } else { [width, height, 1] }, 1, ID, LOOK)),
@@ -73,11 +74,19 @@ impl ShadowMaps {
         // OpenGL takes one layer for no array, and each six for a cube
         let spare = u32::from(gpu.opengl && (count == 1 || count.is_multiple_of(6)));
         let maps = texture(&gpu.device, "shadow maps", [size, size, count + spare], 1, DEPTH, LOOK);
-        let layer = |i| TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2), base_array_layer: i, array_layer_count: Some(1), ..Default::default() };
+        let layer = |i| TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2),
+            base_array_layer: i,
+            array_layer_count: Some(1),
+            ..Default::default()
+        };
         ShadowMaps {
             size,
             layers: (0..count).map(|i| maps.create_view(&layer(i))).collect(),
-            array: maps.create_view(&TextureViewDescriptor { dimension: Some(wgpu::TextureViewDimension::D2Array), ..Default::default() }),
+            array: maps.create_view(&TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2Array),
+                ..Default::default()
+            }),
             drawn: 0,
         }
     }
@@ -102,7 +111,8 @@ pub fn read(gpu: &Gpu, from: &Texture) -> Result<Image, RenderError> {
         mapped_at_creation: false,
     });
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("readback") });
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch(width)), rows_per_image: Some(height) };
+    let layout =
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch(width)), rows_per_image: Some(height) };
     encoder.copy_texture_to_buffer(
         from.as_image_copy(),
         wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
@@ -147,7 +157,14 @@ fn whole(t: Texture) -> TextureView {
     t.create_view(&TextureViewDescriptor::default())
 }
 
-fn texture(device: &wgpu::Device, label: &str, [width, height, layers]: [u32; 3], sample_count: u32, format: TextureFormat, usage: TextureUsages) -> Texture {
+fn texture(
+    device: &wgpu::Device,
+    label: &str,
+    [width, height, layers]: [u32; 3],
+    sample_count: u32,
+    format: TextureFormat,
+    usage: TextureUsages,
+) -> Texture {
     device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
         size: Extent3d { width, height, depth_or_array_layers: layers },

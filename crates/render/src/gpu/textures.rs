@@ -33,13 +33,26 @@ impl TextureCache {
     }
 
     /// Bindings for the textures of a list, in its order.
-    pub(super) fn sync(&mut self, gpu: &Gpu, layout: &BindGroupLayout, textures: &[Arc<Image>]) -> Result<Vec<BindGroup>, RenderError> {
+    pub(super) fn sync(
+        &mut self,
+        gpu: &Gpu,
+        layout: &BindGroupLayout,
+        textures: &[Arc<Image>],
+    ) -> Result<Vec<BindGroup>, RenderError> {
         let most = gpu.device.limits().max_texture_dimension_2d;
         let mut kept = Vec::with_capacity(textures.len());
         for image in textures {
             let fits = |side: u32| (1..=most).contains(&side);
-            if !fits(image.width) || !fits(image.height) || image.rgba.len() != 4 * image.width as usize * image.height as usize {
-                return Err(RenderError::BadSize { width: image.width, height: image.height, max_side: most, max_pixels: u64::from(most) * u64::from(most) });
+            if !fits(image.width)
+                || !fits(image.height)
+                || image.rgba.len() != 4 * image.width as usize * image.height as usize
+            {
+                return Err(RenderError::BadSize {
+                    width: image.width,
+                    height: image.height,
+                    max_side: most,
+                    max_pixels: u64::from(most) * u64::from(most),
+                });
             }
             let known = self.known.iter().find(|(known, _)| Arc::ptr_eq(known, image)).map(|(_, group)| group.clone());
             kept.push((image.clone(), known.unwrap_or_else(|| send(gpu, layout, &self.sampler, image))));
@@ -77,10 +90,13 @@ fn half(image: &Image) -> Option<Image> {
         return None;
     }
     let (width, height) = ((w / 2).max(1), (h / 2).max(1));
-    let light = |x: usize, y: usize, k: usize| linear(f32::from(image.rgba[4 * (y.min(h - 1) * w + x.min(w - 1)) + k]) / 255.0);
+    let light =
+        |x: usize, y: usize, k: usize| linear(f32::from(image.rgba[4 * (y.min(h - 1) * w + x.min(w - 1)) + k]) / 255.0);
     let mut rgba = Vec::with_capacity(4 * width * height);
     for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-        let mean = |k: usize| [(0, 0), (1, 0), (0, 1), (1, 1)].iter().map(|(i, j)| light(2 * x + i, 2 * y + j, k)).sum::<f32>() / 4.0;
+        let mean = |k: usize| {
+            [(0, 0), (1, 0), (0, 1), (1, 1)].iter().map(|(i, j)| light(2 * x + i, 2 * y + j, k)).sum::<f32>() / 4.0
+        };
         rgba.extend([encoded(mean(0)), encoded(mean(1)), encoded(mean(2)), 255]);
     }
     Some(Image { width: width as u32, height: height as u32, rgba })

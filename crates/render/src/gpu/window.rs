@@ -45,7 +45,8 @@ impl Screen {
     pub(crate) fn new(event_loop: &ActiveEventLoop, window: Arc<Window>) -> Result<Screen, RenderError> {
         let mut reasons = Vec::new();
         for (name, backends) in [("Vulkan", wgpu::Backends::VULKAN), ("OpenGL", wgpu::Backends::GL)] {
-            let mut descriptor = wgpu::InstanceDescriptor::new_with_display_handle(Box::new(event_loop.owned_display_handle()));
+            let mut descriptor =
+                wgpu::InstanceDescriptor::new_with_display_handle(Box::new(event_loop.owned_display_handle()));
             descriptor.backends = backends;
             let instance = wgpu::Instance::new(descriptor);
             let surface = match instance.create_surface(window.clone()) {
@@ -58,14 +59,21 @@ impl Screen {
             let wanted = wgpu::RequestAdapterOptions { compatible_surface: Some(&surface), ..Default::default() };
             match pollster::block_on(instance.request_adapter(&wanted)) {
                 Ok(adapter) => return Screen::on(adapter, instance, surface, window),
-                Err(wgpu::RequestAdapterError::NotFound { .. }) => reasons.push(format!("no {name} driver for this window")),
+                Err(wgpu::RequestAdapterError::NotFound { .. }) => {
+                    reasons.push(format!("no {name} driver for this window"))
+                }
                 Err(e) => reasons.push(e.to_string()),
             }
         }
         Err(RenderError::NoAdapter { reason: reasons.join(", ") })
     }
 
-    fn on(adapter: wgpu::Adapter, instance: wgpu::Instance, surface: wgpu::Surface<'static>, window: Arc<Window>) -> Result<Screen, RenderError> {
+    fn on(
+        adapter: wgpu::Adapter,
+        instance: wgpu::Instance,
+        surface: wgpu::Surface<'static>,
+        window: Arc<Window>,
+    ) -> Result<Screen, RenderError> {
         let size = window.inner_size();
         let (width, height) = (size.width.max(1), size.height.max(1));
         let usual = surface.get_default_config(&adapter, width, height);
@@ -179,7 +187,10 @@ impl Screen {
             return Err(self.renderer.gpu.failed("the window's surface is lost again and again".into()));
         }
         if lost {
-            self.surface = self.instance.create_surface(self.window.clone()).map_err(|e| self.renderer.gpu.failed(e.to_string()))?;
+            self.surface = self
+                .instance
+                .create_surface(self.window.clone())
+                .map_err(|e| self.renderer.gpu.failed(e.to_string()))?;
         }
         self.surface.configure(&self.renderer.gpu.device, &self.config);
         self.renderer.gpu.complaint()?;
@@ -196,21 +207,44 @@ struct Copies {
 
 impl Copies {
     fn new(device: &wgpu::Device, surface: TextureFormat) -> Copies {
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
-        let uniform = wgpu::BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: None };
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        };
+        let uniform = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
         let sample_type = wgpu::TextureSampleType::Float { filterable: false };
-        let picture = wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false };
+        let picture = wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
         let entries = [entry(0, uniform), entry(1, picture)];
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("copy"), entries: &entries });
+        let layout = device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("copy"), entries: &entries });
         let source = wgpu::ShaderSource::Wgsl(include_str!("../shaders/window.wgsl").into());
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("copy"), source });
         let make = |blend| {
             let bind_group_layouts = &[Some(&layout)];
-            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some("copy"), bind_group_layouts, immediate_size: 0 });
+            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("copy"),
+                bind_group_layouts,
+                immediate_size: 0,
+            });
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some("copy"),
                 layout: Some(&pipeline_layout),
-                vertex: wgpu::VertexState { module: &module, entry_point: Some("vs_place"), compilation_options: Default::default(), buffers: &[] },
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some("vs_place"),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
                 primitive: Default::default(),
                 depth_stencil: None,
                 multisample: Default::default(),
@@ -218,7 +252,11 @@ impl Copies {
                     module: &module,
                     entry_point: Some("fs_place"),
                     compilation_options: Default::default(),
-                    targets: &[Some(wgpu::ColorTargetState { format: surface, blend, write_mask: wgpu::ColorWrites::ALL })],
+                    targets: &[Some(wgpu::ColorTargetState {
+                        format: surface,
+                        blend,
+                        write_mask: wgpu::ColorWrites::ALL,
+                    })],
                 }),
                 multiview_mask: None,
                 cache: None,
@@ -245,7 +283,11 @@ impl Copies {
             wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
             wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::TextureView(&source) },
         ];
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("copy"), layout: &self.layout, entries: &entries });
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("copy"),
+            layout: &self.layout,
+            entries: &entries,
+        });
         let mut pass = pass(encoder, target, wgpu::LoadOp::Load);
         pass.set_scissor_rect(0, 0, w, h);
         pass.set_pipeline(pipeline);
@@ -255,10 +297,18 @@ impl Copies {
     }
 }
 
-fn pass<'e>(encoder: &'e mut CommandEncoder, target: &TextureView, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::RenderPass<'e> {
+fn pass<'e>(
+    encoder: &'e mut CommandEncoder,
+    target: &TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> wgpu::RenderPass<'e> {
     let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
     let attachment = wgpu::RenderPassColorAttachment { view: target, depth_slice: None, resolve_target: None, ops };
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor { label: Some("copy"), color_attachments: &[Some(attachment)], ..Default::default() })
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("copy"),
+        color_attachments: &[Some(attachment)],
+        ..Default::default()
+    })
 }
 
 fn upload(gpu: &Gpu, image: &Image) -> wgpu::Texture {

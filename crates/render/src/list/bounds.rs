@@ -107,7 +107,10 @@ impl Corners {
 /// The eight world corners of an instance's box; none for an empty mesh.
 fn world_corners(instance: &Instance, local: Option<([f32; 3], [f32; 3])>) -> Option<[Point3<f32>; 8]> {
     let (lo, hi) = local?;
-    Some(corners_of(&(lo.into(), hi.into())).map(|p| instance.pose * Point3::from(p.coords.component_mul(&instance.scale))))
+    Some(
+        corners_of(&(lo.into(), hi.into()))
+            .map(|p| instance.pose * Point3::from(p.coords.component_mul(&instance.scale))),
+    )
 }
 
 /// The upper median; 0 of nothing.

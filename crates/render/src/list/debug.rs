@@ -142,7 +142,8 @@ fn line_strokes(line: &DebugLine, out: &mut Vec<Stroke>) {
     let px = line.style.width_px;
     let length = (line.end - line.start).norm();
     let head = line.head_m.min(length);
-    let stroke = |start, end, start_px, end_px| Stroke { start, end, start_px, end_px, round: false, style: line.style };
+    let stroke =
+        |start, end, start_px, end_px| Stroke { start, end, start_px, end_px, round: false, style: line.style };
     if head <= 0.0 {
         out.push(stroke(line.start, line.end, px, px));
         return;
@@ -162,6 +163,13 @@ fn ring_strokes(sphere: &DebugSphere, out: &mut Vec<Stroke>) {
             p[(axis + 2) % 3] += sphere.radius * sin;
             p
         };
-        out.extend((0..RING_PIECES).map(|i| Stroke { start: at(i), end: at(i + 1), start_px: px, end_px: px, round: false, style: sphere.style }));
+        out.extend((0..RING_PIECES).map(|i| Stroke {
+            start: at(i),
+            end: at(i + 1),
+            start_px: px,
+            end_px: px,
+            round: false,
+            style: sphere.style,
+        }));
     }
 }

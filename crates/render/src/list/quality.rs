@@ -55,7 +55,9 @@ pub struct Quality {
 
 /// A word that names no quality.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no quality '{0}'; wanted usual, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), with commas between them")]
+#[error(
+    "no quality '{0}'; wanted usual, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), with commas between them"
+)]
 pub struct UnknownQuality(String);
 
 impl Default for Quality {
@@ -99,14 +101,19 @@ impl FromStr for Quality {
                 None if word == "usual" => quality = Quality::default(),
                 None if word == "fastest" => quality = Quality::fastest(),
                 None if word == "fast" => quality = Quality::fast(),
-                Some(("shadows", name)) => quality.shadows = SHADOWS.iter().find(|(known, _)| *known == name).ok_or_else(unknown)?.1,
+                Some(("shadows", name)) => {
+                    quality.shadows = SHADOWS.iter().find(|(known, _)| *known == name).ok_or_else(unknown)?.1
+                }
                 Some(("samples", "1")) => quality.samples = 1,
                 Some(("samples", "4")) => quality.samples = 4,
                 Some(("occlusion", "on")) => quality.occlusion = true,
                 Some(("occlusion", "off")) => quality.occlusion = false,
                 Some(("reflections", "on")) => quality.reflections = true,
                 Some(("reflections", "off")) => quality.reflections = false,
-                Some(("map", side)) => quality.shadow_map_size = side.parse().ok().filter(|n| (256..=8192).contains(n)).ok_or_else(unknown)?,
+                Some(("map", side)) => {
+                    quality.shadow_map_size =
+                        side.parse().ok().filter(|n| (256..=8192).contains(n)).ok_or_else(unknown)?
+                }
                 _ => return Err(unknown()),
             }
         }
@@ -118,6 +125,12 @@ impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let occlusion = if self.occlusion { "on" } else { "off" };
         let reflections = if self.reflections { "" } else { "reflections=off," };
-        write!(f, "shadows={},samples={},occlusion={occlusion},{reflections}map={}", self.shadows.name(), self.samples, self.shadow_map_size)
+        write!(
+            f,
+            "shadows={},samples={},occlusion={occlusion},{reflections}map={}",
+            self.shadows.name(),
+            self.samples,
+            self.shadow_map_size
+        )
     }
 }

@@ -15,9 +15,25 @@ impl Display for DrawList {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         write_camera(f, &self.camera)?;
         let (s, k) = (&self.settings, &self.sky);
-        write!(f, "settings: exposure {} shadow map {} occlusion {} tone map {}", n(s.exposure), s.shadow_map_size, s.occlusion_m.map_or("auto".into(), n), s.tone_map)?;
+        write!(
+            f,
+            "settings: exposure {} shadow map {} occlusion {} tone map {}",
+            n(s.exposure),
+            s.shadow_map_size,
+            s.occlusion_m.map_or("auto".into(), n),
+            s.tone_map
+        )?;
         writeln!(f, " shadows {} samples {} reflections {}", s.shadows.name(), s.samples, s.reflections)?;
-        writeln!(f, "sky: zenith {} horizon {} ground {} ambient {} softbox {} backdrop {}", v(&k.zenith), v(&k.horizon), v(&k.ground), n(k.ambient), n(k.softbox), k.backdrop.map_or("none".into(), |c| v(&c)))?;
+        writeln!(
+            f,
+            "sky: zenith {} horizon {} ground {} ambient {} softbox {} backdrop {}",
+            v(&k.zenith),
+            v(&k.horizon),
+            v(&k.ground),
+            n(k.ambient),
+            n(k.softbox),
+            k.backdrop.map_or("none".into(), |c| v(&c))
+        )?;
         if let Some(g) = &self.ground {
             writeln!(f, "ground: height {} reach {} {}", n(g.height_m), n(g.reach_m), material(&g.material))?;
         }
@@ -27,7 +43,14 @@ impl Display for DrawList {
         for (i, mesh) in self.meshes.iter().enumerate() {
             let (lo, hi) = mesh.bounds().unwrap_or_default();
             let unwrapped = if mesh.unwrapped.is_empty() { "" } else { " unwrapped" };
-            writeln!(f, "mesh {i}: {} vertices {} triangles from {} to {}{unwrapped}", mesh.positions.len(), mesh.indices.len() / 3, v(&lo), v(&hi))?;
+            writeln!(
+                f,
+                "mesh {i}: {} vertices {} triangles from {} to {}{unwrapped}",
+                mesh.positions.len(),
+                mesh.indices.len() / 3,
+                v(&lo),
+                v(&hi)
+            )?;
         }
         for (i, image) in self.textures.iter().enumerate() {
             writeln!(f, "texture {i}: {} x {}", image.width, image.height)?;
@@ -39,16 +62,36 @@ impl Display for DrawList {
         }
         for (i, s) in self.spheres.iter().enumerate() {
             let q = s.orientation.coords;
-            writeln!(f, "sphere {i}: at {} radius {} turned {} {}{}", v(s.center.coords.as_slice()), n(s.radius), v(q.as_slice()), material(&s.material), shadow(s.casts_shadow))?;
+            writeln!(
+                f,
+                "sphere {i}: at {} radius {} turned {} {}{}",
+                v(s.center.coords.as_slice()),
+                n(s.radius),
+                v(q.as_slice()),
+                material(&s.material),
+                shadow(s.casts_shadow)
+            )?;
         }
         for (i, c) in self.capsules.iter().enumerate() {
             let (t, q) = (c.pose.translation.vector, c.pose.rotation.coords);
-            write!(f, "capsule {i}: at {} turned {} half length {}", v(t.as_slice()), v(q.as_slice()), n(c.half_length))?;
+            write!(
+                f,
+                "capsule {i}: at {} turned {} half length {}",
+                v(t.as_slice()),
+                v(q.as_slice()),
+                n(c.half_length)
+            )?;
             writeln!(f, " radius {} {}{}", n(c.radius), material(&c.material), shadow(c.casts_shadow))?;
         }
         for (i, l) in self.lines.iter().enumerate() {
             let kind = if l.head_m > 0.0 { "arrow" } else { "line" };
-            writeln!(f, "{kind} {i}: from {} to {} {}", v(l.start.coords.as_slice()), v(l.end.coords.as_slice()), style(&l.style))?;
+            writeln!(
+                f,
+                "{kind} {i}: from {} to {} {}",
+                v(l.start.coords.as_slice()),
+                v(l.end.coords.as_slice()),
+                style(&l.style)
+            )?;
         }
         for (i, p) in self.points.iter().enumerate() {
             writeln!(f, "point {i}: at {} {}", v(p.position.coords.as_slice()), style(&p.style))?;
@@ -66,9 +109,16 @@ fn write_camera(f: &mut Formatter<'_>, camera: &Camera) -> Result {
         Camera::LookAt { eye, target, up, vertical_fov_rad, near_m, far_m } => writeln!(
             f,
             "camera: eye {} target {} up {} fov {} near {} far {}",
-            v(eye.coords.as_slice()), v(target.coords.as_slice()), v(up.as_slice()), n(*vertical_fov_rad), n(*near_m), n(*far_m)
+            v(eye.coords.as_slice()),
+            v(target.coords.as_slice()),
+            v(up.as_slice()),
+            n(*vertical_fov_rad),
+            n(*near_m),
+            n(*far_m)
         ),
-        Camera::Raw { view, projection } => writeln!(f, "camera: view {} projection {} (columns)", v(view.as_slice()), v(projection.as_slice())),
+        Camera::Raw { view, projection } => {
+            writeln!(f, "camera: view {} projection {} (columns)", v(view.as_slice()), v(projection.as_slice()))
+        }
     }
 }
 
@@ -77,12 +127,20 @@ fn write_light(f: &mut Formatter<'_>, i: usize, light: &Light) -> Result {
         Light::Directional { direction, color, intensity, angular_radius_rad, casts_shadow } => writeln!(
             f,
             "light {i}: directional along {} color {} intensity {} radius {} rad{}",
-            v(direction.as_slice()), v(color), n(*intensity), n(*angular_radius_rad), shadow(*casts_shadow)
+            v(direction.as_slice()),
+            v(color),
+            n(*intensity),
+            n(*angular_radius_rad),
+            shadow(*casts_shadow)
         ),
         Light::Point { position, color, intensity, radius_m, casts_shadow } => writeln!(
             f,
             "light {i}: point at {} color {} intensity {} radius {}{}",
-            v(position.coords.as_slice()), v(color), n(*intensity), n(*radius_m), shadow(*casts_shadow)
+            v(position.coords.as_slice()),
+            v(color),
+            n(*intensity),
+            n(*radius_m),
+            shadow(*casts_shadow)
         ),
     }
 }
@@ -95,7 +153,13 @@ fn material(m: &Material) -> String {
     };
     let shader = if m.shader == Shader::Unlit { " unlit" } else { "" };
     let texture = m.texture.map_or(String::new(), |t| format!(" texture {} every {}", t.id, n(t.repeat_m)));
-    format!("color {} rough {} metal {} coat {}{pattern}{shader}{texture}", v(&m.color), n(m.roughness), n(m.metallic), n(m.clearcoat))
+    format!(
+        "color {} rough {} metal {} coat {}{pattern}{shader}{texture}",
+        v(&m.color),
+        n(m.roughness),
+        n(m.metallic),
+        n(m.clearcoat)
+    )
 }
 
 fn style(s: &DebugStyle) -> String {

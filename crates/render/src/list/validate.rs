@@ -25,7 +25,12 @@ impl DrawList {
             at.check(x.mesh.0 < self.meshes.len(), "mesh", &x.mesh.0, "the number of a mesh of this list")?;
             at.finite("pose", x.pose.translation.vector.as_slice())?;
             at.finite("pose", x.pose.rotation.coords.as_slice())?;
-            at.check(x.scale.iter().all(|s| s.is_finite() && *s != 0.0), "scale", &x.scale.as_slice(), "finite factors other than 0")?;
+            at.check(
+                x.scale.iter().all(|s| s.is_finite() && *s != 0.0),
+                "scale",
+                &x.scale.as_slice(),
+                "finite factors other than 0",
+            )?;
             at.material(&x.material)?;
             at.texture(&x.material, self.textures.len())?;
         }
@@ -42,7 +47,12 @@ impl DrawList {
             at.finite("pose", c.pose.translation.vector.as_slice())?;
             at.finite("pose", c.pose.rotation.coords.as_slice())?;
             at.check(c.radius > 0.0 && c.radius.is_finite(), "radius", &c.radius, "finite and above 0")?;
-            at.check(c.half_length >= 0.0 && c.half_length.is_finite(), "half_length", &c.half_length, "finite and not negative")?;
+            at.check(
+                c.half_length >= 0.0 && c.half_length.is_finite(),
+                "half_length",
+                &c.half_length,
+                "finite and not negative",
+            )?;
             at.material(&c.material)?;
             at.texture(&c.material, self.textures.len())?;
         }
@@ -93,20 +103,35 @@ impl DrawList {
 
     fn check_surroundings(&self) -> Result<(), RenderError> {
         let (sky, s) = (&self.sky, &self.settings);
-        for (field, color) in [("zenith", sky.zenith), ("horizon", sky.horizon), ("ground", sky.ground), ("backdrop", sky.backdrop.unwrap_or_default())] {
+        for (field, color) in [
+            ("zenith", sky.zenith),
+            ("horizon", sky.horizon),
+            ("ground", sky.ground),
+            ("backdrop", sky.backdrop.unwrap_or_default()),
+        ] {
             Item("sky", 0).color(field, color)?;
         }
         Item("sky", 0).check(in_range(sky.ambient, 0.0, 1e6), "ambient", &sky.ambient, "0 or more")?;
         Item("sky", 0).check(in_range(sky.softbox, 0.0, 1e6), "softbox", &sky.softbox, "0 or more")?;
         if let Some(g) = &self.ground {
             Item("ground", 0).finite("height_m", &[g.height_m])?;
-            Item("ground", 0).check(g.reach_m > 0.0 && g.reach_m.is_finite(), "reach_m", &g.reach_m, "finite and above 0")?;
+            Item("ground", 0).check(
+                g.reach_m > 0.0 && g.reach_m.is_finite(),
+                "reach_m",
+                &g.reach_m,
+                "finite and above 0",
+            )?;
             Item("ground", 0).material(&g.material)?;
             Item("ground", 0).texture(&g.material, self.textures.len())?;
         }
         let at = Item("settings", 0);
         at.check(in_range(s.exposure, 0.0, 1e6), "exposure", &s.exposure, "0 or more")?;
-        at.check((256..=8192).contains(&s.shadow_map_size), "shadow_map_size", &s.shadow_map_size, "256 to 8192 texels")?;
+        at.check(
+            (256..=8192).contains(&s.shadow_map_size),
+            "shadow_map_size",
+            &s.shadow_map_size,
+            "256 to 8192 texels",
+        )?;
         at.check([1, 4].contains(&s.samples), "samples", &s.samples, "1 or 4")?;
         at.check(s.occlusion_m.is_none_or(|r| in_range(r, 0.0, 1e6)), "occlusion_m", &s.occlusion_m, "0 or more")
     }
@@ -134,8 +159,18 @@ fn check_light(at: Item, light: &Light) -> Result<(), RenderError> {
 struct Item(&'static str, usize);
 
 impl Item {
-    fn check(self, ok: bool, field: &'static str, value: &dyn std::fmt::Debug, expected: &'static str) -> Result<(), RenderError> {
-        if ok { Ok(()) } else { Err(RenderError::BadValue { what: self.0, index: self.1, field, value: format!("{value:?}"), expected }) }
+    fn check(
+        self,
+        ok: bool,
+        field: &'static str,
+        value: &dyn std::fmt::Debug,
+        expected: &'static str,
+    ) -> Result<(), RenderError> {
+        if ok {
+            Ok(())
+        } else {
+            Err(RenderError::BadValue { what: self.0, index: self.1, field, value: format!("{value:?}"), expected })
+        }
     }
 
     fn finite(self, field: &'static str, numbers: &[f32]) -> Result<(), RenderError> {

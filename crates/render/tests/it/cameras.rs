@@ -50,7 +50,10 @@ fn framing_shows_the_whole_ball() {
             let r = (1.0 - z * z).sqrt();
             let p = center + radius * Vector3::new(r * a.cos(), r * a.sin(), z);
             let [x, y, depth] = camera.project(p, 500, 500).expect("in front");
-            assert!((-1.0..=501.0).contains(&x) && (-1.0..=501.0).contains(&y) && (0.0..=1.0).contains(&depth), "{direction:?}: {x} {y} {depth}");
+            assert!(
+                (-1.0..=501.0).contains(&x) && (-1.0..=501.0).contains(&y) && (0.0..=1.0).contains(&depth),
+                "{direction:?}: {x} {y} {depth}"
+            );
         }
     }
 }

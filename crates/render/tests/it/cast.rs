@@ -24,7 +24,11 @@ fn a_capsule_covers_a_disc_and_a_strip() {
         list.add_capsule(tipped(angle as f32, [0.1, 0.2, 0.0]), half, 0.3, Material::unlit(WHITE));
         let Some(image) = picture(&list, 400, 400) else { return };
         let expected = 1e4 * (PI * 0.09 + 0.6 * 2.0 * f64::from(half) * angle.sin());
-        assert!((area(&image, 0) / expected - 1.0).abs() < 3e-3, "half length {half}, {angle} rad: {} of {expected}", area(&image, 0));
+        assert!(
+            (area(&image, 0) / expected - 1.0).abs() < 3e-3,
+            "half length {half}, {angle} rad: {} of {expected}",
+            area(&image, 0)
+        );
     }
 }
 
@@ -56,7 +60,12 @@ fn a_cast_capsule_and_a_tessellated_one_agree() {
         let off = |least: u8| cast.rgba.iter().zip(&mesh.rgba).filter(|(a, b)| a.abs_diff(**b) > least).count();
         assert!(area(&mesh, 0) > 500.0, "it is in the picture: {}", area(&mesh, 0));
         // light within two levels everywhere but at edges of coverage, which may differ by a chord's sagitta
-        assert!(off(2) < 400 && off(40) < 60, "{} channels differ by more than 2 levels, {} by more than 40", off(2), off(40));
+        assert!(
+            off(2) < 400 && off(40) < 60,
+            "{} channels differ by more than 2 levels, {} by more than 40",
+            off(2),
+            off(40)
+        );
     }
 }
 
@@ -65,17 +74,31 @@ fn the_shadow_of_a_capsule_lies_where_the_light_leaves_it() {
     // along y at height 2, light leaning 45 degrees towards +x: around x = 2, 0.3 sqrt 2 wide to both sides, from y = -0.8 to 0.8
     let mut list = bare(from_above(10.0));
     let floor = list.add_mesh(MeshData::ground_quad(3.5));
-    list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) }).casts_shadow = false;
+    list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) })
+        .casts_shadow = false;
     let along_y = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI as f32 / 2.0);
-    list.add_capsule(Isometry3::from_parts(Vector3::new(0.0, 0.0, 2.0).into(), along_y), 0.5, 0.3, Material::unlit([0.0; 3]));
+    list.add_capsule(
+        Isometry3::from_parts(Vector3::new(0.0, 0.0, 2.0).into(), along_y),
+        0.5,
+        0.3,
+        Material::unlit([0.0; 3]),
+    );
     list.lights.push(crate::support::white_sun([1.0, 0.0, -1.0], 1.0, true));
     let Some(image) = picture(&list, 400, 400) else { return };
     let scale = 200.0 / 0.4f64.tan() / 10.0;
     let at = |x: f64, y: f64| linear(&image, (200.0 + x * scale) as u32, (200.0 - y * scale) as u32, 1);
     for y in [-0.45, 0.0, 0.45] {
-        assert!(at(2.0, y) < 0.02 && at(2.37, y) < 0.02 && at(1.63, y) < 0.02 && at(2.48, y) > 0.6 && at(1.52, y) > 0.6, "across at {y}: {:?}", [1.52, 1.63, 2.0, 2.37, 2.48].map(|x| at(x, y)));
+        assert!(
+            at(2.0, y) < 0.02 && at(2.37, y) < 0.02 && at(1.63, y) < 0.02 && at(2.48, y) > 0.6 && at(1.52, y) > 0.6,
+            "across at {y}: {:?}",
+            [1.52, 1.63, 2.0, 2.37, 2.48].map(|x| at(x, y))
+        );
     }
-    assert!(at(2.0, 0.75) < 0.02 && at(2.0, -0.75) < 0.02 && at(2.0, 0.86) > 0.6 && at(2.0, -0.86) > 0.6, "along: {:?}", [-0.86, -0.75, 0.75, 0.86].map(|y| at(2.0, y)));
+    assert!(
+        at(2.0, 0.75) < 0.02 && at(2.0, -0.75) < 0.02 && at(2.0, 0.86) > 0.6 && at(2.0, -0.86) > 0.6,
+        "along: {:?}",
+        [-0.86, -0.75, 0.75, 0.86].map(|y| at(2.0, y))
+    );
 }
 
 /// Balls, capsules and blocks that hide and cut each other, over a floor, by colours that take no light.
@@ -84,11 +107,21 @@ fn medley() -> DrawList {
     let cube = list.add_mesh(MeshData::cuboid([0.4, 0.3, 0.35]));
     for i in 0..6 {
         let (x, y, shade) = (-1.2 + 0.5 * i as f32, 0.4 * (i % 3) as f32 - 0.4, 0.15 * i as f32);
-        list.add_instance(cube, Isometry3::new(Vector3::new(x, y, 0.3), Vector3::new(0.3, 0.2 * i as f32, 0.5)), Material::unlit([shade, 1.0, 0.2]));
-        list.add_sphere(Point3::new(x + 0.2, y - 0.5, 0.35), 0.35, UnitQuaternion::identity(), Material::unlit([1.0, shade, 0.1]));
+        list.add_instance(
+            cube,
+            Isometry3::new(Vector3::new(x, y, 0.3), Vector3::new(0.3, 0.2 * i as f32, 0.5)),
+            Material::unlit([shade, 1.0, 0.2]),
+        );
+        list.add_sphere(
+            Point3::new(x + 0.2, y - 0.5, 0.35),
+            0.35,
+            UnitQuaternion::identity(),
+            Material::unlit([1.0, shade, 0.1]),
+        );
         list.add_capsule(tipped(0.4 * i as f32, [x, y + 0.3, 0.6]), 0.5, 0.15, Material::unlit([0.1, shade, 1.0]));
     }
-    list.ground = Some(tumble_render::Ground { height_m: 0.0, reach_m: 30.0, material: Material::unlit([0.5, 0.5, 0.4]) });
+    list.ground =
+        Some(tumble_render::Ground { height_m: 0.0, reach_m: 30.0, material: Material::unlit([0.5, 0.5, 0.4]) });
     list.sky = tumble_render::Sky::default();
     list
 }
@@ -117,16 +150,27 @@ fn a_lamp_amid_posts_throws_a_shadow_behind_each() {
     // is 0.2 times the distance wide to both sides
     let mut list = bare(from_above(10.0));
     let floor = list.add_mesh(MeshData::ground_quad(3.5));
-    list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) }).casts_shadow = false;
+    list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) })
+        .casts_shadow = false;
     let plate = list.add_mesh(MeshData::cuboid([0.005, 0.2, 0.25]));
     let directions: Vec<f64> = (0..8).map(|i| f64::from(i) * PI / 4.0 + 0.1).collect();
     for &a in &directions {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), a as f32);
-        list.add_instance(plate, Isometry3::from_parts((turn * Vector3::new(1.0, 0.0, 0.25)).into(), turn), Material::unlit([0.0; 3]));
+        list.add_instance(
+            plate,
+            Isometry3::from_parts((turn * Vector3::new(1.0, 0.0, 0.25)).into(), turn),
+            Material::unlit([0.0; 3]),
+        );
     }
     // something above the lamp, so that it hangs amid
     list.add_instance(plate, Isometry3::translation(0.0, 0.0, 2.0), Material::unlit([0.0; 3]));
-    list.lights.push(Light::Point { position: Point3::new(0.0, 0.0, 1.0), color: WHITE, intensity: 2.0, radius_m: 0.0, casts_shadow: true });
+    list.lights.push(Light::Point {
+        position: Point3::new(0.0, 0.0, 1.0),
+        color: WHITE,
+        intensity: 2.0,
+        radius_m: 0.0,
+        casts_shadow: true,
+    });
     let Some(image) = picture(&list, 400, 400) else { return };
     let scale = 200.0 / 0.4f64.tan() / 10.0;
     let share = |a: f64, along: f64, aside: f64| {
@@ -136,10 +180,18 @@ fn a_lamp_amid_posts_throws_a_shadow_behind_each() {
     };
     for &a in &directions {
         for (along, aside) in [(1.15, 0.0), (1.5, 0.0), (1.5, 0.24), (1.5, -0.24), (1.9, 0.0)] {
-            assert!(share(a, along, aside) < 0.03, "in shade at {along} {aside} of {a} rad: {}", share(a, along, aside));
+            assert!(
+                share(a, along, aside) < 0.03,
+                "in shade at {along} {aside} of {a} rad: {}",
+                share(a, along, aside)
+            );
         }
         for (along, aside) in [(0.85, 0.0), (1.5, 0.38), (1.5, -0.38), (2.15, 0.0)] {
-            assert!((share(a, along, aside) - 1.0).abs() < 0.08, "lit at {along} {aside} of {a} rad: {}", share(a, along, aside));
+            assert!(
+                (share(a, along, aside) - 1.0).abs() < 0.08,
+                "lit at {along} {aside} of {a} rad: {}",
+                share(a, along, aside)
+            );
         }
     }
 }

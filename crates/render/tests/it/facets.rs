@@ -43,11 +43,22 @@ fn corners_of_every_screen_land_in_the_corners_of_the_picture() {
         let cave = shipped.read().unwrap();
         for (index, screen) in cave.screens.iter().enumerate() {
             for _ in 0..200 {
-                let view = FacetView::new(eye_before(&mut random, &cave, &[index]), corners(screen), 0.05, 500.0).unwrap();
-                let named = [(screen.lower_left_m, -1.0, -1.0), (screen.lower_right_m, 1.0, -1.0), (screen.upper_left_m, -1.0, 1.0), (screen.upper_right_m(), 1.0, 1.0)];
+                let view =
+                    FacetView::new(eye_before(&mut random, &cave, &[index]), corners(screen), 0.05, 500.0).unwrap();
+                let named = [
+                    (screen.lower_left_m, -1.0, -1.0),
+                    (screen.lower_right_m, 1.0, -1.0),
+                    (screen.upper_left_m, -1.0, 1.0),
+                    (screen.upper_right_m(), 1.0, 1.0),
+                ];
                 for (corner, x, y) in named {
                     let ndc = view.project(&corner).expect("in front");
-                    assert!((ndc.x - x).abs() < 1e-12 && (ndc.y - y).abs() < 1e-12, "{}/{}: {ndc:?}", shipped.name, screen.name);
+                    assert!(
+                        (ndc.x - x).abs() < 1e-12 && (ndc.y - y).abs() < 1e-12,
+                        "{}/{}: {ndc:?}",
+                        shipped.name,
+                        screen.name
+                    );
                 }
             }
         }
@@ -73,7 +84,9 @@ fn points_land_where_their_ray_meets_the_screen() {
     for _ in 0..1000 {
         let eye = Point3::new(random.within(-1.0, 0.5), random.within(-1.0, 1.0), random.within(0.5, 2.5));
         let view = FacetView::new(eye, corners(&screen), near, far).unwrap();
-        let on_screen = screen.lower_left_m + screen.across() * random.within(-0.5, 1.5) + screen.upward() * random.within(-0.5, 1.5);
+        let on_screen = screen.lower_left_m
+            + screen.across() * random.within(-0.5, 1.5)
+            + screen.upward() * random.within(-0.5, 1.5);
         let beyond = random.within(0.1, 30.0);
         let point = eye + (on_screen - eye) * beyond;
         let ndc = view.project(&point).unwrap();
@@ -88,12 +101,17 @@ fn points_land_where_their_ray_meets_the_screen() {
 fn both_pictures_of_a_shared_edge_have_its_points_at_the_same_place() {
     let mut random = Random(3);
     let mut worst: f64 = 0.0;
-    let edges: Vec<(Cave, _)> = shipped_caves().iter().map(|c| c.read().unwrap()).flat_map(|cave| gaps(&cave.screens).into_iter().map(move |gap| (cave.clone(), gap))).collect();
+    let edges: Vec<(Cave, _)> = shipped_caves()
+        .iter()
+        .map(|c| c.read().unwrap())
+        .flat_map(|cave| gaps(&cave.screens).into_iter().map(move |gap| (cave.clone(), gap)))
+        .collect();
     assert_eq!(edges.len(), 27);
     for k in 0..10_000 {
         let (cave, gap) = &edges[k % edges.len()];
         let middle = eye_before(&mut random, cave, &[gap.first.0, gap.second.0]);
-        let facing = Vector3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(-1.0, 1.0)).normalize();
+        let facing =
+            Vector3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(-1.0, 1.0)).normalize();
         let [width, height] = cave.facets[0].size_px;
         // a point of the edge as the first screen has it, and something beyond or before it on the same ray
         let screen = &cave.screens[gap.first.0];
@@ -116,7 +134,10 @@ fn both_pictures_of_a_shared_edge_have_its_points_at_the_same_place() {
                 let (off, at) = [(y - h, x), (x - w, h - y), (y, x), (x, h - y)][edge];
                 worst = worst.max(off.abs());
                 let s = &cave.screens[screen];
-                let (from, length) = ([s.lower_left_m, s.lower_right_m, s.upper_left_m, s.lower_left_m][edge], if edge % 2 == 0 { s.across() } else { s.upward() });
+                let (from, length) = (
+                    [s.lower_left_m, s.lower_right_m, s.upper_left_m, s.lower_left_m][edge],
+                    if edge % 2 == 0 { s.across() } else { s.upward() },
+                );
                 let pixels = if edge % 2 == 0 { w } else { h };
                 along.push(from + length * (at / pixels));
             }
@@ -139,7 +160,10 @@ fn six_faces_see_every_direction_once_and_where_it_meets_the_cube() {
             _ => Vector3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(-1.0, 1.0)),
         };
         // slabs: the least way out of the room
-        let way = (0..3).map(|a| { let (lo, hi) = if a == 2 { (0.0, 3.0) } else { (-1.5, 1.5) }; ((if direction[a] > 0.0 { hi } else { lo }) - eye[a]) / direction[a] });
+        let way = (0..3).map(|a| {
+            let (lo, hi) = if a == 2 { (0.0, 3.0) } else { (-1.5, 1.5) };
+            ((if direction[a] > 0.0 { hi } else { lo }) - eye[a]) / direction[a]
+        });
         let hit = eye + direction * way.filter(|t| t.is_finite()).fold(f64::MAX, f64::min);
         let (mut inside, mut on_rim) = (0, 0);
         for screen in &cave.screens {
@@ -149,18 +173,28 @@ fn six_faces_see_every_direction_once_and_where_it_meets_the_cube() {
             if most > 1.0 + 1e-9 {
                 continue;
             }
-            if most < 1.0 - 1e-9 { inside += 1 } else { on_rim += 1 }
-            let seen = screen.lower_left_m + screen.across() * (0.5 + 0.5 * ndc.x) + screen.upward() * (0.5 + 0.5 * ndc.y);
+            if most < 1.0 - 1e-9 {
+                inside += 1
+            } else {
+                on_rim += 1
+            }
+            let seen =
+                screen.lower_left_m + screen.across() * (0.5 + 0.5 * ndc.x) + screen.upward() * (0.5 + 0.5 * ndc.y);
             assert!((seen - hit).norm() < 1e-9, "{}: {seen} and {hit}", screen.name);
         }
-        assert!((inside == 1 && on_rim == 0) || (inside == 0 && on_rim >= 2), "{eye} {direction}: {inside} faces, {on_rim} rims");
+        assert!(
+            (inside == 1 && on_rim == 0) || (inside == 0 && on_rim >= 2),
+            "{eye} {direction}: {inside} faces, {on_rim} rims"
+        );
     }
 }
 
 #[test]
 fn bad_facets_are_refused_by_name() {
     let [a, b, c] = [Point3::new(-1.0, 2.0, 0.0), Point3::new(1.0, 2.0, 0.0), Point3::new(-1.0, 2.0, 1.5)];
-    let said = |eye: Point3<f64>, corners, near, far| FacetView::new(eye, corners, near, far).expect_err("refused").to_string();
+    let said = |eye: Point3<f64>, corners, near, far| {
+        FacetView::new(eye, corners, near, far).expect_err("refused").to_string()
+    };
     assert!(said(Point3::new(0.0, 3.0, 1.0), [a, b, c], 0.1, 9.0).contains("a point in front of the screen"));
     assert!(said(Point3::origin(), [a, b, b], 0.1, 9.0).contains("three corners of a rectangle"));
     assert!(said(Point3::origin(), [a, b, c], 9.0, 9.0).contains("near_m"));
@@ -176,7 +210,8 @@ fn unfolded_caves_are_nets_without_overlap() {
         assert_eq!([w * high, tiles.len() as u32], [h * wide, least], "{name}: {w} x {h}");
         for (i, a) in tiles.iter().enumerate() {
             assert!((0..2).all(|k| a.position_px[k] + a.size_px[k] <= [w, h][k] && a.size_px[k] == w / wide));
-            assert!(tiles[..i].iter().all(|b| (0..2).any(|k| a.position_px[k] + a.size_px[k] <= b.position_px[k] || b.position_px[k] + b.size_px[k] <= a.position_px[k])));
+            assert!(tiles[..i].iter().all(|b| (0..2).any(|k| a.position_px[k] + a.size_px[k] <= b.position_px[k]
+                || b.position_px[k] + b.size_px[k] <= a.position_px[k])));
         }
     }
 }
@@ -188,7 +223,11 @@ fn what_is_unfolded_into_its_own_size_stays_as_it_is() {
         let cave = cave.read().unwrap();
         for most in (20..400).step_by(7).map(|w| [w, 100]).chain([[1280, 720], [1920, 1080], [150, 100]]) {
             let (size, tiles) = unfold(&cave, most);
-            assert!((0..2).all(|k| size[k] <= most[k]) && (0..2).any(|k| size[k] == most[k]), "{}: {size:?} in {most:?}", cave.file);
+            assert!(
+                (0..2).all(|k| size[k] <= most[k]) && (0..2).any(|k| size[k] == most[k]),
+                "{}: {size:?} in {most:?}",
+                cave.file
+            );
             assert_eq!(unfold(&cave, size), (size, tiles), "{}: {most:?}", cave.file);
         }
     }
@@ -205,8 +244,17 @@ fn still_life() -> DrawList {
     for i in 0..9 {
         let (x, y) = (-3.6 + 0.9 * i as f32, 4.0 + 1.3 * (i % 3) as f32);
         let turn = UnitQuaternion::from_euler_angles(0.1 * i as f32, 0.3, 0.5 * i as f32);
-        list.add_instance(cube, nalgebra::Isometry3::from_parts(nalgebra::Translation3::new(x, y, 0.6), turn), Material::plastic([0.2 + 0.08 * i as f32, 0.5, 0.3]));
-        list.add_sphere(Point3::new(x + 0.4, y - 0.8, 0.35), 0.35, UnitQuaternion::identity(), Material::billiard_ball(i as u8 + 1));
+        list.add_instance(
+            cube,
+            nalgebra::Isometry3::from_parts(nalgebra::Translation3::new(x, y, 0.6), turn),
+            Material::plastic([0.2 + 0.08 * i as f32, 0.5, 0.3]),
+        );
+        list.add_sphere(
+            Point3::new(x + 0.4, y - 0.8, 0.35),
+            0.35,
+            UnitQuaternion::identity(),
+            Material::billiard_ball(i as u8 + 1),
+        );
     }
     list.ground = Some(Ground::grid(0.0));
     list.lights.push(Light::sun(Vector3::new(0.4, 0.5, -1.0), 2.0));
@@ -219,7 +267,9 @@ const EYE: Point3<f64> = Point3::new(0.3, 0.0, 1.6);
 /// The part of a wall 6 m wide and 2 m high at y = 2 from `from` to `to` of its width, in a picture of so many pixels.
 fn part_of_wall(list: &DrawList, eye: Point3<f64>, from: f64, to: f64, width: u32, height: u32) -> Option<Image> {
     let at = |t: f64, z: f64| Point3::new(-3.0 + 6.0 * t, 2.0, z);
-    let view = FacetView::new(eye, [at(from, 0.2), at(to, 0.2), at(from, 2.2)], 0.05, 200.0).unwrap().part(width, height, RIM_PX);
+    let view = FacetView::new(eye, [at(from, 0.2), at(to, 0.2), at(from, 2.2)], 0.05, 200.0)
+        .unwrap()
+        .part(width, height, RIM_PX);
     picture_from(&view, list, width, height)
 }
 
@@ -242,7 +292,9 @@ fn at_edge(image: &Image, &(x, y): &(u32, u32)) -> bool {
 
 fn joined(parts: &[Image]) -> Image {
     let (width, height) = (parts.iter().map(|p| p.width).sum(), parts[0].height);
-    let rows = (0..height as usize).flat_map(|y| parts.iter().flat_map(move |p| p.rgba[4 * y * p.width as usize..][..4 * p.width as usize].to_vec()));
+    let rows = (0..height as usize).flat_map(|y| {
+        parts.iter().flat_map(move |p| p.rgba[4 * y * p.width as usize..][..4 * p.width as usize].to_vec())
+    });
     Image { width, height, rgba: rows.collect() }
 }
 
@@ -260,17 +312,57 @@ fn a_wall_in_parts_is_the_wall() {
         let Some(whole) = part_of_wall(&list, EYE, 0.0, 1.0, 768, 256) else { return };
         for parts in [2u32, 6] {
             let share = |i: u32| f64::from(i) / f64::from(parts);
-            let cut = |step: f64| joined(&(0..parts).filter_map(|i| part_of_wall(&list, EYE + Vector3::x() * (step * f64::from(i)), share(i), share(i + 1), 768 / parts, 256)).collect::<Vec<_>>());
+            let cut = |step: f64| {
+                joined(
+                    &(0..parts)
+                        .filter_map(|i| {
+                            part_of_wall(
+                                &list,
+                                EYE + Vector3::x() * (step * f64::from(i)),
+                                share(i),
+                                share(i + 1),
+                                768 / parts,
+                                256,
+                            )
+                        })
+                        .collect::<Vec<_>>(),
+                )
+            };
             let parted = cut(0.0);
             let off = differing(&whole, &parted);
             let elsewhere: Vec<_> = off.iter().filter(|at| !at_edge(&whole, at)).collect();
-            let most = elsewhere.iter().map(|&&(x, y)| levels_apart(whole.pixel(x, y).unwrap(), parted.pixel(x, y).unwrap())).max().unwrap_or(0);
-            println!("{parts} parts, occlusion {occlusion}, shadows {shadows}: {} of {all} pixels off; {} away from edges, by {most} levels", off.len(), elsewhere.len());
+            let most = elsewhere
+                .iter()
+                .map(|&&(x, y)| levels_apart(whole.pixel(x, y).unwrap(), parted.pixel(x, y).unwrap()))
+                .max()
+                .unwrap_or(0);
+            println!(
+                "{parts} parts, occlusion {occlusion}, shadows {shadows}: {} of {all} pixels off; {} away from edges, by {most} levels",
+                off.len(),
+                elsewhere.len()
+            );
             assert!(off.len() * 1000 < all, "{parts} parts: {} of {all} pixels off", off.len());
-            assert!(elsewhere.is_empty(), "{parts} parts: {} away from edges, by {most} levels: {elsewhere:?}", elsewhere.len());
+            assert!(
+                elsewhere.is_empty(),
+                "{parts} parts: {} away from edges, by {most} levels: {elsewhere:?}",
+                elsewhere.len()
+            );
         }
         // and it would show: each part from an eye 2 cm aside of where it belongs
-        let aside = joined(&(0..3).filter_map(|i| part_of_wall(&list, EYE + Vector3::x() * (0.02 * i as f64), i as f64 / 3.0, (i + 1) as f64 / 3.0, 256, 256)).collect::<Vec<_>>());
+        let aside = joined(
+            &(0..3)
+                .filter_map(|i| {
+                    part_of_wall(
+                        &list,
+                        EYE + Vector3::x() * (0.02 * i as f64),
+                        i as f64 / 3.0,
+                        (i + 1) as f64 / 3.0,
+                        256,
+                        256,
+                    )
+                })
+                .collect::<Vec<_>>(),
+        );
         let shifted = differing(&whole, &aside).len();
         assert!(shifted * 50 > all, "shifted: only {shifted} of {all} pixels off");
     }
@@ -283,15 +375,37 @@ fn brightness_does_not_jump_where_walls_meet() {
     let list = still_life();
     let (a, b, c) = (Point3::new(-2.0, 2.0, 0.2), Point3::new(0.5, 2.0, 0.2), Point3::new(0.5, -0.5, 0.2));
     let up = Vector3::z() * 2.0;
-    let draw = |from: Point3<f64>, to: Point3<f64>| picture_from(&FacetView::new(Point3::new(-0.4, 0.0, 1.6), [from, to, from + up], 0.05, 200.0).unwrap().part(320, 256, RIM_PX), &list, 320, 256);
+    let draw = |from: Point3<f64>, to: Point3<f64>| {
+        picture_from(
+            &FacetView::new(Point3::new(-0.4, 0.0, 1.6), [from, to, from + up], 0.05, 200.0)
+                .unwrap()
+                .part(320, 256, RIM_PX),
+            &list,
+            320,
+            256,
+        )
+    };
     let (Some(left), Some(right)) = (draw(a, b), draw(b, c)) else { return };
-    let column = |image: &Image, x: u32| -> Vec<f64> { (0..image.height).map(|y| image.pixel(x, y).unwrap()[..3].iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0).collect() };
+    let column = |image: &Image, x: u32| -> Vec<f64> {
+        (0..image.height)
+            .map(|y| image.pixel(x, y).unwrap()[..3].iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0)
+            .collect()
+    };
     let apart = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| (p - q).abs()).sum::<f64>() / p.len() as f64;
     let bias = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| p - q).sum::<f64>() / p.len() as f64;
     let inside = (300..319).map(|x| apart(&column(&left, x), &column(&left, x + 1))).sum::<f64>() / 19.0;
     let (last, first) = (column(&left, 319), column(&right, 0));
-    println!("levels between columns: {inside:.3} inside, {:.3} across the seam; bias {:.3}", apart(&last, &first), bias(&last, &first));
-    assert!(apart(&last, &first) < 2.0 * inside + 0.3 && bias(&last, &first).abs() < 0.5, "{inside} inside, {} across, bias {}", apart(&last, &first), bias(&last, &first));
+    println!(
+        "levels between columns: {inside:.3} inside, {:.3} across the seam; bias {:.3}",
+        apart(&last, &first),
+        bias(&last, &first)
+    );
+    assert!(
+        apart(&last, &first) < 2.0 * inside + 0.3 && bias(&last, &first).abs() < 0.5,
+        "{inside} inside, {} across, bias {}",
+        apart(&last, &first),
+        bias(&last, &first)
+    );
 }
 
 #[test]
@@ -299,10 +413,12 @@ fn a_facet_straight_ahead_is_the_pinhole() {
     // a wall 2 m ahead, 2 m high: 2 atan(1/2) from bottom to top
     let list = still_life();
     let at = |x: f64, z: f64| Point3::new(x, 2.0, z);
-    let view = FacetView::new(Point3::new(0.0, 0.0, 1.2), [at(-1.5, 0.2), at(1.5, 0.2), at(-1.5, 2.2)], 0.05, 500.0).unwrap();
+    let view =
+        FacetView::new(Point3::new(0.0, 0.0, 1.2), [at(-1.5, 0.2), at(1.5, 0.2), at(-1.5, 2.2)], 0.05, 500.0).unwrap();
     let Some(facet) = picture_from(&view, &list, 240, 160) else { return };
     let mut pinhole = list.clone();
-    pinhole.camera = tumble_render::Camera::look_at(Point3::new(0.0, 0.0, 1.2), Point3::new(0.0, 5.0, 1.2)).with_fov(2.0 * 0.5f32.atan());
+    pinhole.camera = tumble_render::Camera::look_at(Point3::new(0.0, 0.0, 1.2), Point3::new(0.0, 5.0, 1.2))
+        .with_fov(2.0 * 0.5f32.atan());
     let off = differing(&facet, &picture(&pinhole, 240, 160).unwrap());
     let inside = off.iter().filter(|at| !at_edge(&facet, at)).count();
     println!("{} pixels off, {inside} away from edges", off.len());

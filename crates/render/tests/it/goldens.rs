@@ -38,7 +38,9 @@ fn pictures(renderer: &mut Renderer, only: Option<&str>) -> Vec<(String, Image)>
 /// Mean light of blocks of 4 x 4 pixels, as levels of 0 to 255 in the curve of sRGB.
 fn small(image: &Image) -> Vec<f64> {
     let linear = |c: u8| (f64::from(c) / 255.0).powf(2.2);
-    let block = |x: u32, y: u32, k: usize| (0..16).filter_map(|i| image.pixel(4 * x + i % 4, 4 * y + i / 4)).map(|p| linear(p[k])).sum::<f64>() / 16.0;
+    let block = |x: u32, y: u32, k: usize| {
+        (0..16).filter_map(|i| image.pixel(4 * x + i % 4, 4 * y + i / 4)).map(|p| linear(p[k])).sum::<f64>() / 16.0
+    };
     let blocks = (0..image.height / 4).flat_map(|y| (0..image.width / 4).map(move |x| (x, y)));
     blocks.flat_map(|(x, y)| [0, 1, 2].map(|k| 255.0 * block(x, y, k).powf(1.0 / 2.2))).collect()
 }
@@ -66,8 +68,12 @@ fn without_vulkan_opengl_draws() {
     }
     let none = std::env::temp_dir().join("there-is-no-driver-here.json");
     let mut child = Command::new(std::env::current_exe().unwrap());
-    child.args(["--exact", "--ignored", "--nocapture", "goldens::child_draws_one_scene"]).env("VK_DRIVER_FILES", &none).env("VK_ICD_FILENAMES", &none);
-    let mut child = child.env_remove("TUMBLE_KEEP_PICTURES").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    child
+        .args(["--exact", "--ignored", "--nocapture", "goldens::child_draws_one_scene"])
+        .env("VK_DRIVER_FILES", &none)
+        .env("VK_ICD_FILENAMES", &none);
+    let mut child =
+        child.env_remove("TUMBLE_KEEP_PICTURES").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let begin = Instant::now();
     while child.try_wait().unwrap().is_none() && begin.elapsed() < Duration::from_secs(300) {
         std::thread::sleep(Duration::from_millis(50));
@@ -91,7 +97,10 @@ fn compare(only: Option<&str>) {
     let keep = std::env::var_os("TUMBLE_KEEP_PICTURES").is_some();
     if !keep && !folder.is_dir() {
         // past the harness, which keeps what passing tests print
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no pictures are kept for {interface}\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: no pictures are kept for {interface}\n"),
+        );
         return;
     }
     let mut wrong = Vec::new();
@@ -110,7 +119,10 @@ fn compare(only: Option<&str>) {
         if mean > MEAN_LEVELS || most > MOST_LEVELS {
             let seen = std::env::temp_dir().join(format!("tumble-{name}.png"));
             image.write_png(&seen).unwrap();
-            wrong.push(format!("{name}: {mean:.2} levels off on the average, {most:.1} at most; it is in {}", seen.display()));
+            wrong.push(format!(
+                "{name}: {mean:.2} levels off on the average, {most:.1} at most; it is in {}",
+                seen.display()
+            ));
         }
     }
     assert!(wrong.is_empty(), "{}\nif that is meant: `make goldens`", wrong.join("\n"));
@@ -118,7 +130,19 @@ fn compare(only: Option<&str>) {
 
 #[test]
 fn the_measure_sees_what_moved() {
-    let square = |from: u32| Image { width: 64, height: 64, rgba: (0..64 * 64u32).flat_map(|i| if (from..from + 16).contains(&(i % 64)) && i / 64 < 16 { [200, 200, 200, 255] } else { [60, 60, 60, 255] }).collect() };
+    let square = |from: u32| Image {
+        width: 64,
+        height: 64,
+        rgba: (0..64 * 64u32)
+            .flat_map(|i| {
+                if (from..from + 16).contains(&(i % 64)) && i / 64 < 16 {
+                    [200, 200, 200, 255]
+                } else {
+                    [60, 60, 60, 255]
+                }
+            })
+            .collect(),
+    };
     let most = |a: &Image, b: &Image| small(a).iter().zip(small(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(most(&square(8), &square(8)) == 0.0 && most(&square(8), &square(12)) > MOST_LEVELS);
 }

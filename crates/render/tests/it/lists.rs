@@ -2,21 +2,32 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tumble_render::{
-    DebugDraw, DebugStyle, DrawList, Drawing, Ground, Image, Light, MAX_LIGHTS, Material, MeshData, MeshId, Pattern, Quality, RenderError, Sky, Texture,
+    DebugDraw, DebugStyle, DrawList, Drawing, Ground, Image, Light, MAX_LIGHTS, Material, MeshData, MeshId, Pattern,
+    Quality, RenderError, Sky, Texture,
 };
 use tumble_scene::SceneFile;
 
 fn sample() -> DrawList {
     let mut list = DrawList::default();
     let cube = list.add_mesh(MeshData::unit_box());
-    list.add_instance(cube, Isometry3::translation(1.0, -0.00001, 0.5), Material::plastic([0.8, 0.3, 0.2])).casts_shadow = false;
+    list.add_instance(cube, Isometry3::translation(1.0, -0.00001, 0.5), Material::plastic([0.8, 0.3, 0.2]))
+        .casts_shadow = false;
     list.add_sphere(Point3::new(0.0, 0.0, 0.25), 0.25, UnitQuaternion::identity(), Material::billiard_ball(11));
     list.textures.push(std::sync::Arc::new(Image { width: 2, height: 1, rgba: vec![255; 8] }));
     let worn = Material { texture: Some(Texture { id: 0, repeat_m: 0.25 }), metallic: 1.0, ..Material::walnut() };
     list.add_capsule(Isometry3::translation(0.0, 2.0, 1.0), 0.5, 0.125, worn).casts_shadow = false;
     let square = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
-    let sign = list.add_mesh(MeshData::from_unwrapped(&square, &[[0, 1, 2]], &[[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]], 0.0).expect("a triangle"));
-    list.add_instance(sign, Isometry3::identity(), Material { texture: Some(Texture { id: 0, repeat_m: 1.0 }), ..Material::unlit([1.0; 3]) }).scale.z = 2.0;
+    let sign = list.add_mesh(
+        MeshData::from_unwrapped(&square, &[[0, 1, 2]], &[[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]], 0.0)
+            .expect("a triangle"),
+    );
+    list.add_instance(
+        sign,
+        Isometry3::identity(),
+        Material { texture: Some(Texture { id: 0, repeat_m: 1.0 }), ..Material::unlit([1.0; 3]) },
+    )
+    .scale
+    .z = 2.0;
     list.arrow(Point3::origin(), Vector3::z(), DebugStyle::new([1.0, 0.0, 0.0]).on_top());
     list.line(Point3::origin(), Point3::new(1.0, 2.0, 3.0), DebugStyle::new([0.0, 1.0, 0.0]));
     list.point(Point3::new(0.12345678, 0.0, 0.0), DebugStyle::new([0.0, 0.0, 1.0]).width(8.0));
@@ -67,7 +78,10 @@ fn a_flock_is_forty_cast_spheres_and_no_mesh() {
     assert_eq!((list.spheres.len(), list.meshes.len(), list.instances.len()), (40, 0, 0));
     // the corners of the grid, from the middle 2, 1.5 and 0.5 spacings away
     let text = list.to_text();
-    for line in ["sphere 0: at (-1 -0.75 2.75) radius 0.02 turned (0 0 0 1)", "sphere 39: at (1 0.75 3.25) radius 0.02 turned (0 0 0 1)"] {
+    for line in [
+        "sphere 0: at (-1 -0.75 2.75) radius 0.02 turned (0 0 0 1)",
+        "sphere 39: at (1 0.75 3.25) radius 0.02 turned (0 0 0 1)",
+    ] {
         assert!(text.contains(line), "{line} in\n{text}");
     }
 }
@@ -84,7 +98,9 @@ fn faults_are_named() {
     assert!(fault(&|l| l.instances[0].pose.translation.x = f32::NAN).starts_with("instance 0: pose is [NaN"));
     assert!(fault(&|l| l.instances[0].scale.y = 0.0).starts_with("instance 0: scale"));
     assert!(fault(&|l| l.spheres[0].radius = -1.0).starts_with("sphere 0: radius is -1"));
-    assert!(fault(&|l| l.spheres[0].material.roughness = 1.5).starts_with("sphere 0: roughness is 1.5, expected 0 to 1"));
+    assert!(
+        fault(&|l| l.spheres[0].material.roughness = 1.5).starts_with("sphere 0: roughness is 1.5, expected 0 to 1")
+    );
     assert!(fault(&|l| l.spheres[0].material.color[1] = f32::INFINITY).starts_with("sphere 0: color"));
     assert!(fault(&|l| l.lines[1].end.z = f32::NAN).starts_with("line 1: end"));
     assert!(fault(&|l| l.lights[0] = Light::sun(Vector3::zeros(), 1.0)).starts_with("light 0: direction"));
@@ -101,7 +117,11 @@ fn bounds_follow_poses_and_scales() {
     assert_eq!(list.bounding_box(false), None);
     let cube = list.add_mesh(MeshData::unit_box());
     // an eighth of a turn about z: the half diagonal of the square is 1/sqrt 2, scaled by 2 along z
-    let placed = list.add_instance(cube, Isometry3::new(Vector3::new(3.0, 0.0, 0.0), Vector3::z() * std::f32::consts::FRAC_PI_4), Material::default());
+    let placed = list.add_instance(
+        cube,
+        Isometry3::new(Vector3::new(3.0, 0.0, 0.0), Vector3::z() * std::f32::consts::FRAC_PI_4),
+        Material::default(),
+    );
     placed.scale.z = 2.0;
     placed.casts_shadow = false;
     list.add_sphere(Point3::new(-1.0, 0.0, 0.0), 0.5, UnitQuaternion::identity(), Material::default());
@@ -143,7 +163,9 @@ fn rings_stand_where_the_scene_says_though_the_body_turns_about_its_centre_of_ma
     let (world, _) = scene.build().expect("a right world");
     let list = Drawing::new(&scene).list(&world, &DebugDraw::default()).expect("a small mesh");
     // the centre of mass of a cone is a quarter of its height above its base: 1 m
-    let Pattern::Rings { other, from_m, to_m } = list.instances[0].material.pattern else { panic!("rings, not {:?}", list.instances[0].material.pattern) };
+    let Pattern::Rings { other, from_m, to_m } = list.instances[0].material.pattern else {
+        panic!("rings, not {:?}", list.instances[0].material.pattern)
+    };
     assert_eq!(other, [1.0, 0.0, 0.0]);
     assert!((from_m - 2.0).abs() < 1e-6 && (to_m - 2.5).abs() < 1e-6, "{from_m} to {to_m}");
 }
@@ -152,7 +174,10 @@ fn rings_stand_where_the_scene_says_though_the_body_turns_about_its_centre_of_ma
 fn every_preset_is_known_and_others_are_not() {
     for name in Material::PRESETS {
         let own = Material::preset(name, None).expect(name);
-        assert_eq!(Material::preset(name, Some([0.1, 0.2, 0.3])).expect(name), Material { color: [0.1, 0.2, 0.3], ..own });
+        assert_eq!(
+            Material::preset(name, Some([0.1, 0.2, 0.3])).expect(name),
+            Material { color: [0.1, 0.2, 0.3], ..own }
+        );
     }
     assert_eq!(Material::preset("velvet", None), None);
 }
@@ -173,12 +198,20 @@ fn bodies_carry_cameras_and_lights_with_them() {
     assert_eq!(views[0].camera, list.camera);
     // a quarter turn to the left: ahead is the world's y, and (0.5, 0, 0.5) of the cart lies at (2, 0.5, 1.5)
     list.look_from(&world, "cart").unwrap();
-    assert!(list.to_text().starts_with("camera: eye (2 0.5 1.5) target (2 1.5 1.5) up (0 0 1) fov 1.0472 near 0.05 far 500\n"), "{}", list.to_text());
+    assert!(
+        list.to_text()
+            .starts_with("camera: eye (2 0.5 1.5) target (2 1.5 1.5) up (0 0 1) fov 1.0472 near 0.05 far 500\n"),
+        "{}",
+        list.to_text()
+    );
     let lamp = list.to_text().lines().find(|l| l.contains("point at")).unwrap().to_owned();
     assert_eq!(lamp, "light 1: point at (2 0 2) color (1 0 0) intensity 3.4 radius 0.1 no shadow");
     let error = list.look_from(&world, "crat").unwrap_err().to_string();
     assert_eq!(error, "no camera is named 'crat'; there are: scene, cart");
-    let wrong = SceneFile::parse(&CARRIER.replace("vertical_fov_deg = 60", "vertical_fov_deg = 60, up = [1, 0, 0]"), "s.toml").unwrap_err().to_string();
+    let wrong =
+        SceneFile::parse(&CARRIER.replace("vertical_fov_deg = 60", "vertical_fov_deg = 60, up = [1, 0, 0]"), "s.toml")
+            .unwrap_err()
+            .to_string();
     assert!(wrong.contains("the camera of body") && wrong.contains("looks along its own `up`"), "{wrong}");
 }
 
@@ -204,14 +237,21 @@ fn quality_says_how_much_of_an_object_is_drawn() {
     let balls = drawing.list(&world, &DebugDraw::default()).unwrap();
     assert_eq!(balls.spheres.len(), 1);
     assert!(balls.spheres[0].radius >= 1.04_f32.sqrt() - 1e-4, "{}", balls.spheres[0].radius);
-    assert!(SceneFile::parse(&CARRIER.replace("wireframe", "wirframe"), "s.toml").unwrap_err().to_string().contains("wanted full, simplified, wireframe or sphere_tree=LEVEL"));
+    assert!(
+        SceneFile::parse(&CARRIER.replace("wireframe", "wirframe"), "s.toml")
+            .unwrap_err()
+            .to_string()
+            .contains("wanted full, simplified, wireframe or sphere_tree=LEVEL")
+    );
 }
 
 #[test]
 fn a_texture_is_listed_once_and_a_missing_one_is_told_with_its_line() {
     let folder = std::env::temp_dir().join(format!("tumble-texture-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
-    tumble_render::Image { width: 2, height: 1, rgba: vec![255, 0, 0, 255, 0, 0, 255, 255] }.write_png(folder.join("t.png")).unwrap();
+    tumble_render::Image { width: 2, height: 1, rgba: vec![255, 0, 0, 255, 0, 0, 255, 255] }
+        .write_png(folder.join("t.png"))
+        .unwrap();
     let text = "[materials.m]\ntexture = \"t.png\"\npattern_scale_m = 0.5\n[[grid]]\nname = \"b\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\n\
         material = \"m\"\ncount = [3, 1, 1]\nspacing_m = [2, 0, 0]\n";
     let name = folder.join("s.toml").display().to_string();
@@ -262,10 +302,14 @@ fn what_stands_still_is_told_from_what_moves() {
         world.step().unwrap();
     });
     let list = Drawing::new(&scene).list(&world, &"resting".parse().unwrap()).unwrap();
-    let [box_, ball, capsule] = [list.instances[0].material.color, list.spheres[0].material.color, list.capsules[0].material.color];
+    let [box_, ball, capsule] =
+        [list.instances[0].material.color, list.spheres[0].material.color, list.capsules[0].material.color];
     assert!(world.asleep(world.find("lies").unwrap()));
     // blue-grey, orange, and as it is
-    assert!(box_[2] > box_[0] && ball[0] > 2.0 * ball[2] && capsule == [0.0, 1.0, 0.0], "{box_:?} {ball:?} {capsule:?}");
+    assert!(
+        box_[2] > box_[0] && ball[0] > 2.0 * ball[2] && capsule == [0.0, 1.0, 0.0],
+        "{box_:?} {ball:?} {capsule:?}"
+    );
     world.get_mut::<tumble_core::RigidBody>(world.find("lies").unwrap()).unwrap();
     let list = Drawing::new(&scene).list(&world, &"resting".parse().unwrap()).unwrap();
     let awake = list.instances[0].material.color;

@@ -36,14 +36,23 @@ fn solids_have_their_volume_and_outward_normals() {
         ("unit box", MeshData::unit_box(), 1.0, 6.0, 1e-3),
         ("sphere", MeshData::uv_sphere(r, 64), 4.0 / 3.0 * PI * r * r * r, 4.0 * PI * r * r, 0.05),
         ("cylinder", MeshData::cylinder(r, h, 128), PI * r * r * 2.0 * h, 2.0 * PI * r * (r + 2.0 * h), 0.05),
-        ("capsule", MeshData::capsule(r, h, 128), PI * r * r * (2.0 * h + 4.0 / 3.0 * r), 2.0 * PI * r * (2.0 * h + 2.0 * r), 0.05),
+        (
+            "capsule",
+            MeshData::capsule(r, h, 128),
+            PI * r * r * (2.0 * h + 4.0 / 3.0 * r),
+            2.0 * PI * r * (2.0 * h + 2.0 * r),
+            0.05,
+        ),
     ];
     for (name, mesh, true_volume, true_area, normal_tolerance) in solids {
         mesh.validate().expect(name);
         assert!((volume(&mesh) / true_volume - 1.0).abs() < 2e-3, "{name}: volume {} not {true_volume}", volume(&mesh));
         assert!((area(&mesh) / true_area - 1.0).abs() < 2e-3, "{name}: area {} not {true_area}", area(&mesh));
         assert!(worst_normal(&mesh) < normal_tolerance, "{name}: a normal is off by {}", worst_normal(&mesh));
-        assert!(mesh.normals.iter().all(|n| (Vector3::from(*n).norm() - 1.0).abs() < 1e-5), "{name}: normals of length 1");
+        assert!(
+            mesh.normals.iter().all(|n| (Vector3::from(*n).norm() - 1.0).abs() < 1e-5),
+            "{name}: normals of length 1"
+        );
     }
 }
 
@@ -52,7 +61,8 @@ fn a_rounded_box_is_the_sum_of_a_box_and_a_ball() {
     // Steiner: V = V0 + A0 r + (sum of the 12 edges) pi r^2 / 4 + 4/3 pi r^3 for the core of half extents h - r
     let (half, r) = ([1.0f32, 1.5, 2.0], 0.4f32);
     let [a, b, c] = half.map(|h| 2.0 * (h - r));
-    let expected = a * b * c + 2.0 * (a * b + b * c + c * a) * r + (a + b + c) * PI * r * r + 4.0 / 3.0 * PI * r * r * r;
+    let expected =
+        a * b * c + 2.0 * (a * b + b * c + c * a) * r + (a + b + c) * PI * r * r + 4.0 / 3.0 * PI * r * r * r;
     let mesh = MeshData::rounded_cuboid(half, r, 12);
     assert!((volume(&mesh) / expected - 1.0).abs() < 2e-3, "{} not {expected}", volume(&mesh));
     assert!(worst_normal(&mesh) < 0.1, "{}", worst_normal(&mesh));
@@ -66,7 +76,8 @@ fn creases_split_and_smooth_edges_do_not() {
     points.dedup();
     assert_eq!(points.len(), 8);
     let at = |p: &[f32; 3]| points.iter().position(|q| q == p).expect("a corner") as u32;
-    let faces: Vec<[u32; 3]> = cube.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| at(&cube.positions[i as usize]))).collect();
+    let faces: Vec<[u32; 3]> =
+        cube.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| at(&cube.positions[i as usize]))).collect();
     let sharp = MeshData::from_triangles(&points, &faces, 0.5).expect("valid");
     assert_eq!(sharp.positions.len(), 24, "each corner of a cube splits in three");
     assert!(worst_normal(&sharp) < 1e-3);
@@ -83,7 +94,10 @@ fn bad_meshes_are_refused() {
     let p = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let message = |r: Result<MeshData, RenderError>| r.expect_err("refused").to_string();
     assert!(message(MeshData::from_triangles(&p, &[[0, 1, 3]], 0.5)).contains("index 3 in a mesh of 3 vertices"));
-    assert!(message(MeshData::from_triangles(&[[0.0; 3], [f32::NAN; 3], [1.0; 3]], &[[0, 1, 2]], 0.5)).contains("position 1"));
+    assert!(
+        message(MeshData::from_triangles(&[[0.0; 3], [f32::NAN; 3], [1.0; 3]], &[[0, 1, 2]], 0.5))
+            .contains("position 1")
+    );
     let flat = MeshData::from_triangles(&p, &[[0, 1, 1], [0, 1, 2]], 0.5).expect("flat triangles are dropped");
     assert_eq!(flat.indices.len(), 3);
     let mut torn = MeshData::unit_box();

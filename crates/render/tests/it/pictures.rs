@@ -48,7 +48,11 @@ fn a_ball_at_the_side_is_the_predicted_ellipse() {
     let (a, b, center) = outline(f64::from(radius), distance, f64::from(x / 5.0).atan(), 200.0 / 0.4f64.tan());
     let (sum, mx, my) = moments(&image, 0);
     assert!((sum / (PI * a * b) - 1.0).abs() < 3e-3, "area {sum}, expected {}", PI * a * b);
-    assert!((mx - 200.0 - center).abs() < 0.05 && (my - 200.0).abs() < 0.02, "centre {mx} {my}, expected {}", 200.0 + center);
+    assert!(
+        (mx - 200.0 - center).abs() < 0.05 && (my - 200.0).abs() < 0.02,
+        "centre {mx} {my}, expected {}",
+        200.0 + center
+    );
 }
 
 #[test]
@@ -100,13 +104,17 @@ fn edges_have_quarter_steps() {
     }
     let mut list = bare(from_above(5.0));
     ball(&mut list, [0.0; 3], 1.0, WHITE);
-    block(&mut list, [0.25, 0.25, 0.1], [1.5, 0.0, 0.0], WHITE).pose.rotation = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.3);
+    block(&mut list, [0.25, 0.25, 0.1], [1.5, 0.0, 0.0], WHITE).pose.rotation =
+        UnitQuaternion::from_euler_angles(0.0, 0.0, 0.3);
     let Some(image) = picture(&list, 400, 400) else { return };
     let columns = [("ball", 0..300), ("box", 300..400)];
     for (what, range) in columns {
         for quarter in 1..4 {
             let close = |v: f64| (v - f64::from(quarter) / 4.0).abs() < 0.01;
-            let found = (0..400u32).flat_map(|y| range.clone().map(move |x| (x, y))).filter(|&(x, y)| close(linear(&image, x, y, 0))).count();
+            let found = (0..400u32)
+                .flat_map(|y| range.clone().map(move |x| (x, y)))
+                .filter(|&(x, y)| close(linear(&image, x, y, 0)))
+                .count();
             assert!(found > 3, "{what}: {found} pixels are covered by {quarter} of 4 samples");
         }
     }
@@ -159,7 +167,8 @@ fn off_axis_projection_shifts_the_picture() {
     let mut projection = Matrix4::zeros();
     (projection[(0, 0)], projection[(0, 2)], projection[(1, 1)]) = (1.0, 1.0, 1.0);
     let (near, far) = (0.1, 100.0);
-    (projection[(2, 2)], projection[(2, 3)], projection[(3, 2)]) = (far / (near - far), near * far / (near - far), -1.0);
+    (projection[(2, 2)], projection[(2, 3)], projection[(3, 2)]) =
+        (far / (near - far), near * far / (near - far), -1.0);
     let Camera::LookAt { eye, .. } = from_above(5.0) else { unreachable!("from_above makes a look-at camera") };
     let view = Matrix4::look_at_rh(&eye, &Point3::origin(), &Vector3::y());
     let mut list = bare(Camera::Raw { view, projection });
@@ -219,7 +228,10 @@ fn the_same_list_gives_the_same_bytes() {
     assert_eq!(first, two.render(&list, 320, 200).expect("valid"), "another renderer");
     one.render(&bare(from_above(3.0)), 64, 64).expect("valid");
     assert_eq!(first, one.render(&list, 320, 200).expect("valid"), "after another picture");
-    assert!(first.rgba.chunks(4).any(|p| p[0] > 200) && first.rgba.chunks(4).any(|p| p[0] < 60), "the picture has light and dark");
+    assert!(
+        first.rgba.chunks(4).any(|p| p[0] > 200) && first.rgba.chunks(4).any(|p| p[0] < 60),
+        "the picture has light and dark"
+    );
 }
 
 #[test]
@@ -242,9 +254,11 @@ fn balls_at_behind_and_around_the_eye() {
 #[test]
 fn what_lies_in_the_plane_of_the_ground_is_seen() {
     let mut list = bare(Camera::look_at(Point3::new(3.0, -2.0, 1.0), Point3::origin()));
-    list.ground = Some(tumble_render::Ground { height_m: 0.0, reach_m: 80.0, material: Material::unlit([1.0, 0.0, 0.0]) });
+    list.ground =
+        Some(tumble_render::Ground { height_m: 0.0, reach_m: 80.0, material: Material::unlit([1.0, 0.0, 0.0]) });
     let quad = list.add_mesh(MeshData::ground_quad(60.0));
-    list.add_instance(quad, Isometry3::rotation(Vector3::z() * 0.3), Material::unlit([0.0, 0.0, 1.0])).casts_shadow = false;
+    list.add_instance(quad, Isometry3::rotation(Vector3::z() * 0.3), Material::unlit([0.0, 0.0, 1.0])).casts_shadow =
+        false;
     let Some(image) = picture(&list, 300, 200) else { return };
     for y in 60..200 {
         for x in 0..300 {
@@ -291,7 +305,10 @@ fn bad_sizes_and_lists_leave_the_renderer_usable() {
     let Some(mut renderer) = renderer() else { return };
     let list = bare(from_above(5.0));
     for (width, height) in [(0, 10), (10, 0), (20000, 10), (16384, 16384)] {
-        assert!(matches!(renderer.render(&list, width, height), Err(RenderError::BadSize { .. })), "{width} x {height}");
+        assert!(
+            matches!(renderer.render(&list, width, height), Err(RenderError::BadSize { .. })),
+            "{width} x {height}"
+        );
     }
     let mut bad = list.clone();
     ball(&mut bad, [f32::NAN, 0.0, 0.0], 1.0, WHITE);

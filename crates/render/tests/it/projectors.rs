@@ -33,7 +33,11 @@ fn a_warp_that_changes_nothing_changes_no_byte() {
 fn a_mirroring_warp_mirrors_and_a_half_leaves_the_rest_black() {
     let image = colorful(20, 10);
     let mirrored = Warp::from_obj(format!("{UNIT}f 1/2 2/1 3/4 4/3\n").as_bytes()).unwrap().apply(&image);
-    let half = Warp::from_obj("v 0 0\nv 0.5 0\nv 0.5 1\nv 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n".as_bytes()).unwrap().apply(&image);
+    let half = Warp::from_obj(
+        "v 0 0\nv 0.5 0\nv 0.5 1\nv 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n".as_bytes(),
+    )
+    .unwrap()
+    .apply(&image);
     for y in 0..10 {
         for x in 0..20 {
             assert_eq!(mirrored.pixel(x, y), image.pixel(19 - x, y));
@@ -65,7 +69,8 @@ fn a_place_slightly_outside_blacks_out_no_cell() {
     };
     let (outside, obj) = bent([-0.1, -0.05]);
     assert_eq!(outside, Warp::from_obj(obj.as_bytes()).unwrap().apply(&image));
-    assert!((0..1600).all(|i| outside.pixel(i % 40, i / 40) != Some([0, 0, 0, 255]) || image.pixel(i % 40, i / 40) == Some([0, 0, 0, 255])));
+    assert!((0..1600).all(|i| outside.pixel(i % 40, i / 40) != Some([0, 0, 0, 255])
+        || image.pixel(i % 40, i / 40) == Some([0, 0, 0, 255])));
     let (marked, _) = bent([-1.0, -1.0]);
     let black = (0..1600).filter(|i| marked.pixel(i % 40, i / 40) == Some([0, 0, 0, 255])).count();
     assert_eq!(black, 400, "the lower left quarter");
@@ -75,7 +80,10 @@ fn a_place_slightly_outside_blacks_out_no_cell() {
 fn bad_warps_say_what_is_wrong_and_where() {
     let obj = |text: &str| Warp::from_obj(text.as_bytes()).unwrap_err();
     assert!(obj("v 0 0\nv 1 zero\n").starts_with("line 2: wanted `v x y`"));
-    assert!(obj(&format!("{UNIT}f 1/1 2/2 9/3\n")).contains("line 9: the corner `9/3` names no `v` above it, of which there are 4"));
+    assert!(
+        obj(&format!("{UNIT}f 1/1 2/2 9/3\n"))
+            .contains("line 9: the corner `9/3` names no `v` above it, of which there are 4")
+    );
     for pixels in ["v 0 0\nv 480 320\n", "v 0 0\nvt 480 320\n", "v 0 0\nv 1.6 0\n", "v 0 0\nv 0 -0.6\n"] {
         assert!(obj(pixels).starts_with("line 2: wanted `v") && obj(pixels).contains("not pixels"), "{}", obj(pixels));
     }
@@ -118,7 +126,10 @@ fn a_blend_takes_its_share_of_the_light() {
 #[test]
 fn cave_files_know_how_large_a_picture_may_be() {
     use tumble_scene::cave::{MOST_PIXELS, MOST_SIDE_PX, RIM_PX};
-    assert_eq!((MOST_SIDE_PX, MOST_PIXELS, RIM_PX), (tumble_render::MAX_SIDE, tumble_render::MAX_PIXELS, tumble_render::RIM_PX));
+    assert_eq!(
+        (MOST_SIDE_PX, MOST_PIXELS, RIM_PX),
+        (tumble_render::MAX_SIDE, tumble_render::MAX_PIXELS, tumble_render::RIM_PX)
+    );
 }
 
 fn cave(facet: &str) -> Cave {
@@ -142,7 +153,11 @@ fn ball() -> DrawList {
 }
 
 fn middle(image: &Image, channel: usize, from: u32, to: u32) -> f64 {
-    let lit: Vec<f64> = (0..image.height).flat_map(|y| (from..to).map(move |x| (x, y))).filter(|&(x, y)| image.pixel(x, y).unwrap()[channel] > 128).map(|(x, _)| f64::from(x) + 0.5).collect();
+    let lit: Vec<f64> = (0..image.height)
+        .flat_map(|y| (from..to).map(move |x| (x, y)))
+        .filter(|&(x, y)| image.pixel(x, y).unwrap()[channel] > 128)
+        .map(|(x, _)| f64::from(x) + 0.5)
+        .collect();
     lit.iter().sum::<f64>() / lit.len() as f64
 }
 
@@ -161,7 +176,10 @@ fn eyes_see_the_ball_apart_by_what_similar_triangles_say() {
     assert!((left - 48.75).abs() < 0.1 && (right - 51.25).abs() < 0.1, "{left} {right}");
     let below = draw("stereo = \"top_bottom\"");
     assert_eq!((below.width, below.height), (100, 200));
-    assert_eq!(below.rgba[..4 * 100 * 50], side.rgba.chunks_exact(800).take(50).flat_map(|row| row[..400].to_vec()).collect::<Vec<u8>>()[..]);
+    assert_eq!(
+        below.rgba[..4 * 100 * 50],
+        side.rgba.chunks_exact(800).take(50).flat_map(|row| row[..400].to_vec()).collect::<Vec<u8>>()[..]
+    );
     let red_cyan = draw("stereo = \"anaglyph\"");
     assert_eq!((red_cyan.width, red_cyan.height), (100, 100));
     assert!((middle(&red_cyan, 0, 0, 100) - left).abs() < 1e-9 && (middle(&red_cyan, 2, 0, 100) - right).abs() < 1e-9);
@@ -173,7 +191,12 @@ fn eyes_see_the_ball_apart_by_what_similar_triangles_say() {
 fn flips_mirror_the_finished_picture() {
     let Some(mut renderer) = renderer() else { return };
     let mut list = ball();
-    list.add_sphere(Point3::new(0.8, 4.0, 1.6), 0.3, nalgebra::UnitQuaternion::identity(), Material::unlit([0.2, 0.9, 0.4]));
+    list.add_sphere(
+        Point3::new(0.8, 4.0, 1.6),
+        0.3,
+        nalgebra::UnitQuaternion::identity(),
+        Material::unlit([0.2, 0.9, 0.4]),
+    );
     let mut draw = |flip: &str| {
         let view = CaveView::new(cave(&format!("flip = \"{flip}\"")), &empty_scene()).unwrap();
         view.draw(&mut renderer, &list, &view.cave().facets[0]).unwrap()
@@ -192,19 +215,30 @@ fn flips_mirror_the_finished_picture() {
 fn each_eye_is_mirrored_in_its_own_place() {
     let Some(mut renderer) = renderer() else { return };
     let mut list = ball();
-    list.add_sphere(Point3::new(0.8, 4.0, 1.6), 0.3, nalgebra::UnitQuaternion::identity(), Material::unlit([0.2, 0.9, 0.4]));
+    list.add_sphere(
+        Point3::new(0.8, 4.0, 1.6),
+        0.3,
+        nalgebra::UnitQuaternion::identity(),
+        Material::unlit([0.2, 0.9, 0.4]),
+    );
     let mut draw = |stereo: &str, flip: &str| {
         let view = CaveView::new(cave(&format!("stereo = \"{stereo}\"\nflip = \"{flip}\"")), &empty_scene()).unwrap();
         view.draw(&mut renderer, &list, &view.cave().facets[0]).unwrap()
     };
-    for (stereo, eyes) in [("side_by_side", vec![[0, 0], [100, 0]]), ("top_bottom", vec![[0, 0], [0, 100]]), ("anaglyph", vec![[0, 0]])] {
+    for (stereo, eyes) in
+        [("side_by_side", vec![[0, 0], [100, 0]]), ("top_bottom", vec![[0, 0], [0, 100]]), ("anaglyph", vec![[0, 0]])]
+    {
         let plain = draw(stereo, "none");
         for (flip, across, upward) in [("horizontal", true, false), ("vertical", false, true), ("both", true, true)] {
             let mirrored = draw(stereo, flip);
             assert_ne!(plain, mirrored, "{stereo}, {flip}");
             for (&[x0, y0], (x, y)) in eyes.iter().flat_map(|eye| (0..10_000).map(move |i| (eye, (i % 100, i / 100)))) {
                 let there = [x0 + if across { 99 - x } else { x }, y0 + if upward { 99 - y } else { y }];
-                assert_eq!(plain.pixel(x0 + x, y0 + y), mirrored.pixel(there[0], there[1]), "{stereo}, {flip}: {x} {y} of the eye at {x0} {y0}");
+                assert_eq!(
+                    plain.pixel(x0 + x, y0 + y),
+                    mirrored.pixel(there[0], there[1]),
+                    "{stereo}, {flip}: {x} {y} of the eye at {x0} {y0}"
+                );
             }
         }
     }
@@ -235,11 +269,15 @@ fn calibration_pictures_have_their_lines_where_a_tape_measures_them() {
     assert_eq!((grid.width, grid.height), (400, 400));
     let white = |x: u32, y: u32| grid.pixel(x, y) == Some([255, 255, 255, 255]);
     assert!((0..400).all(|i| white(i, 0) && white(i, 399) && white(0, i) && white(399, i)), "the rim");
-    assert!(white(99, 30) && white(100, 30) && white(300, 30) && !white(103, 30) && !white(200, 30), "lines of half a metre");
+    assert!(
+        white(99, 30) && white(100, 30) && white(300, 30) && !white(103, 30) && !white(200, 30),
+        "lines of half a metre"
+    );
     for shipped in shipped_caves() {
         let cave = shipped.read().unwrap();
         let facet = &cave.facets[0];
-        let pictures = ["grid", "corners", "colours", "name"].map(|word| calibration_picture(&cave, facet, word.parse().unwrap()));
+        let pictures =
+            ["grid", "corners", "colours", "name"].map(|word| calibration_picture(&cave, facet, word.parse().unwrap()));
         for picture in &pictures {
             assert_eq!([picture.width, picture.height], facet.whole_px());
             let lit = picture.rgba.chunks_exact(4).filter(|p| p[..3].iter().any(|&c| c > 60)).count();
@@ -259,7 +297,11 @@ fn calibration_pictures_of_every_small_size_are_drawn() {
         cave.facets[0].size_px = size;
         for word in ["grid", "corners", "colours", "name"] {
             let picture = calibration_picture(&cave, &cave.facets[0], word.parse().unwrap());
-            assert_eq!(([picture.width, picture.height], picture.rgba.len() as u32), (size, 4 * size[0] * size[1]), "{word}");
+            assert_eq!(
+                ([picture.width, picture.height], picture.rgba.len() as u32),
+                (size, 4 * size[0] * size[1]),
+                "{word}"
+            );
         }
     }
 }
@@ -271,7 +313,11 @@ fn bent_cave(folder: &std::path::Path, facet: &str) -> CaveView {
     for y in 0..=n {
         for x in 0..=n {
             let (u, v) = (x as f64 / n as f64, y as f64 / n as f64);
-            obj += &format!("v {u} {v}\nvt {} {}\n", 0.06 + 0.88 * u + 0.03 * (5.0 * v).sin(), 0.05 + 0.9 * v + 0.03 * (7.0 * u).cos());
+            obj += &format!(
+                "v {u} {v}\nvt {} {}\n",
+                0.06 + 0.88 * u + 0.03 * (5.0 * v).sin(),
+                0.05 + 0.9 * v + 0.03 * (7.0 * u).cos()
+            );
         }
     }
     for y in 0..n {
@@ -285,7 +331,11 @@ fn bent_cave(folder: &std::path::Path, facet: &str) -> CaveView {
         }
     }
     std::fs::write(folder.join("warp.obj"), obj).unwrap();
-    let mask = Image { width: 100, height: 100, rgba: (0..10_000u32).flat_map(|i| [(255 - i % 100) as u8, (155 + i % 100) as u8, 255, 255]).collect() };
+    let mask = Image {
+        width: 100,
+        height: 100,
+        rgba: (0..10_000u32).flat_map(|i| [(255 - i % 100) as u8, (155 + i % 100) as u8, 255, 255]).collect(),
+    };
     mask.write_png(folder.join("mask.png")).unwrap();
     let (warp, blend) = (folder.join("warp.obj"), folder.join("mask.png"));
     let cave = cave(&format!("{facet}\nwarp_file = \"{}\"\nblend_file = \"{}\"", warp.display(), blend.display()));
@@ -298,16 +348,28 @@ fn finishing_on_the_device_is_finishing_in_memory_within_a_level() {
     let mut list = ball();
     for i in 0..40 {
         let (x, z) = ((i % 8) as f32 * 0.3 - 1.0, (i / 8) as f32 * 0.4 + 0.2);
-        list.add_sphere(Point3::new(x, 4.0 + 0.1 * x, z), 0.12, nalgebra::UnitQuaternion::identity(), Material::plastic([0.3 + 0.01 * i as f32, 0.8 - 0.015 * i as f32, 0.5]));
+        list.add_sphere(
+            Point3::new(x, 4.0 + 0.1 * x, z),
+            0.12,
+            nalgebra::UnitQuaternion::identity(),
+            Material::plastic([0.3 + 0.01 * i as f32, 0.8 - 0.015 * i as f32, 0.5]),
+        );
     }
     let folder = std::env::temp_dir().join(format!("tumble-finish-{}", std::process::id()));
     for stereo in ["mono", "side_by_side", "top_bottom", "anaglyph"] {
         for flip in ["none", "horizontal", "both"] {
             for bent in [false, true] {
                 let facet = format!("stereo = \"{stereo}\"\nflip = \"{flip}\"");
-                let view = if bent { bent_cave(&folder, &facet) } else { CaveView::new(cave(&facet), &empty_scene()).unwrap() };
+                let view = if bent {
+                    bent_cave(&folder, &facet)
+                } else {
+                    CaveView::new(cave(&facet), &empty_scene()).unwrap()
+                };
                 let facet = &view.cave().facets[0];
-                let (device, memory) = (view.draw(&mut renderer, &list, facet).unwrap(), view.draw_in_memory(&mut renderer, &list, facet).unwrap());
+                let (device, memory) = (
+                    view.draw(&mut renderer, &list, facet).unwrap(),
+                    view.draw_in_memory(&mut renderer, &list, facet).unwrap(),
+                );
                 assert_eq!((device.width, device.height), (memory.width, memory.height));
                 let most = device.rgba.iter().zip(&memory.rgba).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
                 assert!(most <= if bent { 1 } else { 0 }, "{stereo}, flip {flip}, bent {bent}: {most} levels");

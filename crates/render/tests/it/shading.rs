@@ -43,7 +43,13 @@ fn lamps_fall_off_with_the_square_of_the_distance() {
         let mut list = bare(from_above(10.0));
         floor(&mut list, 3.0);
         let position = Point3::new(0.0, 0.0, height);
-        list.lights.push(Light::Point { position, color: [1.0; 3], intensity: 1.0, radius_m: 0.0, casts_shadow: false });
+        list.lights.push(Light::Point {
+            position,
+            color: [1.0; 3],
+            intensity: 1.0,
+            radius_m: 0.0,
+            casts_shadow: false,
+        });
         picture(&list, 400, 400).map(|image| (brightness(&image, 0.0, 0.0), brightness(&image, 2.0, 0.0)))
     };
     let (Some((near, near_side)), Some((far, _))) = (at(1.5), at(3.0)) else { return };
@@ -64,7 +70,9 @@ fn the_shadow_of_a_ball_lies_where_the_light_leaves_it() {
     assert!((lit - 0.5f64.sqrt()).abs() < 0.04, "the open floor: {lit}");
     let (along, across) = (0.3 * 2f64.sqrt(), 0.3);
     for (share, expected) in [(0.0, 0.0), (0.85, 0.0), (1.15, 1.0)] {
-        for (x, y) in [(2.0 + share * along, 0.0), (2.0 - share * along, 0.0), (2.0, share * across), (2.0, -share * across)] {
+        for (x, y) in
+            [(2.0 + share * along, 0.0), (2.0 - share * along, 0.0), (2.0, share * across), (2.0, -share * across)]
+        {
             let got = brightness(&image, x, y) / lit;
             assert!((got - expected).abs() < 0.02, "at {x} {y}: {got}, expected {expected}");
         }
@@ -88,7 +96,11 @@ fn the_shadow_of_a_box_under_a_lamp_is_its_central_projection() {
     for (x, y) in [(0.80f64, 0.0f64), (-0.80, 0.0), (0.0, 0.80), (0.0, -0.80), (0.8, 0.8)] {
         let d2 = x * x + y * y + 9.0;
         let expected = 9.0 / d2 * 3.0 / d2.sqrt();
-        assert!((brightness(&image, x, y) / expected - 1.0).abs() < 0.06, "lit at {x} {y}: {}", brightness(&image, x, y));
+        assert!(
+            (brightness(&image, x, y) / expected - 1.0).abs() < 0.06,
+            "lit at {x} {y}: {}",
+            brightness(&image, x, y)
+        );
     }
 }
 
@@ -99,7 +111,13 @@ fn penumbra_width_is_the_gap_times_the_size_of_the_sun() {
     floor(&mut list, 3.5);
     let plate = list.add_mesh(MeshData::cuboid([1.0, 1.5, 0.005]));
     list.add_instance(plate, Isometry3::translation(-1.0, 0.0, 1.0), Material::unlit([0.0; 3]));
-    list.lights.push(Light::Directional { direction: -Vector3::z(), color: [1.0; 3], intensity: 0.9, angular_radius_rad: 0.1, casts_shadow: true });
+    list.lights.push(Light::Directional {
+        direction: -Vector3::z(),
+        color: [1.0; 3],
+        intensity: 0.9,
+        angular_radius_rad: 0.1,
+        casts_shadow: true,
+    });
     // seen from the side below the plate's height, since the plate itself hides its shadow from above
     list.camera = Camera::LookAt {
         eye: Point3::new(6.0, 0.0, 3.0),
@@ -140,7 +158,8 @@ fn smooth_surfaces_show_no_acne_and_feet_touch_their_shadows() {
     for py in 0..400u32 {
         for px in 0..400u32 {
             let t = 0.4f64.tan() / 200.0;
-            let dir = Vector3::new((f64::from(px) + 0.5 - 200.0) * t, (200.0 - f64::from(py) - 0.5) * t, -1.0).normalize();
+            let dir =
+                Vector3::new((f64::from(px) + 0.5 - 200.0) * t, (200.0 - f64::from(py) - 0.5) * t, -1.0).normalize();
             let to = Vector3::new(0.0, 0.0, 1.0) - eye;
             let along = to.dot(&dir);
             let miss2 = to.norm_squared() - along * along;
@@ -224,8 +243,12 @@ fn a_turned_ball_shows_its_other_side() {
         picture(&list, 200, 200).map(|image| image.pixel(100, 100).expect("inside"))
     };
     let Some(pole) = top(UnitQuaternion::identity()) else { return };
-    let side = top(UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f32::consts::FRAC_PI_2)).expect("an adapter");
+    let side =
+        top(UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f32::consts::FRAC_PI_2)).expect("an adapter");
     assert!(pole[0] > 220 && pole[1] > 215 && pole[2] > 200, "ivory at the pole: {pole:?}");
     let blue = [0.05, 0.22, 0.62].map(|c: f32| (c * 255.0).round());
-    assert!((0..3).all(|k| (f32::from(side[k]) - blue[k]).abs() < 2.0), "blue stripe at the side: {side:?}, expected {blue:?}");
+    assert!(
+        (0..3).all(|k| (f32::from(side[k]) - blue[k]).abs() < 2.0),
+        "blue stripe at the side: {side:?}, expected {blue:?}"
+    );
 }

@@ -27,7 +27,10 @@ pub fn exact_edges() -> bool {
     let exact = renderer().is_some_and(|r| !r.adapter().contains("Gl)"));
     if !exact {
         // past the harness, which keeps what passing tests print
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no adapter with sample masks\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: no adapter with sample masks\n"),
+        );
     }
     exact
 }
@@ -38,7 +41,10 @@ pub fn renderer() -> Option<Renderer> {
         Ok(renderer) => Some(renderer),
         Err(RenderError::NoAdapter { reason }) => {
             // past the harness, which keeps what passing tests print
-            let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: no graphics adapter ({reason})\n"));
+            let _ = std::io::Write::write_fmt(
+                &mut std::io::stderr(),
+                format_args!("\nSKIPPED: no graphics adapter ({reason})\n"),
+            );
             None
         }
         Err(other) => panic!("an adapter exists and fails: {other}"),
@@ -69,7 +75,13 @@ pub fn from_above(height: f32) -> Camera {
 
 /// White parallel light without colour, so that numbers are easy.
 pub fn white_sun(direction: [f32; 3], intensity: f32, casts_shadow: bool) -> Light {
-    Light::Directional { direction: direction.into(), color: [1.0; 3], intensity, angular_radius_rad: 0.0, casts_shadow }
+    Light::Directional {
+        direction: direction.into(),
+        color: [1.0; 3],
+        intensity,
+        angular_radius_rad: 0.0,
+        casts_shadow,
+    }
 }
 
 /// One channel of a pixel as linear light, 0 to 1 (inverse of the sRGB curve, IEC 61966-2-1).

@@ -15,9 +15,9 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::Cave;
 use super::facet::{Facet, Stereo};
 use super::parts::{Screen, User};
-use super::Cave;
 use crate::fields::Fields;
 
 /// Largest cosine of a screen's corner: 1 mm in a metre.
@@ -57,22 +57,35 @@ pub(crate) fn screen(screen: &Screen, f: &Fields<'_>) {
     let cosine = u.dot(&v) / (wide * high);
     if cosine.abs() > SQUARE_TOLERANCE {
         let degrees = cosine.acos().to_degrees();
-        let message = format!("{} is not square: its edges meet at {degrees:.3} degrees, {:.1} mm off in a metre", f.what, 1e3 * cosine.abs());
+        let message = format!(
+            "{} is not square: its edges meet at {degrees:.3} degrees, {:.1} mm off in a metre",
+            f.what,
+            1e3 * cosine.abs()
+        );
         f.log.report(f.span.clone(), message, "wanted a right angle at `lower_left_m`, within 1 mm in a metre");
     }
 }
 
 /// What can be drawn: both eyes in one picture, and each eye's with its rim.
 pub(crate) fn target(size_px: [u32; 2], stereo: Stereo, f: &mut Fields<'_>) {
-    let fits = |[w, h]: [u32; 2]| w <= MOST_SIDE_PX && h <= MOST_SIDE_PX && u64::from(w.next_multiple_of(64)) * u64::from(h) <= MOST_PIXELS;
+    let fits = |[w, h]: [u32; 2]| {
+        w <= MOST_SIDE_PX && h <= MOST_SIDE_PX && u64::from(w.next_multiple_of(64)) * u64::from(h) <= MOST_PIXELS
+    };
     let (whole, rimmed) = (stereo.whole_px(size_px), size_px.map(|n| n + 2 * RIM_PX));
     let what = match (fits(whole), fits(rimmed)) {
         (true, true) => return,
         (false, _) if whole != size_px => format!("the picture with both eyes is {} x {} pixels", whole[0], whole[1]),
-        _ => format!("the picture with the rim of {RIM_PX} pixels that is drawn around it is {} x {} pixels", rimmed[0], rimmed[1]),
+        _ => format!(
+            "the picture with the rim of {RIM_PX} pixels that is drawn around it is {} x {} pixels",
+            rimmed[0], rimmed[1]
+        ),
     };
     let place = f.value("size_px").map_or(f.span.clone(), |value| value.span());
-    f.log.report(place, format!("`size_px` of {}: {what}", f.what), format!("wanted at most {MOST_SIDE_PX} each way and {MOST_PIXELS} together; a larger wall is several facets"));
+    f.log.report(
+        place,
+        format!("`size_px` of {}: {what}", f.what),
+        format!("wanted at most {MOST_SIDE_PX} each way and {MOST_PIXELS} together; a larger wall is several facets"),
+    );
 }
 
 /// Near before far, and every eye in front of the screen.
@@ -81,7 +94,12 @@ pub(crate) fn facet(facet: &Facet, screen: &Screen, user: &User, f: &mut Fields<
         let message = format!("`near_m` of {} is {}, `far_m` {}", f.what, facet.near_m, facet.far_m);
         f.log.report(f.span.clone(), message, "wanted near_m less than far_m");
     }
-    let behind = facet.stereo.sides().iter().map(|side| (side, screen.distance_m(&user.eye(*side)))).find(|(_, d)| *d < LEAST_DISTANCE_M);
+    let behind = facet
+        .stereo
+        .sides()
+        .iter()
+        .map(|side| (side, screen.distance_m(&user.eye(*side))))
+        .find(|(_, d)| *d < LEAST_DISTANCE_M);
     if let Some((side, distance)) = behind {
         let eye = match *side {
             s if s < 0.0 => "the left eye",
@@ -89,7 +107,10 @@ pub(crate) fn facet(facet: &Facet, screen: &Screen, user: &User, f: &mut Fields<
             _ => "the eye",
         };
         let place = f.value("screen").map_or(f.span.clone(), |value| value.span());
-        let message = format!("{}: {eye} of user \"{}\" is {:.3} m behind screen \"{}\"", f.what, user.name, -distance, screen.name);
+        let message = format!(
+            "{}: {eye} of user \"{}\" is {:.3} m behind screen \"{}\"",
+            f.what, user.name, -distance, screen.name
+        );
         f.log.report(place, message, "wanted the eye in front; corners are named as seen by who looks at the screen, so that left and right may be swapped");
     }
 }
@@ -114,7 +135,10 @@ pub(crate) fn notes(cave: &Cave) -> Vec<String> {
             notes.push(format!("facet \"{}\": near_m {} lies behind the screen, {distance:.3} m from the eye: what is nearer is cut off", facet.name, facet.near_m));
         }
         if facet.stereo != Stereo::Mono && user.interpupillary_m == 0.0 {
-            notes.push(format!("facet \"{}\" is in stereo, and interpupillary_m of user \"{}\" is 0: both eyes see the same", facet.name, user.name));
+            notes.push(format!(
+                "facet \"{}\" is in stereo, and interpupillary_m of user \"{}\" is 0: both eyes see the same",
+                facet.name, user.name
+            ));
         }
     }
     for (index, screen) in cave.screens.iter().enumerate() {
@@ -164,7 +188,8 @@ pub fn gaps(screens: &[Screen]) -> Vec<Gap> {
     for (first, second, a, b) in pairs(screens) {
         if let Some(gap_m) = between(&a, &b, NEIGHBOUR_SHARE, NEIGHBOUR_SINE) {
             let d = middle(&b) - middle(&a);
-            let inside = d.dot(&outward(&screens[first.0], first.1)) < -LEAST_OVERLAP_M && d.dot(&outward(&screens[second.0], second.1)) > LEAST_OVERLAP_M;
+            let inside = d.dot(&outward(&screens[first.0], first.1)) < -LEAST_OVERLAP_M
+                && d.dot(&outward(&screens[second.0], second.1)) > LEAST_OVERLAP_M;
             out.push(Gap { first, second, gap_m, overlaps: inside });
         }
     }
@@ -186,7 +211,10 @@ fn astray(screens: &[Screen], found: &[Gap]) -> Vec<Astray> {
     candidates.sort_by(|a, b| a.2.total_cmp(&b.2));
     let mut out: Vec<Astray> = Vec::new();
     for pair in candidates {
-        if !out.iter().any(|(first, second, ..)| [*first, *second].iter().any(|edge| *edge == pair.0 || *edge == pair.1)) {
+        if !out
+            .iter()
+            .any(|(first, second, ..)| [*first, *second].iter().any(|edge| *edge == pair.0 || *edge == pair.1))
+        {
             out.push(pair);
         }
     }
@@ -196,7 +224,11 @@ fn astray(screens: &[Screen], found: &[Gap]) -> Vec<Astray> {
 
 /// All pairs of edges of different screens, each once, in the order of the file.
 fn pairs(screens: &[Screen]) -> Vec<(Place, Place, Edge, Edge)> {
-    let all: Vec<(Place, Edge)> = screens.iter().enumerate().flat_map(|(i, s)| edges(s).into_iter().enumerate().map(move |(k, edge)| ((i, k), edge))).collect();
+    let all: Vec<(Place, Edge)> = screens
+        .iter()
+        .enumerate()
+        .flat_map(|(i, s)| edges(s).into_iter().enumerate().map(move |(k, edge)| ((i, k), edge)))
+        .collect();
     let mut out = Vec::new();
     for (i, j) in (0..screens.len()).flat_map(|i| (i + 1..screens.len()).map(move |j| (i, j))) {
         for (first, a) in &all[4 * i..4 * i + 4] {

@@ -46,8 +46,12 @@ pub enum Output {
 }
 
 impl Stereo {
-    pub(crate) const NAMES: Names<Self> =
-        &[("mono", Stereo::Mono), ("side_by_side", Stereo::SideBySide), ("top_bottom", Stereo::TopBottom), ("anaglyph", Stereo::Anaglyph)];
+    pub(crate) const NAMES: Names<Self> = &[
+        ("mono", Stereo::Mono),
+        ("side_by_side", Stereo::SideBySide),
+        ("top_bottom", Stereo::TopBottom),
+        ("anaglyph", Stereo::Anaglyph),
+    ];
 
     /// The sides of the eyes that are drawn: −1 left, 0 between, +1 right.
     pub fn sides(self) -> &'static [f64] {
@@ -109,15 +113,27 @@ pub struct Facet {
 }
 
 impl Facet {
-    pub(crate) fn read(mut f: Fields<'_>, users: &[User], screens: &[Screen], nodes: &[Node], folder: &Path) -> Option<Facet> {
+    pub(crate) fn read(
+        mut f: Fields<'_>,
+        users: &[User],
+        screens: &[Screen],
+        nodes: &[Node],
+        folder: &Path,
+    ) -> Option<Facet> {
         let name = read_name(&mut f)?;
         let problems = f.log.count();
         let screen = match f.text("screen", "the name of a [[screen]]") {
-            Some((typed, value)) => reference(&f, "screen", typed, value, screens.iter().map(|s| s.name.as_str()).collect()),
+            Some((typed, value)) => {
+                reference(&f, "screen", typed, value, screens.iter().map(|s| s.name.as_str()).collect())
+            }
             None => None,
         };
-        let user = f.optional_text("user").map_or(Some(0), |(typed, value)| reference(&f, "user", typed, value, users.iter().map(|u| u.name.as_str()).collect()));
-        let node = f.optional_text("node").map(|(typed, value)| reference(&f, "node", typed, value, nodes.iter().map(|n| n.name.as_str()).collect()));
+        let user = f.optional_text("user").map_or(Some(0), |(typed, value)| {
+            reference(&f, "user", typed, value, users.iter().map(|u| u.name.as_str()).collect())
+        });
+        let node = f
+            .optional_text("node")
+            .map(|(typed, value)| reference(&f, "node", typed, value, nodes.iter().map(|n| n.name.as_str()).collect()));
         let output = match f.choice_or("output", TARGETS, Target::Window) {
             Target::Window => Output::Window { position_px: position(&mut f) },
             Target::Offscreen => Output::Offscreen,
@@ -158,7 +174,13 @@ impl Facet {
 const NEAR: Bound = Bound::new(1e-4, 1e6, "a length from 0.0001 m on");
 
 /// The index of `typed` among `known`; `None`, with the problem recorded, where it is not there.
-fn reference(f: &Fields<'_>, key: &str, typed: &str, value: &crate::fields::Value<'_>, known: Vec<&str>) -> Option<usize> {
+fn reference(
+    f: &Fields<'_>,
+    key: &str,
+    typed: &str,
+    value: &crate::fields::Value<'_>,
+    known: Vec<&str>,
+) -> Option<usize> {
     let found = known.iter().position(|name| *name == typed);
     if found.is_none() && known.is_empty() {
         f.wrong(key, value, format!("a table [[{key}]] of this name, and there is none at all"));
@@ -172,7 +194,9 @@ fn reference(f: &Fields<'_>, key: &str, typed: &str, value: &crate::fields::Valu
 fn size(f: &mut Fields<'_>) -> [u32; 2] {
     let Some(value) = f.required("size_px", "width and height in pixels, such as [1920, 1080]") else { return [1, 1] };
     match value.get_ref().as_array().filter(|items| items.len() == 2) {
-        Some(items) => std::array::from_fn(|k| items.get(k).map_or(1, |item| f.as_integer("size_px", item, 1..=checks::MOST_SIDE_PX))),
+        Some(items) => std::array::from_fn(|k| {
+            items.get(k).map_or(1, |item| f.as_integer("size_px", item, 1..=checks::MOST_SIDE_PX))
+        }),
         None => {
             f.wrong("size_px", value, "width and height in pixels, such as [1920, 1080]");
             [1, 1]
@@ -183,7 +207,8 @@ fn size(f: &mut Fields<'_>) -> [u32; 2] {
 /// `position_px`: two whole numbers, negative ones too.
 fn position(f: &mut Fields<'_>) -> [i32; 2] {
     let problems = f.log.count();
-    let place: [f64; 2] = f.vector_or("position_px", Bound::new(-1e6, 1e6, "a number of pixels from -1e6 to 1e6"), [0.0; 2]);
+    let place: [f64; 2] =
+        f.vector_or("position_px", Bound::new(-1e6, 1e6, "a number of pixels from -1e6 to 1e6"), [0.0; 2]);
     if f.log.count() == problems && place.iter().any(|x| x.fract() != 0.0) {
         let message = format!("`position_px` of {} has parts of pixels", f.what);
         f.log.report(f.span.clone(), message, "wanted two whole numbers");

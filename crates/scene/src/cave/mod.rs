@@ -112,7 +112,11 @@ impl Cave {
             Some(cave) if log.count() == 0 => Ok(cave),
             _ => {
                 let problems = log.into_problems();
-                Err(CaveError::Invalid(Box::new(Invalid { file: file_name.to_owned(), text: text.to_owned(), problems })))
+                Err(CaveError::Invalid(Box::new(Invalid {
+                    file: file_name.to_owned(),
+                    text: text.to_owned(),
+                    problems,
+                })))
             }
         }
     }
@@ -124,7 +128,8 @@ impl Cave {
         let users = named(&mut f, "user", User::read, |user| &user.name);
         let screens = named(&mut f, "screen", Screen::read, |screen| &screen.name);
         let nodes = named(&mut f, "node", Node::read, |node| &node.name);
-        let facets = named(&mut f, "facet", |table| Facet::read(table, &users, &screens, &nodes, folder), |facet| &facet.name);
+        let facets =
+            named(&mut f, "facet", |table| Facet::read(table, &users, &screens, &nodes, folder), |facet| &facet.name);
         for (key, count) in [("user", users.len()), ("screen", screens.len()), ("facet", facets.len())] {
             if count == 0 && f.value(key).is_none() {
                 f.missing(key, &format!("at least one table [[{key}]]"));
@@ -136,7 +141,18 @@ impl Cave {
         let tracker = read_table(&mut f, "tracker", |table| Tracker::read(table, &users));
         let place = f.value("sync").map_or(0..0, |value| value.span());
         f.finish();
-        let cave = Cave { file: file_name.to_owned(), description, users, screens, nodes, facets, sync, security, recording, tracker };
+        let cave = Cave {
+            file: file_name.to_owned(),
+            description,
+            users,
+            screens,
+            nodes,
+            facets,
+            sync,
+            security,
+            recording,
+            tracker,
+        };
         if log.count() == 0 {
             settings::check_reach(&cave, log, &place);
         }
@@ -156,7 +172,11 @@ impl Cave {
             count(self.facets.len(), "facet", "facets"),
             count(self.screens.len(), "screen", "screens"),
             count(self.users.len(), "user", "users"),
-            if self.nodes.is_empty() { "all on this machine".to_owned() } else { count(self.nodes.len(), "node", "nodes") }
+            if self.nodes.is_empty() {
+                "all on this machine".to_owned()
+            } else {
+                count(self.nodes.len(), "node", "nodes")
+            }
         )
     }
 
@@ -174,11 +194,17 @@ pub fn is_cave(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text.get(..text.len().min(MOST_BYTES as usize)).unwrap_or(""));
     let root = root.get_ref();
     let nearly = || root.keys().any(|key| nearest(key.get_ref(), MARKS).is_some());
-    MARKS.iter().any(|key| root.get(*key).is_some()) || (!SCENE_MARKS.iter().any(|key| root.get(*key).is_some()) && nearly())
+    MARKS.iter().any(|key| root.get(*key).is_some())
+        || (!SCENE_MARKS.iter().any(|key| root.get(*key).is_some()) && nearly())
 }
 
 /// The tables `[[key]]`, each with a name that no other has.
-fn named<'a, T>(f: &mut Fields<'a>, key: &'static str, read: impl Fn(Fields<'a>) -> Option<T>, name: impl Fn(&T) -> &str) -> Vec<T> {
+fn named<'a, T>(
+    f: &mut Fields<'a>,
+    key: &'static str,
+    read: impl Fn(Fields<'a>) -> Option<T>,
+    name: impl Fn(&T) -> &str,
+) -> Vec<T> {
     let mut taken: BTreeMap<String, Range<usize>> = BTreeMap::new();
     let mut out = Vec::new();
     for mut table in f.tables(key, MOST_PARTS) {
@@ -186,7 +212,11 @@ fn named<'a, T>(f: &mut Fields<'a>, key: &'static str, read: impl Fn(Fields<'a>)
         let Some(part) = read(table) else { continue };
         match taken.get(name(&part)) {
             Some(earlier) => {
-                let message = format!("`name`: a second {key} \"{}\"; the first is at line {}", name(&part), log.line(earlier.start));
+                let message = format!(
+                    "`name`: a second {key} \"{}\"; the first is at line {}",
+                    name(&part),
+                    log.line(earlier.start)
+                );
                 log.report(place, message, format!("wanted a name that no other {key} has"));
             }
             None => {

@@ -138,8 +138,17 @@ impl Node {
         let name = read_name(&mut f)?;
         let address = f.text("address", "an IP address or a host name, such as \"127.0.0.1\"");
         if let Some((text, value)) = address.filter(|(text, _)| !is_address(text)) {
-            let port = text.rsplit_once(':').is_some_and(|(host, port)| is_address(host) && port.parse::<u16>().is_ok());
-            f.wrong("address", value, if port { "an address without a port; the server's is `port` of [sync]" } else { "an IP address or a host name" });
+            let port =
+                text.rsplit_once(':').is_some_and(|(host, port)| is_address(host) && port.parse::<u16>().is_ok());
+            f.wrong(
+                "address",
+                value,
+                if port {
+                    "an address without a port; the server's is `port` of [sync]"
+                } else {
+                    "an IP address or a host name"
+                },
+            );
         }
         let launch = read_launch(&mut f);
         f.finish();
@@ -155,14 +164,25 @@ impl Node {
 fn read_launch(f: &mut Fields<'_>) -> Vec<String> {
     let wanted = "the words of a command, such as [\"ssh\", \"{address}\", \"tumble {line}\"]";
     let place = f.value("launch");
-    let words: Vec<String> = f.list("launch", MOST_WORDS, wanted).into_iter().filter_map(|item| f.as_text("launch", item)).map(str::to_owned).collect();
+    let words: Vec<String> = f
+        .list("launch", MOST_WORDS, wanted)
+        .into_iter()
+        .filter_map(|item| f.as_text("launch", item))
+        .map(str::to_owned)
+        .collect();
     let Some(place) = place else { return words };
     let unknown = words.iter().find_map(|word| braces(word).find(|inside| !LAUNCH_WORDS.contains(inside)));
     if let Some(unknown) = unknown {
-        f.wrong("launch", place, format!("none but {{{}}} in braces; there is no {{{unknown}}}", LAUNCH_WORDS.join("}, {")));
+        f.wrong(
+            "launch",
+            place,
+            format!("none but {{{}}} in braces; there is no {{{unknown}}}", LAUNCH_WORDS.join("}, {")),
+        );
     } else if words.iter().any(|word| word.contains("{arguments}") && word != "{arguments}") {
         f.wrong("launch", place, "{arguments} as a word by itself; within a word it is {line}");
-    } else if words.first().is_none_or(|word| word.is_empty()) || !words.iter().any(|word| word == "{arguments}" || word.contains("{line}")) {
+    } else if words.first().is_none_or(|word| word.is_empty())
+        || !words.iter().any(|word| word == "{arguments}" || word.contains("{line}"))
+    {
         f.wrong("launch", place, format!("{wanted}, with {{arguments}} or {{line}} among them"));
     }
     words
@@ -175,7 +195,11 @@ fn braces(text: &str) -> impl Iterator<Item = &str> {
 
 /// An IP address, or a host name: letters, digits, hyphens, and dots between them.
 fn is_address(text: &str) -> bool {
-    let label = |label: &str| !label.is_empty() && label.len() <= 63 && label.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+    let label = |label: &str| {
+        !label.is_empty()
+            && label.len() <= 63
+            && label.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
+    };
     text.parse::<IpAddr>().is_ok() || (text.len() <= 253 && text.split('.').all(label))
 }
 
@@ -186,7 +210,9 @@ pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
         // what else may stand here does not depend on the name, but an unnamed part helps nobody
         return Some(String::new());
     };
-    let right = (1..=64).contains(&name.chars().count()) && name.chars().all(|c| c.is_alphanumeric() || "_- .".contains(c)) && name.trim() == name;
+    let right = (1..=64).contains(&name.chars().count())
+        && name.chars().all(|c| c.is_alphanumeric() || "_- .".contains(c))
+        && name.trim() == name;
     if !right {
         f.wrong("name", value, "1 to 64 letters, digits, and _ - . or blanks inside");
     }

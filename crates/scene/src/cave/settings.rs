@@ -74,8 +74,15 @@ impl Sync {
             history_frames: f.integer_or("history_frames", 1..=1024, usual.history_frames),
         };
         if sync.drop_timeout_ms < sync.ready_timeout_ms {
-            let message = format!("`drop_timeout_ms` of {} is {}, `ready_timeout_ms` {}", f.what, sync.drop_timeout_ms, sync.ready_timeout_ms);
-            f.log.report(f.span.clone(), message, "wanted a facet to be dropped no sooner than a frame stops waiting for it");
+            let message = format!(
+                "`drop_timeout_ms` of {} is {}, `ready_timeout_ms` {}",
+                f.what, sync.drop_timeout_ms, sync.ready_timeout_ms
+            );
+            f.log.report(
+                f.span.clone(),
+                message,
+                "wanted a facet to be dropped no sooner than a frame stops waiting for it",
+            );
         }
         f.finish();
         sync
@@ -119,10 +126,17 @@ impl Recording {
 pub(crate) fn check_reach(cave: &Cave, log: &Log<'_>, place: &Range<usize>) {
     let Some(far) = cave.nodes.iter().find(|node| !node.is_local()) else { return };
     if cave.sync.transport == Transport::SharedMemory {
-        let message = format!("node \"{}\" is at {}, and `transport` of [sync] is shared_memory, which ends at this machine", far.name, far.address);
+        let message = format!(
+            "node \"{}\" is at {}, and `transport` of [sync] is shared_memory, which ends at this machine",
+            far.name, far.address
+        );
         log.report(place.clone(), message, "wanted transport = \"udp\", or nodes at 127.0.0.1");
     } else if cave.security.is_none() {
         let message = format!("node \"{}\" is at {}, and there is no [security]", far.name, far.address);
-        log.report(place.clone(), message, "wanted [security] with a key_file; without one only nodes at 127.0.0.1 are spoken to");
+        log.report(
+            place.clone(),
+            message,
+            "wanted [security] with a key_file; without one only nodes at 127.0.0.1 are spoken to",
+        );
     }
 }

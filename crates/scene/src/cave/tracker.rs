@@ -44,8 +44,12 @@ impl Tracker {
     /// With the defaults, for these users.
     pub fn of(users: &[User]) -> Tracker {
         Tracker {
-            address: Ipv4Addr::LOCALHOST.into(), port: TRACKER_PORT, users: users.iter().map(|u| u.name.clone()).collect(), senders: Vec::new(),
-            axes: Axes::ZUp, origin_m: [0.0; 3],
+            address: Ipv4Addr::LOCALHOST.into(),
+            port: TRACKER_PORT,
+            users: users.iter().map(|u| u.name.clone()).collect(),
+            senders: Vec::new(),
+            axes: Axes::ZUp,
+            origin_m: [0.0; 3],
         }
     }
 
@@ -57,7 +61,10 @@ impl Tracker {
     pub(crate) fn read(mut f: Fields<'_>, users: &[User]) -> Tracker {
         let usual = Tracker::of(users);
         let problems = f.log.count();
-        let address = f.optional_text("address").and_then(|(text, value)| address_of(&f, "address", text, value)).unwrap_or(usual.address);
+        let address = f
+            .optional_text("address")
+            .and_then(|(text, value)| address_of(&f, "address", text, value))
+            .unwrap_or(usual.address);
         let port = u32::from(usual.port);
         let tracker = Tracker {
             address,
@@ -78,12 +85,17 @@ impl Tracker {
 
 fn read_users(f: &mut Fields<'_>, users: &[User]) -> Option<Vec<String>> {
     let place = f.value("users")?;
-    let wanted = format!("one name for each of the cave's {} users, in their order, that no other has and without /", users.len());
+    let wanted = format!(
+        "one name for each of the cave's {} users, in their order, that no other has and without /",
+        users.len()
+    );
     let names: Vec<String> = match place.get_ref() {
         DeValue::Array(items) => items.iter().filter_map(|item| Some(item.get_ref().as_str()?.to_owned())).collect(),
         _ => Vec::new(),
     };
-    let right = |k: usize| !names[k].is_empty() && names[k].len() <= 64 && !names[k].contains('/') && !names[..k].contains(&names[k]);
+    let right = |k: usize| {
+        !names[k].is_empty() && names[k].len() <= 64 && !names[k].contains('/') && !names[..k].contains(&names[k])
+    };
     if names.len() != users.len() || !(0..names.len()).all(right) {
         f.wrong("users", place, wanted);
     }
@@ -92,7 +104,10 @@ fn read_users(f: &mut Fields<'_>, users: &[User]) -> Option<Vec<String>> {
 
 fn read_senders(f: &mut Fields<'_>) -> Vec<IpAddr> {
     let items = f.list("senders", MOST_SENDERS, "a list of IP addresses");
-    items.into_iter().filter_map(|value| f.as_text("senders", value).and_then(|text| address_of(f, "senders", text, value))).collect()
+    items
+        .into_iter()
+        .filter_map(|value| f.as_text("senders", value).and_then(|text| address_of(f, "senders", text, value)))
+        .collect()
 }
 
 fn address_of(f: &Fields<'_>, key: &str, text: &str, value: &crate::fields::Value<'_>) -> Option<IpAddr> {

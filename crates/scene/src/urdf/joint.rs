@@ -76,7 +76,19 @@ impl JointElement {
         });
         let placement = read_origin(joint);
         let (name, span) = (name?.to_owned(), joint.span());
-        Some(JointElement { name, span, kind: kind?, parent: parent?, child: child?, placement, axis, freedom, effort, speed, mimic })
+        Some(JointElement {
+            name,
+            span,
+            kind: kind?,
+            parent: parent?,
+            child: child?,
+            placement,
+            axis,
+            freedom,
+            effort,
+            speed,
+            mimic,
+        })
     }
 
     /// The joint with one or no degree of freedom of its own; `None` for those that are made of several.
@@ -116,7 +128,12 @@ fn read_end(joint: &Element<'_, '_>, end: &'static str, links: &BTreeMap<String,
     let found = links.get(name).copied();
     if found.is_none() {
         let near = crate::suggest::nearest(name, links.keys().map(String::as_str));
-        element.wrong("link", near.map_or("the name of a link of this file".into(), |near| format!("the name of a link; did you mean \"{near}\"?")));
+        element.wrong(
+            "link",
+            near.map_or("the name of a link of this file".into(), |near| {
+                format!("the name of a link; did you mean \"{near}\"?")
+            }),
+        );
     }
     found
 }
@@ -142,18 +159,28 @@ fn read_axis(joint: &Element<'_, '_>) -> Vec3 {
 fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (Freedom, Option<f64>, Option<f64>) {
     let bounded = matches!(kind, Kind::Revolute | Kind::Prismatic);
     let limit = match bounded {
-        true => joint.required("limit", "<limit lower upper effort velocity/>, or type=\"continuous\" for a hinge without limits"),
+        true => joint.required(
+            "limit",
+            "<limit lower upper effort velocity/>, or type=\"continuous\" for a hinge without limits",
+        ),
         false => joint.child("limit"),
     };
-    let [lower, upper] = ["lower", "upper"].map(|end| limit.and_then(|l| l.text(end).and_then(|_| l.open_number(end))).unwrap_or(0.0));
+    let [lower, upper] =
+        ["lower", "upper"].map(|end| limit.and_then(|l| l.text(end).and_then(|_| l.open_number(end))).unwrap_or(0.0));
     if let Some(limit) = limit.filter(|_| lower > upper) {
         limit.wrong("lower", format_args!("at most `upper`, {upper}"));
     }
     // 0 and negative numbers stand for "not known" in many files
-    let most = |name: &str| limit.and_then(|l| l.text(name).and_then(|_| l.open_number(name))).filter(|x| *x > 0.0 && x.is_finite());
+    let most = |name: &str| {
+        limit.and_then(|l| l.text(name).and_then(|_| l.open_number(name))).filter(|x| *x > 0.0 && x.is_finite())
+    };
     let dynamics = joint.child("dynamics");
     let constant = |name: &str| dynamics.and_then(|d| d.number(name, Bound::NOT_NEGATIVE)).unwrap_or(0.0);
     let open = lower == f64::NEG_INFINITY && upper == f64::INFINITY;
     let limits = (bounded && limit.is_some() && !open).then_some([lower, upper]);
-    (Freedom { limits, damping: constant("damping"), friction: constant("friction"), ..Freedom::default() }, most("effort"), most("velocity"))
+    (
+        Freedom { limits, damping: constant("damping"), friction: constant("friction"), ..Freedom::default() },
+        most("effort"),
+        most("velocity"),
+    )
 }

@@ -66,13 +66,14 @@ fn read_inertial(inertial: &Element<'_, '_>, context: &mut Context<'_>) -> LinkM
     let origin = read_origin(inertial);
     let mass = inertial.required("mass", "<mass value=\"…\"/>, kg");
     let mass = mass.map_or(0.0, |mass| mass.required_number("value", Bound::NOT_NEGATIVE));
-    let inertia = inertial.required("inertia", "<inertia ixx iyy izz ixy ixz iyz/>, kg·m² about the centre of mass").map(|i| {
-        let of = |name| i.number(name, Bound::ANY);
-        let diagonal = ["ixx", "iyy", "izz"].map(|name| i.required_number(name, Bound::ANY));
-        let [xy, xz, yz] = ["ixy", "ixz", "iyz"].map(|name| of(name).unwrap_or(0.0));
-        let [xx, yy, zz] = diagonal;
-        (i, Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
-    });
+    let inertia =
+        inertial.required("inertia", "<inertia ixx iyy izz ixy ixz iyz/>, kg·m² about the centre of mass").map(|i| {
+            let of = |name| i.number(name, Bound::ANY);
+            let diagonal = ["ixx", "iyy", "izz"].map(|name| i.required_number(name, Bound::ANY));
+            let [xy, xz, yz] = ["ixy", "ixz", "iyz"].map(|name| of(name).unwrap_or(0.0));
+            let [xx, yy, zz] = diagonal;
+            (i, Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
+        });
     let mut own = Mat3::zeros();
     if let Some((element, matrix)) = inertia
         && matrix.iter().all(|x| x.is_finite())
@@ -90,7 +91,9 @@ fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Context<'_>) -
     if let Some(fault) = inertia_fault(&inertia) {
         let what = match fault {
             InertiaFault::Negative(_) => "principal moments below 0 are set to 0",
-            InertiaFault::Triangle(_) => "one principal moment is greater than the sum of the others, as that of no rigid body; it is used as it is",
+            InertiaFault::Triangle(_) => {
+                "one principal moment is greater than the sum of the others, as that of no rigid body; it is used as it is"
+            }
         };
         let line = element.log.line(element.span().start);
         context.notes.add(format!("{}:{line}: {}", context.file, element.what()), what);

@@ -190,7 +190,8 @@ pub fn parse_model(text: &str, file_name: &str, options: &UrdfOptions) -> Result
 impl Robot {
     fn into_model(self, path: &Path) -> Result<UrdfModel, UrdfError> {
         let masses: Vec<LinkMass> = self.links.iter().map(LinkSpec::given_mass).collect();
-        let model = assemble::model(&self.links, &masses).map_err(|source| UrdfError::Model { file: path.to_path_buf(), source })?;
+        let model = assemble::model(&self.links, &masses)
+            .map_err(|source| UrdfError::Model { file: path.to_path_buf(), source })?;
         Ok(UrdfModel { joints: assemble::moving_joints(&self.links), name: self.name, model, notes: self.notes })
     }
 }
@@ -251,7 +252,12 @@ pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, wanted: 
     let document = xml::parse(&log, text);
     let robot = document.as_ref().and_then(|document| {
         let context = Context {
-            folder: path.parent().unwrap_or(Path::new("")), file: &file, options, wanted, colors: BTreeMap::new(), notes: NoteList::default(),
+            folder: path.parent().unwrap_or(Path::new("")),
+            file: &file,
+            options,
+            wanted,
+            colors: BTreeMap::new(),
+            notes: NoteList::default(),
         };
         read_robot(&Element::new(&log, document.root_element()), context)
     });
@@ -273,7 +279,8 @@ fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot
     let colors: Vec<_> = robot.children("material").filter_map(|m| Some((m.text("name")?, read_color(&m)?))).collect();
     context.colors = colors.iter().map(|(name, color)| ((*name).to_owned(), *color)).collect();
     let mut taken = BTreeMap::new();
-    let elements: Vec<LinkElement> = robot.children("link").filter_map(|link| LinkElement::read(&link, &mut context)).collect();
+    let elements: Vec<LinkElement> =
+        robot.children("link").filter_map(|link| LinkElement::read(&link, &mut context)).collect();
     let mut names = BTreeMap::new();
     for (number, link) in elements.iter().enumerate() {
         names.insert(link.name.clone(), number);
@@ -283,7 +290,8 @@ fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot
         robot.problem(format_args!("has {} links", elements.len()), format!("wanted 1 to {MOST_LINKS}"));
         return None;
     }
-    let joints: Vec<JointElement> = robot.children("joint").filter_map(|joint| JointElement::read(&joint, &names)).collect();
+    let joints: Vec<JointElement> =
+        robot.children("joint").filter_map(|joint| JointElement::read(&joint, &names)).collect();
     taken.clear();
     joints.iter().for_each(|joint| note_unique(robot.log, &mut taken, "joint", &joint.name, &joint.span));
     if robot.log.count() > 0 {

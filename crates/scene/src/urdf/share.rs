@@ -35,7 +35,10 @@ pub(super) struct MeshShare<'s> {
 ///
 /// # Errors
 /// More shapes than spheres; trees that cannot be built.
-pub(super) fn shared<'s>(surfaces: impl ExactSizeIterator<Item = &'s Surface>, options: &SphereOptions) -> Result<Vec<Share<'s>>, String> {
+pub(super) fn shared<'s>(
+    surfaces: impl ExactSizeIterator<Item = &'s Surface>,
+    options: &SphereOptions,
+) -> Result<Vec<Share<'s>>, String> {
     let count = surfaces.len();
     if count > options.most {
         return Err(format!("it has {count} collision shapes, and each needs a sphere; {} are allowed", options.most));
@@ -43,7 +46,9 @@ pub(super) fn shared<'s>(surfaces: impl ExactSizeIterator<Item = &'s Surface>, o
     let mut shares: Vec<Share<'s>> = surfaces.map(Share::new).collect();
     while shares.iter().map(Share::count).sum::<usize>() < options.most {
         let open = (0..shares.len()).filter(|k| shares[*k].wants_more(options.error));
-        let Some(worst) = open.max_by(|a, b| shares[*a].worst().total_cmp(&shares[*b].worst()).then(b.cmp(a))) else { break };
+        let Some(worst) = open.max_by(|a, b| shares[*a].worst().total_cmp(&shares[*b].worst()).then(b.cmp(a))) else {
+            break;
+        };
         shares[worst].add(options)?;
     }
     Ok(shares)
@@ -56,7 +61,14 @@ impl<'s> Share<'s> {
             Surface::Capsule(radius, length) => Share::Capsule { radius: *radius, length: *length, count: 1 },
             Surface::Mesh { given, solid, slack } => {
                 let covering = Covering::new(given, solid);
-                Share::Mesh(Box::new(MeshShare { covering, solid, slack: *slack, next_tree: FIRST_TREE, octrees: Vec::new(), stuck: false }))
+                Share::Mesh(Box::new(MeshShare {
+                    covering,
+                    solid,
+                    slack: *slack,
+                    next_tree: FIRST_TREE,
+                    octrees: Vec::new(),
+                    stuck: false,
+                }))
             }
         }
     }
@@ -107,7 +119,9 @@ impl<'s> Share<'s> {
                 let reach = reach(*radius, *length, *count);
                 (0..*count).map(|n| (Vec3::z() * at(n), reach, reach - radius)).collect()
             }
-            Share::Mesh(mesh) => mesh.covering.balls().map(|(center, radius, outward)| (center, radius, outward + mesh.slack)).collect(),
+            Share::Mesh(mesh) => {
+                mesh.covering.balls().map(|(center, radius, outward)| (center, radius, outward + mesh.slack)).collect()
+            }
         }
     }
 }
@@ -115,7 +129,11 @@ impl<'s> Share<'s> {
 /// The radius of each of so many spheres on a capsule's axis that cover it.
 fn reach(radius: f64, length: f64, count: usize) -> f64 {
     // one alone holds the ends
-    if count == 1 { radius + 0.5 * length } else { (radius * radius + 0.25 * (length / (count - 1) as f64).powi(2)).sqrt() }
+    if count == 1 {
+        radius + 0.5 * length
+    } else {
+        (radius * radius + 0.25 * (length / (count - 1) as f64).powi(2)).sqrt()
+    }
 }
 
 impl MeshShare<'_> {
@@ -134,14 +152,20 @@ impl MeshShare<'_> {
 
     /// The centres of trees' balls, at most `count` of each tree.
     fn trees(&mut self, count: usize, options: &SphereOptions) -> Result<Vec<Vec<Vec3>>, String> {
-        let build = |settings: TreeSettings| SphereTree::build_cached(self.solid, &settings, &options.cache).map(|built| built.tree).map_err(|e| e.to_string());
+        let build = |settings: TreeSettings| {
+            SphereTree::build_cached(self.solid, &settings, &options.cache)
+                .map(|built| built.tree)
+                .map_err(|e| e.to_string())
+        };
         let enough = options.error * self.solid.diagonal();
         let cut = |tree: &SphereTree| tree.cut(count, enough).iter().map(|&n| tree.nodes()[n].center).collect();
         if options.tree.builder != Builder::Octree {
             let settings = TreeSettings { branch: count as u32, depth: 1, ..options.tree };
             return if count <= MOST_BRANCHES { Ok(vec![cut(&build(settings)?)]) } else { Ok(Vec::new()) };
         }
-        while self.octrees.len() < options.tree.depth as usize && self.octrees.last().is_none_or(|tree| tree.leaves().count() <= count) {
+        while self.octrees.len() < options.tree.depth as usize
+            && self.octrees.last().is_none_or(|tree| tree.leaves().count() <= count)
+        {
             self.octrees.push(build(TreeSettings { depth: self.octrees.len() as u32 + 1, ..options.tree })?);
         }
         Ok(self.octrees.iter().rev().take(2).map(cut).collect())

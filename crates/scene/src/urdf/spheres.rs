@@ -14,9 +14,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use roxmltree::Node;
-use tumble_core::collide::{
-    MeshError, Pose, Progress, RepairSettings, TreeCache, TreeSettings, TriMesh, Vec3,
-};
+use tumble_core::collide::{MeshError, Pose, Progress, RepairSettings, TreeCache, TreeSettings, TriMesh, Vec3};
 
 use super::link::{Context, read_shape};
 use super::share::{self, Share};
@@ -86,14 +84,22 @@ pub(super) enum Surface {
     /// Radius, and length of the straight part.
     Capsule(f64, f64),
     /// The surface that is to be covered, a closed one around the same solid or more, and how far that is outside the shape that it stands for.
-    Mesh { given: TriMesh, solid: TriMesh, slack: f64 },
+    Mesh {
+        given: TriMesh,
+        solid: TriMesh,
+        slack: f64,
+    },
 }
 
 /// Reads a robot and covers its links by spheres; `progress` is told the share of links that are done.
 ///
 /// # Errors
 /// [`UrdfError`]: those of [`load`](super::load), and meshes that cannot be read.
-pub fn spherize(path: impl AsRef<Path>, options: &SphereOptions, progress: &dyn Progress) -> Result<SphereRobot, UrdfError> {
+pub fn spherize(
+    path: impl AsRef<Path>,
+    options: &SphereOptions,
+    progress: &dyn Progress,
+) -> Result<SphereRobot, UrdfError> {
     let path = path.as_ref();
     let text = text_of(path)?;
     // all that is wrong with it is found by the one reader of robots
@@ -116,7 +122,8 @@ pub fn spherize(path: impl AsRef<Path>, options: &SphereOptions, progress: &dyn 
         let name = link.text("name").unwrap_or("").to_owned();
         let parts = parts(link, &mut context).map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
         if !parts.is_empty() {
-            let shares = share::shared(parts.iter().map(|part| &part.surface), options).map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
+            let shares = share::shared(parts.iter().map(|part| &part.surface), options)
+                .map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
             links.push(written(name, &parts, &shares, &text, &mut edits).map_err(wrong)?);
         }
         progress.at((n + 1) as f64 / elements.len() as f64);
@@ -149,7 +156,9 @@ fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, St
         }
         Geometry::Shape(other) => Err(format!("{other:?} is no shape of a URDF")),
         Geometry::File { path, scale, hull, .. } => {
-            let given = read_file(path).map(|mesh| stretched(mesh, *scale)).map_err(|why| format!("{}: {why}", path.display()))?;
+            let given = read_file(path)
+                .map(|mesh| stretched(mesh, *scale))
+                .map_err(|why| format!("{}: {why}", path.display()))?;
             let (solid, note) = solid_of(&given, *hull).map_err(|e| format!("{}: {e}", path.display()))?;
             note.into_iter().for_each(|note| context.notes.add(path.display().to_string(), note));
             Ok(Surface::Mesh { given, solid, slack: 0.0 })
@@ -168,21 +177,34 @@ fn solid_of(given: &TriMesh, hull: bool) -> Result<(TriMesh, Option<String>), Me
     }
     match solid.repair(&RepairSettings::default()) {
         Ok(report) => Ok((solid, Some(format!("its surface is not closed; {}", report.notes().join("; "))))),
-        Err(_) => Ok((given.convex_hull()?, Some("its surface is not closed, so spheres are fitted to its convex hull".into()))),
+        Err(_) => Ok((
+            given.convex_hull()?,
+            Some("its surface is not closed, so spheres are fitted to its convex hull".into()),
+        )),
     }
 }
 
 /// The spheres in the link's frame, and the edits that write them.
-fn written(name: String, parts: &[Part<'_, '_>], shares: &[Share<'_>], text: &str, edits: &mut Vec<(Range<usize>, String)>) -> Result<LinkSpheres, String> {
+fn written(
+    name: String,
+    parts: &[Part<'_, '_>],
+    shares: &[Share<'_>],
+    text: &str,
+    edits: &mut Vec<(Range<usize>, String)>,
+) -> Result<LinkSpheres, String> {
     let mut link = LinkSpheres { name, shapes: parts.len(), spheres: Vec::new(), outward: Vec::new() };
     for (part, share) in parts.iter().zip(shares) {
         let exact = matches!(part.surface, Surface::Sphere(_));
         let spheres = share.spheres();
-        let placed: Vec<(Vec3, f64)> = spheres.iter().map(|(center, radius, _)| placed(&part.shape.pose, center, *radius, exact)).collect();
+        let placed: Vec<(Vec3, f64)> =
+            spheres.iter().map(|(center, radius, _)| placed(&part.shape.pose, center, *radius, exact)).collect();
         if !exact {
             let range = part.node.range();
             if text.get(range.clone()).is_none_or(|own| !own.starts_with("<collision")) {
-                return Err(format!("link \"{}\": a <collision> comes from an entity and cannot be replaced; write it out", link.name));
+                return Err(format!(
+                    "link \"{}\": a <collision> comes from an entity and cannot be replaced; write it out",
+                    link.name
+                ));
             }
             edits.push((range, elements(&part.node, &placed, text)));
         }
@@ -201,13 +223,17 @@ fn placed(pose: &Pose, center: &Vec3, radius: f64, exact: bool) -> (Vec3, f64) {
 fn elements(node: &Node<'_, '_>, spheres: &[(Vec3, f64)], text: &str) -> String {
     let start = node.range().start;
     let indent = text[..start].rsplit('\n').next().unwrap_or("");
-    let indent = if indent.trim().is_empty() && text[..start].contains('\n') { format!("\n{indent}") } else { String::new() };
+    let indent =
+        if indent.trim().is_empty() && text[..start].contains('\n') { format!("\n{indent}") } else { String::new() };
     let of = |range: Range<usize>| text.get(range).unwrap_or("");
-    let attributes: String = node.attributes().filter(|a| a.name() != "name").map(|a| format!(" {}", of(a.range()))).collect();
-    let is_kept = |child: &Node<'_, '_>| child.is_element() && !child.has_tag_name("origin") && !child.has_tag_name("geometry");
+    let attributes: String =
+        node.attributes().filter(|a| a.name() != "name").map(|a| format!(" {}", of(a.range()))).collect();
+    let is_kept =
+        |child: &Node<'_, '_>| child.is_element() && !child.has_tag_name("origin") && !child.has_tag_name("geometry");
     let kept: String = node.children().filter(is_kept).map(|child| of(child.range())).collect();
     // comments stand once, before the spheres
-    let comments: String = node.descendants().filter(Node::is_comment).map(|c| format!("{}{indent}", of(c.range()))).collect();
+    let comments: String =
+        node.descendants().filter(Node::is_comment).map(|c| format!("{}{indent}", of(c.range()))).collect();
     let name = node.attribute_node("name").map(|a| of(a.range_value()));
     let element = |(n, (c, r)): (usize, &(Vec3, f64))| {
         let name = name.map_or(String::new(), |name| format!(" name=\"{}_{n}\"", name.replace('"', "&quot;")));

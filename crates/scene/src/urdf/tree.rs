@@ -4,9 +4,9 @@ use tumble_core::Joint;
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Pose, Vec3};
 
+use super::Wanted;
 use super::joint::{JointElement, Kind};
 use super::link::{Context, LinkElement};
-use super::Wanted;
 use crate::joint::{JointSpec, MimicSpec};
 use crate::link::{LinkMassSpec, LinkSpec};
 use crate::log::Log;
@@ -20,13 +20,23 @@ pub(crate) fn find_root(log: &Log<'_>, links: &[LinkElement], joints: &[JointEle
     for (number, joint) in joints.iter().enumerate() {
         if let Some(earlier) = moved_by[joint.child].replace(number) {
             let (name, line) = (&links[joint.child].name, log.line(joints[earlier].span.start));
-            let message = format!("joint \"{}\" has the child \"{name}\", which joint \"{}\" at line {line} has too", joint.name, joints[earlier].name);
-            log.report(joint.span.clone(), message, "wanted one joint for each link; loops are closed by closures of a scene");
+            let message = format!(
+                "joint \"{}\" has the child \"{name}\", which joint \"{}\" at line {line} has too",
+                joint.name, joints[earlier].name
+            );
+            log.report(
+                joint.span.clone(),
+                message,
+                "wanted one joint for each link; loops are closed by closures of a scene",
+            );
         }
     }
     let roots: Vec<usize> = (0..links.len()).filter(|&k| moved_by[k].is_none()).collect();
     if let [root, second, ..] = roots[..] {
-        let message = format!("link \"{}\" is the child of no joint, and neither is \"{}\"", links[second].name, links[root].name);
+        let message = format!(
+            "link \"{}\" is the child of no joint, and neither is \"{}\"",
+            links[second].name, links[root].name
+        );
         log.report(links[second].span.clone(), message, "wanted one root that all others hang on");
     }
     // follows parents as often as there are links: who is not at a root then goes round in a circle
@@ -38,7 +48,11 @@ pub(crate) fn find_root(log: &Log<'_>, links: &[LinkElement], joints: &[JointEle
         }
         if let Some(joint) = moved_by[at] {
             let joint = &joints[joint];
-            log.report(joint.span.clone(), format!("joint \"{}\" is part of a loop of joints", joint.name), "wanted a tree with one root");
+            log.report(
+                joint.span.clone(),
+                format!("joint \"{}\" is part of a loop of joints", joint.name),
+                "wanted a tree with one root",
+            );
             break;
         }
     }
@@ -109,7 +123,13 @@ impl<'t> TreeBuilder<'t> {
     /// A root of its own where its parent stands still; else three slides and a ball joint.
     fn add_floating(&mut self, joint: &JointElement, parent: usize) -> usize {
         if let Some(pose) = self.pose_in_base(parent) {
-            return self.hang(joint.child, None, pose * joint.placement, JointSpec::new(&joint.name, Joint::Floating), joint.span.clone());
+            return self.hang(
+                joint.child,
+                None,
+                pose * joint.placement,
+                JointSpec::new(&joint.name, Joint::Floating),
+                joint.span.clone(),
+            );
         }
         let x = self.stack(joint, "x", parent, joint.placement, Joint::Prismatic { axis: Vec3::x() });
         let y = self.stack(joint, "y", x, Pose::identity(), Joint::Prismatic { axis: Vec3::y() });
@@ -134,15 +154,38 @@ impl<'t> TreeBuilder<'t> {
         let name = format!("{}/{axis}", joint.name);
         let spec = joint.with_effects(JointSpec::new(&name, kind));
         let mass = LinkMassSpec::Given(LinkMass::none());
-        self.links.push(LinkSpec { name, parent: Some(parent), placement, joint: spec, mass, shapes: Vec::new(), mounts: Default::default() });
+        self.links.push(LinkSpec {
+            name,
+            parent: Some(parent),
+            placement,
+            joint: spec,
+            mass,
+            shapes: Vec::new(),
+            mounts: Default::default(),
+        });
         self.spans.push(joint.span.clone());
         self.links.len() - 1
     }
 
-    fn hang(&mut self, element: usize, parent: Option<usize>, placement: Pose, joint: JointSpec, span: std::ops::Range<usize>) -> usize {
+    fn hang(
+        &mut self,
+        element: usize,
+        parent: Option<usize>,
+        placement: Pose,
+        joint: JointSpec,
+        span: std::ops::Range<usize>,
+    ) -> usize {
         let element = &mut self.elements[element];
         let shapes = std::mem::take(&mut element.shapes);
-        self.links.push(LinkSpec { name: element.name.clone(), parent, placement, joint, mass: LinkMassSpec::Given(element.mass), shapes, mounts: Default::default() });
+        self.links.push(LinkSpec {
+            name: element.name.clone(),
+            parent,
+            placement,
+            joint,
+            mass: LinkMassSpec::Given(element.mass),
+            shapes,
+            mounts: Default::default(),
+        });
         self.spans.push(span);
         self.links.len() - 1
     }
@@ -151,7 +194,8 @@ impl<'t> TreeBuilder<'t> {
     fn resolve_mimics(&mut self, notes: &mut NoteList) {
         for joint in self.joints {
             let Some(mimic) = &joint.mimic else { continue };
-            let find = |name: &str| self.links.iter().position(|link| link.joint.name == name && link.joint.is_single());
+            let find =
+                |name: &str| self.links.iter().position(|link| link.joint.name == name && link.joint.is_single());
             let known = self.joints.iter().any(|other| other.name == mimic.joint && other.name != joint.name);
             match (find(&joint.name), find(&mimic.joint)) {
                 _ if !known => {
@@ -159,11 +203,15 @@ impl<'t> TreeBuilder<'t> {
                     self.log.report(mimic.span.clone(), message, "wanted the name of another joint");
                 }
                 (Some(follower), Some(link)) => {
-                    self.links[follower].joint.mimic = Some(MimicSpec { link, multiplier: mimic.multiplier, offset: mimic.offset });
+                    self.links[follower].joint.mimic =
+                        Some(MimicSpec { link, multiplier: mimic.multiplier, offset: mimic.offset });
                 }
                 _ => {
                     let line = self.log.line(mimic.span.start);
-                    notes.add(format!("line {line}: joint \"{}\"", joint.name), "follows no other, as it or the other is fixed");
+                    notes.add(
+                        format!("line {line}: joint \"{}\"", joint.name),
+                        "follows no other, as it or the other is fixed",
+                    );
                 }
             }
         }
@@ -175,7 +223,10 @@ impl<'t> TreeBuilder<'t> {
         for k in (0..self.links.len()).rev() {
             let link = &self.links[k];
             if !heavy[k] && link.joint.kind != Joint::Fixed {
-                let message = format!("\"{}\" moves link \"{}\", and neither that nor what hangs on it has a mass", link.joint.name, link.name);
+                let message = format!(
+                    "\"{}\" moves link \"{}\", and neither that nor what hangs on it has a mass",
+                    link.joint.name, link.name
+                );
                 self.log.report(self.spans[k].clone(), message, "wanted <inertial> in one of them, or a fixed joint");
             }
             if let Some(parent) = link.parent {

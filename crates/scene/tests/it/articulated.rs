@@ -18,7 +18,9 @@ fn examples() -> Vec<&'static str> {
 
 /// A body with one revolute link, whose further keys begin at line 7.
 fn link_with(keys: &str) -> String {
-    format!("[[articulated]]\nname = \"a\"\n[[articulated.link]]\nname = \"l\"\njoint = \"revolute\"\naxis = [0, 0, 2]\n{keys}\n")
+    format!(
+        "[[articulated]]\nname = \"a\"\n[[articulated.link]]\nname = \"l\"\njoint = \"revolute\"\naxis = [0, 0, 2]\n{keys}\n"
+    )
 }
 
 #[test]
@@ -34,7 +36,9 @@ fn the_example_of_every_key_means_what_it_says() {
     let limits = jib.joint.freedom.limits.unwrap();
     assert!((limits[1] - 2.9670597283903604).abs() < 1e-15 && limits[0] == -limits[1], "170 degrees");
     assert_eq!((jib.joint.freedom.damping, jib.joint.freedom.friction), (2.0, 0.5));
-    let Drive::Position { stiffness, damping, target, velocity, limit } = jib.joint.freedom.drive else { panic!("a position drive") };
+    let Drive::Position { stiffness, damping, target, velocity, limit } = jib.joint.freedom.drive else {
+        panic!("a position drive")
+    };
     assert_eq!((stiffness, damping, velocity, limit), (4000.0, 800.0, 0.0, 900.0));
     assert!((target - std::f64::consts::FRAC_PI_4).abs() < 1e-15);
     assert_eq!(jib.shapes.len(), 2);
@@ -63,28 +67,46 @@ fn the_example_of_every_key_means_what_it_says() {
 
     let Drive::Playback { motion, limit } = &link("lamp").joint.freedom.drive else { panic!("a playback") };
     assert_eq!(*limit, 20.0);
-    assert!((motion.at(1.0).0 - 1.0471975511965976).abs() < 1e-15 && (motion.at(5.0).0 - motion.at(1.0).0).abs() < 1e-12);
+    assert!(
+        (motion.at(1.0).0 - 1.0471975511965976).abs() < 1e-15 && (motion.at(5.0).0 - motion.at(1.0).0).abs() < 1e-12
+    );
 
     assert_eq!(ragdoll.links[0].joint.kind, Joint::Floating);
     assert_eq!(ragdoll.links[0].joint.velocity, [0.0, 0.0, 2.0, 1.0, 0.0, 0.0]);
     let half = 10f64.to_radians();
-    assert!((ragdoll.links[1].joint.position[1] - half.sin()).abs() < 1e-15 && (ragdoll.links[1].joint.position[3] - half.cos()).abs() < 1e-15);
+    assert!(
+        (ragdoll.links[1].joint.position[1] - half.sin()).abs() < 1e-15
+            && (ragdoll.links[1].joint.position[3] - half.cos()).abs() < 1e-15
+    );
 
     let sling = &scene.closures[0];
-    assert_eq!((sling.kind, sling.a, sling.b), (ClosureKind::Point, PartSpec::Link(0, crane.link("hook").unwrap()), Some(PartSpec::Body(0))));
+    assert_eq!(
+        (sling.kind, sling.a, sling.b),
+        (ClosureKind::Point, PartSpec::Link(0, crane.link("hook").unwrap()), Some(PartSpec::Body(0)))
+    );
 }
 
 #[test]
 fn a_position_drive_without_a_target_holds_the_start() {
     let scene = read(&link_with("angle_deg = 90\ndrive = { type = \"position\", stiffness_n_m_per_rad = 1 }"));
     let joint = &scene.articulated[0].links[0].joint;
-    assert!(matches!(joint.freedom.drive, Drive::Position { target, limit: f64::INFINITY, .. } if target == std::f64::consts::FRAC_PI_2));
+    assert!(
+        matches!(joint.freedom.drive, Drive::Position { target, limit: f64::INFINITY, .. } if target == std::f64::consts::FRAC_PI_2)
+    );
 }
 
 #[test]
 fn wrong_links_are_told() {
-    told("[[articulated]]\nname = \"a\"\n", &["s.toml:1:1: articulated \"a\" has no `link`; wanted links, each under a line [[articulated.link]], or `urdf`"]);
-    told(&link_with("parent = \"x\""), &["s.toml:7:10: `parent` of link \"l\" is \"x\"; wanted no parent for the first link, which hangs on the base"]);
+    told(
+        "[[articulated]]\nname = \"a\"\n",
+        &[
+            "s.toml:1:1: articulated \"a\" has no `link`; wanted links, each under a line [[articulated.link]], or `urdf`",
+        ],
+    );
+    told(
+        &link_with("parent = \"x\""),
+        &["s.toml:7:10: `parent` of link \"l\" is \"x\"; wanted no parent for the first link, which hangs on the base"],
+    );
     told(
         &link_with("[[articulated.link]]\nname = \"l\"\nparent = \"m\"\njoint = \"fixed\""),
         &[
@@ -92,56 +114,111 @@ fn wrong_links_are_told() {
             "s.toml:9:10: `parent` of link \"l\" is \"m\"; did you mean `l`?",
         ],
     );
-    told(&link_with("").replace("[0, 0, 2]", "[0, 0, 0]"), &["s.toml:6:8: `axis` of link \"l\" is [0, 0, 0]; wanted a direction: a vector that is not zero"]);
-    told(&link_with("").replace("revolute", "hinge"), &[
-        "s.toml:5:9: `joint` of link \"l\" is \"hinge\"; wanted `revolute`, `prismatic`, `spherical` or `fixed`",
-    ]);
+    told(
+        &link_with("").replace("[0, 0, 2]", "[0, 0, 0]"),
+        &["s.toml:6:8: `axis` of link \"l\" is [0, 0, 0]; wanted a direction: a vector that is not zero"],
+    );
+    told(
+        &link_with("").replace("revolute", "hinge"),
+        &["s.toml:5:9: `joint` of link \"l\" is \"hinge\"; wanted `revolute`, `prismatic`, `spherical` or `fixed`"],
+    );
     told(
         &link_with("").replace("[[articulated.link]]", "floating = true\n[[articulated.link]]"),
-        &["s.toml:6:9: `joint` of link \"l\" is \"revolute\"; wanted no joint: the body floats, and this link hangs on nothing; or floating = false"],
+        &[
+            "s.toml:6:9: `joint` of link \"l\" is \"revolute\"; wanted no joint: the body floats, and this link hangs on nothing; or floating = false",
+        ],
     );
 }
 
 #[test]
 fn wrong_joints_are_told() {
-    told(&link_with("limits_deg = [30, -30]"), &["s.toml:7:14: `limits_deg` of link \"l\" is [30, -30]; wanted [lower, upper], the lower first; or false for none"]);
-    told(&link_with("limits_rad = [-1, 1]\nlimits_deg = [-1, 1]"), &["s.toml:3:1: link \"l\" has both `limits_rad` and `limits_deg`; wanted one of them"]);
-    told(&link_with("limits_m = [-1, 1]"), &["s.toml:7:1: unknown key `limits_m` in link \"l\"; did you mean `limits_deg`?"]);
-    told(&link_with("damping_n_m_s_per_rad = -1"), &["s.toml:7:25: `damping_n_m_s_per_rad` of link \"l\" is -1; wanted a number of at least 0"]);
-    told(&link_with("drive = { type = \"position\" }"), &[
-        "s.toml:7:9: the `drive` of link \"l\" has no stiffness and no damping; wanted `stiffness_n_m_per_rad` or `damping_n_m_s_per_rad` greater than 0",
-    ]);
-    told(&link_with("drive = { type = \"playback\", times_s = [0, 0], values_rad = [1, 2] }"), &[
-        "s.toml:7:9: the `drive` of link \"l\": sample 1 of a recorded motion: time 0 s, value 2; both must be finite and times must rise",
-    ]);
-    told(&link_with("mimic = { joint = \"l\" }"), &["s.toml:7:19: `mimic` of articulated \"a\" is \"l\"; wanted a joint other than its own"]);
-    told(&link_with("[articulated.start]\nk = 1"), &["s.toml:8:1: articulated \"a\" has no joint \"k\" with one position; did you mean `l`?"]);
+    told(
+        &link_with("limits_deg = [30, -30]"),
+        &[
+            "s.toml:7:14: `limits_deg` of link \"l\" is [30, -30]; wanted [lower, upper], the lower first; or false for none",
+        ],
+    );
+    told(
+        &link_with("limits_rad = [-1, 1]\nlimits_deg = [-1, 1]"),
+        &["s.toml:3:1: link \"l\" has both `limits_rad` and `limits_deg`; wanted one of them"],
+    );
+    told(
+        &link_with("limits_m = [-1, 1]"),
+        &["s.toml:7:1: unknown key `limits_m` in link \"l\"; did you mean `limits_deg`?"],
+    );
+    told(
+        &link_with("damping_n_m_s_per_rad = -1"),
+        &["s.toml:7:25: `damping_n_m_s_per_rad` of link \"l\" is -1; wanted a number of at least 0"],
+    );
+    told(
+        &link_with("drive = { type = \"position\" }"),
+        &[
+            "s.toml:7:9: the `drive` of link \"l\" has no stiffness and no damping; wanted `stiffness_n_m_per_rad` or `damping_n_m_s_per_rad` greater than 0",
+        ],
+    );
+    told(
+        &link_with("drive = { type = \"playback\", times_s = [0, 0], values_rad = [1, 2] }"),
+        &[
+            "s.toml:7:9: the `drive` of link \"l\": sample 1 of a recorded motion: time 0 s, value 2; both must be finite and times must rise",
+        ],
+    );
+    told(
+        &link_with("mimic = { joint = \"l\" }"),
+        &["s.toml:7:19: `mimic` of articulated \"a\" is \"l\"; wanted a joint other than its own"],
+    );
+    told(
+        &link_with("[articulated.start]\nk = 1"),
+        &["s.toml:8:1: articulated \"a\" has no joint \"k\" with one position; did you mean `l`?"],
+    );
 }
 
 #[test]
 fn wrong_masses_are_told() {
-    told(&link_with("shape = { type = \"sphere\", radius_m = 1 }"), &[
-        "s.toml:3:1: link \"l\" has no `mass_kg`; wanted `mass_kg` or `density_kg_per_m3` for the link, or for each of its shapes",
-    ]);
-    told(&link_with("mass_kg = 1\ninertia_kg_m2 = [1, 1, 3]"), &[
-        "s.toml:8:17: `inertia_kg_m2` of link \"l\" is [1, 1, 3]; wanted no principal moment greater than the sum of the others; they are 1.000000e0, 1.000000e0 and 3.000000e0 kg·m²",
-    ]);
-    told(&link_with("inertia_kg_m2 = [1, 1, 1]"), &["s.toml:3:1: link \"l\" has `center_m` or `inertia_kg_m2` but no `mass_kg`; wanted `mass_kg` with them"]);
-    told(&link_with("mass_kg = nan"), &["s.toml:7:11: `mass_kg` of link \"l\" is nan; wanted a number greater than 0 (from 1e-9 to 1e12)"]);
-    told(&link_with("mass_kg = 1\nshape = { type = \"half_space\" }"), &[
-        "s.toml:8:9: the shape of link \"l\" is a half-space, which has no end; wanted a shape of finite size; make the half-space a static [[body]]",
-    ]);
+    told(
+        &link_with("shape = { type = \"sphere\", radius_m = 1 }"),
+        &[
+            "s.toml:3:1: link \"l\" has no `mass_kg`; wanted `mass_kg` or `density_kg_per_m3` for the link, or for each of its shapes",
+        ],
+    );
+    told(
+        &link_with("mass_kg = 1\ninertia_kg_m2 = [1, 1, 3]"),
+        &[
+            "s.toml:8:17: `inertia_kg_m2` of link \"l\" is [1, 1, 3]; wanted no principal moment greater than the sum of the others; they are 1.000000e0, 1.000000e0 and 3.000000e0 kg·m²",
+        ],
+    );
+    told(
+        &link_with("inertia_kg_m2 = [1, 1, 1]"),
+        &["s.toml:3:1: link \"l\" has `center_m` or `inertia_kg_m2` but no `mass_kg`; wanted `mass_kg` with them"],
+    );
+    told(
+        &link_with("mass_kg = nan"),
+        &["s.toml:7:11: `mass_kg` of link \"l\" is nan; wanted a number greater than 0 (from 1e-9 to 1e12)"],
+    );
+    told(
+        &link_with("mass_kg = 1\nshape = { type = \"half_space\" }"),
+        &[
+            "s.toml:8:9: the shape of link \"l\" is a half-space, which has no end; wanted a shape of finite size; make the half-space a static [[body]]",
+        ],
+    );
 }
 
 #[test]
 fn wrong_pairs_and_closures_are_told() {
-    told(&link_with("mass_kg = 1").replace("[[articulated.link]]", "keep_apart = [[\"l\", \"k\"]]\n[[articulated.link]]"), &[
-        "s.toml:3:21: `keep_apart` of articulated \"a\" is \"k\"; did you mean `l`?",
-    ]);
-    let closure = |keys: &str| link_with(&format!("mass_kg = 1\n[[closure]]\nname = \"c\"\ntype = \"hinge\"\nposition_m = [0, 0, 0]\n{keys}"));
+    told(
+        &link_with("mass_kg = 1")
+            .replace("[[articulated.link]]", "keep_apart = [[\"l\", \"k\"]]\n[[articulated.link]]"),
+        &["s.toml:3:21: `keep_apart` of articulated \"a\" is \"k\"; did you mean `l`?"],
+    );
+    let closure = |keys: &str| {
+        link_with(&format!("mass_kg = 1\n[[closure]]\nname = \"c\"\ntype = \"hinge\"\nposition_m = [0, 0, 0]\n{keys}"))
+    };
     told(&closure("a = \"a/l\""), &["s.toml:8:1: closure \"c\" has no `axis`; wanted a direction, such as [0, 0, -1]"]);
-    told(&closure("a = \"a/k\"\naxis = [0, 0, 1]"), &["s.toml:12:5: `a` of closure \"c\" is \"a/k\"; did you mean `a/l`?"]);
-    told(&closure("a = \"a/l\"\nb = \"a/l\"\naxis = [0, 0, 1]"), &[
-        "s.toml:13:5: `b` of closure \"c\" is \"a/l\"; wanted a part other than `a`; or no `b`, which is the world",
-    ]);
+    told(
+        &closure("a = \"a/k\"\naxis = [0, 0, 1]"),
+        &["s.toml:12:5: `a` of closure \"c\" is \"a/k\"; did you mean `a/l`?"],
+    );
+    told(
+        &closure("a = \"a/l\"\nb = \"a/l\"\naxis = [0, 0, 1]"),
+        &["s.toml:13:5: `b` of closure \"c\" is \"a/l\"; wanted a part other than `a`; or no `b`, which is the world"],
+    );
 }

@@ -101,7 +101,9 @@ fn closures_of_every_kind_join_links_bodies_and_the_world() {
                  [[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 1\nposition_m = [2, 0, 0]\nvelocity_m_per_s = [0, 0.1, 0]\n";
     for (kind, rows) in [("point", 3), ("hinge", 5), ("weld", 6), ("slider", 5)] {
         let axis = if rows == 5 { "axis = [1, 0, 0]" } else { "" };
-        let text = format!("{links}[[closure]]\nname = \"c\"\ntype = \"{kind}\"\na = \"o/m\"\nb = \"b\"\nposition_m = [1.5, 0, 0]\n{axis}\n[[closure]]\nname = \"w\"\ntype = \"point\"\na = \"b\"\nposition_m = [2, 0, 1]\n");
+        let text = format!(
+            "{links}[[closure]]\nname = \"c\"\ntype = \"{kind}\"\na = \"o/m\"\nb = \"b\"\nposition_m = [1.5, 0, 0]\n{axis}\n[[closure]]\nname = \"w\"\ntype = \"point\"\na = \"b\"\nposition_m = [2, 0, 1]\n"
+        );
         let (mut world, _) = world(&text);
         for _ in 0..240 {
             world.step().unwrap();
@@ -121,21 +123,34 @@ fn a_urdf_in_a_scene_takes_its_start_and_drives_from_the_scene() {
                  <joint name=\"shoulder\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/><limit lower=\"-1\" upper=\"1\" effort=\"7\" velocity=\"1\"/></joint></robot>";
     std::fs::write(folder.join("robot.urdf"), robot).unwrap();
     let keys = "start = { shoulder = 0.5 }\n[[articulated.joint]]\nname = \"shoulder\"\ndrive = { type = \"position\", stiffness_n_m_per_rad = 20 }\n";
-    let text = |keys: &str| format!("[[articulated]]\nname = \"arm\"\nurdf = \"robot.urdf\"\nposition_m = [0, 0, 3]\n{keys}");
+    let text =
+        |keys: &str| format!("[[articulated]]\nname = \"arm\"\nurdf = \"robot.urdf\"\nposition_m = [0, 0, 3]\n{keys}");
     let name = folder.join("scene.toml").display().to_string();
     let (world, _) = SceneFile::parse(&text(keys), &name).unwrap().build().unwrap();
     let arm = body(&world, "arm");
-    assert_eq!(arm.freedoms()[0].drive, Drive::Position { stiffness: 20.0, damping: 0.0, target: 0.5, velocity: 0.0, limit: 7.0 });
+    assert_eq!(
+        arm.freedoms()[0].drive,
+        Drive::Position { stiffness: 20.0, damping: 0.0, target: 0.5, velocity: 0.0, limit: 7.0 }
+    );
     assert_eq!(arm.freedoms()[0].limits, Some([-1.0, 1.0]));
     assert_eq!(world.state_of(world.find("arm").unwrap()).unwrap(), [0.5, 0.0]);
     assert_eq!(world.site(world.find("arm").unwrap(), 0).unwrap().position(), Vec3::new(0.0, 0.0, 3.0));
 
     let lines = |keys: &str| SceneFile::parse(&text(keys), &name).unwrap_err().to_string().replace(&name, "s");
-    assert_eq!(lines("start = { sholder = 1 }\n"), "s:5:11: articulated \"arm\" has no joint \"sholder\" with one position; did you mean `shoulder`?");
-    assert_eq!(lines("[[articulated.joint]]\nname = \"elbow\"\n"), "s:6:8: `name` of joint 1 is \"elbow\"; wanted `shoulder`");
+    assert_eq!(
+        lines("start = { sholder = 1 }\n"),
+        "s:5:11: articulated \"arm\" has no joint \"sholder\" with one position; did you mean `shoulder`?"
+    );
+    assert_eq!(
+        lines("[[articulated.joint]]\nname = \"elbow\"\n"),
+        "s:6:8: `name` of joint 1 is \"elbow\"; wanted `shoulder`"
+    );
     std::fs::write(folder.join("robot.urdf"), robot.replace("value=\"1\"", "value=\"-1\"")).unwrap();
     let told = lines("");
     assert!(told.starts_with("s:3:8: `urdf` of articulated \"arm\": ") && told.contains("robot.urdf:1:"), "{told}");
-    assert!(told.contains("`value` of the mass of the inertial of link \"b\" is \"-1\"; wanted a number of at least 0"), "{told}");
+    assert!(
+        told.contains("`value` of the mass of the inertial of link \"b\" is \"-1\"; wanted a number of at least 0"),
+        "{told}"
+    );
     std::fs::remove_dir_all(&folder).unwrap();
 }

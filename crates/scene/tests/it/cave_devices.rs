@@ -1,7 +1,7 @@
 //! `[tracker]` and the launch commands of nodes in cave files.
 
-use std::net::{IpAddr, Ipv4Addr};
 use crate::caves::SMALL;
+use std::net::{IpAddr, Ipv4Addr};
 use tumble_scene::cave::{Axes, Cave};
 
 fn told(text: &str) -> String {
@@ -10,12 +10,22 @@ fn told(text: &str) -> String {
 
 #[test]
 fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
-    let of = |text: &str| Cave::parse(&format!("{SMALL}{text}"), "my.toml").unwrap_or_else(|e| panic!("{e}")).tracker.unwrap();
+    let of = |text: &str| {
+        Cave::parse(&format!("{SMALL}{text}"), "my.toml").unwrap_or_else(|e| panic!("{e}")).tracker.unwrap()
+    };
     assert_eq!(Cave::parse(SMALL, "my.toml").unwrap().tracker, None);
     let usual = of("[tracker]\n");
-    assert_eq!((usual.socket(), &usual.users[..], usual.axes, usual.origin_m), ("127.0.0.1:47200".parse().unwrap(), &["u".to_owned()][..], Axes::ZUp, [0.0; 3]));
-    let far = of("[tracker]\naddress = \"0.0.0.0\"\nport = 9000\nusers = [\"glasses 1\"]\nsenders = [\"10.0.0.7\"]\naxes = \"y_up\"\norigin_m = [0, 1, 0]\n");
-    assert_eq!((far.senders, far.axes, far.users), (vec![IpAddr::from(Ipv4Addr::new(10, 0, 0, 7))], Axes::YUp, vec!["glasses 1".to_owned()]));
+    assert_eq!(
+        (usual.socket(), &usual.users[..], usual.axes, usual.origin_m),
+        ("127.0.0.1:47200".parse().unwrap(), &["u".to_owned()][..], Axes::ZUp, [0.0; 3])
+    );
+    let far = of(
+        "[tracker]\naddress = \"0.0.0.0\"\nport = 9000\nusers = [\"glasses 1\"]\nsenders = [\"10.0.0.7\"]\naxes = \"y_up\"\norigin_m = [0, 1, 0]\n",
+    );
+    assert_eq!(
+        (far.senders, far.axes, far.users),
+        (vec![IpAddr::from(Ipv4Addr::new(10, 0, 0, 7))], Axes::YUp, vec!["glasses 1".to_owned()])
+    );
     let cases = [
         ("[tracker]\naddress = \"0.0.0.0\"\n", "has no `senders`"),
         ("[tracker]\naddress = \"here\"\n", "wanted an IP address"),
@@ -34,7 +44,8 @@ fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
 #[test]
 fn a_launch_command_names_the_arguments_and_nothing_unknown() {
     let node = |launch: &str| format!("[[node]]\nname = \"n\"\naddress = \"127.0.0.1\"\nlaunch = {launch}\n");
-    let cave = Cave::parse(&format!("{SMALL}{}", node("[\"ssh\", \"{address}\", \"tumble {line}\"]")), "my.toml").unwrap();
+    let cave =
+        Cave::parse(&format!("{SMALL}{}", node("[\"ssh\", \"{address}\", \"tumble {line}\"]")), "my.toml").unwrap();
     assert_eq!(cave.nodes[0].launch, ["ssh", "{address}", "tumble {line}"]);
     let cases = [
         ("[]", "the words of a command"),

@@ -35,7 +35,10 @@ fn a_small_cave_has_its_defaults() {
     assert_eq!((facet.stereo, facet.flip, facet.critical), (Stereo::Mono, Flip::None, true));
     assert_eq!(facet.output, Output::Window { position_px: [0, 0] });
     assert_eq!((facet.near_m, facet.far_m, facet.size_px), (0.05, 500.0, [800, 600]));
-    assert_eq!((cave.sync.transport, cave.sync.ready_timeout_ms, cave.users[0].interpupillary_m), (Transport::SharedMemory, 100, 0.063));
+    assert_eq!(
+        (cave.sync.transport, cave.sync.ready_timeout_ms, cave.users[0].interpupillary_m),
+        (Transport::SharedMemory, 100, 0.063)
+    );
     // 2 m x 1.5 m and 800 x 600: square pixels, one screen: nothing to say
     assert!(cave.notes().is_empty(), "{:?}", cave.notes());
     // the right eye is 31.5 mm to the right of who faces y
@@ -46,21 +49,81 @@ fn a_small_cave_has_its_defaults() {
 #[test]
 fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
     let cases = [
-        ("interpupillary = 0.06", "eye_m = [0, 0, 1.5]\ninterpupillary = 0.06", "eye_m = [0, 0, 1.5]", 5, "unknown key `interpupillary` in user \"u\"; did you mean `interpupillary_m`?"),
+        (
+            "interpupillary = 0.06",
+            "eye_m = [0, 0, 1.5]\ninterpupillary = 0.06",
+            "eye_m = [0, 0, 1.5]",
+            5,
+            "unknown key `interpupillary` in user \"u\"; did you mean `interpupillary_m`?",
+        ),
         ("a screen by another name", "screen = \"t\"", "screen = \"s\"", 12, "did you mean `s`?"),
-        ("no such stereo", "size_px = [800, 600]\nstereo = \"side_by\"", "size_px = [800, 600]", 14, "did you mean `side_by_side`?"),
+        (
+            "no such stereo",
+            "size_px = [800, 600]\nstereo = \"side_by\"",
+            "size_px = [800, 600]",
+            14,
+            "did you mean `side_by_side`?",
+        ),
         ("no pixels", "size_px = [0, 600]", "size_px = [800, 600]", 13, "a whole number from 1 to 16384"),
-        ("more pixels than can be drawn", "size_px = [16384, 16384]", "size_px = [800, 600]", 13, "with the rim of 48 pixels that is drawn around it is 16480 x 16480"),
-        ("two eyes wider than can be drawn", "size_px = [9000, 100]\nstereo = \"side_by_side\"", "size_px = [800, 600]", 13, "the picture with both eyes is 18000 x 100 pixels"),
-        ("two eyes of too many pixels", "size_px = [5000, 4000]\nstereo = \"top_bottom\"", "size_px = [800, 600]", 13, "the picture with both eyes is 5000 x 8000 pixels"),
+        (
+            "more pixels than can be drawn",
+            "size_px = [16384, 16384]",
+            "size_px = [800, 600]",
+            13,
+            "with the rim of 48 pixels that is drawn around it is 16480 x 16480",
+        ),
+        (
+            "two eyes wider than can be drawn",
+            "size_px = [9000, 100]\nstereo = \"side_by_side\"",
+            "size_px = [800, 600]",
+            13,
+            "the picture with both eyes is 18000 x 100 pixels",
+        ),
+        (
+            "two eyes of too many pixels",
+            "size_px = [5000, 4000]\nstereo = \"top_bottom\"",
+            "size_px = [800, 600]",
+            13,
+            "the picture with both eyes is 5000 x 8000 pixels",
+        ),
         ("one number of pixels", "size_px = [600]", "size_px = [800, 600]", 13, "width and height in pixels"),
-        ("not square", "upper_left_m = [-0.9, 2, 2.0]", "upper_left_m = [-1, 2, 2.0]", 5, "is not square: its edges meet at 86.186 degrees"),
+        (
+            "not square",
+            "upper_left_m = [-0.9, 2, 2.0]",
+            "upper_left_m = [-1, 2, 2.0]",
+            5,
+            "is not square: its edges meet at 86.186 degrees",
+        ),
         ("no area", "upper_left_m = [-1, 2, 0.5]", "upper_left_m = [-1, 2, 2.0]", 5, "has no area: `upper_left_m`"),
-        ("behind", "eye_m = [0, 2.25, 1.5]", "eye_m = [0, 0, 1.5]", 12, "the eye of user \"u\" is 0.250 m behind screen \"s\""),
+        (
+            "behind",
+            "eye_m = [0, 2.25, 1.5]",
+            "eye_m = [0, 0, 1.5]",
+            12,
+            "the eye of user \"u\" is 0.250 m behind screen \"s\"",
+        ),
         ("not finite", "eye_m = [0, nan, 1.5]", "eye_m = [0, 0, 1.5]", 4, "a finite number"),
-        ("near beyond far", "size_px = [800, 600]\nnear_m = 9\nfar_m = 3", "size_px = [800, 600]", 10, "`near_m` of facet \"f\" is 9, `far_m` 3"),
-        ("a warp by another ending", "size_px = [800, 600]\nwarp_file = \"a.png\"", "size_px = [800, 600]", 14, "a file that ends in .obj or .pfm"),
-        ("along up", "eye_m = [0, 0, 1.5]\nforward = [0, 0, 1]", "eye_m = [0, 0, 1.5]", 2, "`forward` of user \"u\" lies along its `up`"),
+        (
+            "near beyond far",
+            "size_px = [800, 600]\nnear_m = 9\nfar_m = 3",
+            "size_px = [800, 600]",
+            10,
+            "`near_m` of facet \"f\" is 9, `far_m` 3",
+        ),
+        (
+            "a warp by another ending",
+            "size_px = [800, 600]\nwarp_file = \"a.png\"",
+            "size_px = [800, 600]",
+            14,
+            "a file that ends in .obj or .pfm",
+        ),
+        (
+            "along up",
+            "eye_m = [0, 0, 1.5]\nforward = [0, 0, 1]",
+            "eye_m = [0, 0, 1.5]",
+            2,
+            "`forward` of user \"u\" lies along its `up`",
+        ),
     ];
     for (what, wrong, right, line, said) in cases {
         assert_eq!(SMALL.matches(right).count(), 1, "{what}");
@@ -69,16 +132,24 @@ fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
     }
     let (line, message) = problem(&format!("{SMALL}[[facet]]\nname = \"f\"\nscreen = \"s\"\nsize_px = [8, 6]\n"));
     assert!(line == 15 && message.contains("a second facet \"f\"; the first is at line 11"), "{line}: {message}");
-    let twice = format!("{}[[screen]]\nname = \"s\"\nlower_left_m = [5, 2, 0.5]\nlower_right_m = [7, 2, 0.5]\nupper_left_m = [5, 2, 2]\n", SMALL.replace("screen = \"s\"", "screen = \"wall\""));
+    let twice = format!(
+        "{}[[screen]]\nname = \"s\"\nlower_left_m = [5, 2, 0.5]\nlower_right_m = [7, 2, 0.5]\nupper_left_m = [5, 2, 2]\n",
+        SMALL.replace("screen = \"s\"", "screen = \"wall\"")
+    );
     let said = Cave::parse(&twice, "my.toml").unwrap_err().report(false);
     assert!(said.contains("wanted `s`") && !said.contains("`s` or `s`"), "a name used twice is listed once: {said}");
-    let (_, message) = problem("description = \"nothing\"\n[[user]]\nname = \"u\"\neye_m = [0, 0, 1]\n[[screen]]\nname = \"s\"\nlower_left_m = [0, 1, 0]\nlower_right_m = [1, 1, 0]\nupper_left_m = [0, 1, 1]\n");
+    let (_, message) = problem(
+        "description = \"nothing\"\n[[user]]\nname = \"u\"\neye_m = [0, 0, 1]\n[[screen]]\nname = \"s\"\nlower_left_m = [0, 1, 0]\nlower_right_m = [1, 1, 0]\nupper_left_m = [0, 1, 1]\n",
+    );
     assert!(message.contains("has no `facet`"), "{message}");
 }
 
 #[test]
 fn swapped_corners_are_told_as_an_eye_behind_the_screen() {
-    let text = SMALL.replace("lower_left_m = [-1,", "lower_left_m = [1,").replace("lower_right_m = [1,", "lower_right_m = [-1,").replace("upper_left_m = [-1,", "upper_left_m = [1,");
+    let text = SMALL
+        .replace("lower_left_m = [-1,", "lower_left_m = [1,")
+        .replace("lower_right_m = [1,", "lower_right_m = [-1,")
+        .replace("upper_left_m = [-1,", "upper_left_m = [1,");
     let (_, message) = problem(&text);
     assert!(message.contains("2.000 m behind") && message.contains("left and right may be swapped"), "{message}");
 }
@@ -90,7 +161,11 @@ fn nothing_leaves_the_machine_without_a_key() {
     assert!(message.contains("shared_memory, which ends at this machine"), "{message}");
     let (_, message) = problem(&format!("{SMALL}{far}[sync]\ntransport = \"udp\"\n"));
     assert!(message.contains("there is no [security]"), "{message}");
-    let cave = Cave::parse(&format!("{SMALL}{far}[sync]\ntransport = \"udp\"\n[security]\nkey_file = \"wall.key\"\n"), "walls/my.toml").unwrap();
+    let cave = Cave::parse(
+        &format!("{SMALL}{far}[sync]\ntransport = \"udp\"\n[security]\nkey_file = \"wall.key\"\n"),
+        "walls/my.toml",
+    )
+    .unwrap();
     assert_eq!(cave.security.unwrap().key_file, std::path::Path::new("walls/wall.key"));
     let (_, message) = problem(&format!("{SMALL}[[node]]\nname = \"n\"\naddress = \"10.0.0.7:99\"\n"));
     assert!(message.contains("an address without a port"), "{message}");
@@ -106,9 +181,16 @@ fn gaps_are_what_a_tape_measure_says() {
     let cave = Cave::parse(&format!("{SMALL}{second}"), "my.toml").unwrap();
     let found = gaps(&cave.screens);
     assert_eq!(found.len(), 1);
-    assert!((found[0].gap_m - 0.005).abs() < 1e-12 && found[0].first == (0, 1) && found[0].second == (1, 3), "{found:?}");
+    assert!(
+        (found[0].gap_m - 0.005).abs() < 1e-12 && found[0].first == (0, 1) && found[0].second == (1, 3),
+        "{found:?}"
+    );
     let notes = cave.notes().join("\n");
-    assert!(notes.contains("right edge of \"s\" and left edge of \"t\": 5.000 mm apart") && notes.contains("screen \"t\" has no facet"), "{notes}");
+    assert!(
+        notes.contains("right edge of \"s\" and left edge of \"t\": 5.000 mm apart")
+            && notes.contains("screen \"t\" has no facet"),
+        "{notes}"
+    );
     let wide = Cave::parse(&SMALL.replace("[800, 600]", "[1000, 600]"), "my.toml").unwrap().notes().join("\n");
     assert!(wide.contains("1.250 times denser across than upward; 1000 x 750 would be square"), "{wide}");
 }
@@ -116,15 +198,25 @@ fn gaps_are_what_a_tape_measure_says() {
 /// 2^25 pixels, rows filled up to multiples of 64, and a rim of 48: 16288 + 96 = 16384 = 2^14 leaves 2^11 - 96 rows.
 #[test]
 fn the_largest_pictures_are_let_through_and_no_larger_ones() {
-    let read = |size: &str, stereo: &str| Cave::parse(&SMALL.replace("[800, 600]", &format!("{size}\nstereo = \"{stereo}\"")), "my.toml").is_ok();
-    for (size, larger, stereo) in [("[16288, 1952]", "[16289, 1952]", "mono"), ("[16288, 1952]", "[16288, 1953]", "mono"), ("[8192, 100]", "[8193, 100]", "side_by_side"), ("[4096, 4096]", "[4096, 4097]", "top_bottom"), ("[4096, 4096]", "[4097, 4096]", "side_by_side")] {
+    let read = |size: &str, stereo: &str| {
+        Cave::parse(&SMALL.replace("[800, 600]", &format!("{size}\nstereo = \"{stereo}\"")), "my.toml").is_ok()
+    };
+    for (size, larger, stereo) in [
+        ("[16288, 1952]", "[16289, 1952]", "mono"),
+        ("[16288, 1952]", "[16288, 1953]", "mono"),
+        ("[8192, 100]", "[8193, 100]", "side_by_side"),
+        ("[4096, 4096]", "[4096, 4097]", "top_bottom"),
+        ("[4096, 4096]", "[4097, 4096]", "side_by_side"),
+    ] {
         assert!(read(size, stereo) && !read(larger, stereo), "{size} {larger} {stereo}");
     }
 }
 
 /// A second screen to the right of the first, which ends at x = 1 and is 1.5 m high.
 fn beside(lower_left: [f64; 3], lower_right: [f64; 3], upper_left: [f64; 3]) -> Cave {
-    let second = format!("[[screen]]\nname = \"t\"\nlower_left_m = {lower_left:?}\nlower_right_m = {lower_right:?}\nupper_left_m = {upper_left:?}\n[[facet]]\nname = \"g\"\nscreen = \"t\"\nsize_px = [800, 600]\n");
+    let second = format!(
+        "[[screen]]\nname = \"t\"\nlower_left_m = {lower_left:?}\nlower_right_m = {lower_right:?}\nupper_left_m = {upper_left:?}\n[[facet]]\nname = \"g\"\nscreen = \"t\"\nsize_px = [800, 600]\n"
+    );
     Cave::parse(&format!("{SMALL}{second}"), "my.toml").unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -132,10 +224,16 @@ fn beside(lower_left: [f64; 3], lower_right: [f64; 3], upper_left: [f64; 3]) -> 
 fn a_badly_placed_screen_is_told_as_one_without_a_neighbour() {
     // turned by 90 degrees, 0.4 m off to the right, and tilted by 8 degrees about the normal of its plane: 1.5 m high, its left edge leans back to y - 1.5 sin 8
     let (sin, cos) = 8f64.to_radians().sin_cos();
-    let cave = beside([1.4, 2.0, 0.5], [1.4, 2.0 - 2.0 * cos, 0.5 - 2.0 * sin], [1.4, 2.0 - 1.5 * sin, 0.5 + 1.5 * cos]);
+    let cave =
+        beside([1.4, 2.0, 0.5], [1.4, 2.0 - 2.0 * cos, 0.5 - 2.0 * sin], [1.4, 2.0 - 1.5 * sin, 0.5 + 1.5 * cos]);
     assert!(gaps(&cave.screens).is_empty());
     // the edge's upper end is 0.4 m to the right and 1.5 sin 8 = 0.2088 m nearer: 451 mm
-    assert_eq!(cave.notes(), ["screen \"s\" has no neighbour along its right edge: the nearest, the left edge of \"t\", is 451 mm and 8.0 degrees off"]);
+    assert_eq!(
+        cave.notes(),
+        [
+            "screen \"s\" has no neighbour along its right edge: the nearest, the left edge of \"t\", is 451 mm and 8.0 degrees off"
+        ]
+    );
     // a metre off it is another wall
     assert!(beside([2.0, 2.0, 0.5], [2.0, 0.0, 0.5], [2.0, 2.0, 2.0]).notes().is_empty());
 }
@@ -198,7 +296,13 @@ fn schema() -> serde_json::Value {
 }
 
 /// What is wrong with a value by the few words of JSON Schema that ours uses; any other word is a mistake of ours.
-fn violations(schema: &serde_json::Value, root: &serde_json::Value, value: &DeValue<'_>, at: &str, out: &mut Vec<String>) {
+fn violations(
+    schema: &serde_json::Value,
+    root: &serde_json::Value,
+    value: &DeValue<'_>,
+    at: &str,
+    out: &mut Vec<String>,
+) {
     let number = |v: &DeValue<'_>| match v {
         DeValue::Float(f) => f.as_str().parse::<f64>().ok(),
         DeValue::Integer(i) => i.as_str().parse::<f64>().ok(),
@@ -207,7 +311,18 @@ fn violations(schema: &serde_json::Value, root: &serde_json::Value, value: &DeVa
     let mut wrong = |what: String| out.push(format!("{at}: {what}"));
     for (word, rule) in schema.as_object().unwrap() {
         match word.as_str() {
-            "$schema" | "$id" | "$defs" | "title" | "description" | "default" | "required" | "additionalProperties" | "properties" | "items" | "minItems" | "maxItems" => {}
+            "$schema"
+            | "$id"
+            | "$defs"
+            | "title"
+            | "description"
+            | "default"
+            | "required"
+            | "additionalProperties"
+            | "properties"
+            | "items"
+            | "minItems"
+            | "maxItems" => {}
             "$ref" => {
                 let name = rule.as_str().unwrap().strip_prefix("#/$defs/").unwrap();
                 violations(&root["$defs"][name], root, value, at, out);
@@ -235,7 +350,9 @@ fn violations(schema: &serde_json::Value, root: &serde_json::Value, value: &DeVa
             }
             "minimum" if number(value).unwrap() < rule.as_f64().unwrap() => wrong(format!("is below {rule}")),
             "maximum" if number(value).unwrap() > rule.as_f64().unwrap() => wrong(format!("is above {rule}")),
-            "exclusiveMinimum" if number(value).unwrap() <= rule.as_f64().unwrap() => wrong(format!("is not above {rule}")),
+            "exclusiveMinimum" if number(value).unwrap() <= rule.as_f64().unwrap() => {
+                wrong(format!("is not above {rule}"))
+            }
             "minimum" | "maximum" | "exclusiveMinimum" => {}
             other => panic!("the test knows no word `{other}` of schemas"),
         }
@@ -249,18 +366,25 @@ fn violations(schema: &serde_json::Value, root: &serde_json::Value, value: &DeVa
         for (key, item) in table.iter() {
             match schema["properties"].get(key.get_ref().as_ref()) {
                 Some(rule) => violations(rule, root, item.get_ref(), &format!("{at}/{}", key.get_ref()), out),
-                None if schema["additionalProperties"] == false => out.push(format!("{at}: unknown key {}", key.get_ref())),
+                None if schema["additionalProperties"] == false => {
+                    out.push(format!("{at}: unknown key {}", key.get_ref()))
+                }
                 None => {}
             }
         }
     }
     if let DeValue::Array(items) = value {
         let count = items.len() as u64;
-        if schema["minItems"].as_u64().is_some_and(|least| count < least) || schema["maxItems"].as_u64().is_some_and(|most| count > most) {
+        if schema["minItems"].as_u64().is_some_and(|least| count < least)
+            || schema["maxItems"].as_u64().is_some_and(|most| count > most)
+        {
             out.push(format!("{at}: has {count} entries"));
         }
         if schema["items"].is_object() {
-            items.iter().enumerate().for_each(|(i, item)| violations(&schema["items"], root, item.get_ref(), &format!("{at}[{i}]"), out));
+            items
+                .iter()
+                .enumerate()
+                .for_each(|(i, item)| violations(&schema["items"], root, item.get_ref(), &format!("{at}[{i}]"), out));
         }
     }
 }
@@ -277,7 +401,12 @@ fn shipped_caves_satisfy_the_schema_and_wrong_ones_do_not() {
     for cave in shipped_caves() {
         assert_eq!(against_schema(cave.text), Vec::<String>::new(), "{}", cave.name);
     }
-    for (right, wrong) in [("eye_m = [0, 0, 1.5]", "eye = [0, 0, 1.5]"), ("size_px = [800, 600]", "size_px = [0, 600]"), ("screen = \"s\"", "screen = 3"), ("eye_m = [0, 0, 1.5]", "eye_m = [0, 0]")] {
+    for (right, wrong) in [
+        ("eye_m = [0, 0, 1.5]", "eye = [0, 0, 1.5]"),
+        ("size_px = [800, 600]", "size_px = [0, 600]"),
+        ("screen = \"s\"", "screen = 3"),
+        ("eye_m = [0, 0, 1.5]", "eye_m = [0, 0]"),
+    ] {
         let text = SMALL.replace(right, wrong);
         assert!(!against_schema(&text).is_empty() && Cave::parse(&text, "my.toml").is_err(), "{wrong}");
     }
@@ -286,9 +415,19 @@ fn shipped_caves_satisfy_the_schema_and_wrong_ones_do_not() {
 /// The keys that the parser knows in a table, from what it says of an unknown one: those that are there, and those it names as free.
 fn known_keys(text: &str, table: &str) -> BTreeSet<String> {
     let error = Cave::parse(text, "my.toml").expect_err("there is an unknown key");
-    let problem = error.problems().iter().find(|p| p.message.contains("`zzzzzzzzzzzz`") && p.message.contains(table)).unwrap_or_else(|| panic!("{table}: {error}"));
-    let list = problem.wanted.split_once(": ").map_or_else(|| problem.wanted.split_once("only ").map_or("", |(_, list)| list), |(_, list)| list);
-    list.split('`').filter(|word| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c == '_')).map(str::to_owned).collect()
+    let problem = error
+        .problems()
+        .iter()
+        .find(|p| p.message.contains("`zzzzzzzzzzzz`") && p.message.contains(table))
+        .unwrap_or_else(|| panic!("{table}: {error}"));
+    let list = problem
+        .wanted
+        .split_once(": ")
+        .map_or_else(|| problem.wanted.split_once("only ").map_or("", |(_, list)| list), |(_, list)| list);
+    list.split('`')
+        .filter(|word| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c == '_'))
+        .map(str::to_owned)
+        .collect()
 }
 
 #[test]
@@ -298,9 +437,19 @@ fn schema_and_parser_know_the_same_keys() {
     let tables = [
         (format!("{odd}{SMALL}"), "the cave", "", vec!["user", "screen", "facet"]),
         (SMALL.replace("name = \"u\"\n", &format!("name = \"u\"\n{odd}")), "user", "user", vec!["name", "eye_m"]),
-        (SMALL.replace("name = \"s\"\nlower", &format!("name = \"s\"\n{odd}lower")), "screen", "screen", vec!["name", "lower_left_m", "lower_right_m", "upper_left_m"]),
+        (
+            SMALL.replace("name = \"s\"\nlower", &format!("name = \"s\"\n{odd}lower")),
+            "screen",
+            "screen",
+            vec!["name", "lower_left_m", "lower_right_m", "upper_left_m"],
+        ),
         (format!("{SMALL}{odd}"), "facet", "facet", vec!["name", "screen", "size_px"]),
-        (format!("{SMALL}[[node]]\nname = \"n\"\naddress = \"127.0.0.1\"\n{odd}"), "node", "node", vec!["name", "address"]),
+        (
+            format!("{SMALL}[[node]]\nname = \"n\"\naddress = \"127.0.0.1\"\n{odd}"),
+            "node",
+            "node",
+            vec!["name", "address"],
+        ),
         (format!("{SMALL}[sync]\n{odd}"), "sync", "sync", vec![]),
         (format!("{SMALL}[security]\nkey_file = \"k\"\n{odd}"), "security", "security", vec!["key_file"]),
         (format!("{SMALL}[recording]\nfile = \"k\"\n{odd}"), "recording", "recording", vec!["file"]),
@@ -312,7 +461,8 @@ fn schema_and_parser_know_the_same_keys() {
         let mut in_parser = known_keys(&text, called);
         in_parser.extend(present.iter().map(|key| (*key).to_owned()));
         assert_eq!(in_parser, in_schema, "{called}");
-        let required: BTreeSet<&str> = rule["required"].as_array().into_iter().flatten().filter_map(|key| key.as_str()).collect();
+        let required: BTreeSet<&str> =
+            rule["required"].as_array().into_iter().flatten().filter_map(|key| key.as_str()).collect();
         assert_eq!(required, present.iter().copied().collect(), "{called}: required keys");
         assert_eq!(rule["additionalProperties"], false, "{called}");
     }

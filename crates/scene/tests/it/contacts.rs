@@ -14,7 +14,8 @@ fn ball(world: &str, body: &str) -> String {
 }
 
 fn built(world: &str, body: &str) -> (SceneFile, World) {
-    let scene = SceneFile::parse(&ball(world, body), "s.toml").unwrap_or_else(|error| panic!("{}", error.report(false)));
+    let scene =
+        SceneFile::parse(&ball(world, body), "s.toml").unwrap_or_else(|error| panic!("{}", error.report(false)));
     let world = scene.build().unwrap().0;
     (scene, world)
 }
@@ -40,7 +41,9 @@ fn contacts_are_those_of_the_surface_unless_the_world_or_the_body_says_otherwise
 fn the_word_decides_what_touches() {
     let rests = |lines: &str| {
         let (_, mut world) = built(lines, "");
-        (0..480).for_each(|_| { world.step().unwrap(); });
+        (0..480).for_each(|_| {
+            world.step().unwrap();
+        });
         let id = world.find("ball").unwrap();
         world.site(id, 0).unwrap().position().z
     };
@@ -52,5 +55,8 @@ fn the_word_decides_what_touches() {
 
 #[test]
 fn a_wrong_word_is_told_where_and_what_would_be_right() {
-    told(&ball("contacts = \"sphere\"", ""), &["s.toml:2:12: `contacts` of [world] is \"sphere\"; did you mean `spheres`?"]);
+    told(
+        &ball("contacts = \"sphere\"", ""),
+        &["s.toml:2:12: `contacts` of [world] is \"sphere\"; did you mean `spheres`?"],
+    );
 }

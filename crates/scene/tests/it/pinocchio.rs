@@ -80,7 +80,10 @@ fn agrees(name: &str, model: &Model) -> bool {
             *most = most.max(error);
         }
     }
-    println!("{name}: {}", worst.iter().map(|(what, error)| format!("{what} {error:.1e}")).collect::<Vec<_>>().join(", "));
+    println!(
+        "{name}: {}",
+        worst.iter().map(|(what, error)| format!("{what} {error:.1e}")).collect::<Vec<_>>().join(", ")
+    );
     true
 }
 
@@ -176,7 +179,13 @@ fn read(links: &[&str]) -> Model {
 fn python(mode: &str, input: &str) -> Option<String> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pinocchio_reference.py");
     let python = std::env::var("TUMBLE_PYTHON").unwrap_or_else(|_| "python3".into());
-    let started = Command::new(&python).arg(&script).arg(mode).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let started = Command::new(&python)
+        .arg(&script)
+        .arg(mode)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
     let mut child = match started {
         Ok(child) => child,
         Err(error) => return skip(&format!("{python} does not run: {error}")),
@@ -186,7 +195,8 @@ fn python(mode: &str, input: &str) -> Option<String> {
     let writer = std::thread::spawn(move || pipe.write_all(input.as_bytes()).is_ok());
     let output = child.wait_with_output().unwrap();
     let wrote = writer.join().unwrap();
-    let (said, complaint) = (String::from_utf8_lossy(&output.stdout).into_owned(), String::from_utf8_lossy(&output.stderr));
+    let (said, complaint) =
+        (String::from_utf8_lossy(&output.stdout).into_owned(), String::from_utf8_lossy(&output.stderr));
     match output.status.code() {
         Some(0) => {
             assert!(wrote);

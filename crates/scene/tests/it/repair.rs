@@ -29,7 +29,10 @@ fn open_mesh_is_an_error_that_names_the_line_or_is_closed_on_request() {
 
     let (folder, mended) = scene("repair = true\n");
     let (world, notes) = mended.build().unwrap();
-    assert!(notes.iter().any(|n| n.contains("mesh \"crate\": 1 hole(s) were filled with 2 faces; the longest has 4 edges")), "{notes:?}");
+    assert!(
+        notes.iter().any(|n| n.contains("mesh \"crate\": 1 hole(s) were filled with 2 faces; the longest has 4 edges")),
+        "{notes:?}"
+    );
     let body = world.get::<tumble_core::RigidBody>(world.find("b").unwrap()).unwrap();
     assert!((body.mass() - 12.0).abs() < 1e-9, "{}", body.mass());
     let _ = std::fs::remove_dir_all(folder);
@@ -43,5 +46,8 @@ fn solids_are_read_with_notes_or_refused_with_the_line() {
     assert!(read_solid(path, OPEN.as_bytes(), None).unwrap_err().starts_with("line 11: "));
     let few = RepairSettings { hole_edges: 3, ..RepairSettings::default() };
     let error = read_solid(path, OPEN.as_bytes(), Some(&few)).unwrap_err();
-    assert!(error.starts_with("line 11: ") && error.ends_with("its longest hole has 4 edges; at most 3 are filled"), "{error}");
+    assert!(
+        error.starts_with("line 11: ") && error.ends_with("its longest hole has 4 edges; at most 3 are filled"),
+        "{error}"
+    );
 }

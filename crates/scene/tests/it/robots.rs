@@ -10,8 +10,13 @@ use tumble_scene::urdf::{UrdfOptions, load, model};
 fn robots() -> Option<PathBuf> {
     let folder = std::env::var_os("TUMBLE_ROBOTS").map(PathBuf::from).or_else(|| {
         let python = std::env::var_os("TUMBLE_PYTHON").unwrap_or_else(|| "python3".into());
-        let said = Command::new(python).args(["-c", "import sysconfig; print(sysconfig.get_paths()['purelib'])"]).output().ok()?;
-        Some(Path::new(String::from_utf8(said.stdout).ok()?.trim()).join("cmeel.prefix/share/example-robot-data/robots"))
+        let said = Command::new(python)
+            .args(["-c", "import sysconfig; print(sysconfig.get_paths()['purelib'])"])
+            .output()
+            .ok()?;
+        Some(
+            Path::new(String::from_utf8(said.stdout).ok()?.trim()).join("cmeel.prefix/share/example-robot-data/robots"),
+        )
     });
     let found = folder.filter(|folder| folder.is_dir());
     if found.is_none() {
@@ -85,7 +90,9 @@ fn without_shapes(urdf: &str) -> String {
         let (open, close) = (format!("<{element}"), format!("</{element}>"));
         let mut parts = text.split(&open);
         let first = parts.next().unwrap().to_string();
-        parts.fold(first, |kept, part| kept + part.split_once(&close).unwrap_or_else(|| panic!("a {element} does not end")).1)
+        parts.fold(first, |kept, part| {
+            kept + part.split_once(&close).unwrap_or_else(|| panic!("a {element} does not end")).1
+        })
     })
 }
 
@@ -96,7 +103,10 @@ fn all_files_are_read_or_their_faults_are_named() {
     for path in urdf_files(&robots) {
         match model(&path, &floating()) {
             Ok(_) => read += 1,
-            Err(error) => assert!(error.to_string().lines().all(|line| line.starts_with(&format!("{}:", path.display()))), "{error}"),
+            Err(error) => assert!(
+                error.to_string().lines().all(|line| line.starts_with(&format!("{}:", path.display()))),
+                "{error}"
+            ),
         }
     }
     assert!(read >= 60, "{read} robots");

@@ -39,7 +39,9 @@ fn articulated_bodies_cut_at_every_byte() {
 /// A damping of 1e-320 had an infinite compliance, and stopped the first step.
 #[test]
 fn what_is_too_small_for_an_inverse_is_zero() {
-    let with = |damping: &str| articulated().replace("damping_n_m_s_per_rad = 0.001", &format!("damping_n_m_s_per_rad = {damping}"));
+    let with = |damping: &str| {
+        articulated().replace("damping_n_m_s_per_rad = 0.001", &format!("damping_n_m_s_per_rad = {damping}"))
+    };
     assert_ne!(with("0"), articulated());
     let none = SceneFile::parse(&with("0"), "crane.toml").unwrap();
     assert_eq!(SceneFile::parse(&with("1e-320"), "crane.toml").unwrap(), none);
@@ -60,8 +62,23 @@ fn deep_nesting_and_long_lines() {
 }
 
 const OTHERS: &[&str] = &[
-    "nan", "-1", "0", "1e400", "[]", "[[[]]]", "{}", "\"\"", "true", "[1, 2, 3]", "{ type = \"box\" }", "{ count = 300 }", "\"rope_20\"", "\"fixed\"",
-    "{ type = \"playback\", times_s = [], values_rad = [] }", "{ joint = \"wheel\" }", "[[\"jib\"]]",
+    "nan",
+    "-1",
+    "0",
+    "1e400",
+    "[]",
+    "[[[]]]",
+    "{}",
+    "\"\"",
+    "true",
+    "[1, 2, 3]",
+    "{ type = \"box\" }",
+    "{ count = 300 }",
+    "\"rope_20\"",
+    "\"fixed\"",
+    "{ type = \"playback\", times_s = [], values_rad = [] }",
+    "{ joint = \"wheel\" }",
+    "[[\"jib\"]]",
 ];
 
 #[test]

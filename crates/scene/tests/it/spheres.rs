@@ -1,8 +1,8 @@
 //! Robots of spheres: what is replaced, what stays, and that no point of the collision surface is bare.
 
 use std::path::PathBuf;
-use tumble_core::collide::{Builder, Pose, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble_core::Object;
+use tumble_core::collide::{Builder, Pose, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble_scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfError, UrdfOptions, load, spherize};
 
 const ROBOT: &str = r#"<?xml version="1.0"?>
@@ -89,7 +89,8 @@ fn at(xyz: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
 fn points(mesh: &TriMesh, pose: Pose) -> Vec<Vec3> {
     let inside = |t: usize| {
         let [a, b, c] = mesh.corners(t);
-        [(0.2, 0.3), (0.6, 0.2), (0.1, 0.8), (0.5, 0.5), (1.0 / 3.0, 1.0 / 3.0)].map(|(u, v)| a + (b - a) * u + (c - a) * v)
+        [(0.2, 0.3), (0.6, 0.2), (0.1, 0.8), (0.5, 0.5), (1.0 / 3.0, 1.0 / 3.0)]
+            .map(|(u, v)| a + (b - a) * u + (c - a) * v)
     };
     let corners = (0..mesh.triangles.len()).flat_map(|t| mesh.corners(t));
     let all = corners.chain((0..mesh.triangles.len()).flat_map(inside));
@@ -98,7 +99,10 @@ fn points(mesh: &TriMesh, pose: Pose) -> Vec<Vec3> {
 
 /// Points of the surface by formula, as the text of [`ROBOT`] says.
 fn surface(link: &str) -> Vec<Vec3> {
-    let scaled = |mesh: TriMesh, by: Vec3| TriMesh { vertices: mesh.vertices.iter().map(|v| v.component_mul(&by)).collect(), ..mesh };
+    let scaled = |mesh: TriMesh, by: Vec3| TriMesh {
+        vertices: mesh.vertices.iter().map(|v| v.component_mul(&by)).collect(),
+        ..mesh
+    };
     // fine meshes whose vertices lie on the true cylinder and capsule; points within their triangles lie a little inside
     match link {
         "arm" => [
@@ -129,7 +133,10 @@ fn no_point_of_the_collision_surface_is_bare_with_any_number_of_spheres() {
     let mut last = f64::INFINITY;
     for most in [3, 64, 300] {
         let robot = folder.spherize(&options(most)).unwrap();
-        assert_eq!(robot.links.iter().map(|l| (l.name.as_str(), l.shapes)).collect::<Vec<_>>(), [("arm", 3), ("tip", 3)]);
+        assert_eq!(
+            robot.links.iter().map(|l| (l.name.as_str(), l.shapes)).collect::<Vec<_>>(),
+            [("arm", 3), ("tip", 3)]
+        );
         for link in &robot.links {
             assert!(link.spheres.len() <= most.max(3), "{}: {} of {most}", link.name, link.spheres.len());
             assert_eq!(link.spheres.len(), link.outward.len());
@@ -139,7 +146,11 @@ fn no_point_of_the_collision_surface_is_bare_with_any_number_of_spheres() {
         // one sphere around all, then ever tighter ones
         assert!(worst < last, "{most}: {worst} after {last}");
         last = worst;
-        eprintln!("at most {most}: {:?} spheres, {:.1} mm outside", robot.links.iter().map(|l| l.spheres.len()).collect::<Vec<_>>(), 1e3 * worst);
+        eprintln!(
+            "at most {most}: {:?} spheres, {:.1} mm outside",
+            robot.links.iter().map(|l| l.spheres.len()).collect::<Vec<_>>(),
+            1e3 * worst
+        );
     }
 }
 
@@ -190,7 +201,12 @@ fn all_else_of_the_file_stays() {
     assert!(blocks.len() > 1);
     for block in blocks {
         assert!(block.starts_with("    <collision name=\"block_"), "{block}");
-        assert!(block.contains("group=\"a&amp;b\"") && block.contains("<drake:proximity_properties><drake:mu_static value=\"0.9\"/></drake:proximity_properties>"));
+        assert!(
+            block.contains("group=\"a&amp;b\"")
+                && block.contains(
+                    "<drake:proximity_properties><drake:mu_static value=\"0.9\"/></drake:proximity_properties>"
+                )
+        );
     }
     // a robot of spheres alone is left to the letter
     let again = Folder::new("again", &text);
@@ -232,14 +248,23 @@ fn one_link(shapes: &str) -> String {
 
 #[test]
 fn more_spheres_never_reach_further_and_are_never_too_many() {
-    for (name, shapes) in [("cube", "<box size=\"1 1 1\"/>"), ("cylinder", "<cylinder radius=\"0.05\" length=\"1\"/>")] {
+    for (name, shapes) in [("cube", "<box size=\"1 1 1\"/>"), ("cylinder", "<cylinder radius=\"0.05\" length=\"1\"/>")]
+    {
         let folder = Folder::new(name, &one_link(shapes));
         let tree = TreeSettings { builder: Builder::Grid, ..TreeSettings::default() };
         let mut last = (0, f64::INFINITY);
         for most in [1, 2, 3, 4, 5, 8, 16, 17, 33, 64, 65, 100] {
-            let link = folder.spherize(&SphereOptions { tree, cache: TreeCache::at(folder.0.join("trees")), ..options(most) }).unwrap().links.remove(0);
+            let link = folder
+                .spherize(&SphereOptions { tree, cache: TreeCache::at(folder.0.join("trees")), ..options(most) })
+                .unwrap()
+                .links
+                .remove(0);
             let worst = link.outward.iter().copied().fold(0.0, f64::max);
-            assert!(link.spheres.len() <= most && worst <= last.1, "{name} {most}: {} reach {worst}, {last:?} before", link.spheres.len());
+            assert!(
+                link.spheres.len() <= most && worst <= last.1,
+                "{name} {most}: {} reach {worst}, {last:?} before",
+                link.spheres.len()
+            );
             assert!(most > 5 || link.spheres.len() == most, "{name}: {} of {most}", link.spheres.len());
             last = (link.spheres.len(), worst);
             eprintln!("{name} {most}: {} spheres, {:.2} mm", link.spheres.len(), 1e3 * worst);
@@ -253,9 +278,20 @@ fn the_shape_that_is_covered_worst_gets_the_next_sphere() {
     let folder = Folder::new("rod", &one_link("<box size=\"1 1 0.1\"/>;<cylinder radius=\"0.005\" length=\"1\"/>"));
     for most in [16, 32, 64] {
         let link = folder.spherize(&options(most)).unwrap().links.remove(0);
-        let rod: Vec<f64> = link.spheres.iter().zip(&link.outward).filter(|((c, _), _)| c.xy().norm() < 1e-2).map(|(_, o)| *o).collect();
+        let rod: Vec<f64> = link
+            .spheres
+            .iter()
+            .zip(&link.outward)
+            .filter(|((c, _), _)| c.xy().norm() < 1e-2)
+            .map(|(_, o)| *o)
+            .collect();
         let worst = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
-        assert!(link.spheres.len() == most && rod.len() > 2, "{most}: {} spheres, {} on the rod", link.spheres.len(), rod.len());
+        assert!(
+            link.spheres.len() == most && rod.len() > 2,
+            "{most}: {} spheres, {} on the rod",
+            link.spheres.len(),
+            rod.len()
+        );
         assert!(worst(&rod) < 0.25, "{most}: {rod:?}");
     }
     let error = folder.spherize(&options(1)).unwrap_err().to_string();

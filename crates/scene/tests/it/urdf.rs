@@ -70,7 +70,10 @@ const ARM: &str = r#"<?xml version="1.0"?>
 #[test]
 fn an_arm_means_what_it_says() {
     let arm = read(ARM);
-    assert_eq!((arm.name.as_str(), arm.joints.as_slice()), ("arm", ["shoulder", "slide", "wheel"].map(String::from).as_slice()));
+    assert_eq!(
+        (arm.name.as_str(), arm.joints.as_slice()),
+        ("arm", ["shoulder", "slide", "wheel"].map(String::from).as_slice())
+    );
     let [upper, rod, disc] = arm.model.links() else { panic!("three links move") };
     assert_eq!(upper.placement.translation.vector, Vec3::new(0.0, 0.0, 0.6), "through the fixed mount");
     assert!((upper.placement.rotation * Vec3::x() - Vec3::y()).norm() < 1e-15, "yaw of a quarter turn");
@@ -118,7 +121,11 @@ fn joints_of_several_freedoms_are_stacks() {
     let floating = read(&two("floating", "<origin xyz=\"1 2 3\"/>"));
     assert_eq!(floating.model.links()[0].joint, Joint::Floating);
     assert_eq!(floating.model.links()[0].placement.translation.vector, Vec3::new(1.0, 2.0, 3.0));
-    let root = parse_model(&two("continuous", "").replace("<link name=\"a\"/>", &format!("<link name=\"a\">{BALL}</link>")), "r.urdf", &UrdfOptions { floating: true, ..UrdfOptions::default() });
+    let root = parse_model(
+        &two("continuous", "").replace("<link name=\"a\"/>", &format!("<link name=\"a\">{BALL}</link>")),
+        "r.urdf",
+        &UrdfOptions { floating: true, ..UrdfOptions::default() },
+    );
     assert_eq!(root.unwrap().model.dof(), 7);
 }
 
@@ -132,61 +139,132 @@ fn a_floating_joint_on_a_link_that_moves_is_a_stack() {
 
 #[test]
 fn xml_that_is_not() {
-    told("<robot>\n<link name=\"a\">\n</robot>", &["r.urdf:3:1: XML: expected 'link' tag, not 'robot'; wanted a URDF: an XML document with one element <robot>"]);
-    told("<robot>\n<link", &["r.urdf:2:6: XML: the root node was opened but never closed; wanted a URDF: an XML document with one element <robot>"]);
-    told("", &["r.urdf:1:1: XML: the document does not have a root node; wanted a URDF: an XML document with one element <robot>"]);
+    told(
+        "<robot>\n<link name=\"a\">\n</robot>",
+        &["r.urdf:3:1: XML: expected 'link' tag, not 'robot'; wanted a URDF: an XML document with one element <robot>"],
+    );
+    told(
+        "<robot>\n<link",
+        &[
+            "r.urdf:2:6: XML: the root node was opened but never closed; wanted a URDF: an XML document with one element <robot>",
+        ],
+    );
+    told(
+        "",
+        &[
+            "r.urdf:1:1: XML: the document does not have a root node; wanted a URDF: an XML document with one element <robot>",
+        ],
+    );
     told("<sdf/>", &["r.urdf:1:1: <sdf> is the outermost element; wanted <robot>"]);
     told("<robot/>", &["r.urdf:1:1: <robot> has 0 links; wanted 1 to 10000"]);
-    told("<!DOCTYPE r [<!ENTITY a \"b\">]><robot/>", &["r.urdf:1:1: XML: XML with DTD detected; wanted a URDF: an XML document with one element <robot>"]);
+    told(
+        "<!DOCTYPE r [<!ENTITY a \"b\">]><robot/>",
+        &["r.urdf:1:1: XML: XML with DTD detected; wanted a URDF: an XML document with one element <robot>"],
+    );
 }
 
 #[test]
 fn trees_that_are_none() {
-    let joint = |name: &str, parent: &str, child: &str| format!("<joint name=\"{name}\" type=\"fixed\"><parent link=\"{parent}\"/><child link=\"{child}\"/></joint>\n");
+    let joint = |name: &str, parent: &str, child: &str| {
+        format!("<joint name=\"{name}\" type=\"fixed\"><parent link=\"{parent}\"/><child link=\"{child}\"/></joint>\n")
+    };
     let robot = |links: &[&str], joints: &str| {
         let links: String = links.iter().map(|name| format!("<link name=\"{name}\">{BALL}</link>\n")).collect();
         format!("<robot>\n{links}{joints}</robot>")
     };
-    told(&robot(&["a", "b"], &joint("j", "a", "c")), &["r.urdf:4:61: `link` of the child of joint \"j\" is \"c\"; wanted the name of a link; did you mean \"a\"?"]);
-    told(&robot(&["a", "b"], ""), &["r.urdf:3:1: link \"b\" is the child of no joint, and neither is \"a\"; wanted one root that all others hang on"]);
-    told(&robot(&["a", "b", "c"], &(joint("j", "b", "c") + &joint("k", "c", "b"))), &["r.urdf:5:1: joint \"j\" is part of a loop of joints; wanted a tree with one root"]);
-    told(&robot(&["a", "b", "c"], &(joint("j", "a", "c") + &joint("k", "b", "c"))), &[
-        "r.urdf:3:1: link \"b\" is the child of no joint, and neither is \"a\"; wanted one root that all others hang on",
-        "r.urdf:6:1: joint \"k\" has the child \"c\", which joint \"j\" at line 5 has too; wanted one joint for each link; loops are closed by closures of a scene",
-    ]);
-    told(&robot(&["a", "a"], ""), &["r.urdf:3:1: there is a second link \"a\"; the first is at line 2; wanted a name that no other link has"]);
-    told(&robot(&["a"], "<joint name=\"j\" type=\"hinge\"><parent link=\"a\"/></joint>"), &[
-        "r.urdf:3:1: joint \"j\" has no <child>; wanted <child link=\"NAME\"/>",
-        "r.urdf:3:23: `type` of joint \"j\" is \"hinge\"; wanted revolute, continuous, prismatic, fixed, floating, planar or spherical",
-    ]);
+    told(
+        &robot(&["a", "b"], &joint("j", "a", "c")),
+        &["r.urdf:4:61: `link` of the child of joint \"j\" is \"c\"; wanted the name of a link; did you mean \"a\"?"],
+    );
+    told(
+        &robot(&["a", "b"], ""),
+        &[
+            "r.urdf:3:1: link \"b\" is the child of no joint, and neither is \"a\"; wanted one root that all others hang on",
+        ],
+    );
+    told(
+        &robot(&["a", "b", "c"], &(joint("j", "b", "c") + &joint("k", "c", "b"))),
+        &["r.urdf:5:1: joint \"j\" is part of a loop of joints; wanted a tree with one root"],
+    );
+    told(
+        &robot(&["a", "b", "c"], &(joint("j", "a", "c") + &joint("k", "b", "c"))),
+        &[
+            "r.urdf:3:1: link \"b\" is the child of no joint, and neither is \"a\"; wanted one root that all others hang on",
+            "r.urdf:6:1: joint \"k\" has the child \"c\", which joint \"j\" at line 5 has too; wanted one joint for each link; loops are closed by closures of a scene",
+        ],
+    );
+    told(
+        &robot(&["a", "a"], ""),
+        &["r.urdf:3:1: there is a second link \"a\"; the first is at line 2; wanted a name that no other link has"],
+    );
+    told(
+        &robot(&["a"], "<joint name=\"j\" type=\"hinge\"><parent link=\"a\"/></joint>"),
+        &[
+            "r.urdf:3:1: joint \"j\" has no <child>; wanted <child link=\"NAME\"/>",
+            "r.urdf:3:23: `type` of joint \"j\" is \"hinge\"; wanted revolute, continuous, prismatic, fixed, floating, planar or spherical",
+        ],
+    );
 }
 
 #[test]
 fn wrong_numbers() {
-    told(&two("revolute", ""), &["r.urdf:4:1: joint \"j\" has no <limit>; wanted <limit lower upper effort velocity/>, or type=\"continuous\" for a hinge without limits"]);
-    told(&two("revolute", "<limit lower=\"1\" upper=\"-1\"/>"), &["r.urdf:4:82: `lower` of the limit of joint \"j\" is \"1\"; wanted at most `upper`, -1"]);
-    told(&two("continuous", "<axis xyz=\"0 0 0\"/>"), &["r.urdf:4:81: `xyz` of the axis of joint \"j\" is \"0 0 0\"; wanted a direction: three numbers, not all 0"]);
-    told(&two("continuous", "<origin xyz=\"0 nan 0\"/>"), &[
-        "r.urdf:4:83: `xyz` of the origin of joint \"j\" is \"0 nan 0\"; wanted 3 numbers with blanks between; each a finite number from -1e12 to 1e12",
-    ]);
-    told(&two("continuous", "<origin rpy=\"0 0\"/>"), &[
-        "r.urdf:4:83: `rpy` of the origin of joint \"j\" is \"0 0\"; wanted 3 numbers with blanks between; each a finite number from -1e12 to 1e12",
-    ]);
-    told(&two("continuous", "").replace("value=\"2\"", "value=\"-2\""), &["r.urdf:3:39: `value` of the mass of the inertial of link \"b\" is \"-2\"; wanted a number of at least 0"]);
-    told(&two("continuous", "").replace("iyy=\"1\"", "iyy=\"one\""), &[
-        "r.urdf:3:65: `iyy` of the inertia of the inertial of link \"b\" is \"one\"; wanted a finite number from -1e12 to 1e12",
-    ]);
-    told(&two("continuous", "<mimic joint=\"k\"/>"), &["r.urdf:4:70: joint \"j\" mimics \"k\"; wanted the name of another joint"]);
-    told(&two("continuous", "").replace(BALL, ""), &[
-        "r.urdf:4:1: \"j\" moves link \"b\", and neither that nor what hangs on it has a mass; wanted <inertial> in one of them, or a fixed joint",
-    ]);
+    told(
+        &two("revolute", ""),
+        &[
+            "r.urdf:4:1: joint \"j\" has no <limit>; wanted <limit lower upper effort velocity/>, or type=\"continuous\" for a hinge without limits",
+        ],
+    );
+    told(
+        &two("revolute", "<limit lower=\"1\" upper=\"-1\"/>"),
+        &["r.urdf:4:82: `lower` of the limit of joint \"j\" is \"1\"; wanted at most `upper`, -1"],
+    );
+    told(
+        &two("continuous", "<axis xyz=\"0 0 0\"/>"),
+        &["r.urdf:4:81: `xyz` of the axis of joint \"j\" is \"0 0 0\"; wanted a direction: three numbers, not all 0"],
+    );
+    told(
+        &two("continuous", "<origin xyz=\"0 nan 0\"/>"),
+        &[
+            "r.urdf:4:83: `xyz` of the origin of joint \"j\" is \"0 nan 0\"; wanted 3 numbers with blanks between; each a finite number from -1e12 to 1e12",
+        ],
+    );
+    told(
+        &two("continuous", "<origin rpy=\"0 0\"/>"),
+        &[
+            "r.urdf:4:83: `rpy` of the origin of joint \"j\" is \"0 0\"; wanted 3 numbers with blanks between; each a finite number from -1e12 to 1e12",
+        ],
+    );
+    told(
+        &two("continuous", "").replace("value=\"2\"", "value=\"-2\""),
+        &["r.urdf:3:39: `value` of the mass of the inertial of link \"b\" is \"-2\"; wanted a number of at least 0"],
+    );
+    told(
+        &two("continuous", "").replace("iyy=\"1\"", "iyy=\"one\""),
+        &[
+            "r.urdf:3:65: `iyy` of the inertia of the inertial of link \"b\" is \"one\"; wanted a finite number from -1e12 to 1e12",
+        ],
+    );
+    told(
+        &two("continuous", "<mimic joint=\"k\"/>"),
+        &["r.urdf:4:70: joint \"j\" mimics \"k\"; wanted the name of another joint"],
+    );
+    told(
+        &two("continuous", "").replace(BALL, ""),
+        &[
+            "r.urdf:4:1: \"j\" moves link \"b\", and neither that nor what hangs on it has a mass; wanted <inertial> in one of them, or a fixed joint",
+        ],
+    );
 }
 
 #[test]
 fn an_inertia_of_no_body_is_mended_and_told() {
-    let robot = read(&two("continuous", "").replace("ixx=\"1\" iyy=\"1\" izz=\"1\"", "ixx=\"-0.5\" iyy=\"1\" izz=\"1\""));
+    let robot =
+        read(&two("continuous", "").replace("ixx=\"1\" iyy=\"1\" izz=\"1\"", "ixx=\"-0.5\" iyy=\"1\" izz=\"1\""));
     assert_eq!(robot.notes.len(), 1);
-    assert_eq!(robot.notes[0], "r.urdf:3: the inertia of the inertial of link \"b\": principal moments below 0 are set to 0");
+    assert_eq!(
+        robot.notes[0],
+        "r.urdf:3: the inertia of the inertial of link \"b\": principal moments below 0 are set to 0"
+    );
     assert!((robot.model.links()[0].mass.inertia - Mat3::from_diagonal(&Vec3::new(0.0, 1.0, 1.0))).amax() < 1e-15);
 }
 
@@ -217,24 +295,39 @@ impl Drop for Folder {
 /// A mesh as the text of an OBJ file, without its last `without` triangles.
 fn obj(mesh: &TriMesh, without: usize) -> String {
     let vertices = mesh.vertices.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
-    let faces = mesh.triangles[..mesh.triangles.len() - without].iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
+    let faces = mesh.triangles[..mesh.triangles.len() - without]
+        .iter()
+        .map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
     vertices.chain(faces).collect()
 }
 
 /// A chain of balls 0.1 m apart on a fixed base, with radii that overlap their second neighbours.
 #[test]
 fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
-    let link = |name: &str, radius: f64| format!("<link name=\"{name}\">{BALL}<collision><geometry><sphere radius=\"{radius}\"/></geometry></collision></link>\n");
+    let link = |name: &str, radius: f64| {
+        format!(
+            "<link name=\"{name}\">{BALL}<collision><geometry><sphere radius=\"{radius}\"/></geometry></collision></link>\n"
+        )
+    };
     let joint = |name: &str, kind: &str, parent: &str, child: &str| {
-        format!("<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0.1 0 0\"/></joint>\n")
+        format!(
+            "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0.1 0 0\"/></joint>\n"
+        )
     };
     let text = format!(
         "<robot name=\"r\">\n{}{}{}{}{}{}{}{}</robot>",
-        link("base", 0.04), link("a", 0.04), link("b", 0.12), link("c", 0.04), link("d", 0.09),
-        joint("j", "continuous", "base", "a") + &joint("k", "planar", "a", "b"), joint("l", "continuous", "b", "c"), joint("m", "continuous", "c", "d"),
+        link("base", 0.04),
+        link("a", 0.04),
+        link("b", 0.12),
+        link("c", 0.04),
+        link("d", 0.09),
+        joint("j", "continuous", "base", "a") + &joint("k", "planar", "a", "b"),
+        joint("l", "continuous", "b", "c"),
+        joint("m", "continuous", "c", "d"),
     );
     let folder = Folder::new("overlap");
-    let (body, notes) = load(folder.write("r.urdf", &text), &UrdfOptions { floating: true, ..UrdfOptions::default() }).unwrap();
+    let (body, notes) =
+        load(folder.write("r.urdf", &text), &UrdfOptions { floating: true, ..UrdfOptions::default() }).unwrap();
     let first = body.model().links().len() + 1;
     let collidable = body.collidable().unwrap();
     let meet = |a: usize, b: usize| collidable.parts_meet(first + a, first + b);
@@ -257,14 +350,23 @@ fn meshes_are_found_by_package_path_and_uri() {
     let folder = Folder::new("found");
     let box_ = TriMesh::box_(Vec3::new(0.5, 1.0, 1.5)).translated(&Vec3::new(1.0, 0.0, 0.0));
     let mesh = folder.write("my_robot/meshes/box.obj", &obj(&box_, 0));
-    let elsewhere = UrdfOptions { packages: [("other".to_owned(), folder.0.join("my_robot"))].into(), ..UrdfOptions::default() };
-    for uri in ["package://my_robot/meshes/box.obj", "../meshes/box.obj", &format!("file://{}", mesh.display()), "package://other/meshes/box.obj"] {
+    let elsewhere =
+        UrdfOptions { packages: [("other".to_owned(), folder.0.join("my_robot"))].into(), ..UrdfOptions::default() };
+    for uri in [
+        "package://my_robot/meshes/box.obj",
+        "../meshes/box.obj",
+        &format!("file://{}", mesh.display()),
+        "package://other/meshes/box.obj",
+    ] {
         let path = folder.write("my_robot/urdf/r.urdf", &with_meshes(uri, "2 2 -2", uri));
         let (body, notes) = load(path, &elsewhere).unwrap_or_else(|error| panic!("{uri}: {error}"));
         assert_eq!(notes, Vec::<String>::new());
         let Some(Shape::Mesh(shape)) = body.collidable().unwrap().shape(2) else { panic!("a mesh") };
         assert!((shape.volume() - 8.0 * 6.0).abs() < 1e-9, "scaled by 2 and not inside out, though mirrored");
-        assert!((body.part_pose(2).translation.vector - Vec3::new(2.0, 0.0, 0.0)).norm() < 1e-12, "the centre of the scaled box");
+        assert!(
+            (body.part_pose(2).translation.vector - Vec3::new(2.0, 0.0, 0.0)).norm() < 1e-12,
+            "the centre of the scaled box"
+        );
     }
 }
 
@@ -281,19 +383,33 @@ fn meshes_that_are_missing_open_or_in_another_format() {
     let path = file("nowhere.stl", "open.obj");
     let error = load(&path, &UrdfOptions::default()).err().unwrap().to_string();
     assert!(error.starts_with(&format!("{}:2:", path.display())), "{error}");
-    assert!(error.contains("nowhere.stl\" cannot be collided with: there is no file") && error.ends_with("missing_meshes = \"skip\" (--missing-meshes skip) leaves it out"), "{error}");
+    assert!(
+        error.contains("nowhere.stl\" cannot be collided with: there is no file")
+            && error.ends_with("missing_meshes = \"skip\" (--missing-meshes skip) leaves it out"),
+        "{error}"
+    );
     let (body, notes) = load(&path, &skip).unwrap();
     assert_eq!(body.collidable().unwrap().parts(), 2, "a link and the base");
     assert_eq!(notes, [format!("{}:2: collision mesh nowhere.stl: left out: there is no such file", path.display())]);
-    let Some(Shape::Mesh(drawn)) = body.renderable().unwrap().visuals().first().map(|v| v.shape.clone()) else { panic!("a picture") };
+    let Some(Shape::Mesh(drawn)) = body.renderable().unwrap().visuals().first().map(|v| v.shape.clone()) else {
+        panic!("a picture")
+    };
     assert_eq!(drawn.mesh().triangles.len(), 4 * (320 - 40), "an open surface is drawn with its hole");
 
     let path = file("open.obj", "ball.mesh");
     let (body, notes) = load(&path, &UrdfOptions::default()).unwrap();
     let Some(Shape::Mesh(hull)) = body.collidable().unwrap().shape(2) else { panic!("a mesh") };
-    assert!(hull.volume() > 0.9 * ball.signed_volume() && hull.volume() < ball.signed_volume() * (1.0 + 1e-6), "the hull of most of a ball");
+    assert!(
+        hull.volume() > 0.9 * ball.signed_volume() && hull.volume() < ball.signed_volume() * (1.0 + 1e-6),
+        "the hull of most of a ball"
+    );
     assert_eq!(notes.len(), 2, "{notes:?}");
-    assert!(notes[0].ends_with("visual mesh ball.mesh: left out: the format 'mesh' is not read, only .stl, .obj, .ply and .dae"), "{notes:?}");
+    assert!(
+        notes[0].ends_with(
+            "visual mesh ball.mesh: left out: the format 'mesh' is not read, only .stl, .obj, .ply and .dae"
+        ),
+        "{notes:?}"
+    );
     assert!(notes[1].ends_with("open.obj: its surface is not closed, so its convex hull collides"), "{notes:?}");
     assert_eq!(body.renderable().unwrap().visuals().len(), 1, "what collides is drawn instead");
 

@@ -57,11 +57,17 @@ impl Bodies {
                 let body = if drawn { body } else { body.drawn_as(Vec::new()) };
                 world.add_boxed(Box::new(body), Mode::Kinematic).map_err(|e| failed(&e))
             };
-            let capsule = Shape::capsule(RADIUS_M * viewer.scale, half_length(user) * viewer.scale).map_err(|e| failed(&e))?;
+            let capsule =
+                Shape::capsule(RADIUS_M * viewer.scale, half_length(user) * viewer.scale).map_err(|e| failed(&e))?;
             let capsule = add(format!("user {k}"), capsule, upright(viewer, user), false)?;
             let mut hand = |side: usize| {
                 let ball = Shape::sphere(HAND_RADIUS_M * viewer.scale).map_err(|e| failed(&e))?;
-                add(format!("user {k} {} hand", SIDES[side].0), ball, in_scene(viewer, &wanted(user, side, Hand::Hanging)), true)
+                add(
+                    format!("user {k} {} hand", SIDES[side].0),
+                    ball,
+                    in_scene(viewer, &wanted(user, side, Hand::Hanging)),
+                    true,
+                )
             };
             bodies.0.push(Limbs { capsule, hands: [hand(0)?, hand(1)?] });
         }
@@ -74,12 +80,23 @@ impl Bodies {
     }
 
     /// Takes them along for the next step of `dt` seconds; `hands` by user.
-    pub fn follow(&self, viewer: &Viewer, hands: impl Fn(usize) -> [Hand; 2], world: &mut World, dt: f64) -> Result<(), WorldError> {
+    pub fn follow(
+        &self,
+        viewer: &Viewer,
+        hands: impl Fn(usize) -> [Hand; 2],
+        world: &mut World,
+        dt: f64,
+    ) -> Result<(), WorldError> {
         for (k, (limbs, user)) in self.0.iter().zip(&viewer.users).enumerate() {
             advance(world, limbs.capsule, upright(viewer, user), MOST_M_PER_S * viewer.scale * dt)?;
             for (side, hand) in hands(k).into_iter().enumerate() {
                 let most = if matches!(hand, Hand::Tracked(_)) { MOST_M_PER_S } else { REACH_M_PER_S };
-                advance(world, limbs.hands[side], in_scene(viewer, &wanted(user, side, hand)), most * viewer.scale * dt)?;
+                advance(
+                    world,
+                    limbs.hands[side],
+                    in_scene(viewer, &wanted(user, side, hand)),
+                    most * viewer.scale * dt,
+                )?;
             }
         }
         Ok(())
@@ -112,7 +129,8 @@ fn wanted(user: &User, side: usize, hand: Hand) -> Pose {
         _ => {
             let right = head.rotation * Vec3::x();
             let level = Vec3::new(right.x, right.y, 0.0);
-            level * (SIDES[side].1 * aside / level.norm().max(1e-3)) + Vec3::new(0.0, 0.0, above.max(0.1 - head.translation.z))
+            level * (SIDES[side].1 * aside / level.norm().max(1e-3))
+                + Vec3::new(0.0, 0.0, above.max(0.1 - head.translation.z))
         }
     };
     Pose::from_parts((head.translation.vector + offset).into(), head.rotation)

@@ -79,35 +79,64 @@ pub fn seats(cave: &Cave, preview: bool) -> Vec<Seat> {
 
 impl Crew {
     /// Starts the facets of this machine, if there is a launcher, and says how the others are started.
-    pub fn start(serve: &ServeOptions, cave: &Cave, launcher: Option<&CaveOptions>, address: &Address, signals: &Signals) -> Result<Crew, Failure> {
-        let mut crew = Crew { members: Vec::new(), restart: launcher.is_some_and(|l| l.restart), quiet: serve.quiet, signals: signals.clone() };
+    pub fn start(
+        serve: &ServeOptions,
+        cave: &Cave,
+        launcher: Option<&CaveOptions>,
+        address: &Address,
+        signals: &Signals,
+    ) -> Result<Crew, Failure> {
+        let mut crew = Crew {
+            members: Vec::new(),
+            restart: launcher.is_some_and(|l| l.restart),
+            quiet: serve.quiet,
+            signals: signals.clone(),
+        };
         for (k, seat) in seats(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
             let far = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
             let seen = far.map_or_else(|| Some(address.clone()), |node| seen_by(node, address));
             match (launcher, far) {
                 (Some(_), Some(node)) if seen.is_none() && !node.launch.is_empty() => {
-                    let why = format!("{} cannot be reached from here, so the address at which its facets would find this machine is not known; name it with --listen ADDR:PORT", node.address);
+                    let why = format!(
+                        "{} cannot be reached from here, so the address at which its facets would find this machine is not known; name it with --listen ADDR:PORT",
+                        node.address
+                    );
                     return Err(Failure::input(format!("node {}: {why}", node.name)));
                 }
                 (Some(launcher), None) => {
                     let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
                     let words = led(launcher, &seat.name, address).into_iter().map(OsString::from);
-                    crew.members.push(Member::new(k, &seat.name, std::iter::once(program.into_os_string()).chain(words).collect()));
+                    crew.members.push(Member::new(
+                        k,
+                        &seat.name,
+                        std::iter::once(program.into_os_string()).chain(words).collect(),
+                    ));
                 }
                 (Some(launcher), Some(node)) if !node.launch.is_empty() => {
                     let words = launch(node, &seat.name, &led(launcher, &seat.name, seen.as_ref().unwrap_or(address)));
-                    crew.say(&format!("facet {}: starting it on {}: {}", seat.name, node.name, words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" ")));
+                    crew.say(&format!(
+                        "facet {}: starting it on {}: {}",
+                        seat.name,
+                        node.name,
+                        words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" ")
+                    ));
                     crew.members.push(Member::new(k, &seat.name, words.into_iter().map(OsString::from).collect()));
                 }
                 (_, node) => {
                     let server = match (&seen, address) {
                         (Some(Address::Udp(at)), _) if node.is_some() => format!(" --server {at}"),
-                        (None, Address::Udp(at)) => format!(" --server ADDR:{} with this machine's address as that one sees it", at.port()),
+                        (None, Address::Udp(at)) => {
+                            format!(" --server ADDR:{} with this machine's address as that one sees it", at.port())
+                        }
                         _ => String::new(),
                     };
                     let place = node.map_or("here".to_owned(), |n| format!("on {} ({})", n.name, n.address));
                     let what = stage_args(serve).iter().map(|a| quoted(a)).collect::<Vec<_>>().join(" ");
-                    crew.say(&format!("facet {}: start it {place}: tumble facet {what} --facet {}{server}", seat.name, quoted(&seat.name)));
+                    crew.say(&format!(
+                        "facet {}: start it {place}: tumble facet {what} --facet {}{server}",
+                        seat.name,
+                        quoted(&seat.name)
+                    ));
                 }
             }
         }
@@ -128,18 +157,31 @@ impl Crew {
                 member.over = status.success() || !self.restart;
                 let title = format!("facet {}", member.name);
                 if joining {
-                    return Err(Failure::run(&title, format!("ended before the start ({}); what it said stands above", told(status))));
+                    return Err(Failure::run(
+                        &title,
+                        format!("ended before the start ({}); what it said stands above", told(status)),
+                    ));
                 }
-                self.say(&if status.success() { format!("{title} has left") } else { format!("{title} ended ({})", told(status)) });
+                self.say(&if status.success() {
+                    format!("{title} has left")
+                } else {
+                    format!("{title} ended ({})", told(status))
+                });
             }
             let member = &mut self.members[k];
             member.restarts.retain(|at| at.elapsed() < MINUTE);
-            let hasty = |ended: Instant| member.restarts.back().is_some_and(|began| ended.duration_since(*began) < HASTE);
-            let due = member.ended.is_some_and(|at| !hasty(at) || at.elapsed() >= PAUSE) && member.child.is_none() && !member.over;
+            let hasty =
+                |ended: Instant| member.restarts.back().is_some_and(|began| ended.duration_since(*began) < HASTE);
+            let due = member.ended.is_some_and(|at| !hasty(at) || at.elapsed() >= PAUSE)
+                && member.child.is_none()
+                && !member.over;
             if due {
                 if member.restarts.len() >= MOST_RESTARTS {
                     member.over = true;
-                    let text = format!("facet {} ended {MOST_RESTARTS} times within a minute and is not started again", member.name);
+                    let text = format!(
+                        "facet {} ended {MOST_RESTARTS} times within a minute and is not started again",
+                        member.name
+                    );
                     self.say(&text);
                     continue;
                 }
@@ -165,7 +207,8 @@ impl Crew {
     /// Errors: a facet has ended by a failure of its own, and was not started again.
     pub fn end(&mut self, begun: bool) -> Result<(), Failure> {
         self.wait(if begun { GRACE } else { LAST_GRACE / 2 });
-        let faults: Vec<String> = self.members.iter().filter_map(|m| Some(format!("{} ({})", m.name, m.fault.as_ref()?))).collect();
+        let faults: Vec<String> =
+            self.members.iter().filter_map(|m| Some(format!("{} ({})", m.name, m.fault.as_ref()?))).collect();
         // who has not heard it finds its pipe closed
         self.members.iter_mut().filter_map(|m| m.child.as_mut()).for_each(|child| drop(child.stdin.take()));
         self.wait(LAST_GRACE);
@@ -183,7 +226,10 @@ impl Crew {
         }
         match faults.is_empty() {
             true => Ok(()),
-            false => Err(Failure::run("the facets", format!("{} ended by a failure; what it said stands above", faults.join(", ")))),
+            false => Err(Failure::run(
+                "the facets",
+                format!("{} ended by a failure; what it said stands above", faults.join(", ")),
+            )),
         }
     }
 
@@ -230,7 +276,17 @@ impl Drop for Crew {
 
 impl Member {
     fn new(seat: usize, name: &str, command: Vec<OsString>) -> Member {
-        Member { seat: seat as FacetNumber, name: name.to_owned(), command, child: None, ended: None, over: false, failed: false, fault: None, restarts: VecDeque::new() }
+        Member {
+            seat: seat as FacetNumber,
+            name: name.to_owned(),
+            command,
+            child: None,
+            ended: None,
+            over: false,
+            failed: false,
+            fault: None,
+            restarts: VecDeque::new(),
+        }
     }
 
     /// How it ended, if it did since the last look.
@@ -248,7 +304,9 @@ impl Member {
 /// The server's address, as a node reaches it; `None` where there is no way to the node.
 fn seen_by(node: &Node, address: &Address) -> Option<Address> {
     match *address {
-        Address::Udp(at) if at.ip().is_unspecified() => seen_from(&node.address, at.port()).map(|ip| Address::Udp((ip, at.port()).into())),
+        Address::Udp(at) if at.ip().is_unspecified() => {
+            seen_from(&node.address, at.port()).map(|ip| Address::Udp((ip, at.port()).into()))
+        }
         _ => Some(address.clone()),
     }
 }
@@ -258,7 +316,12 @@ fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
     let line = arguments.iter().map(|a| quoted(a)).collect::<Vec<_>>().join(" ");
     let fill = |word: &String| match word.as_str() {
         "{arguments}" => arguments.to_vec(),
-        _ => vec![word.replace("{address}", &node.address).replace("{node}", &node.name).replace("{facet}", facet).replace("{line}", &line)],
+        _ => vec![
+            word.replace("{address}", &node.address)
+                .replace("{node}", &node.name)
+                .replace("{facet}", facet)
+                .replace("{line}", &line),
+        ],
     };
     node.launch.iter().flat_map(fill).collect()
 }
@@ -267,13 +330,19 @@ fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
 fn led(launcher: &CaveOptions, name: &str, address: &Address) -> Vec<String> {
     let mut args = vec!["facet".to_owned()];
     args.extend(stage_args(&launcher.serve));
-    if name == PREVIEW && launcher.preview { args.push("--preview".into()) } else { args.extend(["--facet".into(), name.to_owned()]) }
+    if name == PREVIEW && launcher.preview {
+        args.push("--preview".into())
+    } else {
+        args.extend(["--facet".into(), name.to_owned()])
+    }
     args.extend(match address {
         Address::Memory(run) => ["--run".into(), run.clone()],
         Address::Udp(server) => ["--server".into(), local(*server).to_string()],
     });
     let draw = &launcher.draw;
-    let folder = |option: &str, path: &Option<std::path::PathBuf>| path.iter().flat_map(|p| [option.to_owned(), p.display().to_string()]).collect::<Vec<_>>();
+    let folder = |option: &str, path: &Option<std::path::PathBuf>| {
+        path.iter().flat_map(|p| [option.to_owned(), p.display().to_string()]).collect::<Vec<_>>()
+    };
     args.extend(folder("--frames-dir", &draw.frames_dir));
     args.extend(folder("--log-dir", &draw.log_dir));
     args.extend(draw.quality.iter().flat_map(|q| ["--quality".to_owned(), q.to_string()]));
@@ -304,7 +373,11 @@ fn local(at: std::net::SocketAddr) -> std::net::SocketAddr {
 /// As a shell takes it.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:".contains(c);
-    if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
 }
 
 fn told(status: ExitStatus) -> String {
@@ -318,6 +391,7 @@ fn told(status: ExitStatus) -> String {
 
 /// What carries the frames: as the command line says, else the cave.
 pub fn carrier(serve: &ServeOptions, cave: &Cave) -> Carrier {
-    let of_cave = if cave.sync.transport == tumble::scene::cave::Transport::Udp { Carrier::Udp } else { Carrier::SharedMemory };
+    let of_cave =
+        if cave.sync.transport == tumble::scene::cave::Transport::Udp { Carrier::Udp } else { Carrier::SharedMemory };
     serve.transport.unwrap_or(of_cave)
 }

@@ -22,7 +22,8 @@ impl Devices {
     /// As files and command line say, for a scene of this hash.
     pub fn open(options: &ServeOptions, cave: &Cave, scene: [u8; 32], simulating: bool) -> Result<Devices, Failure> {
         let played = options.input_from.as_ref().map(|path| Played::open(path, scene)).transpose()?;
-        let wanted = described(cave, options.tracker, &options.tracker_from)?.filter(|_| played.is_none() && simulating);
+        let wanted =
+            described(cave, options.tracker, &options.tracker_from)?.filter(|_| played.is_none() && simulating);
         let tracker = wanted.as_ref().map(Heard::open).transpose()?;
         if let (Some(heard), Some(tracker), false) = (&tracker, &wanted, options.quiet) {
             eprintln!("{}", heard.describe(tracker));
@@ -50,7 +51,10 @@ impl Devices {
     }
 
     /// What was recorded as done from this frame to the next; `simulated` is asked for only where there is a recording.
-    pub fn after(&mut self, simulated: impl FnOnce() -> Option<Recorded>) -> Result<Vec<(FacetNumber, Input)>, Failure> {
+    pub fn after(
+        &mut self,
+        simulated: impl FnOnce() -> Option<Recorded>,
+    ) -> Result<Vec<(FacetNumber, Input)>, Failure> {
         match &mut self.played {
             Some(played) => simulated().map_or(Ok(Vec::new()), |recorded| played.after(&recorded)),
             None => Ok(Vec::new()),

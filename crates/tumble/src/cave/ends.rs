@@ -6,7 +6,9 @@ use std::net::{SocketAddr, UdpSocket};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use tumble::net::sync::shm::{ShmFacet, ShmServer};
-use tumble::net::sync::transport::{Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, Message, ServerLink};
+use tumble::net::sync::transport::{
+    Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, Message, ServerLink,
+};
 use tumble::net::sync::udp::{SharedKey, Timing, UdpFacet, UdpServer};
 use tumble::scene::cave::Cave;
 
@@ -68,7 +70,12 @@ impl FacetEnd {
     pub fn open(address: &Address, facet: FacetNumber, setting: &Setting, again: bool) -> Result<FacetEnd, Failure> {
         let link = Link::open(address, facet, &setting.cave)?;
         let looking = || Looking {
-            place: setting.place.clone(), cave: setting.cave.clone(), facet, address: address.clone(), connected: false, asked: Instant::now(),
+            place: setting.place.clone(),
+            cave: setting.cave.clone(),
+            facet,
+            address: address.clone(),
+            connected: false,
+            asked: Instant::now(),
         };
         Ok(FacetEnd { link, looking: again.then(looking) })
     }
@@ -92,8 +99,12 @@ impl Link {
     fn open(address: &Address, facet: FacetNumber, cave: &Cave) -> Result<Link, Failure> {
         let failed = |e: LinkError| Failure::run("the connection to the server", e);
         Ok(match address {
-            Address::Memory(run) => Link::Shm(Box::new(ShmFacet::new(run, facet).map_err(failed)?.silent_after(silence(cave)))),
-            Address::Udp(server) => Link::Udp(Box::new(UdpFacet::connect(*server, facet, key(cave)?, timing(cave)).map_err(failed)?)),
+            Address::Memory(run) => {
+                Link::Shm(Box::new(ShmFacet::new(run, facet).map_err(failed)?.silent_after(silence(cave))))
+            }
+            Address::Udp(server) => {
+                Link::Udp(Box::new(UdpFacet::connect(*server, facet, key(cave)?, timing(cave)).map_err(failed)?))
+            }
         })
     }
 }
@@ -131,7 +142,11 @@ impl ServerLink for ServerEnd {
         }
     }
 
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
+    fn recv(
+        &mut self,
+        timeout: Duration,
+        message: &mut Vec<u8>,
+    ) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
         match self {
             ServerEnd::Shm(link) => link.recv(timeout, message),
             ServerEnd::Udp(link) => link.recv(timeout, message),

@@ -29,17 +29,24 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let leader = options.led.then(watch_stdin).transpose()?;
     let setting = Setting::load(&options.stage, |_| {})?;
     let described = options.facet.as_deref().map(|name| setting.cave.facet(name).cloned()).transpose()?;
-    let number = described.as_ref().map_or(0, |facet| setting.cave.facets.iter().position(|f| f.name == facet.name).unwrap_or(0)) as FacetNumber;
+    let number = described
+        .as_ref()
+        .map_or(0, |facet| setting.cave.facets.iter().position(|f| f.name == facet.name).unwrap_or(0))
+        as FacetNumber;
     let name = seat_name(described.as_ref()).to_owned();
     let draw = &options.draw;
-    let offscreen = draw.no_pictures || draw.offscreen || described.as_ref().is_some_and(|f| f.output == Output::Offscreen) || no_desktop(&name);
+    let offscreen = draw.no_pictures
+        || draw.offscreen
+        || described.as_ref().is_some_and(|f| f.output == Output::Offscreen)
+        || no_desktop(&name);
     let (mut painter, mut parts) = (None, None);
     match (draw.no_pictures, offscreen) {
         (true, _) => {}
         (false, true) => painter = Some(Painter::new(&setting, described.as_ref(), draw.quality)?),
         (false, false) => parts = Some(Parts::new(&setting, described.as_ref(), draw.quality)?),
     }
-    let mut watch = Watch { name: name.clone(), signals, leader, patience: Duration::from_secs_f64(options.wait), sealed: false };
+    let mut watch =
+        Watch { name: name.clone(), signals, leader, patience: Duration::from_secs_f64(options.wait), sealed: false };
     let address = address(options, &setting, &watch)?;
     watch.sealed = matches!(address, Address::Udp(_));
     let again = options.server.is_none() && options.run.is_none();
@@ -51,7 +58,16 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
         (None, None) => None,
     };
     let facet = Facet::new(link, told, setting.world);
-    let mut running = Running { facet, painter, log, stamp: draw.stamp, watch, alone: Alone::default(), drawing: None, picture: None };
+    let mut running = Running {
+        facet,
+        painter,
+        log,
+        stamp: draw.stamp,
+        watch,
+        alone: Alone::default(),
+        drawing: None,
+        picture: None,
+    };
     let outcome = match parts {
         Some(parts) => parts.show(&mut running, draw.stamp),
         None => running.go(),
@@ -66,7 +82,9 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
 fn no_desktop(name: &str) -> bool {
     match desktop() {
         Desktop::There => return false,
-        Desktop::Silent(why) => eprintln!("facet {name}: draws into memory, because the desktop does not answer ({why})"),
+        Desktop::Silent(why) => {
+            eprintln!("facet {name}: draws into memory, because the desktop does not answer ({why})")
+        }
         Desktop::None => {}
     }
     true
@@ -77,7 +95,11 @@ fn told(setting: &Setting, name: &str) -> Result<Told, Failure> {
     let seed = Entropy::system().map_err(|e| Failure::run("the facet", e))?.next_u64();
     let sync = &setting.cave.sync;
     let pace = if sync.mode == Mode::Lockstep { Pace::Lockstep } else { Pace::Latest };
-    Ok(Told { pace, drop_after: Duration::from_millis(sync.drop_timeout_ms.into()), ..Told::new(name, setting.joined, seed) })
+    Ok(Told {
+        pace,
+        drop_after: Duration::from_millis(sync.drop_timeout_ms.into()),
+        ..Told::new(name, setting.joined, seed)
+    })
 }
 
 /// Where the server is: as the command line says, or as the run that goes on here says, which is waited for.
@@ -100,7 +122,10 @@ fn address(options: &FacetOptions, setting: &Setting, watch: &Watch) -> Result<A
         if Instant::now() > until {
             let far = setting.cave.nodes.iter().any(|n| !n.is_local());
             let hint = if far { "; on another machine say where it is with --server ADDR:PORT" } else { "" };
-            return Err(Failure::run(&watch.title(), format!("no run goes on in {} on this machine, {:.0} s long{hint}", setting.cave.file, options.wait)));
+            return Err(Failure::run(
+                &watch.title(),
+                format!("no run goes on in {} on this machine, {:.0} s long{hint}", setting.cave.file, options.wait),
+            ));
         }
         if !std::mem::replace(&mut said, true) {
             watch.say(&format!("waits for a run in {}", setting.cave.file));
@@ -168,12 +193,24 @@ impl Alone {
         let (_, since) = *self.since.filter(|(before, _)| *before == why).get_or_insert((why, Instant::now()));
         self.since = Some((why, since));
         if since.elapsed() > watch.patience {
-            let what = if why == Waiting::Lost { "the server is lost and did not come back" } else { "no server answers" };
-            let key = if watch.sealed { "; a server that has another key file looks like this, too: compare them" } else { "" };
-            return Err(Failure::run(&watch.title(), format!("{what}, {:.0} s long{key}", watch.patience.as_secs_f64())));
+            let what =
+                if why == Waiting::Lost { "the server is lost and did not come back" } else { "no server answers" };
+            let key = if watch.sealed {
+                "; a server that has another key file looks like this, too: compare them"
+            } else {
+                ""
+            };
+            return Err(Failure::run(
+                &watch.title(),
+                format!("{what}, {:.0} s long{key}", watch.patience.as_secs_f64()),
+            ));
         }
         if !self.said && (why == Waiting::Lost || since.elapsed() > MOMENT) {
-            watch.say(if why == Waiting::Lost { "has lost its server, keeps the last picture and looks for it" } else { "waits for the server" });
+            watch.say(if why == Waiting::Lost {
+                "has lost its server, keeps the last picture and looks for it"
+            } else {
+                "waits for the server"
+            });
             self.said = true;
         }
         Ok(())
@@ -219,7 +256,9 @@ impl Running {
         let task = self.facet.next(timeout).map_err(failed)?;
         self.alone.look(&task, &self.watch)?;
         match task {
-            Task::Over(Over::Refused(why)) => Err(Failure::input(format!("facet {}: the server refuses it: {why}", self.watch.name))),
+            Task::Over(Over::Refused(why)) => {
+                Err(Failure::input(format!("facet {}: the server refuses it: {why}", self.watch.name)))
+            }
             Task::Over(_) => Ok(None),
             task => Ok(Some(task)),
         }

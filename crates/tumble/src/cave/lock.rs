@@ -37,7 +37,14 @@ impl Run {
     pub fn here(scene: &str, cave: &str) -> Run {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let pid = std::process::id() as i32;
-        Run { pid, scene: scene.into(), cave: cave.into(), since_unix_s: since.as_secs(), began: began(pid).unwrap_or(0), address: None }
+        Run {
+            pid,
+            scene: scene.into(),
+            cave: cave.into(),
+            since_unix_s: since.as_secs(),
+            began: began(pid).unwrap_or(0),
+            address: None,
+        }
     }
 
     /// Whether the process that it names is the one that wrote it.
@@ -70,9 +77,16 @@ impl Lock {
             }
             // the text may still be an earlier run's, and its process another by now
             let other = read(&path).filter(Run::lives);
-            let name = other.as_ref().map_or("another process, which has not said yet who it is".to_owned(), Run::described);
+            let name =
+                other.as_ref().map_or("another process, which has not said yet who it is".to_owned(), Run::described);
             if !replace {
-                return Err(Failure::run("the cave", format!("a run is going on in {} already: {name}; end it first, or take its place with --replace", cave.file)));
+                return Err(Failure::run(
+                    "the cave",
+                    format!(
+                        "a run is going on in {} already: {name}; end it first, or take its place with --replace",
+                        cave.file
+                    ),
+                ));
             }
             let now = Instant::now();
             if now > until {
@@ -142,7 +156,14 @@ fn path(place: &str) -> Result<PathBuf, Failure> {
 fn try_take(path: &Path) -> Result<Option<File>, Failure> {
     let failed = |e: std::io::Error| Failure::run(&format!("the cave's lock {}", path.display()), e);
     for _ in 0..100 {
-        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).mode(0o600).open(path).map_err(failed)?;
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .mode(0o600)
+            .open(path)
+            .map_err(failed)?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Ok(None),

@@ -47,7 +47,11 @@ impl FrameLog {
         if anew {
             file.set_len(0).map_err(failed)?;
             let all = std::fs::read_dir(&folder).map_err(failed)?;
-            let old = |name: &str| name.strip_prefix("frame_").and_then(|n| n.strip_suffix(".png")).is_some_and(|n| n.parse::<u64>().is_ok());
+            let old = |name: &str| {
+                name.strip_prefix("frame_")
+                    .and_then(|n| n.strip_suffix(".png"))
+                    .is_some_and(|n| n.parse::<u64>().is_ok())
+            };
             for entry in all.flatten().filter(|e| e.file_name().to_str().is_some_and(old)) {
                 std::fs::remove_file(entry.path()).map_err(failed)?;
             }
@@ -55,7 +59,8 @@ impl FrameLog {
         let (orders, wanted) = sync_channel(MOST_WAITING + 1);
         let waiting = Arc::new(AtomicUsize::new(0));
         let left = waiting.clone();
-        let writer = std::thread::Builder::new().name("frames".into()).spawn(move || write_all(&folder, file, &wanted, &left));
+        let writer =
+            std::thread::Builder::new().name("frames".into()).spawn(move || write_all(&folder, file, &wanted, &left));
         let writer = writer.map_err(|e| Failure::run("the frames", e))?;
         Ok(FrameLog { orders: Some(orders), writer: Some(writer), waiting, pictures })
     }
@@ -71,23 +76,38 @@ impl FrameLog {
     }
 
     /// A frame that is on the screen.
-    pub fn shown(&mut self, frame: u64, time_s: f64, state: &[u8; 16], hash: &[u8; 16], image: Option<Image>) -> Result<(), Failure> {
+    pub fn shown(
+        &mut self,
+        frame: u64,
+        time_s: f64,
+        state: &[u8; 16],
+        hash: &[u8; 16],
+        image: Option<Image>,
+    ) -> Result<(), Failure> {
         let shown = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let line = Line { frame, time_s, state: hex(state), image: hex(hash), shown_unix_us: shown.as_micros() as u64 };
         self.waiting.fetch_add(1, Ordering::AcqRel);
-        let sent = self.orders.as_ref().is_some_and(|orders| orders.send((line, image.filter(|_| self.pictures))).is_ok());
+        let sent =
+            self.orders.as_ref().is_some_and(|orders| orders.send((line, image.filter(|_| self.pictures))).is_ok());
         if sent { Ok(()) } else { self.finish() }
     }
 
     /// Waits until all is written; what went wrong.
     pub fn finish(&mut self) -> Result<(), Failure> {
         self.orders = None;
-        self.writer.take().map_or(Ok(()), |writer| writer.join().unwrap_or_else(|_| Err(Failure::run("the frames", "their writer has gone"))))
+        self.writer.take().map_or(Ok(()), |writer| {
+            writer.join().unwrap_or_else(|_| Err(Failure::run("the frames", "their writer has gone")))
+        })
     }
 }
 
 /// Each picture, and behind it its line, whole.
-fn write_all(folder: &Path, mut file: File, wanted: &Receiver<(Line, Option<Image>)>, waiting: &AtomicUsize) -> Result<(), Failure> {
+fn write_all(
+    folder: &Path,
+    mut file: File,
+    wanted: &Receiver<(Line, Option<Image>)>,
+    waiting: &AtomicUsize,
+) -> Result<(), Failure> {
     let wrong = |file: &Path, why: &dyn std::fmt::Display| Failure::run(&format!("writing {}", file.display()), why);
     let lines = folder.join("frames.jsonl");
     while let Ok((line, image)) = wanted.recv() {

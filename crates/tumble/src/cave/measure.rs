@@ -67,7 +67,14 @@ impl Spread {
     /// All of it.
     pub fn figures(&self) -> Figures {
         let (longest, max_at_frame, max_at_s) = self.longest;
-        Figures { count: self.count, p50_ms: 1e3 * self.within(0.5), p99_ms: 1e3 * self.within(0.99), max_ms: 1e3 * longest, max_at_frame, max_at_s }
+        Figures {
+            count: self.count,
+            p50_ms: 1e3 * self.within(0.5),
+            p99_ms: 1e3 * self.within(0.99),
+            max_ms: 1e3 * longest,
+            max_at_frame,
+            max_at_s,
+        }
     }
 }
 
@@ -84,7 +91,10 @@ mod tests {
             assert!(found >= s && found <= 1.021 * s, "{share}: {found}");
         }
         let figures = spread.figures();
-        assert_eq!((figures.count, figures.max_ms, figures.max_at_frame, figures.max_at_s), (1000, 1000.0, 1000, 1000.0));
+        assert_eq!(
+            (figures.count, figures.max_ms, figures.max_at_frame, figures.max_at_s),
+            (1000, 1000.0, 1000, 1000.0)
+        );
         assert_eq!(Spread::default().figures(), super::Figures::default());
     }
 }

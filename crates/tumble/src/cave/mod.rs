@@ -72,7 +72,9 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let serve = &options.cave.serve;
     let users = serve.push || serve.tracker.is_some() || serve.input_from.is_some();
     if serve.record.is_some() || users || serve.dt.is_some() || serve.stepper.is_some() || serve.solver.is_some() {
-        return Err(Failure::input("a replay shows what was recorded; --record, --push, --tracker, --input-from, --dt, --stepper and --solver go with tumble cave"));
+        return Err(Failure::input(
+            "a replay shows what was recorded; --record, --push, --tracker, --input-from, --dt, --stepper and --solver go with tumble cave",
+        ));
     }
     serve::run(serve, Some(&options.cave), Some(&options.file))
 }
@@ -80,8 +82,20 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
 /// A recording, mended.
 pub fn recover(options: &RecoverOptions) -> Result<(), Failure> {
     let report = tumble::net::record::recover(&options.file, &options.output).map_err(Failure::input)?;
-    println!("{}: {} frames in {} messages and {} chunks kept", options.output.display(), report.frames, report.messages, report.chunks);
+    println!(
+        "{}: {} frames in {} messages and {} chunks kept",
+        options.output.display(),
+        report.frames,
+        report.messages,
+        report.chunks
+    );
     let fault = report.fault.map_or("it was complete".to_owned(), |fault| format!("what was wrong: {fault}"));
-    println!("{}: {} bytes read, {} damaged chunks and {} other records left out; {fault}", options.file.display(), report.bytes_used, report.damaged_chunks, report.dropped_records);
+    println!(
+        "{}: {} bytes read, {} damaged chunks and {} other records left out; {fault}",
+        options.file.display(),
+        report.bytes_used,
+        report.damaged_chunks,
+        report.dropped_records
+    );
     Ok(())
 }

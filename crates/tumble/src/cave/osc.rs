@@ -109,7 +109,14 @@ impl Book {
             Axes::YUp => Quat::from_axis_angle(&Vec3::x_axis(), std::f64::consts::FRAC_PI_2),
         };
         let users = vec![Tracked::default(); tracker.users.len()];
-        Book { names: tracker.users.clone(), senders: tracker.senders.clone(), turn, origin: tracker.origin_m.into(), users, counts: Counts::default() }
+        Book {
+            names: tracker.users.clone(),
+            senders: tracker.senders.clone(),
+            turn,
+            origin: tracker.origin_m.into(),
+            users,
+            counts: Counts::default(),
+        }
     }
 
     /// A datagram that nobody looks at, because too many come.
@@ -234,7 +241,11 @@ mod tests {
 
     fn book() -> Book {
         let user = |name: &str| tumble::scene::cave::User {
-            name: name.into(), eye_m: nalgebra::Point3::origin(), forward: Vec3::y(), up: Vec3::z(), interpupillary_m: 0.06,
+            name: name.into(),
+            eye_m: nalgebra::Point3::origin(),
+            forward: Vec3::y(),
+            up: Vec3::z(),
+            interpupillary_m: 0.06,
         };
         Book::new(&Tracker { senders: vec![Ipv4Addr::LOCALHOST.into()], ..Tracker::of(&[user("a"), user("b")]) })
     }
@@ -253,7 +264,10 @@ mod tests {
         assert!(book.inputs().is_empty() && book.counts.dropped["stranger"] == 1);
         book.take(Ipv4Addr::LOCALHOST.into(), &head());
         let inputs = book.inputs();
-        assert_eq!((inputs.len(), inputs[0].user, inputs[0].sequence, inputs[0].head.unwrap().translation.z), (1, 0, 1, 1.0));
+        assert_eq!(
+            (inputs.len(), inputs[0].user, inputs[0].sequence, inputs[0].head.unwrap().translation.z),
+            (1, 0, 1, 1.0)
+        );
         // told once
         assert!(book.inputs().is_empty());
         // as a socket of both kinds of addresses names the same sender

@@ -17,10 +17,14 @@ pub fn check(options: &ServeOptions, cave: &Cave) -> Result<(), Failure> {
         && same(read, written)
     {
         let (read, written) = (read.display(), written.display());
-        return Err(Failure::input(format!("--input-from {read}: the run would be recorded into the same file ({written}); say another with --record")));
+        return Err(Failure::input(format!(
+            "--input-from {read}: the run would be recorded into the same file ({written}); say another with --record"
+        )));
     }
     if let (Some(listen), Carrier::SharedMemory) = (options.listen, carrier(options, cave)) {
-        return Err(Failure::input(format!("--listen {listen}: frames go through shared memory and nobody listens there; it goes with --transport udp")));
+        return Err(Failure::input(format!(
+            "--listen {listen}: frames go through shared memory and nobody listens there; it goes with --transport udp"
+        )));
     }
     options.summary.as_deref().map_or(Ok(()), writable)
 }
@@ -42,7 +46,12 @@ fn writable(path: &Path) -> Result<(), Failure> {
     if there && std::fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
         return Ok(()); // a pipe is waited for when there is something to say
     }
-    OpenOptions::new().write(true).create(true).truncate(false).open(path).map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))?;
+    OpenOptions::new()
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(path)
+        .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))?;
     if !there {
         let _ = std::fs::remove_file(path);
     }
@@ -90,7 +99,10 @@ impl Recording {
                 return Ok(Recording { file: real, beside: Some(beside), _lock: locked.then_some(lock) });
             }
         }
-        Err(Failure::run(&format!("recording into {}", file.display()), format!("{} is removed again and again", beside.display())))
+        Err(Failure::run(
+            &format!("recording into {}", file.display()),
+            format!("{} is removed again and again", beside.display()),
+        ))
     }
 
     /// What is opened.
@@ -122,10 +134,13 @@ impl Recording {
 
 /// Removes what starts that were killed left beside `real`: names that begin so and end with a process's number, and are nobody's.
 fn remove_left(real: &Path, begin: &str) {
-    let number = |name: &str| name.strip_prefix(begin).is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let number =
+        |name: &str| name.strip_prefix(begin).is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
     let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    for entry in entries.filter(|e| e.file_name().to_str().is_some_and(number) && e.file_type().is_ok_and(|kind| kind.is_file())) {
+    for entry in
+        entries.filter(|e| e.file_name().to_str().is_some_and(number) && e.file_type().is_ok_and(|kind| kind.is_file()))
+    {
         if OpenOptions::new().write(true).open(entry.path()).is_ok_and(|left| left.try_lock().is_ok()) {
             let _ = std::fs::remove_file(entry.path());
         }

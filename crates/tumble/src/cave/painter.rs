@@ -62,7 +62,9 @@ impl Painter {
     /// Begins a picture of the world; with the frame's number in it, if it is to be stamped.
     pub fn begin(&mut self, world: &World, viewer: &Viewer, stamp: Option<u64>) -> Result<(), Failure> {
         let list = draw_list(&mut self.drawing, world, self.quality.as_ref())?;
-        self.orders.send(Order { list, viewer: viewer.clone(), stamp }).map_err(|_| Failure::run("drawing", "the painter has gone"))
+        self.orders
+            .send(Order { list, viewer: viewer.clone(), stamp })
+            .map_err(|_| Failure::run("drawing", "the painter has gone"))
     }
 
     /// The picture, if it is finished within `timeout`.
@@ -87,7 +89,13 @@ pub fn draw_list(drawing: &mut Drawing, world: &World, quality: Option<&Quality>
     Ok(list)
 }
 
-fn paint(mut view: CaveView, facet: Option<Facet>, renderer: &mut Renderer, wanted: &Receiver<Order>, done: &SyncSender<Result<Image, RenderError>>) {
+fn paint(
+    mut view: CaveView,
+    facet: Option<Facet>,
+    renderer: &mut Renderer,
+    wanted: &Receiver<Order>,
+    done: &SyncSender<Result<Image, RenderError>>,
+) {
     while let Ok(order) = wanted.recv() {
         follow(&mut view, &order.viewer);
         let mut image = match &facet {

@@ -42,7 +42,9 @@ impl Played {
         let next = replay.next_frame().map_err(|e| wrong(&e))?;
         let numbers = [&now, &next].map(|frame| frame.as_ref().map(|f| f.recorded.frame));
         if numbers != [Some(0), Some(1)] {
-            return Err(wrong(&"its inputs are played only if it begins with frame 0 and has every frame (every_frames = 1)"));
+            return Err(wrong(
+                &"its inputs are played only if it begins with frame 0 and has every frame (every_frames = 1)",
+            ));
         }
         Ok(Played { path: path.to_owned(), replay, now, next, counts: Counts::default() })
     }
@@ -60,7 +62,11 @@ impl Played {
         if ours.0 != theirs.0 || (ours.1 - theirs.1).abs() > SAME_S {
             let text = format!(
                 "{}: frame {} at {:.6} s follows where this run has frame {} at {:.6} s; --dt and --fps must be those of the recording, and no frame may be left out",
-                self.path.display(), theirs.0, theirs.1, ours.0, ours.1
+                self.path.display(),
+                theirs.0,
+                theirs.1,
+                ours.0,
+                ours.1
             );
             return Err(Failure::input(text));
         }

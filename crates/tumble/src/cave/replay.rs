@@ -41,7 +41,10 @@ impl Tape {
         for _ in 0..2 {
             ahead.extend(replay.next_frame().map_err(|e| wrong(&e))?);
         }
-        let frame_length = ahead.get(1).map(|second: &ReplayFrame| second.recorded.time_s - ahead[0].recorded.time_s).filter(|s| *s > 0.0);
+        let frame_length = ahead
+            .get(1)
+            .map(|second: &ReplayFrame| second.recorded.time_s - ahead[0].recorded.time_s)
+            .filter(|s| *s > 0.0);
         Ok(Tape { replay, ahead, frame_length, images: BTreeMap::new(), counts: Counts::default() })
     }
 

@@ -20,8 +20,8 @@ use tumble::core::World;
 use tumble::net::record::RecorderOptions;
 use tumble::net::sync::awake::Awake;
 use tumble::net::sync::shm::{ShmServer, clean_up};
-use tumble::net::sync::udp::{Entropy, UdpServer};
 use tumble::net::sync::transport::FacetNumber;
+use tumble::net::sync::udp::{Entropy, UdpServer};
 use tumble::net::sync::{Input, Pace, Seat, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder};
 use tumble::scene::cave::{Cave, Mode};
 
@@ -58,7 +58,8 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
             (ServerEnd::Shm(Box::new(server)), Address::Memory(name))
         }
         Carrier::Udp => {
-            let server = UdpServer::bind(listen(options, &setting.cave), count, key, timing(&setting.cave)).map_err(failed)?;
+            let server =
+                UdpServer::bind(listen(options, &setting.cave), count, key, timing(&setting.cave)).map_err(failed)?;
             let address = Address::Udp(server.address().map_err(failed)?);
             say(&format!("server: {}", server.describe()));
             (ServerEnd::Udp(Box::new(server)), address)
@@ -70,7 +71,9 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     let shared_memory = matches!(end, ServerEnd::Shm(_));
     let server = Server::new(end, told(options, &setting, number, &seats), &setting.world);
     let mut crew = Crew::start(options, &setting.cave, launcher, &address, &signals)?;
-    let _awake = options.stay_awake.then(|| Awake::ask().inspect_err(|why| _ = say(&format!("the cores may fall asleep: {why}"))));
+    let _awake = options
+        .stay_awake
+        .then(|| Awake::ask().inspect_err(|why| _ = say(&format!("the cores may fall asleep: {why}"))));
     let outcome = Host::new(options, setting, server, seats, &signals, tape).and_then(|mut host| {
         let outcome = host.show(&mut crew);
         let ended = host.end(&mut crew);
@@ -136,7 +139,12 @@ struct Host<'a> {
 
 impl<'a> Host<'a> {
     fn new(
-        options: &'a ServeOptions, setting: Setting, server: Server<ServerEnd>, seats: Vec<Seat>, signals: &'a Signals, tape: Option<Tape>,
+        options: &'a ServeOptions,
+        setting: Setting,
+        server: Server<ServerEnd>,
+        seats: Vec<Seat>,
+        signals: &'a Signals,
+        tape: Option<Tape>,
     ) -> Result<Host<'a>, Failure> {
         let viewer = setting.viewer()?;
         let Setting { scene, cave, mut world, hash, .. } = setting;
@@ -149,12 +157,37 @@ impl<'a> Host<'a> {
             if !recording.has_begun() {
                 signals.remove_at_the_end(recording.begins_at().to_owned());
             }
-            let recorder = SessionRecorder::create(recording.begins_at(), &scene.file, hash, &world, every, RecorderOptions::default());
+            let recorder = SessionRecorder::create(
+                recording.begins_at(),
+                &scene.file,
+                hash,
+                &world,
+                every,
+                RecorderOptions::default(),
+            );
             recorder.map(|r| (r, recording)).map_err(|e| Failure::run("recording", e))
         });
         Ok(Host {
-            options, signals, server, world, users, devices, viewers, recorder: recorder.transpose()?, recorded: false, cave, scene: scene.file, seconds: options.seconds,
-            meter: Meter::new(seats.len()), seats, status: Status::new(options.quiet), tape, time_s: 0.0, began: Instant::now(), behind_s: 0.0, frames: 0,
+            options,
+            signals,
+            server,
+            world,
+            users,
+            devices,
+            viewers,
+            recorder: recorder.transpose()?,
+            recorded: false,
+            cave,
+            scene: scene.file,
+            seconds: options.seconds,
+            meter: Meter::new(seats.len()),
+            seats,
+            status: Status::new(options.quiet),
+            tape,
+            time_s: 0.0,
+            began: Instant::now(),
+            behind_s: 0.0,
+            frames: 0,
         })
     }
 
@@ -311,7 +344,9 @@ impl<'a> Host<'a> {
                 ServerEvent::Gone(k, true) => Some(format!("facet {} left", seat(k))),
                 ServerEvent::Gone(k, false) => Some(format!("facet {} is dropped; the others go on", seat(k))),
                 ServerEvent::Late(k, frame) => Some(format!("facet {} is late with frame {frame}", seat(k))),
-                ServerEvent::Presented(k, frame, _, false) => Some(format!("facet {} drew another frame {frame} than was sent", seat(k))),
+                ServerEvent::Presented(k, frame, _, false) => {
+                    Some(format!("facet {} drew another frame {frame} than was sent", seat(k)))
+                }
                 _ => None,
             };
             if let (Some(said), false) = (said, self.options.quiet) {
@@ -341,7 +376,9 @@ impl<'a> Host<'a> {
         let wall_s = self.began.elapsed().as_secs_f64();
         let told = self.server.end().map_err(failed);
         let recorded = match self.recorder.take() {
-            Some((recorder, recording)) if recording.has_begun() => recorder.finish().map(|_| Some(recording)).map_err(|e| Failure::run("recording", e)),
+            Some((recorder, recording)) if recording.has_begun() => {
+                recorder.finish().map(|_| Some(recording)).map_err(|e| Failure::run("recording", e))
+            }
             _ => Ok(None),
         };
         let summed = self.sum_up(wall_s);

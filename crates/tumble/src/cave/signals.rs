@@ -42,7 +42,10 @@ impl Signals {
         }
         let left = Arc::new(Mutex::new(Left::default()));
         let (raised, kept) = (asked.clone(), left.clone());
-        std::thread::Builder::new().name("signals".into()).spawn(move || watch(&came, &raised, &kept)).map_err(|e| Failure::run("signals", e))?;
+        std::thread::Builder::new()
+            .name("signals".into())
+            .spawn(move || watch(&came, &raised, &kept))
+            .map_err(|e| Failure::run("signals", e))?;
         Ok(Signals { asked, left })
     }
 

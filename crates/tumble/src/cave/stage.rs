@@ -43,7 +43,11 @@ impl Setting {
             CaveSource::Shipped(cave) => cave.name.to_owned(),
         };
         if cave.facets.len() > MAX_FACETS {
-            return Err(Failure::input(format!("{}: a run has at most {MAX_FACETS} facets, this cave has {}", cave.file, cave.facets.len())));
+            return Err(Failure::input(format!(
+                "{}: a run has at most {MAX_FACETS} facets, this cave has {}",
+                cave.file,
+                cave.facets.len()
+            )));
         }
         let mut notes = Vec::new();
         if let Some(name) = &stage.environment {
@@ -66,7 +70,12 @@ impl Setting {
     /// Who looks, as the files say.
     pub fn viewer(&self) -> Result<Viewer, Failure> {
         let view = self.view()?;
-        let users = self.cave.users.iter().map(|user| User { head: head_of(user), interpupillary_m: user.interpupillary_m, input: 0 }).collect();
+        let users = self
+            .cave
+            .users
+            .iter()
+            .map(|user| User { head: head_of(user), interpupillary_m: user.interpupillary_m, input: 0 })
+            .collect();
         Ok(Viewer { users, cave: pose_of(view.place()), scale: view.place().scale })
     }
 }
@@ -83,13 +92,18 @@ fn joined_hash(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
     put(scene);
     put(format!("{:?} {:?} {:?}", cave.sync.mode, cave.screens, cave.users).as_bytes());
     for f in &cave.facets {
-        put(format!("{:?} {} {} {:?} {} {} {:?} {:?}", f.name, f.screen, f.user, f.size_px, f.near_m, f.far_m, f.stereo, f.flip).as_bytes());
+        put(format!(
+            "{:?} {} {} {:?} {} {} {:?} {:?}",
+            f.name, f.screen, f.user, f.size_px, f.near_m, f.far_m, f.stereo, f.flip
+        )
+        .as_bytes());
         [&f.warp_file, &f.blend_file].into_iter().for_each(|file| put(&file.as_deref().map_or([0; 32], content)));
     }
     let visuals = world.ids().iter().filter_map(|&id| world.object(id)?.renderable()).flat_map(|r| r.visuals());
     let textures: std::collections::BTreeSet<_> = visuals.filter_map(|visual| visual.look.texture.clone()).collect();
     // by names of files, as the scene's hash has them: folders differ between machines
-    let mut textures: Vec<_> = textures.iter().map(|path| (path.file_name().unwrap_or_default().as_encoded_bytes(), content(path))).collect();
+    let mut textures: Vec<_> =
+        textures.iter().map(|path| (path.file_name().unwrap_or_default().as_encoded_bytes(), content(path))).collect();
     textures.sort();
     for (name, bytes) in textures {
         put(name);
@@ -124,7 +138,11 @@ pub fn place_of(pose: &Pose, scale: f64) -> CavePlace {
 /// The head of a user of a cave file: x to the right, y ahead, z up.
 fn head_of(user: &tumble::scene::cave::User) -> Pose {
     let (right, ahead) = (user.right(), user.forward);
-    let rotation = nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[right, ahead, right.cross(&ahead)]));
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[
+        right,
+        ahead,
+        right.cross(&ahead),
+    ]));
     Pose::from_parts(user.eye_m.coords.into(), nalgebra::UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
@@ -134,15 +152,22 @@ fn surround(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<String>) -> 
     notes.push(format!("environment {}: its camera, lights, sky, ground and {still} bodies that do not move; camera and lights of {} are ignored", from.file, scene.file));
     let moving = from.bodies.iter().filter(|b| b.mode != Mode::Static).count() + from.articulated.len();
     if moving > 0 {
-        notes.push(format!("environment {}: {moving} objects that move are left out; put them into the scene", from.file));
+        notes.push(format!(
+            "environment {}: {moving} objects that move are left out; put them into the scene",
+            from.file
+        ));
     }
-    (scene.camera, scene.cave, scene.lights, scene.sky, scene.ground) = (from.camera, from.cave, from.lights, from.sky, from.ground);
+    (scene.camera, scene.cave, scene.lights, scene.sky, scene.ground) =
+        (from.camera, from.cave, from.lights, from.sky, from.ground);
     let (meshes, materials) = (scene.meshes.len(), scene.materials.len());
     scene.meshes.extend(from.meshes);
     scene.materials.extend(from.materials);
     for mut body in from.bodies.into_iter().filter(|b| b.mode == Mode::Static && b.alive) {
         if scene.bodies.iter().any(|b| b.name == body.name) || scene.articulated.iter().any(|a| a.name == body.name) {
-            return Err(Failure::input(format!("{}: body \"{}\" of the environment has the name of one of {}; rename one", from.file, body.name, scene.file)));
+            return Err(Failure::input(format!(
+                "{}: body \"{}\" of the environment has the name of one of {}; rename one",
+                from.file, body.name, scene.file
+            )));
         }
         body.collides = false;
         body.material = body.material.map(|m| m + materials);

@@ -94,7 +94,12 @@ pub struct FacetSummary {
 impl Meter {
     /// For so many seats.
     pub fn new(seats: usize) -> Meter {
-        Meter { draw: (0..seats).map(|_| Spread::default()).collect(), last: vec![(0, 0.0); seats], shown: vec![(None, 0); seats], ..Meter::default() }
+        Meter {
+            draw: (0..seats).map(|_| Spread::default()).collect(),
+            last: vec![(0, 0.0); seats],
+            shown: vec![(None, 0); seats],
+            ..Meter::default()
+        }
     }
 
     /// What facets answered.
@@ -105,7 +110,9 @@ impl Meter {
             }
             shown.input.iter().for_each(|input| self.input.add(input.as_secs_f64(), shown.frame, time_s));
         }
-        let (ServerEvent::Ready(facet, frame, done, _) | ServerEvent::Presented(facet, frame, done, _)) = event else { return };
+        let (ServerEvent::Ready(facet, frame, done, _) | ServerEvent::Presented(facet, frame, done, _)) = event else {
+            return;
+        };
         let k = *facet as usize;
         if let (ServerEvent::Ready(..), Some(draw)) = (event, self.draw.get_mut(k)) {
             draw.add(f64::from(done.took_us) * 1e-6, *frame, time_s);
@@ -124,8 +131,14 @@ impl Meter {
         let one = |(k, seat): (usize, &Seat)| {
             let (counts, _, link) = server.counts(k as FacetNumber);
             FacetSummary {
-                name: seat.name.clone(), not_shown: frames.saturating_sub(self.shown[k].1), counts,
-                draw: self.draw[k].figures(), bytes_out: link.bytes_out, bytes_in: link.bytes_in, repeated: link.repeated, refused_packets: refused(&link),
+                name: seat.name.clone(),
+                not_shown: frames.saturating_sub(self.shown[k].1),
+                counts,
+                draw: self.draw[k].figures(),
+                bytes_out: link.bytes_out,
+                bytes_in: link.bytes_in,
+                repeated: link.repeated,
+                refused_packets: refused(&link),
             }
         };
         seats.iter().enumerate().map(one).collect()
@@ -140,7 +153,10 @@ impl Summary {
             self.scene, self.cave, self.simulated_s, self.frames, self.mode, self.transport, self.wall_s, self.behind_s
         );
         let figures = |what: &str, f: &Figures| {
-            format!("{what} {:.2} ms (half), {:.2} ms (99 %), {:.2} ms (all; frame {} at {:.3} s)\n", f.p50_ms, f.p99_ms, f.max_ms, f.max_at_frame, f.max_at_s)
+            format!(
+                "{what} {:.2} ms (half), {:.2} ms (99 %), {:.2} ms (all; frame {} at {:.3} s)\n",
+                f.p50_ms, f.p99_ms, f.max_ms, f.max_at_frame, f.max_at_s
+            )
         };
         text += &figures("simulating a frame took at most", &self.simulation);
         text += &figures("sent, drawn and shown within", &self.barrier);
@@ -152,13 +168,23 @@ impl Summary {
             text += &figures("what users did was to be seen within", input);
         }
         if let Some(Counts { same, different, not_compared }) = self.replay {
-            text += &format!("pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n");
+            text += &format!(
+                "pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n"
+            );
         }
         if let Some(played) = &self.input_from {
-            text += &format!("{} inputs played: {} states as they were recorded, {} different\n", played.inputs, played.same, played.different);
+            text += &format!(
+                "{} inputs played: {} states as they were recorded, {} different\n",
+                played.inputs, played.same, played.different
+            );
         }
         if let Some(tracker) = &self.tracker {
-            text += &format!("tracker: {} messages taken in {} datagrams{}\n", tracker.taken, tracker.datagrams, reasons(", dropped", &tracker.dropped));
+            text += &format!(
+                "tracker: {} messages taken in {} datagrams{}\n",
+                tracker.taken,
+                tracker.datagrams,
+                reasons(", dropped", &tracker.dropped)
+            );
         }
         if self.heads_refused > 0 {
             text += &format!("{} heads not followed: an eye would be behind a screen\n", self.heads_refused);
@@ -166,7 +192,15 @@ impl Summary {
         for FacetSummary { name, counts: c, not_shown, refused_packets, .. } in &self.facets {
             text += &format!(
                 "facet {name}: {} shown, {not_shown} not shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
-                c.presented, c.late, c.missing, c.duplicate, c.stale, c.torn, c.mismatched, c.dropped, reasons("; packets refused", refused_packets)
+                c.presented,
+                c.late,
+                c.missing,
+                c.duplicate,
+                c.stale,
+                c.torn,
+                c.mismatched,
+                c.dropped,
+                reasons("; packets refused", refused_packets)
             );
         }
         if !self.strangers.is_empty() {
@@ -178,8 +212,16 @@ impl Summary {
 
 /// A line of what was refused from who is no facet; nothing for nothing.
 pub fn from_strangers(refused: &Refusals) -> String {
-    let key = if refused.contains_key(Refused::Forged.name()) { " (forged: who has another key file, or none, looks like this)" } else { "" };
-    if refused.is_empty() { String::new() } else { format!("from who is no facet{}{key}\n", reasons(": packets refused", refused)) }
+    let key = if refused.contains_key(Refused::Forged.name()) {
+        " (forged: who has another key file, or none, looks like this)"
+    } else {
+        ""
+    };
+    if refused.is_empty() {
+        String::new()
+    } else {
+        format!("from who is no facet{}{key}\n", reasons(": packets refused", refused))
+    }
 }
 
 /// `; packets refused: 3 forged, 1 replayed`; nothing for nothing.
@@ -201,7 +243,14 @@ pub struct Status {
 impl Status {
     /// From now on.
     pub fn new(quiet: bool) -> Status {
-        Status { quiet, terminal: std::io::stderr().is_terminal(), since: Instant::now(), frame: 0, shown: Vec::new(), lines: 0 }
+        Status {
+            quiet,
+            terminal: std::io::stderr().is_terminal(),
+            since: Instant::now(),
+            frame: 0,
+            shown: Vec::new(),
+            lines: 0,
+        }
     }
 
     /// What is said next must not be written over.
@@ -218,9 +267,15 @@ impl Status {
         }
         let per_s = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed.as_secs_f64();
         let mut text = if self.terminal && self.lines > 0 { format!("\x1b[{}A", self.lines) } else { String::new() };
-        let more = |what: &str, spread: &Spread| spread.some().map_or(String::new(), |f| format!(", {what} {:.2} ms", f.p50_ms));
+        let more = |what: &str, spread: &Spread| {
+            spread.some().map_or(String::new(), |f| format!(", {what} {:.2} ms", f.p50_ms))
+        };
         let (skew, input) = (more("skew", &meter.skew), more("input to picture", &meter.input));
-        text += &format!("\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms{skew}{input}\n", per_s(frame, self.frame), 1e3 * meter.step.within(0.5));
+        text += &format!(
+            "\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms{skew}{input}\n",
+            per_s(frame, self.frame),
+            1e3 * meter.step.within(0.5)
+        );
         self.shown.resize(seats.len(), 0);
         for (k, seat) in seats.iter().enumerate() {
             let (counts, _, _) = server.counts(k as FacetNumber);
@@ -232,7 +287,10 @@ impl Status {
             let (last, took_ms) = meter.last[k];
             text += &format!(
                 "\x1b[K  {:<12} {standing:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms\n",
-                seat.name, per_s(counts.presented, self.shown[k]), counts.late + counts.missing, counts.dropped
+                seat.name,
+                per_s(counts.presented, self.shown[k]),
+                counts.late + counts.missing,
+                counts.dropped
             );
             self.shown[k] = counts.presented;
         }

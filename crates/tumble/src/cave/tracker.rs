@@ -31,7 +31,11 @@ pub struct Heard {
 pub fn described(cave: &Cave, address: Option<SocketAddr>, senders: &[IpAddr]) -> Result<Option<Tracker>, Failure> {
     let described = cave.tracker.clone();
     if described.is_none() && address.is_none() {
-        return if senders.is_empty() { Ok(None) } else { Err(Failure::input("--tracker-from: there is no tracker; say where it is heard with --tracker")) };
+        return if senders.is_empty() {
+            Ok(None)
+        } else {
+            Err(Failure::input("--tracker-from: there is no tracker; say where it is heard with --tracker"))
+        };
     }
     let mut tracker = described.unwrap_or_else(|| Tracker::of(&cave.users));
     if let Some(address) = address {
@@ -56,7 +60,10 @@ impl Heard {
         let at = socket.local_addr().map_err(failed)?;
         let (book, end) = (Arc::new(Mutex::new(Book::new(tracker))), Arc::new(AtomicBool::new(false)));
         let (theirs, ended) = (book.clone(), end.clone());
-        let thread = std::thread::Builder::new().name("tracker".into()).spawn(move || listen(&socket, &theirs, &ended)).map_err(failed)?;
+        let thread = std::thread::Builder::new()
+            .name("tracker".into())
+            .spawn(move || listen(&socket, &theirs, &ended))
+            .map_err(failed)?;
         Ok(Heard { book, end, thread: Some(thread), at })
     }
 

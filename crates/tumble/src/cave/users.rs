@@ -68,7 +68,9 @@ struct Held {
 impl Users {
     /// As the files place them; with bodies, if they are to push.
     pub fn new(viewer: Viewer, cave: &Cave, world: &mut World, push: bool) -> Result<Users, Failure> {
-        let drawn = |user: usize| cave.facets.iter().filter(|f| f.user == user).map(|f| cave.screens[f.screen].clone()).collect();
+        let drawn = |user: usize| {
+            cave.facets.iter().filter(|f| f.user == user).map(|f| cave.screens[f.screen].clone()).collect()
+        };
         let screens = (0..viewer.users.len()).map(drawn).collect();
         let bodies = if push { Bodies::add(&viewer, world)? } else { Bodies::default() };
         Ok(Users { viewer, heads_refused: 0, screens, inputs: BTreeMap::new(), held: BTreeMap::new(), bodies })
@@ -97,7 +99,8 @@ impl Users {
         self.held.retain(|device, _| self.inputs.get(device).is_some_and(|(input, _)| input.buttons & 1 == 1));
         for (&device, (input, _)) in &self.inputs {
             let Some(wand) = input.wand.filter(|_| input.buttons & 1 == 1) else { continue };
-            let (origin, direction) = (self.to_scene(&wand.translation.vector), self.viewer.cave.rotation * (wand.rotation * Vec3::y()));
+            let (origin, direction) =
+                (self.to_scene(&wand.translation.vector), self.viewer.cave.rotation * (wand.rotation * Vec3::y()));
             if !self.held.contains_key(&device)
                 && let Some(held) = grasp(world, &self.bodies, &origin, &direction)
             {
@@ -166,7 +169,11 @@ impl Renormalize for Pose {
 fn grasp(world: &World, bodies: &Bodies, origin: &Vec3, direction: &Vec3) -> Option<Held> {
     let mut first: Option<(ObjectId, usize, f64)> = None;
     for &id in world.ids().iter().filter(|id| !bodies.has(**id)) {
-        let Some(renderable) = world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.alive)) else { continue };
+        let Some(renderable) =
+            world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.alive))
+        else {
+            continue;
+        };
         for visual in renderable.visuals() {
             let Some(site) = world.site(id, visual.part) else { continue };
             let Some(distance) = visual.shape.ray(&(site.pose * visual.pose), origin, direction) else { continue };

@@ -14,7 +14,9 @@ pub struct Viewers {
 impl Viewers {
     /// Opens the address, if one was asked for.
     pub fn open(options: &ServeOptions) -> Result<Viewers, Failure> {
-        let start = |at: std::net::SocketAddr| tumble::net::record::live::Live::start(at, &options.stage.scene).map_err(|e| Failure::run("viewers", e));
+        let start = |at: std::net::SocketAddr| {
+            tumble::net::record::live::Live::start(at, &options.stage.scene).map_err(|e| Failure::run("viewers", e))
+        };
         let live = options.foxglove.map(start).transpose()?;
         if let (Some(live), Some(at), false) = (&live, options.foxglove, options.quiet) {
             eprintln!("viewers: Foxglove at ws://{}", std::net::SocketAddr::new(at.ip(), live.port()));

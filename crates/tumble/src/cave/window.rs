@@ -69,7 +69,9 @@ impl Parts {
         let title = format!("tumble: {} on {}", setting.scene.file, seat_name(facet));
         let plain = WindowOptions::new(title, view.size_px(facet, PREVIEW_PX));
         let options = match facet.map(|f| f.output) {
-            Some(Output::Window { position_px }) => WindowOptions { position_px: Some(position_px), decorated: false, resizable: false, ..plain },
+            Some(Output::Window { position_px }) => {
+                WindowOptions { position_px: Some(position_px), decorated: false, resizable: false, ..plain }
+            }
             _ => WindowOptions { resizable: facet.is_none(), ..plain },
         };
         let user = facet.map_or(0, |f| f.user) as u16;
@@ -84,8 +86,17 @@ impl Parts {
     pub fn show(self, running: &mut Running, stamp: bool) -> Result<(), Failure> {
         let options = self.options.clone();
         let mut window = Window {
-            parts: self, running, stamp, list: DrawList::default(), keys: Vec::new(), pulling: false, at_px: [0.0; 2], sent: None, sequence: 0,
-            warned: None, ended: false,
+            parts: self,
+            running,
+            stamp,
+            list: DrawList::default(),
+            keys: Vec::new(),
+            pulling: false,
+            at_px: [0.0; 2],
+            sent: None,
+            sequence: 0,
+            warned: None,
+            ended: false,
         };
         run_window(&options, &mut window)
     }
@@ -150,12 +161,15 @@ impl Window<'_> {
         let wand = if self.pulling { self.wand(screen) } else { None };
         let (keys, buttons) = (self.keys.clone(), u32::from(wand.is_some()));
         let idle = keys.is_empty() && buttons == 0;
-        let known = |(sent, at): &(Input, Instant)| sent.keys == keys && sent.buttons == buttons && sent.wand == wand && (idle || at.elapsed() < AGAIN);
+        let known = |(sent, at): &(Input, Instant)| {
+            sent.keys == keys && sent.buttons == buttons && sent.wand == wand && (idle || at.elapsed() < AGAIN)
+        };
         if self.sent.as_ref().map_or(idle, known) {
             return Ok(());
         }
         self.sequence += 1;
-        let input = Input { sequence: self.sequence, user: self.parts.user, head: None, wand, hands: [None; 2], buttons, keys };
+        let input =
+            Input { sequence: self.sequence, user: self.parts.user, head: None, wand, hands: [None; 2], buttons, keys };
         if self.running.facet.send_input(&input).map_err(failed)? {
             self.sent = Some((input, Instant::now()));
         }
@@ -171,7 +185,8 @@ impl Window<'_> {
         let aside = if direction.z.abs() < 0.9 { nalgebra::Vector3::z() } else { nalgebra::Vector3::x() };
         let right = direction.cross(&aside).normalize();
         let axes = nalgebra::Matrix3::from_columns(&[right, direction, right.cross(&direction)]);
-        let rotation = nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(axes));
+        let rotation =
+            nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(axes));
         Some(Pose::from_parts((origin.coords / viewer.scale).into(), rotation))
     }
 }
@@ -200,7 +215,9 @@ impl WindowApp for Window<'_> {
                 }
             }
             WindowEvent::CursorMoved { position, .. } => self.at_px = [position.x, position.y],
-            WindowEvent::MouseInput { state, button: MouseButton::Left, .. } => self.pulling = *state == ElementState::Pressed,
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. } => {
+                self.pulling = *state == ElementState::Pressed
+            }
             WindowEvent::Focused(false) => {
                 self.keys.clear();
                 self.pulling = false;
@@ -242,4 +259,3 @@ fn usage(code: KeyCode) -> Option<u16> {
         _ => return None,
     })
 }
-

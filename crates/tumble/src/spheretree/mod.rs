@@ -8,7 +8,9 @@ use crate::failure::Failure;
 use crate::progress::Share;
 use std::path::Path;
 use std::time::Instant;
-use tumble::collide::{Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh};
+use tumble::collide::{
+    Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh,
+};
 use tumble::scene::read_solid;
 use tumble::table::table;
 use tumble::whole::{check_writable, write_whole};
@@ -30,7 +32,9 @@ fn check_outputs(options: &SphereTreeOptions) -> Result<(), Failure> {
     }
     let depth = settings(options).depth;
     match options.level {
-        Some(level) if level > depth => Err(Failure::input(format!("--level is {level}; a tree of --depth {depth} has levels 0 to {depth} at most"))),
+        Some(level) if level > depth => Err(Failure::input(format!(
+            "--level is {level}; a tree of --depth {depth} has levels 0 to {depth} at most"
+        ))),
         _ => Ok(()),
     }
 }
@@ -51,7 +55,12 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     if !options.quiet {
         let from = if built.found { "from the cache".into() } else { format!("built in {seconds:.2} s") };
         let volume = mesh.union_mass_properties(1.0).mass;
-        println!("{}: {} triangles, volume {volume:.6e} m³, diagonal {} m; {from}", path.display(), mesh.triangles.len(), length(mesh.diagonal()));
+        println!(
+            "{}: {} triangles, volume {volume:.6e} m³, diagonal {} m; {from}",
+            path.display(),
+            mesh.triangles.len(),
+            length(mesh.diagonal())
+        );
         print!("{}", table(&file, options.verbose));
     }
     if let Some(output) = &options.output {
@@ -68,7 +77,8 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
 fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
-    let (mesh, notes) = read_solid(path, &bytes, options.repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
+    let (mesh, notes) =
+        read_solid(path, &bytes, options.repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
     notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{}: {note}", path.display()));
     Ok(mesh)
 }
@@ -102,7 +112,8 @@ fn length(metres: f64) -> String {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    write_whole(path, |path| std::fs::write(path, bytes)).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
+    write_whole(path, |path| std::fs::write(path, bytes))
+        .map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
 }
 
 fn say(options: &SphereTreeOptions, what: &str, path: &Path) {

@@ -4,8 +4,8 @@ use crate::args::SphereTreeOptions;
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{SphereTree, TriMesh};
-use tumble::whole::write_whole;
 use tumble::render::{RenderError, Renderer, UpAxis, tree_over_mesh};
+use tumble::whole::write_whole;
 
 /// Draws and writes. Without a graphics adapter all else still counts, and the message says what brings one.
 pub fn picture(mesh: &TriMesh, tree: &SphereTree, path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
@@ -29,7 +29,8 @@ pub fn picture(mesh: &TriMesh, tree: &SphereTree, path: &Path, options: &SphereT
         }
         Err(error) => return Err(failed(error)),
     };
-    write_whole(path, |path| image.write_png(path).map_err(std::io::Error::other)).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))?;
+    write_whole(path, |path| image.write_png(path).map_err(std::io::Error::other))
+        .map_err(|e| Failure::run(&format!("writing {}", path.display()), e))?;
     super::say(options, "picture", path);
     Ok(())
 }

@@ -27,7 +27,11 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
         error,
         tree: tumble::collide::TreeSettings { error: settings.error.min(error), even: false, ..settings },
         cache: super::cache(options),
-        urdf: UrdfOptions { packages: options.packages.iter().cloned().collect(), missing_meshes: options.missing_meshes, ..UrdfOptions::default() },
+        urdf: UrdfOptions {
+            packages: options.packages.iter().cloned().collect(),
+            missing_meshes: options.missing_meshes,
+            ..UrdfOptions::default()
+        },
     };
     let planner = planner_file(path, options)?;
     if let Some((file, _)) = &planner {
@@ -38,7 +42,10 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
     progress.done();
     let robot = robot?;
     if robot.links.is_empty() {
-        return Err(Failure::input(format!("{}: no link has a <collision>; there is nothing to cover", path.display())));
+        return Err(Failure::input(format!(
+            "{}: no link has a <collision>; there is nothing to cover",
+            path.display()
+        )));
     }
     if !options.quiet {
         robot.notes.iter().for_each(|note| println!("{note}"));
@@ -64,7 +71,10 @@ fn planner_file(path: &Path, options: &SphereTreeOptions) -> Result<Option<(Path
         None => {
             let beside = options.output.as_deref().ok_or_else(|| {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy();
-                Failure::input(format!("--planner {0} has no --output to lie beside; name a file, such as --planner {name}.{0}", planner.display()))
+                Failure::input(format!(
+                    "--planner {0} has no --output to lie beside; name a file, such as --planner {name}.{0}",
+                    planner.display()
+                ))
             })?;
             let ending = if planner.as_os_str() == "json" { "json" } else { "yml" };
             (beside.with_extension(ending), ending.into())
@@ -79,12 +89,22 @@ fn table(robot: &SphereRobot) -> String {
     let mean = |link: &LinkSpheres| link.outward.iter().sum::<f64>() / link.outward.len().max(1) as f64;
     let row = |link: &LinkSpheres| {
         let (shapes, spheres) = (link.shapes.to_string(), link.spheres.len().to_string());
-        vec![link.name.clone(), shapes, spheres, format!("{:.2}", 1e3 * worst(link)), format!("{:.2}", 1e3 * mean(link)), percent(1.0)]
+        vec![
+            link.name.clone(),
+            shapes,
+            spheres,
+            format!("{:.2}", 1e3 * worst(link)),
+            format!("{:.2}", 1e3 * mean(link)),
+            percent(1.0),
+        ]
     };
     let rows = std::iter::once(heads.map(str::to_owned).to_vec()).chain(robot.links.iter().map(row));
     let total: usize = robot.links.iter().map(|l| l.spheres.len()).sum();
     let mut text = aligned(rows);
-    _ = writeln!(text, "{total} spheres; 100 % of the collision surface of each link lies inside the spheres of that link: proved piece by piece, not sampled");
+    _ = writeln!(
+        text,
+        "{total} spheres; 100 % of the collision surface of each link lies inside the spheres of that link: proved piece by piece, not sampled"
+    );
     text
 }
 
@@ -94,7 +114,14 @@ fn planner_yaml(robot: &SphereRobot) -> String {
     for link in &robot.links {
         _ = writeln!(text, "  {}:", Value::from(link.name.as_str()));
         for (c, radius) in &link.spheres {
-            _ = writeln!(text, "    - center: [{}, {}, {}]\n      radius: {}", float(c.x), float(c.y), float(c.z), float(*radius));
+            _ = writeln!(
+                text,
+                "    - center: [{}, {}, {}]\n      radius: {}",
+                float(c.x),
+                float(c.y),
+                float(c.z),
+                float(*radius)
+            );
         }
     }
     text

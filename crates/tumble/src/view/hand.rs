@@ -23,7 +23,10 @@ impl Hand {
         let site = world.site(id, part).filter(|_| moves)?;
         let target = ray.origin + ray.direction * distance;
         let point = site.pose.rotation.inverse() * (target - site.position());
-        Some(Hand { pull: Pull { id, part, point, target, frequency: FREQUENCY }, depth_m: distance * ray.direction.dot(&ray.axis) })
+        Some(Hand {
+            pull: Pull { id, part, point, target, frequency: FREQUENCY },
+            depth_m: distance * ray.direction.dot(&ray.axis),
+        })
     }
 
     /// Where the pointer points now.
@@ -66,10 +69,16 @@ impl Hand {
 fn first_seen(world: &World, ray: &Ray) -> Option<(ObjectId, usize, f64)> {
     let mut first: Option<(ObjectId, usize, f64)> = None;
     for &id in world.ids() {
-        let Some(renderable) = world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.alive)) else { continue };
+        let Some(renderable) =
+            world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.alive))
+        else {
+            continue;
+        };
         for visual in renderable.visuals() {
             let Some(site) = world.site(id, visual.part) else { continue };
-            let Some(distance) = visual.shape.ray(&(site.pose * visual.pose), &ray.origin, &ray.direction) else { continue };
+            let Some(distance) = visual.shape.ray(&(site.pose * visual.pose), &ray.origin, &ray.direction) else {
+                continue;
+            };
             if first.is_none_or(|(_, _, nearest)| distance < nearest) {
                 first = Some((id, visual.part, distance));
             }

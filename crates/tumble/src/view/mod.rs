@@ -20,8 +20,8 @@ use crate::failure::Failure;
 use crate::shots::{may_be_written, write_png};
 use sight::Sight;
 use tumble::render::{CaveView, RenderError, WindowOptions, run_window};
-use tumble::scene::cave::{Output, resolve_cave};
 use tumble::scene::SceneFile;
+use tumble::scene::cave::{Output, resolve_cave};
 use viewer::Viewer;
 
 /// Size of the window where nothing is said, pixels.
@@ -64,7 +64,9 @@ fn sight(scene: &SceneFile, options: &ViewOptions) -> Result<Sight, Failure> {
     let facet = options.facet.as_ref().map(|facet| cave.facet(facet).cloned()).transpose()?;
     let view = Box::new(CaveView::new(cave, scene).map_err(Failure::input)?);
     match facet {
-        Some(_) if options.size.is_some() => Err(Failure::input("the cave says how large a facet is (size_px); --size goes with --preview or without a cave")),
+        Some(_) if options.size.is_some() => Err(Failure::input(
+            "the cave says how large a facet is (size_px); --size goes with --preview or without a cave",
+        )),
         Some(facet) => Ok(Sight::Facet(view, Box::new(facet))),
         None => Ok(Sight::Unfolded(view)),
     }
@@ -75,14 +77,21 @@ fn window(sight: &Sight, options: &ViewOptions) -> WindowOptions {
     let name = &options.scene.name;
     match sight {
         Sight::Camera => WindowOptions::new(format!("tumble: {name}"), most),
-        Sight::Unfolded(view) => WindowOptions::new(format!("tumble: {name} in {}", view.cave().file), view.size_px(None, most)),
+        Sight::Unfolded(view) => {
+            WindowOptions::new(format!("tumble: {name} in {}", view.cave().file), view.size_px(None, most))
+        }
         Sight::Facet(view, facet) => {
             let title = format!("tumble: {name} on {}", facet.name);
             let position_px = match facet.output {
                 Output::Window { position_px } => Some(position_px),
                 Output::Offscreen => None,
             };
-            WindowOptions { position_px, decorated: false, resizable: false, ..WindowOptions::new(title, view.size_px(Some(facet), most)) }
+            WindowOptions {
+                position_px,
+                decorated: false,
+                resizable: false,
+                ..WindowOptions::new(title, view.size_px(Some(facet), most))
+            }
         }
     }
 }

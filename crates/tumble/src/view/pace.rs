@@ -100,7 +100,13 @@ mod tests {
     fn a_second_in_uneven_turns_gives_as_many_steps_as_fit_in_it() {
         let mut pace = Pace::new(false);
         let turns = [0.25, 0.125, 0.5, 0.0625, 0.0625];
-        assert_eq!(turns.map(|t| { pace.pass(t); steps(&mut pace, 1.0 / 64.0) }), [16, 8, 32, 4, 4]);
+        assert_eq!(
+            turns.map(|t| {
+                pace.pass(t);
+                steps(&mut pace, 1.0 / 64.0)
+            }),
+            [16, 8, 32, 4, 4]
+        );
         pace.change_speed(-1);
         pace.pass(1.0);
         assert_eq!(steps(&mut pace, 1.0 / 64.0), 32);
@@ -131,7 +137,11 @@ mod tests {
         pace.step_once();
         assert_eq!(pace.until(0.75), Duration::ZERO);
         assert!(pace.take(0.75) && pace.paused);
-        assert_eq!(pace.until(0.75), Duration::from_secs(1), "nothing comes while time stands; a look a second does no harm");
+        assert_eq!(
+            pace.until(0.75),
+            Duration::from_secs(1),
+            "nothing comes while time stands; a look a second does no harm"
+        );
     }
 
     #[test]

@@ -25,10 +25,17 @@ pub struct Presets {
 impl Presets {
     /// The scene's camera first, then those that objects carry, then everything from the front, both sides, behind and above.
     pub fn new(world: &World, list: &DrawList) -> Presets {
-        let around = [("front", [0.0, 1.0, -0.3]), ("left", [1.0, 0.0, -0.3]), ("back", [0.0, -1.0, -0.3]), ("right", [-1.0, 0.0, -0.3]), ("top", [0.0, 0.02, -1.0])];
+        let around = [
+            ("front", [0.0, 1.0, -0.3]),
+            ("left", [1.0, 0.0, -0.3]),
+            ("back", [0.0, -1.0, -0.3]),
+            ("right", [-1.0, 0.0, -0.3]),
+            ("top", [0.0, 0.02, -1.0]),
+        ];
         let framing = around.map(|(name, d)| (name.to_string(), Source::Framing(Vector3::from(d))));
         let carried = list.views(world).into_iter().skip(1).map(|view| (view.name, Source::Carried));
-        let list = std::iter::once(("scene".to_string(), Source::Fixed(list.camera))).chain(carried).chain(framing).collect();
+        let list =
+            std::iter::once(("scene".to_string(), Source::Fixed(list.camera))).chain(carried).chain(framing).collect();
         Presets { list, current: 0, attached: false }
     }
 
@@ -71,7 +78,9 @@ impl Presets {
     pub fn camera(&self, world: &World, list: &DrawList) -> Option<Camera> {
         match &self.list[self.current].1 {
             Source::Fixed(camera) => Some(*camera),
-            Source::Carried => list.views(world).into_iter().find(|view| view.name == self.name()).map(|view| view.camera),
+            Source::Carried => {
+                list.views(world).into_iter().find(|view| view.name == self.name()).map(|view| view.camera)
+            }
             Source::Framing(direction) => Some(usual_depths(list.framing_camera(*direction))),
         }
     }

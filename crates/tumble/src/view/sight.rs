@@ -91,13 +91,18 @@ impl Sight {
     /// The line of sight through a pixel; `None` where nothing is shown there. Of an anaglyph the left eye's.
     pub fn ray(&self, list: &DrawList, size_px: [u32; 2], at_px: [f64; 2]) -> Option<Ray> {
         let tiles = self.tiles(list, size_px).ok()?;
-        let within = |t: &&Tile| (0..2).all(|k| (0.0..f64::from(t.size_px[k])).contains(&(at_px[k] - f64::from(t.position_px[k]))));
+        let within = |t: &&Tile| {
+            (0..2).all(|k| (0.0..f64::from(t.size_px[k])).contains(&(at_px[k] - f64::from(t.position_px[k]))))
+        };
         let tile = tiles.iter().find(within)?;
-        let share: [f64; 2] = std::array::from_fn(|k| (at_px[k] - f64::from(tile.position_px[k])) / f64::from(tile.size_px[k]));
+        let share: [f64; 2] =
+            std::array::from_fn(|k| (at_px[k] - f64::from(tile.position_px[k])) / f64::from(tile.size_px[k]));
         let share: [f64; 2] = std::array::from_fn(|k| if tile.flip[k] { 1.0 - share[k] } else { share[k] });
         let lens = tile.from.lens(tile.size_px[0] as f32 / tile.size_px[1] as f32).ok()?;
         let back = (lens.projection * lens.view).try_inverse()?;
-        let at = |depth: f64| back.transform_point(&nalgebra::Point3::new(2.0 * share[0] - 1.0, 1.0 - 2.0 * share[1], depth)).coords;
+        let at = |depth: f64| {
+            back.transform_point(&nalgebra::Point3::new(2.0 * share[0] - 1.0, 1.0 - 2.0 * share[1], depth)).coords
+        };
         let (near, far) = (at(0.0), at(0.5));
         let rotation = lens.view.fixed_view::<3, 3>(0, 0).transpose();
         let origin = -(rotation * lens.view.fixed_view::<3, 1>(0, 3));
@@ -105,7 +110,8 @@ impl Sight {
     }
 
     fn tiles(&self, list: &DrawList, size_px: [u32; 2]) -> Result<Vec<Tile>, RenderError> {
-        let whole = |from: Box<dyn Viewpoint>, position_px, size_px| Tile { from, position_px, size_px, flip: [false; 2] };
+        let whole =
+            |from: Box<dyn Viewpoint>, position_px, size_px| Tile { from, position_px, size_px, flip: [false; 2] };
         Ok(match self {
             Sight::Camera => vec![whole(Box::new(list.camera), [0; 2], size_px)],
             Sight::Facet(view, facet) => eyes(view, facet)?,

@@ -47,7 +47,18 @@ impl Simulation {
     pub fn new(world: World, pace: Pace, last: Option<u64>) -> Simulation {
         let start = world.save();
         let steps = Meter::default();
-        Simulation { world, pace, hand: None, trouble: None, steps, changes: 0, start, last, turn: Instant::now(), ending: false }
+        Simulation {
+            world,
+            pace,
+            hand: None,
+            trouble: None,
+            steps,
+            changes: 0,
+            start,
+            last,
+            turn: Instant::now(),
+            ending: false,
+        }
     }
 
     /// Whether the last step is taken, or no further one can be.

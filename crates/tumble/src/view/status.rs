@@ -44,7 +44,15 @@ pub struct Status {
 impl Status {
     /// Whether anything differs but what changes by itself.
     pub fn differs(&self, other: &Status) -> bool {
-        let still = |s: &Status| Status { frame: 0, time_s: 0.0, behind_s: 0.0, shown: 0, held_at_m: None, state_blake3: String::new(), ..s.clone() };
+        let still = |s: &Status| Status {
+            frame: 0,
+            time_s: 0.0,
+            behind_s: 0.0,
+            shown: 0,
+            held_at_m: None,
+            state_blake3: String::new(),
+            ..s.clone()
+        };
         still(self) != still(other)
     }
 }
@@ -61,7 +69,10 @@ impl Log {
         let to: Option<Box<dyn Write>> = match path {
             None => None,
             Some(path) if path.as_os_str() == "-" => Some(Box::new(stdout())),
-            Some(path) => Some(Box::new(File::create(path).map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))?)),
+            Some(path) => Some(Box::new(
+                File::create(path)
+                    .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))?,
+            )),
         };
         Ok(Log { to, last: None })
     }

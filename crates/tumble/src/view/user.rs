@@ -111,7 +111,9 @@ impl User {
     /// A key that moves goes down.
     pub fn press(&mut self, way: Way) {
         match self.held.iter_mut().find(|h| h.way == way) {
-            Some(held) if held.released => *held = Held { way, down_s: 0.0, done_s: held.done_s - TAP_S, released: false },
+            Some(held) if held.released => {
+                *held = Held { way, down_s: 0.0, done_s: held.done_s - TAP_S, released: false }
+            }
             Some(_) => {}
             None => self.held.push(Held { way, down_s: 0.0, done_s: 0.0, released: false }),
         }
@@ -185,7 +187,11 @@ impl User {
             Body::Eye(Camera::LookAt { eye, target, up: upright, .. }) => {
                 let from: Point3<f64> = eye.cast();
                 let distance = (target.cast::<f64>() - from).norm();
-                let heading = if forward.x.hypot(forward.y) > 1e-6 { forward.y.atan2(forward.x) } else { f64::from(upright.y).atan2(f64::from(upright.x)) };
+                let heading = if forward.x.hypot(forward.y) > 1e-6 {
+                    forward.y.atan2(forward.x)
+                } else {
+                    f64::from(upright.y).atan2(f64::from(upright.x))
+                };
                 let (heading, pitch) = (heading + left, (forward.z.asin() + up).clamp(-STEEPEST_RAD, STEEPEST_RAD));
                 let (sin, cos) = pitch.sin_cos();
                 let to = from + Vec3::new(cos * heading.cos(), cos * heading.sin(), sin) * distance;
@@ -227,4 +233,3 @@ fn round_speed(speed: f64) -> f64 {
     let off = |x: &f64| (x / speed).ln().abs();
     [1.0, 2.0, 5.0, 10.0].map(|digit| digit * ten).into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(1.0)
 }
-

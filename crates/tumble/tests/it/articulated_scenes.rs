@@ -31,7 +31,9 @@ fn place(world: &World, name: &str) -> Vec3 {
 fn past_limits(world: &World, name: &str) -> f64 {
     let (body, q, _) = body(world, name);
     let links = body.model().links().iter().filter(|link| link.joint.dof() == 1);
-    links.filter_map(|link| body.freedoms()[link.v].limits.map(|[lo, hi]| (lo - q[link.q]).max(q[link.q] - hi))).fold(f64::MIN, f64::max)
+    links
+        .filter_map(|link| body.freedoms()[link.v].limits.map(|[lo, hi]| (lo - q[link.q]).max(q[link.q] - hi)))
+        .fold(f64::MIN, f64::max)
 }
 
 /// Where the joint of a link is, world axes.
@@ -51,7 +53,12 @@ fn skeleton_has_the_lengths_and_masses_of_its_page() {
     let apart = |a: &str, b: &str| (joint(&world, "skeleton", a) - joint(&world, "skeleton", b)).norm();
     for side in ["left", "right"] {
         let of = |link: &str| format!("{side}_{link}");
-        for (from, to, share) in [("thigh", "shank", 0.245), ("shank", "foot", 0.246), ("upper_arm", "forearm", 0.186), ("forearm", "hand", 0.146)] {
+        for (from, to, share) in [
+            ("thigh", "shank", 0.245),
+            ("shank", "foot", 0.246),
+            ("upper_arm", "forearm", 0.186),
+            ("forearm", "hand", 0.146),
+        ] {
             let length = apart(&of(from), &of(to));
             assert!((length - share * 1.75).abs() < 1e-5, "{side} {from}: {length} m");
         }
@@ -72,7 +79,10 @@ fn skeleton_falls_down_the_stairs_and_lies_still() {
         (gain, energy) = (gain.max(now - energy), now);
     }
     let (end, drop) = (world.energy(), start.potential - world.energy().potential);
-    println!("past a limit by {past:.1e} rad, penetration {deepest:.1e} m, gain {gain:.1e} J in a step, drop {drop:.0} J, motion left {:.1e} J", end.kinetic);
+    println!(
+        "past a limit by {past:.1e} rad, penetration {deepest:.1e} m, gain {gain:.1e} J in a step, drop {drop:.0} J, motion left {:.1e} J",
+        end.kinetic
+    );
     assert!(past < 1e-6, "past a limit by {past} rad");
     assert!(deepest < 5e-3, "penetration {deepest} m");
     assert!(gain < 1e-6 * start.total(), "energy grows by {gain} J in a step");
@@ -132,7 +142,8 @@ fn robot_follows_its_recording_within_its_torques_and_moves_the_blocks_as_its_pa
             assert_eq!(*limit, efforts[i]);
             off = off.max((q[i] - motion.at(world.time()).0).abs());
         }
-        let (mut kin, mut work, mut torque) = (Kinematics::new(arm.model()), InverseDynamics::new(arm.model()), [0.0; 6]);
+        let (mut kin, mut work, mut torque) =
+            (Kinematics::new(arm.model()), InverseDynamics::new(arm.model()), [0.0; 6]);
         let qdd: Vec<f64> = v.iter().zip(&before).map(|(a, b)| (a - b) / h).collect();
         inverse_dynamics(arm.model(), (&mut kin, &mut work), &Vec3::new(0.0, 0.0, -G), q, v, &qdd, &[], &mut torque);
         for i in 0..6 {

@@ -50,7 +50,11 @@ fn every_bad_scene_gets_one_clear_message() {
 #[test]
 fn garbage_is_no_scene() {
     let folder = Folder::new("garbage");
-    for (file, bytes) in [("binary.toml", vec![0xff, 0xfe, 0x00, 0x80]), ("control.toml", vec![0, 1, 2, 3]), ("deep.toml", [b"a = ".to_vec(), vec![b'['; 100_000]].concat())] {
+    for (file, bytes) in [
+        ("binary.toml", vec![0xff, 0xfe, 0x00, 0x80]),
+        ("control.toml", vec![0, 1, 2, 3]),
+        ("deep.toml", [b"a = ".to_vec(), vec![b'['; 100_000]].concat()),
+    ] {
         let said = fail_often(&["run", &folder.write(file, bytes)], 2);
         assert!(said.contains(file), "{file}: {said}");
     }
@@ -83,7 +87,9 @@ fn every_bad_mesh_gets_one_clear_message() {
         let path = folder.write(file, bytes);
         let said = fail(&["check", &path], 2);
         assert!(said.contains(file) && said.contains(word), "{file}: '{word}' is not in: {said}");
-        let mesh = format!("[meshes.m]\ntype = \"file\"\nfile = \"{file}\"\n[[body]]\nname = \"b\"\nshape = {{ type = \"mesh\", mesh = \"m\" }}\nmass_kg = 1.0\n");
+        let mesh = format!(
+            "[meshes.m]\ntype = \"file\"\nfile = \"{file}\"\n[[body]]\nname = \"b\"\nshape = {{ type = \"mesh\", mesh = \"m\" }}\nmass_kg = 1.0\n"
+        );
         let said = fail(&["run", &folder.write("uses.toml", mesh)], 2);
         assert!(said.contains(file), "the scene that uses {file} does not name it: {said}");
     }
@@ -146,7 +152,10 @@ fn a_damaged_or_foreign_snapshot_is_bad_input() {
     assert!(said.contains("another world") && said.contains("crate_1"), "{said}");
     fail(&["run", "stack", "--restore", "/nonexistent/state"], 2);
     #[cfg(target_os = "linux")]
-    assert!(fail(&["run", "stack", "--restore", "/dev/zero"], 2).contains("larger than"), "what never ends is read to its end");
+    assert!(
+        fail(&["run", "stack", "--restore", "/dev/zero"], 2).contains("larger than"),
+        "what never ends is read to its end"
+    );
 }
 
 #[test]
@@ -181,7 +190,10 @@ fn a_full_disk_is_a_failure_at_run_time() {
         let said = String::from_utf8(out.stderr).unwrap();
         assert_eq!(out.status.code(), Some(1), "{args:?}: {said}");
         assert!(said.contains("Error: stdout: No space left") && !said.contains("panicked"), "{args:?}: {said}");
-        assert!(command(args).stdout(full()).stderr(full()).output().unwrap().status.code() == Some(1), "{args:?}: nobody to tell");
+        assert!(
+            command(args).stdout(full()).stderr(full()).output().unwrap().status.code() == Some(1),
+            "{args:?}: nobody to tell"
+        );
     }
 }
 
@@ -189,7 +201,11 @@ fn a_full_disk_is_a_failure_at_run_time() {
 #[test]
 fn a_reader_that_goes_away_is_no_failure() {
     use std::io::Read;
-    let mut child = command(&["check", "stack", "billiards", "incline", "cube4"]).stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let mut child = command(&["check", "stack", "billiards", "incline", "cube4"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
     drop(child.stdout.take());
     let mut said = String::new();
     child.stderr.take().unwrap().read_to_string(&mut said).unwrap();

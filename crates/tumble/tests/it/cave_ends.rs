@@ -14,7 +14,8 @@ const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 fn ctrl_c_keeps_summary_and_recording_where_a_facet_does_not_answer() {
     let place = Place::new("cave-frozen-end", &wall());
     let (summary, record) = (place.path("summary.json"), place.path("run.mcap"));
-    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &summary, "--record", &record]);
+    let run = place
+        .start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &summary, "--record", &record]);
     place.wait_for("out", "r", 5);
     let facets = run.facets();
     signal(run.facet("r"), Signal::STOP);
@@ -55,7 +56,13 @@ fn a_full_disk_is_told_with_the_file_and_ends_the_run() {
     let (code, _, wrong) = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out")]).end();
     assert_eq!(code, Some(1), "{wrong}");
     for facet in ["l", "r"] {
-        assert!(wrong.contains(&format!("writing {}: ", place.folder.path("out").join(facet).join("frames.jsonl").display())), "{wrong}");
+        assert!(
+            wrong.contains(&format!(
+                "writing {}: ",
+                place.folder.path("out").join(facet).join("frames.jsonl").display()
+            )),
+            "{wrong}"
+        );
     }
     place.assert_clean();
 }
@@ -77,7 +84,11 @@ fn a_recording_that_is_played_or_whose_run_does_not_begin_is_not_written_over() 
     let (code, _, wrong) = place.start("serve", &["--record", &record, "--wait", "0.3"]).end();
     assert_eq!(code, Some(1), "{wrong}");
     assert!(before == std::fs::read(&record).unwrap());
-    let hidden = std::fs::read_dir(place.folder.path("")).unwrap().flatten().filter(|e| e.file_name().as_encoded_bytes().starts_with(b".")).count();
+    let hidden = std::fs::read_dir(place.folder.path(""))
+        .unwrap()
+        .flatten()
+        .filter(|e| e.file_name().as_encoded_bytes().starts_with(b"."))
+        .count();
     assert_eq!(hidden, 0);
 }
 
@@ -85,14 +96,18 @@ fn a_recording_that_is_played_or_whose_run_does_not_begin_is_not_written_over() 
 fn a_facet_of_another_cave_is_not_let_in() {
     let place = Place::new("cave-other-cave", &wall());
     let server = place.start("serve", &["--wait", "60"]);
-    wait("the server's lock", || lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory")));
+    wait("the server's lock", || {
+        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+    });
     std::fs::write(&place.cave, wall().replace("[-2, 2, 2.0]", "[-2, 2, 2.2]")).unwrap();
     let (code, _, wrong) = place.start("facet", &["--facet", "r", "--no-pictures"]).end();
     assert_eq!(code, Some(2), "{wrong}");
     assert!(wrong.contains("refuses it"), "{wrong}");
     // with other times, machines and descriptions it is the same cave
     std::fs::write(&place.cave, wall().replace("drop_timeout_ms = 500", "drop_timeout_ms = 600")).unwrap();
-    let facets: Vec<_> = ["l", "r"].map(|f| place.start("facet", &["--facet", f, "--no-pictures", "--log-dir", &place.path("out")])).into();
+    let facets: Vec<_> = ["l", "r"]
+        .map(|f| place.start("facet", &["--facet", f, "--no-pictures", "--log-dir", &place.path("out")]))
+        .into();
     place.wait_for("out", "r", 5);
     signal(server.pid(), Signal::INT);
     assert_eq!(server.end().0, Some(0));
@@ -103,11 +118,18 @@ fn a_facet_of_another_cave_is_not_let_in() {
 #[test]
 fn a_facet_with_another_texture_of_the_same_name_is_not_let_in() {
     let place = Place::new("cave-other-texture", &wall());
-    let picture = |value: u8| tumble::render::Image { width: 2, height: 2, rgba: vec![value; 16] }.write_png(place.folder.path("bark.png")).unwrap();
+    let picture = |value: u8| {
+        tumble::render::Image { width: 2, height: 2, rgba: vec![value; 16] }
+            .write_png(place.folder.path("bark.png"))
+            .unwrap()
+    };
     picture(255);
-    std::fs::write(&place.scene, SCENE.replace("radius_m = 0.3 }", "radius_m = 0.3 }\ntexture = \"bark.png\"")).unwrap();
+    std::fs::write(&place.scene, SCENE.replace("radius_m = 0.3 }", "radius_m = 0.3 }\ntexture = \"bark.png\""))
+        .unwrap();
     let server = place.start("serve", &["--wait", "60"]);
-    wait("the server's lock", || lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory")));
+    wait("the server's lock", || {
+        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+    });
     picture(128);
     let (code, _, wrong) = place.start("facet", &["--facet", "r", "--no-pictures"]).end();
     assert_eq!(code, Some(2), "{wrong}");
@@ -122,13 +144,19 @@ fn facets_by_hand_find_the_server_that_was_started_again() {
         let place = Place::new(&format!("cave-again-{carrier}"), &wall());
         let start = || place.start("serve", &["--transport", carrier]);
         let server = start();
-        let facets: Vec<_> = ["l", "r"].map(|f| place.start("facet", &["--facet", f, "--no-pictures", "--wait", "80", "--log-dir", &place.path("out")])).into();
+        let facets: Vec<_> = ["l", "r"]
+            .map(|f| {
+                place.start("facet", &["--facet", f, "--no-pictures", "--wait", "80", "--log-dir", &place.path("out")])
+            })
+            .into();
         place.wait_for("out", "r", 5);
         signal(server.pid(), Signal::KILL);
         drop(server);
         let server = start();
         for facet in ["l", "r"] {
-            wait(&format!("facet {facet} in the second run, {carrier}"), || numbers(&place.log("out", facet)).iter().filter(|n| **n == 0).count() == 2);
+            wait(&format!("facet {facet} in the second run, {carrier}"), || {
+                numbers(&place.log("out", facet)).iter().filter(|n| **n == 0).count() == 2
+            });
         }
         signal(server.pid(), Signal::INT);
         let (code, _, wrong) = server.end();
@@ -141,7 +169,10 @@ fn facets_by_hand_find_the_server_that_was_started_again() {
 fn lock_file(place: &Place) -> Option<std::path::PathBuf> {
     let folders = std::fs::read_dir(place.folder.path("run")).ok()?.flatten();
     let files = folders.filter_map(|folder| std::fs::read_dir(folder.path()).ok()).flat_map(|files| files.flatten());
-    files.map(|file| file.path()).find(|path| path.extension().is_some_and(|e| e == "lock") && path.file_name().unwrap().to_str().unwrap().starts_with("cave-"))
+    files.map(|file| file.path()).find(|path| {
+        path.extension().is_some_and(|e| e == "lock")
+            && path.file_name().unwrap().to_str().unwrap().starts_with("cave-")
+    })
 }
 
 #[test]
@@ -153,7 +184,9 @@ fn a_shipped_cave_is_one_from_every_folder() {
         serve
     };
     let mut first = start(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).stderr(Stdio::null()).spawn().unwrap();
-    wait("the lock", || lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory")));
+    wait("the lock", || {
+        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+    });
     let out = start("/").output().unwrap();
     signal(first.id() as i32, Signal::INT);
     assert!(first.wait().unwrap().success());
@@ -177,7 +210,9 @@ fn a_run_of_long_paths_has_a_name_and_is_found() {
         command.stdin(Stdio::null()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap()
     };
     let mut server = start("serve", &["--seconds", "0.3", "--quiet"]);
-    wait("the lock", || lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory")));
+    wait("the lock", || {
+        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+    });
     let second = start("serve", &[]).wait_with_output().unwrap();
     let wrong = String::from_utf8_lossy(&second.stderr);
     assert!(wrong.contains(&format!("process {}", server.id())), "{wrong}");
@@ -191,7 +226,9 @@ fn a_run_of_long_paths_has_a_name_and_is_found() {
 fn replacing_a_run_signals_nobody_who_only_has_its_number() {
     let place = Place::new("cave-bystander", &wall());
     let server = place.start("serve", &["--wait", "60"]);
-    wait("the lock", || lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory")));
+    wait("the lock", || {
+        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+    });
     let path = lock_file(&place).unwrap();
     signal(server.pid(), Signal::KILL);
     let _ = server.end();
@@ -218,7 +255,8 @@ fn replacing_a_run_signals_nobody_who_only_has_its_number() {
 fn a_run_goes_on_when_nobody_reads_its_stderr() {
     let place = Place::new("cave-unheard", &wall());
     let (summary, record) = (place.path("summary.json"), place.path("run.mcap"));
-    let mut command = place.command("cave", &["--no-pictures", "--fast", "--seconds", "0.3", "--summary", &summary, "--record", &record]);
+    let mut command = place
+        .command("cave", &["--no-pictures", "--fast", "--seconds", "0.3", "--summary", &summary, "--record", &record]);
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop((child.stdout.take(), child.stderr.take()));
     assert_eq!(child.wait().unwrap().code(), Some(0));
@@ -234,14 +272,33 @@ fn the_others_go_on_when_a_facet_cannot_be_started_again() {
     let program = place.folder.path("tumble");
     std::fs::copy(env!("CARGO_BIN_EXE_tumble"), &program).unwrap();
     let mut command = Command::new(&program);
-    command.args(["cave", &place.scene, "--cave", &place.cave, "--no-pictures", "--restart", "--log-dir", &place.path("out")]);
-    command.env("XDG_RUNTIME_DIR", place.folder.path("run")).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    command.args([
+        "cave",
+        &place.scene,
+        "--cave",
+        &place.cave,
+        "--no-pictures",
+        "--restart",
+        "--log-dir",
+        &place.path("out"),
+    ]);
+    command
+        .env("XDG_RUNTIME_DIR", place.folder.path("run"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
     let child = command.spawn().unwrap();
     place.wait_for("out", "r", 5);
     std::fs::remove_file(&program).unwrap();
     let pid = child.id() as i32;
-    let facets: Vec<i32> = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap().split_whitespace().map(|p| p.parse().unwrap()).collect();
-    let right = facets.iter().find(|pid| String::from_utf8_lossy(&std::fs::read(format!("/proc/{pid}/cmdline")).unwrap()).contains("--facet\0r\0"));
+    let facets: Vec<i32> = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children"))
+        .unwrap()
+        .split_whitespace()
+        .map(|p| p.parse().unwrap())
+        .collect();
+    let right = facets.iter().find(|pid| {
+        String::from_utf8_lossy(&std::fs::read(format!("/proc/{pid}/cmdline")).unwrap()).contains("--facet\0r\0")
+    });
     signal(*right.unwrap(), Signal::KILL);
     let at = *numbers(&place.log("out", "l")).last().unwrap();
     place.wait_for("out", "l", at + 150);
@@ -257,7 +314,9 @@ fn the_others_go_on_when_a_facet_cannot_be_started_again() {
 fn what_cannot_go_well_is_refused_before_the_start() {
     let place = Place::new("cave-refusals", &wall());
     let nowhere = place.path("nowhere/summary.json");
-    for (args, word) in [(["--summary", &nowhere], "cannot be written"), (["--listen", "127.0.0.1:0"], "--transport udp")] {
+    for (args, word) in
+        [(["--summary", &nowhere], "cannot be written"), (["--listen", "127.0.0.1:0"], "--transport udp")]
+    {
         let (code, _, wrong) = place.start("serve", &args).end();
         assert_eq!(code, Some(2), "{wrong}");
         assert!(wrong.contains(args[0]) || wrong.contains(args[1]), "{wrong}");

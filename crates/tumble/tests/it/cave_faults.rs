@@ -10,7 +10,10 @@ use std::time::Duration;
 #[test]
 fn the_wall_goes_on_without_a_killed_facet_which_comes_back() {
     let place = Place::new("cave-kill", &wall());
-    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--restart", "--summary", &place.path("summary.json")]);
+    let run = place.start(
+        "cave",
+        &["--no-pictures", "--log-dir", &place.path("out"), "--restart", "--summary", &place.path("summary.json")],
+    );
     place.wait_for("out", "r", 5);
     signal(run.facet("r"), Signal::KILL);
     let killed_at = *numbers(&place.log("out", "l")).last().unwrap();
@@ -27,14 +30,18 @@ fn the_wall_goes_on_without_a_killed_facet_which_comes_back() {
     let left = place.log("out", "l");
     right.iter().for_each(|line| assert_eq!(line["state"], left[line["frame"].as_u64().unwrap() as usize]["state"]));
     let facets = json(&place.folder.path("summary.json"))["facets"].clone();
-    assert_eq!((&facets[0]["joined"], &facets[1]["joined"], &facets[1]["mismatched"]), (&1.into(), &2.into(), &0.into()));
+    assert_eq!(
+        (&facets[0]["joined"], &facets[1]["joined"], &facets[1]["mismatched"]),
+        (&1.into(), &2.into(), &0.into())
+    );
     place.assert_clean();
 }
 
 #[test]
 fn a_frozen_facet_is_dropped_and_comes_back_when_it_goes_on() {
     let place = Place::new("cave-freeze", &wall());
-    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &place.path("summary.json")]);
+    let run = place
+        .start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &place.path("summary.json")]);
     place.wait_for("out", "r", 5);
     let frozen = run.facet("r");
     signal(frozen, Signal::STOP);
@@ -49,7 +56,11 @@ fn a_frozen_facet_is_dropped_and_comes_back_when_it_goes_on() {
     let left = numbers(&place.log("out", "l"));
     assert_eq!(left, (0..left.len() as u64).collect::<Vec<_>>());
     let facets = json(&place.folder.path("summary.json"))["facets"].clone();
-    assert_eq!((&facets[0]["dropped"], &facets[1]["dropped"], &facets[1]["joined"]), (&0.into(), &1.into(), &2.into()), "{wrong}");
+    assert_eq!(
+        (&facets[0]["dropped"], &facets[1]["dropped"], &facets[1]["joined"]),
+        (&0.into(), &1.into(), &2.into()),
+        "{wrong}"
+    );
     place.assert_clean();
 }
 
@@ -71,7 +82,10 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
     signal(server.pid(), Signal::KILL);
     let (code, _, wrong) = l.end();
     assert_eq!(code, Some(1), "{wrong}");
-    assert!(wrong.contains("facet l: has lost its server") && wrong.contains("did not come back, 10 s long"), "{wrong}");
+    assert!(
+        wrong.contains("facet l: has lost its server") && wrong.contains("did not come back, 10 s long"),
+        "{wrong}"
+    );
     // Ctrl-C while it waits is no failure
     signal(r.pid(), Signal::INT);
     let (code, _, wrong) = r.end();
@@ -96,14 +110,19 @@ fn a_facet_is_shown_by_one_process_over_udp() {
 fn rivals(carrier: &str, joins: std::ops::Range<u64>) {
     let place = Place::new(&format!("cave-rivals-{carrier}"), &wall());
     let server = place.start("serve", &["--transport", carrier, "--summary", &place.path("summary.json")]);
-    let [l, r] = ["l", "r"].map(|name| place.start("facet", &["--facet", name, "--no-pictures", "--log-dir", &place.path("out"), "--wait", "60"]));
+    let [l, r] = ["l", "r"].map(|name| {
+        place.start("facet", &["--facet", name, "--no-pictures", "--log-dir", &place.path("out"), "--wait", "60"])
+    });
     place.wait_for("out", "r", 5);
-    let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("second"), "--wait", "60"]).end();
+    let (code, _, wrong) = place
+        .start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("second"), "--wait", "60"])
+        .end();
     assert!(code == Some(2) && wrong.contains("another process shows facet 'l' and answers"), "{code:?}: {wrong}");
     let at = *numbers(&place.log("out", "r")).last().unwrap();
     place.wait_for("out", "l", at);
     signal(l.pid(), Signal::KILL);
-    let again = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("third"), "--wait", "60"]);
+    let again =
+        place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("third"), "--wait", "60"]);
     place.wait_for("third", "l", at + 5);
     signal(server.pid(), Signal::TERM);
     let (code, said, wrong) = server.end();
@@ -116,10 +135,17 @@ fn rivals(carrier: &str, joins: std::ops::Range<u64>) {
     let (facet, frames) = (&summary["facets"][0], summary["frames"].as_u64().unwrap());
     // five if nobody took the other's connection before it could speak; without end if nobody was refused
     assert!(joins.contains(&facet["joined"].as_u64().unwrap()), "{facet}");
-    let logged: std::collections::BTreeSet<u64> = ["out", "second", "third"].iter().flat_map(|folder| numbers(&place.log(folder, "l"))).collect();
+    let logged: std::collections::BTreeSet<u64> =
+        ["out", "second", "third"].iter().flat_map(|folder| numbers(&place.log(folder, "l"))).collect();
     let shown = frames - facet["not_shown"].as_u64().unwrap();
-    assert!(shown >= logged.len() as u64 && shown <= facet["presented"].as_u64().unwrap() && said.contains("not shown"), "{shown}, {logged:?}: {said}");
-    assert_eq!((&summary["facets"][1]["not_shown"], summary["facets"][1]["presented"].as_u64()), (&0.into(), Some(frames)));
+    assert!(
+        shown >= logged.len() as u64 && shown <= facet["presented"].as_u64().unwrap() && said.contains("not shown"),
+        "{shown}, {logged:?}: {said}"
+    );
+    assert_eq!(
+        (&summary["facets"][1]["not_shown"], summary["facets"][1]["presented"].as_u64()),
+        (&0.into(), Some(frames))
+    );
 }
 
 /// A second Ctrl-C ends what a facet that does not answer holds up, and so does its process.
@@ -139,8 +165,12 @@ fn a_second_signal_ends_a_run_at_once() {
     assert!(!wrong.contains("does not end and is killed"), "{wrong}");
     wait("the end of all facets", || facets.iter().all(|(_, pid)| !alive(*pid)));
     // the cave is free, and the next run takes away what is left
-    let locks = std::fs::read_dir(place.folder.path("run")).unwrap().flatten().flat_map(|folder| std::fs::read_dir(folder.path()).unwrap().flatten());
-    let locks: Vec<_> = locks.map(|file| file.file_name()).filter(|name| name.to_str().unwrap().starts_with("cave-")).collect();
+    let locks = std::fs::read_dir(place.folder.path("run"))
+        .unwrap()
+        .flatten()
+        .flat_map(|folder| std::fs::read_dir(folder.path()).unwrap().flatten());
+    let locks: Vec<_> =
+        locks.map(|file| file.file_name()).filter(|name| name.to_str().unwrap().starts_with("cave-")).collect();
     assert!(locks.is_empty(), "{locks:?}");
     place.succeed("cave", &["--no-pictures", "--seconds", "0.1", "--quiet"]);
     place.assert_clean();
@@ -151,7 +181,13 @@ fn a_second_signal_ends_a_run_at_once() {
 fn what_a_killed_start_has_recorded_goes_with_the_next_recording() {
     let place = Place::new("cave-killed-start", &wall());
     let record = place.path("run.mcap");
-    let hidden = || std::fs::read_dir(place.folder.path("")).unwrap().flatten().filter(|e| e.file_name().as_encoded_bytes().starts_with(b".run.mcap.")).count();
+    let hidden = || {
+        std::fs::read_dir(place.folder.path(""))
+            .unwrap()
+            .flatten()
+            .filter(|e| e.file_name().as_encoded_bytes().starts_with(b".run.mcap."))
+            .count()
+    };
     let start = || {
         let run = place.start("serve", &["--record", &record, "--wait", "60"]);
         wait("the recording", || hidden() == 1);
@@ -170,14 +206,27 @@ fn what_a_killed_start_has_recorded_goes_with_the_next_recording() {
 #[test]
 fn what_a_run_shares_is_open_to_nobody_else() {
     let place = Place::new("cave-private", &wall());
-    let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &place.path("summary.json")]);
+    let run = place
+        .start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &place.path("summary.json")]);
     place.wait_for("out", "r", 5);
-    let folder = std::fs::read_dir(place.folder.path("run")).unwrap().flatten().map(|e| e.path()).find(|path| path.is_dir()).unwrap();
+    let folder = std::fs::read_dir(place.folder.path("run"))
+        .unwrap()
+        .flatten()
+        .map(|e| e.path())
+        .find(|path| path.is_dir())
+        .unwrap();
     let about = std::fs::metadata(&folder).unwrap();
     assert_eq!(about.mode() & 0o777, 0o700);
     let prefix = format!("tumble_{}_{}_", about.uid(), &blake3::hash(text(&folder).as_bytes()).to_hex()[..8]);
-    let ours = |name: &str| name.starts_with(&prefix) || name.starts_with(&format!("tumble_{}_", about.uid())) && name.ends_with(".bell");
-    let files: Vec<_> = std::fs::read_dir("/dev/shm").unwrap().flatten().filter(|file| file.file_name().to_str().is_some_and(ours)).map(|file| file.path()).collect();
+    let ours = |name: &str| {
+        name.starts_with(&prefix) || name.starts_with(&format!("tumble_{}_", about.uid())) && name.ends_with(".bell")
+    };
+    let files: Vec<_> = std::fs::read_dir("/dev/shm")
+        .unwrap()
+        .flatten()
+        .filter(|file| file.file_name().to_str().is_some_and(ours))
+        .map(|file| file.path())
+        .collect();
     // samples and services in both directions, connections of two facets, a bell
     assert!(files.len() >= 10, "{files:?}");
     for file in &files {
@@ -186,7 +235,10 @@ fn what_a_run_shares_is_open_to_nobody_else() {
     }
     if about.uid() == 0 {
         for file in &files {
-            let cut = Command::new("setpriv").args(["--reuid", "65534", "--regid", "65534", "--clear-groups", "truncate", "-s", "0", "-c"]).arg(file).output();
+            let cut = Command::new("setpriv")
+                .args(["--reuid", "65534", "--regid", "65534", "--clear-groups", "truncate", "-s", "0", "-c"])
+                .arg(file)
+                .output();
             assert!(cut.is_ok_and(|cut| !cut.status.success()) || !file.exists(), "{}", file.display());
         }
         let at = *numbers(&place.log("out", "r")).last().unwrap();
@@ -203,7 +255,9 @@ fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
     let place = Place::new("cave-nowhere", &wall());
     // of another kind than the addresses that are listened at, and no name server is asked
     let nowhere = "2001:db8::1";
-    let far = format!("transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n[[node]]\nname = \"far\"\naddress = \"{nowhere}\"\nlaunch = [\"true\", \"{{arguments}}\"]\n");
+    let far = format!(
+        "transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n[[node]]\nname = \"far\"\naddress = \"{nowhere}\"\nlaunch = [\"true\", \"{{arguments}}\"]\n"
+    );
     let key = place.folder.write("cave.key", "1".repeat(64));
     std::fs::set_permissions(key, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
     let text = wall().replace("name = \"l\"\nscreen", "name = \"l\"\nnode = \"far\"\nscreen") + &far;
@@ -213,7 +267,12 @@ fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
     assert_eq!(code, Some(2), "{wrong}");
     assert!(wrong.contains("node far: ") && wrong.contains(nowhere) && wrong.contains("--listen ADDR:PORT"), "{wrong}");
     place.assert_clean();
-    let hasty = place.folder.write("hasty.toml", wall().replace("drop_timeout_ms = 500", "drop_timeout_ms = 2").replace("ready_timeout_ms = 200", "ready_timeout_ms = 1"));
+    let hasty = place.folder.write(
+        "hasty.toml",
+        wall()
+            .replace("drop_timeout_ms = 500", "drop_timeout_ms = 2")
+            .replace("ready_timeout_ms = 200", "ready_timeout_ms = 1"),
+    );
     let wrong = fail(&["check", &hasty], 2);
     assert!(wrong.contains("drop_timeout_ms") && wrong.contains("100"), "{wrong}");
 }
@@ -242,5 +301,9 @@ fn a_wrong_key_is_named() {
 /// The text of all small files of a folder and of those in it.
 fn lines(folder: std::path::PathBuf) -> String {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.map(|e| if e.path().is_dir() { lines(e.path()) } else { std::fs::read_to_string(e.path()).unwrap_or_default() }).collect()
+    entries
+        .map(
+            |e| if e.path().is_dir() { lines(e.path()) } else { std::fs::read_to_string(e.path()).unwrap_or_default() },
+        )
+        .collect()
 }

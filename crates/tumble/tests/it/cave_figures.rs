@@ -31,7 +31,8 @@ fn is_to_present(facet: &mut Facet<UdpFacet>) -> bool {
 fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
     let folder = Folder::new("cave-figures");
     let sync = "transport = \"udp\"\nready_timeout_ms = 5000\ndrop_timeout_ms = 5000\nconnect_timeout_ms = 60000";
-    let screens = [("f", ["[-2, 2, 0.5]", "[0, 2, 0.5]", "[-2, 2, 2.0]"]), ("g", ["[0, 2, 0.5]", "[2, 2, 0.5]", "[0, 2, 2.0]"])];
+    let screens =
+        [("f", ["[-2, 2, 0.5]", "[0, 2, 0.5]", "[-2, 2, 2.0]"]), ("g", ["[0, 2, 0.5]", "[2, 2, 0.5]", "[0, 2, 2.0]"])];
     let cave = folder.write("cave.toml", cave_of(&screens, |_| "size_px = [80, 60]".into(), sync));
     let (scene, summary) = (folder.write("scene.toml", SCENE), folder.path("summary.json"));
     make_runtime(&folder);
@@ -44,7 +45,18 @@ fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
         ready[1] |= !ready[1] && is_to_present(&mut second);
         if ready == [true; 2] {
             shown += 1;
-            server.facet.send_input(&Input { sequence: shown, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() }).unwrap();
+            server
+                .facet
+                .send_input(&Input {
+                    sequence: shown,
+                    user: 0,
+                    head: None,
+                    wand: None,
+                    hands: [None; 2],
+                    buttons: 0,
+                    keys: Vec::new(),
+                })
+                .unwrap();
             server.facet.presented().unwrap();
             std::thread::sleep(LATER);
             second.presented().unwrap();
@@ -54,7 +66,9 @@ fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
     // from who is no facet: too short for a header, longer than any datagram, of another protocol
     let stranger = UdpSocket::bind("127.0.0.1:0").unwrap();
     let wrong = [(3, 5), (2, 1300), (4, 40)];
-    wrong.iter().for_each(|(times, length)| (0..*times).for_each(|_| _ = stranger.send_to(&vec![0; *length], server.address).unwrap()));
+    wrong.iter().for_each(|(times, length)| {
+        (0..*times).for_each(|_| _ = stranger.send_to(&vec![0; *length], server.address).unwrap())
+    });
     second.leave().unwrap();
     server.end();
     let told = json(&summary);
@@ -63,7 +77,10 @@ fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
     // an input of one frame is shown by the next, and both wait for the second facet
     let later = 1e3 * LATER.as_secs_f64();
     assert!(ms("skew") > later - 5.0 && ms("skew") <= told["barrier"]["max_ms"].as_f64().unwrap(), "{told}");
-    assert!(ms("input_to_picture") > 2.0 * later - 5.0 && ms("input_to_picture") <= 1e3 * told["wall_s"].as_f64().unwrap(), "{told}");
+    assert!(
+        ms("input_to_picture") > 2.0 * later - 5.0 && ms("input_to_picture") <= 1e3 * told["wall_s"].as_f64().unwrap(),
+        "{told}"
+    );
     assert_eq!(told["facets"][1]["refused_packets"], serde_json::json!({}));
 }
 

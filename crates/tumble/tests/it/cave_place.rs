@@ -53,7 +53,9 @@ pub const ROOM: [(&str, [&str; 3]); 4] = [
 pub fn cave_of(screens: &[(&str, [&str; 3])], facet: impl Fn(usize) -> String, sync: &str) -> String {
     let part = |(k, (name, [a, b, c])): (usize, &(&str, [&str; 3]))| {
         let facet = facet(k);
-        format!("[[screen]]\nname = \"{name}\"\nlower_left_m = {a}\nlower_right_m = {b}\nupper_left_m = {c}\n[[facet]]\nname = \"{name}\"\nscreen = \"{name}\"\n{facet}\n")
+        format!(
+            "[[screen]]\nname = \"{name}\"\nlower_left_m = {a}\nlower_right_m = {b}\nupper_left_m = {c}\n[[facet]]\nname = \"{name}\"\nscreen = \"{name}\"\n{facet}\n"
+        )
     };
     let parts: String = screens.iter().enumerate().map(part).collect();
     format!("[[user]]\nname = \"u\"\neye_m = [0, 0, 1.5]\n{parts}[sync]\n{sync}\n")
@@ -61,13 +63,22 @@ pub fn cave_of(screens: &[(&str, [&str; 3])], facet: impl Fn(usize) -> String, s
 
 /// The room, with small pictures. A frame waits for 2 s, so that a busy machine loses none.
 pub fn cube() -> String {
-    cave_of(&ROOM, |_| "size_px = [80, 80]".into(), "ready_timeout_ms = 2000\ndrop_timeout_ms = 2000\nconnect_timeout_ms = 60000")
+    cave_of(
+        &ROOM,
+        |_| "size_px = [80, 80]".into(),
+        "ready_timeout_ms = 2000\ndrop_timeout_ms = 2000\nconnect_timeout_ms = 60000",
+    )
 }
 
 /// A wall of two screens. A frame waits for 200 ms, a facet is dropped after 500.
 pub fn wall() -> String {
-    let screens = [("l", ["[-2, 2, 0.5]", "[0, 2, 0.5]", "[-2, 2, 2.0]"]), ("r", ["[0, 2, 0.5]", "[2, 2, 0.5]", "[0, 2, 2.0]"])];
-    cave_of(&screens, |_| "size_px = [80, 60]".into(), "ready_timeout_ms = 200\ndrop_timeout_ms = 500\nconnect_timeout_ms = 60000")
+    let screens =
+        [("l", ["[-2, 2, 0.5]", "[0, 2, 0.5]", "[-2, 2, 2.0]"]), ("r", ["[0, 2, 0.5]", "[2, 2, 0.5]", "[0, 2, 2.0]"])];
+    cave_of(
+        &screens,
+        |_| "size_px = [80, 60]".into(),
+        "ready_timeout_ms = 200\ndrop_timeout_ms = 500\nconnect_timeout_ms = 60000",
+    )
 }
 
 /// A place for locks and sockets.
@@ -107,7 +118,13 @@ impl Place {
     }
 
     pub fn start(&self, what: &str, args: &[&str]) -> Process {
-        let mut child = self.command(what, args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = self
+            .command(what, args)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
         let (said, wrong) = (reader(child.stdout.take().unwrap()), reader(child.stderr.take().unwrap()));
         Process { child, said: Some(said), wrong: Some(wrong) }
     }
@@ -122,14 +139,17 @@ impl Place {
 
     /// What facets wrote about the frames they have shown; an empty list before there is any.
     pub fn log(&self, folder: &str, facet: &str) -> Vec<Value> {
-        let text = std::fs::read_to_string(self.folder.path(folder).join(facet).join("frames.jsonl")).unwrap_or_default();
+        let text =
+            std::fs::read_to_string(self.folder.path(folder).join(facet).join("frames.jsonl")).unwrap_or_default();
         // the last line may be on its way
         text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
     }
 
     /// Waits until a facet has shown a frame beyond `frame`.
     pub fn wait_for(&self, folder: &str, facet: &str, frame: u64) {
-        wait(&format!("frame {frame} of {facet}"), || self.log(folder, facet).last().is_some_and(|line| line["frame"].as_u64() > Some(frame)));
+        wait(&format!("frame {frame} of {facet}"), || {
+            self.log(folder, facet).last().is_some_and(|line| line["frame"].as_u64() > Some(frame))
+        });
     }
 
     /// Locks, sockets, services: nothing may be left of them.
@@ -206,7 +226,8 @@ pub fn signal(pid: i32, signal: Signal) {
 
 pub fn alive(pid: i32) -> bool {
     // a process that ended and was not asked for yet is none any more
-    std::fs::read_to_string(format!("/proc/{pid}/stat")).is_ok_and(|stat| !stat.rsplit(')').next().unwrap_or("").trim_start().starts_with('Z'))
+    std::fs::read_to_string(format!("/proc/{pid}/stat"))
+        .is_ok_and(|stat| !stat.rsplit(')').next().unwrap_or("").trim_start().starts_with('Z'))
 }
 
 pub fn wait(what: &str, mut until: impl FnMut() -> bool) {

@@ -18,10 +18,26 @@ fn stamped(image: &tumble::render::Image) -> u64 {
 fn all_facets_show_the_same_frames(test: &str, frames: u64) {
     let place = Place::new(test, &cube());
     let seconds = (frames as f64 * 0.01).to_string();
-    let (code, _, wrong) =
-        place.start("cave", &["--seconds", &seconds, "--fast", "--stamp", "--frames-dir", &place.path("out"), "--summary", &place.path("summary.json")]).end();
+    let (code, _, wrong) = place
+        .start(
+            "cave",
+            &[
+                "--seconds",
+                &seconds,
+                "--fast",
+                "--stamp",
+                "--frames-dir",
+                &place.path("out"),
+                "--summary",
+                &place.path("summary.json"),
+            ],
+        )
+        .end();
     if wrong.contains("no graphics adapter") || wrong.contains("no Vulkan driver") {
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter; {wrong}\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: this machine has no graphics adapter; {wrong}\n"),
+        );
         return;
     }
     assert_eq!(code, Some(0), "{wrong}");
@@ -32,7 +48,10 @@ fn all_facets_show_the_same_frames(test: &str, frames: u64) {
         assert_eq!(states(&log), states(&front), "{facet}");
         for line in &log {
             let frame = line["frame"].as_u64().unwrap();
-            let image = tumble::render::Image::read_png(place.folder.path("out").join(facet).join(format!("frame_{frame:06}.png"))).unwrap();
+            let image = tumble::render::Image::read_png(
+                place.folder.path("out").join(facet).join(format!("frame_{frame:06}.png")),
+            )
+            .unwrap();
             assert_eq!(stamped(&image), frame, "{facet}");
             assert_eq!(&blake3::hash(&image.rgba).to_hex()[..32], line["image"].as_str().unwrap(), "{facet} {frame}");
         }
@@ -50,9 +69,23 @@ fn all_facets_show_the_same_frames(test: &str, frames: u64) {
     }
     // the same picture as without any of this, below the stamp
     let alone = place.path("alone.png");
-    succeed(&["run", &place.scene, "--cave", &place.cave, "--facet", "left", "--seconds", &seconds, "--picture", &alone, "--quiet"]);
+    succeed(&[
+        "run",
+        &place.scene,
+        "--cave",
+        &place.cave,
+        "--facet",
+        "left",
+        "--seconds",
+        &seconds,
+        "--picture",
+        &alone,
+        "--quiet",
+    ]);
     let alone = tumble::render::Image::read_png(&alone).unwrap();
-    let ours = tumble::render::Image::read_png(place.folder.path("out").join("left").join(format!("frame_{frames:06}.png"))).unwrap();
+    let ours =
+        tumble::render::Image::read_png(place.folder.path("out").join("left").join(format!("frame_{frames:06}.png")))
+            .unwrap();
     let below = 4 * 80 * 24;
     let worst = alone.rgba[below..].iter().zip(&ours.rgba[below..]).map(|(a, b)| a.abs_diff(*b)).max();
     // poses travel in steps of 1/65536 m
@@ -77,7 +110,19 @@ fn full_length_600_frames_are_the_same_on_four_facets() {
 fn datagrams_carry_the_same_states_as_shared_memory() {
     let place = Place::new("cave-udp", &cube());
     for (transport, folder) in [("udp", "a"), ("shared_memory", "b")] {
-        let summary = place.succeed("cave", &["--seconds", "0.4", "--fast", "--no-pictures", "--log-dir", &place.path(folder), "--transport", transport]);
+        let summary = place.succeed(
+            "cave",
+            &[
+                "--seconds",
+                "0.4",
+                "--fast",
+                "--no-pictures",
+                "--log-dir",
+                &place.path(folder),
+                "--transport",
+                transport,
+            ],
+        );
         assert_eq!(summary["frames"], 41);
         assert_eq!(summary["transport"].as_str().unwrap().replace(' ', "_"), transport);
         assert_eq!(summary["strangers"], serde_json::json!({}), "late packets of facets that left are no strangers'");
@@ -118,7 +163,8 @@ fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
     }
     // another cave is another matter
     let elsewhere = place.folder.write("elsewhere.toml", wall());
-    let mut other = command(&["cave", &place.scene, "--cave", &elsewhere, "--no-pictures", "--seconds", "0.1", "--quiet"]);
+    let mut other =
+        command(&["cave", &place.scene, "--cave", &elsewhere, "--no-pictures", "--seconds", "0.1", "--quiet"]);
     assert!(other.env("XDG_RUNTIME_DIR", place.folder.path("run")).status().unwrap().success());
     let facets = first.facets();
     let summary = place.succeed("cave", &["--no-pictures", "--seconds", "0.1", "--replace"]);
@@ -128,7 +174,6 @@ fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
     facets.iter().for_each(|(name, pid)| assert!(!alive(*pid), "facet {name} lives on"));
     place.assert_clean();
 }
-
 
 #[test]
 fn a_facet_of_another_scene_is_refused_with_both_hashes() {
@@ -172,7 +217,10 @@ fn an_environment_brings_lights_camera_and_what_stands_still() {
     let args = ["--no-pictures", "--seconds", "0.2", "--fast", "--environment", &environment, "--log-dir"];
     let (code, _, wrong) = place.start("cave", &[&args[..], &[&place.path("with")]].concat()).end();
     assert_eq!(code, Some(0), "{wrong}");
-    assert!(wrong.contains("1 bodies that do not move; camera and lights of") && wrong.contains("are ignored"), "{wrong}");
+    assert!(
+        wrong.contains("1 bodies that do not move; camera and lights of") && wrong.contains("are ignored"),
+        "{wrong}"
+    );
     assert!(wrong.contains("1 objects that move are left out"), "{wrong}");
     assert_eq!(place.log("with", "l").len(), 21);
     // one body that stands in the way of the other: names meet

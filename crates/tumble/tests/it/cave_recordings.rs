@@ -23,7 +23,12 @@ fn chunks(bytes: &[u8]) -> Vec<(usize, usize)> {
     let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let all = records(bytes);
     let is_state = |begin: usize| bytes[begin + 17..begin + 17 + u32_at(begin + 13)] == *b"/tumble/state";
-    let state = all.iter().rev().find(|(opcode, begin, _)| *opcode == 0x04 && is_state(*begin)).map(|(_, begin, _)| u16_at(begin + 9)).unwrap();
+    let state = all
+        .iter()
+        .rev()
+        .find(|(opcode, begin, _)| *opcode == 0x04 && is_state(*begin))
+        .map(|(_, begin, _)| u16_at(begin + 9))
+        .unwrap();
     let mut chunks = Vec::new();
     for (opcode, begin, end) in all {
         match opcode {
@@ -44,14 +49,29 @@ fn frames(path: &std::path::Path) -> Vec<ReplayFrame> {
 fn a_run_cut_at_every_structural_boundary_keeps_what_was_flushed() {
     let (folder, scene, cave) = place("cave-cuts");
     let file = folder.path("run.mcap");
-    let args = ["cave", &scene, "--cave", &cave, "--no-pictures", "--fast", "--seconds", "0.7", "--record", &text(&file), "--quiet"];
+    let args = [
+        "cave",
+        &scene,
+        "--cave",
+        &cave,
+        "--no-pictures",
+        "--fast",
+        "--seconds",
+        "0.7",
+        "--record",
+        &text(&file),
+        "--quiet",
+    ];
     let out = in_place(&folder, &args).output().unwrap();
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let (bytes, whole) = (std::fs::read(&file).unwrap(), frames(&file));
     let chunks = chunks(&bytes);
     assert_eq!((whole.len(), chunks.iter().map(|(_, n)| n).sum::<usize>()), (71, 71));
     assert!(chunks.len() > 3, "{chunks:?}");
-    let mut points: Vec<usize> = records(&bytes).into_iter().flat_map(|(_, begin, end)| [begin, begin + 1, begin + 9, (begin + end) / 2, end - 1]).collect();
+    let mut points: Vec<usize> = records(&bytes)
+        .into_iter()
+        .flat_map(|(_, begin, end)| [begin, begin + 1, begin + 9, (begin + end) / 2, end - 1])
+        .collect();
     points.sort();
     points.dedup();
     let (cut, mended) = (folder.path("cut.mcap"), folder.path("mended.mcap"));

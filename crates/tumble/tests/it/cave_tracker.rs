@@ -57,7 +57,12 @@ impl Sender {
 fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
     let (folder, scene, cave) = place("cave-tracker");
     let (sender, summary) = (Sender::new(), folder.path("summary.json"));
-    let mut server = Server::start(&folder, &scene, &cave, &["--push", "--tracker", &sender.to.to_string(), "--summary", &text(&summary)]);
+    let mut server = Server::start(
+        &folder,
+        &scene,
+        &cave,
+        &["--push", "--tracker", &sender.to.to_string(), "--summary", &text(&summary)],
+    );
     server.show_until(5, |_| {});
     assert_eq!(server.facet.viewer().users[0].head.translation.vector, Vec3::new(0.0, 0.0, 1.5));
     let hand = |server: &Server, side: &str| {
@@ -71,7 +76,11 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
     let near = |a: Vec3, x: f64, y: f64, z: f64| (a - Vec3::new(x, y, z)).norm() < 1e-4;
     // the other one hangs within the body: 0.15 m to the user's right, which is y now, and 0.7 m below the eyes; poses travel in steps of 1/65536 m
     let both = bundle(&[head, left]);
-    server.show_while("the hand", || sender.send(&both), |s| near(hand(s, "left"), -0.25, 1.5, 1.0) && near(hand(s, "right"), 0.5, 0.4, 1.05));
+    server.show_while(
+        "the hand",
+        || sender.send(&both),
+        |s| near(hand(s, "left"), -0.25, 1.5, 1.0) && near(hand(s, "right"), 0.5, 0.4, 1.05),
+    );
     let viewer = server.facet.viewer();
     assert_eq!(viewer.users[0].head.translation.vector, Vec3::new(0.5, 0.25, 1.75));
     // ahead was y, and is −x now
@@ -85,7 +94,10 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
         server.show_while("the hand", || sender.send(&message), |s| near(hand(s, "left"), 0.0, y, 1.0));
     }
     let (ball, left) = (server.ball(), hand(&server, "left"));
-    assert!((left - Vec3::new(0.0, 2.0, 1.0)).norm() < 1e-4 && ball.y > 2.255, "the ball is at {ball:?}, the hand at {left:?}");
+    assert!(
+        (left - Vec3::new(0.0, 2.0, 1.0)).norm() < 1e-4 && ball.y > 2.255,
+        "the ball is at {ball:?}, the hand at {left:?}"
+    );
     assert!(server.facet.viewer().users[0].input > before);
     // one of each that is wrong
     let unit = [0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0];
@@ -95,15 +107,25 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
         floats("/tumble/user/u/head", &numbers)
     };
     let wrong = [
-        with(0, f32::NAN), with(1, f32::INFINITY), with(2, 101.0), // out of range
-        with(6, 0.5), // no rotation
+        with(0, f32::NAN),
+        with(1, f32::INFINITY),
+        with(2, 101.0),                            // out of range
+        with(6, 0.5),                              // no rotation
         floats("/tumble/user/nobody/head", &unit), // unknown user
-        floats("/tumble/user/u/foot", &unit), floats("/tumble/u/head", &unit), floats("/", &[]), // unknown address
-        floats("/tumble/user/u/head", &unit[..6]), floats("/tumble/user/u/head", &[]), ints("/tumble/user/u/buttons", &[-1]), ints("/tumble/user/u/keys", &[4; 33]), // arguments
-        vec![0; 1537], // too long
-        vec![0; 8], b"forged".to_vec(), floats("/tumble/user/u/head", &unit)[..40].to_vec(), Vec::new(), // malformed
+        floats("/tumble/user/u/foot", &unit),
+        floats("/tumble/u/head", &unit),
+        floats("/", &[]), // unknown address
+        floats("/tumble/user/u/head", &unit[..6]),
+        floats("/tumble/user/u/head", &[]),
+        ints("/tumble/user/u/buttons", &[-1]),
+        ints("/tumble/user/u/keys", &[4; 33]), // arguments
+        vec![0; 1537],                         // too long
+        vec![0; 8],
+        b"forged".to_vec(),
+        floats("/tumble/user/u/head", &unit)[..40].to_vec(),
+        Vec::new(),                           // malformed
         bundle(&vec![floats("/a", &[]); 65]), // 64 of an unknown address, and too many
-        with(1, 3.5), // behind the screen: taken, and not followed
+        with(1, 3.5),                         // behind the screen: taken, and not followed
     ];
     wrong.iter().for_each(|bytes| sender.send(bytes));
     // heard in order: what is good comes last
@@ -115,7 +137,11 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
         let next = server.facet.session().shown().unwrap().0 + 1;
         server.show_until(next, |_| {});
     }
-    assert_eq!(server.facet.viewer().users[0].head.translation.vector, Vec3::new(0.5, 0.25, 1.75), "nothing of it moved the head");
+    assert_eq!(
+        server.facet.viewer().users[0].head.translation.vector,
+        Vec3::new(0.5, 0.25, 1.75),
+        "nothing of it moved the head"
+    );
     server.end();
     let summary = json(&summary);
     let expected = value!({
@@ -145,7 +171,10 @@ fn keys_stretch_out_a_hand() {
 #[test]
 fn the_picture_follows_the_tracked_eye() {
     if tumble::render::Renderer::new().is_err() {
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: this machine has no graphics adapter\n"),
+        );
         return;
     }
     let (folder, scene, cave) = place("cave-eye");
@@ -155,7 +184,10 @@ fn the_picture_follows_the_tracked_eye() {
     };
     // what is seen from there by the cave file
     let moved = folder.write("moved.toml", one_screen().replace("eye_m = [0, 0, 1.5]", "eye_m = [0.5, -0.25, 1.25]"));
-    let args = |cave: &str, log: &str| ["cave", &scene, "--cave", cave, "--offscreen", "--quiet", "--log-dir", &text(&folder.path(log))].map(str::to_owned);
+    let args = |cave: &str, log: &str| {
+        ["cave", &scene, "--cave", cave, "--offscreen", "--quiet", "--log-dir", &text(&folder.path(log))]
+            .map(str::to_owned)
+    };
     for (cave, log) in [(&cave, "before"), (&moved, "after")] {
         let args = [&args(cave, log)[..], &["--seconds".into(), "0.02".into(), "--fast".into()]].concat();
         assert!(in_place(&folder, &args.iter().map(String::as_str).collect::<Vec<_>>()).status().unwrap().success());
@@ -163,7 +195,8 @@ fn the_picture_follows_the_tracked_eye() {
     let (before, after) = (lines("before")[0]["image"].clone(), lines("after")[0]["image"].clone());
     assert_ne!(before, after);
     // and by the tracker, in a space with y up: [x, z up, −y ahead]
-    let tracked = folder.write("tracked.toml", format!("{}[tracker]\nusers = [\"glasses\"]\naxes = \"y_up\"\n", one_screen()));
+    let tracked =
+        folder.write("tracked.toml", format!("{}[tracker]\nusers = [\"glasses\"]\naxes = \"y_up\"\n", one_screen()));
     let sender = Sender::new();
     let args = [&args(&tracked, "tracked")[..], &["--tracker".into(), sender.to.to_string()]].concat();
     let mut run = in_place(&folder, &args.iter().map(String::as_str).collect::<Vec<_>>()).spawn().unwrap();
@@ -193,24 +226,47 @@ fn what_users_did_is_done_again_bit_by_bit() {
     let path = |name: &str| text(&folder.path(name));
     let sender = Sender::new();
     // keys from a window, a wand from a tracker
-    let mut server = Server::start(&folder, &scene, &cave, &["--push", "--tracker", &sender.to.to_string(), "--record", &path("first.mcap")]);
+    let mut server = Server::start(
+        &folder,
+        &scene,
+        &cave,
+        &["--push", "--tracker", &sender.to.to_string(), "--record", &path("first.mcap")],
+    );
     server.show_until(150, |input| {
         input.keys = vec![if input.sequence % 40 < 30 { 0x1A } else { 0x04 }];
         let x = 0.01 * (input.sequence % 20) as f32;
-        sender.send(&bundle(&[floats("/tumble/user/u/wand", &[x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]), ints("/tumble/user/u/buttons", &[1])]));
+        sender.send(&bundle(&[
+            floats("/tumble/user/u/wand", &[x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
+            ints("/tumble/user/u/buttons", &[1]),
+        ]));
     });
     let ball = server.ball();
     assert!((ball - Vec3::new(0.0, 2.0, 1.0)).norm() > 0.05, "it was not moved: {ball:?}");
     server.end();
     let again = |name: &str, args: &[&str]| -> (Value, Option<i32>, String) {
         let (file, summary) = (path(&format!("{name}.mcap")), folder.path(&format!("{name}.json")));
-        let fixed = ["cave", &scene, "--cave", &cave, "--fast", "--no-pictures", "--input-from", &path("first.mcap"), "--record", &file, "--summary", &text(&summary)];
+        let fixed = [
+            "cave",
+            &scene,
+            "--cave",
+            &cave,
+            "--fast",
+            "--no-pictures",
+            "--input-from",
+            &path("first.mcap"),
+            "--record",
+            &file,
+            "--summary",
+            &text(&summary),
+        ];
         let out = in_place(&folder, &[&fixed[..], args].concat()).output().unwrap();
         (json(&summary)["input_from"].clone(), out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
     };
     let frames = |name: &str| {
         let mut replay = Replay::open(path(name)).unwrap();
-        std::iter::from_fn(|| replay.next_frame().unwrap()).map(|f| (f.recorded.frame, f.recorded.state, f.inputs)).collect::<Vec<_>>()
+        std::iter::from_fn(|| replay.next_frame().unwrap())
+            .map(|f| (f.recorded.frame, f.recorded.state, f.inputs))
+            .collect::<Vec<_>>()
     };
     let (counts, code, wrong) = again("second", &["--push"]);
     assert_eq!(code, Some(0), "{wrong}");
@@ -224,9 +280,28 @@ fn what_users_did_is_done_again_bit_by_bit() {
     // with another number of bodies it comes out otherwise, which is a failure
     let (counts, code, wrong) = again("third", &[]);
     assert_eq!((&counts["first_different"], code), (&0.into(), Some(1)), "{counts}");
-    assert!(wrong.contains(&format!("{} of {} frames came out otherwise", counts["different"], first.len())), "{wrong}");
+    assert!(
+        wrong.contains(&format!("{} of {} frames came out otherwise", counts["different"], first.len())),
+        "{wrong}"
+    );
     // another step is another matter
-    let out = in_place(&folder, &["cave", &scene, "--cave", &cave, "--fast", "--no-pictures", "--input-from", &path("first.mcap"), "--dt", "0.02"]).output().unwrap();
+    let out = in_place(
+        &folder,
+        &[
+            "cave",
+            &scene,
+            "--cave",
+            &cave,
+            "--fast",
+            "--no-pictures",
+            "--input-from",
+            &path("first.mcap"),
+            "--dt",
+            "0.02",
+        ],
+    )
+    .output()
+    .unwrap();
     let wrong = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.code() == Some(2) && wrong.contains("--dt and --fps must be those of the recording"), "{wrong}");
     assert!(SCENE.contains("dt_s = 0.01"));

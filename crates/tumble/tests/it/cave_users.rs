@@ -60,7 +60,11 @@ pub fn place(test: &str) -> (Folder, String, String) {
 
 /// Starts a server that waits for its facets, and where it is.
 fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, SocketAddr, BufReader<ChildStderr>) {
-    let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--fast"], args].concat()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--fast"], args].concat())
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
     let mut stderr = BufReader::new(child.stderr.take().unwrap());
     let address = loop {
         let mut line = String::new();
@@ -120,7 +124,15 @@ impl Server {
                 }
                 Task::Present(number) => {
                     self.sequence += 1;
-                    let mut input = Input { sequence: self.sequence, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() };
+                    let mut input = Input {
+                        sequence: self.sequence,
+                        user: 0,
+                        head: None,
+                        wand: None,
+                        hands: [None; 2],
+                        buttons: 0,
+                        keys: Vec::new(),
+                    };
                     doing(&mut input);
                     self.facet.send_input(&input).unwrap();
                     self.facet.presented().unwrap();
@@ -149,7 +161,11 @@ impl Server {
 
     /// Ends it in order; it must have had no trouble.
     pub fn end(mut self) {
-        rustix::process::kill_process(rustix::process::Pid::from_raw(self.child.id() as i32).unwrap(), rustix::process::Signal::TERM).unwrap();
+        rustix::process::kill_process(
+            rustix::process::Pid::from_raw(self.child.id() as i32).unwrap(),
+            rustix::process::Signal::TERM,
+        )
+        .unwrap();
         let start = Instant::now();
         // it hears us leave, and ends
         self.facet.leave().unwrap();
@@ -231,18 +247,27 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
     let (folder, _, cave) = place("cave-replay");
     let file = text(&folder.path("run.mcap"));
     let run = |args: &[&str]| {
-        let out = in_place(&folder, &[args, &["--cave", &cave, "--fast", "--quiet", "--offscreen"]].concat()).output().unwrap();
+        let out = in_place(&folder, &[args, &["--cave", &cave, "--fast", "--quiet", "--offscreen"]].concat())
+            .output()
+            .unwrap();
         let wrong = String::from_utf8_lossy(&out.stderr).into_owned();
         assert!(out.status.success(), "{wrong}");
     };
     let lines = |folder_name: &str| -> Vec<serde_json::Value> {
         let text = std::fs::read_to_string(folder.path(folder_name).join("f").join("frames.jsonl")).unwrap();
-        text.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()).map(|l| serde_json::json!([l["frame"], l["state"], l["image"]])).collect()
+        text.lines()
+            .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
+            .map(|l| serde_json::json!([l["frame"], l["state"], l["image"]]))
+            .collect()
     };
-    let moving = folder.write("moving.toml", SCENE.replace("mass_kg = 2.0", "mass_kg = 2.0\nvelocity_m_per_s = [0.3, 0, 0.2]"));
+    let moving =
+        folder.write("moving.toml", SCENE.replace("mass_kg = 2.0", "mass_kg = 2.0\nvelocity_m_per_s = [0.3, 0, 0.2]"));
     let path = |name: &str| text(&folder.path(name));
     if tumble::render::Renderer::new().is_err() {
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: this machine has no graphics adapter\n"),
+        );
         return;
     }
     run(&["cave", &moving, "--seconds", "0.6", "--record", &file, "--log-dir", &path("a")]);
@@ -251,7 +276,10 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
     run(&["replay", &file, &moving, "--log-dir", &path("b"), "--summary", &path("b.json")]);
     run(&["replay", &file, &moving, "--log-dir", &path("c")]);
     assert_eq!((lines("b"), lines("c")), (recorded.clone(), recorded.clone()));
-    assert_eq!(json(&folder.path("b.json"))["replay"], serde_json::json!({ "same": 61, "different": 0, "not_compared": 0 }));
+    assert_eq!(
+        json(&folder.path("b.json"))["replay"],
+        serde_json::json!({ "same": 61, "different": 0, "not_compared": 0 })
+    );
     // half of it, mended
     let bytes = std::fs::read(&file).unwrap();
     let cut = folder.write("cut.mcap", &bytes[..bytes.len() / 2]);

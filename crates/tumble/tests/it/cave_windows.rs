@@ -41,9 +41,11 @@ fn windows(server: &RustConnection, root: u32) -> Vec<(String, u32, [i16; 2], [u
         if server.get_window_attributes(window).ok()?.reply().ok()?.map_state != MapState::VIEWABLE {
             return None;
         }
-        let title = server.get_property(false, window, AtomEnum::WM_NAME, AtomEnum::ANY, 0, 1024).ok()?.reply().ok()?.value;
+        let title =
+            server.get_property(false, window, AtomEnum::WM_NAME, AtomEnum::ANY, 0, 1024).ok()?.reply().ok()?.value;
         let at = server.get_geometry(window).ok()?.reply().ok()?;
-        (!title.is_empty()).then(|| (String::from_utf8_lossy(&title).into_owned(), window, [at.x, at.y], [at.width, at.height]))
+        (!title.is_empty())
+            .then(|| (String::from_utf8_lossy(&title).into_owned(), window, [at.x, at.y], [at.width, at.height]))
     };
     children.into_iter().filter_map(one).collect()
 }
@@ -56,10 +58,24 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
     }
     let folder = Folder::new("cave-windows");
     make_runtime(&folder);
-    let (scene, cave, summary) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave()), folder.path("summary.json"));
-    let args = ["cave", &scene, "--cave", &cave, "--quality", "fastest", "--log-dir", &text(&folder.path("out")), "--summary", &text(&summary)];
+    let (scene, cave, summary) =
+        (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave()), folder.path("summary.json"));
+    let args = [
+        "cave",
+        &scene,
+        "--cave",
+        &cave,
+        "--quality",
+        "fastest",
+        "--log-dir",
+        &text(&folder.path("out")),
+        "--summary",
+        &text(&summary),
+    ];
     let log = std::fs::File::create(folder.path("stderr")).unwrap();
-    let mut run = Running(in_place(&folder, &args).env("DISPLAY", &desktop.display).stderr(log).stdout(Stdio::null()).spawn().unwrap());
+    let mut run = Running(
+        in_place(&folder, &args).env("DISPLAY", &desktop.display).stderr(log).stdout(Stdio::null()).spawn().unwrap(),
+    );
     let (server, screen) = x11rb::connect(Some(&desktop.display)).unwrap();
     let root = server.setup().roots[screen].root;
     wait("the fourth window", || {
@@ -68,7 +84,8 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
         }
         windows(&server, root).len() == 4
     });
-    let mut there: Vec<_> = windows(&server, root).into_iter().map(|(title, _, at, size)| (at[0], at[1], size, title)).collect();
+    let mut there: Vec<_> =
+        windows(&server, root).into_iter().map(|(title, _, at, size)| (at[0], at[1], size, title)).collect();
     there.sort();
     for ((x, y, size, title), (k, facet)) in there.iter().zip(["front", "left", "right", "floor"].iter().enumerate()) {
         assert_eq!((*x, *y, *size), (110 * k as i16, 20, [100, 100]), "{title}");
@@ -82,9 +99,11 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
     wait("some frames", || ["front", "left", "right", "floor"].iter().all(|facet| frames(facet).len() > 3));
     // the cross of one window: that facet leaves, the others go on
     let close = |facet: &str| {
-        let window = windows(&server, root).into_iter().find(|(title, ..)| title.ends_with(&format!(" on {facet}"))).unwrap().1;
+        let window =
+            windows(&server, root).into_iter().find(|(title, ..)| title.ends_with(&format!(" on {facet}"))).unwrap().1;
         let atom = |name: &[u8]| server.intern_atom(false, name).unwrap().reply().unwrap().atom;
-        let message = ClientMessageEvent::new(32, window, atom(b"WM_PROTOCOLS"), [atom(b"WM_DELETE_WINDOW"), 0, 0, 0, 0]);
+        let message =
+            ClientMessageEvent::new(32, window, atom(b"WM_PROTOCOLS"), [atom(b"WM_DELETE_WINDOW"), 0, 0, 0, 0]);
         server.send_event(false, window, EventMask::NO_EVENT, message).unwrap().check().unwrap();
         server.flush().unwrap();
     };
@@ -99,7 +118,11 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
     assert_eq!(run.0.wait().unwrap().code(), Some(0), "{}", std::fs::read_to_string(folder.path("stderr")).unwrap());
     let facets = json(&summary)["facets"].clone();
     for facet in facets.as_array().unwrap() {
-        assert_eq!((&facet["dropped"], &facet["torn"], &facet["mismatched"]), (&0.into(), &0.into(), &0.into()), "{facet}");
+        assert_eq!(
+            (&facet["dropped"], &facet["torn"], &facet["mismatched"]),
+            (&0.into(), &0.into(), &0.into()),
+            "{facet}"
+        );
     }
 }
 
@@ -117,6 +140,12 @@ fn a_desktop_that_does_not_answer_is_said_and_drawn_for_in_memory() {
         let out = in_place(&folder, &args).env("DISPLAY", display).output().unwrap();
         let wrong = String::from_utf8_lossy(&out.stderr);
         assert!(out.status.success(), "{wrong}");
-        assert_eq!(wrong.matches(&format!("draws into memory, because the desktop does not answer (DISPLAY={display}: ")).count(), 4, "{wrong}");
+        assert_eq!(
+            wrong
+                .matches(&format!("draws into memory, because the desktop does not answer (DISPLAY={display}: "))
+                .count(),
+            4,
+            "{wrong}"
+        );
     }
 }

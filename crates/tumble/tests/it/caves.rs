@@ -11,7 +11,10 @@ fn small() -> String {
 fn pictured(said: &str) -> bool {
     if said.contains("No picture:") {
         // past the harness, which keeps what passing tests print
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter; {said}\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: this machine has no graphics adapter; {said}\n"),
+        );
         return false;
     }
     true
@@ -33,7 +36,10 @@ fn shipped_caves_are_listed_and_checked() {
     let said = succeed(&["check", "cube4", "caves/sphere5.toml", "billiards"]);
     assert!(said.contains("cube4: a cave of 4 facets on 4 screens, 1 user, all on this machine"), "{said}");
     assert!(said.contains("right edge of \"front\" and left edge of \"right\": 0.000 mm apart"), "{said}");
-    assert!(said.contains("caves/sphere5.toml: a cave of 5 facets") && said.contains("billiards: a scene of"), "{said}");
+    assert!(
+        said.contains("caves/sphere5.toml: a cave of 5 facets") && said.contains("billiards: a scene of"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -72,7 +78,11 @@ fn a_check_reads_the_files_that_caves_and_scenes_name() {
 
 #[test]
 fn a_picture_with_another_ending_is_refused() {
-    for args in [&["run", "stack", "--picture", "q.jpg"][..], &["view", "stack", "--picture", "q.jpg"], &["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "front", "--picture", "q.jpg"]] {
+    for args in [
+        &["run", "stack", "--picture", "q.jpg"][..],
+        &["view", "stack", "--picture", "q.jpg"],
+        &["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "front", "--picture", "q.jpg"],
+    ] {
         assert!(fail_often(args, 2).contains("wanted a file that ends in .png"), "{args:?}");
     }
 }
@@ -87,16 +97,27 @@ fn what_is_wrong_with_a_cave_ends_with_code_2_before_anything_runs() {
     assert!(run(&["--cave", "/nowhere/a.toml", "--picture", &picture]).contains("cannot read the cave"));
     assert!(run(&["--facet", "front", "--picture", &picture]).contains("--cave FILE"));
     assert!(run(&["--cave", "cube4"]).contains("--picture FILE"));
-    assert!(run(&["--cave", "cube4", "--facet", "front", "--size", "80x60", "--picture", &picture]).contains("size_px"));
+    assert!(
+        run(&["--cave", "cube4", "--facet", "front", "--size", "80x60", "--picture", &picture]).contains("size_px")
+    );
     let with = |line: &str| folder.write("a.toml", cave(&format!("size_px = [80, 60]\n{line}")));
-    assert!(run(&["--cave", &with("warp_file = \"none.obj\""), "--picture", &picture]).contains("none.obj: the warp grid cannot be read"));
-    assert!(run(&["--cave", &with("blend_file = \"none.png\""), "--picture", &picture]).contains("none.png: the blend mask cannot be read"));
+    assert!(
+        run(&["--cave", &with("warp_file = \"none.obj\""), "--picture", &picture])
+            .contains("none.obj: the warp grid cannot be read")
+    );
+    assert!(
+        run(&["--cave", &with("blend_file = \"none.png\""), "--picture", &picture])
+            .contains("none.png: the blend mask cannot be read")
+    );
     folder.write("bad.obj", "v 0 0\nv 1 x\n");
     assert!(run(&["--cave", &with("warp_file = \"bad.obj\""), "--picture", &picture]).contains("bad.obj: line 2"));
     let empty = folder.write("b.toml", cave("size_px = [80, 0]"));
     assert!(run(&["--cave", &empty, "--picture", &picture]).contains("from 1 to 16384"));
     assert!(!folder.path("out.png").exists());
-    assert!(fail(&["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "fron", "--picture", &picture], 2).contains("did you mean `front`?"));
+    assert!(
+        fail(&["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "fron", "--picture", &picture], 2)
+            .contains("did you mean `front`?")
+    );
     assert!(fail(&["caves", "--pattern", "grid"], 2).contains("--cave"));
 }
 
@@ -105,8 +126,13 @@ fn facets_have_their_size_and_unfolded_caves_fit() {
     let folder = Folder::new("cave-pictures");
     let picture = folder.path("out.png");
     let stereo = folder.write("a.toml", cave("stereo = \"side_by_side\"\nsize_px = [80, 60]"));
-    for (cave, more, size) in [(stereo.as_str(), vec!["--facet", "f"], [160, 60]), ("cube6", vec!["--size", "200x200"], [200, 150])] {
-        let out = tumble(&[&["run", "stack", "--quiet", "--seconds", "0", "--cave", cave, "--picture", &text(&picture)], &more[..]].concat());
+    for (cave, more, size) in
+        [(stereo.as_str(), vec!["--facet", "f"], [160, 60]), ("cube6", vec!["--size", "200x200"], [200, 150])]
+    {
+        let out = tumble(
+            &[&["run", "stack", "--quiet", "--seconds", "0", "--cave", cave, "--picture", &text(&picture)], &more[..]]
+                .concat(),
+        );
         let said = String::from_utf8(out.stderr).unwrap();
         assert!(out.status.success(), "{said}");
         if !pictured(&said) {
@@ -121,12 +147,27 @@ fn facets_have_their_size_and_unfolded_caves_fit() {
 #[test]
 fn frames_come_at_an_even_pace_of_simulated_time() {
     let folder = Folder::new("frames");
-    let out = tumble(&["run", "incline", "--quiet", "--seconds", "0.25", "--size", "32x24", "--fps", "20", "--frames-dir", &text(&folder.path("frames"))]);
+    let out = tumble(&[
+        "run",
+        "incline",
+        "--quiet",
+        "--seconds",
+        "0.25",
+        "--size",
+        "32x24",
+        "--fps",
+        "20",
+        "--frames-dir",
+        &text(&folder.path("frames")),
+    ]);
     let said = String::from_utf8(out.stderr).unwrap();
     assert!(out.status.success(), "{said}");
     if pictured(&said) {
         // at 0, 0.05, … 0.25 s
-        let mut names: Vec<String> = std::fs::read_dir(folder.path("frames")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<String> = std::fs::read_dir(folder.path("frames"))
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         assert_eq!(names, (0..6).map(|k| format!("frame_{k:06}.png")).collect::<Vec<_>>());
         assert!(names.iter().all(|name| png_size(&folder.path("frames").join(name)) == [32, 24]));
@@ -148,7 +189,19 @@ fn with_ffmpeg(folder: &Folder, script: Option<&str>) -> (Option<i32>, String) {
         }
         None => text(&bin),
     };
-    let mut command: Command = command(&["run", "incline", "--quiet", "--seconds", "0.2", "--size", "31x24", "--fps", "20", "--video", &text(&folder.path("out.mp4"))]);
+    let mut command: Command = command(&[
+        "run",
+        "incline",
+        "--quiet",
+        "--seconds",
+        "0.2",
+        "--size",
+        "31x24",
+        "--fps",
+        "20",
+        "--video",
+        &text(&folder.path("out.mp4")),
+    ]);
     let out = command.env("PATH", path).output().unwrap();
     (out.status.code(), String::from_utf8(out.stderr).unwrap())
 }
@@ -158,7 +211,10 @@ fn with_ffmpeg(folder: &Folder, script: Option<&str>) -> (Option<i32>, String) {
 fn a_video_gets_every_frame_and_its_failures_are_told() {
     let folder = Folder::new("video");
     let (code, said) = with_ffmpeg(&folder, None);
-    assert!(code == Some(1) && said.contains("there is no ffmpeg") && said.contains("apt-get install ffmpeg"), "{said}");
+    assert!(
+        code == Some(1) && said.contains("there is no ffmpeg") && said.contains("apt-get install ffmpeg"),
+        "{said}"
+    );
     // one that keeps the raw frames: the path is its last argument
     let keeps = "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\nfor last; do :; done\nexec cat > \"$last\"\n";
     let (code, said) = with_ffmpeg(&folder, Some(keeps));
@@ -178,29 +234,51 @@ fn a_video_gets_every_frame_and_its_failures_are_told() {
 fn a_video_plays_the_run() {
     let out = Command::new("ffmpeg").arg("-version").output();
     if !out.is_ok_and(|out| out.status.success()) {
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: there is no ffmpeg; on Debian: apt-get install ffmpeg\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: there is no ffmpeg; on Debian: apt-get install ffmpeg\n"),
+        );
         return;
     }
     let folder = Folder::new("video-real");
     let (video, picture) = (text(&folder.path("out.mp4")), folder.path("out.png"));
-    let args = ["run", "incline", "--quiet", "--seconds", "0.2", "--size", "161x120", "--fps", "20", "--video", &video, "--picture", &text(&picture)];
+    let args = [
+        "run",
+        "incline",
+        "--quiet",
+        "--seconds",
+        "0.2",
+        "--size",
+        "161x120",
+        "--fps",
+        "20",
+        "--video",
+        &video,
+        "--picture",
+        &text(&picture),
+    ];
     let out = tumble(&args);
     let said = String::from_utf8(out.stderr).unwrap();
     assert!(out.status.success(), "{said}");
     if !pictured(&said) {
         return;
     }
-    let raw = Command::new("ffmpeg").args(["-v", "error", "-i", &video, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]).output().unwrap();
+    let raw = Command::new("ffmpeg")
+        .args(["-v", "error", "-i", &video, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"])
+        .output()
+        .unwrap();
     // sides are made even
     let (width, height) = (162, 120);
     assert_eq!(raw.stdout.len(), 5 * width * height * 3, "{}", String::from_utf8_lossy(&raw.stderr));
     let last = &raw.stdout[4 * width * height * 3..];
     let image = tumble::render::Image::read_png(&picture).unwrap();
     let pixels = (0..120u32).flat_map(|y| (0..161u32).map(move |x| (x, y)));
-    let off: u64 = pixels.map(|(x, y)| {
-        let (seen, sent) = (&last[3 * (y as usize * width + x as usize)..], image.pixel(x, y).unwrap());
-        (0..3).map(|k| u64::from(seen[k].abs_diff(sent[k]))).sum::<u64>()
-    }).sum();
+    let off: u64 = pixels
+        .map(|(x, y)| {
+            let (seen, sent) = (&last[3 * (y as usize * width + x as usize)..], image.pixel(x, y).unwrap());
+            (0..3).map(|k| u64::from(seen[k].abs_diff(sent[k]))).sum::<u64>()
+        })
+        .sum();
     let mean = off as f64 / (161.0 * 120.0 * 3.0);
     let first = &raw.stdout[..width * height * 3];
     let moved: u64 = first.iter().zip(last).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();

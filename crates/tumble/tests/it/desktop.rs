@@ -33,14 +33,22 @@ pub fn skip(why: &str) {
 impl Desktop {
     /// `None`, said visibly, where a program is missing.
     pub fn open() -> Option<Desktop> {
-        let has = |program: &str| std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).any(|folder| folder.join(program).is_file());
+        let has = |program: &str| {
+            std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())
+                .any(|folder| folder.join(program).is_file())
+        };
         if let Some(missing) = ["Xvfb", "xdotool", "import"].into_iter().find(|p| !has(p)) {
-            skip(&format!("windows are not tested: there is no {missing}; on Debian: apt-get install xvfb xdotool imagemagick"));
+            skip(&format!(
+                "windows are not tested: there is no {missing}; on Debian: apt-get install xvfb xdotool imagemagick"
+            ));
             return None;
         }
         let mut command = Command::new("Xvfb");
         // without -noreset it begins anew when the last window closes, and refuses who comes in that moment
-        command.args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp", "-noreset"]).stdout(Stdio::piped()).stderr(Stdio::null());
+        command
+            .args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp", "-noreset"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null());
         let mut server = Running(command.spawn().unwrap());
         let mut number = String::new();
         // the server closes its end when it fails, so this ends
@@ -93,7 +101,12 @@ impl<'a> Session<'a> {
     }
 
     /// With more of an environment.
-    pub fn spawn_with(desktop: &'a Desktop, folder: Folder, args: &[&str], environment: &[(&str, &str)]) -> Session<'a> {
+    pub fn spawn_with(
+        desktop: &'a Desktop,
+        folder: Folder,
+        args: &[&str],
+        environment: &[(&str, &str)],
+    ) -> Session<'a> {
         let (status, log) = (text(&folder.path("status")), std::fs::File::create(folder.path("stderr")).unwrap());
         let mut command = command(&[&["view"], args, &["--status", &status]].concat());
         command.env("DISPLAY", &desktop.display).env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").stderr(log);
@@ -146,7 +159,11 @@ impl<'a> Session<'a> {
         loop {
             let window = self.shot();
             assert_eq!(window.len(), image.rgba.len() / 4 * 3, "the window has another size");
-            let off = window.chunks_exact(3).zip(image.rgba.chunks_exact(4)).filter(|(a, b)| (0..3).any(|k| a[k].abs_diff(b[k]) > 1)).count();
+            let off = window
+                .chunks_exact(3)
+                .zip(image.rgba.chunks_exact(4))
+                .filter(|(a, b)| (0..3).any(|k| a[k].abs_diff(b[k]) > 1))
+                .count();
             if off == 0 {
                 return;
             }
@@ -162,7 +179,8 @@ impl<'a> Session<'a> {
         let (server, _) = x11rb::connect(Some(&self.desktop.display)).unwrap();
         let atom = |name: &[u8]| server.intern_atom(false, name).unwrap().reply().unwrap().atom;
         let window = self.window.parse().unwrap();
-        let message = ClientMessageEvent::new(32, window, atom(b"WM_PROTOCOLS"), [atom(b"WM_DELETE_WINDOW"), 0, 0, 0, 0]);
+        let message =
+            ClientMessageEvent::new(32, window, atom(b"WM_PROTOCOLS"), [atom(b"WM_DELETE_WINDOW"), 0, 0, 0, 0]);
         server.send_event(false, window, EventMask::NO_EVENT, message).unwrap().check().unwrap();
         server.flush().unwrap();
     }

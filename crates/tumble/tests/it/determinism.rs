@@ -51,9 +51,16 @@ fn a_state_saved_in_mid_contact_goes_on_in_another_process_as_if_nothing_had_hap
             let first = [scene, "--seconds", &half.to_string(), "--stepper", stepper, "--summary", &summary];
             let halfway = state(&folder, "half", &first);
             let free = ["pendulum", "piston"].contains(&scene);
-            assert!(free || json(summary.as_ref())["contacts_max"].as_u64() > Some(0), "{scene} in {stepper}: nothing touched before the save");
+            assert!(
+                free || json(summary.as_ref())["contacts_max"].as_u64() > Some(0),
+                "{scene} in {stepper}: nothing touched before the save"
+            );
             let from = text(&folder.path("half"));
-            let resumed = state(&folder, "rest", &[scene, "--seconds", &half.to_string(), "--stepper", stepper, "--restore", &from]);
+            let resumed = state(
+                &folder,
+                "rest",
+                &[scene, "--seconds", &half.to_string(), "--stepper", stepper, "--restore", &from],
+            );
             assert!(resumed != halfway, "{scene} in {stepper}: nothing happened after the restore");
             assert!(resumed == whole, "{scene} in {stepper}: the restored run goes another way");
         }
@@ -75,7 +82,10 @@ fn two_recordings_are_the_same_file() {
 fn the_recording_of_a_killed_run_is_readable() {
     let folder = Folder::new("killed");
     let path = folder.path("killed.mcap");
-    let mut run = command(&["run", "stack", "--seconds", "100000", "--quiet", "--record", &text(&path)]).stderr(Stdio::null()).spawn().unwrap();
+    let mut run = command(&["run", "stack", "--seconds", "100000", "--quiet", "--record", &text(&path)])
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
     let patience = Instant::now() + Duration::from_secs(60);
     let written = || std::fs::metadata(&path).map_or(0, |m| m.len());
     while written() < 1 << 20 && Instant::now() < patience {

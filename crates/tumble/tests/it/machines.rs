@@ -103,7 +103,9 @@ fn pendulum_the_cone_and_the_top_go_round_as_their_quadratics_say() {
     let mut worst = [0.0f64; 4];
     for _ in 0..(10.0 / scene.world.dt_s) as usize {
         world.step().unwrap();
-        for (k, (name, axis, tilt, rate)) in [("cone", -Vec3::z(), 35.0, cone), ("top", Vec3::z(), 20.0, top)].into_iter().enumerate() {
+        for (k, (name, axis, tilt, rate)) in
+            [("cone", -Vec3::z(), 35.0, cone), ("top", Vec3::z(), 20.0, top)].into_iter().enumerate()
+        {
             let arm = turned(link(&world, name, name), axis);
             let lean = arm.xy().norm().atan2(arm.z.abs()) - f64::to_radians(tilt);
             // both start in the plane y = 0, the cone towards -x
@@ -193,12 +195,15 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
         }
         open = open.max((link(&world, "chain", "shackle").position() - HOOK).norm());
     }
-    println!("met after {met} s; joints open by {open:e} m; energy rose by {rise:e} J; moment about the hook off by {off:e} of {begin}; depth {depth:e}");
+    println!(
+        "met after {met} s; joints open by {open:e} m; energy rose by {rise:e} J; moment about the hook off by {off:e} of {begin}; depth {depth:e}"
+    );
     assert!((met - 0.28865).abs() < 2.0 * h, "the ball meets the chain after {met} s");
     assert!(open < 1e-12, "joints open by {open:e} m");
     assert!(rise < 1e-12 * start, "energy rises by {rise:e} J in a frame");
     assert!(off < 1e-3 * begin, "the moment about the hook is off by {off:e} N·m·s");
-    let away = (0..32).map(|k| (link(&world, "chain", &ring(k)).position() - world.site(ball, 0).unwrap().position()).norm());
+    let away =
+        (0..32).map(|k| (link(&world, "chain", &ring(k)).position() - world.site(ball, 0).unwrap().position()).norm());
     assert!(away.fold(f64::INFINITY, f64::min) > 0.5, "the ball has come off the chain");
 }
 
@@ -206,7 +211,10 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
 #[test]
 fn piston_follows_the_slider_crank_formula_without_drift() {
     let slow = std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1");
-    for (stepper, seconds) in [(tumble::scene::Stepper::TimeStepping, if slow { 60.0 } else { 5.0 }), (tumble::scene::Stepper::Backtracking, 1.0)] {
+    for (stepper, seconds) in [
+        (tumble::scene::Stepper::TimeStepping, if slow { 60.0 } else { 5.0 }),
+        (tumble::scene::Stepper::Backtracking, 1.0),
+    ] {
         let mut scene = load("piston");
         scene.world.stepper = stepper;
         let mut world = build(&scene);
@@ -233,7 +241,9 @@ fn piston_follows_the_slider_crank_formula_without_drift() {
             }
         }
         let method = world.methods().0;
-        println!("{method}, {seconds} s: pistons off by {off:?} m in each half, rods by {open:e} m, crank by {late:?} rad");
+        println!(
+            "{method}, {seconds} s: pistons off by {off:?} m in each half, rods by {open:e} m, crank by {late:?} rad"
+        );
         assert!(off[0].max(off[1]) < 1e-6, "{method}: {off:?} m");
         // the drive holds a velocity at the ends of frames, and nothing holds the angle
         assert!(late[0].max(late[1]) < 5e-6, "{method}: the crank is {late:?} rad from 4π·t");

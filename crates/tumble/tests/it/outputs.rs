@@ -6,9 +6,28 @@ use tumble::net::record::read;
 
 /// The keys that users may rely on.
 const KEYS: [&str; 22] = [
-    "scene", "stepper", "solver", "dt_s", "steps", "simulated_s", "wall_s", "real_time_factor", "contacts_mean", "contacts_max",
-    "solver_residual_max_m_per_s", "unconverged_solves", "rays", "max_penetration_m", "tries_mean", "tries_max", "floor_hits", "start", "end",
-    "bodies", "start/kinetic_energy_j", "end/kinetic_energy_j",
+    "scene",
+    "stepper",
+    "solver",
+    "dt_s",
+    "steps",
+    "simulated_s",
+    "wall_s",
+    "real_time_factor",
+    "contacts_mean",
+    "contacts_max",
+    "solver_residual_max_m_per_s",
+    "unconverged_solves",
+    "rays",
+    "max_penetration_m",
+    "tries_mean",
+    "tries_max",
+    "floor_hits",
+    "start",
+    "end",
+    "bodies",
+    "start/kinetic_energy_j",
+    "end/kinetic_energy_j",
 ];
 const SUMS: [&str; 4] = ["kinetic_energy_j", "potential_energy_j", "linear_momentum_n_s", "angular_momentum_n_m_s"];
 
@@ -29,7 +48,19 @@ fn every_shipped_scene_runs_and_leaves_a_whole_summary_and_a_recording_that_ends
     for name in SCENES {
         let file = |kind: &str| text(&folder.path(&format!("{name}.{kind}")));
         let (summary, recording, saved) = (file("json"), file("mcap"), file("state"));
-        let said = succeed(&["run", name, "--seconds", "0.25", "--summary", &summary, "--record", &recording, "--save", &saved, "--quiet"]);
+        let said = succeed(&[
+            "run",
+            name,
+            "--seconds",
+            "0.25",
+            "--summary",
+            &summary,
+            "--record",
+            &recording,
+            "--save",
+            &saved,
+            "--quiet",
+        ]);
         assert_eq!(said, "", "{name}: quiet");
         let frames = check_summary(name, &json(summary.as_ref()), 0.25);
         check_recording(name, &recording, frames, &std::fs::read(&saved).unwrap(), &json(summary.as_ref()));
@@ -74,13 +105,23 @@ fn check_recording(name: &str, path: &str, frames: usize, saved: &[u8], summary:
         let Some((entity, pose)) = found else {
             // an articulated body is recorded by its links
             let links = format!("{}/", body["name"].as_str().unwrap());
-            assert!(reader.entities().iter().any(|entity| entity.name.starts_with(&links)), "{name}: {links} is not in the recording");
+            assert!(
+                reader.entities().iter().any(|entity| entity.name.starts_with(&links)),
+                "{name}: {links} is not in the recording"
+            );
             continue;
         };
         let summed = [numbers(&body["position_m"]), numbers(&body["orientation_xyzw"])].concat();
         // reading a decimal number back may cost its last bit
-        let same = summed.iter().zip(pose.position.iter().chain(&pose.rotation)).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs().max(1e-3));
-        assert!(same && summed.len() == 7, "{name}: {} is at {pose:?} in the recording and at {summed:?} in the summary", entity.name);
+        let same = summed
+            .iter()
+            .zip(pose.position.iter().chain(&pose.rotation))
+            .all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs().max(1e-3));
+        assert!(
+            same && summed.len() == 7,
+            "{name}: {} is at {pose:?} in the recording and at {summed:?} in the summary",
+            entity.name
+        );
     }
 }
 
@@ -97,13 +138,19 @@ fn the_sums_of_the_summary_are_those_of_its_bodies() {
     let (m, g, t, spin) = (2.0, 9.81, 0.5, 0.4 * 2.0 * 0.01 * 3.0); // I = 2/5·m·r²
     let v = [0.5, -0.25, 4.0 - g * t];
     let x = [1.0 + 0.5 * t, 2.0 - 0.25 * t, 3.0 + 4.0 * t - 0.5 * g * t * t];
-    let near = |what: &str, expected: f64, got: f64| assert!((got - expected).abs() < 1e-9, "{what}: {got}, by hand {expected}");
+    let near = |what: &str, expected: f64, got: f64| {
+        assert!((got - expected).abs() < 1e-9, "{what}: {got}, by hand {expected}")
+    };
     (0..3).for_each(|k| near("position", x[k], numbers(&summary["bodies"][0]["position_m"])[k]));
     (0..3).for_each(|k| near("momentum", m * v[k], numbers(&summary["end"]["linear_momentum_n_s"])[k]));
     let cross = |k: usize| x[(k + 1) % 3] * v[(k + 2) % 3] - x[(k + 2) % 3] * v[(k + 1) % 3];
     let angular = [m * cross(0), m * cross(1), m * cross(2) + spin];
     (0..3).for_each(|k| near("angular momentum", angular[k], numbers(&summary["end"]["angular_momentum_n_m_s"])[k]));
-    near("kinetic", 0.5 * m * v.iter().map(|v| v * v).sum::<f64>() + 0.5 * spin * 3.0, number(&summary, "end/kinetic_energy_j"));
+    near(
+        "kinetic",
+        0.5 * m * v.iter().map(|v| v * v).sum::<f64>() + 0.5 * spin * 3.0,
+        number(&summary, "end/kinetic_energy_j"),
+    );
     near("potential", m * g * x[2], number(&summary, "end/potential_energy_j"));
     near("potential at the start", m * g * 3.0, number(&summary, "start/potential_energy_j"));
 }

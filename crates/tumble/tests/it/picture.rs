@@ -12,7 +12,10 @@ fn without_adapter(args: &[&str]) -> std::process::Output {
     for key in ["__EGL_VENDOR_LIBRARY_FILENAMES", "__EGL_VENDOR_LIBRARY_DIRS", "__EGL_EXTERNAL_PLATFORM_CONFIG_DIRS"] {
         command.env(key, "/nonexistent");
     }
-    command.env("LIBGL_DRIVERS_PATH", "/nonexistent").env("GBM_BACKENDS_PATH", "/nonexistent").env("LIBGL_ALWAYS_SOFTWARE", "0");
+    command
+        .env("LIBGL_DRIVERS_PATH", "/nonexistent")
+        .env("GBM_BACKENDS_PATH", "/nonexistent")
+        .env("LIBGL_ALWAYS_SOFTWARE", "0");
     command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
     command.output().unwrap()
 }
@@ -22,7 +25,18 @@ fn without_an_adapter_everything_but_the_picture_succeeds_and_the_message_names_
     let folder = Folder::new("no-adapter");
     let file = |name: &str| text(&folder.path(name));
     let (picture, recording, summary) = (file("out.png"), file("out.mcap"), file("out.json"));
-    let out = without_adapter(&["run", "incline", "--seconds", "0.1", "--picture", &picture, "--record", &recording, "--summary", &summary]);
+    let out = without_adapter(&[
+        "run",
+        "incline",
+        "--seconds",
+        "0.1",
+        "--picture",
+        &picture,
+        "--record",
+        &recording,
+        "--summary",
+        &summary,
+    ]);
     let said = String::from_utf8(out.stderr).unwrap();
     assert_eq!(out.status.code(), Some(0), "{said}");
     assert!(!said.contains("panicked"), "{said}");
@@ -30,7 +44,10 @@ fn without_an_adapter_everything_but_the_picture_succeeds_and_the_message_names_
     assert_eq!(json(summary.as_ref())["steps"], 24);
     if Path::new(&picture).exists() {
         // past the harness, which keeps what passing tests print
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: a driver was found all the same, so there is no message to check\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: a driver was found all the same, so there is no message to check\n"),
+        );
         return;
     }
     assert!(said.contains("mesa-vulkan-drivers"), "{said}");
@@ -42,12 +59,27 @@ fn with_an_adapter_every_scene_gets_a_picture() {
     for scene in SCENES {
         let path = folder.path("out.png");
         let _ = std::fs::remove_file(&path);
-        let out = tumble(&["run", scene, "--seconds", "0.05", "--quiet", "--size", "64x48", "--debug-draw", "all", "--picture", &text(&path)]);
+        let out = tumble(&[
+            "run",
+            scene,
+            "--seconds",
+            "0.05",
+            "--quiet",
+            "--size",
+            "64x48",
+            "--debug-draw",
+            "all",
+            "--picture",
+            &text(&path),
+        ]);
         let said = String::from_utf8(out.stderr).unwrap();
         assert!(out.status.success(), "{scene}: {said}");
         if said.contains("No picture:") {
             // past the harness, which keeps what passing tests print
-            let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter; {said}\n"));
+            let _ = std::io::Write::write_fmt(
+                &mut std::io::stderr(),
+                format_args!("\nSKIPPED: this machine has no graphics adapter; {said}\n"),
+            );
             return;
         }
         let bytes = std::fs::read(&path).unwrap();

@@ -49,7 +49,9 @@ fn billiards_the_cue_ball_arrives_as_its_page_says() {
     let cue = world.find("cue_ball").unwrap();
     let start = site(&world, cue).0;
     let (a, c, t) = (0.2 * G, 0.05f64, 33.0 / 240.0); // the last frame before the impact at 0.13830 s
-    (0..33).for_each(|_| { world.step().unwrap(); });
+    (0..33).for_each(|_| {
+        world.step().unwrap();
+    });
     let speed = (9.0 + a / c) * (-c * t).exp() - a / c;
     let way = (9.0 + a / c) * (1.0 - (-c * t).exp()) / c - a / c * t;
     let (x, v) = site(&world, cue);
@@ -70,12 +72,24 @@ fn billiards_the_break_keeps_momentum_and_energy_before_the_first_cushion() {
     let ids = movers(&scene, &world);
     let (p0, e0) = (world.momentum().linear, world.energy().total());
     // within a frame the fastest ball moves 9 m/s / 240 = 37.5 mm; its radius is 28.6 mm
-    let clear = |world: &World| ids.iter().map(|id| site(world, *id).0).all(|x| x.x.abs() < 1.27 - 0.067 && x.y.abs() < 0.635 - 0.067);
+    let clear = |world: &World| {
+        ids.iter().map(|id| site(world, *id).0).all(|x| x.x.abs() < 1.27 - 0.067 && x.y.abs() < 0.635 - 0.067)
+    };
     let mut moving = 0;
     while clear(&world) {
         let p = world.momentum().linear;
-        assert!((p - p0).xy().norm() < 1e-12 * p0.norm(), "momentum is off by {:e} at {} s", (p - p0).xy().norm() / p0.norm(), world.time());
-        assert!((world.energy().total() / e0 - 1.0).abs() < 1e-6, "energy is off by {:e} at {} s", world.energy().total() / e0 - 1.0, world.time());
+        assert!(
+            (p - p0).xy().norm() < 1e-12 * p0.norm(),
+            "momentum is off by {:e} at {} s",
+            (p - p0).xy().norm() / p0.norm(),
+            world.time()
+        );
+        assert!(
+            (world.energy().total() / e0 - 1.0).abs() < 1e-6,
+            "energy is off by {:e} at {} s",
+            world.energy().total() / e0 - 1.0,
+            world.time()
+        );
         moving = ids.iter().filter(|id| site(&world, **id).1.norm() > 0.01).count();
         world.step().unwrap();
         assert!(world.time() < 2.0, "some ball comes to a cushion within 2 s");
@@ -91,7 +105,9 @@ fn bowling_the_ball_hooks_as_its_page_says_and_at_least_seven_pins_fall() {
     let ball = world.find("ball").unwrap();
     let pins: Vec<ObjectId> = (1..=10).map(|n| world.find(&format!("pin_{n}")).unwrap()).collect();
     let start = site(&world, ball).0;
-    (0..steps(&scene, 2.4)).for_each(|_| { world.step().unwrap(); });
+    (0..steps(&scene, 2.4)).for_each(|_| {
+        world.step().unwrap();
+    });
     let t = world.time();
     let at = start + Vec3::new(8.0 * t - 0.5 * 0.6923 * t * t, -0.4 * t + 0.5 * 0.3696 * t * t, 0.0);
     let (x, v) = site(&world, ball);
@@ -105,7 +121,11 @@ fn bowling_the_ball_hooks_as_its_page_says_and_at_least_seven_pins_fall() {
         if !met && lean(&world, pins[0]) > before + 0.005 {
             met = true;
             assert!((world.time() - 2.547).abs() < 0.03, "pin 1 begins to fall at {} s", world.time());
-            assert!((site(&world, ball).0.y + 0.064).abs() < 0.02, "the ball enters {} m off the middle", site(&world, ball).0.y);
+            assert!(
+                (site(&world, ball).0.y + 0.064).abs() < 0.02,
+                "the ball enters {} m off the middle",
+                site(&world, ball).0.y
+            );
         }
     }
     let fallen = pins.iter().filter(|id| lean(&world, **id) > 0.5).count();
@@ -130,8 +150,14 @@ fn incline_the_block_stops_where_and_when_its_page_says_and_stays() {
         assert!((stop / 0.919197 - 1.0).abs() < 1e-4, "{method}: stops after {stop} s");
         assert!(((x - start).norm() / 0.919197 - 1.0).abs() < 1e-4, "{method}: stops after {} m", (x - start).norm());
         assert!((x - end).norm() < 1e-4, "{method}: stops at {x}");
-        (0..steps(scene, 2.0)).for_each(|_| { world.step().unwrap(); });
-        assert!((site(&world, block).0 - x).norm() < 2e-6, "{method}: creeps by {:e} m in 2 s", (site(&world, block).0 - x).norm());
+        (0..steps(scene, 2.0)).for_each(|_| {
+            world.step().unwrap();
+        });
+        assert!(
+            (site(&world, block).0 - x).norm() < 2e-6,
+            "{method}: creeps by {:e} m in 2 s",
+            (site(&world, block).0 - x).norm()
+        );
     });
 }
 
@@ -149,10 +175,19 @@ fn falling_stays_in_its_box_and_comes_to_rest_with_few_tries() {
             penetration = penetration.max(report.max_penetration);
             for id in &ids {
                 let x = site(&world, *id).0;
-                assert!(x.z > 0.0 && x.x.abs() < 1.2 && x.y.abs() < 1.2, "{method}: '{}' is at {x} at {} s", world.object(*id).unwrap().name(), world.time());
+                assert!(
+                    x.z > 0.0 && x.x.abs() < 1.2 && x.y.abs() < 1.2,
+                    "{method}: '{}' is at {x} at {} s",
+                    world.object(*id).unwrap().name(),
+                    world.time()
+                );
             }
         }
-        assert!(world.energy().kinetic < 1e-3 * fall, "{method}: {} J of motion are left of {fall} J", world.energy().kinetic);
+        assert!(
+            world.energy().kinetic < 1e-3 * fall,
+            "{method}: {} J of motion are left of {fall} J",
+            world.energy().kinetic
+        );
         let resting = ids.iter().filter(|id| site(&world, **id).1.norm() < 0.02).count();
         assert!(3 * resting >= 2 * ids.len(), "{method}: only {resting} of {} rest", ids.len());
         if method == "backtracking" {
@@ -189,7 +224,9 @@ fn every_scene_runs_with_every_solver() {
             let mut scene = load(name);
             scene.world.solver = solver;
             let mut world = build(&scene);
-            (0..steps(&scene, 0.3)).for_each(|_| { world.step().unwrap(); });
+            (0..steps(&scene, 0.3)).for_each(|_| {
+                world.step().unwrap();
+            });
         }
     }
 }

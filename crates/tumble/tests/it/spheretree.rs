@@ -28,7 +28,12 @@ fn the_table_and_the_file_say_what_the_library_says() {
     assert_eq!(file.quality.len(), tree.levels() as usize);
     assert!(file.quality.iter().all(|q| q.coverage == 1.0 && q.nesting_broken == 0));
     for level in 0..tree.levels() {
-        let row: Vec<&str> = said.lines().map(|line| line.split_whitespace().collect::<Vec<_>>()).find(|row| row.first() == Some(&level.to_string().as_str())).unwrap()[..3].to_vec();
+        let row: Vec<&str> = said
+            .lines()
+            .map(|line| line.split_whitespace().collect::<Vec<_>>())
+            .find(|row| row.first() == Some(&level.to_string().as_str()))
+            .unwrap()[..3]
+            .to_vec();
         assert_eq!(row, [level.to_string(), tree.at_level(level).count().to_string(), "100.00".into()], "{said}");
     }
     assert!(said.contains("level 2: ") && said.contains("leaves"), "{said}");
@@ -40,7 +45,11 @@ fn many_processes_share_a_cache_and_all_write_the_same() {
     let folder = Folder::new("spheretree-cache");
     let (mesh, cache) = (folder.write("ring.obj", obj(&ring())), text(&folder.path("cache")));
     let output = |n: usize| text(&folder.path(&format!("tree{n}.json")));
-    let run = |n: usize| command(&[&["spheretree", &mesh, "-q", "--cache", &cache, "-o", &output(n)][..], &QUICK].concat()).spawn().unwrap();
+    let run = |n: usize| {
+        command(&[&["spheretree", &mesh, "-q", "--cache", &cache, "-o", &output(n)][..], &QUICK].concat())
+            .spawn()
+            .unwrap()
+    };
     let children: Vec<_> = (0..6).map(run).collect();
     for mut child in children {
         assert!(child.wait().unwrap().success());
@@ -77,12 +86,21 @@ fn a_damaged_file_of_the_cache_is_told_and_built_anew() {
 fn a_picture_of_a_level_is_written() {
     let folder = Folder::new("spheretree-picture");
     let (mesh, picture) = (folder.write("ring.obj", obj(&ring())), text(&folder.path("level.png")));
-    let out = tumble(&[&["spheretree", &mesh, "-q", "--no-cache", "--picture", &picture, "--level", "1", "--size", "64x48"][..], &QUICK].concat());
+    let out = tumble(
+        &[
+            &["spheretree", &mesh, "-q", "--no-cache", "--picture", &picture, "--level", "1", "--size", "64x48"][..],
+            &QUICK,
+        ]
+        .concat(),
+    );
     let told = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.success(), "{told}");
     if told.contains("No picture:") {
         // past the harness, which keeps what passing tests print
-        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: this machine has no graphics adapter; {told}\n"));
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: this machine has no graphics adapter; {told}\n"),
+        );
         return;
     }
     assert_eq!(std::fs::read(&picture).unwrap()[16..24], [0, 0, 0, 64, 0, 0, 0, 48]);
@@ -108,7 +126,10 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
         (&[&mesh, "--branch", "100"], "ring.obj: the branching of a sphere tree is 100, but must be 2 to 64"),
         (&[&mesh, "--depth", "0"], "the depth of a sphere tree is 0, but must be 1 to 9"),
         (&[&mesh, "--error", "2"], "wanted a number from 0.0001 to 1"),
-        (&[&mesh, "--method", "octree", "--depth", "2", "--picture", &level, "--level", "7"], "--level is 7; a tree of --depth 2 has levels 0 to 2 at most"),
+        (
+            &[&mesh, "--method", "octree", "--depth", "2", "--picture", &level, "--level", "7"],
+            "--level is 7; a tree of --depth 2 has levels 0 to 2 at most",
+        ),
         (&[], "wanted a mesh, or --urdf ROBOT"),
         (&[&mesh, "-o", &nowhere], "nowhere/tree.json cannot be written: there is no folder"),
         (&[&mesh, "-o", &here], "it is a folder; wanted the name of a file"),
@@ -170,8 +191,20 @@ const ROBOT: &str = r#"<robot name="two 1"><link name="a"><collision><origin xyz
 fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
     let folder = Folder::new("spheretree-robot");
     let robot = folder.write("robot.urdf", ROBOT);
-    let (out, yaml, list) = (text(&folder.path("out.urdf")), text(&folder.path("out.yml")), text(&folder.path("list.json")));
-    let said = succeed(&["spheretree", "--no-cache", "--urdf", &robot, "--output", &out, "--planner", "yaml", "--spheres", "12"]);
+    let (out, yaml, list) =
+        (text(&folder.path("out.urdf")), text(&folder.path("out.yml")), text(&folder.path("list.json")));
+    let said = succeed(&[
+        "spheretree",
+        "--no-cache",
+        "--urdf",
+        &robot,
+        "--output",
+        &out,
+        "--planner",
+        "yaml",
+        "--spheres",
+        "12",
+    ]);
     assert!(said.contains("100 % of the collision surface of each link lies inside"), "{said}");
     succeed(&["spheretree", "--no-cache", "-q", "--urdf", &robot, "--planner", &list, "--spheres", "12"]);
     assert!(succeed(&["check", &out]).contains("a robot of 2 links"));
@@ -193,7 +226,10 @@ fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
     // the corners of the box are inside: 0.1 across, 0 and 1 along
     for corner in 0..8 {
         let p = [0, 1, 2].map(|k| if corner >> k & 1 == 1 { [0.1, 0.1, 1.0][k] } else { [-0.1, -0.1, 0.0][k] });
-        let gap = |s: &Value| (0..3).map(|k| (p[k] - s["origin"][k].as_f64().unwrap()).powi(2)).sum::<f64>().sqrt() - s["radius"].as_f64().unwrap();
+        let gap = |s: &Value| {
+            (0..3).map(|k| (p[k] - s["origin"][k].as_f64().unwrap()).powi(2)).sum::<f64>().sqrt()
+                - s["radius"].as_f64().unwrap()
+        };
         assert!(a.iter().any(|s| gap(s) <= 0.0), "{p:?}");
     }
 }

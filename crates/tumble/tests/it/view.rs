@@ -39,8 +39,13 @@ fn state_of_run(folder: &Folder, scene: &str, seconds: &str) -> String {
 fn keys_and_mouse_do_what_they_say() {
     let Some(desktop) = Desktop::open() else { return };
     let folder = Folder::new("view-keys");
-    let scene = folder.write("ball.toml", BALL.replace("mass_kg = 2.0", "mass_kg = 2.0\nvelocity_m_per_s = [0.01, 0, 0]"));
-    let Some(mut view) = Session::open(&desktop, "view-keys-status", &[&scene, "--size", "200x150", "--quality", "fast"]) else { return };
+    let scene =
+        folder.write("ball.toml", BALL.replace("mass_kg = 2.0", "mass_kg = 2.0\nvelocity_m_per_s = [0.01, 0, 0]"));
+    let Some(mut view) =
+        Session::open(&desktop, "view-keys-status", &[&scene, "--size", "200x150", "--quality", "fast"])
+    else {
+        return;
+    };
     let title = String::from_utf8(desktop.run("xdotool", &["getwindowname", &view.window])).unwrap();
     assert!(title.starts_with(&format!("tumble: {scene}")), "{title}");
 
@@ -51,14 +56,20 @@ fn keys_and_mouse_do_what_they_say() {
     view.until("a camera", |s| s["camera"] == "front" && s["shown"].as_u64().unwrap() > later);
     view.key("shift+c");
     let stood = view.until("the camera before", |s| s["camera"] == "scene");
-    assert_eq!((&stood["frame"], &stood["state_blake3"]), (&stands["frame"], &stands["state_blake3"]), "time went on while it stood");
+    assert_eq!(
+        (&stood["frame"], &stood["state_blake3"]),
+        (&stands["frame"], &stands["state_blake3"]),
+        "time went on while it stood"
+    );
 
     // a step is dt = 0.01 s, one by one
     for (key, n) in [("period", 1), ("n", 2)] {
         view.key(key);
         let frame = stands["frame"].as_u64().unwrap() + n;
         let stepped = view.until("a step", |s| s["frame"].as_u64() == Some(frame));
-        assert!((stepped["time_s"].as_f64().unwrap() - stands["time_s"].as_f64().unwrap() - 0.01 * n as f64).abs() < 1e-9);
+        assert!(
+            (stepped["time_s"].as_f64().unwrap() - stands["time_s"].as_f64().unwrap() - 0.01 * n as f64).abs() < 1e-9
+        );
         assert_eq!(stepped["paused"], true);
     }
     view.key("r");
@@ -69,7 +80,14 @@ fn keys_and_mouse_do_what_they_say() {
     // 4 m from the target: 1 m/s, so 0.1 m a tap, along y, which is ahead
     assert_eq!(reset["step_m"].as_f64().unwrap(), 0.1);
     let mut eye = [0.0, -4.0, 1.0];
-    for (key, by) in [("w", [0.0, 0.1, 0.0]), ("Down", [0.0, -0.1, 0.0]), ("d", [0.1, 0.0, 0.0]), ("a", [-0.1, 0.0, 0.0]), ("e", [0.0, 0.0, 0.1]), ("Next", [0.0, 0.0, -0.1])] {
+    for (key, by) in [
+        ("w", [0.0, 0.1, 0.0]),
+        ("Down", [0.0, -0.1, 0.0]),
+        ("d", [0.1, 0.0, 0.0]),
+        ("a", [-0.1, 0.0, 0.0]),
+        ("e", [0.0, 0.0, 0.1]),
+        ("Next", [0.0, 0.0, -0.1]),
+    ] {
         view.key(key);
         eye = std::array::from_fn(|k| eye[k] + by[k]);
         view.until(&format!("{key} to move the eye to {eye:?}"), |s| close(three(&s["eye_m"]), eye, 1e-5));
@@ -90,7 +108,9 @@ fn keys_and_mouse_do_what_they_say() {
     eye = [eye[0] + 0.1 * cos * sin, eye[1] + 0.1 * cos * cos, eye[2] + 0.1 * sin];
     view.until("a flight upwards", |s| s["flies"] == true && close(three(&s["eye_m"]), eye, 1e-5));
     view.key("Home");
-    view.until("the scene's camera", |s| close(three(&s["eye_m"]), [0.0, -4.0, 1.0], 1e-6) && close(three(&s["forward"]), [0.0, 1.0, 0.0], 1e-6));
+    view.until("the scene's camera", |s| {
+        close(three(&s["eye_m"]), [0.0, -4.0, 1.0], 1e-6) && close(three(&s["forward"]), [0.0, 1.0, 0.0], 1e-6)
+    });
 
     for key in ["2", "7", "8", "8"] {
         view.key(key);
@@ -161,13 +181,18 @@ fn a_body_is_pulled_to_the_pointer() {
 #[test]
 fn time_begins_with_the_first_picture() {
     let Some(desktop) = Desktop::open() else { return };
-    let mut view = Session::spawn(&desktop, Folder::new("view-begin"), &["billiards", "--size", "64x48", "--seconds", "0.3"]);
+    let mut view =
+        Session::spawn(&desktop, Folder::new("view-begin"), &["billiards", "--size", "64x48", "--seconds", "0.3"]);
     let (code, said) = view.end();
     if said.contains("no graphics adapter") {
         return skip(&format!("this machine has no graphics adapter; {said}"));
     }
     assert_eq!((code, said.as_str()), (Some(0), ""));
-    let lines: Vec<Value> = std::fs::read_to_string(view.folder.path("status")).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines: Vec<Value> = std::fs::read_to_string(view.folder.path("status"))
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
     let first = lines.iter().find(|s| s["shown"].as_u64().unwrap() > 0).unwrap();
     assert_eq!((&first["time_s"], &first["frame"]), (&serde_json::json!(0.0), &serde_json::json!(0)));
     assert!((lines.last().unwrap()["time_s"].as_f64().unwrap() - 0.3).abs() < 1e-9);
@@ -179,7 +204,11 @@ fn a_picture_that_cannot_be_written_ends_no_session() {
     let folder = Folder::new("view-shots");
     let shots = folder.path("shots");
     std::fs::create_dir(&shots).unwrap();
-    let Some(mut view) = Session::open(&desktop, "view-shots-status", &["stack", "--size", "64x48", "--shots", &text(&shots)]) else { return };
+    let Some(mut view) =
+        Session::open(&desktop, "view-shots-status", &["stack", "--size", "64x48", "--shots", &text(&shots)])
+    else {
+        return;
+    };
     view.key("space");
     view.until("the pause", |s| s["paused"] == true);
     // the folder goes while the window is open
@@ -189,16 +218,24 @@ fn a_picture_that_cannot_be_written_ends_no_session() {
     view.until("the overlay", |s| s["overlays"] == serde_json::json!(["contacts"]));
     view.key("Escape");
     let (code, said) = view.end();
-    assert!(code == Some(0) && said.lines().count() == 1 && said.contains("no picture: ") && said.contains(&text(&shots)), "{code:?} {said}");
+    assert!(
+        code == Some(0) && said.lines().count() == 1 && said.contains("no picture: ") && said.contains(&text(&shots)),
+        "{code:?} {said}"
+    );
 }
 
 #[test]
 fn without_a_desktop_there_is_one_clear_message() {
     let mut command = command(&["view", "stack"]);
-    let out = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").output().unwrap();
+    let out =
+        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").output().unwrap();
     let said = String::from_utf8(out.stderr).unwrap();
     assert_eq!((out.status.code(), said.lines().count()), (Some(1), 1), "{said}");
-    assert!(said.starts_with("Error: ") && ["DISPLAY", "WAYLAND_DISPLAY", "tumble run SCENE --picture"].iter().all(|word| said.contains(word)), "{said}");
+    assert!(
+        said.starts_with("Error: ")
+            && ["DISPLAY", "WAYLAND_DISPLAY", "tumble run SCENE --picture"].iter().all(|word| said.contains(word)),
+        "{said}"
+    );
 }
 
 #[test]
@@ -207,7 +244,10 @@ fn what_cannot_be_shown_ends_with_code_2_before_a_window_opens() {
     assert!(fail(&["view", "stack", "--cave", "cube4", "--facet", "fron"], 2).contains("did you mean `front`?"));
     assert!(fail(&["view", "stack", "--cave", "cube4", "--facet", "front", "--size", "80x60"], 2).contains("size_px"));
     assert!(fail(&["view", "stack", "--picture", "/nonexistent/x.png"], 2).contains("there is no folder /nonexistent"));
-    assert!(fail(&["view", "stack", "--shots", "/nonexistent/dir"], 2).contains("--shots /nonexistent/dir: there is no such folder"));
+    assert!(
+        fail(&["view", "stack", "--shots", "/nonexistent/dir"], 2)
+            .contains("--shots /nonexistent/dir: there is no such folder")
+    );
     assert!(fail(&["view", "stack", "--size", "16384x16384"], 2).contains("at most"));
     assert!(fail_often(&["view", "stack", "--size", "0x10"], 2).contains("1 to 16384"));
     assert!(fail_often(&["view", "stack", "--facet", "front"], 2).contains("--cave"));

@@ -22,7 +22,10 @@ fn loses_its_device(desktop: &Desktop, name: &str, interface: &str, environment:
     if said.contains("no graphics adapter") {
         return skip(&said);
     }
-    assert!(code == Some(1) && said.starts_with("Error: the window: the graphics device ") && said.contains("lost"), "{code:?}: {said}");
+    assert!(
+        code == Some(1) && said.starts_with("Error: the window: the graphics device ") && said.contains("lost"),
+        "{code:?}: {said}"
+    );
     assert!(said.contains(interface) && said.lines().count() == 1, "{said}");
 }
 
@@ -37,7 +40,12 @@ fn a_device_that_is_lost_ends_the_window_with_a_message() {
 fn a_machine_without_vulkan_shows_the_same() {
     let Some(desktop) = Desktop::open() else { return };
     let status = |name: &str, environment: &[(&str, &str)]| {
-        let mut view = Session::spawn_with(&desktop, Folder::new(name), &["stack", "--size", "64x48", "--frames", "3", "--paused"], environment);
+        let mut view = Session::spawn_with(
+            &desktop,
+            Folder::new(name),
+            &["stack", "--size", "64x48", "--frames", "3", "--paused"],
+            environment,
+        );
         let (code, said) = outcome(&mut view);
         if said.contains("no graphics adapter") {
             skip(&said);
@@ -54,8 +62,20 @@ fn a_machine_without_vulkan_shows_the_same() {
 /// A desktop of Wayland without a screen, whose sockets lie in a folder of its own.
 fn compositor(folder: &Folder) -> Option<Running> {
     let mut command = Command::new("weston");
-    command.args(["--backend=headless-backend.so", "--use-pixman", "--idle-time=0", "--socket=wayland-test", "--width=800", "--height=600"]);
-    command.env("XDG_RUNTIME_DIR", folder.path("")).env_remove("WAYLAND_DISPLAY").env_remove("DISPLAY").stdout(Stdio::null()).stderr(Stdio::null());
+    command.args([
+        "--backend=headless-backend.so",
+        "--use-pixman",
+        "--idle-time=0",
+        "--socket=wayland-test",
+        "--width=800",
+        "--height=600",
+    ]);
+    command
+        .env("XDG_RUNTIME_DIR", folder.path(""))
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("DISPLAY")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
     let Ok(child) = command.spawn() else {
         skip("Wayland is not tested: there is no weston; on Debian: apt-get install weston");
         return None;
@@ -87,7 +107,8 @@ fn windows_open_on_wayland() {
     assert!(status["shown"] == 3 && status["size_px"] == serde_json::json!([64, 48]), "{status}");
     loses_its_device(&desktop, "view-device-wayland", "Vulkan", &wayland);
     // the desktop goes away in mid-run
-    let mut view = Session::spawn_with(&desktop, Folder::new("view-wayland-lost"), &["stack", "--size", "64x48"], &wayland);
+    let mut view =
+        Session::spawn_with(&desktop, Folder::new("view-wayland-lost"), &["stack", "--size", "64x48"], &wayland);
     let start = Instant::now();
     while view.status().is_none_or(|s| s["shown"].as_u64() < Some(3)) {
         assert!(start.elapsed() < PATIENCE, "no picture came");

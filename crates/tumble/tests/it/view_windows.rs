@@ -8,7 +8,13 @@ use tumble::render::Image;
 #[test]
 fn a_window_shows_the_picture_that_run_takes() {
     let Some(desktop) = Desktop::open() else { return };
-    let Some(mut view) = Session::open(&desktop, "view-picture", &["bowling", "--size", "160x90", "--quality", "usual", "--plain", "--paused"]) else { return };
+    let Some(mut view) = Session::open(
+        &desktop,
+        "view-picture",
+        &["bowling", "--size", "160x90", "--quality", "usual", "--plain", "--paused"],
+    ) else {
+        return;
+    };
     for n in 1..=12 {
         view.key("period");
         view.until("a step", |s| s["frame"] == n);
@@ -29,11 +35,20 @@ fn bent(folder: &Folder) -> String {
         grid += &format!("v {x} {y}\nvt {} {}\n", 0.1 + 0.8 * x + 0.05 * y, 0.05 + 0.9 * y * (1.0 - 0.1 * x));
     }
     for first in (0..4).flat_map(|y| (0..4).map(move |x| 5 * y + x + 1)).skip(1) {
-        grid += &[first, first + 1, first + 6, first + 5].map(|i| format!(" {i}/{i}")).iter().fold("f".to_string(), |face, corner| face + corner);
+        grid += &[first, first + 1, first + 6, first + 5]
+            .map(|i| format!(" {i}/{i}"))
+            .iter()
+            .fold("f".to_string(), |face, corner| face + corner);
         grid += "\n";
     }
     folder.write("warp.obj", grid);
-    let mask = Image { width: 120, height: 90, rgba: (0..120 * 90u32).flat_map(|i| [(255 - i % 120) as u8, 255, (140 + i % 120).min(255) as u8, 255]).collect() };
+    let mask = Image {
+        width: 120,
+        height: 90,
+        rgba: (0..120 * 90u32)
+            .flat_map(|i| [(255 - i % 120) as u8, 255, (140 + i % 120).min(255) as u8, 255])
+            .collect(),
+    };
     mask.write_png(folder.path("mask.png")).unwrap();
     "warp_file = \"warp.obj\"\nblend_file = \"mask.png\"\n".to_string()
 }
@@ -59,7 +74,13 @@ fn facets_and_unfolded_caves_show_what_run_takes() {
     let mut pictures = Vec::new();
     for (cave, more, size) in cases {
         let args = [&["stack", "--cave", cave], more].concat();
-        let Some(view) = Session::open(&desktop, "view-cave-status", &[&args[..], &["--quality", "usual", "--plain", "--paused"]].concat()) else { return };
+        let Some(view) = Session::open(
+            &desktop,
+            "view-cave-status",
+            &[&args[..], &["--quality", "usual", "--plain", "--paused"]].concat(),
+        ) else {
+            return;
+        };
         let picture = view.folder.path("run.png");
         let run: Vec<&str> = args.into_iter().filter(|word| *word != "--preview").collect();
         succeed(&[&["run"], &run[..], &["--quiet", "--seconds", "0", "--picture", &text(&picture)]].concat());
@@ -69,10 +90,21 @@ fn facets_and_unfolded_caves_show_what_run_takes() {
         pictures.push(image);
     }
     // the grid leaves its first corner black, and the mask takes red on the right and blue on the left; a plain facet has neither
-    let sum = |image: &Image, channel: usize, from: u32, to: u32| (0..90).flat_map(|y| (from..to).map(move |x| (x, y))).map(|(x, y)| u64::from(image.pixel(x, y).unwrap()[channel])).sum::<u64>();
+    let sum = |image: &Image, channel: usize, from: u32, to: u32| {
+        (0..90)
+            .flat_map(|y| (from..to).map(move |x| (x, y)))
+            .map(|(x, y)| u64::from(image.pixel(x, y).unwrap()[channel]))
+            .sum::<u64>()
+    };
     let plain = &pictures[1];
-    let share = |channel: usize, from: u32, to: u32| sum(&pictures[2], channel, from, to) as f64 / sum(plain, channel, from, to) as f64;
-    assert!(pictures[2].pixel(2, 87) == Some([0, 0, 0, 255]) && plain.pixel(2, 2) != Some([0, 0, 0, 255]), "{:?}", pictures[2].pixel(2, 87));
+    let share = |channel: usize, from: u32, to: u32| {
+        sum(&pictures[2], channel, from, to) as f64 / sum(plain, channel, from, to) as f64
+    };
+    assert!(
+        pictures[2].pixel(2, 87) == Some([0, 0, 0, 255]) && plain.pixel(2, 2) != Some([0, 0, 0, 255]),
+        "{:?}",
+        pictures[2].pixel(2, 87)
+    );
     // the mask leaves 155/255 of the red light there and 205/255 here: in sRGB bytes (155/205)^(1/2.4) = 0.89 of it, where the picture is grey
     assert!((share(0, 90, 110) / share(0, 40, 60) - 0.89).abs() < 0.04, "{} {}", share(0, 90, 110), share(0, 40, 60));
 }
@@ -84,7 +116,8 @@ fn windows_that_end_end_well() {
     let Some(mut view) = Session::open(&desktop, "view-close", &args) else { return };
     view.ask_to_close();
     assert_eq!(view.end(), (Some(0), String::new()), "closed");
-    let mut view = Session::spawn(&desktop, Folder::new("view-frames"), &[&args[..], &["--frames", "3", "--paused"]].concat());
+    let mut view =
+        Session::spawn(&desktop, Folder::new("view-frames"), &[&args[..], &["--frames", "3", "--paused"]].concat());
     assert_eq!(view.end(), (Some(0), String::new()));
     assert_eq!(view.status().unwrap()["shown"], 3);
     // without its X server a window ends too: X's own library sees to that, and says so
@@ -98,9 +131,18 @@ fn windows_that_end_end_well() {
 fn a_display_that_does_not_answer_is_named() {
     for (variable, value) in [("DISPLAY", ":987"), ("DISPLAY", "nonsense"), ("WAYLAND_DISPLAY", "wayland-987")] {
         let mut command = command(&["view", "stack"]);
-        let out = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").env(variable, value).output().unwrap();
+        let out = command
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .env(variable, value)
+            .output()
+            .unwrap();
         let said = String::from_utf8(out.stderr).unwrap();
         assert_eq!((out.status.code(), said.lines().count()), (Some(1), 1), "{said}");
-        assert!(said.starts_with("Error: ") && said.contains(&format!("{variable}={value}")) && said.contains("--picture"), "{said}");
+        assert!(
+            said.starts_with("Error: ") && said.contains(&format!("{variable}={value}")) && said.contains("--picture"),
+            "{said}"
+        );
     }
 }

@@ -17,7 +17,10 @@ fn the_cycloid_is_isochronous_and_keeps_energy() {
             let start = world.energy().total();
             let (measured, drift) = swing(&mut world, id, 20.0);
             // the leapfrog of a harmonic oscillator is fast by (ωh)²/24 = 7.1e-6
-            assert!((measured / period - 1.0).abs() < 1e-5, "{stepper} from {angle} rad: {measured} s, by hand {period} s");
+            assert!(
+                (measured / period - 1.0).abs() < 1e-5,
+                "{stepper} from {angle} rad: {measured} s, by hand {period} s"
+            );
             assert!(drift < 1e-4 * start, "{stepper} from {angle} rad: energy is off by {:e}", drift / start);
         }
     }
@@ -43,6 +46,10 @@ fn a_stop_on_the_wire_holds_the_bead_and_lets_it_go() {
         assert!((lowest + 0.5).abs() < 5e-3, "{stepper}: it swings back to {lowest} rad");
         let height = R * (1.0 - 0.5f64.cos());
         let energy = world.energy().total();
-        assert!((energy / (0.7 * G * height) - 1.0).abs() < 0.02, "{stepper}: {energy} J are left, by hand {}", 0.7 * G * height);
+        assert!(
+            (energy / (0.7 * G * height) - 1.0).abs() < 0.02,
+            "{stepper}: {energy} J are left, by hand {}",
+            0.7 * G * height
+        );
     }
 }

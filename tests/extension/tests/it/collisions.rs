@@ -27,12 +27,20 @@ fn collide(stepper: &str, a: impl Object, b: impl Object) -> (World, ObjectId, O
 fn a_particle_hits_a_rigid_body_head_on() {
     for stepper in STEPPERS {
         for e in [0.0, 0.5, 1.0] {
-            let a = Particle::new("particle", 2.0, sphere(0.1)).at(Vec3::new(-0.5, 0.0, 0.0), Vec3::new(3.0, 0.0, 0.0)).surface(e, 0.0);
+            let a = Particle::new("particle", 2.0, sphere(0.1))
+                .at(Vec3::new(-0.5, 0.0, 0.0), Vec3::new(3.0, 0.0, 0.0))
+                .surface(e, 0.0);
             let (world, a, b) = collide(stepper, a, rigid("ball", 3.0, Vec3::zeros(), Vec3::new(-1.0, 0.0, 0.0), e));
             let (va, vb) = head_on(2.0, 3.0, 3.0, -1.0, e);
             let (got_a, got_b) = (velocity(&world, a), velocity(&world, b));
-            assert!((got_a - Vec3::new(va, 0.0, 0.0)).norm() < 1e-8, "{stepper}, e = {e}: particle at {got_a}, by hand {va}");
-            assert!((got_b - Vec3::new(vb, 0.0, 0.0)).norm() < 1e-8, "{stepper}, e = {e}: body at {got_b}, by hand {vb}");
+            assert!(
+                (got_a - Vec3::new(va, 0.0, 0.0)).norm() < 1e-8,
+                "{stepper}, e = {e}: particle at {got_a}, by hand {va}"
+            );
+            assert!(
+                (got_b - Vec3::new(vb, 0.0, 0.0)).norm() < 1e-8,
+                "{stepper}, e = {e}: body at {got_b}, by hand {vb}"
+            );
         }
     }
 }
@@ -41,7 +49,9 @@ fn a_particle_hits_a_rigid_body_head_on() {
 #[test]
 fn an_oblique_elastic_impact_keeps_everything() {
     for stepper in STEPPERS {
-        let a = Particle::new("particle", 2.0, sphere(0.1)).at(Vec3::new(-0.5, 0.08, 0.03), Vec3::new(3.0, 0.0, 0.0)).surface(1.0, 0.0);
+        let a = Particle::new("particle", 2.0, sphere(0.1))
+            .at(Vec3::new(-0.5, 0.08, 0.03), Vec3::new(3.0, 0.0, 0.0))
+            .surface(1.0, 0.0);
         let (mut world, a, b) = collide(stepper, a, rigid("ball", 2.0, Vec3::zeros(), Vec3::zeros(), 1.0));
         let (va, vb) = (velocity(&world, a), velocity(&world, b));
         assert!(va.norm() > 0.1 && vb.norm() > 0.1 && va.dot(&vb).abs() < 1e-6, "{stepper}: {va} and {vb}");
@@ -50,7 +60,11 @@ fn an_oblique_elastic_impact_keeps_everything() {
         assert!((m.linear - Vec3::new(6.0, 0.0, 0.0)).norm() < 1e-12, "{stepper}: momentum {}", m.linear);
         // time_stepping gives the impulse where linear motion meets the surface, backtracking where the surfaces are within 1e-7 m
         let slack = if stepper == "backtracking" { 1e-6 } else { 1e-3 };
-        assert!((m.angular - Vec3::new(0.0, 0.18, -0.48)).norm() < slack, "{stepper}: angular momentum {:?}", m.angular.as_slice());
+        assert!(
+            (m.angular - Vec3::new(0.0, 0.18, -0.48)).norm() < slack,
+            "{stepper}: angular momentum {:?}",
+            m.angular.as_slice()
+        );
         assert!((e / 9.0 - 1.0).abs() < 1e-8, "{stepper}: energy {e}");
         step(&mut world, 1);
     }
@@ -61,7 +75,8 @@ fn an_oblique_elastic_impact_keeps_everything() {
 fn a_bead_at_the_lowest_point_swaps_velocities_with_a_ball() {
     for stepper in STEPPERS {
         let bead = Bead::new("bead", 2.0, 0.25, sphere(0.1)).surface(1.0, 0.0);
-        let (world, bead, ball) = collide(stepper, bead, rigid("ball", 2.0, Vec3::new(0.5, 0.0, 0.0), Vec3::new(-1.5, 0.0, 0.0), 1.0));
+        let (world, bead, ball) =
+            collide(stepper, bead, rigid("ball", 2.0, Vec3::new(0.5, 0.0, 0.0), Vec3::new(-1.5, 0.0, 0.0), 1.0));
         assert!(velocity(&world, ball).norm() < 1e-6, "{stepper}: the ball still has {}", velocity(&world, ball));
         // σ = p/(m·|r'|), the speed along the wire
         let x = world.state_of(bead).unwrap();
@@ -76,9 +91,14 @@ fn a_particle_lands_and_rests() {
     for stepper in STEPPERS {
         let mut world = world(stepper, true);
         world.add_static(RigidBody::fixture("ground", Shape::half_space())).unwrap();
-        let id = world.add(Particle::new("particle", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.0, 0.5), Vec3::zeros())).unwrap();
+        let id =
+            world.add(Particle::new("particle", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.0, 0.5), Vec3::zeros())).unwrap();
         step(&mut world, 240);
-        assert!((position(&world, id).z - 0.1).abs() < 1e-6 && velocity(&world, id).norm() < 1e-9, "{stepper}: at {}", position(&world, id));
+        assert!(
+            (position(&world, id).z - 0.1).abs() < 1e-6 && velocity(&world, id).norm() < 1e-9,
+            "{stepper}: at {}",
+            position(&world, id)
+        );
         let carried: f64 = world.contacts().iter().map(|c| c.force.z.abs()).sum();
         assert!((carried / (2.0 * G) - 1.0).abs() < 1e-6, "{stepper}: {carried} N");
     }
@@ -91,7 +111,13 @@ fn new_kinds_are_saved_and_restored() {
         let build = || {
             let mut world = world(stepper, true);
             world.add_static(RigidBody::fixture("ground", Shape::half_space()).surface(0.5, 0.3)).unwrap();
-            world.add(Particle::new("particle", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.05, 0.5), Vec3::zeros()).surface(0.5, 0.3)).unwrap();
+            world
+                .add(
+                    Particle::new("particle", 2.0, sphere(0.1))
+                        .at(Vec3::new(0.0, 0.05, 0.5), Vec3::zeros())
+                        .surface(0.5, 0.3),
+                )
+                .unwrap();
             world.add(Bead::new("bead", 1.0, 0.25, sphere(0.05)).at(1.0, 0.0).stopped_at(1.2)).unwrap();
             world.add(rigid("ball", 1.0, Vec3::new(0.0, 0.0, 0.9), Vec3::zeros(), 0.5)).unwrap();
             world

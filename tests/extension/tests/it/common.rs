@@ -20,7 +20,9 @@ pub fn sphere(radius: f64) -> Shape {
 }
 
 pub fn step(world: &mut World, frames: usize) {
-    (0..frames).for_each(|_| { world.step().unwrap(); });
+    (0..frames).for_each(|_| {
+        world.step().unwrap();
+    });
 }
 
 pub fn position(world: &World, id: ObjectId) -> Vec3 {

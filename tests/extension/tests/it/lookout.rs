@@ -10,7 +10,12 @@ use tumble_scene::SceneFile;
 fn pictures_are_taken_from_where_an_object_flies_and_its_lamp_flies_with_it() {
     let mut world = world(STEPPERS[0], false);
     // 2 m/s along y for a second; 40 degrees of picture, 0.5 m above the particle
-    world.add(Lookout::new(Particle::new("bird", 1.0, sphere(0.1)).at(Vec3::new(1.0, 0.0, 3.0), Vec3::new(0.0, 2.0, 0.0)), 0.5)).unwrap();
+    world
+        .add(Lookout::new(
+            Particle::new("bird", 1.0, sphere(0.1)).at(Vec3::new(1.0, 0.0, 3.0), Vec3::new(0.0, 2.0, 0.0)),
+            0.5,
+        ))
+        .unwrap();
     let steps = (1.0 / DT).round() as usize;
     step(&mut world, steps);
     let scene = SceneFile::parse("", "empty.toml").unwrap();
@@ -20,7 +25,14 @@ fn pictures_are_taken_from_where_an_object_flies_and_its_lamp_flies_with_it() {
     assert!((eye.coords - nalgebra_point([1.0, 2.0, 3.5])).norm() < 1e-5, "{eye}");
     assert!(((target - eye) - nalgebra_point([1.0, 0.0, 0.0])).norm() < 1e-5 && up.z > 0.999);
     assert!((vertical_fov_rad - 0.698_131_7).abs() < 1e-6);
-    let lamps: Vec<_> = list.lights.iter().filter_map(|light| match light { Light::Point { position, .. } => Some(position.coords), _ => None }).collect();
+    let lamps: Vec<_> = list
+        .lights
+        .iter()
+        .filter_map(|light| match light {
+            Light::Point { position, .. } => Some(position.coords),
+            _ => None,
+        })
+        .collect();
     assert!(lamps.len() == 1 && (lamps[0] - nalgebra_point([1.0, 2.0, 3.5])).norm() < 1e-5, "{lamps:?}");
 }
 

@@ -3,6 +3,6 @@
 mod bead;
 mod collisions;
 mod common;
+mod lookout;
 mod rods;
 mod wind;
-mod lookout;

@@ -24,7 +24,9 @@ fn pendulum(stepper: &str, rigid: bool) -> (World, ObjectId) {
     let mut world = world(stepper, true);
     let id = if rigid {
         let at = bob(AMPLITUDE);
-        world.add(RigidBody::with_mass("bob", sphere(0.1), 2.0).unwrap().at(Pose::translation(at.x, at.y, at.z))).unwrap()
+        world
+            .add(RigidBody::with_mass("bob", sphere(0.1), 2.0).unwrap().at(Pose::translation(at.x, at.y, at.z)))
+            .unwrap()
     } else {
         world.add(Particle::new("bob", 2.0, sphere(0.1)).at(bob(AMPLITUDE), Vec3::zeros())).unwrap()
     };
@@ -40,8 +42,16 @@ fn a_rod_makes_a_pendulum_of_the_right_period_that_keeps_energy_and_length() {
             let swing_energy = 2.0 * G * LENGTH * (1.0 - AMPLITUDE.cos());
             let (measured, drift) = swing(&mut world, id, 20.0);
             // the leapfrog of an oscillator is fast by (ωh)²/24 = 7.1e-6
-            assert!((measured / period() - 1.0).abs() < 2e-5, "{stepper}, rigid {rigid}: period {measured} s, by hand {} s", period());
-            assert!(drift < 2e-4 * swing_energy, "{stepper}, rigid {rigid}: energy is off by {:e} of the swing", drift / swing_energy);
+            assert!(
+                (measured / period() - 1.0).abs() < 2e-5,
+                "{stepper}, rigid {rigid}: period {measured} s, by hand {} s",
+                period()
+            );
+            assert!(
+                drift < 2e-4 * swing_energy,
+                "{stepper}, rigid {rigid}: energy is off by {:e} of the swing",
+                drift / swing_energy
+            );
             let stretch = (position(&world, id).norm() - LENGTH).abs();
             assert!(stretch < 1e-6, "{stepper}, rigid {rigid}: the rod is {stretch:e} m off");
         }
@@ -74,16 +84,25 @@ fn a_rod_carries_a_full_turn() {
 fn a_rope_is_slack_and_then_holds() {
     for stepper in STEPPERS {
         let mut world = world(stepper, true);
-        let id = world.add(Particle::new("bob", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.0, -0.4), Vec3::zeros())).unwrap();
+        let id =
+            world.add(Particle::new("bob", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.0, -0.4), Vec3::zeros())).unwrap();
         world.add(Rod::rope("rope", End::Object(id), End::Point(Vec3::zeros()), LENGTH)).unwrap();
         step(&mut world, 72); // 0.3 s: 0.6 m need √(2·0.6/g) = 0.3497 s
         let free = -0.4 - 0.5 * G * 0.09;
-        assert!((position(&world, id).z - free).abs() < 1e-9, "{stepper}: {} m, by hand {free}", position(&world, id).z);
+        assert!(
+            (position(&world, id).z - free).abs() < 1e-9,
+            "{stepper}: {} m, by hand {free}",
+            position(&world, id).z
+        );
         step(&mut world, 48);
         let z = position(&world, id).z;
         // the moment at which it is used up is located by `backtracking`
         let bound = if stepper == "backtracking" { 1e-6 } else { 1e-5 };
-        assert!((z + LENGTH).abs() < bound && velocity(&world, id).norm() < 1e-6, "{stepper}: at {z} m with {} m/s", velocity(&world, id));
+        assert!(
+            (z + LENGTH).abs() < bound && velocity(&world, id).norm() < 1e-6,
+            "{stepper}: at {z} m with {} m/s",
+            velocity(&world, id)
+        );
     }
 }
 
@@ -97,8 +116,14 @@ fn all_solvers_agree_on_equality_rows() {
             let mut above = End::Point(Vec3::zeros());
             for i in 0..3 {
                 let at = Vec3::new(0.5 * (i + 1) as f64, 0.1 * i as f64, -0.1 * i as f64);
-                let before = if i == 0 { Vec3::zeros() } else { Vec3::new(0.5 * i as f64, 0.1 * (i - 1) as f64, -0.1 * (i - 1) as f64) };
-                let id = world.add(Particle::new(format!("bob{i}"), 1.0 + i as f64, sphere(0.05)).at(at, Vec3::zeros())).unwrap();
+                let before = if i == 0 {
+                    Vec3::zeros()
+                } else {
+                    Vec3::new(0.5 * i as f64, 0.1 * (i - 1) as f64, -0.1 * (i - 1) as f64)
+                };
+                let id = world
+                    .add(Particle::new(format!("bob{i}"), 1.0 + i as f64, sphere(0.05)).at(at, Vec3::zeros()))
+                    .unwrap();
                 world.add(Rod::new(format!("rod{i}"), End::Object(id), above, (at - before).norm())).unwrap();
                 above = End::Object(id);
             }
@@ -111,7 +136,11 @@ fn all_solvers_agree_on_equality_rows() {
         for solver in &NAMES[1..] {
             let other = run(solver);
             let apart = first.state().iter().zip(other.state()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(apart < 1e-6, "{stepper}: {solver} differs from {} by {apart:e} after a quarter of a second", NAMES[0]);
+            assert!(
+                apart < 1e-6,
+                "{stepper}: {solver} differs from {} by {apart:e} after a quarter of a second",
+                NAMES[0]
+            );
         }
     }
 }

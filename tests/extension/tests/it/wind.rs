@@ -13,7 +13,8 @@ fn wind_carries_what_it_blows_on_as_its_equation_says() {
         let particle = world.add(Particle::new("particle", 2.0, sphere(0.1))).unwrap();
         let body = RigidBody::with_mass("ball", sphere(0.1), 3.0).unwrap().at(Pose::translation(0.0, 5.0, 0.0));
         let ball = world.add(body).unwrap();
-        let calm = world.add(Particle::new("calm", 2.0, sphere(0.1)).at(Vec3::new(0.0, -5.0, 0.0), Vec3::zeros())).unwrap();
+        let calm =
+            world.add(Particle::new("calm", 2.0, sphere(0.1)).at(Vec3::new(0.0, -5.0, 0.0), Vec3::zeros())).unwrap();
         let wind = Vec3::new(4.0, 0.0, -1.0);
         world.add(Wind::new("wind", wind, 1.5, vec![particle, ball])).unwrap();
         step(&mut world, 480);

@@ -64,7 +64,9 @@ mod tests {
     fn foot_and_slopes_of_an_edge_and_of_a_corner() {
         let at = Vec3::new(1.5, 2.0, 1.0);
         let along = Vec3::x();
-        for (feature, closest, least) in [(Feature::Edge(Vec3::z()), Vec3::new(0.0, 0.0, 1.0), 2.0), (Feature::Point, Vec3::zeros(), 5.0_f64.sqrt())] {
+        for (feature, closest, least) in
+            [(Feature::Edge(Vec3::z()), Vec3::new(0.0, 0.0, 1.0), 2.0), (Feature::Point, Vec3::zeros(), 5.0_f64.sqrt())]
+        {
             let (offset, s) = (at - closest, 7.5);
             let normal = offset.normalize();
             let hit = Hit { distance: offset.norm(), nearest: offset.norm(), normal, core: 0.0, feature, facing: true };

@@ -33,7 +33,8 @@ const MOST_HALVED: u32 = 40;
 impl Pass<'_> {
     /// One contact at the deepest point of the mesh's faces below the surface of the other one, where that is deeper than what was found.
     pub(super) fn deepest(&self, mesh: &MeshField, other: &MeshField, found: &mut Collector) {
-        let mut hunt = Hunt { pass: self, mesh, other, deepest: (-found.least()).max(0.0), gain: GAIN * self.size, best: None };
+        let mut hunt =
+            Hunt { pass: self, mesh, other, deepest: (-found.least()).max(0.0), gain: GAIN * self.size, best: None };
         mesh.faces_by_boxes(&mut hunt);
         if let Some((t, at)) = hunt.best {
             let hit = self.field.hit(&at, &[], TOUCHING);
@@ -77,7 +78,9 @@ impl Descent for Hunt<'_, '_> {
             return most;
         }
         let corner = |octant: u32| middle + Vec3::from_fn(|k, _| if octant >> k & 1 == 1 { half[k] } else { -half[k] });
-        let furthest = (0..8).map(|octant| self.other.distance_from_face(t, &self.pass.place(&corner(octant)))).fold(0.0, f64::max);
+        let furthest = (0..8)
+            .map(|octant| self.other.distance_from_face(t, &self.pass.place(&corner(octant))))
+            .fold(0.0, f64::max);
         most.min(furthest)
     }
 
@@ -123,15 +126,22 @@ impl Hunt<'_, '_> {
         if most <= self.wanted() {
             return most;
         }
-        let rows = corners.map(|row| corners.map(|c| if c.closest == row.closest { c.depth.abs() } else { self.other.distance_from_face(row.closest, &c.at) }));
+        let rows = corners.map(|row| {
+            corners.map(|c| {
+                if c.closest == row.closest { c.depth.abs() } else { self.other.distance_from_face(row.closest, &c.at) }
+            })
+        });
         most.min(value(&rows))
     }
 }
 
 /// At most the value of a game in which the rows' player wants little; it is met but for rounding.
 fn value(rows: &[[f64; 3]; 3]) -> f64 {
-    let most = |weights: [f64; 3]| (0..3).map(|i| (0..3).map(|t| weights[t] * rows[t][i]).sum::<f64>()).fold(f64::NEG_INFINITY, f64::max);
-    let mut least = (0..3).map(|t| rows[t].iter().copied().fold(f64::NEG_INFINITY, f64::max)).fold(f64::INFINITY, f64::min);
+    let most = |weights: [f64; 3]| {
+        (0..3).map(|i| (0..3).map(|t| weights[t] * rows[t][i]).sum::<f64>()).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let mut least =
+        (0..3).map(|t| rows[t].iter().copied().fold(f64::NEG_INFINITY, f64::max)).fold(f64::INFINITY, f64::min);
     let mut try_weights = |weights: [f64; 3]| {
         let sum: f64 = weights.iter().sum();
         if weights.iter().all(|w| *w >= 0.0) && sum > 0.0 {

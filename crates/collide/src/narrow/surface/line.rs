@@ -83,7 +83,15 @@ impl Look {
 
 impl Pass<'_> {
     #[allow(clippy::too_many_arguments)]
-    pub(super) fn edge(&self, ends: &[Vec3; 2], radius: f64, normals: &[Vec3], index: u32, edge: Option<&Edge>, found: &mut Collector) {
+    pub(super) fn edge(
+        &self,
+        ends: &[Vec3; 2],
+        radius: f64,
+        normals: &[Vec3],
+        index: u32,
+        edge: Option<&Edge>,
+        found: &mut Collector,
+    ) {
         let [start, end] = ends.map(|p| self.place(&p));
         let (middle, length) = (0.5 * (start + end), (end - start).norm());
         if length <= 0.0 || self.field.bound(&middle) - 0.5 * length - radius > found.limit() {
@@ -102,7 +110,13 @@ impl Pass<'_> {
     }
 
     /// A piece that may be in reach, between two places that may have been looked at. Returns what was seen at them.
-    fn halve(&self, line: &Line, low: (f64, Option<Look>), high: (f64, Option<Look>), found: &mut Collector) -> [Option<Look>; 2] {
+    fn halve(
+        &self,
+        line: &Line,
+        low: (f64, Option<Look>),
+        high: (f64, Option<Look>),
+        found: &mut Collector,
+    ) -> [Option<Look>; 2] {
         let (from, to) = (low.0, high.0);
         let smooth = line.edge.is_some_and(|edge| edge.spared > 0.0);
         if !self.is_one_piece(to - from, smooth) && to - from > 1e-3 * line.length {
@@ -135,7 +149,13 @@ impl Pass<'_> {
     }
 
     fn look(&self, line: &Line, s: f64) -> Look {
-        let end = if s == 0.0 { Some(0) } else if s == line.length { Some(1) } else { None };
+        let end = if s == 0.0 {
+            Some(0)
+        } else if s == line.length {
+            Some(1)
+        } else {
+            None
+        };
         let name = end.and_then(|end: usize| line.edge.map(|edge| edge.points[end]));
         let at = line.at(s);
         let hit = self.hit_of(&at, name, line.normals, TOUCHING);
@@ -182,7 +202,11 @@ impl Pass<'_> {
         }
         // two faces that meet in a valley are as high as both tangents where those meet
         let (s, _) = meeting(&low, &high);
-        let s = if halvings == MOST_PARTED && s > low.s + 0.01 * length && s < high.s - 0.01 * length { s } else { 0.5 * (low.s + high.s) };
+        let s = if halvings == MOST_PARTED && s > low.s + 0.01 * length && s < high.s - 0.01 * length {
+            s
+        } else {
+            0.5 * (low.s + high.s)
+        };
         let middle = self.look(line, s);
         match rises {
             true if middle.slope < -LEVEL => self.minima(line, middle, high, false, halvings - 1, found),
@@ -201,7 +225,14 @@ impl Pass<'_> {
     }
 
     /// The minimum that tangents lead to between two slopes, a contact if it is in reach, and the looks next to it; `None` where it is out of reach.
-    fn descend(&self, line: &Line, mut low: Look, mut high: Look, mut on_face: bool, found: &mut Collector) -> Option<[Look; 2]> {
+    fn descend(
+        &self,
+        line: &Line,
+        mut low: Look,
+        mut high: Look,
+        mut on_face: bool,
+        found: &mut Collector,
+    ) -> Option<[Look; 2]> {
         let tolerance = 1e-9 * self.size;
         let limit = found.limit() + line.radius;
         for n in 0..MOST_LOOKS {
@@ -270,7 +301,10 @@ impl Pass<'_> {
 
     fn bottom(&self, line: &Line, s: f64, hit: Hit, found: &mut Collector) {
         let fits = facing(line.normals, &hit.normal) && line.is_closest(&hit.normal);
-        if self.second.is_some() && matches!(hit.feature, Feature::Edge(_)) && self.is_known(&line.at(s), line.radius, &hit, found) {
+        if self.second.is_some()
+            && matches!(hit.feature, Feature::Edge(_))
+            && self.is_known(&line.at(s), line.radius, &hit, found)
+        {
             return; // that edge has found it
         }
         self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);

@@ -51,7 +51,14 @@ pub(in crate::narrow) struct Body<'a> {
 }
 
 /// All contacts of `a` and `b`.
-pub(in crate::narrow) fn surface(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+pub(in crate::narrow) fn surface(
+    a: &Body,
+    pose_a: &Pose,
+    b: &Body,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     let a_in_b = pose_b.inv_mul(pose_a);
     let size = a.radius.min(b.radius);
     let mut found = Collector::new(margin, size, out);

@@ -98,7 +98,8 @@ struct Two<'a> {
 impl Two<'_> {
     /// `D(n)`, metres; `n` from B to A.
     fn overlap(&self, n: &Vec3) -> f64 {
-        self.b.source.highest(n) + self.a.source.highest(&-self.rotation.tr_mul(n)) - n.dot(&self.pose.translation.vector)
+        self.b.source.highest(n) + self.a.source.highest(&-self.rotation.tr_mul(n))
+            - n.dot(&self.pose.translation.vector)
     }
 
     /// The direction along which they are parted soonest, of those tried, and how far that is.
@@ -133,7 +134,11 @@ impl Two<'_> {
             (off - axis * axis.dot(&off)).try_normalize(1e-9 * self.size).into_iter().for_each(&mut either);
         }
         off.try_normalize(1e-9 * self.size).into_iter().for_each(&mut either);
-        let many = |body: &Body| body.field.round() || body.mesh.is_some_and(|mesh| mesh.faces().len() > MOST_FACES) || body.ways().is_empty();
+        let many = |body: &Body| {
+            body.field.round()
+                || body.mesh.is_some_and(|mesh| mesh.faces().len() > MOST_FACES)
+                || body.ways().is_empty()
+        };
         if many(self.a) || many(self.b) { self.refine(best) } else { best }
     }
 
@@ -167,7 +172,8 @@ impl Two<'_> {
     /// Which share of the points of the one that has more of them there is inside the other one, or on it.
     fn share_inside(&self) -> f64 {
         let inverse = self.pose.inverse();
-        let [first, second] = [(self.a, self.b, self.pose), (self.b, self.a, &inverse)].map(|(of, within, pose)| share_inside(of, within, pose, self.size));
+        let [first, second] = [(self.a, self.b, self.pose), (self.b, self.a, &inverse)]
+            .map(|(of, within, pose)| share_inside(of, within, pose, self.size));
         first.max(second)
     }
 
@@ -177,7 +183,11 @@ impl Two<'_> {
             let u = n.cross(&Vec3::ith(n.iamin(), 1.0)).normalize();
             let v = n.cross(&u);
             let around = [u, v, -u, -v].map(|w| (n + w * step).normalize());
-            let better = around.into_iter().map(|m| (m, self.overlap(&m))).min_by(|x, y| x.1.total_cmp(&y.1)).filter(|m| m.1 < depth);
+            let better = around
+                .into_iter()
+                .map(|m| (m, self.overlap(&m)))
+                .min_by(|x, y| x.1.total_cmp(&y.1))
+                .filter(|m| m.1 < depth);
             match better {
                 Some(better) => (n, depth) = better,
                 None if step < LAST_STEP => break,
@@ -202,9 +212,18 @@ impl Two<'_> {
         });
         if found.least() > -(1.0 - NEAR) * depth {
             // nothing flat meets: the outermost places do
-            let lowest = self.pose.translation.vector + self.rotation * self.a.source.outermost(&-self.rotation.tr_mul(&way));
+            let lowest =
+                self.pose.translation.vector + self.rotation * self.a.source.outermost(&-self.rotation.tr_mul(&way));
             let point = 0.5 * (lowest + self.b.source.outermost(&way));
-            found.push(Contact { point, normal: way, gap: -depth, feature: PARTED, core_a: 0.0, core_b: 0.0, normal_from: NormalFrom::Edges });
+            found.push(Contact {
+                point,
+                normal: way,
+                gap: -depth,
+                feature: PARTED,
+                core_a: 0.0,
+                core_b: 0.0,
+                normal_from: NormalFrom::Edges,
+            });
         }
     }
 }
@@ -284,7 +303,8 @@ impl Source<'_> {
             Source::Box(half) => n.map(sign).component_mul(half),
             Source::Round { radius, half_length } => n * *radius + Vec3::z() * (sign(n.z) * half_length),
             Source::Cylinder { radius, half_length } => {
-                Vec3::new(n.x, n.y, 0.0).try_normalize(1e-9).unwrap_or_default() * *radius + Vec3::z() * (sign(n.z) * half_length)
+                Vec3::new(n.x, n.y, 0.0).try_normalize(1e-9).unwrap_or_default() * *radius
+                    + Vec3::z() * (sign(n.z) * half_length)
             }
             Source::Nothing => Vec3::zeros(),
         }

@@ -1,8 +1,8 @@
 //! The elements of one body against the field of the other: which are in reach, and what becomes of those that are.
 
 use super::super::reduce::Collector;
-use super::{Body, Source};
 use super::line::{LEVEL, LYING_EDGE};
+use super::{Body, Source};
 use crate::surface::elements::{Edge, Elements, Group, PARTS, Point};
 use crate::surface::field::{MeshField, Way};
 use crate::surface::{Feature, Field, Hit, OVERHANG};
@@ -66,10 +66,26 @@ const SLOTS: usize = 1024;
 
 impl<'a> Pass<'a> {
     /// The elements of one body, which has that `pose` in the frame of the other.
-    pub(super) fn new([one, other]: [&Body<'a>; 2], pose: &'a Pose, size: f64, second: Option<&'a Pose>, memory: &'a Memory) -> Pass<'a> {
+    pub(super) fn new(
+        [one, other]: [&Body<'a>; 2],
+        pose: &'a Pose,
+        size: f64,
+        second: Option<&'a Pose>,
+        memory: &'a Memory,
+    ) -> Pass<'a> {
         let rotation = *pose.rotation.to_rotation_matrix().matrix();
         let way = other.mesh.and_then(|mesh| mesh.way_from(&rotation, &pose.translation.vector, one.radius));
-        Pass { pose, rotation, field: other.field, mesh: other.mesh, size, second, memory, way, least: Cell::new(f64::INFINITY) }
+        Pass {
+            pose,
+            rotation,
+            field: other.field,
+            mesh: other.mesh,
+            size,
+            second,
+            memory,
+            way,
+            least: Cell::new(f64::INFINITY),
+        }
     }
 
     pub(super) fn run(&self, source: &Source, found: &mut Collector) {
@@ -109,7 +125,8 @@ impl<'a> Pass<'a> {
     /// All parts are asked for before any is opened: so the memory that each waits for is waited for once.
     fn group(&self, elements: &Elements, group: &Group, bound: f64, found: &mut Collector) {
         for parts in elements.parts_of(group).chunks(PARTS) {
-            let bounds: ArrayVec<f64, PARTS> = parts.iter().map(|part| self.bound(part.center_single(), || part.center())).collect();
+            let bounds: ArrayVec<f64, PARTS> =
+                parts.iter().map(|part| self.bound(part.center_single(), || part.center())).collect();
             for (part, bound) in parts.iter().zip(bounds) {
                 if bound - part.reach(self.field.bent()) <= found.limit() {
                     self.group(elements, part, bound, found);
@@ -149,7 +166,8 @@ impl<'a> Pass<'a> {
         let rises = |edge: &Edge| {
             let smooth = edge.spared > 0.0;
             let least = if smooth { -LEVEL } else { LYING_EDGE };
-            self.is_one_piece(edge.length, smooth) && up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= least * edge.length)
+            self.is_one_piece(edge.length, smooth)
+                && up.is_some_and(|up| up.dot(&(edge.ends[1] - edge.ends[0])) >= least * edge.length)
         };
         for edge in elements.edges_of(point, fine) {
             if bound - edge.length <= found.limit() && !rises(edge) && self.may_touch(edge, found) {
@@ -271,14 +289,31 @@ impl<'a> Pass<'a> {
         self.push_if(hit.facing && closest, at, radius, &hit, point_normal(&hit), u64::from(index), found);
     }
 
-    pub(super) fn push(&self, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64, found: &mut Collector) {
+    pub(super) fn push(
+        &self,
+        at: &Vec3,
+        radius: f64,
+        hit: &Hit,
+        normal_from: NormalFrom,
+        feature: u64,
+        found: &mut Collector,
+    ) {
         self.push_if(true, at, radius, hit, normal_from, feature, found);
     }
 
     /// One contact: a core point of the element and what the field says there. One that does not `fit` is kept in
     /// reserve.
     #[allow(clippy::too_many_arguments)]
-    pub(super) fn push_if(&self, fits: bool, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64, found: &mut Collector) {
+    pub(super) fn push_if(
+        &self,
+        fits: bool,
+        at: &Vec3,
+        radius: f64,
+        hit: &Hit,
+        normal_from: NormalFrom,
+        feature: u64,
+        found: &mut Collector,
+    ) {
         let gap = hit.distance - radius;
         if gap.is_nan() || gap > found.limit() {
             return;
@@ -312,7 +347,9 @@ impl<'a> Pass<'a> {
     /// Whether there is a contact at about this place that is as deep.
     pub(super) fn is_known(&self, at: &Vec3, radius: f64, hit: &Hit, found: &Collector) -> bool {
         let new = self.contact(at, radius, hit, NormalFrom::Edges, 0);
-        found.any(|c| (c.gap - new.gap).abs() < SAME_DEPTH * self.size && (c.point - new.point).norm() < SAME_PLACE * self.size)
+        found.any(|c| {
+            (c.gap - new.gap).abs() < SAME_DEPTH * self.size && (c.point - new.point).norm() < SAME_PLACE * self.size
+        })
     }
 }
 

@@ -19,8 +19,8 @@
 use super::super::reduce::Collector;
 use super::line::{LEVEL, PIECE};
 use super::pass::{Pass, point_normal};
-use crate::surface::{Feature, Hit, OVERHANG, facing};
 use crate::Vec3;
+use crate::surface::{Feature, Hit, OVERHANG, facing};
 
 /// A circle at the end of a cylinder, in the frame of the field.
 struct Rim {
@@ -122,7 +122,9 @@ impl Pass<'_> {
             if short || self.field.convex() || self.flat(rim, &low, &high) {
                 return match (low.slope < 0.0, high.slope < 0.0) {
                     (true, false) => self.lowest(rim, low, high, MOST_PARTED, part, found),
-                    (falls, too) if falls == too && !self.field.convex() => self.rim_valley(rim, [low, high], !falls, MOST_PARTED, part, found),
+                    (falls, too) if falls == too && !self.field.convex() => {
+                        self.rim_valley(rim, [low, high], !falls, MOST_PARTED, part, found)
+                    }
                     _ => {}
                 };
             }
@@ -155,9 +157,18 @@ impl Pass<'_> {
     }
 
     /// A part of an arc that rises from a lowest place, or falls to one, at both ends: further lowest places where it has a ridge.
-    fn rim_valley(&self, rim: &Rim, [low, high]: [Look; 2], rises: bool, halvings: u32, part: &mut u64, found: &mut Collector) {
+    fn rim_valley(
+        &self,
+        rim: &Rim,
+        [low, high]: [Look; 2],
+        rises: bool,
+        halvings: u32,
+        part: &mut u64,
+        found: &mut Collector,
+    ) {
         let slack = VALLEY * self.size;
-        let dips = low.hit.distance < high.height(rim, &low.way) - slack || high.hit.distance < low.height(rim, &high.way) - slack;
+        let dips = low.hit.distance < high.height(rim, &low.way) - slack
+            || high.hit.distance < low.height(rim, &high.way) - slack;
         if halvings == 0 || !dips {
             return;
         }
@@ -173,7 +184,14 @@ impl Pass<'_> {
     }
 
     /// The lowest place that tangents lead to, a contact if it is in reach; `None` where it cannot be.
-    fn rim_descend(&self, rim: &Rim, mut low: Look, mut high: Look, part: &mut u64, found: &mut Collector) -> Option<Look> {
+    fn rim_descend(
+        &self,
+        rim: &Rim,
+        mut low: Look,
+        mut high: Look,
+        part: &mut u64,
+        found: &mut Collector,
+    ) -> Option<Look> {
         let tolerance = 1e-10 * self.size;
         let mut kink = None;
         for n in 0..LOOKS {
@@ -280,7 +298,6 @@ fn ridge(low: &Look, high: &Look) -> Option<(Vec3, f64)> {
     let length = sum.norm();
     (a > LEVEL && b > LEVEL && length > 1e-9 * (a + b)).then(|| (sum / length, (a + b) / length))
 }
-
 
 /// The part of `v` across a unit direction.
 fn across(v: &Vec3, along: &Vec3) -> Vec3 {

@@ -23,7 +23,9 @@ impl Pass<'_> {
 
     fn may_dip(&self, edge: &Edge, found: &Collector) -> bool {
         let at = |s: f64| edge.ends[0] + (edge.ends[1] - edge.ends[0]) * s;
-        let near = |s: f64, within: f64| self.bound(&at(s).map(|x| x as f32).into(), || at(s)) - within * edge.length <= found.limit();
+        let near = |s: f64, within: f64| {
+            self.bound(&at(s).map(|x| x as f32).into(), || at(s)) - within * edge.length <= found.limit()
+        };
         if !near(0.5, 0.5) || !(near(0.25, 0.25) || near(0.75, 0.25)) {
             return false;
         }

@@ -77,12 +77,15 @@ struct Builder<'a> {
 /// Fills `field.tree` and `field.lists`.
 pub(super) fn build(field: &mut MeshField) {
     let bounds = field.bounds;
-    let (center, half) = (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).max() + RIM * field.diagonal);
+    let (center, half) =
+        (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).max() + RIM * field.diagonal);
     field.tree = Octree::new(center, half);
     let lengths: f64 = field.corners.iter().map(|[a, b, _]| (b - a).norm()).sum();
     let mean = lengths / field.corners.len() as f64;
     let deepest = (3.0_f64.sqrt() * half / (FINEST * mean)).log2().ceil().clamp(1.0, DEEPEST) as u32;
-    let all: Vec<Near> = (0..field.corners.len() as u32).map(|triangle| Near { distance: 0.0, triangle, slope: Vec3::zeros() }).collect();
+    let all: Vec<Near> = (0..field.corners.len() as u32)
+        .map(|triangle| Near { distance: 0.0, triangle, slope: Vec3::zeros() })
+        .collect();
     let branch = Builder::branch(field, deepest, center, half, &all, &Vec3::zeros(), 0);
     (field.tree.cells, field.lists) = (branch.cells, branch.lists);
     field.tree.finish(deepest);
@@ -111,7 +114,15 @@ fn corner(octant: usize, half: f64) -> Vec3 {
 
 impl<'a> Builder<'a> {
     /// The branch of a cell. `list`: the triangles that count in the parent, with their distances from its centre, from which this one is `moved`.
-    fn branch(field: &'a MeshField, deepest: u32, center: Vec3, half: f64, list: &[Near], moved: &Vec3, depth: u32) -> Branch {
+    fn branch(
+        field: &'a MeshField,
+        deepest: u32,
+        center: Vec3,
+        half: f64,
+        list: &[Near],
+        moved: &Vec3,
+        depth: u32,
+    ) -> Branch {
         let branch = Branch { cells: vec![Cell::empty()], lists: Vec::new() };
         let mut builder = Builder { field, deepest, branch, below: Vec::new(), spare: Vec::new() };
         builder.cell(0, center, half, list, moved, depth);
@@ -146,7 +157,9 @@ impl<'a> Builder<'a> {
         let facing_first = field.normals[first.triangle as usize][0];
         let turned = |t: u32| takes_others && field.normals[t as usize][0].dot(&facing_first) < OTHER_WAY;
         let most = least + 2.0 * reach + field.around;
-        let others = may_be(if takes_others { most } else { f64::NEG_INFINITY }).filter(|n| turned(n.triangle)).map(|n| at(n.triangle));
+        let others = may_be(if takes_others { most } else { f64::NEG_INFINITY })
+            .filter(|n| turned(n.triangle))
+            .map(|n| at(n.triangle));
         near.extend(others.filter(|n| n.distance > least + 2.0 * reach && n.distance <= most));
         let excess = self.excess(&center, half, &first);
         let slack = excess + ROUNDING * field.diagonal;
@@ -173,7 +186,9 @@ impl<'a> Builder<'a> {
             if near.len() <= if away { SHORT } else { LONG } && !full {
                 near.sort_unstable_by(order);
                 (cell.link, cell.count) = (self.branch.lists.len() as u32, near.len() as u8);
-                self.branch.lists.extend(near.iter().map(|n| Listed { triangle: n.triangle, nearer: (n.distance * BELOW) as f32 }));
+                self.branch
+                    .lists
+                    .extend(near.iter().map(|n| Listed { triangle: n.triangle, nearer: (n.distance * BELOW) as f32 }));
             }
             self.branch.cells[index] = cell;
         }
@@ -189,8 +204,10 @@ impl<'a> Builder<'a> {
         let offsets: [Vec3; 8] = std::array::from_fn(|octant| corner(octant, half));
         if depth < BRANCHES {
             let (field, deepest) = (self.field, self.deepest);
-            let branches: Vec<Branch> =
-                offsets.par_iter().map(|offset| Builder::branch(field, deepest, center + offset, half, near, offset, depth + 1)).collect();
+            let branches: Vec<Branch> = offsets
+                .par_iter()
+                .map(|offset| Builder::branch(field, deepest, center + offset, half, near, offset, depth + 1))
+                .collect();
             branches.into_iter().enumerate().for_each(|(octant, branch)| self.branch.graft(children + octant, branch));
         } else {
             for (octant, offset) in offsets.iter().enumerate() {
@@ -230,7 +247,11 @@ mod tests {
     fn bits(threads: usize) -> String {
         let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
         let searched = vec![[true; 3]; mesh.triangles.len()];
-        let field = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| MeshField::new(&mesh, searched));
+        let field = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap()
+            .install(|| MeshField::new(&mesh, searched));
         format!("{:?} {:?}", field.tree.cells, field.lists)
     }
 
@@ -244,7 +265,12 @@ mod tests {
     fn grafted_branches_tell_the_distance() {
         let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
         let field = MeshField::new(&mesh, vec![[true; 3]; mesh.triangles.len()]);
-        assert!(field.tree.cells.len() > 500 && field.lists.len() > 1000, "{} {}", field.tree.cells.len(), field.lists.len());
+        assert!(
+            field.tree.cells.len() > 500 && field.lists.len() > 1000,
+            "{} {}",
+            field.tree.cells.len(),
+            field.lists.len()
+        );
         for n in 0..2000_u32 {
             let place = |step: u32, span: f64| span * (f64::from(n * step % 1999) / 999.5 - 1.0);
             let p = Vec3::new(place(1, 1.3), place(611, 1.3), place(1301, 0.35));
@@ -263,13 +289,16 @@ mod tests {
         let field = MeshField::new(&mesh, vec![[true; 3]; mesh.triangles.len()]);
         for n in 0..4000_u32 {
             let place = |step: u32, span: f64| span * (f64::from(n * step % 3989) / 1994.5 - 1.0);
-            let rotation = crate::Quat::from_euler_angles(place(7, 3.0), place(31, 1.5), place(57, 3.0)).to_rotation_matrix().into_inner();
+            let rotation = crate::Quat::from_euler_angles(place(7, 3.0), place(31, 1.5), place(57, 3.0))
+                .to_rotation_matrix()
+                .into_inner();
             let far = if n % 3 == 0 { 1e3 } else { 1.5 };
             let offset = Vec3::new(place(11, far), place(13, far), place(17, far));
             let single = [place(1, 1.0) as f32, place(611, 1.0) as f32, place(1301, 1.0) as f32];
             let p = rotation * Vec3::from(single.map(f64::from)) + offset;
             let way = field.way_from(&rotation, &offset, 1.8).unwrap();
-            let (bound, usual, truth) = (field.bound_on(&way, &single), field.tree.bound(&p), field.nearest(&p).distance);
+            let (bound, usual, truth) =
+                (field.bound_on(&way, &single), field.tree.bound(&p), field.nearest(&p).distance);
             assert!(bound <= truth, "{p:?}: bound {bound} above {truth}");
             assert!(bound >= usual - 4.0 * way.rounding(), "{p:?}: bound {bound} below {usual}");
         }

@@ -78,7 +78,10 @@ impl MeshField {
             triangles: mesh.triangles.clone(),
             valence: valence(mesh),
             corners: (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect(),
-            normals: pseudonormals(mesh).into_iter().map(|n| n.map(|v| v.try_normalize(0.0).unwrap_or_default())).collect(),
+            normals: pseudonormals(mesh)
+                .into_iter()
+                .map(|n| n.map(|v| v.try_normalize(0.0).unwrap_or_default()))
+                .collect(),
             searched,
             tree: Octree::new(Vec3::zeros(), 1.0),
             lists: Vec::new(),
@@ -152,7 +155,10 @@ impl MeshField {
             if square > limit {
                 continue;
             }
-            let better = |b: &Closest| square < b.square * (1.0 - SAME) || (square <= b.square * (1.0 + SAME) && self.above(p, t) > self.above(p, b.triangle));
+            let better = |b: &Closest| {
+                square < b.square * (1.0 - SAME)
+                    || (square <= b.square * (1.0 + SAME) && self.above(p, t) > self.above(p, b.triangle))
+            };
             if best.as_ref().is_none_or(better) {
                 best = Some(Closest { square, point, triangle: t, feature });
                 limit = square * (1.0 + SAME);
@@ -232,7 +238,9 @@ impl MeshField {
         let (face, normal) = (self.normals[found.triangle][0], self.normals[found.triangle][found.feature]);
         let (offset, length) = (p - found.point, found.square.sqrt());
         let sign = if normal.dot(&offset) < 0.0 { -1.0 } else { 1.0 };
-        let flat = found.feature == 0 || normal.dot(&face) > 1.0 - 1e-9 || (length > self.touching && self.above(p, found.triangle) > ABOVE * found.square);
+        let flat = found.feature == 0
+            || normal.dot(&face) > 1.0 - 1e-9
+            || (length > self.touching && self.above(p, found.triangle) > ABOVE * found.square);
         let normal = match flat {
             true => face,
             false if length > self.touching => offset * (sign / length),
@@ -274,7 +282,8 @@ impl MeshField {
                 // beyond an edge by less than counts, it is still above or below the face
                 let beside = (p - point - normal * above).norm();
                 let distance_signed = if above > 0.0 || beside < aside { above } else { -distance };
-                let hit = Hit { distance: distance_signed, nearest, normal, core: 0.0, feature: Feature::Face, facing: true };
+                let hit =
+                    Hit { distance: distance_signed, nearest, normal, core: 0.0, feature: Feature::Face, facing: true };
                 best = Some((distance, square, hit));
             }
         }
@@ -355,7 +364,9 @@ impl Field for MeshField {
 
 /// A ball around a triangle, its centre told from `center`; rounding is on the safe side.
 fn ball_around(corners: &[Vec3; 3], center: &Vec3, diagonal: f64) -> [f32; 4] {
-    let longest = (0..3).map(|k| (corners[k], corners[(k + 1) % 3])).max_by(|a, b| (a.1 - a.0).norm().total_cmp(&(b.1 - b.0).norm()));
+    let longest = (0..3)
+        .map(|k| (corners[k], corners[(k + 1) % 3]))
+        .max_by(|a, b| (a.1 - a.0).norm().total_cmp(&(b.1 - b.0).norm()));
     let (u, v) = longest.unwrap_or((corners[0], corners[1]));
     // the middle of the longest side serves the obtuse, the mean of the corners others
     let middles = [0.5 * (u + v), (corners[0] + corners[1] + corners[2]) / 3.0];

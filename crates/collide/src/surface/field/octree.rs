@@ -136,7 +136,16 @@ impl Octree {
     /// One cell.
     pub fn new(center: Vec3, half: f64) -> Octree {
         let halves = std::array::from_fn(|depth| (half / f64::from(1_u32 << depth)) as f32);
-        Octree { cells: vec![Cell::empty()], center, half, level: 0, per_metre: (0.5 / half) as f32, top: Vec::new(), halves, rounding: ROUNDING * half }
+        Octree {
+            cells: vec![Cell::empty()],
+            center,
+            half,
+            level: 0,
+            per_metre: (0.5 / half) as f32,
+            top: Vec::new(),
+            halves,
+            rounding: ROUNDING * half,
+        }
     }
 
     /// What single precision may cost, metres.
@@ -184,7 +193,12 @@ impl Octree {
     pub fn way_from(&self, rotation: &Mat3, translation: &Vec3, reach: f64) -> Way {
         let offset = (translation - self.center).add_scalar(self.half);
         let columns = [0, 1, 2].map(|k| single(&rotation.column(k).into_owned()));
-        Way { columns, offset: single(&offset), most: (2.0 * self.half) as f32, rounding: ROUNDING * (offset.norm() + reach + self.half) }
+        Way {
+            columns,
+            offset: single(&offset),
+            most: (2.0 * self.half) as f32,
+            rounding: ROUNDING * (offset.norm() + reach + self.half),
+        }
     }
 
     /// [`Octree::bound`] of a point in that other frame, a little less.

@@ -169,8 +169,13 @@ impl Groups {
         }
         let mut size = vec![0; next.sites.len()];
         next.of.iter().for_each(|&g| size[g] += 1);
-        let mut stale: Vec<usize> =
-            change.balls.iter().map(|(k, _)| *k).filter(|&k| !next.would_fit(k, &next.balls[k])).map(|k| next.of[k]).collect();
+        let mut stale: Vec<usize> = change
+            .balls
+            .iter()
+            .map(|(k, _)| *k)
+            .filter(|&k| !next.would_fit(k, &next.balls[k]))
+            .map(|k| next.of[k])
+            .collect();
         stale.push(home);
         if size[home] > next.room {
             for (ball, to) in next.chain(&size, home)? {

@@ -10,8 +10,8 @@ use super::refit::{Fit, own};
 use super::site::Site;
 use super::spheres::{CoverPoints, Want};
 use crate::tree::ball::{Ball, around_points};
-use crate::tree::close::closed;
 use crate::tree::builder::{Cell, Job, StageCount};
+use crate::tree::close::closed;
 use rayon::prelude::*;
 use std::sync::Mutex;
 
@@ -66,8 +66,16 @@ impl<'a> Levels<'a> {
         let balls = (f64::from(job.settings.branch)).powi(job.settings.depth as i32);
         let points = (balls * 40.0).clamp(POINTS.0, POINTS.1).max((balls * 10.0).min(POINTS.2));
         let cover = CoverPoints::on(job.mesh, points as usize);
-        let mut levels =
-            Levels { job, cover, candidates: Vec::new(), medial: Vec::new(), holders: Vec::new(), scale, done: Mutex::new(0.0), stages: Vec::new() };
+        let mut levels = Levels {
+            job,
+            cover,
+            candidates: Vec::new(),
+            medial: Vec::new(),
+            holders: Vec::new(),
+            scale,
+            done: Mutex::new(0.0),
+            stages: Vec::new(),
+        };
         levels.touch();
         levels
     }

@@ -69,7 +69,7 @@ impl Exchange<'_> {
     /// Which balls to burst for a half of `worst`, in the order in which they are tried: those that are missed less
     /// than `worst` errs, and one of the same group. None need be while there is room; that is tried first.
     fn bursts(&self, fit: &Fit, worst: usize, missed: &[f64], groups: Option<&Groups>) -> Vec<Option<usize>> {
-                let mut order: Vec<usize> =
+        let mut order: Vec<usize> =
             (0..missed.len()).filter(|&k| k != worst && missed[k] < fit.errors[worst]).collect();
         order.sort_by(|&a, &b| missed[a].total_cmp(&missed[b]).then(a.cmp(&b)));
         let same = groups.and_then(|g| order.iter().copied().find(|&k| g.of[k] == g.of[worst]));
@@ -111,7 +111,8 @@ impl Exchange<'_> {
             let ball = |n: usize| after.sites[n].ball(&own(self.points, &after.parts[n]));
             let last = touched.len() - 1;
             let balls = (0..last).map(|n| (touched[n], ball(n))).collect();
-            *present = present.after(&Change { balls, new: (touched[last], ball(last)), split: worst }, self.distance)?;
+            *present =
+                present.after(&Change { balls, new: (touched[last], ball(last)), split: worst }, self.distance)?;
         }
         Some((touched, after))
     }
@@ -140,10 +141,13 @@ impl Exchange<'_> {
     fn best_for(&self, part: &[u32], old: Site) -> Site {
         let own = own(self.points, part);
         let some = part.iter().step_by(part.len().div_ceil(LOOKED_AT));
-        let best = some.map(|&i| Site { fence: old.fence, ..self.candidates[i as usize] }).fold((old.worst(&own), old), |best, c| {
-            let need = c.worst(&own);
-            if need < best.0 { (need, c) } else { best }
-        });
+        let best = some.map(|&i| Site { fence: old.fence, ..self.candidates[i as usize] }).fold(
+            (old.worst(&own), old),
+            |best, c| {
+                let need = c.worst(&own);
+                if need < best.0 { (need, c) } else { best }
+            },
+        );
         moved(best.1.exact(self.distance), &own, self.distance)
     }
 

@@ -26,11 +26,7 @@ pub(super) fn reduce(
     let looked = own(points, region);
     let mut start = Fit::of(expand(candidates, &looked, EACH * most), points, region);
     start.drop_empty();
-    let ways = [
-        expand(candidates, &looked, most),
-        merge(candidates, points, &start, most),
-        burst(points, start, most),
-    ];
+    let ways = [expand(candidates, &looked, most), merge(candidates, points, &start, most), burst(points, start, most)];
     let fits = ways.map(|sites| {
         let sites = sites.into_iter().map(|s| s.exact(distance)).collect();
         let mut fit = Fit::of(sites, points, region);

@@ -118,7 +118,10 @@ pub(super) fn own(points: &[Vec3], part: &[u32]) -> Vec<Vec3> {
 
 /// The least need of the sites and which has it, the first of equals.
 fn least(sites: &[Site], p: &Vec3) -> (f64, usize) {
-    sites.iter().enumerate().fold((f64::INFINITY, 0), |best, (k, site)| site.need_below(p, best.0).map_or(best, |n| (n, k)))
+    sites
+        .iter()
+        .enumerate()
+        .fold((f64::INFINITY, 0), |best, (k, site)| site.need_below(p, best.0).map_or(best, |n| (n, k)))
 }
 
 /// The site moved to where its points need less.

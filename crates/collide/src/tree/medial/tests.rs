@@ -8,9 +8,9 @@ use super::merge::merge;
 use super::refit::Fit;
 use super::site::Site;
 use super::spheres::CoverPoints;
+use crate::tree::TreeSettings;
 use crate::tree::ball::Ball;
 use crate::tree::close::closed;
-use crate::tree::TreeSettings;
 use crate::{MeshDistance, TriMesh, Vec3};
 
 /// A bar along x, from -4 to 4.
@@ -74,7 +74,9 @@ fn expand_finds_the_least_stand_off() {
     let (mesh, distance) = (bar(), MeshDistance::new(&bar()));
     let points = CoverPoints::on(&mesh, 300).points;
     let candidates = sites(&[-3.0, -2.0, -1.0, 0.0, 0.5, 1.0, 2.0, 3.0], &distance);
-    let needs = |set: &[Site]| points.iter().map(|p| set.iter().map(|s| s.need(p)).fold(f64::INFINITY, f64::min)).fold(0.0, f64::max);
+    let needs = |set: &[Site]| {
+        points.iter().map(|p| set.iter().map(|s| s.need(p)).fold(f64::INFINITY, f64::min)).fold(0.0, f64::max)
+    };
     // one: the middle; two: by trying all pairs
     assert_eq!(expand(&candidates, &points, 1), [candidates[3]]);
     let pairs = (0..8).flat_map(|a| (0..a).map(move |b| [a, b]));

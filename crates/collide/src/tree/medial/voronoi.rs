@@ -58,7 +58,8 @@ impl<'a> Voronoi<'a> {
         };
         let points: Vec<Vec3> = (0..CORNERS).map(corner).chain(sites.iter().copied()).collect();
         let delaunay = Delaunay::new(&points)?;
-        let mut made = Voronoi { balls: vec![None; delaunay.cell_count()], delaunay, distance, bounds: solid.grown(1e-3 * half) };
+        let mut made =
+            Voronoi { balls: vec![None; delaunay.cell_count()], delaunay, distance, bounds: solid.grown(1e-3 * half) };
         for c in 0..made.delaunay.cell_count() as u32 {
             made.refresh(c);
         }
@@ -102,8 +103,10 @@ impl<'a> Voronoi<'a> {
             return;
         }
         self.balls[cell as usize] = circumscribed(&self.delaunay.corners(cell)).map(|ball| {
-            let may_be_inside = (0..3).all(|k| ball.center[k] >= self.bounds.min[k] && ball.center[k] <= self.bounds.max[k]);
-            let signed_distance = if may_be_inside { self.distance.closest(&ball.center).signed_distance } else { f64::INFINITY };
+            let may_be_inside =
+                (0..3).all(|k| ball.center[k] >= self.bounds.min[k] && ball.center[k] <= self.bounds.max[k]);
+            let signed_distance =
+                if may_be_inside { self.distance.closest(&ball.center).signed_distance } else { f64::INFINITY };
             VoronoiBall { ball, signed_distance, internal: signed_distance < 0.0 }
         });
     }
@@ -134,7 +137,8 @@ mod tests {
     fn the_sphere_through_four_points_of_a_known_one() {
         let center = Vec3::new(1.0, -2.0, 3.0);
         let on = |x: f64, y: f64, z: f64| center + Vec3::new(x, y, z).normalize() * 0.7;
-        let ball = circumscribed(&[on(1.0, 0.0, 0.2), on(0.0, 1.0, 0.1), on(-1.0, 0.3, 0.0), on(0.1, 0.2, 1.0)]).unwrap();
+        let ball =
+            circumscribed(&[on(1.0, 0.0, 0.2), on(0.0, 1.0, 0.1), on(-1.0, 0.3, 0.0), on(0.1, 0.2, 1.0)]).unwrap();
         assert!((ball.center - center).norm() < 1e-14 && (ball.radius - 0.7).abs() < 1e-11);
         let flat = [Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::new(1.0, 2.0, 0.0)];
         assert_eq!(circumscribed(&flat), None);
@@ -145,7 +149,8 @@ mod tests {
         let mesh = TriMesh::icosphere(1.0, 2);
         let distance = MeshDistance::new(&mesh);
         let voronoi = Voronoi::new(&mesh.vertices, &mesh.aabb(), &distance).unwrap();
-        let inner: Vec<_> = voronoi.delaunay.finite_cells().filter_map(|c| voronoi.ball(c)).filter(|b| b.internal).collect();
+        let inner: Vec<_> =
+            voronoi.delaunay.finite_cells().filter_map(|c| voronoi.ball(c)).filter(|b| b.internal).collect();
         assert!(!inner.is_empty());
         for b in inner {
             // vertices are on the unit sphere to rounding, which slivers magnify

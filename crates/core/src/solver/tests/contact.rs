@@ -116,10 +116,14 @@ fn the_sliding_form_holds_on_random_frictional_contacts() {
             let i = block.row as usize;
             let (l, w, size) = (&solved.lambda[i..i + 3], &solved.w[i..i + 3], c[i + 1].hypot(c[i + 2]));
             let d = [-c[i + 1] / size, -c[i + 2] / size];
-            let (push, along, across) = (l[1] * d[0] + l[2] * d[1], w[1] * d[0] + w[2] * d[1], l[1] * d[1] - l[2] * d[0]);
+            let (push, along, across) =
+                (l[1] * d[0] + l[2] * d[1], w[1] * d[0] + w[2] * d[1], l[1] * d[1] - l[2] * d[0]);
             assert!(l[0].min(w[0]).abs() < 1e-9);
             assert!(across.abs() < 1e-12 && push > -1e-12 && push <= mu * l[0] + 1e-9);
-            assert!(along >= 0.0 || (push - mu * l[0]).abs().min(along.abs()) < 1e-9, "slides below the bound: {push} {along}");
+            assert!(
+                along >= 0.0 || (push - mu * l[0]).abs().min(along.abs()) < 1e-9,
+                "slides below the bound: {push} {along}"
+            );
             assert!(along <= 0.0 || push.abs().min(along) < 1e-9, "pushes past rest: {push} {along}");
         }
     }
@@ -243,7 +247,12 @@ fn walls_that_touch_are_no_contradiction_and_walls_that_crush_are() {
     assert!(solved.w.iter().all(|w| w.abs() < 1e-12));
 
     // Both walls come at 1 m/s.
-    let crushed = solve(&LcpPyramid, &bodies.rows, &vec![-1.0; bodies.rows.len], Accuracy { sweeps: 10, relaxations: u32::MAX, tolerance: 1e-9 });
+    let crushed = solve(
+        &LcpPyramid,
+        &bodies.rows,
+        &vec![-1.0; bodies.rows.len],
+        Accuracy { sweeps: 10, relaxations: u32::MAX, tolerance: 1e-9 },
+    );
     assert!(crushed.outcome.ray && !crushed.outcome.converged);
     assert!(crushed.lambda.iter().all(|l| l.is_finite() && *l >= 0.0));
 }
@@ -261,7 +270,11 @@ fn the_same_problem_gives_the_same_bits() {
 fn islands_and_warm_starts_change_nothing() {
     let mut pair = Bodies::cubes(vec![1.0, 2.0, 3.0], 1.0);
     for (upper, x) in [(0, 0.5), (2, 0.3), (0, -0.5), (1, 0.2), (2, -0.1)] {
-        pair.push(RowSet::Cone { mu: 0.4 }, [(upper == 1).then_some((0, [x, 0.1, 0.5])), Some((upper, [x, 0.1, -0.5]))], UP);
+        pair.push(
+            RowSet::Cone { mu: 0.4 },
+            [(upper == 1).then_some((0, [x, 0.1, 0.5])), Some((upper, [x, 0.1, -0.5]))],
+            UP,
+        );
     }
     let mut random = Random(15);
     let u: Vec<f64> = (0..18).map(|_| random.real(-1.0, 0.2)).collect();

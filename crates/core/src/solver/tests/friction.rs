@@ -58,7 +58,11 @@ fn a_sliding_slab_slows_as_coulomb_says() {
     for solver in solvers() {
         for (slope, mu, speed) in [(0.0f64, 0.3, 2.0), (0.3, 0.5, 1.0), (0.5, 0.2, 4.0)] {
             let v = speed + G * H * (slope.sin() - mu * slope.cos());
-            close(solver, slab(solver, slope, mu, speed, 0.8), [0.0, 0.0, 0.0, v * 0.8f64.cos(), v * 0.8f64.sin(), 0.0]);
+            close(
+                solver,
+                slab(solver, slope, mu, speed, 0.8),
+                [0.0, 0.0, 0.0, v * 0.8f64.cos(), v * 0.8f64.sin(), 0.0],
+            );
         }
         // Friction stops it within the step and does not throw it back.
         close(solver, slab(solver, 0.0, 0.5, 0.01, 0.8), [0.0; 6]);
@@ -84,7 +88,12 @@ fn one_contact_is_the_exact_cone_whatever_way_it_slides() {
         for solver in solvers() {
             let solved = solve(solver, &bodies.rows, &c, FAR);
             assert!(solved.outcome.converged);
-            assert!(distance(&solved.lambda, &expected) < 1e-10 * (1.0 + normal), "{}: {:?}, not {expected:?}", solver.name(), solved.lambda);
+            assert!(
+                distance(&solved.lambda, &expected) < 1e-10 * (1.0 + normal),
+                "{}: {:?}, not {expected:?}",
+                solver.name(),
+                solved.lambda
+            );
             assert!(residual(&bodies.rows, &all(&bodies.rows), &c, &solved.lambda, &solved.du) < 1e-9);
         }
     }
@@ -110,7 +119,10 @@ fn what_relaxation_converges_to_is_a_coulomb_solution() {
             let (l, w) = (&solved.lambda[i..i + 3], &solved.w[i..i + 3]);
             let slip = w[1].hypot(w[2]);
             assert!(l[0].min(w[0]).abs() < 1e-8 && l[1].hypot(l[2]) <= mu * l[0] + 1e-9);
-            assert!((0..2).all(|t| (l[1 + t] * slip + mu * l[0] * w[1 + t]).abs() < 1e-7), "friction not against sliding: {l:?} {w:?}");
+            assert!(
+                (0..2).all(|t| (l[1 + t] * slip + mu * l[0] * w[1 + t]).abs() < 1e-7),
+                "friction not against sliding: {l:?} {w:?}"
+            );
         }
     }
     assert!(converged > 100, "only {converged} of 200 converged");
@@ -129,6 +141,11 @@ fn dead_rows_get_no_multiplier() {
         rows.side(0, 2).expect("first side");
         rows.push_block(RowSet::HalfLine);
         let solved = solve(solver, &rows, &[-1.0, 3.0, 0.0, -1.0, 1.0, 1.0, -1.0], FAR);
-        assert!(distance(&solved.lambda, &[1.0, -0.5, 0.0, 0.0, 0.0, 0.0, 0.0]) < 1e-12, "{}: {:?}", solver.name(), solved.lambda);
+        assert!(
+            distance(&solved.lambda, &[1.0, -0.5, 0.0, 0.0, 0.0, 0.0, 0.0]) < 1e-12,
+            "{}: {:?}",
+            solver.name(),
+            solved.lambda
+        );
     }
 }

@@ -24,7 +24,8 @@ fn tangle(random: &mut Random) -> Rows {
 
 /// Components by flooding from each block that no island has yet.
 fn flood(rows: &Rows, keep: impl Fn(usize) -> bool) -> Vec<Vec<u32>> {
-    let touch = |a: usize, b: usize| rows.blocks[a].sides().iter().any(|s| rows.blocks[b].sides().iter().any(|t| s.u == t.u));
+    let touch =
+        |a: usize, b: usize| rows.blocks[a].sides().iter().any(|s| rows.blocks[b].sides().iter().any(|t| s.u == t.u));
     let alive: Vec<usize> = (0..rows.blocks.len()).filter(|&b| keep(b) && !rows.blocks[b].sides().is_empty()).collect();
     let mut seen = vec![false; rows.blocks.len()];
     let mut islands = Vec::new();

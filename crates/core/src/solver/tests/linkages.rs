@@ -19,7 +19,8 @@ struct Chain {
 impl Chain {
     fn new(mass: Vec<f64>, closed: bool) -> Chain {
         let turn = if closed { std::f64::consts::TAU / mass.len() as f64 } else { 0.0 };
-        let half = (0..mass.len()).map(|i| [0.1 * (turn * i as f64).cos(), 0.0, 0.1 * (turn * i as f64).sin()]).collect();
+        let half =
+            (0..mass.len()).map(|i| [0.1 * (turn * i as f64).cos(), 0.0, 0.1 * (turn * i as f64).sin()]).collect();
         let inertia = mass.iter().map(|m| [m * 0.04 / 12.0, m * 0.04 / 12.0, m * 0.01 / 12.0]).collect();
         Chain { bodies: Bodies::new(mass, inertia), half }
     }
@@ -42,11 +43,13 @@ impl Chain {
 
     /// The velocities that gravity and a twist of every third bar give in a step.
     fn pulled(&self) -> Vec<f64> {
-        let velocity: Vec<[f64; 6]> = (0..self.half.len()).map(|i| {
-            let mut v = GRAVITY;
-            v[i % 3] += 0.1 * (1 + i % 7) as f64;
-            v
-        }).collect();
+        let velocity: Vec<[f64; 6]> = (0..self.half.len())
+            .map(|i| {
+                let mut v = GRAVITY;
+                v[i % 3] += 0.1 * (1 + i % 7) as f64;
+                v
+            })
+            .collect();
         free(&self.bodies.rows, &self.bodies.whiten(&velocity))
     }
 }
@@ -168,7 +171,8 @@ fn linkages_among_other_rows_agree_with_pivoting() {
             }
         }
         let (rows, c) = (&chain.bodies.rows, chain.pulled());
-        let relaxed = solve(&GaussSeidel, rows, &c, Accuracy { tolerance: 1e-12, sweeps: 20_000, relaxations: u32::MAX });
+        let relaxed =
+            solve(&GaussSeidel, rows, &c, Accuracy { tolerance: 1e-12, sweeps: 20_000, relaxations: u32::MAX });
         let pivoted = solve(&LcpPyramid, rows, &c, STEP);
         assert!(relaxed.outcome.converged && pivoted.outcome.converged, "{:?}", relaxed.outcome);
         assert!(distance(&relaxed.du, &pivoted.du) < 1e-7, "{}", distance(&relaxed.du, &pivoted.du));
@@ -207,7 +211,8 @@ fn a_linkage_that_is_too_large_is_relaxed() {
     let large = Chain::hang(vec![1.0; links + 1]);
     let c = large.pulled();
     let left = |sweeps: u32| {
-        let solved = solve(&GaussSeidel, &large.bodies.rows, &c, Accuracy { sweeps, relaxations: u32::MAX, tolerance: 1e-9 });
+        let solved =
+            solve(&GaussSeidel, &large.bodies.rows, &c, Accuracy { sweeps, relaxations: u32::MAX, tolerance: 1e-9 });
         residual(&large.bodies.rows, &all(&large.bodies.rows), &c, &solved.lambda, &solved.du)
     };
     let (few, many) = (left(25), left(2000));

@@ -149,7 +149,10 @@ fn a_problem_without_solution_ends_on_a_ray() {
     for (m, q) in problems {
         let n = q.len();
         let matrix = DMatrix::from_row_slice(n, n, &m);
-        assert!(enumerate(&matrix, &DVector::from_vec(q.clone())).is_empty(), "the problem has a solution: {m:?} {q:?}");
+        assert!(
+            enumerate(&matrix, &DVector::from_vec(q.clone())).is_empty(),
+            "the problem has a solution: {m:?} {q:?}"
+        );
         assert!(matches!(lemke(&m, &q), LcpResult::Ray { .. }), "{m:?} {q:?}: {:?}", lemke(&m, &q));
     }
 }

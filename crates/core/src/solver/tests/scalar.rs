@@ -27,14 +27,27 @@ fn row(rows: &mut Rows, set: RowSet, sides: &[(usize, f64, f64)]) {
 fn a_motor_gives_what_it_needs_and_no_more_than_it_has() {
     let mass = 2.0;
     for solver in solvers() {
-        for (lo, hi) in [(-3.0, 5.0), (0.0, 1.0), (-4.0, -1.0), (-3.0, f64::INFINITY), (f64::NEG_INFINITY, 5.0), (1.0, 1.0), (f64::NEG_INFINITY, f64::INFINITY)] {
+        for (lo, hi) in [
+            (-3.0, 5.0),
+            (0.0, 1.0),
+            (-4.0, -1.0),
+            (-3.0, f64::INFINITY),
+            (f64::NEG_INFINITY, 5.0),
+            (1.0, 1.0),
+            (f64::NEG_INFINITY, f64::INFINITY),
+        ] {
             for wanted in [-7.0, -1.0, 0.0, 0.3, 1.0, 9.0] {
                 let mut rows = sliders(1);
                 row(&mut rows, RowSet::Interval { lo, hi }, &[(0, mass, 1.0)]);
                 let solved = solve(solver, &rows, &[-wanted], FAR);
                 // Impulse m·Δv, within the ends.
                 let expected = (mass * wanted).max(lo).min(hi);
-                assert!((solved.lambda[0] - expected).abs() < 1e-12, "{} {lo} {hi} {wanted}: {}", solver.name(), solved.lambda[0]);
+                assert!(
+                    (solved.lambda[0] - expected).abs() < 1e-12,
+                    "{} {lo} {hi} {wanted}: {}",
+                    solver.name(),
+                    solved.lambda[0]
+                );
                 assert!(solved.outcome.converged);
             }
         }

@@ -33,14 +33,23 @@ fn an_implicit_drive_gives_the_velocity_found_by_hand() {
                 row(&mut rows, set, compliance, &[(0, m, 1.0)]);
                 let solved = solve(solver, &rows, &[v - aim], FAR);
                 let after = v + solved.du[0] / m.sqrt();
-                assert!((after - expected).abs() < 1e-12 * aim.abs().max(1.0), "{} {set:?} {kp} {kd}: {after} {expected}", solver.name());
+                assert!(
+                    (after - expected).abs() < 1e-12 * aim.abs().max(1.0),
+                    "{} {set:?} {kp} {kd}: {after} {expected}",
+                    solver.name()
+                );
                 assert!(solved.outcome.converged);
             }
             // the same drive with half the impulse that it wants
             let wanted = m * (expected - v);
             let mut rows = Rows::default();
             rows.clear(1);
-            row(&mut rows, RowSet::Interval { lo: -0.5 * wanted.abs(), hi: 0.5 * wanted.abs() }, compliance, &[(0, m, 1.0)]);
+            row(
+                &mut rows,
+                RowSet::Interval { lo: -0.5 * wanted.abs(), hi: 0.5 * wanted.abs() },
+                compliance,
+                &[(0, m, 1.0)],
+            );
             let lambda = solve(solver, &rows, &[v - aim], FAR).lambda[0];
             assert!((lambda - 0.5 * wanted).abs() < 1e-12 * wanted.abs(), "{}: {lambda} of {wanted}", solver.name());
         }
@@ -62,7 +71,11 @@ fn springs_side_by_side_share_by_their_stiffness() {
             let solved = solve(solver, &rows, &springs.map(|(_, aim)| v - aim), FAR);
             assert!((v + solved.du[0] / m.sqrt() - expected).abs() < 1e-9, "{} {set:?}", solver.name());
             for (lambda, (r, aim)) in solved.lambda.iter().zip(springs) {
-                assert!((lambda - (aim - expected) / r).abs() < 1e-8 * (1.0 + 1.0 / r), "{} {set:?}: {lambda} at R = {r}", solver.name());
+                assert!(
+                    (lambda - (aim - expected) / r).abs() < 1e-8 * (1.0 + 1.0 / r),
+                    "{} {set:?}: {lambda} at R = {r}",
+                    solver.name()
+                );
             }
         }
     }
@@ -77,7 +90,12 @@ fn a_weld_holds_beside_a_spring_a_million_million_times_weaker() {
         row(&mut rows, RowSet::Equality, 1e15, &[(0, 1.0, 1.0)]);
         row(&mut rows, RowSet::Equality, 0.0, &[(0, 1.0, 1.0), (1, 2.0, -1.0)]);
         let solved = solve(solver, &rows, &[1.0, 3.0], FAR);
-        assert!(solved.w.iter().all(|w| w.abs() < 1e-12) && (solved.lambda[1] + 2.0).abs() < 1e-12, "{}: {:?}", solver.name(), solved.lambda);
+        assert!(
+            solved.w.iter().all(|w| w.abs() < 1e-12) && (solved.lambda[1] + 2.0).abs() < 1e-12,
+            "{}: {:?}",
+            solver.name(),
+            solved.lambda
+        );
     }
 }
 

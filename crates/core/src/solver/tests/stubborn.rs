@@ -21,7 +21,10 @@ fn of_two_feet_that_conflict_the_one_that_carries_less_slides() {
         // levers, and Coulomb at the foot that slides
         let (light, heavy) = (9.81 * near / (near + far), 9.81 * far / (near + far));
         let slides = [light, mu * light, 0.0, heavy, -mu * light, 0.0];
-        assert!(outcome.converged && distance(&lambda, &slides) < 1e-7, "{conflict}: {outcome:?} {lambda:?} but {slides:?}");
+        assert!(
+            outcome.converged && distance(&lambda, &slides) < 1e-7,
+            "{conflict}: {outcome:?} {lambda:?} but {slides:?}"
+        );
     }
 }
 
@@ -51,7 +54,12 @@ fn recorded_problems_are_solved() {
         let accuracy = Accuracy { sweeps: head[0] as u32, relaxations: head[1] as u32, tolerance: head[2] };
         let outcome = GaussSeidel.solve(&rows, &blocks, &c, &mut lambda, &mut du, accuracy);
         let left = residual(&rows, &blocks, &c, &lambda, &du);
-        assert!(outcome.converged && left < 20.0 * accuracy.tolerance, "{} contacts: {outcome:?}, {left} of {}", blocks.len(), accuracy.tolerance);
+        assert!(
+            outcome.converged && left < 20.0 * accuracy.tolerance,
+            "{} contacts: {outcome:?}, {left} of {}",
+            blocks.len(),
+            accuracy.tolerance
+        );
         count += 1;
     }
     assert_eq!(count, 5);

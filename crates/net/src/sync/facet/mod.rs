@@ -51,7 +51,15 @@ impl FacetOptions {
     /// The defaults of a cave file.
     pub fn new(name: &str, scene: [u8; 32], seed: u64) -> FacetOptions {
         let ms = Duration::from_millis;
-        FacetOptions { name: name.to_owned(), scene, exact: false, pace: Pace::Lockstep, drop_after: ms(2000), join_every: ms(250), seed }
+        FacetOptions {
+            name: name.to_owned(),
+            scene,
+            exact: false,
+            pace: Pace::Lockstep,
+            drop_after: ms(2000),
+            join_every: ms(250),
+            seed,
+        }
     }
 }
 
@@ -148,9 +156,31 @@ impl FacetSession {
     /// `base`: the world as the scene file makes it.
     pub fn new(options: FacetOptions, base: World) -> FacetSession {
         let mut session = FacetSession {
-            process: mixed(options.seed) & PROCESS, options, mirror: Mirror::new(base), phase: Phase::Joining, lost: false, run: 0, join: 0, asked: None, heard: Duration::ZERO,
-            beaten: Duration::ZERO, resynced: None, listed: None, newest: None, pending: None, early: None, list: None, drawing: None, held: None, show: false,
-            told: None, inputs: VecDeque::new(), shown: None, counts: FacetCounts::default(), out: Vec::new(), close: false,
+            process: mixed(options.seed) & PROCESS,
+            options,
+            mirror: Mirror::new(base),
+            phase: Phase::Joining,
+            lost: false,
+            run: 0,
+            join: 0,
+            asked: None,
+            heard: Duration::ZERO,
+            beaten: Duration::ZERO,
+            resynced: None,
+            listed: None,
+            newest: None,
+            pending: None,
+            early: None,
+            list: None,
+            drawing: None,
+            held: None,
+            show: false,
+            told: None,
+            inputs: VecDeque::new(),
+            shown: None,
+            counts: FacetCounts::default(),
+            out: Vec::new(),
+            close: false,
         };
         session.join_anew();
         session
@@ -216,7 +246,14 @@ impl FacetSession {
     pub fn drawn(&mut self, now: Duration, image: Hash) {
         let Some((frame, arrived)) = self.drawing.take() else { return };
         let took_us = short_micros(now.saturating_sub(arrived));
-        let done = Done { hash: self.mirror.hash(), image, took_us, input_us: None, heard_us: Some(micros(arrived)), at_us: micros(now) };
+        let done = Done {
+            hash: self.mirror.hash(),
+            image,
+            took_us,
+            input_us: None,
+            heard_us: Some(micros(arrived)),
+            at_us: micros(now),
+        };
         self.held = Some((frame, done, now));
         self.show = self.options.pace == Pace::Latest || self.pending.is_some();
         self.told = (self.options.pace == Pace::Latest).then_some(arrived);
@@ -233,7 +270,10 @@ impl FacetSession {
     /// The frame that was held is on the screen.
     pub fn presented(&mut self, now: Duration) {
         let Some((frame, done, since)) = self.held.take() else { return };
-        let (took_us, input_us) = (short_micros(now.saturating_sub(since)), self.take_shown_input().map(|sent| short_micros(now.saturating_sub(sent))));
+        let (took_us, input_us) = (
+            short_micros(now.saturating_sub(since)),
+            self.take_shown_input().map(|sent| short_micros(now.saturating_sub(sent))),
+        );
         let done = Done { took_us, input_us, heard_us: self.told.take().map(micros), at_us: micros(now), ..done };
         (self.show, self.shown) = (false, Some((frame, done)));
         count(&mut self.counts.shown);
@@ -244,7 +284,12 @@ impl FacetSession {
     fn take_shown_input(&mut self) -> Option<Duration> {
         let users = &self.mirror.viewer().users;
         let shows = |user: u16| users.get(user as usize).map(|u| u.input);
-        let newest = self.inputs.iter().rev().find(|(user, sequence, _)| shows(*user) == Some(*sequence)).map(|(.., sent)| *sent);
+        let newest = self
+            .inputs
+            .iter()
+            .rev()
+            .find(|(user, sequence, _)| shows(*user) == Some(*sequence))
+            .map(|(.., sent)| *sent);
         self.inputs.retain(|(user, sequence, _)| shows(*user).is_none_or(|shown| later(*sequence, shown)));
         newest
     }
@@ -291,7 +336,8 @@ impl FacetSession {
             Phase::Joining => {
                 if self.asked.is_none_or(|asked| now >= asked.saturating_add(self.options.join_every)) {
                     self.asked = Some(now);
-                    let join = Join { scene: self.options.scene, name: self.options.name.clone(), exact: self.options.exact };
+                    let join =
+                        Join { scene: self.options.scene, name: self.options.name.clone(), exact: self.options.exact };
                     self.send(Kind::Join, 0, |out| join.write(out));
                 }
             }
@@ -316,9 +362,11 @@ impl FacetSession {
 
     fn join_anew(&mut self) {
         self.options.seed = self.options.seed.wrapping_add(1);
-        (self.phase, self.run, self.join, self.asked) = (Phase::Joining, 0, self.process | mixed(self.options.seed) & !PROCESS, None);
+        (self.phase, self.run, self.join, self.asked) =
+            (Phase::Joining, 0, self.process | mixed(self.options.seed) & !PROCESS, None);
         (self.listed, self.newest, self.resynced) = (None, None, None);
-        (self.pending, self.early, self.list, self.drawing, self.held, self.show, self.shown) = (None, None, None, None, None, false, None);
+        (self.pending, self.early, self.list, self.drawing, self.held, self.show, self.shown) =
+            (None, None, None, None, None, false, None);
         (self.told, self.inputs) = (None, VecDeque::new());
     }
 

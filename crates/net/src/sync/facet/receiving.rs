@@ -17,7 +17,9 @@ impl FacetSession {
         let taken = match open(&message).map(|(header, _)| header) {
             Ok(header) => self.on_header(now, header, message),
             Err(Fault::Version(theirs)) if self.phase == Phase::Joining => {
-                let why = format!("the server speaks NetSync version {theirs}, this facet version {VERSION}: use the same build of tumble on both");
+                let why = format!(
+                    "the server speaks NetSync version {theirs}, this facet version {VERSION}: use the same build of tumble on both"
+                );
                 self.phase = Phase::Over(Over::Refused(why));
                 Ok(())
             }
@@ -73,12 +75,14 @@ impl FacetSession {
             return Ok(());
         }
         self.mirror.apply_snapshot(payload)?;
-        (self.phase, self.run, self.listed, self.lost, self.resynced) = (Phase::Live, header.run, Some(header.frame), false, None);
+        (self.phase, self.run, self.listed, self.lost, self.resynced) =
+            (Phase::Live, header.run, Some(header.frame), false, None);
         if self.pending.take().is_some() {
             count(&mut self.counts.missing); // it belonged to the old list
         }
         let early = self.early.take().filter(|early| early.header.run == self.run);
-        let fits = early.filter(|early| Mirror::revision_of(&early.message[HEADER_BYTES..]).ok() == self.mirror.revision());
+        let fits =
+            early.filter(|early| Mirror::revision_of(&early.message[HEADER_BYTES..]).ok() == self.mirror.revision());
         fits.into_iter().for_each(|early| self.take_state(early));
         Ok(())
     }

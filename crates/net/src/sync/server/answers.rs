@@ -31,7 +31,13 @@ impl ServerSession {
         count(if *fault == Fault::Torn { &mut counts.torn } else { &mut counts.refused });
     }
 
-    pub(super) fn on_header(&mut self, now: Duration, facet: FacetNumber, header: &Header, payload: &[u8]) -> Result<(), Fault> {
+    pub(super) fn on_header(
+        &mut self,
+        now: Duration,
+        facet: FacetNumber,
+        header: &Header,
+        payload: &[u8],
+    ) -> Result<(), Fault> {
         if header.kind == Kind::Join {
             self.on_join(now, facet, header.join, Join::read(payload)?);
             return Ok(());
@@ -39,7 +45,8 @@ impl ServerSession {
         let place = &mut self.places[facet as usize];
         if header.run != self.options.run || header.join != place.join || place.standing == Standing::Absent {
             count(&mut place.counts.stale);
-            if place.standing == Standing::Absent || !place.retired.contains(&header.join) && header.join != place.join {
+            if place.standing == Standing::Absent || !place.retired.contains(&header.join) && header.join != place.join
+            {
                 self.send_to(facet, Kind::Rejoin, header.join, 0, |_| {});
             }
             return Ok(());
@@ -81,14 +88,18 @@ impl ServerSession {
         }
         let (soon, place) = (self.options.drop_after, &mut self.places[facet as usize]);
         if !place.rivals.admit(now, process_of(join), soon) {
-            let why = format!("another process shows facet '{}' and answers: end that one first, or show another facet", place.seat.name);
+            let why = format!(
+                "another process shows facet '{}' and answers: end that one first, or show another facet",
+                place.seat.name
+            );
             return self.deny(facet, join, why);
         }
         if self.places[facet as usize].standing != Standing::Absent {
             self.gone(facet, false);
         }
         let place = &mut self.places[facet as usize];
-        (place.standing, place.join, place.exact, place.heard, place.sent) = (Standing::Following, join, wanted.exact, now, now);
+        (place.standing, place.join, place.exact, place.heard, place.sent) =
+            (Standing::Following, join, wanted.exact, now, now);
         (place.synced, place.ready, place.presented, place.told) = (false, None, None, FacetCounts::default());
         (place.answered, place.keeps_up) = (None, false);
         place.inputs.clear();
@@ -102,10 +113,18 @@ impl ServerSession {
     pub(super) fn objection(&self, facet: FacetNumber, wanted: &Join) -> Option<String> {
         let seat = &self.places[facet as usize].seat;
         if seat.name != wanted.name {
-            return Some(format!("facet {facet} of the server's cave is '{}', not '{}': use the same cave file on both", seat.name, wanted.name));
+            return Some(format!(
+                "facet {facet} of the server's cave is '{}', not '{}': use the same cave file on both",
+                seat.name, wanted.name
+            ));
         }
         let (ours, theirs) = (hex(&self.options.scene), hex(&wanted.scene));
-        (ours != theirs).then(|| format!("the server's scene has the hash {ours}, that of facet '{}' has {theirs}: use the same files on both", seat.name))
+        (ours != theirs).then(|| {
+            format!(
+                "the server's scene has the hash {ours}, that of facet '{}' has {theirs}: use the same files on both",
+                seat.name
+            )
+        })
     }
 
     pub(super) fn deny(&mut self, facet: FacetNumber, join: u64, why: String) {
@@ -125,7 +144,10 @@ impl ServerSession {
     fn watch_pace(&mut self, now: Duration, facet: FacetNumber, frame: u64) {
         let well_below = self.options.ready_after * 3 / 4;
         let place = &mut self.places[facet as usize];
-        if self.options.pace != Pace::Lockstep || place.standing != Standing::Following || place.answered.is_some_and(|(last, _)| !later(frame, last)) {
+        if self.options.pace != Pace::Lockstep
+            || place.standing != Standing::Following
+            || place.answered.is_some_and(|(last, _)| !later(frame, last))
+        {
             return;
         }
         place.keeps_up = place.answered.is_some_and(|(_, at)| now.saturating_sub(at) < well_below);
@@ -145,7 +167,8 @@ impl ServerSession {
         } else {
             place.ready = Some(frame);
             if self.frame == Some(frame) && self.options.pace == Pace::Lockstep {
-                self.first_ready = self.first_ready.or((place.standing == Standing::InStep && place.seat.critical).then_some(now));
+                self.first_ready =
+                    self.first_ready.or((place.standing == Standing::InStep && place.seat.critical).then_some(now));
                 (place.standing, place.answered, place.keeps_up) = (Standing::InStep, None, false);
             }
             if !right {
@@ -197,7 +220,9 @@ impl ServerSession {
     }
 
     pub(super) fn gone(&mut self, facet: FacetNumber, by_its_word: bool) {
-        let Some(place) = self.places.get_mut(facet as usize).filter(|p| p.standing != Standing::Absent) else { return };
+        let Some(place) = self.places.get_mut(facet as usize).filter(|p| p.standing != Standing::Absent) else {
+            return;
+        };
         place.standing = Standing::Absent;
         place.retired.push_back(place.join);
         if place.retired.len() > MAX_RETIRED {

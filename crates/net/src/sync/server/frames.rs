@@ -118,7 +118,8 @@ impl ServerSession {
                     return;
                 }
                 self.leave_behind(frame, |p| p.ready == Some(frame), |counts| &mut counts.late);
-                let to: Vec<FacetNumber> = self.there().filter(|(_, p)| p.ready == Some(frame)).map(|(k, _)| k).collect();
+                let to: Vec<FacetNumber> =
+                    self.there().filter(|(_, p)| p.ready == Some(frame)).map(|(k, _)| k).collect();
                 self.stage = Stage::Presented(now);
                 self.send_present(now, to, frame);
             }
@@ -149,7 +150,9 @@ impl ServerSession {
                     (false, _) => since.saturating_add(options.first_after),
                     (true, None) => at_most,
                     // what it began before it was waited for comes first
-                    (true, Some(first)) => first.saturating_add(options.ready_after * if p.keeps_up { 2 } else { 1 }).min(at_most),
+                    (true, Some(first)) => {
+                        first.saturating_add(options.ready_after * if p.keeps_up { 2 } else { 1 }).min(at_most)
+                    }
                 };
                 self.waited_for().filter(|p| p.ready != self.frame).map(end).max()
             }
@@ -158,7 +161,12 @@ impl ServerSession {
     }
 
     /// Waits no longer for those who are in step and not `done`.
-    pub(super) fn leave_behind(&mut self, frame: u64, done: impl Fn(&Place) -> bool, counter: impl Fn(&mut SeatCounts) -> &mut u64) {
+    pub(super) fn leave_behind(
+        &mut self,
+        frame: u64,
+        done: impl Fn(&Place) -> bool,
+        counter: impl Fn(&mut SeatCounts) -> &mut u64,
+    ) {
         for k in 0..self.places.len() {
             let place = &mut self.places[k];
             if place.standing == Standing::InStep && !done(place) {

@@ -25,11 +25,11 @@ use super::messages::{Done, FacetCounts};
 use super::publisher::Publisher;
 use super::transport::{Closed, Delivery, FacetNumber, LinkEvent, MAX_FACETS};
 use super::wire::{Hash, Kind};
+use rivals::Rivals;
+pub(crate) use rivals::process_of;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
-pub(crate) use rivals::process_of;
-use rivals::Rivals;
 use times::{Asked, Clock, Times};
 use tumble_core::World;
 
@@ -81,7 +81,15 @@ impl ServerOptions {
     pub fn new(run: u64, scene: [u8; 32], seats: Vec<Seat>) -> ServerOptions {
         let ms = Duration::from_millis;
         ServerOptions {
-            run, scene, seats, pace: Pace::Lockstep, ready_after: ms(100), first_after: ms(10_000), drop_after: ms(2000), history: 8, resend_after: None,
+            run,
+            scene,
+            seats,
+            pace: Pace::Lockstep,
+            ready_after: ms(100),
+            first_after: ms(10_000),
+            drop_after: ms(2000),
+            history: 8,
+            resend_after: None,
             first_frame: 0,
         }
     }
@@ -231,15 +239,49 @@ impl ServerSession {
         options.seats.truncate(MAX_FACETS);
         options.history = options.history.clamp(1, 1024);
         let place = |seat: &Seat| Place {
-            seat: seat.clone(), standing: Standing::Absent, join: 0, retired: VecDeque::new(), rivals: Rivals::default(), exact: false, heard: Duration::ZERO, sent: Duration::ZERO,
-            synced: false, ready: None, presented: None, answered: None, keeps_up: false, counts: SeatCounts::default(), told: FacetCounts::default(), inputs: Default::default(), clock: Clock::default(), asked_state: None, asked_present: None,
+            seat: seat.clone(),
+            standing: Standing::Absent,
+            join: 0,
+            retired: VecDeque::new(),
+            rivals: Rivals::default(),
+            exact: false,
+            heard: Duration::ZERO,
+            sent: Duration::ZERO,
+            synced: false,
+            ready: None,
+            presented: None,
+            answered: None,
+            keeps_up: false,
+            counts: SeatCounts::default(),
+            told: FacetCounts::default(),
+            inputs: Default::default(),
+            clock: Clock::default(),
+            asked_state: None,
+            asked_present: None,
         };
         let places = options.seats.iter().map(place).collect();
-        let stream = |exact| Stream { publisher: Publisher::new(base, exact, 0), snapshot: Arc::default(), listed: None, state: Arc::default(), hashes: VecDeque::new() };
+        let stream = |exact| Stream {
+            publisher: Publisher::new(base, exact, 0),
+            snapshot: Arc::default(),
+            listed: None,
+            state: Arc::default(),
+            hashes: VecDeque::new(),
+        };
         let next = options.first_frame;
         ServerSession {
-            options, places, streams: [stream(false), stream(true)], frame: None, next, time_s: 0.0, stage: Stage::Idle, first_ready: None, out: Vec::new(),
-            events: VecDeque::new(), close: Vec::new(), ended: false, times: Times::default(),
+            options,
+            places,
+            streams: [stream(false), stream(true)],
+            frame: None,
+            next,
+            time_s: 0.0,
+            stage: Stage::Idle,
+            first_ready: None,
+            out: Vec::new(),
+            events: VecDeque::new(),
+            close: Vec::new(),
+            ended: false,
+            times: Times::default(),
         }
     }
 
@@ -265,7 +307,11 @@ impl ServerSession {
 
     /// Names of the critical facets that are not there.
     pub fn absent(&self) -> Vec<&str> {
-        self.places.iter().filter(|p| p.seat.critical && p.standing == Standing::Absent).map(|p| p.seat.name.as_str()).collect()
+        self.places
+            .iter()
+            .filter(|p| p.seat.critical && p.standing == Standing::Absent)
+            .map(|p| p.seat.name.as_str())
+            .collect()
     }
 
     /// Whether the next frame may be published: the last one has been shown, or nobody waits for it any more.

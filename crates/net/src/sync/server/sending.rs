@@ -19,7 +19,8 @@ impl ServerSession {
 
     /// Over a link that loses messages: what is unanswered goes out again.
     pub(super) fn resend(&mut self, now: Duration, after: Duration) {
-        let due: Vec<FacetNumber> = self.there().filter(|(_, p)| now >= p.sent.saturating_add(after)).map(|(k, _)| k).collect();
+        let due: Vec<FacetNumber> =
+            self.there().filter(|(_, p)| now >= p.sent.saturating_add(after)).map(|(k, _)| k).collect();
         for facet in due {
             let place = &mut self.places[facet as usize];
             place.sent = now;
@@ -27,7 +28,9 @@ impl ServerSession {
             match self.stage {
                 _ if !synced => self.send_all_again(now, facet),
                 Stage::Ready(_) if !ready => self.send_state(now, facet),
-                Stage::Presented(_) if ready && !presented => self.send_present(now, vec![facet], self.frame.unwrap_or(0)),
+                Stage::Presented(_) if ready && !presented => {
+                    self.send_present(now, vec![facet], self.frame.unwrap_or(0))
+                }
                 _ => {}
             }
         }
@@ -37,14 +40,19 @@ impl ServerSession {
     pub fn wake(&self) -> Option<Duration> {
         let there = self.there().map(|(_, p)| p.heard.saturating_add(self.options.drop_after));
         let beats = self.there().map(|(_, p)| p.sent.saturating_add(self.options.drop_after / 4));
-        let again = self.options.resend_after.into_iter().flat_map(|after| self.there().map(move |(_, p)| p.sent.saturating_add(after)));
+        let again = self
+            .options
+            .resend_after
+            .into_iter()
+            .flat_map(|after| self.there().map(move |(_, p)| p.sent.saturating_add(after)));
         there.chain(beats).chain(again).chain(self.patience_ends()).min()
     }
 
     /// Who hears nothing else hears that the server lives.
     pub(super) fn beat(&mut self, now: Duration) {
         let every = self.options.drop_after / 4;
-        let due: Vec<FacetNumber> = self.there().filter(|(_, p)| now >= p.sent.saturating_add(every)).map(|(k, _)| k).collect();
+        let due: Vec<FacetNumber> =
+            self.there().filter(|(_, p)| now >= p.sent.saturating_add(every)).map(|(k, _)| k).collect();
         if !due.is_empty() {
             due.iter().for_each(|&k| self.places[k as usize].sent = now);
             let beat = message(&self.head(Kind::Beat, 0, self.frame.unwrap_or(0)), |_| {});
@@ -82,7 +90,9 @@ impl ServerSession {
         let place = &self.places[facet as usize];
         let (snapshot, join) = (self.streams[place.exact as usize].snapshot.clone(), place.join);
         if !snapshot.is_empty() {
-            self.send_to(facet, Kind::Snapshot, join, self.frame.unwrap_or(self.next), |out| out.extend(snapshot.iter()));
+            self.send_to(facet, Kind::Snapshot, join, self.frame.unwrap_or(self.next), |out| {
+                out.extend(snapshot.iter())
+            });
         }
     }
 
@@ -102,7 +112,14 @@ impl ServerSession {
         }
     }
 
-    pub(super) fn send_to(&mut self, facet: FacetNumber, kind: Kind, join: u64, frame: u64, write: impl FnOnce(&mut Vec<u8>)) {
+    pub(super) fn send_to(
+        &mut self,
+        facet: FacetNumber,
+        kind: Kind,
+        join: u64,
+        frame: u64,
+        write: impl FnOnce(&mut Vec<u8>),
+    ) {
         let bytes = message(&self.head(kind, join, frame), write);
         self.send(vec![facet], Delivery::Reliable, Arc::new(bytes));
     }

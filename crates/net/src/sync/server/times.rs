@@ -60,7 +60,11 @@ impl Clock {
         let Some(heard) = done.heard_us.and_then(|us| i64::try_from(us).ok()) else { return };
         let Ok(at) = i64::try_from(done.at_us) else { return };
         let (asked, now) = (micros(asked), micros(now));
-        let (Some(there), Some(first), Some(second)) = (at.checked_sub(heard), heard.checked_sub(asked), at.checked_sub(now)) else { return };
+        let (Some(there), Some(first), Some(second)) =
+            (at.checked_sub(heard), heard.checked_sub(asked), at.checked_sub(now))
+        else {
+            return;
+        };
         let wait = (now - asked).saturating_sub(there);
         if there < 0 || wait < 0 {
             return;
@@ -114,7 +118,11 @@ impl Times {
         if let Some(viewer) = viewer {
             self.shown.resize(viewer.users.len(), 0);
             for (k, user) in viewer.users.iter().enumerate().filter(|(k, user)| self.shown[*k] != user.input) {
-                let came = self.came.get(&(k as u16)).filter(|(sequence, _)| *sequence == user.input).map(|(_, at)| micros(*at));
+                let came = self
+                    .came
+                    .get(&(k as u16))
+                    .filter(|(sequence, _)| *sequence == user.input)
+                    .map(|(_, at)| micros(*at));
                 input = earlier(input, came);
             }
             self.shown.clear();
@@ -145,7 +153,13 @@ impl Showing {
         let between = |from: i64, to: i64| Duration::from_micros(u64::try_from(to.saturating_sub(from)).unwrap_or(0));
         let Showing { frame, input, first, last, facets } = self;
         let error = if facets > 1 { between(0, first.1 + last.1) } else { Duration::ZERO };
-        (facets > 0).then(|| FrameTimes { frame, facets, skew: between(first.0, last.0), error, input: input.map(|input| between(input, last.0)) })
+        (facets > 0).then(|| FrameTimes {
+            frame,
+            facets,
+            skew: between(first.0, last.0),
+            error,
+            input: input.map(|input| between(input, last.0)),
+        })
     }
 }
 

@@ -27,7 +27,14 @@ impl Alive {
         let path = folder.join(LOCK);
         let io = |why| LinkError::Io { what: format!("shared memory: {}", path.display()), why };
         loop {
-            let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).mode(0o600).open(&path).map_err(io)?;
+            let file = OpenOptions::new()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .mode(0o600)
+                .open(&path)
+                .map_err(io)?;
             file.lock_shared().map_err(io)?; // who holds it alone removes two files and lets go
             // one of those may be this one
             if std::fs::metadata(&path).is_ok_and(|there| file.metadata().is_ok_and(|ours| there.ino() == ours.ino())) {
@@ -47,7 +54,12 @@ impl Drop for Alive {
         bell::clean_up(self.user);
         if self.file.unlock().is_ok() && self.file.try_lock().is_ok() {
             let folder = self.path.parent().and_then(|folder| std::fs::read_dir(folder).ok());
-            for file in folder.into_iter().flatten().flatten().filter(|file| file.file_name().as_encoded_bytes().ends_with(COUNTER.as_bytes())) {
+            for file in folder
+                .into_iter()
+                .flatten()
+                .flatten()
+                .filter(|file| file.file_name().as_encoded_bytes().ends_with(COUNTER.as_bytes()))
+            {
                 let _ = std::fs::remove_file(file.path());
             }
             let _ = std::fs::remove_file(&self.path);

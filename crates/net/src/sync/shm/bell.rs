@@ -68,7 +68,10 @@ impl Bell {
                 value.write(Default::default());
                 true
             };
-            let builder = Builder::<Counters>::new(&name).config(&configuration).has_ownership(false).timeout(Duration::from_secs(1));
+            let builder = Builder::<Counters>::new(&name)
+                .config(&configuration)
+                .has_ownership(false)
+                .timeout(Duration::from_secs(1));
             let storage = builder.initializer(&mut fresh).open_or_create().map_err(refused)?;
             // who cleans up may have been quicker than the lock: then there is another one to make
             let Some(lock) = ours(&path).filter(|lock| lock.try_lock_shared().is_ok()) else { continue };
@@ -78,7 +81,10 @@ impl Bell {
                 return Ok(Bell { memory: storage, server: Some((server, lock)) });
             }
         }
-        Err(LinkError::Other(format!("shared memory: {} must be a file of this user with mode 600; remove it", path.display())))
+        Err(LinkError::Other(format!(
+            "shared memory: {} must be a file of this user with mode 600; remove it",
+            path.display()
+        )))
     }
 
     /// A facet's; `None` while there is no server.
@@ -89,7 +95,8 @@ impl Bell {
         if ours(&file(&name, &configuration)).is_none() {
             return Ok(None);
         }
-        let memory = Builder::<Counters>::new(&name).config(&configuration).has_ownership(false).open(AccessMode::ReadWrite);
+        let memory =
+            Builder::<Counters>::new(&name).config(&configuration).has_ownership(false).open(AccessMode::ReadWrite);
         Ok(memory.ok().map(|memory| Bell { memory, server: None }))
     }
 
@@ -160,7 +167,9 @@ impl Drop for Bell {
 /// Removes the bells of this user's servers that are gone.
 pub fn clean_up(user: u32) {
     let (Ok(files), Ok(configuration)) = (std::fs::read_dir(MEMORY), configuration(user)) else { return };
-    let is_bell = |name: &OsStr| FileName::new(name.as_encoded_bytes()).is_ok_and(|name| configuration.extract_name_from_file(&name).is_some());
+    let is_bell = |name: &OsStr| {
+        FileName::new(name.as_encoded_bytes()).is_ok_and(|name| configuration.extract_name_from_file(&name).is_some())
+    };
     for file in files.flatten().filter(|file| is_bell(&file.file_name())) {
         // a server that is about to lock it finds it gone, and makes another one
         if let Some(left) = ours(&file.path())
@@ -179,7 +188,9 @@ fn file(name: &FileName, configuration: &Configuration<Counters>) -> PathBuf {
 
 /// A file of this user that nobody else may open: others could cut it to nothing, which ends whoever reads it.
 fn ours(path: &Path) -> Option<File> {
-    let mine = |about: Metadata| about.is_file() && about.uid() == rustix::process::geteuid().as_raw() && about.mode() & 0o077 == 0;
+    let mine = |about: Metadata| {
+        about.is_file() && about.uid() == rustix::process::geteuid().as_raw() && about.mode() & 0o077 == 0
+    };
     std::fs::symlink_metadata(path).ok().filter(|about| mine(about.clone()))?;
     // to be written: one that is being made can not be read yet
     OpenOptions::new().write(true).open(path).ok().filter(|file| file.metadata().is_ok_and(mine))
@@ -219,7 +230,8 @@ mod tests {
         let awake = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let waiting: Vec<_> = facets.iter().map(|facet| (facet.rung(), facet)).collect();
-            let waiting: Vec<_> = waiting.into_iter().map(|(seen, facet)| scope.spawn(move || facet.wait_for_ring(seen, long))).collect();
+            let waiting: Vec<_> =
+                waiting.into_iter().map(|(seen, facet)| scope.spawn(move || facet.wait_for_ring(seen, long))).collect();
             server.ring();
             waiting.into_iter().for_each(|facet| facet.join().unwrap().unwrap());
             let seen = server.answers();

@@ -4,7 +4,10 @@ use super::order::{Memory, Order};
 use super::ports::{Ports, Received};
 use super::wire::{HEAD, Head, Kind};
 use super::{ASK, PING, SILENCE, draw};
-use crate::sync::transport::{Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Message};
+use crate::sync::transport::{
+    Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES,
+    Message,
+};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -121,7 +124,8 @@ impl ShmFacet {
         let for_me = head.facet == self.facet && head.connection == self.connection;
         if let Stage::Looking { .. } = self.stage {
             if head.kind == Kind::Welcome && for_me {
-                self.stage = Stage::Connected { reign: head.reign, order: Order::new(head.number), heard: now, sent: now };
+                self.stage =
+                    Stage::Connected { reign: head.reign, order: Order::new(head.number), heard: now, sent: now };
                 self.counters.opened += 1;
                 self.waiting.push_back(Waiting::Event(LinkEvent::Opened));
             }
@@ -165,8 +169,9 @@ impl ShmFacet {
             return Ok(());
         };
         let base = self.head(Kind::Piece);
-        let pieces: Vec<(Head, Vec<u8>)> =
-            pieces.map(|(number, kept)| (Head { newest: kept.newest, more: kept.more, number, ..base }, kept.data.clone())).collect();
+        let pieces: Vec<(Head, Vec<u8>)> = pieces
+            .map(|(number, kept)| (Head { newest: kept.newest, more: kept.more, number, ..base }, kept.data.clone()))
+            .collect();
         for (head, data) in pieces {
             self.counters.repeated += 1;
             self.tell(head, &data)?;

@@ -47,7 +47,8 @@ impl Memory {
     /// Remembers the piece that was sent as [`next`](Self::next).
     pub fn keep(&mut self, mask: u64, newest: bool, more: bool, bytes: &[u8]) {
         // A small piece does not take a large buffer away.
-        let mut data = if self.spare.capacity() / 4 <= bytes.len() { std::mem::take(&mut self.spare) } else { Vec::new() };
+        let mut data =
+            if self.spare.capacity() / 4 <= bytes.len() { std::mem::take(&mut self.spare) } else { Vec::new() };
         data.clear();
         data.extend_from_slice(bytes);
         self.bytes += data.len();
@@ -79,14 +80,17 @@ impl Memory {
     pub fn again(&self, head: &Head) -> Option<impl Iterator<Item = (u64, &Kept)>> {
         let until = head.until.min(head.number.saturating_add(AT_ONCE)).min(self.next());
         let range = head.number..until;
-        (head.number >= self.first).then(|| range.filter_map(|number| Some((number, self.kept.get((number - self.first) as usize)?))))
+        (head.number >= self.first)
+            .then(|| range.filter_map(|number| Some((number, self.kept.get((number - self.first) as usize)?))))
     }
 
     /// The same for one reader of many, whose bit of the masks is `bit`: what is for others, or older than its newest, is left out, however much that is.
     pub fn again_to(&self, head: &Head, bit: u64) -> Option<Vec<Again<'_>>> {
-        let mut left = self.kept.iter().enumerate().skip(usize::try_from(head.number.checked_sub(self.first)?).ok()?).peekable();
+        let mut left =
+            self.kept.iter().enumerate().skip(usize::try_from(head.number.checked_sub(self.first)?).ok()?).peekable();
         let newest = self.newest_of(bit);
-        let wanted = |k: usize, kept: &Kept| kept.mask & bit != 0 && !(kept.newest && newest.is_some_and(|first| k < first));
+        let wanted =
+            |k: usize, kept: &Kept| kept.mask & bit != 0 && !(kept.newest && newest.is_some_and(|first| k < first));
         let mut again = Vec::new();
         while again.len() < AT_ONCE as usize
             && let Some((k, kept)) = left.next()
@@ -158,7 +162,13 @@ impl Order {
     }
 
     /// Takes a piece; whole messages go to `deliver`. One that came in one piece and in order goes on as it is.
-    pub fn take(&mut self, head: &Head, mine: bool, data: Message, mut deliver: impl FnMut(Delivery, Message)) -> Result<(), Overrun> {
+    pub fn take(
+        &mut self,
+        head: &Head,
+        mine: bool,
+        data: Message,
+        mut deliver: impl FnMut(Delivery, Message),
+    ) -> Result<(), Overrun> {
         if head.number < self.next || self.pending.contains_key(&head.number) {
             return Ok(());
         }
@@ -257,13 +267,23 @@ mod tests {
     fn a_slow_reader_gets_all_in_order() {
         let (mut memory, mut order, mut buffer) = (Memory::default(), Order::new(0), VecDeque::new());
         let mut got = Vec::new();
-        let head =
-            |number, kept: &Kept| Head { number, mask: kept.mask, newest: kept.newest, more: kept.more, ..Head::new(Kind::Piece, 1) };
+        let head = |number, kept: &Kept| Head {
+            number,
+            mask: kept.mask,
+            newest: kept.newest,
+            more: kept.more,
+            ..Head::new(Kind::Piece, 1)
+        };
         for round in 0..400u64 {
             if round < 100 {
                 for _ in 0..round % 23 {
                     let number = memory.next();
-                    let kept = Kept { mask: 1 << (number % 3 / 2), newest: false, more: number % 3 == 0, data: vec![number as u8; 3] };
+                    let kept = Kept {
+                        mask: 1 << (number % 3 / 2),
+                        newest: false,
+                        more: number % 3 == 0,
+                        data: vec![number as u8; 3],
+                    };
                     memory.keep(kept.mask, false, kept.more, &kept.data);
                     buffer.push_back((head(number, &kept), kept.data));
                 }
@@ -276,11 +296,14 @@ mod tests {
             }
             if let Some((number, until)) = order.ask(Duration::from_millis(round)) {
                 let asked = Head { number, until, ..Head::new(Kind::Again, 1) };
-                buffer.extend(memory.again(&asked).unwrap().map(|(number, kept)| (head(number, kept), kept.data.clone())));
+                buffer.extend(
+                    memory.again(&asked).unwrap().map(|(number, kept)| (head(number, kept), kept.data.clone())),
+                );
             }
         }
         // Numbers 3k and 3k + 1 are the two pieces of a message for this reader; 3k + 2 is for another.
-        let want: Vec<Vec<u8>> = (0..memory.next()).step_by(3).map(|k| [[k as u8; 3], [(k + 1) as u8; 3]].concat()).collect();
+        let want: Vec<Vec<u8>> =
+            (0..memory.next()).step_by(3).map(|k| [[k as u8; 3], [(k + 1) as u8; 3]].concat()).collect();
         let whole = memory.next() as usize / 3 + usize::from(memory.next() % 3 == 2);
         assert_eq!(order.next(), memory.next());
         assert!(got.len() > 300 && got == want[..whole]);
@@ -298,18 +321,34 @@ mod tests {
         }
         // it has the first half of the first message; nothing after that came but the very last piece
         let (mut order, mut got) = (Order::new(0), Vec::new());
-        let head = |number, kept: &Kept| Head { number, mask: kept.mask, newest: kept.newest, more: kept.more, ..Head::new(Kind::Piece, 1) };
+        let head = |number, kept: &Kept| Head {
+            number,
+            mask: kept.mask,
+            newest: kept.newest,
+            more: kept.more,
+            ..Head::new(Kind::Piece, 1)
+        };
         let kept = |number: u64| memory.kept.get(number as usize).unwrap();
         for number in [0, 1999] {
-            order.take(&head(number, kept(number)), true, kept(number).data.clone().into(), |_, message| got.push(message.into_vec())).unwrap();
+            order
+                .take(&head(number, kept(number)), true, kept(number).data.clone().into(), |_, message| {
+                    got.push(message.into_vec())
+                })
+                .unwrap();
         }
         let mut rounds = 0;
         while let Some((number, until)) = order.ask(PATIENCE * 2 * rounds) {
             rounds += 1;
             for again in memory.again_to(&Head { number, until, ..Head::new(Kind::Again, 1) }, 1).unwrap() {
                 match again {
-                    Again::Piece(number, kept) => order.take(&head(number, kept), true, kept.data.clone().into(), |_, message| got.push(message.into_vec())).unwrap(),
-                    Again::Nothing(from, until) => order.skip(from, until, |_, message| got.push(message.into_vec())).unwrap(),
+                    Again::Piece(number, kept) => order
+                        .take(&head(number, kept), true, kept.data.clone().into(), |_, message| {
+                            got.push(message.into_vec())
+                        })
+                        .unwrap(),
+                    Again::Nothing(from, until) => {
+                        order.skip(from, until, |_, message| got.push(message.into_vec())).unwrap()
+                    }
                 }
             }
             assert!(rounds < 4, "asked again and again");

@@ -11,12 +11,14 @@ use super::wire::Words;
 use crate::sync::transport::{FacetNumber, LinkError, Message};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
-use iceoryx2::prelude::{AllocationStrategy, Config, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
+use iceoryx2::prelude::{
+    AllocationStrategy, Config, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level,
+};
 use iceoryx2::sample::Sample;
 use std::fmt::Debug;
-use std::sync::Arc;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Most bytes of a sample from the server; a longer message goes in pieces.
 pub const DOWN_BYTES: usize = 128 << 10;
@@ -63,9 +65,13 @@ impl Ports {
         // Killed processes hold their places until they are cleaned up.
         let places = 2 * usize::from(facets) + 4;
         let data = |name: &str, publishers: usize, subscribers: usize| {
-            let builder = node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>();
             let builder =
-                builder.enable_safe_overflow(true).subscriber_max_buffer_size(BUFFER).history_size(0).subscriber_max_borrowed_samples(HELD);
+                node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>();
+            let builder = builder
+                .enable_safe_overflow(true)
+                .subscriber_max_buffer_size(BUFFER)
+                .history_size(0)
+                .subscriber_max_borrowed_samples(HELD);
             builder
                 .max_publishers(publishers)
                 .max_subscribers(subscribers)
@@ -91,8 +97,18 @@ impl Ports {
     /// Joins a run's services as a facet; `None` while there are none.
     pub fn join(run: &str) -> Result<Option<Ports>, LinkError> {
         let (node, alive) = node("tumble facet")?;
-        let data = |name: &str| Ok::<_, LinkError>(node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>().open().ok());
-        let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, alive.user())?) else { return Ok(None) };
+        let data = |name: &str| {
+            Ok::<_, LinkError>(
+                node.service_builder(&service_name(run, name)?)
+                    .publish_subscribe::<[u8]>()
+                    .user_header::<Words>()
+                    .open()
+                    .ok(),
+            )
+        };
+        let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, alive.user())?) else {
+            return Ok(None);
+        };
         let ports = Ports {
             publisher: publisher(&up, UP_BYTES).map_err(|why| refused(run, "up", why))?,
             subscriber: down.subscriber_builder().create().map_err(|why| refused(run, "down", why))?,
@@ -139,7 +155,11 @@ impl Ports {
     /// The message of a sample: where it lies, or a copy where the reader holds so many already that it could not go on reading.
     pub fn lend(&self, sample: Received) -> Message {
         // one more is held while it is looked at
-        if Arc::strong_count(&self.lent) + 1 < HELD { Message::lent(Lent { sample, _held: self.lent.clone() }) } else { sample.as_ref().to_vec().into() }
+        if Arc::strong_count(&self.lent) + 1 < HELD {
+            Message::lent(Lent { sample, _held: self.lent.clone() })
+        } else {
+            sample.as_ref().to_vec().into()
+        }
     }
 
     /// Removes what killed processes left.
@@ -178,7 +198,8 @@ fn node(name: &str) -> Result<(Node<Private>, Alive), LinkError> {
     set_log_level(LogLevel::Fatal); // what goes wrong is told by our errors
     let (folder, user) = folder()?;
     let text = folder.display().to_string();
-    let unusable = |why: &dyn Debug| LinkError::Other(format!("shared memory: the folder {text} cannot be used: {why:?}"));
+    let unusable =
+        |why: &dyn Debug| LinkError::Other(format!("shared memory: the folder {text} cannot be used: {why:?}"));
     let mut config = Config::default();
     // Of another folder another one: nodes that do not see each other draw from different counters.
     let prefix = format!("tumble_{user}_{}_", &blake3::hash(text.as_bytes()).to_hex()[..8]);
@@ -204,8 +225,9 @@ pub fn clean_up() -> Result<(), LinkError> {
 /// A folder of this user alone, made if need be; and the user's number.
 pub fn folder() -> Result<(PathBuf, u32), LinkError> {
     let user = std::fs::metadata("/proc/self").map_err(|why| LinkError::Io { what: "/proc/self".into(), why })?.uid();
-    let base =
-        std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|dir| std::fs::metadata(dir).is_ok_and(|about| about.uid() == user));
+    let base = std::env::var_os("XDG_RUNTIME_DIR")
+        .map(PathBuf::from)
+        .filter(|dir| std::fs::metadata(dir).is_ok_and(|about| about.uid() == user));
     let folder = base.unwrap_or_else(std::env::temp_dir).join(format!("tumble-{user}"));
     let io = |why| LinkError::Io { what: format!("shared memory: folder {}", folder.display()), why };
     match std::fs::DirBuilder::new().mode(0o700).create(&folder) {
@@ -226,9 +248,9 @@ pub fn folder() -> Result<(PathBuf, u32), LinkError> {
 
 fn service_name(run: &str, name: &str) -> Result<iceoryx2::service::service_name::ServiceName, LinkError> {
     let full = format!("tumble/{run}/{name}");
-    full.as_str()
-        .try_into()
-        .map_err(|why| LinkError::Other(format!("shared memory: {full:?} is no name of a service: {why:?}; at most 200 bytes")))
+    full.as_str().try_into().map_err(|why| {
+        LinkError::Other(format!("shared memory: {full:?} is no name of a service: {why:?}; at most 200 bytes"))
+    })
 }
 
 fn refused(run: &str, name: &str, why: impl Debug) -> LinkError {

@@ -5,7 +5,8 @@ use super::ports::{Ports, Received};
 use super::wire::{HEAD, Head, Kind};
 use super::{PING, SILENCE, draw};
 use crate::sync::transport::{
-    Closed, Delivery, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused, ServerLink,
+    Closed, Delivery, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused,
+    ServerLink,
 };
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -140,7 +141,11 @@ impl ShmServer {
         let Some(connection) = self.connections[facet].as_mut().filter(known) else {
             self.counters[facet].refuse(Refused::Stale);
             // One that was stopped for long and goes on: it does not know yet that it was given up.
-            return self.tell(Head { facet: head.facet, connection: head.connection, ..Head::new(Kind::Close, self.reign) });
+            return self.tell(Head {
+                facet: head.facet,
+                connection: head.connection,
+                ..Head::new(Kind::Close, self.reign)
+            });
         };
         connection.heard = now;
         if head.until > self.memory.next() {
@@ -152,7 +157,9 @@ impl ShmServer {
                 connection.taken = connection.taken.max(head.until);
                 connection.owes &= head.more;
                 let waiting = &mut self.waiting;
-                let taken = connection.order.take(&head, true, data.to_vec().into(), |delivery, message| queue(waiting, head.facet, delivery, message.into_vec()));
+                let taken = connection.order.take(&head, true, data.to_vec().into(), |delivery, message| {
+                    queue(waiting, head.facet, delivery, message.into_vec())
+                });
                 if taken.is_err() {
                     self.end(head.facet, Closed::Overrun);
                 }
@@ -171,13 +178,24 @@ impl ShmServer {
         let same = self.connections[facet].as_ref().is_some_and(|connection| connection.number == hello.connection);
         if !same {
             self.end(hello.facet, Closed::Replaced);
-            let connection = Connection { number: hello.connection, order: Order::new(0), taken: next, heard: self.start.elapsed(), owes: false };
+            let connection = Connection {
+                number: hello.connection,
+                order: Order::new(0),
+                taken: next,
+                heard: self.start.elapsed(),
+                owes: false,
+            };
             self.connections[facet] = Some(connection);
             self.counters[facet].opened += 1;
             self.waiting.push_back((hello.facet, Waiting::Event(LinkEvent::Opened)));
         }
         let number = self.connections[facet].as_ref().map_or(next, |connection| connection.taken);
-        self.tell(Head { facet: hello.facet, connection: hello.connection, number, ..Head::new(Kind::Welcome, self.reign) })
+        self.tell(Head {
+            facet: hello.facet,
+            connection: hello.connection,
+            number,
+            ..Head::new(Kind::Welcome, self.reign)
+        })
     }
 
     /// Sends again what a slow facet missed and still wants; of the rest, that there is nothing.
@@ -187,11 +205,14 @@ impl ShmServer {
             self.end(asked.facet, Closed::Overrun);
             return Ok(());
         };
-        let base = Head { facet: asked.facet, connection: asked.connection, mask: bit, ..Head::new(Kind::Piece, self.reign) };
+        let base =
+            Head { facet: asked.facet, connection: asked.connection, mask: bit, ..Head::new(Kind::Piece, self.reign) };
         let counters = &mut self.counters[usize::from(asked.facet)];
         for again in again {
             let (head, data) = match again {
-                Again::Piece(number, kept) => (Head { newest: kept.newest, more: kept.more, number, ..base }, &kept.data[..]),
+                Again::Piece(number, kept) => {
+                    (Head { newest: kept.newest, more: kept.more, number, ..base }, &kept.data[..])
+                }
                 Again::Nothing(number, until) => (Head { skip: true, number, until, ..base }, &[][..]),
             };
             self.ports.publish(head.words(), data)?;
@@ -208,7 +229,13 @@ impl ShmServer {
         for facet in 0..self.connections.len() {
             let Some(connection) = &mut self.connections[facet] else { continue };
             if let Some((number, until)) = connection.order.ask(now) {
-                let head = Head { facet: facet as u16, connection: connection.number, number, until, ..Head::new(Kind::Again, self.reign) };
+                let head = Head {
+                    facet: facet as u16,
+                    connection: connection.number,
+                    number,
+                    until,
+                    ..Head::new(Kind::Again, self.reign)
+                };
                 self.tell(head)?;
             }
         }
@@ -226,8 +253,9 @@ impl ShmServer {
     }
 
     fn end_all(&mut self, why: Closed, is_over: impl Fn(&Connection) -> bool) -> bool {
-        let over: Vec<u16> =
-            (0..self.connections.len() as u16).filter(|k| self.connections[usize::from(*k)].as_ref().is_some_and(&is_over)).collect();
+        let over: Vec<u16> = (0..self.connections.len() as u16)
+            .filter(|k| self.connections[usize::from(*k)].as_ref().is_some_and(&is_over))
+            .collect();
         over.iter().for_each(|facet| self.end(*facet, why));
         !over.is_empty()
     }
@@ -276,7 +304,11 @@ impl ServerLink for ShmServer {
         Ok(mask.count_ones() as usize)
     }
 
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
+    fn recv(
+        &mut self,
+        timeout: Duration,
+        message: &mut Vec<u8>,
+    ) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
         message.clear();
         let end = self.start.elapsed() + timeout;
         loop {

@@ -67,7 +67,18 @@ pub struct Head {
 impl Head {
     /// A head with zeros behind the kind.
     pub fn new(kind: Kind, reign: u64) -> Head {
-        Head { kind, newest: false, more: false, skip: false, facet: 0, reign, connection: 0, mask: 0, number: 0, until: 0 }
+        Head {
+            kind,
+            newest: false,
+            more: false,
+            skip: false,
+            facet: 0,
+            reign,
+            connection: 0,
+            mask: 0,
+            number: 0,
+            until: 0,
+        }
     }
 
     /// As it lies in shared memory.
@@ -85,6 +96,17 @@ impl Head {
             return Err(Refused::Foreign);
         }
         let flag = |bit: u8| flags >> bit & 1 == 1;
-        Ok(Head { kind, newest: flag(0), more: flag(1), skip: flag(2), facet: u16::from_le_bytes(facet), reign, connection, mask, number, until })
+        Ok(Head {
+            kind,
+            newest: flag(0),
+            more: flag(1),
+            skip: flag(2),
+            facet: u16::from_le_bytes(facet),
+            reign,
+            connection,
+            mask,
+            number,
+            until,
+        })
     }
 }

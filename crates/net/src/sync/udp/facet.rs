@@ -114,7 +114,9 @@ impl FacetMachine {
     fn doubt(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         let Stage::Connected(session) = &self.stage else { return };
         let number = session.agreed.session;
-        if now < doubted_from(session, &self.settings) || self.doubt.as_ref().is_some_and(|doubt| now >= doubt.question.give_up) {
+        if now < doubted_from(session, &self.settings)
+            || self.doubt.as_ref().is_some_and(|doubt| now >= doubt.question.give_up)
+        {
             self.doubt = None;
         }
         if now < doubted_from(session, &self.settings) {
@@ -215,11 +217,17 @@ impl FacetMachine {
     }
 
     fn take_data(&mut self, now: Duration, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
-        let (Stage::Connected(session), counters) = (&mut self.stage, &mut self.counters) else { return Err(Refused::Stale) };
+        let (Stage::Connected(session), counters) = (&mut self.stage, &mut self.counters) else {
+            return Err(Refused::Stale);
+        };
         if session.agreed.session == header.session {
             return session.receive(now, header, datagram, counters).inspect(|()| self.doubt = None);
         }
-        let other = self.doubt.as_mut().and_then(|doubt| doubt.other.as_mut()).filter(|other| other.agreed.session == header.session);
+        let other = self
+            .doubt
+            .as_mut()
+            .and_then(|doubt| doubt.other.as_mut())
+            .filter(|other| other.agreed.session == header.session);
         other.ok_or(Refused::Stale)?.receive(now, header, datagram, counters)?;
         // the server has the new keys, and said nothing by the old ones
         if let Some(other) = self.doubt.take().and_then(|doubt| doubt.other) {
@@ -237,7 +245,10 @@ impl FacetMachine {
 
     fn take_welcome(&mut self, now: Duration, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
         let reply = Reply::read(datagram, &self.handshake)?;
-        let question = self.question().filter(|question| question.answering && question.hello.nonce == reply.nonce).ok_or(Refused::Stale)?;
+        let question = self
+            .question()
+            .filter(|question| question.answering && question.hello.nonce == reply.nonce)
+            .ok_or(Refused::Stale)?;
         let facet_nonce = question.hello.nonce;
         let FacetSettings { facet, server, timing, numbering } = self.settings;
         let agreed = Agreement { session: header.session, facet, facet_nonce, server_nonce: reply.value };
@@ -274,7 +285,12 @@ impl Question {
     }
 
     fn transmit(
-        &mut self, now: Duration, settings: &FacetSettings, handshake: &Handshake, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8]),
+        &mut self,
+        now: Duration,
+        settings: &FacetSettings,
+        handshake: &Handshake,
+        counters: &mut LinkCounters,
+        emit: &mut dyn FnMut(SocketAddr, &[u8]),
     ) {
         if now >= self.next {
             self.next = now + settings.timing.ask;

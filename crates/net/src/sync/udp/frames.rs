@@ -108,7 +108,10 @@ impl Frame<'_> {
         match self {
             Frame::Ack(ack) => {
                 out.push(1 + if ack.newest.is_some() { NEWEST } else { 0 });
-                [Some(ack.reliable), ack.newest, Some(ack.largest)].iter().flatten().for_each(|n| out.extend_from_slice(&n.to_le_bytes()));
+                [Some(ack.reliable), ack.newest, Some(ack.largest)]
+                    .iter()
+                    .flatten()
+                    .for_each(|n| out.extend_from_slice(&n.to_le_bytes()));
                 out.push(ack.bytes);
                 out.extend_from_slice(&ack.mask.to_le_bytes()[..usize::from(ack.bytes.min(16))]);
             }

@@ -70,7 +70,12 @@ impl Hello {
         let (nonce, rest) = body.split_first_chunk().ok_or(Refused::Truncated)?;
         let (facet, rest) = rest.split_first_chunk().ok_or(Refused::Truncated)?;
         let (cookie, _) = rest.split_first_chunk().ok_or(Refused::Truncated)?;
-        Ok(Hello { nonce: *nonce, facet: FacetNumber::from_le_bytes(*facet), cookie: *cookie, doubted: packet::session_of(datagram) })
+        Ok(Hello {
+            nonce: *nonce,
+            facet: FacetNumber::from_le_bytes(*facet),
+            cookie: *cookie,
+            doubted: packet::session_of(datagram),
+        })
     }
 }
 
@@ -115,7 +120,10 @@ impl Cookies {
     pub fn fits(&self, now: Duration, from: SocketAddr, answer: &Hello) -> bool {
         let interval = now.as_secs() / INTERVAL_S;
         let given = blake3::Hash::from(answer.cookie);
-        [Some(interval), interval.checked_sub(1)].into_iter().flatten().any(|interval| self.of(interval, from, answer) == given)
+        [Some(interval), interval.checked_sub(1)]
+            .into_iter()
+            .flatten()
+            .any(|interval| self.of(interval, from, answer) == given)
     }
 
     fn of(&self, interval: u64, from: SocketAddr, hello: &Hello) -> blake3::Hash {
@@ -124,7 +132,11 @@ impl Cookies {
             IpAddr::V6(ip) => ip.octets(),
         };
         let mut hasher = blake3::Hasher::new_keyed(&self.0);
-        hasher.update(&address).update(&from.port().to_le_bytes()).update(&hello.nonce).update(&hello.facet.to_le_bytes());
+        hasher
+            .update(&address)
+            .update(&from.port().to_le_bytes())
+            .update(&hello.nonce)
+            .update(&hello.facet.to_le_bytes());
         hasher.update(&interval.to_le_bytes()).finalize()
     }
 }

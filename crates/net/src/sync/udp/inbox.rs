@@ -43,7 +43,15 @@ pub struct Inbox {
 impl Inbox {
     /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
     pub fn new(first: u32) -> Inbox {
-        Inbox { first, next: [first; 2], assemblies: Default::default(), held: 0, ready: VecDeque::new(), ready_bytes: 0, superseded: 0 }
+        Inbox {
+            first,
+            next: [first; 2],
+            assemblies: Default::default(),
+            held: 0,
+            ready: VecDeque::new(),
+            ready_bytes: 0,
+            superseded: 0,
+        }
     }
 
     /// Where message numbers begin.
@@ -138,7 +146,8 @@ impl Inbox {
             && let Some(assembly) = self.assemblies[channel].remove(&part.message)
         {
             self.held -= assembly.held();
-            let gone: Vec<u32> = self.assemblies[channel].keys().copied().filter(|k| before(*k, part.message)).collect();
+            let gone: Vec<u32> =
+                self.assemblies[channel].keys().copied().filter(|k| before(*k, part.message)).collect();
             for gone in gone.iter().filter_map(|k| self.assemblies[channel].remove(k)) {
                 self.held -= gone.held();
             }
@@ -215,6 +224,10 @@ pub fn xor(into: &mut [u8], other: &[u8]) {
 /// The parity of a group of a message's fragments.
 pub fn parity(message: &[u8], group: u16, groups: u16) -> [u8; FRAGMENT] {
     let mut parity = [0; FRAGMENT];
-    message.chunks(FRAGMENT).skip(usize::from(group)).step_by(usize::from(groups)).for_each(|fragment| xor(&mut parity, fragment));
+    message
+        .chunks(FRAGMENT)
+        .skip(usize::from(group))
+        .step_by(usize::from(groups))
+        .for_each(|fragment| xor(&mut parity, fragment));
     parity
 }

@@ -54,8 +54,10 @@ impl SharedKey {
     /// Errors, each naming the file and what would be right: it cannot be read, others than its owner may read it, or it holds something else.
     pub fn read(path: &Path) -> Result<SharedKey, LinkError> {
         let refuse = |why: String| LinkError::Other(format!("key file {}: {why}", path.display()));
-        let file = std::fs::File::open(path).map_err(|why| LinkError::Io { what: format!("key file {}", path.display()), why })?;
-        let about = file.metadata().map_err(|why| LinkError::Io { what: format!("key file {}", path.display()), why })?;
+        let file = std::fs::File::open(path)
+            .map_err(|why| LinkError::Io { what: format!("key file {}", path.display()), why })?;
+        let about =
+            file.metadata().map_err(|why| LinkError::Io { what: format!("key file {}", path.display()), why })?;
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
@@ -194,9 +196,14 @@ pub struct Seal {
 impl Seal {
     /// The keys of `side`. `first` is the first sequence number: 0 but in tests of the wrap.
     pub fn new(shared: &SharedKey, agreed: &Agreement, side: Side, first: u64) -> Seal {
-        let material =
-            [&shared.bytes[..], &agreed.facet_nonce, &agreed.server_nonce, &agreed.session.to_le_bytes(), &agreed.facet.to_le_bytes()]
-                .concat();
+        let material = [
+            &shared.bytes[..],
+            &agreed.facet_nonce,
+            &agreed.server_nonce,
+            &agreed.session.to_le_bytes(),
+            &agreed.facet.to_le_bytes(),
+        ]
+        .concat();
         let cipher = |context| ChaCha20Poly1305::new(&blake3::derive_key(context, &material).into());
         let (outgoing, incoming) = match side {
             Side::Server => (cipher(TO_FACET), cipher(TO_SERVER)),
@@ -219,7 +226,9 @@ impl Seal {
         datagram.extend_from_slice(body);
         packet::set_length(datagram);
         let covered = packet::associated(datagram);
-        let Ok(tag) = self.outgoing.encrypt_inout_detached(&nonce(sequence), &covered, (&mut datagram[HEADER..]).into()) else {
+        let Ok(tag) =
+            self.outgoing.encrypt_inout_detached(&nonce(sequence), &covered, (&mut datagram[HEADER..]).into())
+        else {
             return false; // only for bodies of gigabytes
         };
         packet::finish(datagram, &tag.into());
@@ -234,7 +243,12 @@ impl Seal {
         body.extend_from_slice(&covered[HEADER..]);
         let tag = Tag::try_from(tag).map_err(|_| Refused::Forged)?;
         self.incoming
-            .decrypt_inout_detached(&nonce(header.sequence), &packet::associated(datagram), body.as_mut_slice().into(), &tag)
+            .decrypt_inout_detached(
+                &nonce(header.sequence),
+                &packet::associated(datagram),
+                body.as_mut_slice().into(),
+                &tag,
+            )
             .map_err(|_| Refused::Forged)
     }
 }

@@ -92,7 +92,10 @@ pub fn parse(datagram: &[u8]) -> Result<Header, Refused> {
 pub fn whole(lower: u32, near: u64) -> u64 {
     let same = near & !u64::from(u32::MAX) | u64::from(lower);
     let others = [same.checked_sub(1 << 32), same.checked_add(1 << 32)];
-    others.into_iter().flatten().fold(same, |best, other| if other.abs_diff(near) < best.abs_diff(near) { other } else { best })
+    others
+        .into_iter()
+        .flatten()
+        .fold(same, |best, other| if other.abs_diff(near) < best.abs_diff(near) { other } else { best })
 }
 
 /// Clears `datagram` and writes the header into it; `seal_off` or [`finish`] set length and checksum.
@@ -143,7 +146,19 @@ mod tests {
 
     #[test]
     fn the_upper_half_of_a_number_is_that_of_its_neighbours() {
-        let corners = [0u64, 1, 200, (1 << 31) - 1, 1 << 31, (1 << 32) - 1, 1 << 32, 7 << 32 | 5, u64::MAX - (1 << 31), u64::MAX - 1, u64::MAX];
+        let corners = [
+            0u64,
+            1,
+            200,
+            (1 << 31) - 1,
+            1 << 31,
+            (1 << 32) - 1,
+            1 << 32,
+            7 << 32 | 5,
+            u64::MAX - (1 << 31),
+            u64::MAX - 1,
+            u64::MAX,
+        ];
         for near in corners {
             for step in [0u64, 1, 255, (1 << 31) - 1] {
                 for number in [near.checked_sub(step), near.checked_add(step)].into_iter().flatten() {

@@ -5,7 +5,9 @@ use super::handshake::{Cookies, Hello, Reply};
 use super::keys::{Agreement, Entropy, Handshake, SharedKey, Side};
 use super::packet::{self, Header, Kind};
 use super::session::{Numbering, Session};
-use crate::sync::transport::{Closed, Delivery, FacetNumber, LinkCounters, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused};
+use crate::sync::transport::{
+    Closed, Delivery, FacetNumber, LinkCounters, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused,
+};
 use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -76,7 +78,9 @@ impl ServerMachine {
     pub fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) {
         let header = packet::parse(datagram);
         let facet = match &header {
-            Ok(header) if header.kind == Kind::Data => self.sessions.get(&header.session).map(|session| session.agreed.facet),
+            Ok(header) if header.kind == Kind::Data => {
+                self.sessions.get(&header.session).map(|session| session.agreed.facet)
+            }
             _ => self.facet_at(from),
         };
         self.counters_of(facet).bytes_in += datagram.len() as u64;
@@ -194,19 +198,28 @@ impl ServerMachine {
 
     /// A packet of a session that is not known, or over: not answered, for it proves nothing. Genuine ones that were late do no harm and are no refusal.
     fn take_late(&mut self, from: SocketAddr, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
-        let over = self.over.iter_mut().find(|session| session.agreed.session == header.session && session.address == from);
+        let over =
+            self.over.iter_mut().find(|session| session.agreed.session == header.session && session.address == from);
         over.ok_or(Refused::Stale)?.receive_late(header, datagram)
     }
 
     fn take_hello(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) -> Result<(), Refused> {
         let hello = self.known(Hello::read(datagram, &self.handshake)?)?;
-        let known = self.sessions.get_mut(&hello.doubted).filter(|s| s.live && s.address == from && s.agreed.facet == hello.facet);
+        let known = self
+            .sessions
+            .get_mut(&hello.doubted)
+            .filter(|s| s.live && s.address == from && s.agreed.facet == hello.facet);
         if let Some(session) = known {
             session.ping();
             return Ok(());
         }
         let mut reply = Vec::new();
-        Reply { nonce: hello.nonce, value: self.cookies.bake(now, from, &hello) }.write(Kind::Challenge, 0, &self.handshake, &mut reply);
+        Reply { nonce: hello.nonce, value: self.cookies.bake(now, from, &hello) }.write(
+            Kind::Challenge,
+            0,
+            &self.handshake,
+            &mut reply,
+        );
         self.reply(from, reply);
         Ok(())
     }
@@ -217,14 +230,21 @@ impl ServerMachine {
             return Err(Refused::Stale);
         }
         let same = |session: &&Session| {
-            session.agreed.facet_nonce == answer.nonce && session.agreed.facet == answer.facet && session.address == from
+            session.agreed.facet_nonce == answer.nonce
+                && session.agreed.facet == answer.facet
+                && session.address == from
         };
         let agreed = match self.sessions.values().find(same) {
             Some(session) => session.agreed,
             None => self.prepare(now, from, &answer),
         };
         let mut reply = Vec::new();
-        Reply { nonce: agreed.facet_nonce, value: agreed.server_nonce }.write(Kind::Welcome, agreed.session, &self.handshake, &mut reply);
+        Reply { nonce: agreed.facet_nonce, value: agreed.server_nonce }.write(
+            Kind::Welcome,
+            agreed.session,
+            &self.handshake,
+            &mut reply,
+        );
         self.reply(from, reply);
         Ok(())
     }
@@ -240,8 +260,14 @@ impl ServerMachine {
         while session == 0 || self.sessions.contains_key(&session) {
             session = self.entropy.next_u64() as u32;
         }
-        let agreed = Agreement { session, facet: answer.facet, facet_nonce: answer.nonce, server_nonce: self.entropy.next_bytes() };
-        let prepared = Session::new(now, &self.shared, agreed, Side::Server, from, self.settings.timing, self.settings.numbering);
+        let agreed = Agreement {
+            session,
+            facet: answer.facet,
+            facet_nonce: answer.nonce,
+            server_nonce: self.entropy.next_bytes(),
+        };
+        let prepared =
+            Session::new(now, &self.shared, agreed, Side::Server, from, self.settings.timing, self.settings.numbering);
         self.sessions.insert(session, prepared);
         self.prepared.push_back(session);
         agreed
@@ -266,7 +292,9 @@ impl ServerMachine {
         if *live == Some(id) {
             *live = None;
             if why != Closed::ByUs {
-                self.events.extend(std::iter::from_fn(|| session.pop()).map(|(_, message)| (facet, LinkEvent::Message, message)));
+                self.events.extend(
+                    std::iter::from_fn(|| session.pop()).map(|(_, message)| (facet, LinkEvent::Message, message)),
+                );
             }
             self.events.push_back((facet, LinkEvent::Closed(why), Vec::new()));
             session.empty();
@@ -287,7 +315,10 @@ impl ServerMachine {
     }
 
     fn facet_at(&self, from: SocketAddr) -> Option<FacetNumber> {
-        self.sessions.values().find(|session| session.live && session.address == from).map(|session| session.agreed.facet)
+        self.sessions
+            .values()
+            .find(|session| session.live && session.address == from)
+            .map(|session| session.agreed.facet)
     }
 
     fn counters_of(&mut self, facet: Option<FacetNumber>) -> &mut LinkCounters {

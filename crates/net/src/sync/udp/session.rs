@@ -91,7 +91,13 @@ impl Session {
     }
 
     /// Takes a packet. Nothing of it is believed before its seal was checked, and nothing of it is taken where one frame contradicts.
-    pub fn receive(&mut self, now: Duration, header: &Header, datagram: &[u8], counters: &mut LinkCounters) -> Result<(), Refused> {
+    pub fn receive(
+        &mut self,
+        now: Duration,
+        header: &Header,
+        datagram: &[u8],
+        counters: &mut LinkCounters,
+    ) -> Result<(), Refused> {
         let mut body = std::mem::take(&mut self.body);
         let result = self.open(header, datagram, &mut body).and_then(|()| {
             self.heard = now;
@@ -119,7 +125,8 @@ impl Session {
 
     /// Window and seal.
     fn open(&mut self, header: &Header, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
-        let header = Header { sequence: whole(header.sequence as u32, self.window.largest().unwrap_or(self.first)), ..*header };
+        let header =
+            Header { sequence: whole(header.sequence as u32, self.window.largest().unwrap_or(self.first)), ..*header };
         self.window.check(header.sequence)?;
         self.seal.open(&header, datagram, body)?;
         self.window.take(header.sequence);
@@ -135,8 +142,12 @@ impl Session {
                     let next = self.seal.next_sequence().unwrap_or(u64::MAX);
                     self.outbox.acknowledged(now, ack, next).map_err(|_| Refused::Torn)?;
                 }
-                Frame::Fragment(part, index, data) => self.inbox.fragment(*part, *index, data).map_err(|_| Refused::Torn)?,
-                Frame::Parity(part, group, groups, data) => self.inbox.parity(*part, *group, *groups, data).map_err(|_| Refused::Torn)?,
+                Frame::Fragment(part, index, data) => {
+                    self.inbox.fragment(*part, *index, data).map_err(|_| Refused::Torn)?
+                }
+                Frame::Parity(part, group, groups, data) => {
+                    self.inbox.parity(*part, *group, *groups, data).map_err(|_| Refused::Torn)?
+                }
                 Frame::Ping => {}
                 Frame::Close => self.closed_by_peer = true,
             }

@@ -7,7 +7,9 @@ use super::facet::FacetSettings;
 use super::keys::{Entropy, SharedKey};
 use super::server::ServerSettings;
 use super::{FacetMachine, Numbering, ServerMachine, Timing};
-use crate::sync::transport::{Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, Message, ServerLink};
+use crate::sync::transport::{
+    Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, Message, ServerLink,
+};
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -101,7 +103,8 @@ impl<M: Machine> Core<M> {
                 self.arrived.notify_one();
             }
             // At least a little, so that a fault in a machine cannot make this thread spin.
-            let wake = state.machine.wake().unwrap_or(now + PATIENCE).clamp(now + Duration::from_micros(50), now + PATIENCE);
+            let wake =
+                state.machine.wake().unwrap_or(now + PATIENCE).clamp(now + Duration::from_micros(50), now + PATIENCE);
             state.asleep_until = wake;
             state = self.earlier.wait_timeout(state, wake - now).unwrap_or_else(PoisonError::into_inner).0;
             state.asleep_until = Duration::ZERO;
@@ -130,7 +133,16 @@ impl<M: Machine> Core<M> {
 /// A system's answer that is over with the next call.
 fn is_passing(error: &std::io::Error) -> bool {
     use std::io::ErrorKind::*;
-    matches!(error.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused | ConnectionReset | HostUnreachable | NetworkUnreachable)
+    matches!(
+        error.kind(),
+        WouldBlock
+            | TimedOut
+            | Interrupted
+            | ConnectionRefused
+            | ConnectionReset
+            | HostUnreachable
+            | NetworkUnreachable
+    )
 }
 
 fn name(socket: &UdpSocket) -> String {
@@ -148,8 +160,13 @@ impl<M: Machine> Running<M> {
         let what = || format!("udp socket {}", name(&socket));
         socket.set_read_timeout(Some(PATIENCE)).map_err(|why| LinkError::Io { what: what(), why })?;
         let state = State { machine, asleep_until: Duration::ZERO, stop: false, failed: None };
-        let core =
-            Arc::new(Core { state: Mutex::new(state), arrived: Condvar::new(), earlier: Condvar::new(), socket, start: Instant::now() });
+        let core = Arc::new(Core {
+            state: Mutex::new(state),
+            arrived: Condvar::new(),
+            earlier: Condvar::new(),
+            socket,
+            start: Instant::now(),
+        });
         let mut running = Running { core, threads: Vec::new() };
         running.spawn("udp receive", Core::receive_until_stopped)?;
         running.spawn("udp wait", Core::wait_until_stopped)?;
@@ -193,7 +210,11 @@ fn bind(address: SocketAddr) -> Result<UdpSocket, LinkError> {
 
 /// What a user should know about an address: whether it is sealed.
 fn describe(socket: &UdpSocket, sealed: bool) -> String {
-    let state = if sealed { "sealed by the key file" } else { "no key: only this machine is served, and nobody is authenticated" };
+    let state = if sealed {
+        "sealed by the key file"
+    } else {
+        "no key: only this machine is served, and nobody is authenticated"
+    };
     format!("udp {}, {state}", name(socket))
 }
 
@@ -207,7 +228,12 @@ impl UdpServer {
     /// Binds `address` for facets with numbers below `facets`. Without a key only a loopback address is bound.
     ///
     /// Errors: the address is not loopback and there is no key; the system refuses.
-    pub fn bind(address: SocketAddr, facets: FacetNumber, key: Option<SharedKey>, timing: Timing) -> Result<UdpServer, LinkError> {
+    pub fn bind(
+        address: SocketAddr,
+        facets: FacetNumber,
+        key: Option<SharedKey>,
+        timing: Timing,
+    ) -> Result<UdpServer, LinkError> {
         check_address(address, &key, "udp")?;
         let sealed = key.is_some();
         let settings = ServerSettings { facets, timing, numbering: Numbering::default() };
@@ -241,7 +267,11 @@ impl ServerLink for UdpServer {
         Ok(sent)
     }
 
-    fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
+    fn recv(
+        &mut self,
+        timeout: Duration,
+        message: &mut Vec<u8>,
+    ) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
         message.clear();
         Ok(self.running.core.next_event(timeout)?.map(|(facet, event, bytes)| {
             *message = bytes;
@@ -273,7 +303,12 @@ impl UdpFacet {
     /// Begins to look for the server. Without a key only a loopback address is asked.
     ///
     /// Errors: the address is not loopback and there is no key; the system refuses.
-    pub fn connect(server: SocketAddr, facet: FacetNumber, key: Option<SharedKey>, timing: Timing) -> Result<UdpFacet, LinkError> {
+    pub fn connect(
+        server: SocketAddr,
+        facet: FacetNumber,
+        key: Option<SharedKey>,
+        timing: Timing,
+    ) -> Result<UdpFacet, LinkError> {
         check_address(server, &key, "udp server")?;
         let local: SocketAddr = match (server, server.ip().is_loopback()) {
             (SocketAddr::V4(_), true) => ([127, 0, 0, 1], 0).into(),
@@ -283,7 +318,8 @@ impl UdpFacet {
         };
         let sealed = key.is_some();
         let settings = FacetSettings { facet, server, timing, numbering: Numbering::default() };
-        let machine = FacetMachine::new(Duration::ZERO, settings, key.unwrap_or_else(SharedKey::none), Entropy::system()?);
+        let machine =
+            FacetMachine::new(Duration::ZERO, settings, key.unwrap_or_else(SharedKey::none), Entropy::system()?);
         Ok(UdpFacet { running: Running::start(bind(local)?, machine)?, sealed })
     }
 

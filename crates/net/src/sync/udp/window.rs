@@ -100,7 +100,9 @@ mod tests {
                     taken.insert(sequence);
                 }
                 let largest = *taken.last().unwrap();
-                let mask = (0..128).filter(|k| largest.checked_sub(*k).is_some_and(|s| taken.contains(&s))).fold(0u128, |m, k| m | 1 << k);
+                let mask = (0..128)
+                    .filter(|k| largest.checked_sub(*k).is_some_and(|s| taken.contains(&s)))
+                    .fold(0u128, |m, k| m | 1 << k);
                 assert_eq!(window.taken(), Some((largest, mask)));
             }
             assert_eq!(window.check(u64::MAX).is_ok(), !taken.contains(&u64::MAX));

@@ -8,10 +8,10 @@ use tumble_net::sync::{FacetSession, Pace, ServerEvent, ServerSession, Standing,
 
 /// States of a session, as the facet that fails is in them.
 const MOMENTS: [fn(&Stage) -> bool; 5] = [
-    |s| s.now > Duration::ZERO,                                                                         // joining
-    |s| s.facets[1].shown.len() >= 10 && s.facets[1].drawing,                                           // drawing
-    |s| s.facets[1].shown.len() >= 10 && matches!(task(s), Some(Task::Wait(Waiting::Others(_)))),       // ready
-    |s| s.facets[1].shown.len() >= 10 && matches!(task(s), Some(Task::Wait(Waiting::Frame))),           // shown, between frames
+    |s| s.now > Duration::ZERO,                               // joining
+    |s| s.facets[1].shown.len() >= 10 && s.facets[1].drawing, // drawing
+    |s| s.facets[1].shown.len() >= 10 && matches!(task(s), Some(Task::Wait(Waiting::Others(_)))), // ready
+    |s| s.facets[1].shown.len() >= 10 && matches!(task(s), Some(Task::Wait(Waiting::Frame))), // shown, between frames
     |s| s.facets[1].shown.len() >= 10 && s.server.as_ref().is_some_and(|s| !s.idle()) && !s.facets[1].drawing, // within a frame
 ];
 
@@ -41,7 +41,10 @@ fn a_facet_that_is_killed_is_dropped_and_comes_back() {
         stage.kill_facet(1);
         stage.run(1000 * MS);
         let after = shown(&stage);
-        assert!(after[0] >= before[0] + 40 && after[2] >= before[2] + 40, "the wall goes on: {before:?} {after:?} (moment {moment})");
+        assert!(
+            after[0] >= before[0] + 40 && after[2] >= before[2] + 40,
+            "the wall goes on: {before:?} {after:?} (moment {moment})"
+        );
         assert_eq!(stage.server.as_ref().unwrap().standing(1), Standing::Following);
         stage.run(1500 * MS);
         assert_eq!(stage.server.as_ref().unwrap().standing(1), Standing::Absent, "dropped after 2 s");
@@ -51,7 +54,12 @@ fn a_facet_that_is_killed_is_dropped_and_comes_back() {
         assert!(stage.until(1000 * MS, back), "back in step within a second (moment {moment}, seed {seed})");
         stage.run(500 * MS);
         let [a, b] = [0, 1].map(|k| stage.numbers(k));
-        assert!(a.ends_with(&b[b.len() - 10..]) || a[..a.len() - 1].ends_with(&b[b.len() - 10..]) || b[..b.len() - 1].ends_with(&a[a.len() - 10..]), "{a:?} {b:?}");
+        assert!(
+            a.ends_with(&b[b.len() - 10..])
+                || a[..a.len() - 1].ends_with(&b[b.len() - 10..])
+                || b[..b.len() - 1].ends_with(&a[a.len() - 10..]),
+            "{a:?} {b:?}"
+        );
         stage.assert_true();
     }
 }
@@ -70,7 +78,10 @@ fn a_facet_whose_process_ended_is_waited_for_no_longer() {
         let after = shown(&stage);
         // ten frames of 16 ms, and in a storm some that take longer
         let least = if seed.is_multiple_of(2) { 9 } else { 6 };
-        assert!(after[0] >= before[0] + least && after[2] >= before[2] + least, "{before:?} {after:?} (moment {moment}, seed {seed})");
+        assert!(
+            after[0] >= before[0] + least && after[2] >= before[2] + least,
+            "{before:?} {after:?} (moment {moment}, seed {seed})"
+        );
         let (counts, _) = stage.server.as_ref().unwrap().counts(1);
         assert_eq!((counts.late, counts.missing, counts.dropped), (0, 0, 1));
         stage.start_facet(1);
@@ -83,7 +94,8 @@ fn a_facet_whose_process_ended_is_waited_for_no_longer() {
 /// A server that sleeps until a message comes or something is due does the same, at the same times, as one that looks ten thousand times a second.
 #[test]
 fn a_server_that_sleeps_until_something_is_due_misses_nothing() {
-    for (seed, weather, resend) in [(120, Weather::CLEAR, None), (121, STORM, Some(5 * MS)), (122, STORM, Some(5 * MS))] {
+    for (seed, weather, resend) in [(120, Weather::CLEAR, None), (121, STORM, Some(5 * MS)), (122, STORM, Some(5 * MS))]
+    {
         let [awake, asleep] = [false, true].map(|sleeps| {
             let mut stage = Stage::new(seed, weather, 3, Pace::Lockstep);
             stage.options.resend_after = resend;
@@ -95,7 +107,10 @@ fn a_server_that_sleeps_until_something_is_due_misses_nothing() {
             stage.run(500 * MS);
             (stage.events, stage.facets.iter().map(|f| (f.shown.clone(), f.shown_at.clone())).collect::<Vec<_>>())
         });
-        assert!(awake.0.iter().any(|e| matches!(e, ServerEvent::Late(1, _))) && awake.0.iter().any(|e| matches!(e, ServerEvent::Gone(1, false))));
+        assert!(
+            awake.0.iter().any(|e| matches!(e, ServerEvent::Late(1, _)))
+                && awake.0.iter().any(|e| matches!(e, ServerEvent::Gone(1, false)))
+        );
         assert!(awake == asleep, "seed {seed}");
     }
 }
@@ -124,10 +139,16 @@ fn a_facet_that_freezes_catches_up_or_joins_again() {
             stage.run(freeze);
             let after = shown(&stage);
             let lost = if moment == 4 { 20 } else { 12 }; // frames of 16 ms in the 100 or 200 ms of standing still
-            assert!(after[0] + lost >= before[0] + (freeze.as_millis() / 17) as usize, "the wall goes on: {before:?} {after:?} (moment {moment})");
+            assert!(
+                after[0] + lost >= before[0] + (freeze.as_millis() / 17) as usize,
+                "the wall goes on: {before:?} {after:?} (moment {moment})"
+            );
             assert_eq!(stage.server.as_ref().unwrap().standing(1) == Standing::Absent, dropped);
             let back = |s: &Stage| s.server.as_ref().unwrap().standing(1) == Standing::InStep;
-            assert!(stage.until(1000 * MS, back), "back in step within a second (moment {moment}, seed {seed}, {freeze:?})");
+            assert!(
+                stage.until(1000 * MS, back),
+                "back in step within a second (moment {moment}, seed {seed}, {freeze:?})"
+            );
             assert!(stage.numbers(1).is_sorted_by(|a, b| a < b));
             stage.assert_true();
         }
@@ -150,7 +171,11 @@ fn a_server_that_is_killed_is_missed_and_its_successor_found() {
             stage.start_server();
             let all = |s: &Stage| s.facets.iter().zip(&before).all(|(f, n)| f.shown.len() >= n + 5);
             // a facet that has not noticed yet is told by the new server when it beats, at the latest after half a second
-            assert!(stage.until(1700 * MS, all), "moment {moment}, seed {seed}, {pause:?}: {before:?} {:?}", shown(&stage));
+            assert!(
+                stage.until(1700 * MS, all),
+                "moment {moment}, seed {seed}, {pause:?}: {before:?} {:?}",
+                shown(&stage)
+            );
             let first = stage.options.first_frame;
             assert!(stage.facets.iter().all(|f| f.shown.last().unwrap().0 >= first));
             stage.assert_true();

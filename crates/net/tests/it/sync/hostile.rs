@@ -29,7 +29,15 @@ fn payloads() -> Vec<Vec<u8>> {
     world.add(tumble_core::RigidBody::with_mass("guest", shape, 1.0).unwrap()).unwrap();
     let published = publisher.publish(&world, &viewer(1), 3).unwrap();
     let pose = tumble_core::collide::Pose::translation(1.0, 2.0, 3.0);
-    let input = Input { sequence: 7, user: 0, head: Some(pose), wand: Some(pose), hands: [None, Some(pose)], buttons: 1, keys: vec![4, 5] };
+    let input = Input {
+        sequence: 7,
+        user: 0,
+        head: Some(pose),
+        wand: Some(pose),
+        hands: [None, Some(pose)],
+        buttons: 1,
+        keys: vec![4, 5],
+    };
     let done = Done { hash: [1; 16], image: [2; 16], took_us: 3, input_us: Some(4), heard_us: None, at_us: 5 };
     let join = Join { scene: SCENE, name: "front".into(), exact: true };
     vec![
@@ -64,13 +72,25 @@ fn parse_all(bytes: &[u8], mirror: &mut Mirror) -> bool {
 fn what_is_written_is_read_back() {
     let pose = tumble_core::collide::Pose::translation(1.0, -2.0, 3.0);
     let mut out = Vec::new();
-    let input = Input { sequence: u64::MAX, user: 3, head: None, wand: Some(pose), hands: [Some(pose), None], buttons: 5, keys: vec![1, 65535] };
+    let input = Input {
+        sequence: u64::MAX,
+        user: 3,
+        head: None,
+        wand: Some(pose),
+        hands: [Some(pose), None],
+        buttons: 5,
+        keys: vec![1, 65535],
+    };
     input.write(&mut out);
     assert_eq!(Input::read(&out), Ok(input));
     let bytes = message(&header(Kind::Input), |m| m.extend(&out));
     assert_eq!(open(&bytes), Ok((header(Kind::Input), &out[..])));
     assert_eq!(&bytes[..7], b"Engine\0");
-    assert_eq!(u64::from_le_bytes(bytes[64..72].try_into().unwrap()), bytes.len() as u64, "the thesis's size: of the whole message");
+    assert_eq!(
+        u64::from_le_bytes(bytes[64..72].try_into().unwrap()),
+        bytes.len() as u64,
+        "the thesis's size: of the whole message"
+    );
     let mut out = Vec::new();
     Refusal("a\nb".into()).write(&mut out);
     assert_eq!(Refusal::read(&out).unwrap().0, "a b");
@@ -156,18 +176,34 @@ fn a_million_random_packets_full_length() {
 fn a_session_under_fire_stays_true() {
     let (mut stage, mut dice, payloads) = (Stage::new(8, Weather::CLEAR, 2, Pace::Lockstep), Dice(3), payloads());
     let kinds = [
-        Kind::Join, Kind::Refused, Kind::Snapshot, Kind::State, Kind::Ready, Kind::Present, Kind::Presented, Kind::Resync, Kind::Rejoin, Kind::Beat, Kind::End,
-        Kind::Leave, Kind::Input,
+        Kind::Join,
+        Kind::Refused,
+        Kind::Snapshot,
+        Kind::State,
+        Kind::Ready,
+        Kind::Present,
+        Kind::Presented,
+        Kind::Resync,
+        Kind::Rejoin,
+        Kind::Beat,
+        Kind::End,
+        Kind::Leave,
+        Kind::Input,
     ];
     stage.run(100 * MS);
     for _ in 0..slow(2000, 50_000) {
         let payload = &payloads[dice.below(payloads.len() as u64) as usize];
         let near = stage.server.as_ref().unwrap().frame().unwrap().wrapping_add(dice.below(5)).wrapping_sub(2);
-        let head = Header { kind: kinds[dice.below(13) as usize], run: 99, join: dice.below(3), frame: near, time_s: 0.0 };
+        let head =
+            Header { kind: kinds[dice.below(13) as usize], run: 99, join: dice.below(3), frame: near, time_s: 0.0 };
         let bytes = message(&head, |out| out.extend(payload));
         let now = stage.now;
         stage.server.as_mut().unwrap().on_event(now, dice.below(3) as u16, LinkEvent::Message, &bytes);
-        stage.facets[dice.below(2) as usize].session.as_mut().unwrap().on_event(now, LinkEvent::Message, bytes.clone().into());
+        stage.facets[dice.below(2) as usize].session.as_mut().unwrap().on_event(
+            now,
+            LinkEvent::Message,
+            bytes.clone().into(),
+        );
         stage.tick();
     }
     stage.run(100 * MS);
@@ -196,8 +232,16 @@ fn refusals_are_counted_by_reason() {
     assert_eq!(shoot(&flipped).torn, 1);
     assert_eq!(shoot(&join[..HEADER_BYTES]).refused, 1);
     assert_eq!(shoot(&message(&Header { run: 1, ..ours }, |_| {})).refused, 2, "JOIN without a payload");
-    assert_eq!(shoot(&message(&Header { kind: Kind::State, run: 1, ..ours }, |_| {})).refused, 3, "STATE is the server's");
+    assert_eq!(
+        shoot(&message(&Header { kind: Kind::State, run: 1, ..ours }, |_| {})).refused,
+        3,
+        "STATE is the server's"
+    );
     assert_eq!(shoot(&message(&Header { kind: Kind::Beat, run: 2, ..ours }, |_| {})).stale, 1, "another run");
     let done = Done::default();
-    assert_eq!(shoot(&message(&Header { kind: Kind::Ready, run: 1, frame: 77, ..ours }, |out| done.write(out))).stale, 2, "a frame that never was");
+    assert_eq!(
+        shoot(&message(&Header { kind: Kind::Ready, run: 1, frame: 77, ..ours }, |out| done.write(out))).stale,
+        2,
+        "a frame that never was"
+    );
 }

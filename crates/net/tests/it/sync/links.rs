@@ -24,13 +24,20 @@ fn run<S: ServerLink, F: FacetLink + Send + 'static>(server: S, facets: Vec<F>) 
         assert_eq!(server.frame(&world, &viewer(frame)).unwrap(), frame);
     }
     server.end().unwrap();
-    let shown: Vec<Frames> = facets.into_iter().map(|f| f.join().unwrap()).map(|(shown, counts)| {
-        assert_eq!(counts, FacetCounts { shown: 60, ..FacetCounts::default() });
-        hashes(&shown)
-    }).collect();
+    let shown: Vec<Frames> = facets
+        .into_iter()
+        .map(|f| f.join().unwrap())
+        .map(|(shown, counts)| {
+            assert_eq!(counts, FacetCounts { shown: 60, ..FacetCounts::default() });
+            hashes(&shown)
+        })
+        .collect();
     for k in 0..3 {
         let (here, _, link) = server.counts(k);
-        assert_eq!((here.presented, here.late, here.missing, here.mismatched, here.dropped, here.refused), (60, 0, 0, 0, 0, 0));
+        assert_eq!(
+            (here.presented, here.late, here.missing, here.mismatched, here.dropped, here.refused),
+            (60, 0, 0, 0, 0, 0)
+        );
         assert_eq!(link.refused, [0; 8]);
         assert_eq!(shown[k as usize], shown[0]);
     }
@@ -76,8 +83,12 @@ fn refuse(link: impl ServerLink) {
 fn a_facet_of_another_scene_hears_why_it_is_refused_on_both_links() {
     let run = format!("refused-{}", std::process::id());
     let udp = UdpServer::bind(([127, 0, 0, 1], 0).into(), 1, None, Timing::default()).unwrap();
-    let facets = [refused(UdpFacet::connect(udp.address().unwrap(), 0, None, Timing::default()).unwrap()), refused(ShmFacet::new(&run, 0).unwrap())];
-    let links: [Box<dyn FnOnce() + Send>; 2] = [Box::new(move || refuse(udp)), Box::new(move || refuse(ShmServer::new(&run, 1).unwrap()))];
+    let facets = [
+        refused(UdpFacet::connect(udp.address().unwrap(), 0, None, Timing::default()).unwrap()),
+        refused(ShmFacet::new(&run, 0).unwrap()),
+    ];
+    let links: [Box<dyn FnOnce() + Send>; 2] =
+        [Box::new(move || refuse(udp)), Box::new(move || refuse(ShmServer::new(&run, 1).unwrap()))];
     let servers = links.map(std::thread::spawn);
     for facet in facets {
         let why = facet.join().unwrap();

@@ -5,7 +5,13 @@ use std::time::Duration;
 use tumble_net::sync::simulate::Weather;
 use tumble_net::sync::{Pace, ServerEvent, Standing};
 
-pub const STORM: Weather = Weather { loss: 0.05, duplication: 0.02, reordering: 0.10, corruption: 0.01, delay: [Duration::from_micros(200), Duration::from_millis(1)] };
+pub const STORM: Weather = Weather {
+    loss: 0.05,
+    duplication: 0.02,
+    reordering: 0.10,
+    corruption: 0.01,
+    delay: [Duration::from_micros(200), Duration::from_millis(1)],
+};
 
 /// As many frames as the test's length asks for.
 fn frames(short: u64, long: u64) -> u64 {
@@ -24,7 +30,11 @@ fn run(seed: u64, weather: Weather, count: u64, first: u64) -> Stage {
             break;
         }
     }
-    assert!(done(&stage), "facets show {:?}, wanted {last}", stage.facets.iter().map(|f| f.shown.last().map(|s| s.0)).collect::<Vec<_>>());
+    assert!(
+        done(&stage),
+        "facets show {:?}, wanted {last}",
+        stage.facets.iter().map(|f| f.shown.last().map(|s| s.0)).collect::<Vec<_>>()
+    );
     stage.run(3 * MS); // the last answers are on their way
     stage
 }
@@ -62,8 +72,12 @@ fn in_a_storm_every_facet_shows_every_frame_once_and_in_order_full_length() {
     let damage = stage.net.damage();
     assert!(damage.lost > 0 && damage.duplicated > 0 && damage.reordered > 0 && damage.corrupted > 0, "{damage:?}");
     let torn: u64 = (0..6).map(|k| stage.server.as_ref().unwrap().counts(k).0).map(|c| c.torn + c.refused).sum();
-    let theirs: u64 = stage.facets.iter().map(|f| f.session.as_ref().unwrap().counts()).map(|c| c.torn + c.refused).sum();
-    assert!(torn + theirs > 0 && torn + theirs <= damage.corrupted, "every damaged message that arrived was refused, and nothing else: {torn} + {theirs}");
+    let theirs: u64 =
+        stage.facets.iter().map(|f| f.session.as_ref().unwrap().counts()).map(|c| c.torn + c.refused).sum();
+    assert!(
+        torn + theirs > 0 && torn + theirs <= damage.corrupted,
+        "every damaged message that arrived was refused, and nothing else: {torn} + {theirs}"
+    );
 }
 
 #[test]
@@ -97,7 +111,10 @@ fn latest_leaves_out_what_is_old() {
     let published = stage.expected.len();
     let [fast, slow] = [0, 2].map(|k| stage.facets[k].shown.len());
     assert!(published > 180, "{published} frames in 3 s at 16 ms");
-    assert!(fast > published * 85 / 100 && fast <= published, "{fast} of {published}: about 5 % are lost and not sent again");
+    assert!(
+        fast > published * 85 / 100 && fast <= published,
+        "{fast} of {published}: about 5 % are lost and not sent again"
+    );
     assert!((40..=61).contains(&slow), "{slow} frames of 50 ms in 3 s");
 }
 
@@ -108,7 +125,10 @@ fn the_slowest_gives_the_pace() {
     stage.facets[4].takes = 40 * MS;
     stage.run(Duration::from_secs(4));
     let shown: Vec<usize> = stage.facets.iter().map(|f| f.shown.len()).collect();
-    assert!(shown.iter().all(|&n| (90..=100).contains(&n) && n.abs_diff(shown[0]) <= 1), "4 s in frames of 40 ms: {shown:?}");
+    assert!(
+        shown.iter().all(|&n| (90..=100).contains(&n) && n.abs_diff(shown[0]) <= 1),
+        "4 s in frames of 40 ms: {shown:?}"
+    );
     assert_eq!(stage.server.as_ref().unwrap().standing(4), Standing::InStep);
     stage.assert_true();
 }

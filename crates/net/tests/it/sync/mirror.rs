@@ -93,9 +93,22 @@ fn a_replica_is_exact() {
 fn objects_come_and_go() {
     let mut pair = Pair::new(false);
     pair.send();
-    let look = Look { color: [0.1, 0.2, 0.3], shader: "checker".into(), properties: vec![("squares".into(), 8.0)], ..Look::default() };
+    let look = Look {
+        color: [0.1, 0.2, 0.3],
+        shader: "checker".into(),
+        properties: vec![("squares".into(), 8.0)],
+        ..Look::default()
+    };
     let spun = Pose::from_parts(Vec3::new(1.0, 2.0, 3.0).into(), Quat::from_scaled_axis(Vec3::new(0.3, -0.2, 0.9)));
-    for (k, shape) in [Shape::sphere(0.2), Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)), Shape::capsule(0.1, 0.2), Shape::cylinder(0.1, 0.3)].into_iter().enumerate() {
+    for (k, shape) in [
+        Shape::sphere(0.2),
+        Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)),
+        Shape::capsule(0.1, 0.2),
+        Shape::cylinder(0.1, 0.3),
+    ]
+    .into_iter()
+    .enumerate()
+    {
         let visual = Visual { part: 0, pose: spun, shape: shape.clone().unwrap(), look: look.clone() };
         let body = RigidBody::with_mass(format!("new {k}"), shape.unwrap(), 1.0).unwrap();
         pair.world.add(body.at(spun).drawn_as(vec![visual])).unwrap();
@@ -116,7 +129,9 @@ fn objects_come_and_go() {
     pair.world.add(RigidBody::with_mass("ball 2", Shape::sphere(0.5).unwrap(), 1.0).unwrap()).unwrap();
     assert!(pair.send());
     let ball = pair.mirror.world().find("ball 2").unwrap();
-    let radius = |o: &dyn Object| if let Shape::Sphere { radius } = o.renderable().unwrap().visuals()[0].shape { radius } else { 0.0 };
+    let radius = |o: &dyn Object| {
+        if let Shape::Sphere { radius } = o.renderable().unwrap().visuals()[0].shape { radius } else { 0.0 }
+    };
     assert_eq!(radius(pair.mirror.world().object(ball).unwrap()), 0.5);
 }
 

@@ -9,6 +9,6 @@ mod pace;
 mod places;
 mod quantise;
 mod refusals;
+pub mod stage;
 mod threads;
 mod times;
-pub mod stage;

@@ -34,7 +34,10 @@ fn assert_steady(stage: &mut Stage, takes: Duration, storm: bool, what: &str) {
     assert_eq!(before, late(stage), "{what}");
     for k in 1..3 {
         let theirs = stage.numbers(k);
-        assert!(numbers[..numbers.len() - 1].iter().all(|frame| theirs.contains(frame)), "{what}: {numbers:?} {theirs:?}");
+        assert!(
+            numbers[..numbers.len() - 1].iter().all(|frame| theirs.contains(frame)),
+            "{what}: {numbers:?} {theirs:?}"
+        );
     }
     stage.assert_true();
 }

@@ -87,7 +87,13 @@ fn the_end_is_understood_before_the_first_frame() {
 
 /// Two processes of one facet, and a link that gives the connection to who came last, as shared memory and UDP do: the loser comes back at once. What each
 /// is told to do next, and how often somebody joined.
-fn rivals(now: &mut Duration, server: &mut ServerSession, facets: &mut [Option<FacetSession>], time: Duration, has: &mut usize) {
+fn rivals(
+    now: &mut Duration,
+    server: &mut ServerSession,
+    facets: &mut [Option<FacetSession>],
+    time: Duration,
+    has: &mut usize,
+) {
     let end = *now + time;
     while *now < end {
         *now += MS;

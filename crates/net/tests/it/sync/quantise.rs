@@ -48,7 +48,10 @@ fn the_error_of_a_pose_is_within_what_is_stated() {
         assert!((sent.rotation.norm() - 1.0).abs() < 1e-15);
     }
     assert!(worst[0] <= POSITION_ERROR_M && worst[1] <= ROTATION_ERROR_RAD, "{worst:?}");
-    assert!(worst[0] > 0.9 * POSITION_ERROR_M && worst[1] > 0.3 * ROTATION_ERROR_RAD, "the bound is far from what happens: {worst:?}");
+    assert!(
+        worst[0] > 0.9 * POSITION_ERROR_M && worst[1] > 0.3 * ROTATION_ERROR_RAD,
+        "the bound is far from what happens: {worst:?}"
+    );
 }
 
 /// Where components are equal the choice of the one left out hangs on a bit; where three are the same the error is largest.
@@ -56,14 +59,25 @@ fn the_error_of_a_pose_is_within_what_is_stated() {
 fn corners_of_the_range_are_within_it_too() {
     for signs in 0..16 {
         for zeros in 0..15 {
-            let part = |k: u32| if zeros >> k & 1 == 1 { 0.0 } else if signs >> k & 1 == 1 { -1.0 } else { 1.0 };
+            let part = |k: u32| {
+                if zeros >> k & 1 == 1 {
+                    0.0
+                } else if signs >> k & 1 == 1 {
+                    -1.0
+                } else {
+                    1.0
+                }
+            };
             let rotation = Quat::from_quaternion(nalgebra::Quaternion::new(part(0), part(1), part(2), part(3)));
             let sent = through(Pose::from_parts(Vec3::zeros().into(), rotation));
             assert!(angle(&rotation, &sent.rotation) <= ROTATION_ERROR_RAD, "{rotation:?}");
         }
     }
     assert_eq!(through(Pose::identity()), Pose::identity());
-    assert_eq!(through(Pose::translation(-1.5, 2.25, 1000.0 + 1.0 / 65536.0)).translation.vector, Vec3::new(-1.5, 2.25, 1000.0 + 1.0 / 65536.0));
+    assert_eq!(
+        through(Pose::translation(-1.5, 2.25, 1000.0 + 1.0 / 65536.0)).translation.vector,
+        Vec3::new(-1.5, 2.25, 1000.0 + 1.0 / 65536.0)
+    );
 }
 
 #[test]

@@ -17,7 +17,11 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
             spoil(&mut bytes);
             server.on_event(MS, 1, LinkEvent::Message, &bytes);
         }
-        let told = server.events().into_iter().find_map(|e| if let ServerEvent::Refused(1, why) = e { Some(why) } else { None }).unwrap();
+        let told = server
+            .events()
+            .into_iter()
+            .find_map(|e| if let ServerEvent::Refused(1, why) = e { Some(why) } else { None })
+            .unwrap();
         for out in server.outgoing() {
             facet.on_event(MS, LinkEvent::Message, out.message.to_vec().into());
         }
@@ -67,7 +71,11 @@ fn a_facet_that_draws_something_else_is_found_out() {
         server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
     }
     assert!(shown > 50 && wrong > 15, "{shown} {wrong}");
-    let told = server.events().iter().filter(|e| matches!(e, ServerEvent::Ready(0, frame, _, false) if frame % 3 == 0)).count();
+    let told = server
+        .events()
+        .iter()
+        .filter(|e| matches!(e, ServerEvent::Ready(0, frame, _, false) if frame % 3 == 0))
+        .count();
     assert_eq!((server.counts(0).0.mismatched, told), (wrong, wrong as usize));
 }
 
@@ -75,7 +83,10 @@ fn a_facet_that_draws_something_else_is_found_out() {
 #[test]
 fn a_frame_that_does_not_fit_is_asked_for_again() {
     let base = scene();
-    let mut server = ServerSession::new(ServerOptions { resend_after: None, ..Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options }, &base);
+    let mut server = ServerSession::new(
+        ServerOptions { resend_after: None, ..Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options },
+        &base,
+    );
     let mut facet = FacetSession::new(FacetOptions::new("facet 0", SCENE, 1), scene());
     let mut spoilt = 0;
     for k in 1..100u32 {
@@ -94,7 +105,11 @@ fn a_frame_that_does_not_fit_is_asked_for_again() {
         for out in server.outgoing() {
             let (header, payload) = wire::open(&out.message).unwrap();
             let spoil = header.kind == wire::Kind::State && header.frame == 5 && spoilt == 0;
-            let bytes = if spoil { wire::message(&header, |out| out.extend(&payload[..payload.len() - 1])) } else { out.message.to_vec() };
+            let bytes = if spoil {
+                wire::message(&header, |out| out.extend(&payload[..payload.len() - 1]))
+            } else {
+                out.message.to_vec()
+            };
             spoilt += u32::from(spoil);
             facet.on_event(now, LinkEvent::Message, bytes.into());
         }

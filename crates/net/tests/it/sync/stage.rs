@@ -16,7 +16,9 @@ pub const MS: Duration = Duration::from_millis(1);
 pub fn scene() -> World {
     let mut world = World::new(Settings::default()).unwrap();
     world.add_static(RigidBody::fixture("ground", Shape::half_space())).unwrap();
-    world.add_static(RigidBody::fixture("post", Shape::capsule(0.1, 1.0).unwrap()).at(Pose::translation(3.0, 0.0, 1.0))).unwrap();
+    world
+        .add_static(RigidBody::fixture("post", Shape::capsule(0.1, 1.0).unwrap()).at(Pose::translation(3.0, 0.0, 1.0)))
+        .unwrap();
     for k in 0..5 {
         let ball = RigidBody::with_mass(format!("ball {k}"), Shape::sphere(0.1).unwrap(), 1.0).unwrap();
         world.add(ball.at(Pose::translation(0.3 * k as f64, 0.0, 1.0 + 0.2 * k as f64))).unwrap();
@@ -75,13 +77,32 @@ impl Stage {
         let mut options = ServerOptions::new(1, SCENE, seats);
         (options.pace, options.resend_after) = (pace, Some(5 * MS));
         let actor = |_| Actor {
-            session: None, frozen_until: Duration::ZERO, busy_until: Duration::ZERO, drawing: false, takes: Duration::from_millis(2),
-            shows_after: Duration::ZERO, told: None, clock: Duration::ZERO, shown: Vec::new(), shown_at: Vec::new(), born: 0,
+            session: None,
+            frozen_until: Duration::ZERO,
+            busy_until: Duration::ZERO,
+            drawing: false,
+            takes: Duration::from_millis(2),
+            shows_after: Duration::ZERO,
+            told: None,
+            clock: Duration::ZERO,
+            shown: Vec::new(),
+            shown_at: Vec::new(),
+            born: 0,
         };
         let base = scene();
         let mut stage = Stage {
-            now: Duration::ZERO, net: Network::new(seed, weather), world: base.fork(), server: Some(ServerSession::new(options.clone(), &base)), options,
-            facets: (0..facets).map(actor).collect(), events: Vec::new(), expected: BTreeMap::new(), base, every: 16 * MS, sleeps: false, next_frame: Duration::ZERO,
+            now: Duration::ZERO,
+            net: Network::new(seed, weather),
+            world: base.fork(),
+            server: Some(ServerSession::new(options.clone(), &base)),
+            options,
+            facets: (0..facets).map(actor).collect(),
+            events: Vec::new(),
+            expected: BTreeMap::new(),
+            base,
+            every: 16 * MS,
+            sleeps: false,
+            next_frame: Duration::ZERO,
         };
         (0..facets).for_each(|k| stage.start_facet(k));
         stage
@@ -171,7 +192,9 @@ impl Stage {
         let there = self.now + actor.clock;
         session.advance(there);
         match session.task() {
-            Task::Draw if !actor.drawing => (actor.drawing, actor.busy_until) = (session.begin().is_some(), self.now + actor.takes),
+            Task::Draw if !actor.drawing => {
+                (actor.drawing, actor.busy_until) = (session.begin().is_some(), self.now + actor.takes)
+            }
             Task::Present(_) if self.now >= *actor.told.get_or_insert(self.now) + actor.shows_after => {
                 session.presented(there);
                 actor.shown.extend(session.shown());

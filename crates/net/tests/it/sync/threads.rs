@@ -28,7 +28,11 @@ fn picture(world: &World, viewer: &Viewer) -> [u8; 16] {
 }
 
 /// A facet that draws what it gets until the run is over, and what it has shown.
-pub fn facet(link: impl FacetLink + Send + 'static, k: u16, stop: &Arc<AtomicBool>) -> JoinHandle<(Shown, FacetCounts)> {
+pub fn facet(
+    link: impl FacetLink + Send + 'static,
+    k: u16,
+    stop: &Arc<AtomicBool>,
+) -> JoinHandle<(Shown, FacetCounts)> {
     let stop = stop.clone();
     std::thread::spawn(move || {
         let mut facet = Facet::new(link, FacetOptions::new(&format!("facet {k}"), SCENE, k as u64), scene());
@@ -90,10 +94,14 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
     server.end().unwrap();
     recorder.events(&server.events());
     assert_eq!(recorder.finish().unwrap().frames, count);
-    let shown: Vec<Shown> = facets.into_iter().map(|f| f.join().unwrap()).map(|(shown, counts)| {
-        assert_eq!(counts, FacetCounts { shown: count, ..FacetCounts::default() });
-        shown
-    }).collect();
+    let shown: Vec<Shown> = facets
+        .into_iter()
+        .map(|f| f.join().unwrap())
+        .map(|(shown, counts)| {
+            assert_eq!(counts, FacetCounts { shown: count, ..FacetCounts::default() });
+            shown
+        })
+        .collect();
     assert!(shown.iter().all(|s| hashes(s) == hashes(&shown[0]) && s.iter().map(|s| s.0).eq(0..count)));
 
     for run in 0..2 {
@@ -115,7 +123,8 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
             assert_eq!(hashes(&facet.join().unwrap().0), hashes(&shown[k]), "replay {run}");
             assert_eq!(server.counts(k as u16).0.mismatched, 0);
             // the recording has what this facet answered then
-            let then: Vec<_> = presented.iter().filter(|(f, ..)| *f as usize == k).map(|(_, frame, done)| (*frame, *done)).collect();
+            let then: Vec<_> =
+                presented.iter().filter(|(f, ..)| *f as usize == k).map(|(_, frame, done)| (*frame, *done)).collect();
             assert_eq!(then, shown[k]);
             assert!(inputs.iter().any(|(f, input)| *f as usize == k && input.keys == [k as u16]));
         }

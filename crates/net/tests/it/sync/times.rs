@@ -14,7 +14,8 @@ fn times(stage: &Stage) -> Vec<FrameTimes> {
 
 /// When each facet showed a frame first, by the stage's clock.
 fn truth(stage: &Stage, frame: u64) -> Vec<Duration> {
-    let at = |k: usize| stage.facets[k].shown.iter().position(|(f, _)| *f == frame).map(|at| stage.facets[k].shown_at[at]);
+    let at =
+        |k: usize| stage.facets[k].shown.iter().position(|(f, _)| *f == frame).map(|at| stage.facets[k].shown_at[at]);
     (0..stage.facets.len()).filter_map(at).collect()
 }
 
@@ -49,7 +50,13 @@ fn over_a_bad_network_the_skew_is_right_within_its_stated_error() {
         for t in times.iter().filter(|t| t.facets == 3) {
             let shown = truth(&stage, t.frame);
             let skew = *shown.iter().max().unwrap() - *shown.iter().min().unwrap();
-            assert!(t.skew.abs_diff(skew) <= t.error, "{pace:?} frame {}: {:?} and {skew:?}, stated {:?}", t.frame, t.skew, t.error);
+            assert!(
+                t.skew.abs_diff(skew) <= t.error,
+                "{pace:?} frame {}: {:?} and {skew:?}, stated {:?}",
+                t.frame,
+                t.skew,
+                t.error
+            );
             assert!(t.error < 5 * MS, "{:?}", t.error);
         }
     }
@@ -64,7 +71,8 @@ fn from_what_a_user_does_to_the_picture_that_shows_it() {
     let (by_facet, by_server) = (stage.world.frame() + 5, stage.world.frame() + 10);
     let sent = stage.now;
     let there = sent + stage.facets[1].clock;
-    let input = Input { sequence: by_facet, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() };
+    let input =
+        Input { sequence: by_facet, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() };
     let facet = stage.facets[1].session.as_mut().unwrap();
     assert!(facet.send_input(there, &input));
     facet.outgoing().iter().for_each(|(_, bytes)| stage.net.send(sent, To::Server(1), bytes));

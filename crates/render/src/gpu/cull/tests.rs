@@ -25,7 +25,8 @@ fn pile(count: usize, seed: u64) -> DrawList {
         let color = [numbers.next(), numbers.next(), numbers.next()];
         list.add_sphere(at, radius, UnitQuaternion::identity(), Material::plastic(color)).casts_shadow = i % 7 != 0;
     }
-    list.lights = vec![Light::sun(Vector3::new(0.3, 0.5, -1.0), 1.0), Light::lamp(Point3::new(3.0, -4.0, 5.0), 0.7, 5.0)];
+    list.lights =
+        vec![Light::sun(Vector3::new(0.3, 0.5, -1.0), 1.0), Light::lamp(Point3::new(3.0, -4.0, 5.0), 0.7, 5.0)];
     list
 }
 
@@ -60,7 +61,9 @@ fn views() -> Vec<Camera> {
 #[test]
 fn what_is_left_out_has_no_pixel() {
     let Ok(mut renderer) = Renderer::new() else { return };
-    for (seed, quality) in [(1, "fastest"), (2, "fast"), (3, "fast,samples=4,shadows=soft,map=512"), (4, "fast,occlusion=on")] {
+    for (seed, quality) in
+        [(1, "fastest"), (2, "fast"), (3, "fast,samples=4,shadows=soft,map=512"), (4, "fast,occlusion=on")]
+    {
         let mut list = pile(700, seed);
         quality.parse::<Quality>().unwrap().apply(&mut list.settings);
         for (i, camera) in views().iter().enumerate() {
@@ -83,7 +86,19 @@ fn eye(camera: &Camera) -> Eye {
 #[test]
 fn most_of_a_pile_is_left_out() {
     // 20 layers of touching balls, seen from above: an octahedral arrangement lets see no deeper than the first few
-    let balls: Vec<Ball> = (0..20 * 400).map(|i| (i / 400, i / 20 % 20, i % 20)).map(|(z, y, x)| (Point3::new(0.1 * x as f32 + 0.05 * (z % 2) as f32, 0.1 * y as f32 + 0.05 * (z % 2) as f32, -0.07 * z as f32), 0.055)).collect();
+    let balls: Vec<Ball> = (0..20 * 400)
+        .map(|i| (i / 400, i / 20 % 20, i % 20))
+        .map(|(z, y, x)| {
+            (
+                Point3::new(
+                    0.1 * x as f32 + 0.05 * (z % 2) as f32,
+                    0.1 * y as f32 + 0.05 * (z % 2) as f32,
+                    -0.07 * z as f32,
+                ),
+                0.055,
+            )
+        })
+        .collect();
     let eye = eye(&Camera::look_at(Point3::new(1.0, 0.9, 5.0), Point3::new(1.0, 1.0, 0.0)));
     let count = seen(&balls, std::iter::once(0..8000), &eye, 1).len();
     assert!(count > 400 && count < 2400, "{count} of 8000 are drawn");
@@ -92,23 +107,36 @@ fn most_of_a_pile_is_left_out() {
 #[test]
 fn a_ball_is_hidden_in_the_shadow_of_a_larger_one() {
     // from the origin along x: a ball of 1 m at 5 m covers a cone of asin(1/5), one of 0.3 m at 10 m about the angle a is within it while a + asin(0.03) is less
-    let camera = Camera::LookAt { eye: Point3::origin(), target: Point3::new(1.0, 0.0, 0.0), up: Vector3::z(), vertical_fov_rad: 1.0, near_m: 0.1, far_m: 100.0 };
+    let camera = Camera::LookAt {
+        eye: Point3::origin(),
+        target: Point3::new(1.0, 0.0, 0.0),
+        up: Vector3::z(),
+        vertical_fov_rad: 1.0,
+        near_m: 0.1,
+        far_m: 100.0,
+    };
     let eye = eye(&camera);
     let limit = (0.2f32).asin() - (0.03f32).asin();
     // a cell of 2 pixels and their share at the edges: 366 pixels per tangent
     let slack = 6.0 / 366.0;
     for (angle, hidden) in [(0.0, true), (limit - slack, true), (limit + 0.001, false), (2.0 * limit, false)] {
         for turn in [0.0f32, 0.7, 2.0, 4.0] {
-            let behind = Point3::new(10.0 * angle.cos(), 10.0 * angle.sin() * turn.cos(), 10.0 * angle.sin() * turn.sin());
+            let behind =
+                Point3::new(10.0 * angle.cos(), 10.0 * angle.sin() * turn.cos(), 10.0 * angle.sin() * turn.sin());
             // and in front it hides
             for (place, count) in [(behind, if hidden { 1 } else { 2 }), (Point3::from(behind.coords * 0.35), 2)] {
                 let balls = [(place, 0.3 * place.coords.norm() / 10.0), (Point3::new(5.0, 0.0, 0.0), 1.0)];
-                assert_eq!(seen(&balls, std::iter::once(0..2), &eye, 1).len(), count, "{angle} rad, turned {turn}: {place}");
+                assert_eq!(
+                    seen(&balls, std::iter::once(0..2), &eye, 1).len(),
+                    count,
+                    "{angle} rad, turned {turn}: {place}"
+                );
             }
         }
     }
     // behind the eye, beside the picture, beyond the far plane: none; around the eye: drawn
-    let outside = [([-3.0, 0.0, 0.0], 1.0), ([5.0, 6.0, 0.0], 1.0), ([5.0, 0.0, -7.0], 2.0), ([200.0, 0.0, 0.0], 1.0)].map(|(at, r): ([f32; 3], f32)| (Point3::from(at), r));
+    let outside = [([-3.0, 0.0, 0.0], 1.0), ([5.0, 6.0, 0.0], 1.0), ([5.0, 0.0, -7.0], 2.0), ([200.0, 0.0, 0.0], 1.0)]
+        .map(|(at, r): ([f32; 3], f32)| (Point3::from(at), r));
     assert!(seen(&outside, std::iter::once(0..4), &eye, 1).is_empty());
     assert_eq!(seen(&[(Point3::new(0.2, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1), [0]);
 }
@@ -117,7 +145,8 @@ fn a_ball_is_hidden_in_the_shadow_of_a_larger_one() {
 #[test]
 fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
     let (width, height, fov) = (1024usize, 768usize, 40f64.to_radians());
-    let at = |i: usize| [0.21 * ((i / 200) as f64 - 24.5), 0.23 * ((i / 4 % 50) as f64 - 24.5), 0.1 + 0.22 * (i % 4) as f64];
+    let at =
+        |i: usize| [0.21 * ((i / 200) as f64 - 24.5), 0.23 * ((i / 4 % 50) as f64 - 24.5), 0.1 + 0.22 * (i % 4) as f64];
     let balls: Vec<Ball> = (0..10_000).map(|i| (Point3::from(at(i).map(|x| x as f32)), 0.1)).collect();
     let (from, to) = (Vector3::new(0.0, -14.175, 8.4), Vector3::new(0.0, -0.84, 0.2));
     let ahead = (to - from).normalize();
@@ -128,11 +157,16 @@ fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
     for i in 0..balls.len() {
         let c = Vector3::from(at(i)) - from;
         let depth = c.dot(&ahead);
-        let middle = [0.5 * width as f64 + pixels_per_tangent * c.dot(&right) / depth, 0.5 * height as f64 - pixels_per_tangent * c.dot(&up) / depth];
+        let middle = [
+            0.5 * width as f64 + pixels_per_tangent * c.dot(&right) / depth,
+            0.5 * height as f64 - pixels_per_tangent * c.dot(&up) / depth,
+        ];
         let reach = 1.2 * pixels_per_tangent * 0.1 / depth + 1.0;
-        let range = |k: usize| (middle[k] - reach).max(0.0) as usize..((middle[k] + reach) as usize).min([width, height][k]);
+        let range =
+            |k: usize| (middle[k] - reach).max(0.0) as usize..((middle[k] + reach) as usize).min([width, height][k]);
         for (x, y) in range(1).flat_map(|y| range(0).map(move |x| (x, y))) {
-            let ray = ahead + right * ((x as f64 + 0.5 - 0.5 * width as f64) / pixels_per_tangent) - up * ((y as f64 + 0.5 - 0.5 * height as f64) / pixels_per_tangent);
+            let ray = ahead + right * ((x as f64 + 0.5 - 0.5 * width as f64) / pixels_per_tangent)
+                - up * ((y as f64 + 0.5 - 0.5 * height as f64) / pixels_per_tangent);
             let half = ray.dot(&c) / ray.norm_squared();
             let room = half * half - (c.norm_squared() - 0.01) / ray.norm_squared();
             if room >= 0.0 && half - room.sqrt() < nearest[y * width + x].0 {
@@ -143,9 +177,25 @@ fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
     let mut met: Vec<usize> = nearest.iter().map(|n| n.1).filter(|i| *i < balls.len()).collect();
     met.sort_unstable();
     met.dedup();
-    let eye = Camera::LookAt { eye: Point3::from(from.cast()), target: Point3::from(to.cast()), up: Vector3::z(), vertical_fov_rad: fov as f32, near_m: 0.05, far_m: 500.0 };
+    let eye = Camera::LookAt {
+        eye: Point3::from(from.cast()),
+        target: Point3::from(to.cast()),
+        up: Vector3::z(),
+        vertical_fov_rad: fov as f32,
+        near_m: 0.05,
+        far_m: 500.0,
+    };
     let lens = eye.lens(width as f32 / height as f32).unwrap();
-    let drawn = seen(&balls, std::iter::once(0..10_000), &Eye::new(&lens.view, &lens.projection, width as u32, height as u32), 1);
-    assert!(met.len() > 2500 && met.iter().all(|i| drawn.binary_search(&(*i as u32)).is_ok()), "{} balls have a pixel", met.len());
+    let drawn = seen(
+        &balls,
+        std::iter::once(0..10_000),
+        &Eye::new(&lens.view, &lens.projection, width as u32, height as u32),
+        1,
+    );
+    assert!(
+        met.len() > 2500 && met.iter().all(|i| drawn.binary_search(&(*i as u32)).is_ok()),
+        "{} balls have a pixel",
+        met.len()
+    );
     assert!(drawn.len() < 6700, "{} balls are drawn, {} have a pixel", drawn.len(), met.len());
 }

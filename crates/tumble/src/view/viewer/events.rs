@@ -21,13 +21,18 @@ impl Viewer {
                 {
                     if down { self.user.press(way) } else { self.user.release(way) }
                 }
-                if down && !event.repeat && let Some(command) = keys::command(&event.logical_key) {
+                if down
+                    && !event.repeat
+                    && let Some(command) = keys::command(&event.logical_key)
+                {
                     self.act(screen, command)?;
                 }
             }
             WindowEvent::ModifiersChanged(modifiers) => self.user.fast = modifiers.state().shift_key(),
             WindowEvent::CursorMoved { position, .. } => self.pointed(screen, [position.x, position.y]),
-            WindowEvent::MouseInput { state, button, .. } => self.button(screen, *button, *state == ElementState::Pressed),
+            WindowEvent::MouseInput { state, button, .. } => {
+                self.button(screen, *button, *state == ElementState::Pressed)
+            }
             WindowEvent::MouseWheel { delta, .. } => {
                 let up = match delta {
                     MouseScrollDelta::LineDelta(_, y) => f64::from(*y),
@@ -66,7 +71,9 @@ impl Viewer {
             }
             Command::Fly => self.user.flies = !self.user.flies,
             Command::Overlay(index) => self.overlays.switch(index),
-            Command::Statistics => (self.show.any, self.show.statistics) = (true, !(self.show.any && self.show.statistics)),
+            Command::Statistics => {
+                (self.show.any, self.show.statistics) = (true, !(self.show.any && self.show.statistics))
+            }
             Command::Help => (self.show.any, self.show.help) = (true, !self.show.help),
             Command::Picture => self.save_picture(screen)?,
             Command::Quality => {

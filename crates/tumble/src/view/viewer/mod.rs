@@ -103,7 +103,10 @@ impl Viewer {
         let mut user = User::new(sight.body(&list), distance(&list.camera));
         if let Some(name) = &options.camera {
             if !presets.find(name) {
-                return Err(Failure::input(format!("no camera `{name}`; wanted one of {}", presets.names().join(", "))));
+                return Err(Failure::input(format!(
+                    "no camera `{name}`; wanted one of {}",
+                    presets.names().join(", ")
+                )));
             }
             presets.camera(&world, &list).iter().for_each(|camera| user.look_from(camera));
         }
@@ -174,7 +177,8 @@ impl Viewer {
         self.update_list()?;
         self.sight.draw(screen, &self.list)?;
         let lines = self.lines();
-        screen.set_caption((!lines.is_empty()).then(|| caption(&lines, if screen.size_px()[0] >= 960 { 2 } else { 1 })));
+        screen
+            .set_caption((!lines.is_empty()).then(|| caption(&lines, if screen.size_px()[0] >= 960 { 2 } else { 1 })));
         if screen.show()? == Shown::Yes {
             self.stale = false;
             self.shown += 1;

@@ -11,10 +11,19 @@ impl Viewer {
         let (world, pace) = (&simulation.world, &simulation.pace);
         if self.show.any && self.show.statistics {
             let f = self.statistics.shown;
-            let time = if pace.paused { "paused".to_string() } else { format!("{:.4}x", pace.speed()).replace(".0000", "") };
+            let time =
+                if pace.paused { "paused".to_string() } else { format!("{:.4}x", pace.speed()).replace(".0000", "") };
             lines.push(format!("{:.0} fps  t {:.3} s  {time}", f.pictures_per_s, world.time()));
-            lines.push(format!("picture {:.1} ms  step {:.2} ms  {:.0} steps/s", f.drawing_ms, f.step_ms, f.steps_per_s));
-            lines.push(format!("contacts {}  behind {:.1} s  camera {}", world.contacts().len(), pace.behind_s, self.presets.name()));
+            lines.push(format!(
+                "picture {:.1} ms  step {:.2} ms  {:.0} steps/s",
+                f.drawing_ms, f.step_ms, f.steps_per_s
+            ));
+            lines.push(format!(
+                "contacts {}  behind {:.1} s  camera {}",
+                world.contacts().len(),
+                pace.behind_s,
+                self.presets.name()
+            ));
         }
         lines.extend(simulation.trouble.iter().map(|trouble| format!("stopped: {trouble}. R goes back to time 0")));
         if self.show.any && self.show.help {

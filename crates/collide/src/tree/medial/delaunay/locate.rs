@@ -14,7 +14,9 @@ impl Delaunay {
         let mut at = self.finite_near(hint);
         let mut from = NONE;
         for step in 0..self.cells.len() + 64 {
-            let beyond = (0..4).map(|k| (k + step) & 3).find(|&k| self.cells[at as usize].across[k] != from && self.side(at, k, p) < 0.0);
+            let beyond = (0..4)
+                .map(|k| (k + step) & 3)
+                .find(|&k| self.cells[at as usize].across[k] != from && self.side(at, k, p) < 0.0);
             let Some(k) = beyond else { return at };
             from = at;
             at = self.cells[at as usize].across[k];

@@ -9,7 +9,8 @@ use crate::mesh::along_curve;
 
 /// All indices of `points`, in the order in which to insert them.
 pub(super) fn order(points: &[Vec3]) -> Vec<u32> {
-    let mut keys: Vec<(u32, u64, u32)> = along_curve(points).into_iter().zip(0..).map(|(place, n)| (round(u64::from(n)), place, n)).collect();
+    let mut keys: Vec<(u32, u64, u32)> =
+        along_curve(points).into_iter().zip(0..).map(|(place, n)| (round(u64::from(n)), place, n)).collect();
     keys.sort_unstable();
     keys.into_iter().map(|k| k.2).collect()
 }

@@ -181,7 +181,8 @@ fn points_added_later_keep_all_spheres_empty_and_tell_what_changed() {
             2 => Vec3::new(0.05 * f64::from(n / 4), 0.05, 0.0),
             _ => Vec3::new(0.0, 0.025 * f64::from(n / 4), 0.1),
         };
-        let before: Vec<Option<[u32; 4]>> = (0..d.cell_count() as u32).map(|c| d.is_alive(c).then(|| d.vertices(c))).collect();
+        let before: Vec<Option<[u32; 4]>> =
+            (0..d.cell_count() as u32).map(|c| d.is_alive(c).then(|| d.vertices(c))).collect();
         if d.insert(p, 0).is_none() {
             assert!(points.contains(&p));
             continue;

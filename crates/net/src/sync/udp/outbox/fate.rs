@@ -129,7 +129,10 @@ impl Outbox {
 
     /// Forgets packets from the front that nothing is expected of any more.
     pub(super) fn forget(&mut self) {
-        while self.sent.front().is_some_and(|sent| sent.fate == Fate::Arrived || (sent.fate == Fate::Lost && self.sent.len() > REMEMBERED))
+        while self
+            .sent
+            .front()
+            .is_some_and(|sent| sent.fate == Fate::Arrived || (sent.fate == Fate::Lost && self.sent.len() > REMEMBERED))
         {
             self.sent.pop_front();
         }

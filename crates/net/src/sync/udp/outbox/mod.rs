@@ -208,7 +208,11 @@ impl Outbox {
     /// The next piece that was never sent, if it has room.
     fn unsent(&mut self, room: usize) -> Option<Piece> {
         let (loss, balance) = (self.loss, self.balance);
-        let outgoing = self.streams.iter_mut().flat_map(|stream| stream.begun.iter_mut()).find(|outgoing| outgoing.has_unsent())?;
+        let outgoing = self
+            .streams
+            .iter_mut()
+            .flat_map(|stream| stream.begun.iter_mut())
+            .find(|outgoing| outgoing.has_unsent())?;
         let Part { channel, message, .. } = outgoing.part;
         if outgoing.unsent == outgoing.part.fragments() {
             if FRAGMENT + PARITY_HEAD > room {
@@ -255,12 +259,19 @@ impl Outbox {
                     let at = usize::from(index) * FRAGMENT;
                     let progress = &mut outgoing.progress[usize::from(index)];
                     progress.copies = progress.copies.saturating_add(1);
-                    Frame::Fragment(outgoing.part, index, &outgoing.data[at..at + outgoing.part.length(index)]).write(body);
+                    Frame::Fragment(outgoing.part, index, &outgoing.data[at..at + outgoing.part.length(index)])
+                        .write(body);
                 }
             }
             Piece::Parity(channel, message, group) => {
                 if let Some(outgoing) = self.streams[channel as usize].find(message) {
-                    Frame::Parity(outgoing.part, group, outgoing.groups, &parity(&outgoing.data, group, outgoing.groups)).write(body);
+                    Frame::Parity(
+                        outgoing.part,
+                        group,
+                        outgoing.groups,
+                        &parity(&outgoing.data, group, outgoing.groups),
+                    )
+                    .write(body);
                 }
             }
             Piece::Ping => Frame::Ping.write(body),

@@ -48,13 +48,21 @@ impl Outgoing {
 impl Stream {
     /// Empty; numbers begin at `first`.
     pub fn new(first: u32) -> Stream {
-        Stream { waiting: VecDeque::new(), begun: VecDeque::new(), begun_bytes: 0, waiting_bytes: 0, next: first, done: first }
+        Stream {
+            waiting: VecDeque::new(),
+            begun: VecDeque::new(),
+            begun_bytes: 0,
+            waiting_bytes: 0,
+            next: first,
+            done: first,
+        }
     }
 
     pub fn may_begin(&self, channel: Channel) -> bool {
         let ahead = if channel == Channel::Reliable { RELIABLE_AHEAD } else { NEWEST_AHEAD };
         let Some(first) = self.waiting.front() else { return false };
-        self.begun.is_empty() || (self.next.wrapping_sub(self.done) < ahead && self.begun_bytes + first.len() <= BYTES_AHEAD)
+        self.begun.is_empty()
+            || (self.next.wrapping_sub(self.done) < ahead && self.begun_bytes + first.len() <= BYTES_AHEAD)
     }
 
     pub fn begin(&mut self, channel: Channel, data: Arc<[u8]>) {
@@ -64,7 +72,15 @@ impl Stream {
         self.waiting_bytes -= data.len();
         self.begun_bytes += data.len();
         let progress = vec![Progress::default(); usize::from(fragments)];
-        self.begun.push_back(Outgoing { part, data, progress, missing: fragments, unsent: 0, groups: 0, unsent_parity: 0 });
+        self.begun.push_back(Outgoing {
+            part,
+            data,
+            progress,
+            missing: fragments,
+            unsent: 0,
+            groups: 0,
+            unsent_parity: 0,
+        });
     }
 
     /// The message, if it is still under way.
