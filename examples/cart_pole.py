@@ -1,4 +1,4 @@
-"""A pole balanced on a cart, by a controller worked out from the library's own derivatives. Needs gymnasium (``pip install tumble[gym]``).
+"""A pole balanced on a cart, by a regulator worked out from central differences of forward dynamics. Needs gymnasium (``pip install ".[gym]"`` in a clone).
 
     python examples/cart_pole.py
 """
