@@ -1,6 +1,6 @@
 #!/bin/sh
 # The Python module: built as `pip install .` builds it, installed in an environment of its own (target/py-tests), tested, its types checked.
-# The environment is filled from PyPI once, and again when crates/py/tests/requirements.txt changes; with it at hand no network is asked.
+# The environment is filled by pip once, and again when crates/py/tests/requirements.txt changes; with it at hand no network is asked.
 #   scripts/test_python.sh [words for pytest]
 . "$(dirname "$0")/env.sh"
 
@@ -16,7 +16,7 @@ fi
 if ! cmp -s "$wanted" "$venv/requirements.txt"; then
     [ -x "$python" ] || python3 -m venv "$venv" || exit 1
     if ! timeout 600 "$python" -m pip install --quiet --disable-pip-version-check --timeout 20 --retries 2 -r "$wanted" </dev/null; then
-        echo "Error: pip could not install what $wanted lists; the tests of the Python module need it once from PyPI." >&2
+        echo "Error: pip could not install what $wanted lists; the tests of the Python module need it once." >&2
         exit 1
     fi
     cp "$wanted" "$venv/requirements.txt"

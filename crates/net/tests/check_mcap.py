@@ -1,4 +1,4 @@
-"""Reads a recording of the test world with PyPI's mcap and mcap-protobuf-support, and checks every number.
+"""Reads a recording of the test world with the Python packages mcap and mcap-protobuf-support, and checks every number.
 
     check_mcap.py FILE.mcap
 

@@ -475,7 +475,7 @@ impl World {
         Ok(slf.py().import("tumble._pictures")?.call_method1("repr_png", (slf,))?.unbind())
     }
 
-    /// Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib (``pip install tumble[plot]``).
+    /// Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib, the extra ``plot``.
     ///
     /// ax: the axes to plot on, by default new ones. Returns the axes.
     #[pyo3(signature = (seconds=5.0, *, ax=None))]

@@ -1,4 +1,4 @@
-"""Plots on matplotlib, which is an extra: ``pip install tumble[plot]``."""
+"""Plots on matplotlib, the extra ``plot``: ``pip install ".[plot]"`` in a clone."""
 
 from __future__ import annotations
 
@@ -66,5 +66,5 @@ def _axes(ax: Any, who: str) -> Any:
     try:
         from matplotlib import pyplot
     except ImportError as error:
-        raise ImportError(f"{who} needs the package matplotlib: pip install matplotlib, or tumble[plot]", name="matplotlib") from error
+        raise ImportError(f"{who} needs the package matplotlib: pip install matplotlib", name="matplotlib") from error
     return pyplot.subplots()[1]

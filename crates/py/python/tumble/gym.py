@@ -1,4 +1,4 @@
-"""An environment for gymnasium, which is an extra: ``pip install tumble[gym]``. ``gymnasium.make("tumble/CartPole-v0")`` finds it after ``import tumble.gym``.
+"""An environment for gymnasium, the extra ``gym``: ``pip install ".[gym]"`` in a clone. ``gymnasium.make("tumble/CartPole-v0")`` finds it after ``import tumble.gym``.
 
 Its equations are those of Barto, Sutton and Anderson (1983), a cart on a rail with a uniform pole on a hinge; here they come out of the library's articulated
 bodies, and are solved by its steps.
@@ -16,7 +16,7 @@ import tumble
 try:
     import gymnasium
 except ImportError as _missing:
-    raise ImportError("tumble.gym needs the package gymnasium: pip install gymnasium, or tumble[gym]", name="gymnasium") from _missing
+    raise ImportError("tumble.gym needs the package gymnasium: pip install gymnasium", name="gymnasium") from _missing
 
 _SCENE = """
 [world]

@@ -1,5 +1,5 @@
-//! Against Pinocchio (the PyPI package `pin`): other programmers' dynamics of the same trees in the same states. Random trees of all joint kinds,
-//! and robots from the PyPI package `example-robot-data`. Python is `$TUMBLE_PYTHON`, else `python3`; without the packages the tests say so and pass.
+//! Against Pinocchio (the Python package `pin`): other programmers' dynamics of the same trees in the same states. Random trees of all joint kinds,
+//! and robots from the Python package `example-robot-data`. Python is `$TUMBLE_PYTHON`, else `python3`; without the packages the tests say so and pass.
 
 #[path = "../../../core/tests/it/articulated_random.rs"]
 #[allow(dead_code, reason = "shared with the tests of tumble-core")]

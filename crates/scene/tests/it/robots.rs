@@ -1,4 +1,4 @@
-//! Robots of the world outside, from the PyPI package `example-robot-data`, against `urdf-rs`, which shares no code with ours.
+//! Robots of the world outside, from the Python package `example-robot-data`, against `urdf-rs`, which shares no code with ours.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
