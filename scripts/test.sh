@@ -1,7 +1,7 @@
 #!/bin/sh
-# Everything that can fail, in the one profile that also runs: set-up, build, tests, doc tests, the Python module, papers.
+# Everything that can fail, in the profile that users run: set-up, build, tests, doc tests, the Python module, papers.
 #   scripts/test.sh          all of them
-#   scripts/test.sh --slow   and again at their full length those that TUMBLE_SLOW=1 lengthens
+#   scripts/test.sh --slow   and again at their full length those that TUMBLE_SLOW=1 lengthens, and geometry and dynamics with assertions
 . "$(dirname "$0")/env.sh"
 
 case "${1:-}" in
@@ -25,6 +25,7 @@ stage build cargo test $tests --no-run
 stage tests cargo test $tests --no-fail-fast
 # shellcheck disable=SC2086
 [ "${1:-}" != --slow ] || stage "slow tests" env TUMBLE_SLOW=1 cargo test $tests --no-fail-fast -- determinism full_length
+[ "${1:-}" != --slow ] || stage assertions cargo test --profile checked --locked -p tumble-collide -p tumble-core -p tumble-scene --no-fail-fast
 stage "doc tests" cargo test --no-fail-fast --release --workspace --locked --doc
 stage python scripts/test_python.sh
 stage papers python3 scripts/check_papers.py
