@@ -7,13 +7,12 @@
 //! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};
 //! let mut world = World::new(Settings::default())?;
 //! world.add_static(RigidBody::fixture("ground", Shape::half_space()))?;
-//! let ball = RigidBody::with_mass("ball", Shape::sphere(0.1).unwrap(), 1.0)?.at(Pose::translation(0.0, 0.0, 1.0));
-//! let ball = world.add(ball)?;
-//! for _ in 0..120 {
-//!     world.step().unwrap();
+//! let ball = world.add(RigidBody::with_mass("ball", Shape::sphere(0.1)?, 2.0)?.at(Pose::translation(0.0, 0.0, 1.0)))?;
+//! for _ in 0..240 {
+//!     world.step()?;
 //! }
 //! assert!((world.site(ball, 0).unwrap().position().z - 0.1).abs() < 1e-6);
-//! # Ok::<(), tumble_core::WorldError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod apart;
