@@ -122,8 +122,9 @@ def run_commands(block, folder, adapter):
         elif program.startswith("examples/") and not (folder / program).is_file():
             skipped.append(f"{line}: not built; `cargo build --release --workspace --examples` builds it")
         else:
-            settings = {**os.environ, "PATH": f"{folder}:{Path(sys.executable).parent}:{os.environ['PATH']}", "MPLBACKEND": "Agg"}
-            done = subprocess.run(["bash", "-c", line], cwd=folder, env=settings, capture_output=True, text=True, timeout=300)
+            path = f"{folder}:{Path(sys.executable).parent}:{os.environ['PATH']}"
+            own = {"PATH": path, "MPLBACKEND": "Agg", "XDG_RUNTIME_DIR": str(folder / "run")}  # a cave of the same name may run beside
+            done = subprocess.run(["bash", "-c", line], cwd=folder, env={**os.environ, **own}, capture_output=True, text=True, timeout=300)
             said += done.stdout + done.stderr
             assert done.returncode == 0, f"{block.page}:{block.line}: {line}\n{done.stdout}{done.stderr}"
     return said, skipped
@@ -177,6 +178,7 @@ def folder(tmp_path, command, monkeypatch):
         (tmp_path / name).symlink_to(ROOT / name)
     if (command.parent / "examples").is_dir():
         (tmp_path / "examples").symlink_to(command.parent / "examples")
+    (tmp_path / "run").mkdir(mode=0o700)
     (tmp_path / "my").mkdir()
     shutil.copy(ROOT / "scenes" / "stack" / "scene.toml", tmp_path / "my" / "scene.toml")
     (tmp_path / "robot.urdf").write_text(ARM)
