@@ -12,6 +12,11 @@ import numpy as np
 
 import tumble
 
+try:
+    import mujoco
+except ImportError:
+    mujoco = None
+
 G, DT, MU = 9.81, 1 / 240, 0.5
 SLOPE = np.radians(20)
 STIFF = 'solref="0.004 1" solimp="0.99 0.999 0.0001"'
@@ -19,8 +24,6 @@ STIFF = 'solref="0.004 1" solimp="0.99 0.999 0.0001"'
 
 def mujoco_world(bodies: str, stiff: bool, gravity=(0, 0, -G)):
     """A floor and bodies, each ``(size, mass, position)`` of a cube; the model and its data."""
-    import mujoco
-
     option = 'cone="elliptic" impratio="100" noslip_iterations="10"' if stiff else ""
     model = mujoco.MjModel.from_xml_string(f"""<mujoco>
         <option timestep="{DT}" gravity="{gravity[0]} {gravity[1]} {gravity[2]}" iterations="200" tolerance="1e-14" {option}/>
@@ -89,8 +92,12 @@ def sink(engine: str) -> float:
     return 0.3 - data.qpos[9]
 
 
+ENGINES = {"tumble": "tumble", "default": "MuJoCo, defaults", "stiff": "MuJoCo, stiff, no slip"}
+
 print(f"{'':24}{'stops after, m':>16}{'lifted, mm':>12}{'creeps, m/s':>13}{'1000 kg sinks by, mm':>22}")
 print(f"{'exact':24}{25 / (2 * MU * G):16.6f}{0:12.4f}{0:13.1e}{0:22.6f}")
-for engine, name in (("tumble", "tumble"), ("default", "MuJoCo, defaults"), ("stiff", "MuJoCo, stiff, no slip")):
-    (way, lift), speed, depth = slide(engine), creep(engine), sink(engine)
-    print(f"{name:24}{way:16.6f}{1e3 * lift:12.4f}{speed:13.1e}{1e3 * depth:22.6f}")
+found = {engine: (*slide(engine), creep(engine), sink(engine)) for engine in (ENGINES if mujoco else ["tumble"])}
+for engine, (way, lift, speed, depth) in found.items():
+    print(f"{ENGINES[engine]:24}{way:16.6f}{1e3 * lift:12.4f}{speed:13.1e}{1e3 * depth:22.6f}")
+if mujoco is None:
+    print("MuJoCo is not installed; `make references` installs it")

@@ -124,6 +124,17 @@ def test_a_heavy_cube_does_not_sink_into_a_light_one(run):
     assert abs(names["load"]) == pytest.approx(1000.001 * G, rel=1e-6)
 
 
+def test_contact_beside_mujoco_is_as_the_readme_says():
+    found = runpy.run_path(str(EXAMPLES.parent / "benches" / "python" / "beside_mujoco.py"))["found"]
+    way, lift, speed, sunk = found["tumble"]
+    assert way == pytest.approx(25 / (2 * 0.5 * G), abs=5e-5)
+    assert lift < 1e-7 and abs(speed) < 1e-15 and abs(sunk) < 1e-7
+    if len(found) == 1:
+        pytest.skip("SKIPPED: MuJoCo is not installed; `make references` installs it")
+    assert found["default"] == pytest.approx((2.5385, 0.0389, 1.8e-3, 0.200), rel=0.05)
+    assert found["stiff"][:2] == pytest.approx((2.6510, 0.2058), rel=0.05) and found["stiff"][3] == pytest.approx(0.2, rel=0.05)
+
+
 def test_a_ring_hangs_in_a_ring(run):
     names = run("linked_rings")
     # facets lie within R(1 − cos(π/48)) + r(1 − cos(π/24)) of the torus, on both rings
