@@ -1,11 +1,12 @@
 # Short names for the scripts; each can be run by itself where there is no make.
 
-.PHONY: help demo test test-slow cave-trial goldens references lint bench clean
+.PHONY: help demo test test-slow wheel cave-trial goldens references lint bench clean
 
 help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/, run an example in Python"
 	@echo "make test       install what is missing, run all tests, check the papers"
 	@echo "make test-slow  the same, and determinism and energy over a minute"
+	@echo "make wheel      a wheel to hand on, in target/wheels/manylinux: tagged with the oldest glibc that it runs on, and checked"
 	@echo "make cave-trial a cave of five processes: frames, kills, freezes, a recording shown again and cut; minutes (scripts/cave_trial.py --long: all of it)"
 	@echo "make goldens    draws the kept pictures of crates/render/tests/goldens anew; look at them before committing"
 	@echo "make references installs Pinocchio, MuJoCo and real robots into target/python; tests that compare with them then run"
@@ -21,6 +22,9 @@ test:
 
 test-slow:
 	@scripts/test.sh --slow
+
+wheel:
+	@scripts/wheel.sh
 
 cave-trial:
 	@scripts/setup.sh

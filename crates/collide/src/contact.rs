@@ -41,7 +41,7 @@ pub enum NormalFrom {
 }
 
 /// How meshes and cylinders collide.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ContactMode {
     /// Points and edges of each body against the exact signed distance of the other: flat faces stay flat, gaps and
     /// normals are those of the surfaces. The gap of two crossing edges of finely triangulated smooth meshes may be
@@ -54,6 +54,9 @@ pub enum ContactMode {
 }
 
 impl ContactMode {
+    /// All modes with their names, as scene files and Python write them.
+    pub const NAMES: &[(&str, ContactMode)] = &[("surface", ContactMode::Surface), ("spheres", ContactMode::Spheres)];
+
     /// The mode of a pair: `Spheres` if either side asks for it.
     pub fn of_pair(self, other: ContactMode) -> ContactMode {
         if self == ContactMode::Spheres { self } else { other }

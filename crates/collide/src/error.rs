@@ -206,6 +206,9 @@ pub enum MeshError {
         /// Which promise, and where.
         what: String,
     },
+    /// A build ended early because its [`Progress`](crate::Progress) asked for it.
+    #[error("the build was stopped")]
+    Stopped,
 }
 
 impl MeshError {

@@ -19,6 +19,7 @@
 //! # Ok::<(), tumble_collide::ShapeError>(())
 //! ```
 
+mod archive;
 mod broad;
 mod contact;
 mod error;
@@ -32,6 +33,8 @@ mod solid;
 mod surface;
 mod tree;
 
+#[doc(hidden)]
+pub use archive::shared;
 pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
 pub use contact::{Contact, ContactMode, NormalFrom};
 pub use error::{MeshError, ShapeError};

@@ -7,7 +7,7 @@ use crate::{
 use std::sync::Arc;
 
 /// A solid in its own frame. Primitives are centred on the origin.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub enum Shape {
     /// All points with local `z ≤ 0`; the outward normal is local `+z`.
     HalfSpace,
@@ -29,9 +29,9 @@ pub enum Shape {
         half_length: f64,
     },
     /// A cylinder along the local z axis; shared, because its tree is large.
-    Cylinder(Arc<CylinderShape>),
+    Cylinder(#[serde(with = "crate::archive::shared")] Arc<CylinderShape>),
     /// A closed mesh about its centre of mass; shared.
-    Mesh(Arc<MeshShape>),
+    Mesh(#[serde(with = "crate::archive::shared")] Arc<MeshShape>),
 }
 
 impl Shape {

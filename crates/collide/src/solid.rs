@@ -65,12 +65,22 @@ impl MeshShape {
         let mass = if overlaps { mass } else { mesh.mass_properties(1.0) };
         let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mass };
         let tree = tree_of(&mesh)?;
+        Ok((MeshShape::of_parts(mesh, tree, unit_mass, report), offset))
+    }
+
+    /// Of a mesh that was checked and moved, with its tree: the rest follows from these.
+    pub(crate) fn of_parts(
+        mesh: TriMesh,
+        tree: SphereTree,
+        unit_mass: MassProperties,
+        report: ClosedReport,
+    ) -> MeshShape {
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
         let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);
         // buried faces are no surface of the union: such a mesh goes shell by shell, or stands for itself by its balls
         let buried = report.crossing_faces > 0 || (unit_mass.mass - mesh.signed_volume()).abs() > 1e-9 * unit_mass.mass;
         let surfaces = if buried { parts(&mesh, &tree).unwrap_or_default() } else { vec![Surface::new(&mesh, &tree)] };
-        Ok((MeshShape { mesh, tree, surfaces, unit_mass, bounding_radius, leaf_radius, report }, offset))
+        MeshShape { mesh, tree, surfaces, unit_mass, bounding_radius, leaf_radius, report }
     }
 
     /// The surface; its centre of mass is the origin.
@@ -87,6 +97,11 @@ impl MeshShape {
     /// itself in another way, which then collides by its balls.
     pub(crate) fn surfaces(&self) -> &[Surface] {
         &self.surfaces
+    }
+
+    /// At density 1, about the center of mass.
+    pub(crate) fn unit_mass(&self) -> &MassProperties {
+        &self.unit_mass
     }
 
     /// What was found and mended when the mesh was read; its notes are for the user.

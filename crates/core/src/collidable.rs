@@ -5,7 +5,7 @@ use crate::site::Site;
 use tumble_collide::{ContactMode, Shape, Vec3};
 
 /// A kind of collidable object, 0 to 63 (thesis `CollisionObjectType`): pairs are filtered by it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct CollisionKind(u8);
 
 impl CollisionKind {
@@ -21,7 +21,7 @@ impl CollisionKind {
 }
 
 /// Surface constants of one body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Material {
     /// Coefficient of restitution, 0 to 1.
     pub restitution: f64,
@@ -36,7 +36,7 @@ impl Default for Material {
 }
 
 /// How the constants of two bodies in contact make the pair's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Combine {
     /// The smaller of the two.
     Min,

@@ -16,6 +16,7 @@
 //! ```
 
 mod apart;
+pub mod archive;
 pub mod articulated;
 mod closure;
 mod collidable;
@@ -39,6 +40,7 @@ mod sync;
 mod view;
 mod world;
 
+pub use archive::ArchiveError;
 pub use articulated::{
     ArticulatedBody, ArticulatedError, Collider, Coupling, Drive, Freedom, Joint, LinkMass, Model, ModelBuilder,
     ModelError, Playback, Spring,

@@ -17,7 +17,7 @@ pub trait LightCarrier {
 }
 
 /// A camera fixed to a part.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CameraMount {
     /// Told apart by it from others of the object; may be empty where there is one.
     pub name: String,
@@ -41,7 +41,7 @@ impl CameraMount {
 }
 
 /// A light fixed to a part.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LightMount {
     /// Part of the object that it moves with.
     pub part: usize,
@@ -58,7 +58,7 @@ pub struct LightMount {
 }
 
 /// How a light spreads.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Spread {
     /// In one direction, from infinitely far.
     Directional,
@@ -70,7 +70,7 @@ pub enum Spread {
 }
 
 /// How much of an object is drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Detail {
     /// Its shape and its look.
     #[default]

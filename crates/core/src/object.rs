@@ -296,7 +296,7 @@ pub struct Visual {
 }
 
 /// How a surface looks: a shader by name and its properties, as the thesis's shader attributes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Look {
     /// Base colour, sRGB, each 0 to 1.
     pub color: [f32; 3],
@@ -309,6 +309,7 @@ pub struct Look {
     /// Named properties of the shader, in the order given.
     pub properties: Vec<(String, f64)>,
     /// A picture (PNG) over the base colour; opened by who draws.
+    #[serde(with = "texture")]
     pub texture: Option<Arc<Path>>,
     /// How much of it is drawn.
     pub detail: Detail,
@@ -325,5 +326,20 @@ impl Default for Look {
             texture: None,
             detail: Detail::Full,
         }
+    }
+}
+
+/// The path of a texture in archives: a string, which a path that is not UTF-8 cannot be.
+mod texture {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use std::path::{Path, PathBuf};
+    use std::sync::Arc;
+
+    pub fn serialize<S: Serializer>(path: &Option<Arc<Path>>, serializer: S) -> Result<S::Ok, S::Error> {
+        path.as_deref().serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Arc<Path>>, D::Error> {
+        Ok(Option::<PathBuf>::deserialize(deserializer)?.map(Arc::from))
     }
 }

@@ -23,7 +23,7 @@ pub enum Integrator {
 }
 
 /// A world's constants; they may be changed between steps.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Settings {
     /// Gravity, m/s².
     pub gravity: Vec3,
@@ -130,7 +130,7 @@ pub struct OutOfReach {
 }
 
 /// What one frame took and how well it went.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StepReport {
     /// Committed sub-steps.
     pub substeps: u32,
@@ -157,6 +157,7 @@ pub struct StepReport {
     /// Deepest penetration found by the narrow phase, metres.
     pub max_penetration: f64,
     /// The joint that was furthest open where it cannot be closed; `None` where all could.
+    #[serde(skip)]
     pub out_of_reach: Option<OutOfReach>,
 }
 

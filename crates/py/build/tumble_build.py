@@ -3,11 +3,14 @@
 Panic messages name the source files of the crates from the registry by absolute paths, which hold the builder's home. Building with
 ``--remap-path-prefix`` would compile every crate a second time under other flags, so the finished library is edited instead: each such prefix is
 overwritten by a neutral one of the same length, and the wheel's list of hashes is written anew.
+
+The sources name no home of the project. Where ``TUMBLE_REPOSITORY`` holds its address, the wheel's metadata names it as a URL.
 """
 
 import base64
 import hashlib
 import os
+import sys
 import zipfile
 from pathlib import Path
 
@@ -38,8 +41,18 @@ def private_prefixes():
     return [str(folder).encode() for folder in folders if len(str(folder)) > len("/cargo")]
 
 
+def urls():
+    """Lines of metadata for the address in ``TUMBLE_REPOSITORY``, if there is one."""
+    address = os.environ.get("TUMBLE_REPOSITORY", "").strip()
+    if not address:
+        return b""
+    if not address.startswith("https://") or any(c.isspace() for c in address):
+        raise SystemExit(f"TUMBLE_REPOSITORY is {address!r}; wanted an address that begins with https://")
+    return f"Project-URL: Repository, {address}\n".encode()
+
+
 def scrub(wheel, prefixes):
-    """Overwrites the prefixes in all files of a wheel, in place."""
+    """Overwrites the prefixes in all files of a wheel, in place, and adds the project's URLs to its metadata."""
     with zipfile.ZipFile(wheel) as archive:
         entries = [(info, archive.read(info)) for info in archive.infolist()]
     record = next(info.filename for info, _ in entries if info.filename.endswith(".dist-info/RECORD"))
@@ -50,7 +63,14 @@ def scrub(wheel, prefixes):
                 continue
             for prefix in prefixes:
                 data = data.replace(prefix, b"/cargo".ljust(len(prefix), b"/"))
+            if info.filename.endswith(".dist-info/METADATA"):
+                data = data.replace(b"\nRequires-Python:", b"\n" + urls() + b"Requires-Python:", 1)
             digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
             lines.append(f"{info.filename},sha256={digest},{len(data)}\n")
             archive.writestr(info, data)
         archive.writestr(record, "".join(lines) + f"{record},,\n")
+
+
+if __name__ == "__main__":
+    for each in sys.argv[1:]:
+        scrub(Path(each), private_prefixes())

@@ -10,7 +10,7 @@ use crate::shapes::Shape;
 use crate::shared::Shared;
 use pyo3::prelude::*;
 use std::sync::Arc;
-use tumble::collide::{ContactMode, Pose};
+use tumble::collide::Pose;
 use tumble::core::{Mode, RigidBody as Rigid};
 
 /// Where a body of this world is, given as a handle or by name.
@@ -36,15 +36,6 @@ pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>,
         (None, Some(density)) => Ok(Rigid::with_density(name, solid, density)?),
         (None, None) if led => Ok(Rigid::fixture(name, solid)),
         _ => Err(Error::value(format!("body '{name}': wanted a mass or a density, and one of the two alone"))),
-    }
-}
-
-/// What a body's contacts go by, told by its word.
-pub fn contact_mode(word: &str) -> Result<ContactMode> {
-    match word {
-        "surface" => Ok(ContactMode::Surface),
-        "spheres" => Ok(ContactMode::Spheres),
-        _ => Err(Error::value(format!("contacts: wanted \"surface\" or \"spheres\", not \"{word}\""))),
     }
 }
 

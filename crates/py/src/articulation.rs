@@ -8,7 +8,9 @@ use crate::inner::Inner;
 use crate::pool;
 use crate::robot::{Robot, Rows};
 use crate::spot::{Now, Source, Spot, Which, locked, start};
+use crate::words::{COLLISION_MESHES, MISSING_MESHES, meaning, word};
 use numpy::{IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
+use pyo3::exceptions::PyTypeError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
@@ -16,7 +18,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use tumble::collide::{Pose, Vec3};
 use tumble::core::{ArticulatedBody, Drive, Freedom};
-use tumble::scene::urdf::{self, CollisionMeshes, MissingMeshes, UrdfOptions};
+use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A tree of links: a robot, a chain, a skeleton.
 ///
@@ -166,22 +168,11 @@ impl Articulation {
         collision_meshes: &str,
     ) -> Result<Articulation> {
         let file = crate::convert::path(path)?;
-        let word = |what: &str, got: &str, wanted: &str| {
-            Error::value(format!("{what}: `{got}` is not known; wanted {wanted}"))
-        };
         let options = UrdfOptions {
             floating,
             packages: packages.unwrap_or_default(),
-            missing_meshes: match missing_meshes {
-                "error" => MissingMeshes::Error,
-                "skip" => MissingMeshes::Skip,
-                other => return Err(word("missing_meshes", other, "error or skip")),
-            },
-            collision_meshes: match collision_meshes {
-                "exact" => CollisionMeshes::Exact,
-                "hull" => CollisionMeshes::Hull,
-                other => return Err(word("collision_meshes", other, "exact or hull")),
-            },
+            missing_meshes: meaning("missing_meshes", missing_meshes, MISSING_MESHES)?,
+            collision_meshes: meaning("collision_meshes", collision_meshes, COLLISION_MESHES)?,
             ..UrdfOptions::default()
         };
         let read = py.detach(|| pool::run(|| Ok(urdf::model(&file, &options)?)))?;
@@ -387,8 +378,8 @@ impl Articulation {
     /// Puts a motor on a hinge or slider of one in a world, by the name of its joint.
     ///
     /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and ``velocity``; with neither it holds ``velocity``; with nothing
-    /// given there is no motor. limit: greatest torque or force, N·m or N. Part of the body and no state: ``save`` leaves it out.
-    #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, limit=f64::INFINITY))]
+    /// given there is no motor. limit: greatest torque or force, N·m or N; None: none. Part of the body and no state: ``save`` leaves it out.
+    #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, limit=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_drive(
         &self,
@@ -398,8 +389,9 @@ impl Articulation {
         velocity: Option<f64>,
         stiffness: f64,
         damping: f64,
-        limit: f64,
+        limit: Option<f64>,
     ) -> Result<()> {
+        let limit = limit.unwrap_or(f64::INFINITY);
         let (place, index) = (self.in_world()?, self.freedom(joint)?);
         let stiff = stiffness != 0.0 || damping != 0.0;
         let drive = match (target, velocity) {
@@ -471,6 +463,23 @@ impl Articulation {
         }
     }
 
+    /// For pickle: the file of a description and its numbers. A handle of one in a world is none by itself.
+    #[allow(clippy::type_complexity, reason = "the parts of a description, once")]
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Result<(Bound<'py, PyAny>, (PathBuf, bool, BTreeMap<String, PathBuf>, [&'static str; 2], [Vec<f64>; 4]))> {
+        let Spot::Free { source, now } = &self.spot else {
+            return Err(alone(&self.name));
+        };
+        let file = std::path::absolute(&source.file).unwrap_or_else(|_| source.file.clone());
+        let UrdfOptions { floating, packages, missing_meshes, collision_meshes, .. } = source.options.clone();
+        let words = [word(missing_meshes, MISSING_MESHES), word(collision_meshes, COLLISION_MESHES)];
+        let Now { gravity, q, qd, tau } = locked(now).clone();
+        let unpickle = py.import("tumble._native")?.getattr("_unpickle_articulation")?;
+        Ok((unpickle, (file, floating, packages, words, [gravity.as_slice().to_vec(), q, qd, tau])))
+    }
+
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
         visit.call(&self.anchor)
     }
@@ -478,6 +487,35 @@ impl Articulation {
     fn __hash__(slf: &Bound<'_, Self>) -> u64 {
         slf.get().place().map_or(slf.as_ptr() as u64 >> 4, hash)
     }
+}
+
+/// What a pickled description becomes: its file is read anew.
+#[pyfunction]
+pub fn _unpickle_articulation(
+    py: Python<'_>,
+    file: PathBuf,
+    floating: bool,
+    packages: BTreeMap<String, PathBuf>,
+    words: [String; 2],
+    numbers: [Vec<f64>; 4],
+) -> Result<Articulation> {
+    let file = file.into_pyobject(py).map_err(PyErr::from)?.into_any();
+    let [missing, collision] = words;
+    let description = Articulation::from_urdf(py, &file, floating, Some(packages), &missing, &collision)?;
+    let [gravity, q, qd, tau] = numbers.map(|row| array(py, &row).into_any());
+    description.set_gravity(&gravity)?;
+    for (which, row) in [(Which::Q, q), (Which::Qd, qd), (Which::Tau, tau)] {
+        description.spot.set(py, which, &description.robot, &row)?;
+    }
+    Ok(description)
+}
+
+/// The error of a handle that is pickled.
+pub fn alone(name: &str) -> Error {
+    PyTypeError::new_err(format!(
+        "cannot pickle a handle of '{name}' by itself; pickle its world, and ask that for the body by name"
+    ))
+    .into()
 }
 
 /// A description of a URDF, from a path.

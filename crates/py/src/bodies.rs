@@ -84,6 +84,28 @@ pub fn by_name(inner: &Inner, name: &str) -> Result<Found> {
     })
 }
 
+/// The handle of the rigid body of that name.
+pub fn rigid_body(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<RigidBody> {
+    let Found { id, name, robot } = shared.read(|inner| by_name(inner, name))?;
+    match robot {
+        None => RigidBody::new(py, Place { shared: shared.clone(), id, name }),
+        Some(_) => Err(Error::Name(format!(
+            "'{name}' is an articulation and not a rigid body; world.articulation('{name}') gives its handle"
+        ))),
+    }
+}
+
+/// The handle of the articulated body of that name.
+pub fn articulation(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<Articulation> {
+    let Found { id, name, robot } = shared.read(|inner| by_name(inner, name))?;
+    match robot {
+        Some(robot) => Articulation::placed(py, Place { shared: shared.clone(), id, name }, robot),
+        None => Err(Error::Name(format!(
+            "'{name}' is a rigid body and not an articulation; world.body('{name}') gives its handle"
+        ))),
+    }
+}
+
 /// Where a handle of any kind points.
 pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
     if let Some(place) = body.cast::<Articulation>().ok().and_then(|body| body.get().place().cloned()) {

@@ -1,11 +1,13 @@
 //! A rigid body of a world: a handle, which asks the world each time.
 
+use crate::articulation::alone;
 use crate::collect::{Anchor, anchor};
 use crate::convert::{array, pose, quaternion, rotation, some, symmetric, vec3, vec3_or, vector};
 use crate::errors::{Error, Result};
 use crate::inner::Inner;
 use crate::looks;
 use crate::shared::Shared;
+use crate::words::{MODES, meaning, word};
 use numpy::{PyArray1, PyArray2};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -56,25 +58,6 @@ impl Place {
     /// Whether two handles point at the same.
     pub fn same(&self, other: &Place) -> bool {
         Arc::ptr_eq(&self.shared, &other.shared) && self.id == other.id
-    }
-}
-
-/// Python's words for how a body takes part.
-pub fn mode_name(mode: Mode) -> &'static str {
-    match mode {
-        Mode::Static => "static",
-        Mode::Kinematic => "kinematic",
-        Mode::Dynamic => "dynamic",
-    }
-}
-
-/// The inverse of [`mode_name`].
-pub fn mode_of(name: &str) -> Result<Mode> {
-    match name {
-        "static" => Ok(Mode::Static),
-        "kinematic" => Ok(Mode::Kinematic),
-        "dynamic" => Ok(Mode::Dynamic),
-        _ => Err(Error::value(format!("mode: `{name}` is not known; wanted static, kinematic or dynamic"))),
     }
 }
 
@@ -211,12 +194,12 @@ impl RigidBody {
     /// ``"dynamic"``, ``"kinematic"`` (follows the velocity it is given and pushes others) or ``"static"``.
     #[getter]
     fn mode(&self) -> Result<&'static str> {
-        Ok(mode_name(self.place.status()?.mode))
+        Ok(word(self.place.status()?.mode, MODES))
     }
 
     #[setter]
     fn set_mode(&self, py: Python<'_>, value: &str) -> Result<()> {
-        let mode = mode_of(value)?;
+        let mode = meaning("mode", value, MODES)?;
         if mode == Mode::Dynamic && self.constant(Rigid::is_fixture)? {
             return Err(Error::value(format!(
                 "'{}' has no mass: it was added as static, and cannot be dynamic",
@@ -383,6 +366,11 @@ impl RigidBody {
 
     fn __hash__(&self) -> u64 {
         hash(&self.place)
+    }
+
+    /// For pickle, which a handle by itself is not for.
+    fn __reduce__(&self) -> Result<()> {
+        Err(alone(&self.place.name))
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {

@@ -7,7 +7,9 @@ use pyo3::types::PyType;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use tumble::collide::{MeshError, ShapeError};
-use tumble::core::{ArticulatedError, BodyError, ModelError, SettingsError, SnapshotError, StepError, WorldError};
+use tumble::core::{
+    ArchiveError, ArticulatedError, BodyError, ModelError, SettingsError, SnapshotError, StepError, WorldError,
+};
 use tumble::net::record::RecordError;
 use tumble::render::RenderError;
 use tumble::scene::cave::CaveError;
@@ -47,6 +49,9 @@ pub enum Error {
     Choice(#[from] UnknownName),
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
+    /// Bytes that are no pickled world or shape.
+    #[error(transparent)]
+    Archive(ArchiveError),
     #[error(transparent)]
     Step(#[from] StepError),
     /// A step of one of many forks.
@@ -71,6 +76,9 @@ pub enum Error {
         "the world is being stepped, and this call comes from within that step; a force or behaviour reads the view it is given"
     )]
     Within,
+    /// Work that ended early; the caller raises what ended it.
+    #[error("the work was stopped")]
+    Stopped,
     /// A panic that was caught.
     #[error("an error inside tumble: {0}; please report it")]
     Internal(String),
@@ -111,12 +119,12 @@ impl Error {
             Error::Record(_) => "RecordingError",
             Error::Build(BuildError::World { .. }) => "InvalidValueError",
             Error::Scene(_) | Error::Build(_) | Error::Urdf(_) => "SceneError",
-            Error::Snapshot(_) => "SnapshotError",
+            Error::Snapshot(_) | Error::Archive(_) => "SnapshotError",
             Error::Step(_) => "StepError",
             Error::Fork { source, .. } => source.class(),
             Error::Name(_) => "UnknownNameError",
             Error::Busy | Error::Within => "BusyError",
-            Error::Internal(_) | Error::Broken => "InternalError",
+            Error::Internal(_) | Error::Broken | Error::Stopped => "InternalError",
             _ => "InvalidValueError",
         }
     }

@@ -135,6 +135,15 @@ impl ForceGenerator for PythonForce {
     }
 }
 
+/// A force whose Python object is yet to come: `None` stands for it.
+pub fn empty_force(name: &str) -> Box<dyn Object> {
+    let nobody = Python::attach(|py| Arc::new(py.None()));
+    Box::new(PythonForce { code: Code::of(name, nobody) })
+}
+
+/// Names and objects of forces; names, objects and bodies of behaviours.
+pub type Extensions = (Vec<(String, Py<PyAny>)>, Vec<(String, Py<PyAny>, Vec<String>)>);
+
 /// A behaviour and the bodies it was given.
 struct Attached {
     code: Code,
@@ -259,6 +268,43 @@ impl Inner {
         let forces =
             self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
         forces.chain(self.extension.behaviours.iter().map(|b| &b.code)).map(|code| code.object.clone()).collect()
+    }
+
+    /// The objects that are forces written in Python.
+    pub fn forces(&self) -> &[ObjectId] {
+        &self.extension.forces
+    }
+
+    /// Counts objects made by [`empty_force`] as forces.
+    pub fn expect_forces(&mut self, names: &[String]) {
+        self.extension.forces = names.iter().filter_map(|name| self.world.find(name)).collect();
+    }
+
+    /// All forces and behaviours with what they were given; `None` where there are none.
+    pub fn pickled_extensions(&self, py: Python<'_>) -> Option<Extensions> {
+        let [forces, _] = self.extensions(py);
+        let name = |&id: &ObjectId| Some(self.world.object(id)?.name().to_string());
+        let of = |b: &Attached| {
+            (b.code.name.clone(), b.code.object.clone_ref(py), b.bodies.iter().filter_map(name).collect())
+        };
+        let behaviours = self.extension.behaviours.iter().map(of).collect();
+        (!self.extension.is_empty()).then_some((forces, behaviours))
+    }
+
+    /// Puts forces in the places that are kept for them, and adds behaviours.
+    pub fn unpickle_extensions(&mut self, py: Python<'_>, (forces, behaviours): Extensions) -> Result<()> {
+        for (name, object) in forces {
+            let id = self.world.find(&name).filter(|id| self.extension.forces.contains(id));
+            let force = id.and_then(|id| self.world.get_mut::<PythonForce>(id));
+            let force = force.ok_or_else(|| Error::value(format!("the pickled world has no force '{name}'")))?;
+            force.code = Code::new(&name, object.bind(py));
+        }
+        for (name, object, bodies) in behaviours {
+            self.check_new(&name)?;
+            let bodies = bodies.iter().filter_map(|name| self.world.find(name)).collect();
+            self.extension.behaviours.push(Attached { code: Code::new(&name, object.bind(py)), bodies });
+        }
+        Ok(())
     }
 
     /// Takes all forces and behaviours out, for who drops them.

@@ -12,7 +12,9 @@ mod errors;
 mod extension;
 mod faults;
 mod inner;
+mod interrupt;
 mod looks;
+mod pickling;
 mod picture;
 mod pool;
 mod recording;
@@ -26,6 +28,7 @@ mod spheretree;
 mod spot;
 mod state;
 mod view;
+mod words;
 mod world;
 
 use pyo3::prelude::*;
@@ -36,7 +39,7 @@ mod _native {
     use super::*;
 
     #[pymodule_export]
-    use super::articulation::Articulation;
+    use super::articulation::{_unpickle_articulation, Articulation};
     #[pymodule_export]
     use super::bodies::Bodies;
     #[pymodule_export]
@@ -44,15 +47,19 @@ mod _native {
     #[pymodule_export]
     use super::faults::_panic;
     #[pymodule_export]
+    use super::pickling::{_unpickle_shape, _unpickle_world};
+    #[pymodule_export]
     use super::recording::{Recorder, read_recording};
     #[pymodule_export]
     use super::report::StepReport;
     #[pymodule_export]
     use super::shapes::{Block, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere};
     #[pymodule_export]
-    use super::spheretree::SphereTree;
+    use super::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]
     use super::view::View;
+    #[pymodule_export]
+    use super::words::_words;
     #[pymodule_export]
     use super::world::World;
 

@@ -4,6 +4,7 @@ use crate::bodies::body_ids;
 use crate::convert::{Numbers, room, shown};
 use crate::errors::{Error, Result, caught};
 use crate::inner::Inner;
+use crate::interrupt::Stop;
 use crate::pool;
 use pyo3::exceptions::PyRecursionError;
 use rayon::prelude::*;
@@ -116,7 +117,7 @@ impl Plan {
 
     /// Runs all forks: the states after every `every` frames, fork by fork. `world` is forked again for each, so that only as many exist at
     /// once as there are threads.
-    pub fn run(&self, world: Inner, threads: Option<usize>) -> Result<Vec<f64>> {
+    pub fn run(&self, world: Inner, threads: Option<usize>, stop: &Stop) -> Result<Vec<f64>> {
         let kept = self.frames / self.every * world.world.state().len();
         let mut out = room(self.count * kept, "states")?;
         out.resize(self.count * kept, 0.0);
@@ -132,8 +133,9 @@ impl Plan {
             true => {
                 let template = Mutex::new(world);
                 let each = |(fork, out): (usize, &mut [f64])| {
+                    stop.check()?;
                     let own = template.lock().map_err(|_| Error::Broken)?.fork();
-                    caught(|| self.fork(own, fork, out))
+                    caught(|| self.fork(own, fork, out, stop))
                 };
                 pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>())
                     .into_iter()
@@ -143,11 +145,12 @@ impl Plan {
             false => {
                 let few = 4 * pool.current_num_threads();
                 for (first, out) in out.chunks_mut(few * kept).enumerate().map(|(k, out)| (k * few, out)) {
+                    stop.check()?;
                     let own: Vec<Mutex<Option<Inner>>> =
                         (0..out.len() / kept).map(|_| Mutex::new(Some(world.fork()))).collect();
                     let each = |(k, out): (usize, &mut [f64])| {
                         let own = own[k].lock().map_err(|_| Error::Broken)?.take().ok_or(Error::Broken)?;
-                        caught(|| self.fork(own, first + k, out))
+                        caught(|| self.fork(own, first + k, out, stop))
                     };
                     pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>())
                         .into_iter()
@@ -158,21 +161,22 @@ impl Plan {
         Ok(out)
     }
 
-    fn fork(&self, own: Inner, fork: usize, out: &mut [f64]) -> Result<()> {
+    fn fork(&self, own: Inner, fork: usize, out: &mut [f64], stop: &Stop) -> Result<()> {
         // a thread that waits may do another's work meanwhile
         let before = DEPTH.replace(self.depth);
-        let outcome = self.go(own, fork, out);
+        let outcome = stop.within(|| self.go(own, fork, out, stop));
         DEPTH.set(before);
         outcome
     }
 
-    fn go(&self, mut own: Inner, fork: usize, out: &mut [f64]) -> Result<()> {
+    fn go(&self, mut own: Inner, fork: usize, out: &mut [f64], stop: &Stop) -> Result<()> {
         if let Some(start) = self.start(fork) {
             own.write_state(&[start.len()], start)?;
         }
         let (width, size) = (self.width(), own.world.state().len());
         let controls = &self.controls[fork * self.frames * width..(fork + 1) * self.frames * width];
         for frame in 0..self.frames {
+            stop.check()?;
             let mut row = &controls[frame * width..(frame + 1) * width];
             for &(id, dof) in &self.driven {
                 let (own_row, rest) = row.split_at(dof);

@@ -2,11 +2,13 @@
 
 use crate::convert::{number, numbers, path, shown, some, vec3_or};
 use crate::errors::{Error, Result, caught};
+use crate::pickling::{ShapeRecord, write_shape};
 use crate::pool;
 use nalgebra::Translation3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::PyClass;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use tumble::collide::{Pose, Quat, Shape as Solid, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble::scene::read_solid;
 
@@ -24,6 +26,21 @@ pub struct Shape {
 impl Shape {
     fn new(solid: Solid, words: String) -> Shape {
         Shape { solid, placement: Pose::identity(), words }
+    }
+
+    /// The shape of a record, as an object of its class.
+    pub fn of_record(py: Python<'_>, record: ShapeRecord) -> Result<Py<PyAny>> {
+        let ShapeRecord { solid, placement, words, center } = record;
+        let center = center.unwrap_or_else(Vec3::zeros);
+        let shape = Shape { solid, placement, words };
+        Ok(match &shape.solid {
+            Solid::Sphere { .. } => Py::new(py, shape.into_a(Sphere))?.into_any(),
+            Solid::Box { .. } => Py::new(py, shape.into_a(Block))?.into_any(),
+            Solid::Capsule { .. } => Py::new(py, shape.into_a(Capsule))?.into_any(),
+            Solid::Cylinder(_) => Py::new(py, shape.into_a(Cylinder))?.into_any(),
+            Solid::HalfSpace => Py::new(py, shape.into_a(HalfSpace))?.into_any(),
+            Solid::Mesh(_) => Py::new(py, shape.into_a(Mesh { center }))?.into_any(),
+        })
     }
 
     /// The shape as an object of one of its classes.
@@ -44,6 +61,16 @@ impl Shape {
     #[getter]
     fn bounding_radius(&self) -> f64 {
         self.solid.bounding_radius()
+    }
+
+    /// For pickle.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let (py, own) = (slf.py(), slf.get());
+        let center = slf.as_any().cast::<Mesh>().ok().map(|mesh| mesh.get().center);
+        let record =
+            ShapeRecord { solid: own.solid.clone(), placement: own.placement, words: own.words.clone(), center };
+        let unpickle = py.import("tumble._native")?.getattr("_unpickle_shape")?;
+        Ok((unpickle, (PyBytes::new(py, &write_shape(&record)?),)))
     }
 
     fn __repr__(&self) -> &str {
@@ -127,7 +154,7 @@ pub struct HalfSpace;
 #[pymethods]
 impl HalfSpace {
     #[new]
-    #[pyo3(signature = (normal=None, offset=0.0))]
+    #[pyo3(signature = (normal=None, offset=0.0), text_signature = "(normal=(0.0, 0.0, 1.0), offset=0.0)")]
     fn new(normal: Option<&Bound<'_, PyAny>>, offset: f64) -> Result<PyClassInitializer<HalfSpace>> {
         let given = vec3_or(normal, "normal", Vec3::z())?;
         let offset = number(offset, "offset")?;

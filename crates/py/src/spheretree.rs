@@ -2,21 +2,21 @@
 
 use crate::convert::{path, whole_number};
 use crate::errors::{Error, Result, caught};
+use crate::interrupt::interruptible;
 use crate::pool;
 use crate::shapes::triangles;
+use crate::words::{BUILDERS, meaning, word};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use tumble::collide::{
     Builder, CachedTree, LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree as Tree, TreeCache, TreeFile,
     TreeSettings, TriMesh,
 };
-
-/// The methods by the words of the command.
-const METHODS: [(&str, Builder); 4] =
-    [("medial", Builder::Medial), ("hubbard", Builder::Hubbard), ("grid", Builder::Grid), ("octree", Builder::Octree)];
+use tumble::core::archive::{open, seal};
 
 /// Nested balls around a closed mesh: every ball holds the balls of its children, and the balls of each level cover the surface.
 ///
@@ -28,6 +28,19 @@ pub struct SphereTree {
     /// What it was built around; a tree that was loaded has no mesh.
     mesh: Option<TriMesh>,
     quality: OnceLock<Vec<LevelQuality>>,
+}
+
+/// What a pickled tree begins with.
+const PICKLED: &[u8; 8] = b"tumbleT1";
+
+/// What a pickled sphere tree becomes.
+#[pyfunction]
+pub fn _unpickle_tree(py: Python<'_>, data: PyBackedBytes) -> Result<SphereTree> {
+    py.detach(|| {
+        let (json, mesh): (String, Option<TriMesh>) = open(PICKLED, &data)?;
+        let file = caught(|| TreeFile::from_json(&json).map_err(|why| Error::value(why.to_string())))?;
+        Ok(SphereTree::of(file, mesh))
+    })
 }
 
 impl SphereTree {
@@ -61,10 +74,7 @@ impl SphereTree {
 
 /// The method's usual settings, with what was given instead.
 fn settings(method: &str, branch: Option<u32>, depth: Option<u32>, error: Option<f64>) -> Result<TreeSettings> {
-    let Some(&(_, builder)) = METHODS.iter().find(|(name, _)| *name == method) else {
-        let names = METHODS.map(|(name, _)| name).join(", ");
-        return Err(Error::value(format!("method: `{method}` is not known; there are {names}")));
-    };
+    let builder = meaning("method", method, BUILDERS)?;
     let usual = if builder == Builder::Octree {
         TreeSettings::octree()
     } else {
@@ -96,7 +106,7 @@ impl SphereTree {
     /// (default 3, of the octree 7); error: no ball that reaches less than this outside is divided, as a part of the mesh's diagonal, 1e-4 to 1
     /// (default 1e-4, of the octree 0.01); cache: keep the tree on disk and take it from there next time.
     ///
-    /// A mesh that is open or encloses nothing, and settings out of range, are ``InvalidValueError``. The interpreter is let go meanwhile.
+    /// A mesh that is open or encloses nothing, and settings out of range, are ``InvalidValueError``. The interpreter is let go meanwhile; Ctrl-C ends the build.
     #[staticmethod]
     #[pyo3(signature = (vertices, faces=None, *, method="medial", branch=None, depth=None, error=None, cache=true))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
@@ -113,10 +123,10 @@ impl SphereTree {
         let settings = settings(method, branch, depth, error)?;
         let (name, mut mesh) = (name_of(vertices, faces), triangles(py, vertices, faces)?);
         let cache = if cache { TreeCache::of_environment() } else { TreeCache::off() };
-        py.detach(|| {
+        interruptible(py, |stop| {
             pool::run(|| {
                 mesh.check_closed()?;
-                let CachedTree { tree, stages, .. } = Tree::build_cached(&mesh, &settings, &cache)?;
+                let CachedTree { tree, stages, .. } = Tree::build_cached_watched(&mesh, &settings, &cache, stop)?;
                 let file = TreeFile { name, mesh: MeshId::of(&mesh), settings, stages, quality: Vec::new(), tree };
                 Ok(SphereTree::of(file, Some(mesh)))
             })
@@ -160,7 +170,7 @@ impl SphereTree {
     /// How it was built.
     #[getter]
     fn method(&self) -> &'static str {
-        METHODS.iter().find(|(_, builder)| *builder == self.file.settings.builder).map_or("", |(name, _)| name)
+        word(self.file.settings.builder, BUILDERS)
     }
 
     /// Most children of a ball that were allowed.
@@ -234,6 +244,14 @@ impl SphereTree {
     #[pyo3(signature = (verbose=false))]
     fn report(&self, py: Python<'_>, verbose: bool) -> Result<String> {
         Ok(tumble::table::table(&self.whole(py)?, verbose))
+    }
+
+    /// For pickle: the tree, the figures that were measured, and the mesh that others are measured with.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let quality = self.quality.get().cloned().unwrap_or_default();
+        let json = TreeFile { quality, ..self.file.clone() }.to_json();
+        let unpickle = py.import("tumble._native")?.getattr("_unpickle_tree")?;
+        Ok((unpickle, (PyBytes::new(py, &seal(PICKLED, &(json, &self.mesh))?),)))
     }
 
     /// Number of levels.

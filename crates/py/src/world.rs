@@ -1,6 +1,6 @@
 //! The world: made or loaded, filled, stepped, asked.
 
-use crate::adding::{add, articulated, contact_mode, own_place, rigid};
+use crate::adding::{add, articulated, own_place, rigid};
 use crate::articulation::Articulation;
 use crate::bodies::{Bodies, by_name, handle, place_of};
 use crate::body::RigidBody;
@@ -8,14 +8,17 @@ use crate::building::{Choices, build};
 use crate::collect::{Anchor, anchor};
 use crate::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
 use crate::errors::{Error, Result};
+use crate::extension::Extensions;
 use crate::inner::Inner;
+use crate::interrupt::interruptible;
 use crate::picture::Shot;
 use crate::pool;
 use crate::report::StepReport;
 use crate::rollout::Plan;
 use crate::shapes::Shape;
 use crate::shared::Shared;
-use crate::{bodies, contacts, saved};
+use crate::words::meaning;
+use crate::{bodies, contacts, pickling, saved};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -24,7 +27,7 @@ use pyo3::types::PyBytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
-use tumble::collide::Vec3;
+use tumble::collide::{ContactMode, Vec3};
 use tumble::core::{Mode, RigidBody as Rigid, Settings};
 use tumble::scene::{SceneFile, resolve_scene};
 
@@ -45,7 +48,8 @@ pub struct World {
 }
 
 impl World {
-    fn of(py: Python<'_>, (inner, notes): (Inner, Vec<String>)) -> Result<World> {
+    /// A world and what is to be said of it.
+    pub fn of(py: Python<'_>, (inner, notes): (Inner, Vec<String>)) -> Result<World> {
         let shared = Shared::new(inner);
         Ok(World { anchor: anchor(py, &shared)?, shared, notes })
     }
@@ -66,7 +70,11 @@ impl World {
 #[pymethods]
 impl World {
     #[new]
-    #[pyo3(signature = (gravity=None, dt=1.0/240.0, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
+    #[pyo3(
+        text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
+        solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5)"
+    )]
+    #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
         contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
@@ -211,7 +219,17 @@ impl World {
         Bodies::new(py, self.shared.clone())
     }
 
-    /// ``world[name]``: the body of that name.
+    /// The rigid body, or static geometry, of that name. An articulation, or a name that no body has, is an ``UnknownNameError``.
+    fn body(&self, py: Python<'_>, name: &str) -> Result<RigidBody> {
+        bodies::rigid_body(py, &self.shared, name)
+    }
+
+    /// The articulated body of that name. A rigid body, or a name that no body has, is an ``UnknownNameError``.
+    fn articulation(&self, py: Python<'_>, name: &str) -> Result<Articulation> {
+        bodies::articulation(py, &self.shared, name)
+    }
+
+    /// ``world[name]``: the body of that name, a ``RigidBody`` or an ``Articulation``.
     fn __getitem__(&self, py: Python<'_>, name: &str) -> Result<Py<PyAny>> {
         handle(py, &self.shared, self.shared.read(|inner| by_name(inner, name))?)
     }
@@ -267,12 +285,36 @@ impl World {
         World::of(py, (inner, self.notes.clone()))
     }
 
+    fn __copy__(&self, py: Python<'_>) -> Result<World> {
+        self.fork(py)
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Result<World> {
+        self.fork(py)
+    }
+
+    /// For pickle: the whole world, with its forces and behaviours.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,), Option<Extensions>)> {
+        let (bytes, state) =
+            self.shared.read(|inner| Ok((pickling::write(inner, &self.notes)?, inner.pickled_extensions(py))))?;
+        let unpickle = py.import("tumble._native")?.getattr("_unpickle_world")?;
+        Ok((unpickle, (PyBytes::new(py, &bytes),), state))
+    }
+
+    /// For pickle: the forces and behaviours of an unpickled world.
+    fn __setstate__(&self, py: Python<'_>, state: Extensions) -> Result<()> {
+        self.shared.extend(py, |inner| inner.unpickle_extensions(py, state))
+    }
+
     /// The futures of many forks, each under forces of its own, on all cores with the interpreter let go. This world stays as it is.
     ///
     /// controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all ``articulations`` one after the other (by default all of the
     /// world, in order; with none of them n is 0); states: where the forks start, shape (len(state),) or (forks, len(state)), by default where the world
     /// is; every: every how many steps the state is kept; threads: at most so many (default: all cores). Returns the states, shape
-    /// (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which.
+    /// (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which; Ctrl-C ends all of them between two steps.
     #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
     fn rollout<'py>(
         &self,
@@ -292,10 +334,8 @@ impl World {
         let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
         let (plan, fork) =
             self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
-        let (shape, out) = py.detach(|| {
-            let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
-            plan.run(fork, threads).map(|out| (shape, out))
-        })?;
+        let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
+        let out = interruptible(py, |stop| plan.run(fork, threads, stop))?;
         Ok(PyArray1::from_vec(py, out).reshape(shape)?)
     }
 
@@ -354,7 +394,7 @@ impl World {
             .at(pose(position, orientation)? * shape.placement)
             .surface(restitution, friction);
         (body.linear_damping, body.angular_damping, body.contact_mode) =
-            (linear_damping, angular_damping, contact_mode(contacts)?);
+            (linear_damping, angular_damping, meaning("contacts", contacts, ContactMode::NAMES)?);
         add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
     }
 
@@ -377,7 +417,7 @@ impl World {
         let body = Rigid::fixture(name, shape.solid.clone())
             .at(pose)
             .surface(restitution, friction)
-            .colliding_by(contact_mode(contacts)?);
+            .colliding_by(meaning("contacts", contacts, ContactMode::NAMES)?);
         add(&self.shared, py, body, Mode::Static, collidable)
     }
 

@@ -9,7 +9,7 @@ use tumble_core::Detail;
 pub type Color = [f64; 3];
 
 /// A pattern drawn over the surface, in body axes, so that turning shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Pattern {
     /// One colour.
     Plain,
@@ -53,7 +53,7 @@ impl Pattern {
 }
 
 /// The look of a surface.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Look {
     /// Main colour. Default a light grey.
     pub color: Color,

@@ -5,7 +5,7 @@ use crate::fields::{Fields, Names};
 use crate::look::{Color, Look, Pattern, read_color};
 
 /// A camera that stands still.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CameraSpec {
     /// Where the eye is, m.
     pub eye_m: [f64; 3],
@@ -59,7 +59,7 @@ impl CameraSpec {
 }
 
 /// `[cave]`: where the frame of a cave lies in the scene, upright. `x_scene = origin + scale · Rz(heading) · x_cave`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CavePlace {
     /// Where the cave's origin is (by custom the floor below its middle), m, world axes.
     pub origin_m: [f64; 3],
@@ -105,7 +105,7 @@ impl CavePlace {
 }
 
 /// A light.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LightSpec {
     /// From everywhere in one direction, or from a point.
     pub kind: LightKind,
@@ -119,7 +119,7 @@ pub struct LightSpec {
 }
 
 /// Where a light comes from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum LightKind {
     /// Like the sun.
     Directional {
@@ -173,7 +173,7 @@ impl LightSpec {
 }
 
 /// The sky: behind everything, and the light from everywhere.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SkySpec {
     /// Straight up.
     pub zenith_color: Color,
@@ -211,7 +211,7 @@ impl SkySpec {
 }
 
 /// A horizontal floor that is only drawn: bodies fall through it unless a half-space lies there.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GroundSpec {
     /// Height of the floor, m. Default 0.
     pub height_m: f64,

@@ -47,11 +47,14 @@ pub enum Solver {
 }
 
 impl Stepper {
-    const NAMES: Names<Self> = &[("time_stepping", Stepper::TimeStepping), ("backtracking", Stepper::Backtracking)];
+    /// All of them with their names, as scene files and Python write them.
+    pub const NAMES: &[(&str, Self)] =
+        &[("time_stepping", Stepper::TimeStepping), ("backtracking", Stepper::Backtracking)];
 }
 
 impl Integrator {
-    const NAMES: Names<Self> = &[
+    /// All of them with their names, as scene files and Python write them.
+    pub const NAMES: &[(&str, Self)] = &[
         ("verlet", Integrator::Verlet),
         ("symplectic_euler", Integrator::SymplecticEuler),
         ("explicit_euler", Integrator::ExplicitEuler),
@@ -61,7 +64,8 @@ impl Integrator {
 }
 
 impl Solver {
-    const NAMES: Names<Self> = &[
+    /// All of them with their names, as scene files and Python write them.
+    pub const NAMES: &[(&str, Self)] = &[
         ("gauss_seidel", Solver::GaussSeidel),
         ("lcp_pyramid", Solver::LcpPyramid),
         ("lcp_sliding", Solver::LcpSliding),
@@ -77,7 +81,7 @@ const COMBINE: Names<Combine> = &[
 ];
 
 /// How meshes and cylinders collide: the words of `contacts`.
-pub(crate) const CONTACTS: Names<ContactMode> = &[("surface", ContactMode::Surface), ("spheres", ContactMode::Spheres)];
+pub(crate) const CONTACTS: Names<ContactMode> = ContactMode::NAMES;
 
 impl From<Integrator> for tumble_core::Integrator {
     fn from(integrator: Integrator) -> Self {

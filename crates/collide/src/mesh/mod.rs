@@ -41,7 +41,7 @@ const FARTHEST: f64 = 1e9;
 const SMALLEST: f64 = 1e-30;
 
 /// A surface made of triangles, counter-clockwise seen from outside.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TriMesh {
     /// Positions, metres.
     pub vertices: Vec<Vec3>,

@@ -32,10 +32,21 @@ pub(super) enum Cell {
     Inner(Vec<Cell>),
 }
 
-/// Told how far a build is, from whichever thread works.
+/// Hears how far a build is, and can end it; called from any thread that works on the build.
 pub trait Progress: Sync {
     /// `share` of the work is done, 0 to 1; does not fall.
     fn at(&self, share: f64);
+
+    /// Whether the build shall end early, with [`MeshError::Stopped`]. Asked in every long loop; a build that runs to its end does not
+    /// depend on it.
+    fn stopped(&self) -> bool {
+        false
+    }
+}
+
+/// [`MeshError::Stopped`] where the build shall end early.
+pub(super) fn go_on(progress: &dyn Progress) -> Result<(), MeshError> {
+    if progress.stopped() { Err(MeshError::Stopped) } else { Ok(()) }
 }
 
 /// Nobody listens.

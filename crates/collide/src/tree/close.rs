@@ -3,6 +3,7 @@
 //! A triangle lies in a ball iff its corners do. Each is halved at its longest side until a piece lies in one ball or is small; the
 //! ball that needs least to hold a small piece is grown to hold it.
 
+use super::Progress;
 use super::ball::Ball;
 use crate::{TriMesh, Vec3};
 
@@ -10,10 +11,10 @@ use crate::{TriMesh, Vec3};
 const SMALL: f64 = 4e-4;
 
 /// The balls, grown to cover.
-pub(super) fn closed(mesh: &TriMesh, mut balls: Vec<Ball>) -> Vec<Ball> {
+pub(super) fn closed(mesh: &TriMesh, mut balls: Vec<Ball>, progress: &dyn Progress) -> Vec<Ball> {
     let small = SMALL * mesh.diagonal();
     let all: Vec<u32> = (0..balls.len() as u32).collect();
-    for t in 0..mesh.triangles.len() {
+    for t in (0..mesh.triangles.len()).take_while(|_| !progress.stopped()) {
         cover(&mesh.corners(t), &all, small, &mut balls);
     }
     // a rounding's worth, so that containment holds in floating point

@@ -11,7 +11,7 @@
 //! Departs from the paper: where a ball reaches out far, over a hole between samples, a sample is added; and the parts that are left are refitted
 //! (points choose balls, balls are fitted anew), which brought spot's 64 balls from 0.034 to 0.023–0.031 of the diagonal.
 
-use super::builder::{Built, Job, StageCount, TreeBuilder};
+use super::builder::{Built, Job, Progress, StageCount, TreeBuilder};
 use super::medial::CoverPoints;
 use super::medial::adaptive::Axis;
 use super::medial::{MedialBall, Want};
@@ -41,7 +41,7 @@ impl TreeBuilder for Hubbard {
     fn build(&self, job: &Job) -> Result<Built, MeshError> {
         let cover = cover_of(job);
         let all: Vec<u32> = (0..cover.points.len() as u32).collect();
-        let mut axis = Axis::new(&cover, &all, job.distance, SAMPLES);
+        let mut axis = Axis::new(&cover, &all, job.distance, SAMPLES, job.progress);
         axis.refine(&Want { target: HOLE * job.mesh.diagonal(), least: 0, most: SAMPLES });
         let all = axis.balls();
         let mut holders = axis.holders();
@@ -50,7 +50,7 @@ impl TreeBuilder for Hubbard {
             of.sort_unstable_by(|&a, &b| outward(a).total_cmp(&outward(b)).then(a.cmp(&b)));
             of.truncate(HOLDERS);
         }
-        let balls = Balls { all, holders, cover: &cover, distance: job.distance };
+        let balls = Balls { all, holders, cover: &cover, distance: job.distance, progress: job.progress };
         let most = job.settings.branch as usize;
         let mut built = build(job, &cover, &|region| balls.divide(region, most));
         built.stages.insert(0, StageCount { level: 0, stage: "medial balls".into(), count: balls.all.len() as u64 });
@@ -64,6 +64,7 @@ struct Balls<'a> {
     holders: Vec<Vec<u32>>,
     cover: &'a CoverPoints,
     distance: &'a MeshDistance,
+    progress: &'a dyn Progress,
 }
 
 /// A ball that some were merged into.
@@ -79,8 +80,13 @@ struct Group {
 impl Balls<'_> {
     fn divide(&self, region: &[u32], most: usize) -> Vec<Part> {
         let mut groups = self.groups(region);
-        let mut merging =
-            Merging { points: &self.cover.points, distance: self.distance, left: groups.len(), groups: &mut groups };
+        let mut merging = Merging {
+            points: &self.cover.points,
+            distance: self.distance,
+            left: groups.len(),
+            groups: &mut groups,
+            progress: self.progress,
+        };
         merging.run(most);
         let parts = groups.into_iter().filter(|g| g.alive);
         let parts: Vec<Part> =
@@ -128,6 +134,7 @@ struct Merging<'a> {
     distance: &'a MeshDistance,
     groups: &'a mut Vec<Group>,
     left: usize,
+    progress: &'a dyn Progress,
 }
 
 impl Merging<'_> {
@@ -136,7 +143,7 @@ impl Merging<'_> {
         for a in 0..self.groups.len() as u32 {
             self.offer(a, &mut queue, |a, b| a < b);
         }
-        while self.left > most {
+        while self.left > most && !self.progress.stopped() {
             let Some(Reverse((_, known, a, b))) = queue.pop() else { return };
             if !(self.groups[a as usize].alive && self.groups[b as usize].alive) {
                 continue;

@@ -41,10 +41,10 @@ pub use settings::{Builder, TreeSettings};
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
 use ball::Ball;
 pub(crate) use ball::around_points;
-use builder::{Cell, Job, TreeBuilder};
+use builder::{Cell, Job, TreeBuilder, go_on};
 
 /// One ball of a tree, in the mesh's frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SphereNode {
     /// Metres.
     pub center: Vec3,
@@ -94,6 +94,7 @@ impl SphereTree {
         settings.check()?;
         mesh.check_data()?;
         let distance = MeshDistance::new(mesh);
+        go_on(progress)?;
         let builder: &dyn TreeBuilder = match settings.builder {
             Builder::Octree => &octree::Octree,
             Builder::Medial => &medial::Medial,
@@ -101,9 +102,11 @@ impl SphereTree {
             Builder::Grid => &grid::Grid,
         };
         let built = builder.build(&Job { mesh, distance: &distance, settings, progress })?;
-        let tree = SphereTree::flatten(&built.root, &distance, settings.builder != Builder::Octree);
+        go_on(progress)?;
+        let tree = SphereTree::flatten(&built.root, &distance, settings.builder != Builder::Octree, progress);
+        go_on(progress)?;
         tree.check_nesting()?;
-        tree.check_coverage(mesh)?;
+        tree.check_coverage_watched(mesh, progress)?;
         progress.at(1.0);
         Ok((tree, built.stages))
     }
@@ -144,7 +147,7 @@ impl SphereTree {
     }
 
     /// Breadth first, so that children are neighbours; a cell with one child is replaced by it.
-    fn flatten(root: &Cell, distance: &MeshDistance, deep: bool) -> SphereTree {
+    fn flatten(root: &Cell, distance: &MeshDistance, deep: bool, progress: &dyn Progress) -> SphereTree {
         let mut nodes = vec![empty_node(0)];
         let mut cells = vec![skip_single(root)];
         let mut next = 0;
@@ -158,7 +161,7 @@ impl SphereTree {
             }
             next += 1;
         }
-        for n in (0..nodes.len()).rev() {
+        for n in (0..nodes.len()).rev().take_while(|_| !progress.stopped()) {
             let ball = match cells[n] {
                 Cell::Leaf(ball) => *ball,
                 Cell::Inner(_) => {
@@ -177,6 +180,19 @@ impl SphereTree {
     }
 
     /// Of nodes that are already a tree: breadth first, children neighbours.
+    /// The tree of nodes that were written: numbers finite, children behind their parents.
+    pub(crate) fn of_archive(nodes: Vec<SphereNode>) -> Result<SphereTree, MeshError> {
+        let sound = |(n, node): (usize, &SphereNode)| {
+            let numbers = node.center.iter().chain([&node.radius, &node.outward]).all(|x| x.is_finite());
+            let end = u64::from(node.first_child) + u64::from(node.children);
+            numbers && (node.is_leaf() || (node.first_child as usize > n && end <= nodes.len() as u64))
+        };
+        match !nodes.is_empty() && nodes.iter().enumerate().all(sound) {
+            true => Ok(SphereTree::of_nodes(nodes)),
+            false => Err(MeshError::Tree { what: "its nodes are out of order or not finite".into() }),
+        }
+    }
+
     fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()

@@ -12,7 +12,7 @@
 //! will do.
 
 use super::ball::{Ball, around_points};
-use super::builder::{Built, Cell, Job, StageCount, TreeBuilder};
+use super::builder::{Built, Cell, Job, Progress, StageCount, TreeBuilder};
 use crate::{MeshDistance, MeshError, Vec3};
 
 /// No tree gets more leaves than this.
@@ -32,6 +32,7 @@ struct Context<'a> {
     depth: u32,
     even: bool,
     leaves: usize,
+    progress: &'a dyn Progress,
 }
 
 /// The builder.
@@ -49,6 +50,7 @@ impl TreeBuilder for Octree {
             depth: settings.depth,
             even: settings.even,
             leaves: 0,
+            progress: job.progress,
         };
         let root = context.cell(pieces, 0.5 * (bounds.min + bounds.max), 0.5 * side, 0);
         if context.leaves > MOST_LEAVES {
@@ -64,7 +66,8 @@ impl TreeBuilder for Octree {
 impl Context<'_> {
     fn cell(&mut self, pieces: Vec<Piece>, center: Vec3, half: f64, depth: u32) -> Cell {
         let (mut ball, outward) = self.tight_ball(&pieces);
-        if outward <= self.target || depth == self.depth || self.leaves > MOST_LEAVES {
+        let fine = outward <= self.target || depth == self.depth;
+        if fine || self.leaves > MOST_LEAVES || self.progress.stopped() {
             self.leaves += 1;
             // a root that is the only leaf has no neighbours to be even with
             if self.even && depth > 0 {

@@ -101,7 +101,7 @@ pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> 
         let divided: Vec<Vec<Part>> = leaves
             .into_par_iter()
             .map(|part| {
-                let mut parts = if part.outward > enough && part.points.len() >= FEWEST {
+                let mut parts = if part.outward > enough && part.points.len() >= FEWEST && !job.progress.stopped() {
                     divide(&part.points)
                 } else {
                     Vec::new()
@@ -121,7 +121,7 @@ pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> 
             break;
         }
     }
-    let balls = closed(job.mesh, leaves.iter().map(|part| part.ball).collect());
+    let balls = closed(job.mesh, leaves.iter().map(|part| part.ball).collect(), job.progress);
     Built { root: nested(&balls, &parents), stages }
 }
 

@@ -1,6 +1,7 @@
 //! The promises of a sphere tree, checked by code that shares nothing with the builders.
 
-use super::{SphereNode, SphereTree};
+use super::builder::go_on;
+use super::{Progress, SphereNode, SphereTree};
 use crate::{MeshError, TriMesh, Vec3};
 
 /// A piece of surface smaller than this part of the mesh's diagonal that lies across balls is covered if its corners
@@ -28,8 +29,14 @@ impl SphereTree {
     /// until every piece lies in one ball, or is tiny (1e-5 of the diagonal) and each of its corners lies in some
     /// ball.
     pub fn check_coverage(&self, mesh: &TriMesh) -> Result<(), MeshError> {
+        self.check_coverage_watched(mesh, &())
+    }
+
+    /// The same; `progress` can end it.
+    pub(super) fn check_coverage_watched(&self, mesh: &TriMesh, progress: &dyn Progress) -> Result<(), MeshError> {
         let tiny = TINY * mesh.diagonal();
         for t in 0..mesh.triangles.len() {
+            go_on(progress)?;
             if let Err(point) = self.cover(&mesh.corners(t), tiny, 80) {
                 let what = format!("triangle {} is not covered near ({}, {}, {})", t + 1, point.x, point.y, point.z);
                 return Err(MeshError::Tree { what });

@@ -125,7 +125,7 @@ pub(super) struct Part {
 pub struct ArticulatedBody {
     pub(super) name: String,
     pub(super) model: Model,
-    base: Pose,
+    pub(super) base: Pose,
     pub(super) colliders: Vec<Part>,
     pub(super) visuals: Vec<Visual>,
     pub(super) cameras: Vec<CameraMount>,
@@ -136,7 +136,7 @@ pub struct ArticulatedBody {
     /// Whether links meet other links of the same body; links joined to each other never do.
     pub self_collision: bool,
     /// Pairs that do not meet, smaller number first and the base (`None`) before all; sorted.
-    apart: Vec<[Option<usize>; 2]>,
+    pub(super) apart: Vec<[Option<usize>; 2]>,
     pub(super) start: Vec<f64>,
     pub(super) dynamics: Dynamics,
     pub(super) working: Mutex<Working>,

@@ -22,7 +22,7 @@ use super::playback::Playback;
 use std::sync::Arc;
 
 /// What acts on one degree of freedom. Of a spherical or floating joint only damping and dry friction apply: its freedoms have no single position.
-#[derive(Clone, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Freedom {
     /// Least and greatest position, rad or m.
     pub limits: Option<[f64; 2]>,
@@ -37,7 +37,7 @@ pub struct Freedom {
 }
 
 /// A linear spring on a joint. A force, never implicit: keep `stiffness·dt²` below the inertia that it moves, or use [`Drive::Position`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spring {
     /// N·m/rad or N/m, at least 0.
     pub stiffness: f64,
@@ -46,7 +46,7 @@ pub struct Spring {
 }
 
 /// A motor on one freedom.
-#[derive(Clone, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Drive {
     /// None. Torques that the user computes go through [`World::apply_generalized`](crate::World::apply_generalized).
     #[default]
@@ -75,6 +75,7 @@ pub enum Drive {
     /// it; in `backtracking` it follows the velocity alone.
     Playback {
         /// Position over time.
+        #[serde(with = "tumble_collide::shared")]
         motion: Arc<Playback>,
         /// Greatest torque or force, N·m or N; may be infinite.
         limit: f64,
@@ -82,7 +83,7 @@ pub enum Drive {
 }
 
 /// One freedom follows another, as URDF's `mimic`: `q = multiplier·q_of + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Coupling {
     /// Velocity coordinate that follows.
     pub freedom: usize,

@@ -11,7 +11,7 @@
 use tumble_collide::Vec3;
 
 /// How a link moves against its parent. At position 0 (or the unit quaternion) the link's frame is the joint's frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Joint {
     /// Not at all.
     Fixed,

@@ -65,7 +65,7 @@ pub enum ModelError {
 }
 
 /// Mass of a link, in the link's frame. All zero is a massless link, for joints of several degrees of freedom that are stacked.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LinkMass {
     /// Mass, kg.
     pub mass: f64,
@@ -138,7 +138,7 @@ impl LinkMass {
 }
 
 /// A link that moves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Link {
     /// Name, unique in the model.
     pub name: String,
@@ -157,7 +157,7 @@ pub struct Link {
 }
 
 /// A named frame that moves with a link: every link, the folded ones too.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Frame {
     /// Name of the link as it was added.
     pub name: String,
@@ -168,7 +168,7 @@ pub struct Frame {
 }
 
 /// A tree of links with its coordinates.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Model {
     links: Vec<Link>,
     frames: Vec<Frame>,
@@ -333,6 +333,17 @@ impl Model {
     }
 
     /// Whether something of mass hangs on every joint: what is below it must have mass, or inertia of its own.
+    /// Whether parents stand before their children and coordinates follow one another: what a builder makes, and a damaged archive may not hold.
+    pub(crate) fn is_sound(&self) -> bool {
+        let mut ends = (0, 0);
+        let links = self.links.iter().enumerate().all(|(i, link)| {
+            let starts = std::mem::replace(&mut ends, (link.q + link.joint.positions(), link.v + link.joint.dof()));
+            link.parent.is_none_or(|parent| parent < i) && (link.q, link.v) == starts && link.joint.dof() > 0
+        });
+        let frames = self.frames.iter().all(|frame| frame.link.is_none_or(|link| link < self.links.len()));
+        links && frames && ends == (self.positions, self.dof) && self.check_masses().is_ok()
+    }
+
     fn check_masses(&self) -> Result<(), ModelError> {
         let mut heavy: Vec<bool> =
             self.links.iter().map(|l| l.mass.mass > 0.0 || l.mass.inertia.amax() > 0.0).collect();

@@ -37,7 +37,7 @@ pub enum PlaybackError {
 }
 
 /// Position of one freedom over time.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Playback {
     times: Vec<f64>,
     values: Vec<f64>,

@@ -36,7 +36,7 @@ use tumble_collide::{Mat3, Pose, Quat, Vec3};
 mod tests;
 
 /// What a closure holds together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ClosureKind {
     /// The frames' origins: a ball joint. Three rows.
     Point,

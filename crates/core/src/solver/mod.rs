@@ -27,7 +27,7 @@ pub use residual::residual;
 use crate::rows::Rows;
 
 /// How far an iterative solver goes. Pivoting solvers are exact and take no notice.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Accuracy {
     /// Sweeps at most, at least 1.
     pub sweeps: u32,

@@ -22,7 +22,7 @@ class UnreadableFileError(TumbleError, OSError):
 
 
 class SnapshotError(TumbleError, ValueError):
-    """Bytes that :meth:`World.restore` refuses. The world is unchanged."""
+    """Bytes that :meth:`World.restore`, which then changes nothing, or unpickling refuses."""
 
 
 class UnknownNameError(TumbleError, KeyError):

@@ -37,7 +37,7 @@ def paths(world: World, seconds: float, bodies: Any, along: str, ax: Any) -> Any
     _, rows = _follow(world, seconds, lambda fork: [fork[name].position for name in names])
     ax = _axes(ax, "World.plot_paths")
     across, up = views[along]
-    for name, path in zip(names, np.array(rows).transpose(1, 2, 0)):
+    for name, path in zip(names, np.array(rows).reshape(len(rows), len(names), 3).transpose(1, 2, 0)):
         ax.plot(path[across], path[up], label=name)
     ax.set(xlabel=f"{'xyz'[across]}, m", ylabel=f"{'xyz'[up]}, m", aspect="equal")
     if 0 < len(names) <= 10:

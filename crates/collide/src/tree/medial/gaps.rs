@@ -6,16 +6,23 @@
 use super::spheres::CoverPoints;
 use crate::TriMesh;
 use crate::Vec3;
+use crate::tree::Progress;
 use crate::tree::ball::Ball;
 use crate::tree::close::{halved, lack};
 
 /// Adds cover points where pieces of surface of about the size `small` lie in no ball, one for each cube of that size;
 /// their number.
-pub(super) fn add_gaps(cover: &mut CoverPoints, mesh: &TriMesh, balls: &[Ball], small: f64) -> usize {
+pub(super) fn add_gaps(
+    cover: &mut CoverPoints,
+    mesh: &TriMesh,
+    balls: &[Ball],
+    small: f64,
+    progress: &dyn Progress,
+) -> usize {
     let all: Vec<u32> = (0..balls.len() as u32).collect();
     let before = cover.points.len();
     let mut found = Vec::new();
-    for t in 0..mesh.triangles.len() {
+    for t in (0..mesh.triangles.len()).take_while(|_| !progress.stopped()) {
         look(&mesh.corners(t), t as u32, &all, small, balls, &mut found);
     }
     let origin = mesh.aabb().min;

@@ -83,15 +83,18 @@ impl<'a> Levels<'a> {
     /// Candidates for the cover points that have none yet.
     fn touch(&mut self) {
         let new = self.candidates.len() as u32..self.cover.points.len() as u32;
-        let more: Vec<Site> =
-            new.into_par_iter().map(|i| touching(&self.cover, i, self.job.distance, 0.5 * self.scale)).collect();
+        let touching = |i| match self.job.progress.stopped() {
+            true => Site { center: self.cover.points[i as usize], depth: 0.0, fence: None },
+            false => touching(&self.cover, i, self.job.distance, 0.5 * self.scale),
+        };
+        let more: Vec<Site> = new.into_par_iter().map(touching).collect();
         self.candidates.extend(more);
     }
 
     /// The whole of it.
     pub fn cells(&mut self) -> Cell {
         let (fit, parents) = self.leaves();
-        let balls = closed(self.job.mesh, self.balls(&fit));
+        let balls = closed(self.job.mesh, self.balls(&fit), self.job.progress);
         nested(&balls, &parents)
     }
 
@@ -106,12 +109,12 @@ impl<'a> Levels<'a> {
         if alone.worst() <= self.enough() {
             return (alone, Vec::new());
         }
-        let mut axis = Axis::new(&self.cover, &all, self.job.distance, FIRST_SITES);
+        let mut axis = Axis::new(&self.cover, &all, self.job.distance, FIRST_SITES, self.job.progress);
         let site = Site::at(self.cover.points[0], self.job.distance);
         let mut fit = Fit { sites: vec![site], parts: vec![all], errors: vec![self.scale] };
         let (mut parents, mut groups) = (Vec::new(), None);
         for level in 1..=self.job.settings.depth {
-            if fit.worst() <= self.enough() {
+            if fit.worst() <= self.enough() || self.job.progress.stopped() {
                 break;
             }
             let room = fit.sites.len() * self.job.settings.branch as usize;
@@ -155,12 +158,12 @@ impl<'a> Levels<'a> {
 
     /// The leaves once more, with cover points where the surface between the others was left bare.
     fn filled(&mut self, mut fit: Fit, level: u32, room: usize, mut groups: Option<&mut Groups>) -> Fit {
-        for (n, gap) in GAPS.into_iter().enumerate() {
+        for (n, gap) in GAPS.into_iter().enumerate().take_while(|_| !self.job.progress.stopped()) {
             let balls = self.balls(&fit);
-            let added = add_gaps(&mut self.cover, self.job.mesh, &balls, gap * self.scale);
+            let added = add_gaps(&mut self.cover, self.job.mesh, &balls, gap * self.scale, self.job.progress);
             self.count(level, "gaps filled", added as u64);
             self.touch();
-            fit.refit_all(2, &self.cover.points, self.job.distance);
+            fit.refit_all(2, &self.cover.points, self.job);
             if n == 1 {
                 fit = self.exchanged(fit, level, room, groups.as_deref_mut());
             }
@@ -203,7 +206,7 @@ impl<'a> Levels<'a> {
         }
         let exchange = self.exchange(room.max(fit.sites.len()));
         let (mut fit, exchanges) = exchange.run(fit, groups);
-        fit.refit_all(3, &self.cover.points, self.job.distance);
+        fit.refit_all(3, &self.cover.points, self.job);
         self.count(level, "exchanges across regions", exchanges);
         self.report(SHARES[1] / f64::from(self.job.settings.depth));
         fit
@@ -217,6 +220,7 @@ impl<'a> Levels<'a> {
             most,
             enough: self.enough(),
             tries: (TRIES * most).min(MOST_TRIES),
+            progress: self.job.progress,
         }
     }
 
@@ -228,7 +232,7 @@ impl<'a> Levels<'a> {
             .zip(&fit.sites)
             .zip(&fit.errors)
             .map(|((part, site), error)| {
-                if *error <= self.enough() {
+                if *error <= self.enough() || self.job.progress.stopped() {
                     let fit = Fit { sites: vec![*site], parts: vec![part.clone()], errors: vec![*error] };
                     Divided { fit, way: None, exchanges: 0 }
                 } else {

@@ -7,6 +7,7 @@
 use super::group::{Change, Groups};
 use super::refit::{Fit, moved, own};
 use super::site::Site;
+use crate::tree::Progress;
 use crate::{MeshDistance, Vec3};
 
 /// After so many exchanges in a row that did not pay, the worst balls are left as they are.
@@ -28,12 +29,14 @@ pub(super) struct Exchange<'a> {
     pub enough: f64,
     /// Exchanges tried.
     pub tries: usize,
+    pub progress: &'a dyn Progress,
 }
 
 impl Exchange<'_> {
     /// The fit after the exchanges that paid, and their number; `groups`, if there are any, follow.
     pub fn run(&self, mut fit: Fit, mut groups: Option<&mut Groups>) -> (Fit, u64) {
-        let mut missed: Vec<f64> = (0..fit.sites.len()).map(|k| self.missed(&fit, k).0).collect();
+        let mut missed: Vec<f64> =
+            (0..fit.sites.len()).map(|k| if self.progress.stopped() { 0.0 } else { self.missed(&fit, k).0 }).collect();
         // balls that were split in vain, until something near them changes
         let mut vain = vec![false; fit.sites.len()];
         let (mut wins, mut failures) = (0, 0);
@@ -41,7 +44,7 @@ impl Exchange<'_> {
             let worst = (0..fit.sites.len())
                 .filter(|&k| !vain[k] && fit.errors[k] > self.enough)
                 .max_by(|&a, &b| fit.errors[a].total_cmp(&fit.errors[b]).then(b.cmp(&a)));
-            let Some(worst) = worst.filter(|_| failures < FAILURES) else { break };
+            let Some(worst) = worst.filter(|_| failures < FAILURES && !self.progress.stopped()) else { break };
             let done = self
                 .bursts(&fit, worst, &missed, groups.as_deref())
                 .into_iter()

@@ -5,6 +5,7 @@
 //! `max |p − c| + s(c)` over its own points. Neither half can raise the worst need.
 
 use super::site::{LOOKED_AT, Site};
+use crate::tree::builder::Job;
 use crate::tree::simplex::simplex;
 use crate::{MeshDistance, Vec3};
 use rayon::prelude::*;
@@ -84,18 +85,22 @@ impl Fit {
     }
 
     /// The same for many sites, on all threads.
-    pub fn refit_all(&mut self, passes: usize, points: &[Vec3], distance: &MeshDistance) {
-        for _ in 0..passes {
-            self.assign_all(points);
-            let moved_to = |(site, part): (&Site, &Vec<u32>)| moved(*site, &own(points, part), distance);
+    pub fn refit_all(&mut self, passes: usize, points: &[Vec3], job: &Job) {
+        for _ in (0..passes).take_while(|_| !job.progress.stopped()) {
+            self.assign_all(points, job);
+            let moved_to = |(site, part): (&Site, &Vec<u32>)| match job.progress.stopped() {
+                true => *site,
+                false => moved(*site, &own(points, part), job.distance),
+            };
             self.sites = self.sites.par_iter().zip(&self.parts).map(moved_to).collect();
         }
-        self.assign_all(points);
+        self.assign_all(points, job);
     }
 
     /// Assigns all points there are, on all threads.
-    pub fn assign_all(&mut self, points: &[Vec3]) {
-        let owners: Vec<(f64, usize)> = points.par_iter().map(|p| least(&self.sites, p)).collect();
+    fn assign_all(&mut self, points: &[Vec3], job: &Job) {
+        let least = |p: &Vec3| if job.progress.stopped() { (0.0, 0) } else { least(&self.sites, p) };
+        let owners: Vec<(f64, usize)> = points.par_iter().map(least).collect();
         self.parts = vec![Vec::new(); self.sites.len()];
         self.errors = vec![0.0; self.sites.len()];
         for (i, (need, k)) in owners.into_iter().enumerate() {

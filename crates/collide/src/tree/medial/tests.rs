@@ -119,10 +119,10 @@ fn full_groups_hand_on_what_they_can_not_hold() {
 #[test]
 fn a_leaf_is_grown_by_what_it_lacks_and_no_more() {
     let mesh = TriMesh::box_(Vec3::new(1.0, 2.0, 2.0));
-    let balls = closed(&mesh, vec![Ball { center: Vec3::zeros(), radius: 0.1 }]);
+    let balls = closed(&mesh, vec![Ball { center: Vec3::zeros(), radius: 0.1 }], &());
     assert!((balls[0].radius - 3.0).abs() < 1e-9, "{}", balls[0].radius);
     let enough = vec![Ball { center: Vec3::zeros(), radius: 3.5 }];
-    assert!((closed(&mesh, enough)[0].radius - 3.5).abs() < 1e-9);
+    assert!((closed(&mesh, enough, &())[0].radius - 3.5).abs() < 1e-9);
 }
 
 #[test]
@@ -130,11 +130,11 @@ fn gaps_are_where_no_ball_is() {
     let mesh = TriMesh { vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::y()], triangles: vec![[0, 1, 2]] };
     let corners = mesh.vertices.iter().map(|v| Ball { center: *v, radius: 0.45 });
     let mut cover = CoverPoints::default();
-    let added = add_gaps(&mut cover, &mesh, &corners.clone().collect::<Vec<_>>(), 0.05);
+    let added = add_gaps(&mut cover, &mesh, &corners.clone().collect::<Vec<_>>(), 0.05, &());
     assert!(added > 0 && added == cover.points.len());
     // each sticks out of some ball, next to where none is
     let depth = |p: &Vec3| mesh.vertices.iter().map(|v| (p - v).norm() - 0.45).fold(f64::INFINITY, f64::min);
     assert!(cover.points.iter().all(|p| depth(p) > -0.05) && cover.points.iter().any(|p| depth(p) > 0.04));
     let whole = [Ball { center: Vec3::zeros(), radius: 1.0 + 1e-9 }];
-    assert_eq!(add_gaps(&mut cover, &mesh, &whole, 0.05), 0);
+    assert_eq!(add_gaps(&mut cover, &mesh, &whole, 0.05, &()), 0);
 }

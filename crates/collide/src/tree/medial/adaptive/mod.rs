@@ -25,6 +25,7 @@ mod witness;
 
 use super::spheres::{CoverPoints, MedialBall, Want};
 use super::voronoi::Voronoi;
+use crate::tree::Progress;
 use crate::tree::ball::Ball;
 use crate::tree::builder::StageCount;
 use crate::{Aabb, MeshDistance, Vec3};
@@ -68,6 +69,7 @@ pub(in crate::tree) struct Axis<'a> {
     /// Whether the points are of a part of the surface.
     partial: bool,
     distance: &'a MeshDistance,
+    progress: &'a dyn Progress,
     /// `None` for a region of no extent.
     voronoi: Option<Voronoi<'a>>,
     /// Per cover point, the cell whose ball is its witness.
@@ -92,7 +94,13 @@ pub(in crate::tree) struct Axis<'a> {
 
 impl<'a> Axis<'a> {
     /// Begins with `sites` of the region's points (at least 8), taken evenly.
-    pub fn new(cover: &CoverPoints, region: &[u32], distance: &'a MeshDistance, sites: usize) -> Axis<'a> {
+    pub fn new(
+        cover: &CoverPoints,
+        region: &[u32],
+        distance: &'a MeshDistance,
+        sites: usize,
+        progress: &'a dyn Progress,
+    ) -> Axis<'a> {
         let points: Vec<Vec3> = region.iter().map(|&i| cover.points[i as usize]).collect();
         let stride = (points.len() / sites.max(8)).max(1);
         let first: Vec<Vec3> = points.iter().copied().step_by(stride).collect();
@@ -103,6 +111,7 @@ impl<'a> Axis<'a> {
             partial: points.len() < cover.points.len(),
             points,
             distance,
+            progress,
             voronoi: Voronoi::new(&first, &solid, distance),
             first: Vec::new(),
             inner: Vec::new(),
@@ -120,7 +129,7 @@ impl<'a> Axis<'a> {
             axis.welcome(c);
         }
         let mut hint = 0;
-        for i in 0..axis.points.len() as u32 {
+        for i in (0..axis.points.len() as u32).take_while(|_| !progress.stopped()) {
             hint = axis.judge(i, hint);
         }
         axis
@@ -129,7 +138,7 @@ impl<'a> Axis<'a> {
     /// Refines until the worst error is below the target and there are enough balls, or no more may be inserted.
     pub fn refine(&mut self, want: &Want) {
         let most = self.inserted + want.most;
-        while self.inserted < most {
+        while self.inserted < most && !self.progress.stopped() {
             let Some((error, cell)) = self.worst() else { return };
             let enough = error < want.target && self.internal + self.covering >= want.least;
             if enough {
@@ -143,7 +152,8 @@ impl<'a> Axis<'a> {
 
     /// The flagged balls, of points that have none a ball of no size.
     pub fn balls(&mut self) -> Vec<MedialBall> {
-        for c in 0..self.first.len() as u32 {
+        let progress = self.progress;
+        for c in (0..self.first.len() as u32).take_while(|_| !progress.stopped()) {
             self.judge_again(c);
         }
         let mut balls = Vec::with_capacity(self.internal + self.covering);
@@ -169,6 +179,10 @@ impl<'a> Axis<'a> {
         let mut all = Vec::with_capacity(self.points.len());
         for i in 0..self.points.len() as u32 {
             let mut holders = Vec::new();
+            if self.progress.stopped() {
+                all.push(holders);
+                continue;
+            }
             hint = self.each_holder(i, hint, |c, _| {
                 if place[c as usize] != NONE {
                     holders.push(place[c as usize]);

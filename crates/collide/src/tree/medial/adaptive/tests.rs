@@ -5,7 +5,7 @@ use crate::TriMesh;
 
 /// The whole of it: the balls of a region and what was done.
 fn adaptive(cover: &CoverPoints, region: &[u32], distance: &MeshDistance, want: &Want) -> (Vec<MedialBall>, Counts) {
-    let mut axis = Axis::new(cover, region, distance, want.least / 12);
+    let mut axis = Axis::new(cover, region, distance, want.least / 12, &());
     axis.refine(want);
     (axis.balls(), axis.counts())
 }
@@ -25,7 +25,7 @@ fn check(mesh: &TriMesh, want: &Want) -> (Vec<MedialBall>, Counts) {
         assert!((b.outward - (b.ball.radius + s).max(0.0)).abs() <= 1e-7 * b.ball.radius);
     }
     assert_eq!(balls.len() as u64, counts.internal + counts.cover + counts.alone);
-    let mut axis = Axis::new(&cover, &region, &distance, want.least / 12);
+    let mut axis = Axis::new(&cover, &region, &distance, want.least / 12, &());
     axis.refine(want);
     assert_eq!(axis.balls(), balls);
     for (p, holders) in cover.points.iter().zip(axis.holders()) {

@@ -1,0 +1,194 @@
+//! A whole world as bytes: everything that [`save`](World::save) leaves to the scene, and the snapshot itself.
+//!
+//! | part | bytes |
+//! |---|---|
+//! | `tumbleA1`; the last is the number of the format | 8 |
+//! | XXH3 of the rest, little-endian | 8 |
+//! | settings, methods, shapes, objects, snapshot, contacts, report in postcard | any |
+//!
+//! The same world gives the same bytes. Objects of kinds of their own are written by name alone; the caller makes them anew. Shapes that objects
+//! share are written once and are shared again. The order of objects is kept, ids are not: they are new.
+
+mod bodies;
+mod records;
+
+use crate::settings::{Settings, StepReport};
+use crate::solver::{self, RowSolver};
+use crate::step::{Stepper, stepper_by_name};
+use crate::view::{Mode, ObjectId};
+use crate::world::{ContactPoint, World};
+use crate::{ArticulatedBody, Closure, Object, OutOfReach, RigidBody};
+use bodies::{ArticulatedRecord, RigidRecord};
+use records::{ClosureRecord, ContactRecord, Places, ReportRecord, ShapeTable};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use tumble_collide::Shape;
+use xxhash_rust::xxh3::xxh3_64;
+
+/// What an archive of a world begins with. The number is raised with every change of what is in it.
+const HEAD: &[u8; 8] = b"tumbleA1";
+
+/// Why an archive was not written or read.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ArchiveError {
+    /// Other bytes.
+    #[error("these bytes do not begin with '{0}': they were not written by tumble, or as something else")]
+    NotOne(String),
+    /// Of an older or newer library.
+    #[error("these bytes have format '{theirs}'; this version of tumble reads '{ours}'")]
+    Format {
+        /// As written.
+        theirs: String,
+        /// As read here.
+        ours: String,
+    },
+    /// Changed or cut bytes.
+    #[error("these bytes are damaged: {0}")]
+    Damaged(String),
+    /// What cannot be written, such as a path that is not UTF-8.
+    #[error("the world cannot be written: {0}")]
+    Unwritable(String),
+    /// An object that this library cannot write, or that the caller did not make anew.
+    #[error("'{0}' is an object of a kind of its own, and nothing was given to write it or to make it anew")]
+    Foreign(String),
+}
+
+/// What an archive holds.
+#[derive(Serialize, Deserialize)]
+struct Archive {
+    settings: Settings,
+    stepper: String,
+    solver: String,
+    shapes: Vec<Shape>,
+    objects: Vec<Record>,
+    snapshot: Vec<u8>,
+    contacts: Vec<ContactRecord>,
+    report: ReportRecord,
+}
+
+/// One object.
+#[derive(Serialize, Deserialize)]
+enum Record {
+    Rigid(RigidRecord),
+    Articulated(Box<ArticulatedRecord>),
+    Closure(ClosureRecord),
+    Foreign(String),
+}
+
+impl World {
+    /// The whole world as bytes: objects with their shapes, settings, methods and state. `foreign` are the objects of kinds of their own that
+    /// [`from_archive`](World::from_archive)'s caller makes anew.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Foreign`]: an object of a kind of its own that is not among `foreign`.
+    pub fn archive(&self, foreign: &[ObjectId]) -> Result<Vec<u8>, ArchiveError> {
+        let (mut shapes, places) = (ShapeTable::default(), Places::of(self.ids()));
+        let (stepper, solver) = self.methods();
+        let objects = self
+            .ids()
+            .iter()
+            .filter_map(|&id| self.object(id))
+            .map(|object| record(object, &mut shapes, &places))
+            .collect::<Vec<Record>>();
+        let unknown = self.ids().iter().zip(&objects).find_map(|(id, record)| match record {
+            Record::Foreign(name) if !foreign.contains(id) => Some(name.clone()),
+            _ => None,
+        });
+        if let Some(name) = unknown {
+            return Err(ArchiveError::Foreign(name));
+        }
+        let archive = Archive {
+            settings: *self.settings(),
+            stepper: stepper.into(),
+            solver: solver.into(),
+            shapes: shapes.list,
+            objects,
+            snapshot: self.save(),
+            contacts: self.contacts().iter().map(|c| ContactRecord::of(c, &places)).collect(),
+            report: ReportRecord::of(self.report(), &places),
+        };
+        seal(HEAD, &archive)
+    }
+
+    /// The world of an archive: the same state, the same future. `foreign` makes an object of a kind of its own by its name.
+    ///
+    /// # Errors
+    /// [`ArchiveError`]: bytes that are no archive, of another format or damaged, or an object that `foreign` does not make.
+    pub fn from_archive(
+        bytes: &[u8],
+        foreign: &mut dyn FnMut(&str) -> Option<Box<dyn Object>>,
+    ) -> Result<World, ArchiveError> {
+        let archive: Archive = open(HEAD, bytes)?;
+        let mut world = World::new(archive.settings).map_err(damaged)?;
+        world.set_stepper(stepper(&archive.stepper)?);
+        world.set_solver(solver(&archive.solver)?);
+        let mut ids = Vec::with_capacity(archive.objects.len());
+        for record in archive.objects {
+            let object: Box<dyn Object> = match record {
+                Record::Rigid(rigid) => Box::new(rigid.body(&archive.shapes)?),
+                Record::Articulated(articulated) => Box::new(articulated.body(&archive.shapes)?),
+                Record::Closure(closure) => Box::new(closure.closure(&ids)?),
+                Record::Foreign(name) => foreign(&name).ok_or(ArchiveError::Foreign(name))?,
+            };
+            ids.push(world.add_boxed(object, Mode::Dynamic).map_err(damaged)?);
+        }
+        world.restore(&archive.snapshot).map_err(damaged)?;
+        let contacts = archive.contacts.into_iter().map(|c| c.contact(&ids)).collect();
+        world.publish(contacts, archive.report.report(&ids));
+        Ok(world)
+    }
+}
+
+/// A value as bytes: eight bytes that name the kind and, as the last, the number of the format; XXH3 of the rest; the value in postcard.
+///
+/// # Errors
+/// [`ArchiveError::Unwritable`].
+pub fn seal(head: &[u8; 8], value: &impl Serialize) -> Result<Vec<u8>, ArchiveError> {
+    let body = postcard::to_stdvec(value).map_err(|e| ArchiveError::Unwritable(e.to_string()))?;
+    Ok([&head[..], &xxh3_64(&body).to_le_bytes(), &body].concat())
+}
+
+/// The value of [`seal`]ed bytes.
+///
+/// # Errors
+/// [`ArchiveError`]: other bytes, another format, damaged ones.
+pub fn open<T: DeserializeOwned>(head: &[u8; 8], bytes: &[u8]) -> Result<T, ArchiveError> {
+    let text = |bytes: &[u8]| bytes.escape_ascii().to_string();
+    let (theirs, rest) = bytes.split_first_chunk::<8>().ok_or_else(|| ArchiveError::NotOne(text(&head[..7])))?;
+    if theirs[..7] != head[..7] {
+        return Err(ArchiveError::NotOne(text(&head[..7])));
+    }
+    if theirs != head {
+        return Err(ArchiveError::Format { theirs: text(theirs), ours: text(head) });
+    }
+    let (checksum, body) = rest.split_first_chunk::<8>().ok_or_else(|| damaged("they are cut off"))?;
+    if xxh3_64(body) != u64::from_le_bytes(*checksum) {
+        return Err(damaged("their checksum is another"));
+    }
+    postcard::from_bytes(body).map_err(damaged)
+}
+
+fn damaged(why: impl ToString) -> ArchiveError {
+    ArchiveError::Damaged(why.to_string())
+}
+
+fn stepper(name: &str) -> Result<Box<dyn Stepper>, ArchiveError> {
+    stepper_by_name(name).ok_or_else(|| damaged(format!("there is no stepper '{name}'")))
+}
+
+fn solver(name: &str) -> Result<Box<dyn RowSolver>, ArchiveError> {
+    solver::by_name(name).ok_or_else(|| damaged(format!("there is no solver '{name}'")))
+}
+
+fn record(object: &dyn Object, shapes: &mut ShapeTable, places: &Places) -> Record {
+    let any: &dyn std::any::Any = object;
+    if let Some(body) = any.downcast_ref::<RigidBody>() {
+        Record::Rigid(RigidRecord::of(body, shapes))
+    } else if let Some(body) = any.downcast_ref::<ArticulatedBody>() {
+        Record::Articulated(Box::new(ArticulatedRecord::of(body, shapes)))
+    } else if let Some(closure) = any.downcast_ref::<Closure>() {
+        Record::Closure(ClosureRecord::of(closure, places))
+    } else {
+        Record::Foreign(object.name().into())
+    }
+}

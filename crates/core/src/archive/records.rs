@@ -1,0 +1,159 @@
+//! The parts of an archive that name objects by their place, and shapes by their place in a table.
+
+use super::{ArchiveError, ContactPoint, OutOfReach, StepReport, damaged};
+use crate::closure::{Anchor, Closure, ClosureKind};
+use crate::object::{Look, Object, Visual};
+use crate::view::ObjectId;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tumble_collide::{Pose, Shape, Vec3};
+
+/// Every shape once: shared ones by where they are in memory, others as they come.
+#[derive(Default)]
+pub(super) struct ShapeTable {
+    pub list: Vec<Shape>,
+    known: BTreeMap<usize, u32>,
+}
+
+impl ShapeTable {
+    /// The place of a shape.
+    pub fn place(&mut self, shape: &Shape) -> u32 {
+        let next = self.list.len() as u32;
+        let address = match shape {
+            Shape::Mesh(mesh) => Some(Arc::as_ptr(mesh).addr()),
+            Shape::Cylinder(cylinder) => Some(Arc::as_ptr(cylinder).addr()),
+            _ => None,
+        };
+        let place = address.map_or(next, |address| *self.known.entry(address).or_insert(next));
+        if place == next {
+            self.list.push(shape.clone());
+        }
+        place
+    }
+}
+
+/// The shape at a place.
+pub(super) fn shape(shapes: &[Shape], place: u32) -> Result<Shape, ArchiveError> {
+    shapes.get(place as usize).cloned().ok_or_else(|| damaged(format!("there is no shape {place}")))
+}
+
+/// Places of objects in the order of adding.
+pub(super) struct Places(BTreeMap<ObjectId, u32>);
+
+impl Places {
+    pub fn of(ids: &[ObjectId]) -> Places {
+        Places(ids.iter().zip(0..).map(|(id, place)| (*id, place)).collect())
+    }
+
+    /// `None` of an object that is gone.
+    fn of_id(&self, id: ObjectId) -> Option<u32> {
+        self.0.get(&id).copied()
+    }
+}
+
+/// The id at a place; one that names nothing where there is none.
+fn id(ids: &[ObjectId], place: Option<u32>) -> ObjectId {
+    place.and_then(|place| ids.get(place as usize)).copied().unwrap_or_default()
+}
+
+/// One side of a closure: the place of its object, if that is still there, and the part; `None` for the world.
+type Side = (Option<(Option<u32>, usize)>, Pose);
+
+/// A closure.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ClosureRecord {
+    name: String,
+    kind: ClosureKind,
+    sides: [Side; 2],
+}
+
+impl ClosureRecord {
+    pub fn of(closure: &Closure, places: &Places) -> ClosureRecord {
+        let side = |a: Anchor| (a.part.map(|(id, part)| (places.of_id(id), part)), a.frame);
+        ClosureRecord { name: closure.name().into(), kind: closure.kind(), sides: closure.sides().map(side) }
+    }
+
+    pub fn closure(self, ids: &[ObjectId]) -> Result<Closure, ArchiveError> {
+        let [a, b] = self.sides.map(|(part, frame)| {
+            let part = part.map(|(place, part)| (id(ids, place), part));
+            Anchor { part, frame }
+        });
+        Closure::new(self.name, self.kind, a, b).map_err(damaged)
+    }
+}
+
+/// A contact.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ContactRecord {
+    sides: [(Option<u32>, usize); 2],
+    /// Point, normal, velocity, impulse, force.
+    vectors: [Vec3; 5],
+    gap: f64,
+}
+
+impl ContactRecord {
+    pub fn of(c: &ContactPoint, places: &Places) -> ContactRecord {
+        ContactRecord {
+            sides: [(places.of_id(c.a), c.part_a), (places.of_id(c.b), c.part_b)],
+            vectors: [c.point, c.normal, c.velocity, c.impulse, c.force],
+            gap: c.gap,
+        }
+    }
+
+    pub fn contact(self, ids: &[ObjectId]) -> ContactPoint {
+        let [(a, part_a), (b, part_b)] = self.sides;
+        let [point, normal, velocity, impulse, force] = self.vectors;
+        ContactPoint {
+            a: id(ids, a),
+            part_a,
+            b: id(ids, b),
+            part_b,
+            point,
+            normal,
+            gap: self.gap,
+            velocity,
+            impulse,
+            force,
+        }
+    }
+}
+
+/// The report of the last step; a joint in it by its place, with its distance and angle.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ReportRecord {
+    report: StepReport,
+    out_of_reach: Option<(Option<u32>, f64, f64)>,
+}
+
+impl ReportRecord {
+    pub fn of(report: &StepReport, places: &Places) -> ReportRecord {
+        let out_of_reach = report.out_of_reach.map(|o| (places.of_id(o.closure), o.distance, o.angle));
+        ReportRecord { report: *report, out_of_reach }
+    }
+
+    pub fn report(self, ids: &[ObjectId]) -> StepReport {
+        let joint = |(place, distance, angle)| OutOfReach { closure: id(ids, place), distance, angle };
+        StepReport { out_of_reach: self.out_of_reach.map(joint), ..self.report }
+    }
+}
+
+/// A picture of an object.
+#[derive(Serialize, Deserialize)]
+pub(super) struct VisualRecord {
+    part: usize,
+    pose: Pose,
+    shape: u32,
+    look: Look,
+}
+
+impl VisualRecord {
+    pub fn of(visual: &Visual, shapes: &mut ShapeTable) -> VisualRecord {
+        let Visual { part, pose, shape, look } = visual;
+        VisualRecord { part: *part, pose: *pose, shape: shapes.place(shape), look: look.clone() }
+    }
+
+    pub fn visual(self, shapes: &[Shape]) -> Result<Visual, ArchiveError> {
+        Ok(Visual { part: self.part, pose: self.pose, shape: shape(shapes, self.shape)?, look: self.look })
+    }
+}

@@ -1,0 +1,48 @@
+//! What of an articulated body is neither its model nor its freedoms, for archives.
+
+use super::body::{ArticulatedBody, ArticulatedError, Collider, Part};
+use super::freedom::Coupling;
+use crate::mounts::{CameraMount, LightMount};
+use crate::object::Visual;
+use tumble_collide::Pose;
+
+/// Everything that is fixed to the links, and the state at time 0.
+pub(crate) struct ArticulatedParts {
+    /// With the link that each is fixed to; `None` for the base.
+    pub colliders: Vec<(Option<usize>, Collider)>,
+    pub visuals: Vec<Visual>,
+    pub cameras: Vec<CameraMount>,
+    pub lights: Vec<LightMount>,
+    pub couplings: Vec<Coupling>,
+    /// Pairs of links that do not collide, sorted.
+    pub apart: Vec<[Option<usize>; 2]>,
+    pub start: Vec<f64>,
+}
+
+impl ArticulatedBody {
+    pub(crate) fn to_parts(&self) -> ArticulatedParts {
+        ArticulatedParts {
+            colliders: self.colliders.iter().map(|part| (part.link, part.collider.clone())).collect(),
+            visuals: self.visuals.clone(),
+            cameras: self.cameras.clone(),
+            lights: self.lights.clone(),
+            couplings: self.couplings.clone(),
+            apart: self.apart.clone(),
+            start: self.start.clone(),
+        }
+    }
+
+    /// Puts them on a body without any, whose model stands on `base` already.
+    pub(crate) fn with_parts(mut self, base: Pose, parts: ArticulatedParts) -> Result<Self, ArticulatedError> {
+        if !self.is_state(&parts.start) {
+            return Err(ArticulatedError::Start { body: self.name, what: "positions", wanted: self.start.len() });
+        }
+        let ArticulatedParts { colliders, visuals, cameras, lights, couplings, apart, start } = parts;
+        self.colliders = colliders.into_iter().map(|(link, collider)| Part { link, collider }).collect();
+        (self.base, self.visuals, self.cameras, self.lights) = (base, visuals, cameras, lights);
+        (self.couplings, self.apart) = (couplings, apart);
+        self.refresh_dynamics(&start);
+        self.start = start;
+        Ok(self)
+    }
+}

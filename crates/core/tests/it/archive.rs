@@ -1,0 +1,150 @@
+//! A world that was written whole and read again goes the same way.
+
+use crate::common::*;
+use tumble_core::collide::{Pose, TreeSettings, TriMesh, Vec3};
+use tumble_core::*;
+
+/// Every shape, a chain of links with limits, drives and a coupling, loops, cameras; one body was removed, one sleeps.
+fn everything(stepper: &str) -> World {
+    let mut world = world(stepper, 1.0 / 240.0);
+    ground(&mut world, 0.3, 0.4);
+    let gone = world.add(RigidBody::with_mass("gone", sphere(0.1), 1.0).unwrap()).unwrap();
+    let (mesh, _) = Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap();
+    let shapes = [sphere(0.1), cube(0.2), Shape::capsule(0.1, 0.1).unwrap(), Shape::cylinder(0.1, 0.1).unwrap(), mesh];
+    let ids: Vec<ObjectId> = (0..10)
+        .map(|i| {
+            let body = RigidBody::with_density(format!("body{i}"), shapes[i % 5].clone(), 500.0 + i as f64).unwrap();
+            let pose = Pose::translation(0.3 * (i % 3) as f64, 0.0, 0.3 + 0.4 * i as f64);
+            let mut body =
+                body.at(pose).moving(Vec3::zeros(), Vec3::new(i as f64, 1.0, 0.0)).surface(0.1 * i as f64, 0.5);
+            body.linear_damping = 0.01;
+            world.add(body.with_camera(CameraMount::new("eye", 0, Pose::identity()))).unwrap()
+        })
+        .collect();
+    let at = Vec3::new(0.0, 0.0, 0.5);
+    world.add(Closure::point_at("joint", &world, Some((ids[0], 0)), Some((ids[1], 0)), at).unwrap()).unwrap();
+    world.add(Closure::hinge_at("loose", &world, Some((gone, 0)), None, at, Vec3::z()).unwrap()).unwrap();
+    world.remove(gone).unwrap();
+    let mut links = ModelBuilder::new();
+    let mut last = None;
+    for i in 0..4 {
+        let joint = if i == 2 { Joint::Spherical } else { Joint::revolute(Vec3::new(0.0, 1.0, 0.1)) };
+        let mass = LinkMass {
+            mass: 1.0,
+            center: Vec3::new(0.0, 0.0, -0.2),
+            inertia: 0.02 * tumble_core::collide::Mat3::identity(),
+        };
+        last = Some(links.link(format!("link{i}"), last, joint, Pose::translation(0.0, 0.0, -0.4), mass));
+    }
+    let mut chain = ArticulatedBody::new("chain", links.build().unwrap()).at(Pose::translation(2.0, 0.0, 2.0));
+    chain.add_collider("link1", Collider::new(shapes[3].clone(), Pose::translation(0.0, 0.0, -0.2))).unwrap();
+    chain.keep_apart("link0", "link3").unwrap();
+    let motion = Playback::new(vec![0.0, 0.3, 1.0], vec![0.0, 0.4, -0.2]).unwrap();
+    let drive = Drive::Playback { motion: motion.into(), limit: 20.0 };
+    chain.set_freedom(0, Freedom { drive, damping: 0.1, ..Freedom::default() }).unwrap();
+    chain.set_freedom(1, Freedom { limits: Some([-0.3, 0.2]), friction: 0.05, ..Freedom::default() }).unwrap();
+    chain.couple(Coupling { freedom: 5, of: 1, multiplier: 0.5, offset: 0.1 }).unwrap();
+    world.add(chain).unwrap();
+    world.set_mode(ids[9], Mode::Kinematic).unwrap();
+    world.set_alive(ids[8], false).unwrap();
+    world
+}
+
+fn again(world: &World) -> World {
+    World::from_archive(&world.archive(&[]).unwrap(), &mut |_| None).unwrap()
+}
+
+#[test]
+fn an_archived_world_goes_the_same_way() {
+    for stepper in STEPPERS {
+        let mut world = everything(stepper);
+        for frame in 0..60 {
+            if frame % 20 == 0 {
+                let mut other = again(&world);
+                assert_eq!(other.save(), world.save(), "{stepper}: frame {frame}");
+                assert_eq!(other.archive(&[]).unwrap(), world.archive(&[]).unwrap());
+                assert_eq!(other.contacts().len(), world.contacts().len());
+                assert_eq!((other.methods(), other.settings()), (world.methods(), world.settings()));
+                let mut ours = world.fork();
+                for _ in 0..100 {
+                    (ours.step().unwrap(), other.step().unwrap());
+                    assert_eq!(other.save(), ours.save(), "{stepper}: written at frame {frame}");
+                }
+            }
+            world.step().unwrap();
+        }
+        assert!(!world.contacts().is_empty());
+    }
+}
+
+#[test]
+fn shared_shapes_are_written_once_and_shared_again() {
+    let (mesh, _) = Shape::mesh(TriMesh::torus(0.3, 0.1, 48, 24), &TreeSettings::octree()).unwrap();
+    let of = |count: usize| {
+        let mut world = world(STEPPERS[0], 1.0 / 240.0);
+        (0..count).for_each(|i| {
+            world.add(RigidBody::with_mass(format!("body{i}"), mesh.clone(), 1.0).unwrap()).unwrap();
+        });
+        world
+    };
+    let [one, ten] = [1, 10].map(|count| of(count).archive(&[]).unwrap().len());
+    assert!(ten < one + 10 * 1000, "{one} {ten}");
+    let ten = again(&of(10));
+    let meshes: Vec<_> = ten.ids().iter().map(|&id| ten.get::<RigidBody>(id).unwrap().shape().clone()).collect();
+    let [Shape::Mesh(a), Shape::Mesh(b)] = [&meshes[0], &meshes[9]] else { panic!("meshes") };
+    assert!(std::sync::Arc::ptr_eq(a, b));
+}
+
+/// Pulls upwards.
+struct Lift;
+
+impl Object for Lift {
+    fn name(&self) -> &str {
+        "lift"
+    }
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(Lift)
+    }
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        Some(self)
+    }
+}
+
+impl ForceGenerator for Lift {
+    fn apply(&self, _me: &Span, _view: &WorldView, out: &mut Forces) {
+        out.wrenches.iter_mut().for_each(|w| w.force.z += 1.0);
+    }
+}
+
+#[test]
+fn objects_of_other_kinds_are_made_by_the_caller() {
+    let mut world = everything(STEPPERS[0]);
+    let lift = world.add(Lift).unwrap();
+    world.add(RigidBody::with_mass("last", sphere(0.1), 1.0).unwrap().at(Pose::translation(9.0, 0.0, 1.0))).unwrap();
+    assert_eq!(world.archive(&[]), Err(ArchiveError::Foreign("lift".into())));
+    let bytes = world.archive(&[lift]).unwrap();
+    let refused = World::from_archive(&bytes, &mut |_| None).map(|_| ());
+    assert_eq!(refused, Err(ArchiveError::Foreign("lift".into())));
+    let mut other = World::from_archive(&bytes, &mut |name| (name == "lift").then(|| Box::new(Lift) as _)).unwrap();
+    for _ in 0..50 {
+        (world.step().unwrap(), other.step().unwrap());
+    }
+    assert_eq!(other.save(), world.save());
+}
+
+#[test]
+fn damage_is_found() {
+    let bytes = everything(STEPPERS[0]).archive(&[]).unwrap();
+    let refused = |bytes: &[u8]| World::from_archive(bytes, &mut |_| None).map(|_| ()).unwrap_err();
+    assert!(matches!(refused(b"other bytes"), ArchiveError::NotOne(_)));
+    assert!(matches!(refused(&bytes[..7]), ArchiveError::NotOne(_)));
+    let mut newer = bytes.clone();
+    newer[7] += 1;
+    assert!(matches!(refused(&newer), ArchiveError::Format { .. }));
+    for place in (8..bytes.len()).step_by(997) {
+        let mut changed = bytes.clone();
+        changed[place] ^= 0x10;
+        assert!(matches!(refused(&changed), ArchiveError::Damaged(_)), "byte {place}");
+        assert!(matches!(refused(&bytes[..place]), ArchiveError::Damaged(_)), "cut at {place}");
+    }
+}
