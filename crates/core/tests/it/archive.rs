@@ -1,7 +1,7 @@
 //! A world that was written whole and read again goes the same way.
 
 use crate::common::*;
-use tumble_core::collide::{Pose, TreeSettings, TriMesh, Vec3};
+use tumble_core::collide::{Mat3, Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
 /// Every shape, a chain of links with limits, drives and a coupling, loops, cameras; one body was removed, one sleeps.
@@ -29,11 +29,7 @@ fn everything(stepper: &str) -> World {
     let mut last = None;
     for i in 0..4 {
         let joint = if i == 2 { Joint::Spherical } else { Joint::revolute(Vec3::new(0.0, 1.0, 0.1)) };
-        let mass = LinkMass {
-            mass: 1.0,
-            center: Vec3::new(0.0, 0.0, -0.2),
-            inertia: 0.02 * tumble_core::collide::Mat3::identity(),
-        };
+        let mass = LinkMass { mass: 1.0, center: Vec3::new(0.0, 0.0, -0.2), inertia: 0.02 * Mat3::identity() };
         last = Some(links.link(format!("link{i}"), last, joint, Pose::translation(0.0, 0.0, -0.4), mass));
     }
     let mut chain = ArticulatedBody::new("chain", links.build().unwrap()).at(Pose::translation(2.0, 0.0, 2.0));
