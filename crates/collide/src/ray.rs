@@ -2,7 +2,7 @@
 //!
 //! In the shape's frame the ray is `o + t·d`, `|d| = 1`. A ball: `t² + 2 t o·d + o² − r² = 0`. A slab `|x| ≤ h` is entered and left at `(∓h − o)/d`; a box is
 //! inside while all its slabs are (Kay and Kajiya, 1986). The side of a tube is a ball in the two dimensions across its axis. Triangles by Möller and
-//! Trumbore, 1997, from outside only.
+//! Trumbore, 1997: of a solid from outside only, of a bare mesh from either side.
 
 use crate::{Pose, Shape, TriMesh, Vec3};
 
@@ -32,9 +32,19 @@ impl Shape {
             Shape::Mesh(mesh) => {
                 // what passes the ball around it by misses it
                 let near = o - d * o.dot(&d);
-                if near.norm() > mesh.bounding_radius() { None } else { triangles(mesh.mesh(), &o, &d) }
+                if near.norm() > mesh.bounding_radius() { None } else { triangles(mesh.mesh(), &o, &d, 0.0) }
             }
         }
+    }
+}
+
+impl TriMesh {
+    /// The distance along `direction` (any length above 0) at which a ray from `origin` first meets a triangle of the mesh at `pose`, from either side,
+    /// metres; world axes.
+    pub fn ray(&self, pose: &Pose, origin: &Vec3, direction: &Vec3) -> Option<f64> {
+        let d = pose.rotation.inverse() * direction.try_normalize(0.0)?;
+        let o = pose.rotation.inverse() * (origin - pose.translation.vector);
+        triangles(self, &o, &d, f64::NEG_INFINITY)
     }
 }
 
@@ -70,13 +80,14 @@ fn slabs(o: &Vec3, d: &Vec3, half: &Vec3) -> Option<f64> {
     (enter >= 0.0 && enter <= leave).then_some(enter)
 }
 
-fn triangles(mesh: &TriMesh, o: &Vec3, d: &Vec3) -> Option<f64> {
+/// Triangles whose volume with the ray is at most `least` are met from behind and left out.
+fn triangles(mesh: &TriMesh, o: &Vec3, d: &Vec3, least: f64) -> Option<f64> {
     let hit = |t: usize| {
         let [a, b, c] = mesh.corners(t);
         let (ab, ac) = (b - a, c - a);
         let p = d.cross(&ac);
         let volume = ab.dot(&p);
-        if volume <= 0.0 {
+        if volume <= least || volume == 0.0 {
             return None; // from behind, or edge on
         }
         let s = o - a;

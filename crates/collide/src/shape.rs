@@ -87,7 +87,28 @@ impl Shape {
         Ok((Shape::Mesh(Arc::new(shape)), offset, note))
     }
 
-    /// The sphere tree of a mesh or cylinder.
+    /// [`Shape::mesh`] with its tree and surface built when first asked for: for a world that is drawn and not stepped. The tree then comes from the cache
+    /// where it has it.
+    pub fn mesh_lazy(mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<(Shape, Vec3), ShapeError> {
+        let (shape, offset) = MeshShape::new_lazy(mesh, settings, cache)?;
+        Ok((Shape::Mesh(Arc::new(shape)), offset))
+    }
+
+    /// Whether a tree or surface of it is built; no other shape has any.
+    pub fn is_built(&self) -> bool {
+        match self {
+            Shape::Cylinder(cylinder) => cylinder.is_built(),
+            Shape::Mesh(mesh) => mesh.is_built(),
+            _ => false,
+        }
+    }
+
+    /// Whether it has a sphere tree: meshes and cylinders.
+    pub fn has_tree(&self) -> bool {
+        matches!(self, Shape::Cylinder(_) | Shape::Mesh(_))
+    }
+
+    /// The sphere tree of a mesh or cylinder; that of a cylinder is built when first asked for.
     pub fn tree(&self) -> Option<&SphereTree> {
         match self {
             Shape::Cylinder(cylinder) => Some(cylinder.tree()),

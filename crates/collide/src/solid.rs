@@ -6,26 +6,46 @@ use crate::surface::parts::parts;
 use crate::{
     Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3,
 };
+use std::sync::OnceLock;
+
+/// Of a bound that is computed otherwise than what it bounds.
+const ROUNDING: f64 = 1e-9;
 
 /// A closed mesh about its centre of mass, with its sphere tree.
 #[derive(Clone, Debug)]
 pub struct MeshShape {
     mesh: TriMesh,
-    tree: SphereTree,
+    settings: TreeSettings,
+    cache: TreeCache,
+    tree: OnceLock<Tree>,
     /// One; of shells that overlap, each; none where it collides by its balls.
-    surfaces: Vec<Surface>,
+    surfaces: OnceLock<Vec<Surface>>,
+    /// Whether some of its faces are no surface of the union of its shells.
+    buried: bool,
     /// At density 1.
     unit_mass: MassProperties,
     bounding_radius: f64,
-    /// The same for the leaves.
-    leaf_radius: f64,
     report: ClosedReport,
+}
+
+/// A tree, and the radius of the ball about the origin that holds its leaves, metres.
+#[derive(Clone, Debug)]
+struct Tree {
+    tree: SphereTree,
+    leaf_radius: f64,
+}
+
+impl From<SphereTree> for Tree {
+    fn from(tree: SphereTree) -> Tree {
+        let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);
+        Tree { tree, leaf_radius }
+    }
 }
 
 /// The rest is made of these two.
 impl PartialEq for MeshShape {
     fn eq(&self, other: &MeshShape) -> bool {
-        (&self.mesh, &self.tree) == (&other.mesh, &other.tree)
+        (&self.mesh, self.tree()) == (&other.mesh, other.tree())
     }
 }
 
@@ -33,7 +53,8 @@ impl MeshShape {
     /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
     /// tree. Also returns the offset that was subtracted from the vertices (metres).
     pub fn new(mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
-        MeshShape::with_tree(mesh, |mesh| SphereTree::build(mesh, settings))
+        let (shape, offset, _) = MeshShape::new_cached(mesh, settings, &TreeCache::off())?;
+        Ok((shape, offset))
     }
 
     /// The same with a tree from the cache where it has one; also returns what is to be said of the cache.
@@ -42,20 +63,20 @@ impl MeshShape {
         settings: &TreeSettings,
         cache: &TreeCache,
     ) -> Result<(MeshShape, Vec3, Option<String>), MeshError> {
-        let mut note = None;
-        let tree_of = |mesh: &TriMesh| {
-            let cached = SphereTree::build_cached(mesh, settings, cache)?;
-            note = cached.note;
-            Ok(cached.tree)
-        };
-        let (shape, offset) = MeshShape::with_tree(mesh, tree_of)?;
-        Ok((shape, offset, note))
+        let (shape, offset) = MeshShape::new_lazy(mesh, settings, cache)?;
+        let cached = SphereTree::build_cached(&shape.mesh, settings, cache)?;
+        let shape = MeshShape { tree: OnceLock::from(Tree::from(cached.tree)), ..shape };
+        shape.surfaces();
+        Ok((shape, offset, cached.note))
     }
 
-    fn with_tree(
+    /// The same with tree and surface built when first asked for: for what is drawn and not stepped. A tree that cannot be built is then one ball.
+    pub fn new_lazy(
         mut mesh: TriMesh,
-        tree_of: impl FnOnce(&TriMesh) -> Result<SphereTree, MeshError>,
+        settings: &TreeSettings,
+        cache: &TreeCache,
     ) -> Result<(MeshShape, Vec3), MeshError> {
+        settings.check()?;
         let report = mesh.check_closed()?;
         let overlaps = report.crossing_faces > 0 || report.shells > 1;
         let mass = if overlaps { mesh.union_mass_properties(1.0) } else { mesh.mass_properties(1.0) };
@@ -64,8 +85,8 @@ impl MeshShape {
         // what rounding left of the offset is not worth a second shift
         let mass = if overlaps { mass } else { mesh.mass_properties(1.0) };
         let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mass };
-        let tree = tree_of(&mesh)?;
-        Ok((MeshShape::of_parts(mesh, tree, unit_mass, report), offset))
+        let (settings, cache) = (*settings, cache.clone());
+        Ok((MeshShape { settings, cache, ..MeshShape::of_checked(mesh, unit_mass, report) }, offset))
     }
 
     /// Of a mesh that was checked and moved, with its tree: the rest follows from these.
@@ -75,12 +96,25 @@ impl MeshShape {
         unit_mass: MassProperties,
         report: ClosedReport,
     ) -> MeshShape {
+        let shape = MeshShape { tree: OnceLock::from(Tree::from(tree)), ..MeshShape::of_checked(mesh, unit_mass, report) };
+        shape.surfaces();
+        shape
+    }
+
+    fn of_checked(mesh: TriMesh, unit_mass: MassProperties, report: ClosedReport) -> MeshShape {
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
-        let leaf_radius = tree.leaves().map(|l| l.center.norm() + l.radius).fold(0.0, f64::max);
-        // buried faces are no surface of the union: such a mesh goes shell by shell, or stands for itself by its balls
         let buried = report.crossing_faces > 0 || (unit_mass.mass - mesh.signed_volume()).abs() > 1e-9 * unit_mass.mass;
-        let surfaces = if buried { parts(&mesh, &tree).unwrap_or_default() } else { vec![Surface::new(&mesh, &tree)] };
-        MeshShape { mesh, tree, surfaces, unit_mass, bounding_radius, leaf_radius, report }
+        MeshShape {
+            mesh,
+            settings: TreeSettings::octree(),
+            cache: TreeCache::off(),
+            tree: OnceLock::new(),
+            surfaces: OnceLock::new(),
+            buried,
+            unit_mass,
+            bounding_radius,
+            report,
+        }
     }
 
     /// The surface; its centre of mass is the origin.
@@ -90,13 +124,27 @@ impl MeshShape {
 
     /// The balls around the surface.
     pub fn tree(&self) -> &SphereTree {
-        &self.tree
+        &self.whole_tree().tree
+    }
+
+    fn whole_tree(&self) -> &Tree {
+        let build = || SphereTree::build_cached(&self.mesh, &self.settings, &self.cache).map(|cached| cached.tree);
+        self.tree.get_or_init(|| build().unwrap_or_else(|_| SphereTree::ball(&self.mesh)).into())
+    }
+
+    /// Whether tree and surface are built, which happens where a world is stepped.
+    pub fn is_built(&self) -> bool {
+        self.tree.get().is_some() || self.surfaces.get().is_some()
     }
 
     /// Elements and fields of the `surface` contact mode: one, or one for each of several shells that overlap; none where the surface crosses
     /// itself in another way, which then collides by its balls.
     pub(crate) fn surfaces(&self) -> &[Surface] {
-        &self.surfaces
+        // buried faces are no surface of the union: such a mesh goes shell by shell, or stands for itself by its balls
+        self.surfaces.get_or_init(|| match self.buried {
+            true => parts(&self.mesh, self.tree()).unwrap_or_default(),
+            false => vec![Surface::new(&self.mesh, self.tree())],
+        })
     }
 
     /// At density 1, about the center of mass.
@@ -121,12 +169,13 @@ impl MeshShape {
 
     /// The box in world axes around the leaves: the turned local box, cut by the ball about the centre.
     pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
-        let (bounds, here) = (self.tree.bounds(), pose.translation.vector);
+        let Tree { tree, leaf_radius } = self.whole_tree();
+        let (bounds, here) = (tree.bounds(), pose.translation.vector);
         let center = pose.rotation * (0.5 * (bounds.min + bounds.max)) + here;
         let half = pose.rotation.to_rotation_matrix().matrix().abs() * (0.5 * (bounds.max - bounds.min));
         Aabb {
-            min: (center - half).sup(&here.add_scalar(-self.leaf_radius)),
-            max: (center + half).inf(&here.add_scalar(self.leaf_radius)),
+            min: (center - half).sup(&here.add_scalar(-leaf_radius)),
+            max: (center + half).inf(&here.add_scalar(*leaf_radius)),
         }
     }
 
@@ -139,16 +188,23 @@ impl MeshShape {
     }
 }
 
-/// A cylinder along local z about the origin, with the sphere tree of a closed mesh around it.
-#[derive(Clone, Debug, PartialEq)]
+/// A cylinder along local z about the origin. The sphere tree of a closed mesh around it is built when first asked for: contacts by surfaces need none.
+#[derive(Clone, Debug)]
 pub struct CylinderShape {
     radius: f64,
     half_length: f64,
     mesh: TriMesh,
-    tree: SphereTree,
+    tree: OnceLock<SphereTree>,
     /// Of a cylinder around prism and leaves, metres.
     outer_radius: f64,
     outer_half_length: f64,
+}
+
+/// The rest is made of these two.
+impl PartialEq for CylinderShape {
+    fn eq(&self, other: &CylinderShape) -> bool {
+        (self.radius, self.half_length) == (other.radius, other.half_length)
+    }
 }
 
 /// Sides of the prism that stands for a cylinder: its edges lie `1/cos(π/48)`, 0.2 % of the radius, outside.
@@ -160,10 +216,11 @@ impl CylinderShape {
         // the prism is around the cylinder, so that its tree covers the true surface
         let outer = radius / nalgebra::ComplexField::cos(std::f64::consts::PI / SIDES as f64);
         let mesh = TriMesh::cylinder(outer, half_length, SIDES);
-        let tree = SphereTree::build(&mesh, &TreeSettings::octree())?;
-        let error = tree.outward_error();
+        mesh.check_data()?;
+        // leaves of an octree that ends for its error and not for its depth reach no further; a prism's does
+        let error = TreeSettings::octree().error * mesh.diagonal() * (1.0 + ROUNDING);
         let (outer_radius, outer_half_length) = (outer + error, half_length + error);
-        Ok(CylinderShape { radius, half_length, mesh, tree, outer_radius, outer_half_length })
+        Ok(CylinderShape { radius, half_length, mesh, tree: OnceLock::new(), outer_radius, outer_half_length })
     }
 
     /// Metres.
@@ -185,13 +242,19 @@ impl CylinderShape {
         Aabb { min: here - half, max: here + half }
     }
 
-    /// The prism around the cylinder that the tree was made of.
+    /// The prism around the cylinder that the tree is made of.
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
     }
 
-    /// The balls around the surface.
+    /// The balls around the surface, built when first asked for; one ball where that fails.
     pub fn tree(&self) -> &SphereTree {
-        &self.tree
+        let build = || SphereTree::build(&self.mesh, &TreeSettings::octree());
+        self.tree.get_or_init(|| build().unwrap_or_else(|_| SphereTree::ball(&self.mesh)))
+    }
+
+    /// Whether that has happened.
+    pub fn is_built(&self) -> bool {
+        self.tree.get().is_some()
     }
 }

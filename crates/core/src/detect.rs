@@ -301,7 +301,7 @@ fn across(v: Vec3, along: &Vec3) -> Vec3 {
 }
 
 /// Whether two parts are to be tested: one of them moves (or is led towards a sleeper), and both kinds say yes.
-fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize, sites: &[Site]) -> bool {
+pub(crate) fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize, sites: &[Site]) -> bool {
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
     let stirs = a.asleep && b.comes(sites) || b.asleep && a.comes(sites);
     if !(stirs || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {

@@ -38,6 +38,7 @@ pub mod spatial;
 mod step;
 mod sync;
 mod view;
+mod visual;
 mod world;
 
 pub use archive::ArchiveError;
@@ -50,7 +51,7 @@ pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material,
 pub use mounts::{CameraCarrier, CameraMount, Detail, LightCarrier, LightMount, Spread};
 pub use object::{
     Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget,
-    SyncError, Visual,
+    SyncError,
 };
 pub use rigid::{BodyError, RigidBody};
 pub use row_builder::RowBuilder;
@@ -60,4 +61,7 @@ pub use sleep::Sleep;
 pub use step::{Backtracking, Frame, STEPPERS, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
 pub use view::{Mode, ObjectId, Status, WorldView};
-pub use world::{Checkpoint, ContactPoint, MirrorError, Pull, SnapshotError, StateHold, StepError, World, WorldError};
+pub use visual::{Drawn, Visual, VisualGeometry, VisualMesh};
+pub use world::{
+    Checkpoint, ContactPoint, MirrorError, Overlap, Pull, SnapshotError, StateHold, StepError, World, WorldError,
+};

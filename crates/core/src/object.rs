@@ -10,10 +10,11 @@ use crate::row_builder::RowBuilder;
 use crate::rows::RowSet;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::view::{ObjectId, WorldView};
+use crate::visual::Visual;
 use std::any::Any;
 use std::path::Path;
 use std::sync::Arc;
-use tumble_collide::{Pose, Vec3};
+use tumble_collide::Vec3;
 
 /// Everything the world holds. One accessor per interface; the default answer is "not I" (the thesis's
 /// `ImplementsInterface`, §IV.B.1).
@@ -280,19 +281,6 @@ pub enum SyncError {
 pub trait Renderable {
     /// Its pictures.
     fn visuals(&self) -> &[Visual];
-}
-
-/// One thing to draw, fixed to a site.
-#[derive(Clone, Debug)]
-pub struct Visual {
-    /// Part of the object that it moves with.
-    pub part: usize,
-    /// Pose in the part's frame.
-    pub pose: Pose,
-    /// Geometry.
-    pub shape: tumble_collide::Shape,
-    /// Look.
-    pub look: Look,
 }
 
 /// How a surface looks: a shader by name and its properties, as the thesis's shader attributes.

@@ -89,7 +89,7 @@ pub(crate) struct Pair<'a> {
 impl Pair<'_> {
     /// Whether a mesh or cylinder takes part.
     pub fn is_dear(&self) -> bool {
-        self.shapes.iter().any(|shape| shape.tree().is_some())
+        self.shapes.iter().any(|shape| shape.has_tree())
     }
 
     /// Whether the boxes around both cannot come near each other.
@@ -102,10 +102,10 @@ impl Pair<'_> {
     fn margins(&self) -> (f64, f64) {
         let closing = self.near + self.travel[0].between(&self.travel[1], self.reach);
         let size = self.shapes.iter().map(|shape| shape.bounding_radius()).fold(f64::INFINITY, f64::min);
-        let margin = match (self.mode, self.shapes.map(|shape| shape.tree())) {
+        let margin = match (self.mode, self.shapes.map(|shape| shape.has_tree())) {
             // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
-            (ContactMode::Spheres, [Some(_), Some(_)]) => closing.min(self.near + TREE_REACH * size),
-            (ContactMode::Surface, [Some(_), Some(_)]) if !self.has_simple_mesh() => {
+            (ContactMode::Spheres, [true, true]) => closing.min(self.near + TREE_REACH * size),
+            (ContactMode::Surface, [true, true]) if !self.has_simple_mesh() => {
                 closing.min(self.near + MESH_REACH * size)
             }
             _ => closing,

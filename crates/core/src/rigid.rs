@@ -12,11 +12,12 @@
 
 use crate::collidable::{Collidable, CollisionKind, Material};
 use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
-use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
+use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
 use crate::rotation;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::sync;
 use crate::view::WorldView;
+use crate::visual::Visual;
 use nalgebra::{Quaternion, SymmetricEigen, Translation3, Unit};
 use tumble_collide::{ContactMode, Mat3, Pose, Quat, Shape, Vec3};
 
@@ -126,7 +127,7 @@ impl RigidBody {
         }
         let inertia = Inertia::new(&name, inertia)?;
         let cache = Cache { respond: inertia.inverse_root, recover: inertia.root };
-        let visuals = vec![Visual { part: 0, pose: Pose::identity(), shape: shape.clone(), look: Default::default() }];
+        let visuals = vec![Visual::shape(0, Pose::identity(), shape.clone(), Default::default())];
         Ok(RigidBody {
             name,
             shape,

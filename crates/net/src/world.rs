@@ -2,7 +2,8 @@
 
 use crate::record::{Entity, Pose, Shape, VisualPart};
 use tumble_collide::Shape as Solid;
-use tumble_core::{ObjectId, World};
+use tumble_collide::TriMesh;
+use tumble_core::{Drawn, ObjectId, World};
 
 /// Half the side of the square that stands for a half-space, metres.
 const PLANE_M: f64 = 20.0;
@@ -36,9 +37,10 @@ fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {
 fn entity(world: &World, id: ObjectId, part: usize) -> Entity {
     let object = world.object(id);
     let visuals = object.and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
-    let parts = visuals.iter().filter(|v| v.part == part).map(|v| {
+    let parts = visuals.iter().filter(|v| v.part == part).filter_map(|v| {
         let [r, g, b] = v.look.color;
-        VisualPart { shape: shape(&v.shape), pose: pose(&v.pose), color: [r, g, b, 1.0].map(f64::from).map(|c| c as _) }
+        let color = [r, g, b, 1.0].map(f64::from).map(|c| c as _);
+        Some(VisualPart { shape: drawn(v.drawn()?), pose: pose(&v.pose), color })
     });
     Entity { name: name(world, id, part), parts: parts.collect() }
 }
@@ -47,16 +49,21 @@ fn pose(pose: &tumble_collide::Pose) -> Pose {
     Pose { position: pose.translation.vector.into(), rotation: pose.rotation.coords.into() }
 }
 
-fn shape(shape: &Solid) -> Shape {
+fn drawn(drawn: Drawn<'_>) -> Shape {
+    let shape = match drawn {
+        Drawn::Mesh(mesh) => return triangles(mesh),
+        Drawn::Shape(shape) => shape,
+    };
     match shape {
         Solid::HalfSpace => Shape::Plane { half_size: PLANE_M },
         Solid::Sphere { radius } => Shape::Sphere { radius: *radius },
         Solid::Box { half_extents } => Shape::Box { half_extents: (*half_extents).into() },
         Solid::Capsule { radius, half_length } => Shape::Capsule { radius: *radius, half_height: *half_length },
         Solid::Cylinder(c) => Shape::Cylinder { radius: c.radius(), half_height: c.half_length() },
-        Solid::Mesh(mesh) => Shape::Mesh {
-            vertices: mesh.mesh().vertices.iter().map(|v| (*v).into()).collect(),
-            triangles: mesh.mesh().triangles.clone(),
-        },
+        Solid::Mesh(mesh) => triangles(mesh.mesh()),
     }
+}
+
+fn triangles(mesh: &TriMesh) -> Shape {
+    Shape::Mesh { vertices: mesh.vertices.iter().map(|v| (*v).into()).collect(), triangles: mesh.triangles.clone() }
 }

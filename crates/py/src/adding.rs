@@ -61,13 +61,14 @@ pub fn articulated(
 ) -> Result<Articulation> {
     let description = described(description)?;
     let description = description.get();
-    let (body, robot) = description.body(py, base.map_or(Ok(Pose::identity()), base_pose)?, name)?;
+    let (body, robot, notes) = description.body(py, base.map_or(Ok(Pose::identity()), base_pose)?, name)?;
     let (robot, efforts) = (Arc::new(robot), description.spot.efforts());
     let place = shared.write(py, |inner| {
         let id = inner.world.add(body)?;
         inner.robots.insert(id, robot.clone());
         efforts.map(|tau| inner.efforts.insert(id, tau));
-        let name = inner.world.object(id).map_or("", |o| o.name()).into();
+        let name: Arc<str> = inner.world.object(id).map_or("", |o| o.name()).into();
+        inner.notes.extend(notes.iter().map(|note| format!("articulated \"{name}\": {note}")));
         Ok(Place { shared: shared.clone(), id, name })
     })?;
     Articulation::placed(py, place, robot)

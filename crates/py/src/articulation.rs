@@ -55,15 +55,21 @@ impl Articulation {
         }
     }
 
-    /// The body to be put into a world, in the state that the description has.
-    pub fn body(&self, py: Python<'_>, base: Pose, name: Option<&str>) -> Result<(ArticulatedBody, Robot)> {
+    /// The body to be put into a world, in the state that the description has, and what is to be said of its files.
+    pub fn body(
+        &self,
+        py: Python<'_>,
+        base: Pose,
+        name: Option<&str>,
+    ) -> Result<(ArticulatedBody, Robot, Vec<String>)> {
         let Spot::Free { source, now } = &self.spot else {
             return Err(Error::value(format!(
                 "'{}' is in a world already; add the description that it was made of",
                 self.name
             )));
         };
-        let body = py.detach(|| pool::run(|| source.body(&source.options)))?.at(base).named(name.unwrap_or(&self.name));
+        let (body, notes) = py.detach(|| pool::run(|| source.body()))?;
+        let body = body.at(base).named(name.unwrap_or(&self.name));
         let Now { mut q, qd, .. } = locked(now).clone();
         // where a floating root is, is said from the base
         let model = body.model();
@@ -76,7 +82,7 @@ impl Articulation {
         }
         let body = body.with_positions(&q)?.with_velocities(&qd)?;
         let robot = Robot { model: body.model().clone(), base, joints: self.robot.joints.clone() };
-        Ok((body, robot))
+        Ok((body, robot, notes))
     }
 
     /// Arguments of an algorithm: what is not given is what it is now.
@@ -153,7 +159,7 @@ type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 #[pymethods]
 impl Articulation {
-    /// Reads a URDF: its tree at once, its shapes when it is added to a world.
+    /// Reads a URDF: its tree at once, its collision shapes when it is added to a world, the meshes of its visuals when somebody draws them.
     ///
     /// floating: whether the root floats, else it is fixed to the base; packages: folders by name, for ``package://NAME/…``; missing_meshes:
     /// ``"error"`` or ``"skip"``, for collision meshes that are not there; collision_meshes: ``"exact"`` or ``"hull"``.
@@ -183,7 +189,7 @@ impl Articulation {
         Ok(Articulation {
             name: read.name.into(),
             robot: Arc::new(robot),
-            spot: Spot::Free { source: Source { file, options }, now: Mutex::new(now) },
+            spot: Spot::Free { source: Source { file, options, freedoms: read.freedoms }, now: Mutex::new(now) },
             anchor: None,
         })
     }
@@ -289,7 +295,7 @@ impl Articulation {
     /// Least and greatest position of each freedom, shape (dof, 2), rad or m; infinite where there is no limit.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
-        let freedoms = self.spot.freedoms(py)?;
+        let freedoms = self.spot.freedoms()?;
         let flat = freedoms.iter().flat_map(|f| f.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect();
         Ok(PyArray1::from_vec(py, flat).reshape([freedoms.len(), 2])?)
     }

@@ -30,10 +30,11 @@ impl Choices<'_> {
     }
 }
 
-/// The world of a scene and what is to be said of it.
-pub fn build(scene: SceneFile) -> Result<(Inner, Vec<String>)> {
+/// The world of a scene.
+pub fn build(scene: SceneFile) -> Result<Inner> {
     let (world, notes) = caught(|| Ok(scene.build()?))?;
     let mut inner = Inner::new(world, Arc::new(scene));
+    inner.notes = notes;
     let scene = inner.scene.clone();
     for spec in &scene.articulated {
         let Some((id, body)) =
@@ -50,5 +51,5 @@ pub fn build(scene: SceneFile) -> Result<(Inner, Vec<String>)> {
         let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
         inner.robots.insert(id, Arc::new(robot));
     }
-    Ok((inner, notes))
+    Ok(inner)
 }

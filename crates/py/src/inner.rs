@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tumble::core::{ObjectId, World};
-use tumble::scene::SceneFile;
+use tumble::scene::{SceneFile, overlap_notes, visual_notes};
 
 /// A world and what belongs to it on Python's side.
 pub struct Inner {
@@ -25,6 +25,10 @@ pub struct Inner {
     pub extension: Extension,
     /// The array that Python sees the state by.
     pub shown: Shown,
+    /// What is to be said of the files that it was made of.
+    pub notes: Vec<String>,
+    /// Which bodies overlap, as last asked before the first step.
+    pub overlaps: Vec<String>,
     /// Whether a panic left it half-way.
     pub broken: bool,
 }
@@ -39,6 +43,8 @@ impl Inner {
             efforts: BTreeMap::new(),
             extension: Extension::default(),
             shown: Shown::default(),
+            notes: Vec::new(),
+            overlaps: Vec::new(),
             broken: false,
         }
     }
@@ -52,6 +58,8 @@ impl Inner {
             efforts: self.efforts.clone(),
             extension: self.extension.fork(),
             shown: Shown::default(),
+            notes: self.notes.clone(),
+            overlaps: self.overlaps.clone(),
             broken: false,
         }
     }
@@ -73,6 +81,16 @@ impl Inner {
         }
         self.world.step()?;
         Ok(())
+    }
+
+    /// What is to be said of files, of meshes that could not be drawn, and of bodies that overlap at the start. These are looked for now, before the
+    /// first step; after it those are told that were found then.
+    pub fn all_notes(&mut self) -> Vec<String> {
+        if self.world.frame() == 0 {
+            self.overlaps = overlap_notes(&self.world);
+        }
+        let found = visual_notes(self.world.visuals()).into_iter().chain(self.overlaps.iter().cloned());
+        self.notes.iter().cloned().chain(found).collect()
     }
 
     /// What is kept about an object that is gone.

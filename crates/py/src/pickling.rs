@@ -28,6 +28,7 @@ struct Record {
     /// Places of articulated bodies, the names of their joints, and the forces that act on them.
     robots: Vec<(u32, Vec<String>, Option<Vec<f64>>)>,
     notes: Vec<String>,
+    overlaps: Vec<String>,
 }
 
 /// What is kept of a scene: its name, and what pictures are taken with.
@@ -58,7 +59,7 @@ impl SceneRecord {
 }
 
 /// The bytes of a world without its forces and behaviours.
-pub fn write(inner: &Inner, notes: &[String]) -> Result<Vec<u8>> {
+pub fn write(inner: &Inner) -> Result<Vec<u8>> {
     let ids = inner.world.ids();
     let robots = (0..).zip(ids).filter_map(|(place, id)| {
         let robot = inner.robots.get(id)?;
@@ -68,13 +69,14 @@ pub fn write(inner: &Inner, notes: &[String]) -> Result<Vec<u8>> {
         archive: inner.world.archive(&inner.forces())?,
         scene: SceneRecord::of(&inner.scene),
         robots: robots.collect(),
-        notes: notes.to_vec(),
+        notes: inner.notes.clone(),
+        overlaps: inner.overlaps.clone(),
     };
     Ok(seal(WORLD, &record)?)
 }
 
 /// The world of such bytes; its forces have no Python object yet.
-pub fn read(bytes: &[u8]) -> Result<(Inner, Vec<String>)> {
+pub fn read(bytes: &[u8]) -> Result<Inner> {
     let record: Record = open(WORLD, bytes)?;
     let mut forces = Vec::new();
     let world = Core::from_archive(&record.archive, &mut |name| {
@@ -92,7 +94,8 @@ pub fn read(bytes: &[u8]) -> Result<(Inner, Vec<String>)> {
         effort.map(|effort| inner.efforts.insert(id, effort));
     }
     inner.expect_forces(&forces);
-    Ok((inner, record.notes))
+    (inner.notes, inner.overlaps) = (record.notes, record.overlaps);
+    Ok(inner)
 }
 
 /// A shape: its solid, where that stands in the body's frame, and how it is written.

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard};
 use tumble::collide::Vec3;
 use tumble::core::{ArticulatedBody, Freedom};
-use tumble::scene::urdf::{self, MissingMeshes, UrdfOptions};
+use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A description by itself, or one in a world.
 #[allow(clippy::large_enum_variant, reason = "each is the inside of one Python object")]
@@ -23,6 +23,7 @@ pub enum Spot {
 pub struct Source {
     pub file: PathBuf,
     pub options: UrdfOptions,
+    pub freedoms: Vec<Freedom>,
 }
 
 /// The numbers of a description.
@@ -66,14 +67,9 @@ impl Which {
 }
 
 impl Source {
-    /// The body, with its shapes.
-    pub fn body(&self, options: &UrdfOptions) -> Result<ArticulatedBody> {
-        caught(|| Ok(urdf::load(&self.file, options)?.0))
-    }
-
-    /// The body for its joints alone: whatever meshes can be read.
-    fn joints(&self) -> Result<ArticulatedBody> {
-        self.body(&UrdfOptions { missing_meshes: MissingMeshes::Skip, ..self.options.clone() })
+    /// The body with its shapes, and what is to be said of its files.
+    pub fn body(&self) -> Result<(ArticulatedBody, Vec<String>)> {
+        caught(|| Ok(urdf::load(&self.file, &self.options)?))
     }
 }
 
@@ -144,9 +140,9 @@ impl Spot {
     }
 
     /// Limits and drives of its freedoms.
-    pub fn freedoms(&self, py: Python<'_>) -> Result<Vec<Freedom>> {
+    pub fn freedoms(&self) -> Result<Vec<Freedom>> {
         match self {
-            Spot::Free { source, .. } => Ok(py.detach(|| source.joints())?.freedoms().to_vec()),
+            Spot::Free { source, .. } => Ok(source.freedoms.clone()),
             Spot::Placed(place) => {
                 place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.freedoms().to_vec()))
             }

@@ -43,15 +43,14 @@ use tumble::scene::{SceneFile, resolve_scene};
 #[pyclass(frozen, weakref, module = "tumble")]
 pub struct World {
     pub shared: Arc<Shared>,
-    notes: Vec<String>,
     anchor: Py<Anchor>,
 }
 
 impl World {
-    /// A world and what is to be said of it.
-    pub fn of(py: Python<'_>, (inner, notes): (Inner, Vec<String>)) -> Result<World> {
+    /// A world of its own.
+    pub fn of(py: Python<'_>, inner: Inner) -> Result<World> {
         let shared = Shared::new(inner);
-        Ok(World { anchor: anchor(py, &shared)?, shared, notes })
+        Ok(World { anchor: anchor(py, &shared)?, shared })
     }
 
     fn settings<T>(&self, get: impl FnOnce(&Settings) -> T) -> Result<T> {
@@ -133,10 +132,14 @@ impl World {
         World::of(py, py.detach(|| pool::run(|| build(SceneFile::parse(text, "scene.toml")?)))?)
     }
 
-    /// What is to be said of the files of a loaded scene, such as what was mended in a mesh: a list of sentences.
+    /// What is to be said of the world: a list of sentences.
+    ///
+    /// Of the files of a scene and of articulations that were added, such as what was mended in a mesh or that a convex hull collides; of visual meshes
+    /// that could not be read, once something has drawn them; of bodies that overlap at the start, the deepest eight by name. Overlaps are looked for when
+    /// this is asked before the first step.
     #[getter]
-    fn notes(&self) -> Vec<String> {
-        self.notes.clone()
+    fn notes(&self, py: Python<'_>) -> Result<Vec<String>> {
+        self.shared.write(py, |inner| Ok(inner.all_notes()))
     }
 
     /// Advances by ``n`` steps of ``dt``. The interpreter is let go meanwhile; Ctrl-C ends it between two steps.
@@ -282,7 +285,7 @@ impl World {
     fn fork(&self, py: Python<'_>) -> Result<World> {
         let inner = self.shared.read(|inner| Ok(inner.fork()))?;
         inner.take_raised()?;
-        World::of(py, (inner, self.notes.clone()))
+        World::of(py, inner)
     }
 
     fn __copy__(&self, py: Python<'_>) -> Result<World> {
@@ -299,7 +302,7 @@ impl World {
         py: Python<'py>,
     ) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,), Option<Extensions>)> {
         let (bytes, state) =
-            self.shared.read(|inner| Ok((pickling::write(inner, &self.notes)?, inner.pickled_extensions(py))))?;
+            self.shared.read(|inner| Ok((pickling::write(inner)?, inner.pickled_extensions(py))))?;
         let unpickle = py.import("tumble._native")?.getattr("_unpickle_world")?;
         Ok((unpickle, (PyBytes::new(py, &bytes),), state))
     }

@@ -1,7 +1,8 @@
 //! From links to what the dynamics knows: a model, and a body with colliders, pictures and motors.
 
 use tumble_core::articulated::{
-    ArticulatedBody, ArticulatedError, Collider, Coupling, Kinematics, LinkMass, Model, ModelBuilder, ModelError,
+    ArticulatedBody, ArticulatedError, Collider, Coupling, Freedom, Kinematics, LinkMass, Model, ModelBuilder,
+    ModelError,
 };
 use tumble_core::collide::{Pose, Shape, contacts};
 use tumble_core::{CameraMount, Joint, Look, Material, Object, Visual};
@@ -9,7 +10,7 @@ use tumble_core::{CameraMount, Joint, Look, Material, Object, Visual};
 use crate::articulated::ArticulatedSpec;
 use crate::build::look;
 use crate::link::LinkSpec;
-use crate::link_shapes::{Placed, ShapeMaker, mass};
+use crate::link_shapes::{Placed, Purpose, ShapeMaker, mass};
 
 /// Pairs of links told by name.
 const TOLD_PAIRS: usize = 8;
@@ -26,6 +27,12 @@ pub(crate) fn model(links: &[LinkSpec], masses: &[LinkMass]) -> Result<Model, Mo
 /// Names of the joints that move, in the order of the model's links and so of its coordinates.
 pub(crate) fn moving_joints(links: &[LinkSpec]) -> Vec<String> {
     links.iter().filter(|link| moves(link)).map(|link| link.joint.name.clone()).collect()
+}
+
+/// What acts on each degree of freedom, in the order of the velocities.
+pub(crate) fn freedoms(links: &[LinkSpec]) -> Vec<Freedom> {
+    let of = |link: &LinkSpec| vec![link.joint.freedom.clone(); link.joint.kind.dof()];
+    links.iter().filter(|link| moves(link)).flat_map(of).collect()
 }
 
 fn moves(link: &LinkSpec) -> bool {
@@ -87,7 +94,7 @@ fn furnished(
         body.keep_apart(&spec.links[*a].name, &spec.links[*b].name)?;
     }
     keep_apart_across_stacks(spec, &mut body)?;
-    if spec.part_overlaps && spec.self_collision {
+    if spec.part_overlaps && spec.self_collision && maker.purpose == Purpose::Stepped {
         let poses = link_poses(spec, &body, &positions, &velocities);
         part_overlaps(spec, shapes, &poses, &mut body, maker)?;
     }
@@ -107,16 +114,17 @@ fn position(link: &LinkSpec, base: &Pose) -> Vec<f64> {
 
 fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result<(), ArticulatedError> {
     let surface = &placed.spec.surface;
-    if placed.spec.collides {
+    if let Some(shape) = placed.solid().filter(|_| placed.spec.collides) {
         let material = Material { restitution: surface.restitution, friction: surface.friction };
         body.add_collider(
             link,
-            Collider { material, contact_mode: surface.contacts, ..Collider::new(placed.shape.clone(), placed.pose) },
+            Collider { material, contact_mode: surface.contacts, ..Collider::new(shape.clone(), placed.pose) },
         )?;
     }
     if placed.visible {
         let look: Look = look(&surface.look, &placed.center);
-        body.add_visual(link, Visual { part: 0, pose: placed.pose, shape: placed.shape.clone(), look })?;
+        let (geometry, stands_in_for) = (placed.geometry.clone(), placed.stands_in_for.clone());
+        body.add_visual(link, Visual { part: 0, pose: placed.pose, geometry, look, stands_in_for })?;
     }
     Ok(())
 }
@@ -148,7 +156,7 @@ fn part_overlaps(
         .iter()
         .enumerate()
         .flat_map(|(link, placed)| placed.iter().filter(|p| p.spec.collides).map(move |p| (link, p)))
-        .map(|(link, placed)| Solid { link, shape: &placed.shape, pose: poses[link] * placed.pose })
+        .filter_map(|(link, p)| Some(Solid { link, shape: p.solid()?, pose: poses[link] * p.pose }))
         .collect();
     // parts are the links, the base, then the colliders in this order
     let first = body.model().links().len() + 1;

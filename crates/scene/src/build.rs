@@ -17,7 +17,7 @@ use crate::body::{BodySpec, MassSpec};
 use crate::closure::{ClosureKind, ClosureSpec, PartSpec};
 use crate::collada;
 use crate::file::SceneFile;
-use crate::link_shapes::{self, ShapeMaker};
+use crate::link_shapes::{self, Purpose, ShapeMaker};
 use crate::look::Look;
 use crate::mesh::{MeshSource, MeshSpec};
 
@@ -99,9 +99,23 @@ impl SceneFile {
     /// # Errors
     /// [`BuildError`]: a mesh is unreadable or open, a body has no volume, a constant is refused.
     pub fn build(&self) -> Result<(World, Notes), BuildError> {
+        self.build_for(Purpose::Stepped)
+    }
+
+    /// The same world to be drawn and not stepped, as a facet's: its meshes get no sphere trees and no distance fields until somebody asks for them, and
+    /// links of a URDF that overlap at the start are not looked for.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_drawn(&self) -> Result<(World, Notes), BuildError> {
+        self.build_for(Purpose::Drawn)
+    }
+
+    fn build_for(&self, purpose: Purpose) -> Result<(World, Notes), BuildError> {
         let mut notes = Notes::new();
         let world = |source| BuildError::World { scene: self.file.clone(), source };
-        let meshes = self.meshes.iter().map(|mesh| self.solid(mesh, &mut notes)).collect::<Result<Vec<_>, _>>()?;
+        let meshes =
+            self.meshes.iter().map(|mesh| self.solid(mesh, purpose, &mut notes)).collect::<Result<Vec<_>, _>>()?;
         let mut built = World::new(self.settings()).map_err(world)?;
         stepper_by_name(&self.world.stepper.to_string()).into_iter().for_each(|s| built.set_stepper(s));
         solver::by_name(&self.world.solver.to_string()).into_iter().for_each(|s| built.set_solver(s));
@@ -111,7 +125,7 @@ impl SceneFile {
             built.set_collidable(id, spec.collides).map_err(world)?;
             built.set_alive(id, spec.alive).map_err(world)?;
         }
-        let mut maker = ShapeMaker::new(&meshes);
+        let mut maker = ShapeMaker::new(&meshes, purpose);
         for spec in &self.articulated {
             self.add_articulated(spec, &mut maker, &mut built)?;
             let said = spec.notes.iter().cloned().chain(maker.notes.take());
@@ -181,7 +195,7 @@ impl SceneFile {
     }
 
     /// A mesh as a solid about its centre of mass, with the place of that centre in the mesh's own axes.
-    fn solid(&self, spec: &MeshSpec, notes: &mut Notes) -> Result<(Shape, Vec3), BuildError> {
+    fn solid(&self, spec: &MeshSpec, purpose: Purpose, notes: &mut Notes) -> Result<(Shape, Vec3), BuildError> {
         let file = match &spec.source {
             MeshSource::File { path, .. } => Some(path.clone()),
             _ => None,
@@ -199,7 +213,7 @@ impl SceneFile {
         settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
         settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
         let (shape, center, note) =
-            Shape::mesh_cached(mesh, &settings, &TreeCache::of_environment()).map_err(|e| wrong(e.to_string()))?;
+            purpose.mesh(mesh, &settings, &TreeCache::of_environment()).map_err(|e| wrong(e.to_string()))?;
         notes.extend(note.filter(|note| !notes.contains(note)));
         Ok((shape, center))
     }
@@ -339,7 +353,7 @@ fn visuals(spec: &BodySpec, shape: Shape, center: &Vec3) -> Vec<Visual> {
     if !spec.visible {
         return Vec::new();
     }
-    vec![Visual { part: 0, pose: Pose::identity(), shape, look: look(&spec.look, center) }]
+    vec![Visual::shape(0, Pose::identity(), shape, look(&spec.look, center))]
 }
 
 /// The look in body axes, whose origin is the centre of mass.

@@ -83,6 +83,7 @@ mod shipped;
 mod suggest;
 pub mod urdf;
 mod view;
+mod visual_mesh;
 mod world;
 
 pub use articulated::ArticulatedSpec;
@@ -97,6 +98,7 @@ pub use look::{Color, Look, Pattern};
 pub use material::MaterialSpec;
 pub use mesh::{MeshSource, MeshSpec};
 pub use mount::Mounts;
+pub use notes::{overlap_notes, visual_notes};
 pub use shape::ShapeSpec;
 pub use shipped::{SceneSource, Shipped, resolve_scene, shipped};
 pub use tumble_core::{Combine, Mode};

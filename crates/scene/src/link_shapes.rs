@@ -1,52 +1,87 @@
-//! Shapes of links: made from their descriptions, mesh files read once each.
+//! What is on links, made from their descriptions: shapes, whose mesh files are read once each, and visual meshes, which are left to whoever draws.
 //!
-//! Meshes of real robots are often not closed, and a surface that is not closed has no inside to collide with. Their convex hull stands in, and a note
-//! says so: it is closed for any input, it touches what the mesh touches from outside, and robots' collision meshes are mostly made to be used that
-//! way. (A box or capsule around them would be larger by far at the corners that robots touch things with.)
+//! Collision meshes of real robots are often not closed, and a surface that is not closed has no inside to collide with. Their convex hull stands in,
+//! and a note says so: it is closed for any input, it touches what the mesh touches from outside, and robots' collision meshes are mostly made to be
+//! used that way. (A box or capsule around them would be larger by far at the corners that robots touch things with.)
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Pose, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
+use tumble_core::{VisualGeometry, VisualMesh};
 
 use crate::body::MassSpec;
 use crate::build::{MOST_MESH_BYTES, read_triangles};
 use crate::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec};
 use crate::notes::NoteList;
 use crate::shape::ShapeSpec;
+use crate::visual_mesh;
 
-/// A shape in its place on a link.
+/// Something in its place on a link.
 #[derive(Clone)]
 pub(crate) struct Placed<'s> {
-    pub(crate) shape: Shape,
+    pub(crate) geometry: VisualGeometry,
     /// In the link's frame.
     pub(crate) pose: Pose,
-    /// Where the shape's origin was in the axes of the description.
+    /// Where the geometry's origin was in the axes of the description.
     pub(crate) center: Vec3,
     pub(crate) spec: &'s LinkShape,
     pub(crate) visible: bool,
+    /// Drawn only where none of these can be read.
+    pub(crate) stands_in_for: Vec<Arc<VisualMesh>>,
+}
+
+impl Placed<'_> {
+    /// What collides and has a mass; a visual mesh has neither.
+    pub(crate) fn solid(&self) -> Option<&Shape> {
+        match &self.geometry {
+            VisualGeometry::Shape(shape) => Some(shape),
+            VisualGeometry::Mesh(_) => None,
+        }
+    }
 }
 
 /// Makes shapes, and remembers those from files. Trees come from the cache that the environment names.
 pub(crate) struct ShapeMaker<'m> {
     /// Meshes of the scene as solids, with the place of the centre of each.
     meshes: &'m [(Shape, Vec3)],
-    files: BTreeMap<FileKey, Result<(Shape, Vec3), String>>,
+    solids: BTreeMap<SolidKey, Result<(Shape, Vec3), String>>,
+    pictures: BTreeMap<FileKey, Arc<VisualMesh>>,
     cache: TreeCache,
+    pub(crate) purpose: Purpose,
     pub(crate) notes: NoteList,
 }
 
-/// A file, the bits of its scale, and what it is read for.
-type FileKey = (PathBuf, [u64; 3], Use);
-
-/// What a mesh file is read for.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Use {
-    Collision,
-    Hull,
-    Drawing,
+/// What a world is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// To be stepped.
+    Stepped,
+    /// To be drawn alone: sphere trees and surfaces are built when somebody asks for them, as nobody does.
+    Drawn,
 }
+
+impl Purpose {
+    /// A closed mesh as a shape, where its centre of mass was, and what is to be said of the cache of trees.
+    pub(crate) fn mesh(
+        self,
+        mesh: TriMesh,
+        settings: &TreeSettings,
+        cache: &TreeCache,
+    ) -> Result<(Shape, Vec3, Option<String>), ShapeError> {
+        match self {
+            Purpose::Stepped => Shape::mesh_cached(mesh, settings, cache),
+            Purpose::Drawn => Shape::mesh_lazy(mesh, settings, cache).map(|(shape, center)| (shape, center, None)),
+        }
+    }
+}
+
+/// A file and the bits of its scale.
+type FileKey = (PathBuf, [u64; 3]);
+/// The same, and whether its convex hull collides instead of itself.
+type SolidKey = (FileKey, bool);
 
 /// A shape of the scene and the place of its centre of mass in the axes of the description.
 pub(crate) fn make(spec: &ShapeSpec, meshes: &[(Shape, Vec3)]) -> Result<(Shape, Vec3), ShapeError> {
@@ -62,93 +97,110 @@ pub(crate) fn make(spec: &ShapeSpec, meshes: &[(Shape, Vec3)]) -> Result<(Shape,
 }
 
 impl<'m> ShapeMaker<'m> {
-    pub(crate) fn new(meshes: &'m [(Shape, Vec3)]) -> Self {
-        ShapeMaker { meshes, files: BTreeMap::new(), cache: TreeCache::of_environment(), notes: NoteList::default() }
+    pub(crate) fn new(meshes: &'m [(Shape, Vec3)], purpose: Purpose) -> Self {
+        ShapeMaker {
+            meshes,
+            solids: BTreeMap::new(),
+            pictures: BTreeMap::new(),
+            cache: TreeCache::of_environment(),
+            purpose,
+            notes: NoteList::default(),
+        }
     }
 
-    /// All shapes of a link; what may be left out and cannot be read is, with a note. Where no picture of a link can be read its collision shapes
-    /// are drawn.
+    /// All that is on a link; collision meshes that may be left out and cannot be read are, with a note. Where no picture of a link can be read its
+    /// collision shapes are drawn.
     pub(crate) fn shapes<'s>(&mut self, link: &'s LinkSpec) -> Result<Vec<Placed<'s>>, String> {
         let mut placed = Vec::with_capacity(link.shapes.len());
         let mut lost_picture = false;
-        for spec in &link.shapes {
-            match self.shape(spec)? {
-                Some((shape, center)) => {
+        let unused =
+            |spec: &&LinkShape| matches!(spec.geometry, Geometry::File { .. }) && !spec.collides && !spec.visible;
+        for spec in link.shapes.iter().filter(|spec| !unused(spec)) {
+            match self.geometry(spec)? {
+                Some((geometry, center)) => {
                     let pose = spec.pose * Pose::from_parts(center.into(), nalgebra::one());
-                    placed.push(Placed { shape, pose, center, spec, visible: spec.visible });
+                    let visible = spec.visible;
+                    placed.push(Placed { geometry, pose, center, spec, visible, stands_in_for: Vec::new() });
                 }
                 None => lost_picture |= spec.visible,
             }
         }
-        if lost_picture && placed.iter().all(|p| !p.visible) {
-            placed.iter_mut().for_each(|p| p.visible = true);
+        let shown = placed.iter().filter(|p| p.visible);
+        let meshes = shown.clone().filter_map(|p| match &p.geometry {
+            VisualGeometry::Mesh(mesh) => Some(mesh.clone()),
+            VisualGeometry::Shape(_) => None,
+        });
+        let meshes: Vec<Arc<VisualMesh>> = meshes.collect();
+        if shown.count() == meshes.len() && (lost_picture || !meshes.is_empty()) {
+            for p in placed.iter_mut().filter(|p| !p.visible) {
+                (p.visible, p.stands_in_for) = (true, meshes.clone());
+            }
         }
         Ok(placed)
     }
 
-    fn shape(&mut self, spec: &LinkShape) -> Result<Option<(Shape, Vec3)>, String> {
-        let (path, scale, place, hull, required) = match &spec.geometry {
-            Geometry::Shape(shape) => return make(shape, self.meshes).map(Some).map_err(|e| e.to_string()),
-            Geometry::File { path, scale, place, hull, required } => (path, scale, place, *hull, *required),
-        };
-        let used = if !spec.collides {
-            Use::Drawing
-        } else if hull {
-            Use::Hull
-        } else {
-            Use::Collision
-        };
-        let key = (path.clone(), scale.map(f64::to_bits), used);
-        if !self.files.contains_key(&key) {
-            let made = self.read(path, *scale, used);
-            self.files.insert(key.clone(), made);
-        }
-        match &self.files[&key] {
-            Ok(made) => Ok(Some(made.clone())),
-            Err(why) if required && spec.collides => Err(format!("{place}: {}: {why}", path.display())),
-            Err(why) => {
-                self.notes.add(format!("{place}: {}", path.display()), format!("left out: {why}"));
-                Ok(None)
+    fn geometry(&mut self, spec: &LinkShape) -> Result<Option<(VisualGeometry, Vec3)>, String> {
+        let as_shape = |(shape, center)| Some((VisualGeometry::Shape(shape), center));
+        match &spec.geometry {
+            Geometry::Shape(shape) => make(shape, self.meshes).map(as_shape).map_err(|e| e.to_string()),
+            Geometry::File { path, scale, .. } if !spec.collides => {
+                let key = (path.clone(), scale.map(f64::to_bits));
+                let mesh = self.pictures.entry(key).or_insert_with(|| Arc::new(visual_mesh::of_file(path, *scale)));
+                Ok(Some((VisualGeometry::Mesh(mesh.clone()), Vec3::zeros())))
+            }
+            Geometry::File { path, scale, place, hull, required } => {
+                let key = ((path.clone(), scale.map(f64::to_bits)), *hull);
+                if !self.solids.contains_key(&key) {
+                    let made = self.read(path, *scale, *hull);
+                    self.solids.insert(key.clone(), made);
+                }
+                match &self.solids[&key] {
+                    Ok(made) => Ok(as_shape(made.clone())),
+                    Err(why) if *required => Err(format!("{place}: {}: {why}", path.display())),
+                    Err(why) => {
+                        self.notes.add(format!("{place}: {}", path.display()), format!("left out: {why}"));
+                        Ok(None)
+                    }
+                }
             }
         }
     }
 
-    fn read(&mut self, path: &Path, scale: [f64; 3], used: Use) -> Result<(Shape, Vec3), String> {
+    fn read(&mut self, path: &Path, scale: [f64; 3], hull: bool) -> Result<(Shape, Vec3), String> {
         let mesh = stretched(read_file(path)?, scale);
-        if used != Use::Hull {
-            if let Ok(made) = self.solid(mesh.clone(), used) {
+        if !hull {
+            if let Ok(made) = self.solid(mesh.clone()) {
                 return Ok(made);
             }
-            if used == Use::Drawing
-                && let Ok(made) = self.solid(scales(&mesh), used)
-            {
-                return Ok(made);
-            }
-            let does = if used == Use::Drawing { "is drawn" } else { "collides" };
-            self.notes.add(path.display().to_string(), format!("its surface is not closed, so its convex hull {does}"));
+            self.notes.add(path.display().to_string(), "its surface is not closed, so its convex hull collides");
         }
         let hull = mesh.convex_hull().map_err(|e| e.to_string())?;
-        self.solid(hull, used).map_err(|e| e.to_string())
+        self.solid(hull).map_err(|e| e.to_string())
     }
 
-    /// With the coarsest tree for what is only drawn, else with one from the cache.
-    fn solid(&mut self, mesh: TriMesh, used: Use) -> Result<(Shape, Vec3), ShapeError> {
-        if used == Use::Drawing {
-            return Shape::mesh(mesh, &TreeSettings { depth: 1, error: 1.0, ..TreeSettings::octree() });
-        }
-        let (shape, center, note) = Shape::mesh_cached(mesh, &TreeSettings::octree(), &self.cache)?;
+    /// With a tree from the cache, where it is built.
+    fn solid(&mut self, mesh: TriMesh) -> Result<(Shape, Vec3), ShapeError> {
+        let (shape, center, note) = self.purpose.mesh(mesh, &TreeSettings::octree(), &self.cache)?;
         note.into_iter().for_each(|note| self.notes.add("sphere trees", note));
         Ok((shape, center))
     }
 }
 
 pub(crate) fn read_file(path: &Path) -> Result<TriMesh, String> {
+    read_triangles(path, &read_bytes(path)?)
+}
+
+/// The bytes of a mesh file. A pipe or device, which could keep its reader waiting, is refused.
+pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, String> {
     let unread = |error: std::io::Error| format!("cannot be read: {error}");
-    let size = std::fs::metadata(path).map_err(unread)?.len();
-    if size > MOST_MESH_BYTES {
-        return Err(format!("it has {size} bytes; the most that is read is {MOST_MESH_BYTES}"));
+    let about = std::fs::metadata(path).map_err(unread)?;
+    if !about.is_file() {
+        return Err("cannot be read: it is no regular file".into());
     }
-    read_triangles(path, &std::fs::read(path).map_err(unread)?)
+    if about.len() > MOST_MESH_BYTES {
+        return Err(format!("it has {} bytes; the most that is read is {MOST_MESH_BYTES}", about.len()));
+    }
+    std::fs::read(path).map_err(unread)
 }
 
 /// Scaled along each axis; a mirrored mesh is turned outside out again.
@@ -161,41 +213,13 @@ pub(crate) fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
     mesh
 }
 
-/// A surface that need not be closed as a solid to draw: each triangle with a shallow pyramid below it. Slivers, and triangles that are there
-/// already, are left out.
-fn scales(mesh: &TriMesh) -> TriMesh {
-    let size = mesh.diagonal();
-    let depth = 1e-4 * size;
-    let mut made = TriMesh::default();
-    let mut there = BTreeSet::new();
-    for t in 0..mesh.triangles.len() {
-        let [a, b, c] = mesh.corners(t);
-        let mut key = [a, b, c].map(|corner| [0, 1, 2].map(|k| corner[k].to_bits()));
-        key.sort_unstable();
-        if let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-12 * size * size).filter(|_| there.insert(key)) {
-            let first = made.vertices.len() as u32;
-            made.vertices.extend([a, b, c, (a + b + c) / 3.0 - depth * normal]);
-            made.triangles.extend([[0, 1, 2], [1, 0, 3], [2, 1, 3], [0, 2, 3]].map(|face| face.map(|v| first + v)));
-        }
-    }
-    made
-}
-
-/// The mass of a link, link frame.
+/// The mass of a link, link frame. Visual meshes have none.
 pub(crate) fn mass(link: &LinkSpec, placed: &[Placed<'_>]) -> Result<LinkMass, ShapeError> {
-    let solid = |placed: &Placed<'_>, mass: MassSpec| -> Result<LinkMass, ShapeError> {
-        let properties = match mass {
-            MassSpec::Density(density) => placed.shape.mass_properties(density)?,
-            MassSpec::Mass(mass) => placed.shape.mass_properties(1.0)?.with_mass(mass),
-        };
-        let own = LinkMass { mass: properties.mass, center: properties.center_of_mass, inertia: properties.inertia };
-        Ok(own.seen_from(&placed.pose))
-    };
     let total = |each: &dyn Fn(&Placed<'_>) -> Option<MassSpec>| {
         let mut sum = LinkMass::none();
-        for placed in placed {
+        for (placed, shape) in placed.iter().filter_map(|placed| Some((placed, placed.solid()?))) {
             if let Some(mass) = each(placed) {
-                sum = sum.with(&solid(placed, mass)?);
+                sum = sum.with(&own_mass(shape, mass)?.seen_from(&placed.pose));
             }
         }
         Ok(sum)
@@ -205,8 +229,17 @@ pub(crate) fn mass(link: &LinkSpec, placed: &[Placed<'_>]) -> Result<LinkMass, S
         LinkMassSpec::OfShapes => total(&|placed| placed.spec.mass),
         LinkMassSpec::Spread(MassSpec::Density(density)) => total(&|_| Some(MassSpec::Density(density))),
         LinkMassSpec::Spread(MassSpec::Mass(mass)) => {
-            let volume: f64 = placed.iter().map(|p| p.shape.volume()).sum();
+            let volume: f64 = placed.iter().filter_map(Placed::solid).map(Shape::volume).sum();
             total(&|_| Some(MassSpec::Density(mass / volume)))
         }
     }
+}
+
+/// In the shape's own axes.
+fn own_mass(shape: &Shape, mass: MassSpec) -> Result<LinkMass, ShapeError> {
+    let properties = match mass {
+        MassSpec::Density(density) => shape.mass_properties(density)?,
+        MassSpec::Mass(mass) => shape.mass_properties(1.0)?.with_mass(mass),
+    };
+    Ok(LinkMass { mass: properties.mass, center: properties.center_of_mass, inertia: properties.inertia })
 }

@@ -4,10 +4,11 @@ use crate::args::CheckOptions;
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{RepairSettings, Shape, TreeSettings};
+use tumble::core::{Object, Visual};
 use tumble::net::sync::udp::SharedKey;
 use tumble::render::{Blend, DebugDraw, Drawing, RenderError, Warp};
 use tumble::scene::cave::{Cave, MOST_BYTES, is_cave, resolve_cave, shipped_caves};
-use tumble::scene::{SceneError, read_solid, resolve_scene, shipped, urdf};
+use tumble::scene::{SceneError, overlap_notes, read_solid, resolve_scene, shipped, urdf, visual_notes};
 
 /// Checks every file; all are looked at, and the first failure's code is kept.
 pub fn check(options: &CheckOptions) -> Result<(), Failure> {
@@ -37,13 +38,20 @@ fn one(file: &str, repair: bool) -> Result<String, Failure> {
 
 fn robot(path: &Path) -> Result<String, Failure> {
     let (body, notes) = urdf::load(path, &urdf::UrdfOptions::default())?;
-    notes.iter().for_each(|note| println!("{note}"));
+    let visuals = body.renderable().map_or(&[][..], |r| r.visuals());
+    notes.into_iter().chain(read_visuals(visuals)).for_each(|note| println!("{note}"));
     let (links, model) = (body.model().frames().len(), body.model());
     Ok(format!(
         "a robot of {links} links, {} degrees of freedom on a fixed base, {:.6} kg that move",
         model.dof(),
         model.mass()
     ))
+}
+
+/// Reads the meshes that are only drawn; what is to be said of those that cannot be read.
+fn read_visuals<'v>(visuals: impl IntoIterator<Item = &'v Visual> + Clone) -> Vec<String> {
+    visuals.clone().into_iter().for_each(|visual| _ = visual.drawn());
+    visual_notes(visuals)
 }
 
 /// A file is a cave where it has a table that caves have and scenes have not; a name where it is a shipped cave's and no scene's.
@@ -83,11 +91,12 @@ fn scene(name: &str) -> Result<String, Failure> {
     })?;
     let scene = scene.load()?;
     let (world, notes) = scene.build().map_err(Failure::input)?;
-    // textures are read when a picture is made
+    // textures and meshes that are only drawn are read when a picture is made
     Drawing::new(&scene)
         .list(&world, &DebugDraw::default())
         .map_err(|e| Failure::input(format!("{}: {e}", scene.file)))?;
-    notes.iter().for_each(|note| println!("{note}"));
+    let found = visual_notes(world.visuals()).into_iter().chain(overlap_notes(&world));
+    notes.into_iter().chain(found).for_each(|note| println!("{note}"));
     Ok(format!("a scene of {} bodies, {} degrees of freedom", world.ids().len(), degrees(&world)))
 }
 

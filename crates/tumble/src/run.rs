@@ -11,7 +11,7 @@ use std::time::Instant;
 use tumble::core::World;
 use tumble::net::record::{Recorder, RecorderOptions};
 use tumble::net::world::{entities, poses};
-use tumble::scene::SceneFile;
+use tumble::scene::{SceneFile, visual_notes};
 
 /// Most bytes of a saved state: a thousand times what ten thousand bodies take.
 const MOST_RESTORED: u64 = 1 << 30;
@@ -28,6 +28,8 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     restore(&mut world, options)?;
     let mut shots = Shots::new(&scene, &world, options)?;
     let mut recorder = recorder(&world, &scene, options)?;
+    // both have read the meshes that are only drawn
+    visual_notes(world.visuals()).iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     let start = State::of(&world);
     let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), shots.as_mut(), &scene, options)?;
     finish_recording(recorder, options)?;

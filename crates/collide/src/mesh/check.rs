@@ -125,8 +125,9 @@ impl TriMesh {
         Ok((mesh, report))
     }
 
-    /// Merges vertices at exactly the same place (`-0` equals `0`) and drops those not in use.
-    pub(crate) fn welded(&self) -> TriMesh {
+    /// Merges vertices at exactly the same place (`-0` equals `0`) and drops those not in use. Indices must be in range
+    /// ([`TriMesh::check_data`]).
+    pub fn welded(&self) -> TriMesh {
         self.with_shared_vertices().0.compacted()
     }
 

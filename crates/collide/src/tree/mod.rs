@@ -111,6 +111,14 @@ impl SphereTree {
         Ok((tree, built.stages))
     }
 
+    /// One ball around all vertices of a mesh whose data is right.
+    pub(crate) fn ball(mesh: &TriMesh) -> SphereTree {
+        let ball = around_points(&mesh.vertices);
+        // no point of the ball is further from the surface than its other end
+        let node = SphereNode { center: ball.center, radius: ball.radius, outward: 2.0 * ball.radius, ..empty_node(0) };
+        SphereTree::of_nodes(vec![node])
+    }
+
     /// All balls, breadth first; the root is the first.
     pub fn nodes(&self) -> &[SphereNode] {
         &self.nodes

@@ -49,7 +49,7 @@ impl TreeSettings {
         TreeSettings { builder: Builder::Octree, branch: 8, depth: 7, error: 0.01, even: true }
     }
 
-    pub(super) fn check(&self) -> Result<(), MeshError> {
+    pub(crate) fn check(&self) -> Result<(), MeshError> {
         if !(2..=64).contains(&self.branch) {
             return Err(MeshError::Settings {
                 what: "the branching of a sphere tree",

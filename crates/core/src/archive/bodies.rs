@@ -1,6 +1,6 @@
 //! Rigid and articulated bodies as data. What their constructors compute (roots of inertias, whitening, caches) is computed anew.
 
-use super::records::{ShapeTable, VisualRecord, shape};
+use super::records::{Known, Tables, VisualRecord, shape};
 use super::{ArchiveError, damaged};
 use crate::articulated::{ArticulatedParts, Collider};
 use crate::collidable::{CollisionKind, Material};
@@ -8,7 +8,7 @@ use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Object, Renderable};
 use crate::{ArticulatedBody, Coupling, Freedom, Model, RigidBody};
 use serde::{Deserialize, Serialize};
-use tumble_collide::{ContactMode, Mat3, Pose, Shape, Vec3};
+use tumble_collide::{ContactMode, Mat3, Pose, Vec3};
 
 /// A rigid body.
 #[derive(Serialize, Deserialize)]
@@ -31,10 +31,10 @@ pub(super) struct RigidRecord {
 }
 
 impl RigidRecord {
-    pub fn of(body: &RigidBody, shapes: &mut ShapeTable) -> RigidRecord {
+    pub fn of(body: &RigidBody, tables: &mut Tables) -> RigidRecord {
         RigidRecord {
             name: body.name().into(),
-            shape: shapes.place(body.shape()),
+            shape: tables.shapes.place(body.shape()),
             mass: (!body.is_fixture()).then(|| (body.mass(), *body.inertia())),
             material: body.material,
             linear_damping: body.linear_damping,
@@ -44,14 +44,14 @@ impl RigidRecord {
             meets: body.meets,
             initial_pose: body.initial_pose,
             initial_velocity: [body.initial_velocity, body.initial_angular_velocity],
-            visuals: body.visuals().iter().map(|visual| VisualRecord::of(visual, shapes)).collect(),
+            visuals: body.visuals().iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
             cameras: body.cameras().to_vec(),
             lights: body.lights().to_vec(),
         }
     }
 
-    pub fn body(self, shapes: &[Shape]) -> Result<RigidBody, ArchiveError> {
-        let shape = shape(shapes, self.shape)?;
+    pub fn body(self, known: &Known) -> Result<RigidBody, ArchiveError> {
+        let shape = shape(&known.shapes, self.shape)?;
         let mut body = match self.mass {
             Some((mass, inertia)) => RigidBody::new(self.name, shape, mass, inertia).map_err(damaged)?,
             None => RigidBody::fixture(self.name, shape),
@@ -60,7 +60,7 @@ impl RigidRecord {
         (body.linear_damping, body.angular_damping) = (self.linear_damping, self.angular_damping);
         (body.kind, body.meets) = (self.kind, self.meets);
         let [velocity, angular_velocity] = self.initial_velocity;
-        let visuals = self.visuals.into_iter().map(|v| v.visual(shapes)).collect::<Result<_, _>>()?;
+        let visuals = self.visuals.into_iter().map(|v| v.visual(known)).collect::<Result<_, _>>()?;
         let body = body.at(self.initial_pose).moving(velocity, angular_velocity).drawn_as(visuals);
         let body = self.cameras.into_iter().fold(body, RigidBody::with_camera);
         Ok(self.lights.into_iter().fold(body, RigidBody::with_light))
@@ -80,12 +80,12 @@ struct ColliderRecord {
 }
 
 impl ColliderRecord {
-    fn of(link: Option<usize>, collider: &Collider, shapes: &mut ShapeTable) -> ColliderRecord {
+    fn of(link: Option<usize>, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
         let Collider { pose, shape, material, contact_mode, kind, meets } = collider;
         ColliderRecord {
             link,
             pose: *pose,
-            shape: shapes.place(shape),
+            shape: tables.shapes.place(shape),
             material: *material,
             contact_mode: *contact_mode,
             kind: *kind,
@@ -93,9 +93,9 @@ impl ColliderRecord {
         }
     }
 
-    fn collider(self, shapes: &[Shape]) -> Result<(Option<usize>, Collider), ArchiveError> {
+    fn collider(self, known: &Known) -> Result<(Option<usize>, Collider), ArchiveError> {
         let ColliderRecord { link, pose, shape: place, material, contact_mode, kind, meets } = self;
-        Ok((link, Collider { pose, shape: shape(shapes, place)?, material, contact_mode, kind, meets }))
+        Ok((link, Collider { pose, shape: shape(&known.shapes, place)?, material, contact_mode, kind, meets }))
     }
 }
 
@@ -117,14 +117,14 @@ pub(super) struct ArticulatedRecord {
 }
 
 impl ArticulatedRecord {
-    pub fn of(body: &ArticulatedBody, shapes: &mut ShapeTable) -> ArticulatedRecord {
+    pub fn of(body: &ArticulatedBody, tables: &mut Tables) -> ArticulatedRecord {
         let parts = body.to_parts();
         ArticulatedRecord {
             name: body.name().into(),
             model: body.model().clone(),
             base: *body.base(),
-            colliders: parts.colliders.iter().map(|(link, c)| ColliderRecord::of(*link, c, shapes)).collect(),
-            visuals: parts.visuals.iter().map(|visual| VisualRecord::of(visual, shapes)).collect(),
+            colliders: parts.colliders.iter().map(|(link, c)| ColliderRecord::of(*link, c, tables)).collect(),
+            visuals: parts.visuals.iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
             cameras: parts.cameras,
             lights: parts.lights,
             freedoms: body.freedoms().to_vec(),
@@ -135,7 +135,7 @@ impl ArticulatedRecord {
         }
     }
 
-    pub fn body(self, shapes: &[Shape]) -> Result<ArticulatedBody, ArchiveError> {
+    pub fn body(self, known: &Known) -> Result<ArticulatedBody, ArchiveError> {
         if !self.model.is_sound() {
             return Err(damaged(format!("'{}' is no tree of links", self.name)));
         }
@@ -145,8 +145,8 @@ impl ArticulatedRecord {
         }
         body.self_collision = self.self_collision;
         let parts = ArticulatedParts {
-            colliders: self.colliders.into_iter().map(|c| c.collider(shapes)).collect::<Result<_, _>>()?,
-            visuals: self.visuals.into_iter().map(|v| v.visual(shapes)).collect::<Result<_, _>>()?,
+            colliders: self.colliders.into_iter().map(|c| c.collider(known)).collect::<Result<_, _>>()?,
+            visuals: self.visuals.into_iter().map(|v| v.visual(known)).collect::<Result<_, _>>()?,
             cameras: self.cameras,
             lights: self.lights,
             couplings: self.couplings,

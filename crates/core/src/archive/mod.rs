@@ -4,10 +4,10 @@
 //! |---|---|
 //! | `tumbleA1`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
-//! | settings, methods, shapes, objects, snapshot, contacts, report in postcard | any |
+//! | settings, methods, shapes, visual meshes, objects, snapshot, contacts, report in postcard | any |
 //!
 //! The same world gives the same bytes. Objects of kinds of their own are written by name alone; the caller makes them anew. Shapes that objects
-//! share are written once and are shared again. The order of objects is kept, ids are not: they are new.
+//! share are written once and are shared again; meshes that are only drawn are read for it, so that no file is needed later. The order of objects is kept, ids are not: they are new.
 
 mod bodies;
 mod records;
@@ -19,7 +19,7 @@ use crate::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, World};
 use crate::{ArticulatedBody, Closure, Object, OutOfReach, RigidBody};
 use bodies::{ArticulatedRecord, RigidRecord};
-use records::{ClosureRecord, ContactRecord, Places, ReportRecord, ShapeTable};
+use records::{ClosureRecord, ContactRecord, Known, MeshRecord, Places, ReportRecord, Tables, meshes};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Shape;
@@ -60,6 +60,7 @@ struct Archive {
     stepper: String,
     solver: String,
     shapes: Vec<Shape>,
+    meshes: Vec<MeshRecord>,
     objects: Vec<Record>,
     snapshot: Vec<u8>,
     contacts: Vec<ContactRecord>,
@@ -82,13 +83,13 @@ impl World {
     /// # Errors
     /// [`ArchiveError::Foreign`]: an object of a kind of its own that is not among `foreign`.
     pub fn archive(&self, foreign: &[ObjectId]) -> Result<Vec<u8>, ArchiveError> {
-        let (mut shapes, places) = (ShapeTable::default(), Places::of(self.ids()));
+        let (mut tables, places) = (Tables::default(), Places::of(self.ids()));
         let (stepper, solver) = self.methods();
         let objects = self
             .ids()
             .iter()
             .filter_map(|&id| self.object(id))
-            .map(|object| record(object, &mut shapes, &places))
+            .map(|object| record(object, &mut tables, &places))
             .collect::<Vec<Record>>();
         let unknown = self.ids().iter().zip(&objects).find_map(|(id, record)| match record {
             Record::Foreign(name) if !foreign.contains(id) => Some(name.clone()),
@@ -101,7 +102,8 @@ impl World {
             settings: *self.settings(),
             stepper: stepper.into(),
             solver: solver.into(),
-            shapes: shapes.list,
+            shapes: tables.shapes.list,
+            meshes: tables.meshes.list,
             objects,
             snapshot: self.save(),
             contacts: self.contacts().iter().map(|c| ContactRecord::of(c, &places)).collect(),
@@ -122,11 +124,12 @@ impl World {
         let mut world = World::new(archive.settings).map_err(damaged)?;
         world.set_stepper(stepper(&archive.stepper)?);
         world.set_solver(solver(&archive.solver)?);
+        let known = Known { shapes: archive.shapes, meshes: meshes(archive.meshes) };
         let mut ids = Vec::with_capacity(archive.objects.len());
         for record in archive.objects {
             let object: Box<dyn Object> = match record {
-                Record::Rigid(rigid) => Box::new(rigid.body(&archive.shapes)?),
-                Record::Articulated(articulated) => Box::new(articulated.body(&archive.shapes)?),
+                Record::Rigid(rigid) => Box::new(rigid.body(&known)?),
+                Record::Articulated(articulated) => Box::new(articulated.body(&known)?),
                 Record::Closure(closure) => Box::new(closure.closure(&ids)?),
                 Record::Foreign(name) => foreign(&name).ok_or(ArchiveError::Foreign(name))?,
             };
@@ -180,12 +183,12 @@ fn solver(name: &str) -> Result<Box<dyn RowSolver>, ArchiveError> {
     solver::by_name(name).ok_or_else(|| damaged(format!("there is no solver '{name}'")))
 }
 
-fn record(object: &dyn Object, shapes: &mut ShapeTable, places: &Places) -> Record {
+fn record(object: &dyn Object, tables: &mut Tables, places: &Places) -> Record {
     let any: &dyn std::any::Any = object;
     if let Some(body) = any.downcast_ref::<RigidBody>() {
-        Record::Rigid(RigidRecord::of(body, shapes))
+        Record::Rigid(RigidRecord::of(body, tables))
     } else if let Some(body) = any.downcast_ref::<ArticulatedBody>() {
-        Record::Articulated(Box::new(ArticulatedRecord::of(body, shapes)))
+        Record::Articulated(Box::new(ArticulatedRecord::of(body, tables)))
     } else if let Some(closure) = any.downcast_ref::<Closure>() {
         Record::Closure(ClosureRecord::of(closure, places))
     } else {

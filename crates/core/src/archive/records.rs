@@ -2,12 +2,13 @@
 
 use super::{ArchiveError, ContactPoint, OutOfReach, StepReport, damaged};
 use crate::closure::{Anchor, Closure, ClosureKind};
-use crate::object::{Look, Object, Visual};
+use crate::object::{Look, Object};
 use crate::view::ObjectId;
+use crate::visual::{Visual, VisualGeometry, VisualMesh};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tumble_collide::{Pose, Shape, Vec3};
+use tumble_collide::{Pose, Shape, TriMesh, Vec3};
 
 /// Every shape once: shared ones by where they are in memory, others as they come.
 #[derive(Default)]
@@ -36,6 +37,35 @@ impl ShapeTable {
 /// The shape at a place.
 pub(super) fn shape(shapes: &[Shape], place: u32) -> Result<Shape, ArchiveError> {
     shapes.get(place as usize).cloned().ok_or_else(|| damaged(format!("there is no shape {place}")))
+}
+
+/// Every visual mesh once. They are read now: the archive needs none of their files.
+#[derive(Default)]
+pub(super) struct MeshTable {
+    pub list: Vec<MeshRecord>,
+    known: BTreeMap<usize, u32>,
+}
+
+/// The name of a visual mesh, and its triangles or why they cannot be read.
+pub(super) type MeshRecord = (String, Result<TriMesh, String>);
+
+impl MeshTable {
+    fn place(&mut self, mesh: &Arc<VisualMesh>) -> u32 {
+        *self.known.entry(Arc::as_ptr(mesh).addr()).or_insert_with(|| {
+            let triangles = mesh.triangles().map(|mesh| TriMesh::clone(mesh)).map_err(str::to_owned);
+            self.list.push((mesh.name().to_owned(), triangles));
+            self.list.len() as u32 - 1
+        })
+    }
+}
+
+/// The meshes of a table.
+pub(super) fn meshes(list: Vec<MeshRecord>) -> Vec<Arc<VisualMesh>> {
+    let mesh = |(name, triangles): MeshRecord| {
+        let triangles = triangles.map(Arc::new);
+        Arc::new(VisualMesh::read_by(name, move || triangles.clone()))
+    };
+    list.into_iter().map(mesh).collect()
 }
 
 /// Places of objects in the order of adding.
@@ -143,17 +173,52 @@ impl ReportRecord {
 pub(super) struct VisualRecord {
     part: usize,
     pose: Pose,
-    shape: u32,
+    geometry: GeometryRecord,
     look: Look,
+    stands_in_for: Vec<u32>,
+}
+
+/// The place of a shape, or of a visual mesh.
+#[derive(Serialize, Deserialize)]
+enum GeometryRecord {
+    Shape(u32),
+    Mesh(u32),
+}
+
+/// What visuals are made of.
+#[derive(Default)]
+pub(super) struct Tables {
+    pub shapes: ShapeTable,
+    pub meshes: MeshTable,
+}
+
+/// The same, as it is read.
+pub(super) struct Known {
+    pub shapes: Vec<Shape>,
+    pub meshes: Vec<Arc<VisualMesh>>,
 }
 
 impl VisualRecord {
-    pub fn of(visual: &Visual, shapes: &mut ShapeTable) -> VisualRecord {
-        let Visual { part, pose, shape, look } = visual;
-        VisualRecord { part: *part, pose: *pose, shape: shapes.place(shape), look: look.clone() }
+    pub fn of(visual: &Visual, tables: &mut Tables) -> VisualRecord {
+        let Visual { part, pose, geometry, look, stands_in_for } = visual;
+        let geometry = match geometry {
+            VisualGeometry::Shape(shape) => GeometryRecord::Shape(tables.shapes.place(shape)),
+            VisualGeometry::Mesh(mesh) => GeometryRecord::Mesh(tables.meshes.place(mesh)),
+        };
+        let stands_in_for = stands_in_for.iter().map(|mesh| tables.meshes.place(mesh)).collect();
+        VisualRecord { part: *part, pose: *pose, geometry, look: look.clone(), stands_in_for }
     }
 
-    pub fn visual(self, shapes: &[Shape]) -> Result<Visual, ArchiveError> {
-        Ok(Visual { part: self.part, pose: self.pose, shape: shape(shapes, self.shape)?, look: self.look })
+    pub fn visual(self, known: &Known) -> Result<Visual, ArchiveError> {
+        let mesh = |place: u32| {
+            let mesh = known.meshes.get(place as usize).cloned();
+            mesh.ok_or_else(|| damaged(format!("there is no visual mesh {place}")))
+        };
+        let geometry = match self.geometry {
+            GeometryRecord::Shape(place) => VisualGeometry::Shape(shape(&known.shapes, place)?),
+            GeometryRecord::Mesh(place) => VisualGeometry::Mesh(mesh(place)?),
+        };
+        let stands_in_for = self.stands_in_for.into_iter().map(mesh).collect::<Result<_, _>>()?;
+        Ok(Visual { part: self.part, pose: self.pose, geometry, look: self.look, stands_in_for })
     }
 }

@@ -11,7 +11,7 @@ use super::kinematics::Kinematics;
 use super::model::Model;
 use crate::collidable::{CollisionKind, Material};
 use crate::mounts::{CameraMount, LightMount};
-use crate::object::Visual;
+use crate::visual::Visual;
 use nalgebra::Quaternion;
 use std::sync::{Mutex, MutexGuard};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};

@@ -7,12 +7,13 @@ use super::energy::{energy, momentum};
 use super::joint::Joint;
 use crate::collidable::{Collidable, CollisionKind, Material};
 use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
-use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError, Visual};
+use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
 use crate::rigid::vec3;
 use crate::rotation;
 use crate::site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
 use crate::sync;
 use crate::view::WorldView;
+use crate::visual::Visual;
 use tumble_collide::{ContactMode, Pose, Shape, Vec3};
 
 impl Object for ArticulatedBody {

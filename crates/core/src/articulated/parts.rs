@@ -3,7 +3,7 @@
 use super::body::{ArticulatedBody, ArticulatedError, Collider, Part};
 use super::freedom::Coupling;
 use crate::mounts::{CameraMount, LightMount};
-use crate::object::Visual;
+use crate::visual::Visual;
 use tumble_collide::Pose;
 
 /// Everything that is fixed to the links, and the state at time 0.

@@ -39,7 +39,7 @@ pub(super) fn time_contacts(core: &Core, h: f64, touches: &mut Vec<Touch>) {
         if closing_time(touch.contact.gap, &touch.contact, a, b, 0.0).is_none_or(|t| t > h) {
             return true;
         }
-        if shape_a.tree().is_some() || shape_b.tree().is_some() {
+        if shape_a.has_tree() || shape_b.has_tree() {
             return true; // a tree's contacts come and go with its leaves
         }
         let (side_a, side_b) = ((shape_a, a), (shape_b, b));

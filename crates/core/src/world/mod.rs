@@ -5,6 +5,7 @@ mod checkpoint;
 mod core;
 mod flat;
 mod mirror;
+mod overlaps;
 mod pull;
 mod snapshot;
 
@@ -12,6 +13,7 @@ pub use self::core::{ContactPoint, Core, StepError};
 pub use checkpoint::Checkpoint;
 pub use flat::StateHold;
 pub use mirror::MirrorError;
+pub use overlaps::Overlap;
 pub use pull::Pull;
 pub use snapshot::SnapshotError;
 
@@ -24,6 +26,7 @@ use crate::sleep::Sleepers;
 use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{Frame, Stepper, TimeStepping};
 use crate::view::{Entry, Mode, ObjectId, Status, Table, WorldView};
+use crate::visual::Visual;
 use std::collections::BTreeMap;
 use tumble_collide::SweepAndPrune;
 
@@ -263,6 +266,11 @@ impl World {
     /// The object of that name.
     pub fn find(&self, name: &str) -> Option<ObjectId> {
         self.names.get(name).copied()
+    }
+
+    /// All visuals, object by object in the order of adding.
+    pub fn visuals(&self) -> impl Iterator<Item = &Visual> {
+        self.core.table.iter().filter_map(|e| e.object.renderable()).flat_map(|renderable| renderable.visuals())
     }
 
     /// Mechanical energy of everything that moves, J.

@@ -1,13 +1,13 @@
 //! How an object looks that the scene file does not have: shapes, colours and poses, as bytes.
 //!
 //! A mesh that is drawn anywhere in the scene of the file travels as a reference (object and number of the visual); another one travels whole, once per
-//! snapshot and object.
+//! snapshot and object, and is drawn as it is on the other side: nothing collides there, so that it need not be a solid.
 
 use super::viewer::{exact_pose, put_exact_pose};
 use super::wire::{Bytes, Fault, put_f64, put_name};
 use std::sync::Arc;
-use tumble_collide::{Shape, TreeSettings, TriMesh, Vec3};
-use tumble_core::{Look, Visual, World};
+use tumble_collide::{Shape, TriMesh, Vec3};
+use tumble_core::{Drawn, Look, Visual, VisualGeometry, VisualMesh, World};
 
 /// Most pictures of one object.
 pub const MAX_VISUALS: usize = 4096;
@@ -18,17 +18,31 @@ const MAX_TEXT: usize = 255;
 
 /// Appends the pictures. `base` is the world as the scene file makes it.
 pub(crate) fn put_looks(out: &mut Vec<u8>, visuals: &[Visual], base: &World) {
-    let visuals = &visuals[..visuals.len().min(MAX_VISUALS)];
-    out.extend((visuals.len() as u32).to_le_bytes());
-    for visual in visuals {
+    let drawn: Vec<(&Visual, Drawn<'_>)> =
+        visuals.iter().filter_map(|visual| Some((visual, visual.drawn()?))).take(MAX_VISUALS).collect();
+    out.extend((drawn.len() as u32).to_le_bytes());
+    for (visual, drawn) in drawn {
         out.extend((visual.part as u32).to_le_bytes());
         put_exact_pose(out, &visual.pose);
-        put_shape(out, &visual.shape, base);
+        put_geometry(out, drawn, base);
         put_look(out, &visual.look);
     }
 }
 
-fn put_shape(out: &mut Vec<u8>, shape: &Shape, base: &World) {
+fn put_geometry(out: &mut Vec<u8>, drawn: Drawn<'_>, base: &World) {
+    let shape = match drawn {
+        Drawn::Mesh(mesh) => {
+            return put_triangles(
+                out,
+                mesh,
+                place_of(
+                    base,
+                    |other| matches!(other, VisualGeometry::Mesh(other) if other.triangles().is_ok_and(|other| Arc::ptr_eq(mesh, other))),
+                ),
+            );
+        }
+        Drawn::Shape(shape) => shape,
+    };
     let mut tagged = |tag: u8, numbers: &[f64]| {
         out.push(tag);
         put_f64(out, numbers);
@@ -39,23 +53,35 @@ fn put_shape(out: &mut Vec<u8>, shape: &Shape, base: &World) {
         Shape::Box { half_extents: h } => tagged(2, &[h.x, h.y, h.z]),
         Shape::Capsule { radius, half_length } => tagged(3, &[*radius, *half_length]),
         Shape::Cylinder(c) => tagged(4, &[c.radius(), c.half_length()]),
-        Shape::Mesh(mesh) => {
-            let same = |v: &Visual| matches!(&v.shape, Shape::Mesh(other) if Arc::ptr_eq(mesh, other));
-            let found = base.ids().iter().find_map(|&id| {
-                let object = base.object(id)?;
-                Some((object.name(), object.renderable()?.visuals().iter().position(same)?))
-            });
-            match found {
-                Some((name, index)) => {
-                    tagged(5, &[]);
-                    put_name(out, name);
-                    out.extend((index as u32).to_le_bytes());
-                }
-                None => {
-                    tagged(6, &[]);
-                    put_mesh(out, mesh.mesh());
-                }
-            }
+        Shape::Mesh(mesh) => put_triangles(
+            out,
+            mesh.mesh(),
+            place_of(
+                base,
+                |other| matches!(other, VisualGeometry::Shape(Shape::Mesh(other)) if Arc::ptr_eq(mesh, other)),
+            ),
+        ),
+    }
+}
+
+/// Where the scene of the file draws the same: the object's name and the number of the visual.
+fn place_of(base: &World, same: impl Fn(&VisualGeometry) -> bool) -> Option<(&str, usize)> {
+    base.ids().iter().find_map(|&id| {
+        let object = base.object(id)?;
+        Some((object.name(), object.renderable()?.visuals().iter().position(|visual| same(&visual.geometry))?))
+    })
+}
+
+fn put_triangles(out: &mut Vec<u8>, mesh: &TriMesh, place: Option<(&str, usize)>) {
+    match place {
+        Some((name, index)) => {
+            out.push(5);
+            put_name(out, name);
+            out.extend((index as u32).to_le_bytes());
+        }
+        None => {
+            out.push(6);
+            put_mesh(out, mesh);
         }
     }
 }
@@ -99,13 +125,14 @@ pub(crate) fn get_looks(bytes: &[u8], parts: usize, base: &World) -> Result<Vec<
             return Err(Fault::Malformed("a picture of a part that there is not"));
         }
         let pose = exact_pose(&mut rest)?;
-        visuals.push(Visual { part, pose, shape: get_shape(&mut rest, base)?, look: get_look(&mut rest)? });
+        let geometry = get_geometry(&mut rest, base)?;
+        visuals.push(Visual { part, pose, geometry, look: get_look(&mut rest)?, stands_in_for: Vec::new() });
     }
     rest.end()?;
     Ok(visuals)
 }
 
-fn get_shape(rest: &mut Bytes<'_>, base: &World) -> Result<Shape, Fault> {
+fn get_geometry(rest: &mut Bytes<'_>, base: &World) -> Result<VisualGeometry, Fault> {
     let shape = match rest.u8()? {
         0 => Ok(Shape::half_space()),
         1 => Shape::sphere(rest.f64()?),
@@ -116,22 +143,21 @@ fn get_shape(rest: &mut Bytes<'_>, base: &World) -> Result<Shape, Fault> {
         6 => {
             let mesh = get_mesh(rest)?;
             let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
-            // it is drawn and meets nothing: the coarsest tree will do
-            let shape = Shape::mesh(mesh, &TreeSettings { depth: 1, ..TreeSettings::octree() }).map(|(shape, _)| shape);
-            return shape.map_err(|why| {
+            let mesh = VisualMesh::new("a mesh of the server", mesh).map_err(|why| {
                 Fault::Unfit(format!("a mesh of {vertices} vertices and {triangles} triangles: {why}"))
-            });
+            })?;
+            return Ok(VisualGeometry::Mesh(Arc::new(mesh)));
         }
         _ => return Err(Fault::Malformed("a shape that there is not")),
     };
-    shape.map_err(|_| Fault::Malformed("a shape with a size that is not above 0"))
+    shape.map(VisualGeometry::Shape).map_err(|_| Fault::Malformed("a shape with a size that is not above 0"))
 }
 
-fn mesh_of(base: &World, name: &str, index: usize) -> Result<Shape, Fault> {
+fn mesh_of(base: &World, name: &str, index: usize) -> Result<VisualGeometry, Fault> {
     let object = base.find(name).and_then(|id| base.object(id));
     let visual = object.and_then(|o| o.renderable()).and_then(|r| r.visuals().get(index));
     visual
-        .map(|v| v.shape.clone())
+        .map(|v| v.geometry.clone())
         .ok_or_else(|| Fault::Unfit(format!("picture {index} of '{name}', which the scene has not")))
 }
 

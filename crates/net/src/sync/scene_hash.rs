@@ -4,7 +4,7 @@ use super::viewer::put_exact_pose;
 use super::wire::{put_f64, put_name};
 use std::path::Path;
 use tumble_collide::{Shape, TriMesh};
-use tumble_core::{Look, World};
+use tumble_core::{Drawn, Look, World};
 
 /// The BLAKE3 of a scene: the text of its file (lights, camera, sky), and everything in the world as it makes it that can be seen: names, modes, poses,
 /// shapes with every corner of every mesh, looks (textures by the names of their files). So a mesh file that differs is found even where the scene file is the same.
@@ -21,12 +21,14 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
         let parts = world.view().span(id).map_or(0, |span| span.site.len());
         (0..parts).filter_map(|part| world.site(id, part)).for_each(|site| put_exact_pose(&mut out, &site.pose));
         for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
+            let Some(drawn) = visual.drawn() else { continue };
             out.extend((visual.part as u64).to_le_bytes());
             put_exact_pose(&mut out, &visual.pose);
-            match &visual.shape {
-                Shape::Mesh(mesh) => put_mesh(&mut out, mesh.mesh()),
-                Shape::Cylinder(c) => put_f64(&mut out, &[4.0, c.radius(), c.half_length()]),
-                other => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
+            match drawn {
+                Drawn::Mesh(mesh) => put_mesh(&mut out, mesh),
+                Drawn::Shape(Shape::Mesh(mesh)) => put_mesh(&mut out, mesh.mesh()),
+                Drawn::Shape(Shape::Cylinder(c)) => put_f64(&mut out, &[4.0, c.radius(), c.half_length()]),
+                Drawn::Shape(other) => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
             }
             // a texture by its file's name: the folder is another one on another machine
             let texture =

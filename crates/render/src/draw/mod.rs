@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tumble_collide::{Pose, Shape, TriMesh, Vec3};
-use tumble_core::{Detail, Look, Visual, World};
+use tumble_core::{Detail, Drawn, Look, Visual, VisualGeometry, World};
 use tumble_scene::{LightKind, LightSpec, MeshSource, SceneFile};
 use unwrap::Unwrapped;
 
@@ -39,6 +39,8 @@ const ROUNDING: f32 = 0.06;
 pub struct Drawing {
     meshes: BTreeMap<String, Arc<MeshData>>,
     edges: BTreeMap<String, Vec<[[f32; 3]; 2]>>,
+    /// What those were made of: their keys hold addresses.
+    sources: Vec<VisualGeometry>,
     textures: BTreeMap<Arc<Path>, Arc<Image>>,
     /// The scene's files of meshes; read when the first mesh with a texture is met.
     mesh_files: Vec<PathBuf>,
@@ -92,6 +94,7 @@ impl Drawing {
         Drawing {
             meshes: BTreeMap::new(),
             edges: BTreeMap::new(),
+            sources: Vec::new(),
             textures: BTreeMap::new(),
             mesh_files: mesh_files.collect(),
             unwrapped: None,
@@ -142,6 +145,7 @@ impl Drawing {
         pose: &Pose,
         tint: Option<[f32; 3]>,
     ) -> Result<(), RenderError> {
+        let Some(drawn) = visual.drawn() else { return Ok(()) };
         let detail = self.detail.unwrap_or(visual.look.detail);
         let mut material = match tint {
             Some(color) => Material::matte(color),
@@ -152,35 +156,35 @@ impl Drawing {
         } else {
             material = Material { pattern: Pattern::Plain, clearcoat: 0.0, ..material };
         }
-        if let Detail::SphereTree(level) = detail
-            && detail::draw_balls(list, &visual.shape, level, pose, material).is_some()
+        if let (Detail::SphereTree(level), Drawn::Shape(shape)) = (detail, drawn)
+            && detail::draw_balls(list, shape, level, pose, material).is_some()
         {
             return Ok(());
         }
         if detail == Detail::Wireframe {
-            return self.place_edges(list, visual, pose, material.color);
+            return self.place_edges(list, visual, drawn, pose, material.color);
         }
-        if let Shape::Sphere { radius } = visual.shape {
+        if let Drawn::Shape(Shape::Sphere { radius }) = drawn {
             list.add_sphere(
                 Point3::from(small(&pose.translation.vector)),
-                radius as f32,
+                *radius as f32,
                 pose.rotation.cast(),
                 material,
             );
             return Ok(());
         }
         let simple = detail == Detail::Simplified;
-        if let Shape::Capsule { radius, half_length } = visual.shape
+        if let Drawn::Shape(Shape::Capsule { radius, half_length }) = drawn
             && !simple
         {
-            list.add_capsule(pose.cast(), half_length as f32, radius as f32, material);
+            list.add_capsule(pose.cast(), *half_length as f32, *radius as f32, material);
             return Ok(());
         }
         let textured = material.texture.is_some();
         let key = match (simple, textured) {
-            (true, _) => format!("simple {}", key(&visual.shape)),
-            (_, true) => format!("textured {}", key(&visual.shape)),
-            _ => key(&visual.shape),
+            (true, _) => format!("simple {}", key(drawn)),
+            (_, true) => format!("textured {}", key(drawn)),
+            _ => key(drawn),
         };
         let mesh = match placed.meshes.get(&key) {
             Some(mesh) => *mesh,
@@ -188,11 +192,12 @@ impl Drawing {
                 let data = match self.meshes.get(&key) {
                     Some(data) => data.clone(),
                     None => {
-                        let full = match if textured { self.unwrapped(&visual.shape) } else { None } {
+                        let full = match if textured { self.unwrapped(drawn) } else { None } {
                             Some(unwrapped) => unwrapped?,
-                            None => mesh_of(&visual.shape)?,
+                            None => mesh_of(drawn)?,
                         };
                         let data = if simple { detail::simplified(&full) } else { full };
+                        self.sources.push(visual.geometry.clone());
                         self.meshes.entry(key.clone()).or_insert(Arc::new(data)).clone()
                     }
                 };
@@ -200,7 +205,7 @@ impl Drawing {
             }
         };
         let pose: Isometry3<f32> = pose.cast();
-        list.add_instance(mesh, pose, material).casts_shadow = !matches!(visual.shape, Shape::HalfSpace);
+        list.add_instance(mesh, pose, material).casts_shadow = !matches!(drawn, Drawn::Shape(Shape::HalfSpace));
         Ok(())
     }
 }
@@ -211,21 +216,23 @@ impl Drawing {
         &mut self,
         list: &mut DrawList,
         visual: &Visual,
+        drawn: Drawn<'_>,
         pose: &Pose,
         color: [f32; 3],
     ) -> Result<(), RenderError> {
         let pose: Isometry3<f32> = pose.cast();
-        if let Shape::Sphere { radius } = visual.shape {
-            list.wire_sphere(pose.translation.vector.into(), radius as f32, DebugStyle::new(color).width(1.5));
+        if let Drawn::Shape(Shape::Sphere { radius }) = drawn {
+            list.wire_sphere(pose.translation.vector.into(), *radius as f32, DebugStyle::new(color).width(1.5));
             return Ok(());
         }
-        let key = key(&visual.shape);
+        let key = key(drawn);
         if !self.edges.contains_key(&key) {
-            let mesh = match &visual.shape {
+            let mesh = match drawn {
                 // without the roundings, which would be edges beside edges
-                Shape::Box { half_extents } => MeshData::cuboid(small(half_extents).into()),
+                Drawn::Shape(Shape::Box { half_extents }) => MeshData::cuboid(small(half_extents).into()),
                 other => mesh_of(other)?,
             };
+            self.sources.push(visual.geometry.clone());
             self.edges.insert(key.clone(), detail::edges(&mesh));
         }
         detail::draw_edges(list, &self.edges[&key], &pose, color);
@@ -233,8 +240,8 @@ impl Drawing {
     }
 
     /// A mesh with the texture coordinates of its file, where it has any.
-    fn unwrapped(&mut self, shape: &Shape) -> Option<Result<MeshData, RenderError>> {
-        let Shape::Mesh(mesh) = shape else { return None };
+    fn unwrapped(&mut self, drawn: Drawn<'_>) -> Option<Result<MeshData, RenderError>> {
+        let Drawn::Shape(Shape::Mesh(mesh)) = drawn else { return None };
         let mesh = mesh.mesh();
         let files = self
             .unwrapped
@@ -268,16 +275,21 @@ impl Drawing {
     }
 }
 
-/// What makes two shapes share a mesh: their numbers, or the shared mesh itself.
-fn key(shape: &Shape) -> String {
-    match shape {
-        Shape::Mesh(mesh) => format!("mesh {:p}", Arc::as_ptr(mesh)),
-        Shape::Cylinder(c) => format!("cylinder {} {}", c.radius(), c.half_length()),
-        other => format!("{other:?}"),
+/// What makes two visuals share a mesh: their numbers, or the shared mesh itself.
+fn key(drawn: Drawn<'_>) -> String {
+    match drawn {
+        Drawn::Mesh(mesh) => format!("triangles {:p}", Arc::as_ptr(mesh)),
+        Drawn::Shape(Shape::Mesh(mesh)) => format!("mesh {:p}", Arc::as_ptr(mesh)),
+        Drawn::Shape(Shape::Cylinder(c)) => format!("cylinder {} {}", c.radius(), c.half_length()),
+        Drawn::Shape(other) => format!("{other:?}"),
     }
 }
 
-fn mesh_of(shape: &Shape) -> Result<MeshData, RenderError> {
+fn mesh_of(drawn: Drawn<'_>) -> Result<MeshData, RenderError> {
+    let shape = match drawn {
+        Drawn::Mesh(mesh) => return triangles(mesh),
+        Drawn::Shape(shape) => shape,
+    };
     Ok(match shape {
         Shape::HalfSpace => MeshData::ground_quad(PLANE_M),
         Shape::Sphere { radius } => MeshData::uv_sphere(*radius as f32, 24),

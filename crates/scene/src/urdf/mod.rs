@@ -19,7 +19,7 @@
 //! | `<dynamics>` | viscous damping and dry friction |
 //! | `<mimic>` | a coupling of the two joints |
 //! | `<collision>` | box, cylinder, sphere, capsule; meshes in STL, OBJ, PLY and COLLADA |
-//! | `<visual>` | the same, with the colour of its material; where no visual of a link can be read its collision shapes are drawn |
+//! | `<visual>` | the same, with the colour of its material; its mesh need be no solid, is read by whoever draws, and collides with nothing. Where no visual of a link can be read its collision shapes are drawn |
 //!
 //! All else (transmissions, sensors, simulators' own elements) is passed over. The root link is fixed to the base, or floats if asked.
 
@@ -43,7 +43,7 @@ use crate::assemble;
 use crate::build::Notes;
 use crate::error::Invalid;
 use crate::link::{LinkSpec, Surface};
-use crate::link_shapes::ShapeMaker;
+use crate::link_shapes::{Purpose, ShapeMaker};
 use crate::log::Log;
 use crate::notes::NoteList;
 pub use spheres::{LinkSpheres, SphereOptions, SphereRobot, spherize};
@@ -51,13 +51,14 @@ pub use spheres::{LinkSpheres, SphereOptions, SphereRobot, spherize};
 use joint::JointElement;
 use link::{Context, LinkElement, read_color};
 use tree::TreeBuilder;
-use tumble_core::articulated::{ArticulatedBody, LinkMass, MOST_LINKS, Model, ModelError};
+use tumble_core::articulated::{ArticulatedBody, Freedom, LinkMass, MOST_LINKS, Model, ModelError};
 use xml::Element;
 
 /// Most bytes of a URDF: 64 MiB.
 const MOST_BYTES: u64 = 64 << 20;
 
-/// What to do about collision meshes that are not there or cannot be read. Visual ones are always left out, with a note.
+/// What to do about collision meshes that are not there or cannot be read. Visual ones are never an error: those that are not there are left out with a
+/// note, those that cannot be read when they are drawn ([`visual_notes`](crate::visual_notes)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MissingMeshes {
     /// They are an error.
@@ -142,14 +143,15 @@ pub enum UrdfError {
     },
 }
 
-/// Reads a URDF as a body that stands at the origin (or floats there), with its shapes, limits and couplings.
+/// Reads a URDF as a body that stands at the origin (or floats there), with its shapes, limits and couplings. The meshes of its visuals are left to
+/// whoever draws them.
 ///
 /// # Errors
 /// [`UrdfError`]: a file cannot be read, or has problems; those of the XML are told at once with line and column.
 pub fn load(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<(ArticulatedBody, Notes), UrdfError> {
     let path = path.as_ref();
     let robot = read_file(path, options, Wanted::Body)?;
-    let mut maker = ShapeMaker::new(&[]);
+    let mut maker = ShapeMaker::new(&[], Purpose::Stepped);
     let spec = ArticulatedSpec { part_overlaps: true, ..ArticulatedSpec::of(robot.name, robot.links) };
     let body = assemble::body(&spec, &mut maker).map_err(|why| UrdfError::Body { file: path.to_path_buf(), why })?;
     Ok((body, robot.notes.into_iter().chain(maker.notes.take()).collect()))
@@ -164,6 +166,8 @@ pub struct UrdfModel {
     pub model: Model,
     /// Names of its joints, one for each of [`Model::links`]: in the order of the coordinates. That of a floating root is the root link's.
     pub joints: Vec<String>,
+    /// Limits, damping and dry friction of its degrees of freedom, in the order of the velocities.
+    pub freedoms: Vec<Freedom>,
     /// What is to be said of the file.
     pub notes: Vec<String>,
 }
@@ -192,7 +196,8 @@ impl Robot {
         let masses: Vec<LinkMass> = self.links.iter().map(LinkSpec::given_mass).collect();
         let model = assemble::model(&self.links, &masses)
             .map_err(|source| UrdfError::Model { file: path.to_path_buf(), source })?;
-        Ok(UrdfModel { joints: assemble::moving_joints(&self.links), name: self.name, model, notes: self.notes })
+        let (joints, freedoms) = (assemble::moving_joints(&self.links), assemble::freedoms(&self.links));
+        Ok(UrdfModel { joints, freedoms, name: self.name, model, notes: self.notes })
     }
 }
 

@@ -15,3 +15,4 @@ mod robust;
 mod shipped;
 mod spheres;
 mod urdf;
+mod visuals;

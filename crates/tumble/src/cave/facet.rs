@@ -6,7 +6,7 @@ use super::lock;
 use super::log::FrameLog;
 use super::painter::{Painter, image_hash, seat_name};
 use super::signals::Signals;
-use super::stage::Setting;
+use super::stage::{Role, Setting};
 use super::window::{Desktop, Parts, desktop};
 use crate::failure::Failure;
 use std::io::Read;
@@ -27,7 +27,7 @@ const MOMENT: Duration = Duration::from_secs(1);
 pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let leader = options.led.then(watch_stdin).transpose()?;
-    let setting = Setting::load(&options.stage, |_| {})?;
+    let setting = Setting::load(&options.stage, Role::Facet, |_| {})?;
     let described = options.facet.as_deref().map(|name| setting.cave.facet(name).cloned()).transpose()?;
     let number = described
         .as_ref()

@@ -8,7 +8,7 @@ use super::lock::{Lock, Run};
 use super::outputs::{self, Recording};
 use super::replay::Tape;
 use super::signals::Signals;
-use super::stage::Setting;
+use super::stage::{Role, Setting};
 use super::summary::{Meter, Status, Summary, from_strangers, refused};
 use super::users::Users;
 use super::viewers::Viewers;
@@ -31,7 +31,7 @@ const TURN: Duration = Duration::from_millis(20);
 /// Runs a scene in a cave, or shows a recording of one; with a launcher's options, also the facets of this machine.
 pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
     let signals = Signals::watch()?;
-    let setting = Setting::load(&options.stage, |w| {
+    let setting = Setting::load(&options.stage, Role::Server, |w| {
         w.dt_s = options.dt.unwrap_or(w.dt_s);
         w.stepper = options.stepper.unwrap_or(w.stepper);
         w.solver = options.solver.unwrap_or(w.solver);

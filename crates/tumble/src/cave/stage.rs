@@ -9,10 +9,19 @@ use tumble::net::sync::transport::MAX_FACETS;
 use tumble::net::sync::{User, Viewer, scene_hash};
 use tumble::render::CaveView;
 use tumble::scene::cave::{Cave, CaveSource, resolve_cave};
-use tumble::scene::{CavePlace, SceneFile, ShapeSpec, WorldSettings, resolve_scene};
+use tumble::scene::{CavePlace, SceneFile, ShapeSpec, WorldSettings, resolve_scene, visual_notes};
 
 /// Name of the seat of the one process that draws a preview.
 pub const PREVIEW: &str = "preview";
+
+/// What a process does with the world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Steps it.
+    Server,
+    /// Draws what the server says.
+    Facet,
+}
 
 /// What all processes of a run have in common.
 pub struct Setting {
@@ -33,7 +42,7 @@ pub struct Setting {
 impl Setting {
     /// Reads the files and builds the world, whose settings `adapt` may change: time and method are the server's alone, and nothing that is seen at
     /// the start depends on them.
-    pub fn load(stage: &Stage, adapt: impl FnOnce(&mut WorldSettings)) -> Result<Setting, Failure> {
+    pub fn load(stage: &Stage, role: Role, adapt: impl FnOnce(&mut WorldSettings)) -> Result<Setting, Failure> {
         let mut scene = resolve_scene(&stage.scene, &[])?.load()?;
         adapt(&mut scene.world);
         let source = resolve_cave(&stage.cave)?;
@@ -53,12 +62,14 @@ impl Setting {
         if let Some(name) = &stage.environment {
             surround(&mut scene, resolve_scene(name, &[])?.load()?, &mut notes)?;
         }
-        let (world, built) = scene.build().map_err(Failure::input)?;
+        let build = if role == Role::Server { SceneFile::build } else { SceneFile::build_drawn };
+        let (world, built) = build(&scene).map_err(Failure::input)?;
         notes.extend(built);
         // everything that is drawn and stands in no body
         let seen = format!("{:?} {:?} {:?} {:?} {:?}", scene.camera, scene.cave, scene.lights, scene.sky, scene.ground);
         let hash = scene_hash(&seen, &world);
         let joined = joined_hash(&hash, &cave, &world);
+        notes.extend(visual_notes(world.visuals()));
         Ok(Setting { scene, cave, world, hash, joined, place, notes })
     }
 
@@ -99,8 +110,8 @@ fn joined_hash(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
         .as_bytes());
         [&f.warp_file, &f.blend_file].into_iter().for_each(|file| put(&file.as_deref().map_or([0; 32], content)));
     }
-    let visuals = world.ids().iter().filter_map(|&id| world.object(id)?.renderable()).flat_map(|r| r.visuals());
-    let textures: std::collections::BTreeSet<_> = visuals.filter_map(|visual| visual.look.texture.clone()).collect();
+    let textures: std::collections::BTreeSet<_> =
+        world.visuals().filter_map(|visual| visual.look.texture.clone()).collect();
     // by names of files, as the scene's hash has them: folders differ between machines
     let mut textures: Vec<_> =
         textures.iter().map(|path| (path.file_name().unwrap_or_default().as_encoded_bytes(), content(path))).collect();

@@ -176,7 +176,7 @@ fn grasp(world: &World, bodies: &Bodies, origin: &Vec3, direction: &Vec3) -> Opt
         };
         for visual in renderable.visuals() {
             let Some(site) = world.site(id, visual.part) else { continue };
-            let Some(distance) = visual.shape.ray(&(site.pose * visual.pose), origin, direction) else { continue };
+            let Some(distance) = visual.ray(&site.pose, origin, direction) else { continue };
             if first.is_none_or(|(_, _, nearest)| distance < nearest) {
                 first = Some((id, visual.part, distance));
             }

@@ -76,9 +76,7 @@ fn first_seen(world: &World, ray: &Ray) -> Option<(ObjectId, usize, f64)> {
         };
         for visual in renderable.visuals() {
             let Some(site) = world.site(id, visual.part) else { continue };
-            let Some(distance) = visual.shape.ray(&(site.pose * visual.pose), &ray.origin, &ray.direction) else {
-                continue;
-            };
+            let Some(distance) = visual.ray(&site.pose, &ray.origin, &ray.direction) else { continue };
             if first.is_none_or(|(_, _, nearest)| distance < nearest) {
                 first = Some((id, visual.part, distance));
             }

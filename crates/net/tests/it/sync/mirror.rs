@@ -1,8 +1,10 @@
 //! A world and its copy: what is seen is the same, whatever is added, removed, switched off or moved.
 
 use super::stage::{scene, viewer};
+use std::sync::Arc;
+use tumble_core::collide::TriMesh;
 use tumble_core::collide::{Pose, Quat, Shape, Vec3};
-use tumble_core::{Look, Mode, Object, RigidBody, Visual, World};
+use tumble_core::{Drawn, Look, Mode, Object, RigidBody, Visual, VisualMesh, World};
 use tumble_net::sync::quantise::{POSITION_ERROR_M, ROTATION_ERROR_RAD};
 use tumble_net::sync::wire::Fault;
 use tumble_net::sync::{Mirror, Publisher, VIEWER_NAME};
@@ -109,7 +111,7 @@ fn objects_come_and_go() {
     .into_iter()
     .enumerate()
     {
-        let visual = Visual { part: 0, pose: spun, shape: shape.clone().unwrap(), look: look.clone() };
+        let visual = Visual::shape(0, spun, shape.clone().unwrap(), look.clone());
         let body = RigidBody::with_mass(format!("new {k}"), shape.unwrap(), 1.0).unwrap();
         pair.world.add(body.at(spun).drawn_as(vec![visual])).unwrap();
         assert!(pair.send(), "an object more");
@@ -130,7 +132,8 @@ fn objects_come_and_go() {
     assert!(pair.send());
     let ball = pair.mirror.world().find("ball 2").unwrap();
     let radius = |o: &dyn Object| {
-        if let Shape::Sphere { radius } = o.renderable().unwrap().visuals()[0].shape { radius } else { 0.0 }
+        let visual = &o.renderable().unwrap().visuals()[0];
+        if let Some(Drawn::Shape(Shape::Sphere { radius })) = visual.drawn() { *radius } else { 0.0 }
     };
     assert_eq!(radius(pair.mirror.world().object(ball).unwrap()), 0.5);
 }
@@ -154,7 +157,7 @@ fn what_is_switched_off_or_moved_by_hand_is_seen_so() {
 
 #[test]
 fn a_mesh_of_the_scene_is_not_sent_again() {
-    use tumble_core::collide::{TreeSettings, TriMesh};
+    use tumble_core::collide::TreeSettings;
     let tetrahedron = TriMesh {
         vertices: [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3::from).to_vec(),
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
@@ -187,9 +190,26 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
     publisher.publish(&world, &viewer(0), 2).unwrap();
     mirror.apply_snapshot(&publisher.snapshot()).unwrap();
     let boulder = mirror.world().object(mirror.world().find("boulder").unwrap()).unwrap();
-    let Shape::Mesh(mesh) = &boulder.renderable().unwrap().visuals()[0].shape else { panic!("a mesh") };
-    assert_eq!(mesh.mesh().triangles.len(), 4);
-    assert!((mesh.volume() - 8.0 / 6.0).abs() < 1e-12, "{}", mesh.volume());
+    let Some(Drawn::Mesh(mesh)) = boulder.renderable().unwrap().visuals()[0].drawn() else { panic!("a mesh") };
+    assert_eq!(mesh.triangles.len(), 4);
+    assert!((mesh.diagonal() - 12.0f64.sqrt()).abs() < 1e-12, "{}", mesh.diagonal());
+    // an open one, which is drawn and nothing else
+    let sheet = TriMesh { vertices: [Vec3::zeros(), Vec3::x(), Vec3::y()].to_vec(), triangles: vec![[0, 1, 2]] };
+    let open = Arc::new(VisualMesh::new("sheet", sheet.clone()).unwrap());
+    let drawn = [0.0, 1.0].map(|z| Visual::mesh(0, Pose::translation(0.0, 0.0, z), open.clone(), Look::default()));
+    let lost = Visual::mesh(
+        0,
+        Pose::identity(),
+        Arc::new(VisualMesh::read_by("lost", || Err("gone".into()))),
+        Look::default(),
+    );
+    world.add(body("tent", &shape).drawn_as(drawn.into_iter().chain([lost]).collect())).unwrap();
+    publisher.publish(&world, &viewer(0), 3).unwrap();
+    mirror.apply_snapshot(&publisher.snapshot()).unwrap();
+    let tent = mirror.world().object(mirror.world().find("tent").unwrap()).unwrap();
+    let seen: Vec<_> = tent.renderable().unwrap().visuals().iter().map(Visual::drawn).collect();
+    assert_eq!(seen.len(), 2, "what cannot be read is not sent");
+    assert!(seen.iter().all(|drawn| matches!(drawn, Some(Drawn::Mesh(mesh)) if ***mesh == sheet)));
 }
 
 #[test]
@@ -267,7 +287,7 @@ fn the_hash_of_a_scene_does_not_see_folders() {
         let mut world = scene();
         let shape = Shape::sphere(0.1).unwrap();
         let look = Look { texture: Some(std::path::Path::new(texture).into()), ..Look::default() };
-        let visual = Visual { part: 0, pose: Pose::identity(), shape: shape.clone(), look };
+        let visual = Visual::shape(0, Pose::identity(), shape.clone(), look);
         world.add(RigidBody::with_mass("textured", shape, 1.0).unwrap().drawn_as(vec![visual])).unwrap();
         tumble_net::sync::scene_hash("text", &world)
     };

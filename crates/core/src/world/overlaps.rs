@@ -1,0 +1,87 @@
+//! Which objects reach into each other as the world stands.
+
+use crate::detect::meet;
+use crate::view::{Entry, Mode, ObjectId};
+use crate::world::World;
+use std::collections::BTreeMap;
+use tumble_collide::{Aabb, BroadPhase, Contact, Pose, Shape, SweepAndPrune, contacts_in};
+
+/// Two objects that overlap, or one twice whose own parts do; the one added first stands first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Overlap {
+    /// The objects.
+    pub objects: [ObjectId; 2],
+    /// The parts that overlap most.
+    pub parts: [usize; 2],
+    /// How far these would have to be moved apart along their contact's normal, metres.
+    pub depth: f64,
+}
+
+/// A part that takes part.
+struct Part<'w> {
+    entry: &'w Entry,
+    part: usize,
+    shape: &'w Shape,
+    pose: Pose,
+}
+
+impl World {
+    /// The pairs of objects that may meet and reach into each other by more than `depth` metres, in the order in which they were added. Changes nothing, and
+    /// costs a detection of contacts.
+    pub fn overlaps(&self, depth: f64) -> Vec<Overlap> {
+        let parts = self.meeting_parts();
+        let mut broad = SweepAndPrune::default();
+        let places: BTreeMap<u32, usize> =
+            parts.iter().enumerate().map(|(n, part)| (broad.insert(&part.bounds(), part.moves()), n)).collect();
+        let mut pairs = Vec::new();
+        broad.pairs(&mut pairs);
+        let mut deepest: BTreeMap<[u32; 2], Overlap> = BTreeMap::new();
+        for pair in pairs {
+            let [i, j] = pair.map(|handle| places[&handle]);
+            let (a, b) = (&parts[i.min(j)], &parts[i.max(j)]);
+            let Some(found) = self.depth_of(a, b).filter(|found| *found > depth) else { continue };
+            let overlap = Overlap { objects: [a.id(self), b.id(self)], parts: [a.part, b.part], depth: found };
+            let known = deepest.entry([a.entry.serial, b.entry.serial]).or_insert(overlap);
+            if found > known.depth {
+                *known = overlap;
+            }
+        }
+        deepest.into_values().collect()
+    }
+
+    fn meeting_parts(&self) -> Vec<Part<'_>> {
+        let entries = self.core.table.iter().filter(|e| e.status.alive && e.status.collidable);
+        let parts = entries.filter_map(|entry| Some((entry, entry.object.collidable()?))).flat_map(|(entry, body)| {
+            entry.span.site.clone().enumerate().filter_map(move |(part, site)| {
+                Some(Part { entry, part, shape: body.shape(part)?, pose: self.core.sites[site].pose })
+            })
+        });
+        parts.collect()
+    }
+
+    /// The greatest depth of the contacts of two parts that may meet, if they overlap.
+    fn depth_of(&self, a: &Part<'_>, b: &Part<'_>) -> Option<f64> {
+        if !meet(a.entry, a.part, b.entry, b.part, &self.core.sites) {
+            return None;
+        }
+        let (of_a, of_b) = (a.entry.object.collidable()?, b.entry.object.collidable()?);
+        let mode = of_a.contact_mode(a.part).of_pair(of_b.contact_mode(b.part));
+        let mut found: Vec<Contact> = Vec::new();
+        contacts_in(mode, a.shape, &a.pose, b.shape, &b.pose, 0.0, &mut found);
+        found.iter().map(|contact| -contact.gap).max_by(f64::total_cmp)
+    }
+}
+
+impl Part<'_> {
+    fn bounds(&self) -> Aabb {
+        self.shape.aabb(&self.pose)
+    }
+
+    fn moves(&self) -> bool {
+        self.entry.status.mode != Mode::Static
+    }
+
+    fn id(&self, world: &World) -> ObjectId {
+        world.core.owners[self.entry.span.site.start + self.part].id
+    }
+}
