@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 use tumble::core::World;
 use tumble::render::winit::event::WindowEvent;
 use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, Shown, WindowApp, caption};
-use tumble::scene::SceneFile;
+use tumble::scene::{SceneFile, visual_notes};
 
 /// Between two status lines while nothing but time changes.
 const IDLE: Duration = Duration::from_millis(250);
@@ -99,6 +99,7 @@ impl Viewer {
     pub fn new(scene: &SceneFile, world: World, sight: Sight, options: &ViewOptions) -> Result<Viewer, Failure> {
         let mut drawing = Drawing::new(scene);
         let list = drawing.list(&world, &DebugDraw::default()).map_err(Failure::input)?;
+        visual_notes(world.visuals()).iter().for_each(|note| eprintln!("{note}"));
         let mut presets = Presets::new(&world, &list);
         let mut user = User::new(sight.body(&list), distance(&list.camera));
         if let Some(name) = &options.camera {
