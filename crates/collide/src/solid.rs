@@ -96,7 +96,8 @@ impl MeshShape {
         unit_mass: MassProperties,
         report: ClosedReport,
     ) -> MeshShape {
-        let shape = MeshShape { tree: OnceLock::from(Tree::from(tree)), ..MeshShape::of_checked(mesh, unit_mass, report) };
+        let shape =
+            MeshShape { tree: OnceLock::from(Tree::from(tree)), ..MeshShape::of_checked(mesh, unit_mass, report) };
         shape.surfaces();
         shape
     }

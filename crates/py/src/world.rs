@@ -301,8 +301,7 @@ impl World {
         &self,
         py: Python<'py>,
     ) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,), Option<Extensions>)> {
-        let (bytes, state) =
-            self.shared.read(|inner| Ok((pickling::write(inner)?, inner.pickled_extensions(py))))?;
+        let (bytes, state) = self.shared.read(|inner| Ok((pickling::write(inner)?, inner.pickled_extensions(py))))?;
         let unpickle = py.import("tumble._native")?.getattr("_unpickle_world")?;
         Ok((unpickle, (PyBytes::new(py, &bytes),), state))
     }

@@ -144,3 +144,30 @@ fn damage_is_found() {
         assert!(matches!(refused(&bytes[..place]), ArchiveError::Damaged(_)), "cut at {place}");
     }
 }
+
+/// A mesh that is only drawn is read for the archive, and shared again; what cannot be read stays so, with the same reason.
+#[test]
+fn visual_meshes_need_no_file_any_more() {
+    let sheet = TriMesh { vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::y()], triangles: vec![[0, 1, 2]] };
+    let read = sheet.clone();
+    let there = std::sync::Arc::new(VisualMesh::read_by("sheet", move || Ok(read.clone().into())));
+    let gone = std::sync::Arc::new(VisualMesh::read_by("gone", || Err("no file".into())));
+    let mesh = |mesh: &std::sync::Arc<VisualMesh>| Visual::mesh(0, Pose::identity(), mesh.clone(), Look::default());
+    let instead = |of: &std::sync::Arc<VisualMesh>| Visual {
+        stands_in_for: vec![of.clone()],
+        ..Visual::shape(0, Pose::identity(), sphere(0.1), Look::default())
+    };
+    let visuals = vec![mesh(&there), mesh(&there), mesh(&gone), instead(&there), instead(&gone)];
+    let mut world = world("time_stepping", 1.0 / 240.0);
+    world.add(RigidBody::with_mass("b", sphere(0.1), 1.0).unwrap().drawn_as(visuals)).unwrap();
+    let bytes = world.archive(&[]).unwrap();
+    let copy = World::from_archive(&bytes, &mut |_| None).unwrap();
+    assert_eq!(copy.archive(&[]).unwrap(), bytes);
+    let drawn: Vec<Option<Drawn<'_>>> = copy.visuals().map(Visual::drawn).collect();
+    let [Some(Drawn::Mesh(a)), Some(Drawn::Mesh(b)), None, None, Some(Drawn::Shape(_))] = drawn[..] else {
+        panic!("{drawn:?}")
+    };
+    assert!(std::sync::Arc::ptr_eq(a, b) && **a == sheet);
+    let VisualGeometry::Mesh(lost) = &copy.visuals().nth(2).unwrap().geometry else { panic!() };
+    assert_eq!((lost.name(), lost.fault()), ("gone", Some("no file")));
+}
