@@ -1,9 +1,10 @@
 //! Bodies on their way into a world.
 
-use crate::articulation::{Articulation, described};
+use crate::articulation::Articulation;
 use crate::bodies::{by_name, place_of};
 use crate::body::{Place, RigidBody};
 use crate::convert::base_pose;
+use crate::description::described;
 use crate::errors::{Error, Result};
 use crate::looks;
 use crate::shapes::Shape;

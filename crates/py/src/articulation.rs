@@ -2,7 +2,8 @@
 
 use crate::body::{Place, hash};
 use crate::collect::{Anchor, anchor};
-use crate::convert::{Numbers, array, numbers, path, vec3, vector};
+use crate::convert::{Numbers, array, numbers, vec3, vector};
+use crate::description::alone;
 use crate::errors::{Error, Result};
 use crate::inner::Inner;
 use crate::pool;
@@ -10,7 +11,6 @@ use crate::robot::{Robot, Rows};
 use crate::spot::{Now, Source, Spot, Which, locked, start};
 use crate::words::{COLLISION_MESHES, MISSING_MESHES, meaning, word};
 use numpy::{IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
-use pyo3::exceptions::PyTypeError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ use tumble::scene::urdf::{self, UrdfOptions};
 #[pyclass(frozen, module = "tumble")]
 pub struct Articulation {
     name: Arc<str>,
-    robot: Arc<Robot>,
+    pub robot: Arc<Robot>,
     pub spot: Spot,
     anchor: Option<Py<Anchor>>,
 }
@@ -165,7 +165,7 @@ impl Articulation {
     /// ``"error"`` or ``"skip"``, for collision meshes that are not there; collision_meshes: ``"exact"`` or ``"hull"``.
     #[staticmethod]
     #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact"))]
-    fn from_urdf(
+    pub fn from_urdf(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
         floating: bool,
@@ -283,7 +283,7 @@ impl Articulation {
     }
 
     #[setter]
-    fn set_gravity(&self, value: &Bound<'_, PyAny>) -> Result<()> {
+    pub fn set_gravity(&self, value: &Bound<'_, PyAny>) -> Result<()> {
         let gravity = vec3(value, "gravity")?;
         match &self.spot {
             Spot::Free { now, .. } => locked(now).gravity = gravity,
@@ -493,42 +493,4 @@ impl Articulation {
     fn __hash__(slf: &Bound<'_, Self>) -> u64 {
         slf.get().place().map_or(slf.as_ptr() as u64 >> 4, hash)
     }
-}
-
-/// What a pickled description becomes: its file is read anew.
-#[pyfunction]
-pub fn _unpickle_articulation(
-    py: Python<'_>,
-    file: PathBuf,
-    floating: bool,
-    packages: BTreeMap<String, PathBuf>,
-    words: [String; 2],
-    numbers: [Vec<f64>; 4],
-) -> Result<Articulation> {
-    let file = file.into_pyobject(py).map_err(PyErr::from)?.into_any();
-    let [missing, collision] = words;
-    let description = Articulation::from_urdf(py, &file, floating, Some(packages), &missing, &collision)?;
-    let [gravity, q, qd, tau] = numbers.map(|row| array(py, &row).into_any());
-    description.set_gravity(&gravity)?;
-    for (which, row) in [(Which::Q, q), (Which::Qd, qd), (Which::Tau, tau)] {
-        description.spot.set(py, which, &description.robot, &row)?;
-    }
-    Ok(description)
-}
-
-/// The error of a handle that is pickled.
-pub fn alone(name: &str) -> Error {
-    PyTypeError::new_err(format!(
-        "cannot pickle a handle of '{name}' by itself; pickle its world, and ask that for the body by name"
-    ))
-    .into()
-}
-
-/// A description of a URDF, from a path.
-pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulation>> {
-    if let Ok(own) = value.cast::<Articulation>() {
-        return Ok(own.clone());
-    }
-    path(value)?;
-    Ok(Bound::new(value.py(), Articulation::from_urdf(value.py(), value, false, None, "error", "exact")?)?)
 }

@@ -1,8 +1,8 @@
 //! A rigid body of a world: a handle, which asks the world each time.
 
-use crate::articulation::alone;
 use crate::collect::{Anchor, anchor};
 use crate::convert::{array, pose, quaternion, rotation, some, symmetric, vec3, vec3_or, vector};
+use crate::description::alone;
 use crate::errors::{Error, Result};
 use crate::inner::Inner;
 use crate::looks;

@@ -4,10 +4,12 @@
 //! a frame, before it, and what it does acts during that frame. Both see a [`View`]. What Python raises is kept, and handed to the caller of the step
 //! with its traceback; the frame is run to its end without that force, and then the world is put back to where it was before.
 
+use crate::arrays::Arrays;
 use crate::collect::Callable;
 use crate::errors::{Error, Result};
 use crate::inner::Inner;
-use crate::view::{Arrays, Layout, View};
+use crate::layout::Layout;
+use crate::view::View;
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard};
 use tumble::core::{Checkpoint, ForceGenerator, Forces, Mode, Object, ObjectId, Span, WorldView, Wrench};

@@ -1,6 +1,7 @@
 //! The Python module `tumble._native`: conversion between Python and the crates, and no physics.
 
 mod adding;
+mod arrays;
 mod articulation;
 mod bodies;
 mod body;
@@ -8,11 +9,13 @@ mod building;
 mod collect;
 mod contacts;
 mod convert;
+mod description;
 mod errors;
 mod extension;
 mod faults;
 mod inner;
 mod interrupt;
+mod layout;
 mod looks;
 mod pickling;
 mod picture;
@@ -39,11 +42,13 @@ mod _native {
     use super::*;
 
     #[pymodule_export]
-    use super::articulation::{_unpickle_articulation, Articulation};
+    use super::articulation::Articulation;
     #[pymodule_export]
     use super::bodies::Bodies;
     #[pymodule_export]
     use super::body::RigidBody;
+    #[pymodule_export]
+    use super::description::_unpickle_articulation;
     #[pymodule_export]
     use super::faults::_panic;
     #[pymodule_export]

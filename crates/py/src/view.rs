@@ -4,250 +4,19 @@
 //! kept would look into it. The arrays of one call serve the next, unless Python kept any. After the call the view
 //! refuses to be asked, and what was added to its arrays is read once and then no more.
 
+use crate::arrays::Arrays;
 use crate::bodies::place_of;
 use crate::convert::{vec3, whole_number};
 use crate::errors::{Error, Result};
-use crate::state::holders;
+use crate::layout::Layout;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyString};
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tumble::collide::Vec3;
-use tumble::core::{ArticulatedBody, ObjectId, RigidBody as Rigid, Site, WorldView, Wrench};
-
-/// Numbers of a row: position, quaternion, velocity, angular velocity, acceleration, angular acceleration.
-const WIDTHS: [usize; 6] = [3, 4, 3, 3, 3, 3];
-
-/// Which rows belong to whom: made once and kept until objects come or go.
-pub struct Layout {
-    ids: Vec<ObjectId>,
-    /// Objects with rows: their id, name and rows.
-    objects: Vec<(ObjectId, Arc<str>, Range<usize>)>,
-    /// Of each articulated body the names of its links, the fixed ones too, and their places among its rows.
-    links: Vec<(ObjectId, Vec<(String, usize)>)>,
-    rows: Vec<Row>,
-    /// How many sites the world has, and whether each of them is a row as it stands.
-    sites: usize,
-    plain: bool,
-}
-
-/// What a row shows: a rigid body, or a link at its centre of mass. Shapes on links have sites too, but no rows: they have no mass of their own.
-struct Row {
-    site: usize,
-    /// In the frame of the site, m.
-    center: Vec3,
-    /// kg.
-    mass: f64,
-    /// Not of a base.
-    may_move: bool,
-}
-
-impl Row {
-    /// From the site to the centre of mass, world axes, m.
-    fn arm(&self, sites: &[Site]) -> Vec3 {
-        sites[self.site].pose.rotation * self.center
-    }
-
-    /// The centre of mass as a site.
-    fn shown(&self, sites: &[Site]) -> Site {
-        let (mut site, arm) = (sites[self.site], self.arm(sites));
-        let spin = site.angular_velocity;
-        site.acceleration += site.angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
-        site.velocity += spin.cross(&arm);
-        site.pose.translation.vector += arm;
-        site
-    }
-}
-
-impl Layout {
-    /// Of the world as it is.
-    pub fn of(view: &WorldView) -> Layout {
-        let mut layout = Layout {
-            ids: view.ids().to_vec(),
-            objects: Vec::new(),
-            links: Vec::new(),
-            rows: Vec::new(),
-            sites: view.sites.len(),
-            plain: true,
-        };
-        for &id in view.ids() {
-            let (Some(span), Some(object)) = (view.span(id), view.object(id)) else { continue };
-            if span.site.is_empty() {
-                continue;
-            }
-            let first = layout.rows.len();
-            match view.get::<ArticulatedBody>(id) {
-                Some(body) => {
-                    let links = body.model().links();
-                    let moving = links.iter().enumerate().map(|(i, link)| (i, link.mass.center, link.mass.mass, true));
-                    let rows = moving.chain([(links.len(), Vec3::zeros(), 0.0, false)]);
-                    layout.rows.extend(rows.map(|(part, center, mass, may_move)| Row {
-                        site: span.site.start + part,
-                        center,
-                        mass,
-                        may_move,
-                    }));
-                    let names = body
-                        .model()
-                        .frames()
-                        .iter()
-                        .map(|frame| (frame.name.clone(), frame.link.unwrap_or(links.len())));
-                    layout.links.push((id, names.collect()));
-                    layout.plain = false;
-                }
-                None => {
-                    let mass = view.get::<Rigid>(id).filter(|body| !body.is_fixture()).map_or(0.0, |body| body.mass());
-                    layout.rows.extend(span.site.clone().map(|site| Row {
-                        site,
-                        center: Vec3::zeros(),
-                        mass,
-                        may_move: true,
-                    }));
-                }
-            }
-            layout.objects.push((id, object.name().into(), first..layout.rows.len()));
-        }
-        layout
-    }
-
-    /// Whether it still holds.
-    pub fn fits(&self, view: &WorldView) -> bool {
-        self.ids == view.ids() && self.sites == view.sites.len()
-    }
-
-    /// Number of rows.
-    pub fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// The rows as sites.
-    pub fn shown<'a>(&self, sites: &'a [Site]) -> Cow<'a, [Site]> {
-        if self.plain { Cow::Borrowed(sites) } else { self.rows.iter().map(|row| row.shown(sites)).collect() }
-    }
-
-    /// The site that a row belongs to, and what a wrench at the row is there.
-    pub fn at_site(&self, row: usize, sites: &[Site], mut wrench: Wrench) -> (usize, Wrench) {
-        let row = &self.rows[row];
-        if !self.plain {
-            wrench.torque += row.arm(sites).cross(&wrench.force);
-        }
-        (row.site, wrench)
-    }
-
-    /// The place of a link among the rows of its body.
-    fn link(&self, id: ObjectId, link: &str) -> Result<usize> {
-        let names = self.links.iter().find(|(other, _)| *other == id).map_or(&[][..], |(_, names)| names);
-        names.iter().find(|(name, _)| name == link).map(|(_, place)| *place).ok_or_else(|| {
-            let names: Vec<&str> = names.iter().take(12).map(|(name, _)| &**name).collect();
-            Error::Name(format!("the body has no link named '{link}'; there are: {}", names.join(", ")))
-        })
-    }
-
-    /// Rows of an object.
-    pub fn rows(&self, id: ObjectId) -> Option<Range<usize>> {
-        Some(self.objects.iter().find(|(other, ..)| *other == id)?.2.clone())
-    }
-
-    /// Whose row it is, and which part of it.
-    pub fn owner(&self, row: usize) -> Option<(ObjectId, usize, &Arc<str>)> {
-        let (id, name, rows) = self.objects.iter().find(|(.., rows)| rows.contains(&row))?;
-        Some((*id, row - rows.start, name))
-    }
-}
-
-/// An array that is written here, and a read-only view of it, of which Python gets views.
-type Column = (Py<PyArray2<f64>>, Py<PyAny>);
-
-/// The arrays of a view.
-pub struct Arrays {
-    rows: usize,
-    /// In the order of [`WIDTHS`].
-    shown: [Column; 6],
-    force: Py<PyArray2<f64>>,
-    torque: Py<PyArray2<f64>>,
-}
-
-impl Arrays {
-    /// For a number of rows.
-    pub fn new(py: Python<'_>, rows: usize) -> Result<Arrays> {
-        let zeros = |width| PyArray2::zeros(py, [rows, width], false);
-        let mut shown = Vec::with_capacity(WIDTHS.len());
-        for width in WIDTHS {
-            let array = zeros(width);
-            let view = array.call_method0("view")?;
-            view.call_method1("setflags", (false,))?;
-            shown.push((array.unbind(), view.unbind()));
-        }
-        let shown = shown.try_into().map_err(|_| Error::Internal("as many arrays as there are kinds".into()))?;
-        Ok(Arrays { rows, shown, force: zeros(3).unbind(), torque: zeros(3).unbind() })
-    }
-
-    /// Whether they may be written again: Python holds none of them, nor a view of one.
-    pub fn free(self: &Arc<Arrays>, py: Python<'_>, rows: usize) -> bool {
-        let own = |(array, view): &Column| holders(array, py) == 2 && holders(view, py) == 1;
-        let wrenches = [&self.force, &self.torque].iter().all(|array| holders(array, py) == 1);
-        self.rows == rows && Arc::strong_count(self) == 1 && wrenches && self.shown.iter().all(own)
-    }
-
-    /// Writes the sites, and zeros for what will act.
-    pub fn fill(&self, py: Python<'_>, sites: &[Site]) -> Result<()> {
-        let [position, orientation, velocity, angular_velocity, acceleration, angular_acceleration] = &self.shown;
-        copy(py, position, sites, |s| s.position().into())?;
-        copy(py, orientation, sites, |s| s.pose.rotation.coords.into())?;
-        copy(py, velocity, sites, |s| s.velocity.into())?;
-        copy(py, angular_velocity, sites, |s| s.angular_velocity.into())?;
-        copy(py, acceleration, sites, |s| s.acceleration.into())?;
-        copy(py, angular_acceleration, sites, |s| s.angular_acceleration.into())?;
-        for array in [&self.force, &self.torque] {
-            array.bind(py).try_readwrite().map_err(PyErr::from)?.as_slice_mut().map_err(PyErr::from)?.fill(0.0);
-        }
-        Ok(())
-    }
-
-    /// What a callback added, by row.
-    pub fn take(
-        &self,
-        py: Python<'_>,
-        layout: &Layout,
-        whose: &str,
-        mut each: impl FnMut(usize, Wrench),
-    ) -> Result<()> {
-        let (force, torque) = (
-            self.force.bind(py).try_readonly().map_err(PyErr::from)?,
-            self.torque.bind(py).try_readonly().map_err(PyErr::from)?,
-        );
-        let (force, torque) = (force.as_slice().map_err(PyErr::from)?, torque.as_slice().map_err(PyErr::from)?);
-        for (what, numbers) in [("force", force), ("torque", torque)] {
-            if let Some(k) = numbers.iter().position(|x| !x.is_finite()) {
-                let name = layout.owner(k / 3).map_or("nothing", |(_, _, name)| name);
-                return Err(Error::value(format!(
-                    "'{whose}': its {what} on '{name}' is {}; it must be finite",
-                    numbers[k]
-                )));
-            }
-        }
-        for (row, (force, torque)) in force.chunks_exact(3).zip(torque.chunks_exact(3)).enumerate() {
-            each(row, Wrench { force: Vec3::from_column_slice(force), torque: Vec3::from_column_slice(torque) });
-        }
-        Ok(())
-    }
-}
-
-/// Writes one row of each site.
-fn copy<const N: usize>(
-    py: Python<'_>,
-    (array, _): &Column,
-    sites: &[Site],
-    get: impl Fn(&Site) -> [f64; N],
-) -> Result<()> {
-    let mut out = array.bind(py).try_readwrite().map_err(PyErr::from)?;
-    let rows = out.as_slice_mut().map_err(PyErr::from)?.as_chunks_mut().0;
-    rows.iter_mut().zip(sites).for_each(|(row, site)| *row = get(site));
-    Ok(())
-}
+use tumble::core::WorldView;
 
 /// The world as a force or a behaviour sees it while it is called: a row for every rigid body and every link, in world axes.
 ///
@@ -295,7 +64,7 @@ impl View {
         }
     }
 
-    /// A view of what is shown, by its place in [`WIDTHS`].
+    /// A view of what is shown, by its place in [`Arrays::shown`].
     fn shown<'py>(&self, py: Python<'py>, which: usize) -> Result<Bound<'py, PyAny>> {
         self.open()?;
         Ok(self.arrays.shown[which].1.bind(py).call_method0("view")?)

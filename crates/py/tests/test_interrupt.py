@@ -77,7 +77,7 @@ print(took)
 def test_a_rollout_of_hours_ends(force, threads):
     lines, after = run(ROLLOUT.format(force=force, threads=threads))
     assert lines == ["interrupted", "True True"]
-    assert after < 2.0  # a tenth of that on a machine that does nothing else
+    assert after < 10.0  # a fiftieth of that on a machine that does nothing else
 
 
 def test_a_rollout_within_a_force_ends():
@@ -99,15 +99,15 @@ def test_a_rollout_within_a_force_ends():
             print("interrupted")
         print(waited())
     """)
-    assert lines == ["interrupted"] and after < 2.0
+    assert lines == ["interrupted"] and after < 10.0
 
 
 @pytest.mark.parametrize("method", ["medial", "hubbard", "grid", "octree"])
 def test_the_building_of_a_tree_ends(method):
     lines, after = run(f"""
-        mesh = ball(200)
+        mesh = ball(60)
         count = threads()
-        soon(1.5)
+        soon(1.0)
         try:
             for _ in range(1000):
                 tumble.SphereTree.build(*mesh, method="{method}", branch=8, depth=5, error=1e-4, cache=False)
@@ -117,7 +117,7 @@ def test_the_building_of_a_tree_ends(method):
         print(threads() - count <= os.cpu_count() + 1)
         print(took)
     """)
-    assert lines == ["interrupted", "True"] and after < 2.0
+    assert lines == ["interrupted", "True"] and after < 10.0
 
 
 def test_a_signal_that_raises_nothing_lets_work_go_on():

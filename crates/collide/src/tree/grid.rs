@@ -8,7 +8,7 @@
 
 use super::builder::{Built, Job, TreeBuilder};
 use super::regions::{Part, build, cover_of, refitted, worst};
-use crate::{Mat3, MeshDistance, MeshError, Vec3};
+use crate::{Mat3, MeshError, Vec3};
 use nalgebra::{Rotation3, SymmetricEigen, Unit};
 
 /// Points of a region that grids are ranked by.
@@ -26,7 +26,7 @@ impl TreeBuilder for Grid {
     fn build(&self, job: &Job) -> Result<Built, MeshError> {
         let cover = cover_of(job);
         let most = job.settings.branch as usize;
-        Ok(build(job, &cover, &|region| divided(region, &cover.points, most, job.distance)))
+        Ok(build(job, &cover, &|region| divided(region, &cover.points, most, job)))
     }
 }
 
@@ -73,7 +73,7 @@ impl Cubes {
 }
 
 /// The region parted by the best grid found; nothing if no grid parts it.
-fn divided(region: &[u32], points: &[Vec3], most: usize, distance: &MeshDistance) -> Vec<Part> {
+fn divided(region: &[u32], points: &[Vec3], most: usize, job: &Job) -> Vec<Part> {
     let looked_at: Vec<u32> = region.iter().copied().step_by(region.len().div_ceil(LOOKED_AT)).collect();
     let some: Vec<Vec3> = looked_at.iter().map(|&i| points[i as usize]).collect();
     let mut ranked: Vec<(f64, Cubes)> =
@@ -81,14 +81,15 @@ fn divided(region: &[u32], points: &[Vec3], most: usize, distance: &MeshDistance
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = ranked
         .iter()
+        .take_while(|_| !job.progress.stopped())
         .map(|(_, cubes)| cubes.parts(region, points))
         // points that were not looked at may lie in more cubes
         .filter(|parts| (2..=most).contains(&parts.len()))
         .take(FITTED)
-        .map(|parts| parts.into_iter().map(|own| Part::of(own, None, points, distance)).collect::<Vec<Part>>())
+        .map(|parts| parts.into_iter().map(|own| Part::of(own, None, points, job.distance)).collect::<Vec<Part>>())
         .min_by(|a, b| worst(a).total_cmp(&worst(b)))
         .unwrap_or_default();
-    refitted(best, points, distance)
+    refitted(best, points, job.distance, job.progress)
 }
 
 /// The grids tried: along the axes given, along the principal axes, and these turned by 45° about each.

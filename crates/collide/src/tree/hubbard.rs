@@ -88,10 +88,14 @@ impl Balls<'_> {
             progress: self.progress,
         };
         merging.run(most);
+        // half merged, the groups are too many for what follows
+        if self.progress.stopped() {
+            return Vec::new();
+        }
         let parts = groups.into_iter().filter(|g| g.alive);
         let parts: Vec<Part> =
             parts.map(|g| Part::of(g.points, Some(g.center), &self.cover.points, self.distance)).collect();
-        if parts.len() < 2 { Vec::new() } else { refitted(parts, &self.cover.points, self.distance) }
+        if parts.len() < 2 { Vec::new() } else { refitted(parts, &self.cover.points, self.distance, self.progress) }
     }
 
     /// Each point with the ball that reaches out least, among those that hold it.

@@ -4,7 +4,7 @@
 //! of the leaves over the surface itself ([`super::close`]).
 
 use super::ball::{Ball, around_points};
-use super::builder::{Built, Cell, Job, StageCount};
+use super::builder::{Built, Cell, Job, Progress, StageCount};
 use super::close::closed;
 use super::medial::CoverPoints;
 use super::simplex::simplex;
@@ -55,8 +55,13 @@ impl Part {
 }
 
 /// Points choose the ball that reaches out least to hold them, and balls are fitted anew, while that lowers how far the worst reaches out.
-pub(super) fn refitted(mut parts: Vec<Part>, all: &[Vec3], distance: &MeshDistance) -> Vec<Part> {
-    for _ in 0..REFITS {
+pub(super) fn refitted(
+    mut parts: Vec<Part>,
+    all: &[Vec3],
+    distance: &MeshDistance,
+    progress: &dyn Progress,
+) -> Vec<Part> {
+    for _ in (0..REFITS).take_while(|_| !progress.stopped()) {
         let needs: Vec<(Vec3, f64)> = parts.iter().map(|p| (p.ball.center, p.outward - p.ball.radius)).collect();
         let mut chosen: Vec<Vec<u32>> = vec![Vec::new(); parts.len()];
         for &i in parts.iter().flat_map(|p| &p.points) {

@@ -1,0 +1,104 @@
+//! The numpy arrays of a view, which serve one call after another.
+
+use crate::errors::{Error, Result};
+use crate::layout::Layout;
+use crate::state::holders;
+use numpy::{PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use std::sync::Arc;
+use tumble::collide::Vec3;
+use tumble::core::{Site, Wrench};
+
+/// Numbers of a row: position, quaternion, velocity, angular velocity, acceleration, angular acceleration.
+const WIDTHS: [usize; 6] = [3, 4, 3, 3, 3, 3];
+
+/// An array that is written here, and a read-only view of it, of which Python gets views.
+type Column = (Py<PyArray2<f64>>, Py<PyAny>);
+
+/// The arrays of a view.
+pub struct Arrays {
+    rows: usize,
+    /// In the order of [`WIDTHS`].
+    pub shown: [Column; 6],
+    pub force: Py<PyArray2<f64>>,
+    pub torque: Py<PyArray2<f64>>,
+}
+
+impl Arrays {
+    /// For a number of rows.
+    pub fn new(py: Python<'_>, rows: usize) -> Result<Arrays> {
+        let zeros = |width| PyArray2::zeros(py, [rows, width], false);
+        let mut shown = Vec::with_capacity(WIDTHS.len());
+        for width in WIDTHS {
+            let array = zeros(width);
+            let view = array.call_method0("view")?;
+            view.call_method1("setflags", (false,))?;
+            shown.push((array.unbind(), view.unbind()));
+        }
+        let shown = shown.try_into().map_err(|_| Error::Internal("as many arrays as there are kinds".into()))?;
+        Ok(Arrays { rows, shown, force: zeros(3).unbind(), torque: zeros(3).unbind() })
+    }
+
+    /// Whether they may be written again: Python holds none of them, nor a view of one.
+    pub fn free(self: &Arc<Arrays>, py: Python<'_>, rows: usize) -> bool {
+        let own = |(array, view): &Column| holders(array, py) == 2 && holders(view, py) == 1;
+        let wrenches = [&self.force, &self.torque].iter().all(|array| holders(array, py) == 1);
+        self.rows == rows && Arc::strong_count(self) == 1 && wrenches && self.shown.iter().all(own)
+    }
+
+    /// Writes the sites, and zeros for what will act.
+    pub fn fill(&self, py: Python<'_>, sites: &[Site]) -> Result<()> {
+        let [position, orientation, velocity, angular_velocity, acceleration, angular_acceleration] = &self.shown;
+        copy(py, position, sites, |s| s.position().into())?;
+        copy(py, orientation, sites, |s| s.pose.rotation.coords.into())?;
+        copy(py, velocity, sites, |s| s.velocity.into())?;
+        copy(py, angular_velocity, sites, |s| s.angular_velocity.into())?;
+        copy(py, acceleration, sites, |s| s.acceleration.into())?;
+        copy(py, angular_acceleration, sites, |s| s.angular_acceleration.into())?;
+        for array in [&self.force, &self.torque] {
+            array.bind(py).try_readwrite().map_err(PyErr::from)?.as_slice_mut().map_err(PyErr::from)?.fill(0.0);
+        }
+        Ok(())
+    }
+
+    /// What a callback added, by row.
+    pub fn take(
+        &self,
+        py: Python<'_>,
+        layout: &Layout,
+        whose: &str,
+        mut each: impl FnMut(usize, Wrench),
+    ) -> Result<()> {
+        let (force, torque) = (
+            self.force.bind(py).try_readonly().map_err(PyErr::from)?,
+            self.torque.bind(py).try_readonly().map_err(PyErr::from)?,
+        );
+        let (force, torque) = (force.as_slice().map_err(PyErr::from)?, torque.as_slice().map_err(PyErr::from)?);
+        for (what, numbers) in [("force", force), ("torque", torque)] {
+            if let Some(k) = numbers.iter().position(|x| !x.is_finite()) {
+                let name = layout.owner(k / 3).map_or("nothing", |(_, _, name)| name);
+                return Err(Error::value(format!(
+                    "'{whose}': its {what} on '{name}' is {}; it must be finite",
+                    numbers[k]
+                )));
+            }
+        }
+        for (row, (force, torque)) in force.chunks_exact(3).zip(torque.chunks_exact(3)).enumerate() {
+            each(row, Wrench { force: Vec3::from_column_slice(force), torque: Vec3::from_column_slice(torque) });
+        }
+        Ok(())
+    }
+}
+
+/// Writes one row of each site.
+fn copy<const N: usize>(
+    py: Python<'_>,
+    (array, _): &Column,
+    sites: &[Site],
+    get: impl Fn(&Site) -> [f64; N],
+) -> Result<()> {
+    let mut out = array.bind(py).try_readwrite().map_err(PyErr::from)?;
+    let rows = out.as_slice_mut().map_err(PyErr::from)?.as_chunks_mut().0;
+    rows.iter_mut().zip(sites).for_each(|(row, site)| *row = get(site));
+    Ok(())
+}
