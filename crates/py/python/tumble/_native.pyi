@@ -38,6 +38,10 @@ __all__ = [
     "__version__",
     "read_recording",
     "_panic",
+    "_unpickle_articulation",
+    "_unpickle_shape",
+    "_unpickle_tree",
+    "_unpickle_world",
     "_words",
 ]
 
@@ -646,6 +650,8 @@ class World:
 
         Forces and behaviours are copied by their own ``fork``.
         """
+    def __copy__(self) -> World: ...
+    def __deepcopy__(self, _memo: Any) -> World: ...
     def rollout(
         self,
         controls: ArrayLike,
@@ -751,7 +757,7 @@ class World:
     def _repr_png_(self) -> bytes | None:
         """How a notebook shows the world: a PNG, or nothing where there is no graphics adapter."""
     def plot_energy(self, seconds: float = 5.0, *, ax: Any = None) -> Any:
-        """Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib, the extra ``plot``.
+        """Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib.
 
         ax: the axes to plot on, by default new ones. Returns the axes.
         """
@@ -767,3 +773,13 @@ def _panic(world: World, while_: str) -> None:
     """Panics within a call on a world: while it is ``"read"``, ``"changed"`` or ``"stepped"``."""
 def _words() -> dict[str, list[str]]:
     """Every set of words by the name of its type in ``tumble.typing``, in the library's order."""
+def _unpickle_articulation(
+    file: Path, floating: bool, packages: Mapping[str, Path], words: Sequence[str], numbers: Sequence[Sequence[float]]
+) -> Articulation:
+    """What a pickled description becomes: its file is read anew."""
+def _unpickle_shape(data: bytes) -> Shape:
+    """What a pickled shape becomes: an object of its class."""
+def _unpickle_tree(data: bytes) -> SphereTree:
+    """What a pickled sphere tree becomes."""
+def _unpickle_world(data: bytes) -> World:
+    """What a pickled world becomes; pickle then puts its forces and behaviours back."""
