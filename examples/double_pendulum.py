@@ -10,7 +10,7 @@ world = {{ stepper = "backtracking", integrator = "dormand_prince", integrator_t
 name = "arm"
 link = [{{ name = "upper", {ROD} }}, {{ name = "lower", parent = "upper", position_m = [0, 0, -1], {ROD} }}]"""
 world = tumble.World.parse(SCENE)
-arm, rest, errors, energies = world["arm"], world.save(), [], []
+arm, rest, errors, energies = world.articulation("arm"), world.save(), [], []
 for root in (2**0.5, -(2**0.5)):  # the lower rod leans by ±√2 of the upper; q holds the upper's angle and the one between them
     world.restore(rest)
     arm.q = 1e-4, 1e-4 * (root - 1)

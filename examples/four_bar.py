@@ -15,7 +15,7 @@ link = [
     {{ name = "pin", parent = "rocker", joint = "fixed", position_m = [0, 0, 0.5] }},
 ]"""
 world = tumble.World.parse(SCENE)
-linkage, gaps, angles = world["linkage"], [], [np.radians(40)]
+linkage, gaps, angles = world.articulation("linkage"), [], [np.radians(40)]
 for _ in range(2400):
     world.step()
     angles.append(linkage.q[0])

@@ -38,7 +38,7 @@ def swing(integrator: str) -> tuple[float, float]:
     """The mean period over 20 s, and the largest change of energy."""
     text = ROD.replace("dt_s = 0.01", f'dt_s = 0.01\nstepper = "backtracking"\nintegrator = "{integrator}"')
     world = tumble.World.parse(text)
-    arm, start = world["pendulum"], world.energy().total
+    arm, start = world.articulation("pendulum"), world.energy().total
     times, drift, before = [], 0.0, arm.q[0]
     for _ in range(2000):
         world.step()

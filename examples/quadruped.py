@@ -15,7 +15,7 @@ GROUND = '{ name = "ground", mode = "static", shape = { type = "half_space" } }'
 world = tumble.World.parse(f'body = [{GROUND}]\n[[articulated]]\nname = "dog"\nfloating = true\nposition_m = [0, 0, 0.4]\nlink = [\n{LINKS}\n]')
 
 world.step(3 * 240)
-dog, forces = world["dog"], {}
+dog, forces = world.articulation("dog"), {}
 for contact in world.contacts:  # parts are places in link_names; the force is on the first body, which is the dog or the ground
     side = list(contact["bodies"]).index(1)
     foot = dog.link_names[contact["parts"][side]]

@@ -8,7 +8,7 @@ import tumble
 
 CART = 'name = "cart", joint = "prismatic", axis = [1, 0, 0], mass_kg = 1, center_m = [0, 0, 0], inertia_kg_m2 = [1, 1, 1]'
 world = tumble.World.parse(f'world = {{ dt_s = 0.05 }}\n[[articulated]]\nname = "cart"\nlink = [{{ {CART} }}]')
-cart = world["cart"]
+cart = world.articulation("cart")
 
 rng, mean, spread = np.random.default_rng(1), np.zeros(10), 25 * np.eye(10)
 for turn in range(40):  # the cross-entropy method: draw, keep the best tenth, draw as they are spread

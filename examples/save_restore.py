@@ -1,8 +1,9 @@
-"""A snapshot taken in mid-fall: restored in the same world, in a fork and in another world, its future has the same bits.
+"""A snapshot taken in mid-fall: restored in the same world, a fork, a pickled copy and a new world, its future has the same bits.
 
     python examples/save_restore.py
 """
 
+import pickle
 import tumble
 
 
@@ -17,7 +18,7 @@ def build() -> tumble.World:
 world = build()
 world.step(100)
 snapshot = world.save()  # bytes: all that the next step reads; the shapes come with the world it is restored into
-for each in (world, world, world.fork(), build()):
+for each in (world, world, world.fork(), pickle.loads(pickle.dumps(world)), build()):
     each.restore(snapshot)
     each.step(400)
     print(f"frame {each.frame}: {each.energy().total!r} J, the same bytes: {each.save() == world.save()}")

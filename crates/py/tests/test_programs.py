@@ -114,7 +114,7 @@ def test_training_balances_the_pole(run):
 def test_a_snapshot_has_one_future(run, capsys):
     names = run("save_restore")
     lines = capsys.readouterr().out.splitlines()
-    assert len(set(lines)) == 1 and len(lines) == 4
+    assert len(set(lines)) == 1 and len(lines) == 5
     assert lines[0].endswith("True") and names["each"] is not names["world"]
 
 
