@@ -219,7 +219,7 @@ class Articulation:
         missing_meshes: MissingMeshes = "error",
         collision_meshes: CollisionMeshes = "exact",
     ) -> Articulation:
-        """Reads a URDF: its tree at once, its shapes when it is added to a world.
+        """Reads a URDF: its tree at once, its collision shapes when it is added to a world, the meshes of its visuals when somebody draws them.
 
         floating: whether the root floats, else it is fixed to the base; packages: folders by name, for ``package://NAME/…``; missing_meshes:
         ``"error"`` or ``"skip"``, for collision meshes that are not there; collision_meshes: ``"exact"`` or ``"hull"``.
@@ -587,7 +587,12 @@ class World:
         """The world of a scene that is given as the text of its file."""
     @property
     def notes(self) -> list[str]:
-        """What is to be said of the files of a loaded scene, such as what was mended in a mesh: a list of sentences."""
+        """What is to be said of the world: a list of sentences.
+
+        Of the files of a scene and of articulations that were added, such as what was mended in a mesh or that a convex hull collides; of visual meshes
+        that could not be read, once something has drawn them; of bodies that overlap at the start, the deepest eight by name. Overlaps are looked for when
+        this is asked before the first step.
+        """
     def step(self, n: int = 1) -> None:
         """Advances by ``n`` steps of ``dt``. The interpreter is let go meanwhile; Ctrl-C ends it between two steps.
 
