@@ -1,5 +1,6 @@
 """The package as it is installed."""
 
+import importlib.metadata
 import inspect
 import runpy
 from pathlib import Path
@@ -23,6 +24,18 @@ def test_the_library_holds_no_path_of_its_builder(root):
     for folder in [root, Path.home() / ".cargo"]:
         assert str(folder).encode() not in code
     assert b"crates/py/src/" in code  # where panics come from is still said
+
+
+def test_the_metadata_says_what_it_is(root):
+    if not installed():
+        pytest.skip("SKIPPED: the package is not that of a wheel")
+    metadata = importlib.metadata.metadata("tumble")
+    classifiers = metadata.get_all("Classifier")
+    assert {"Topic :: Scientific/Engineering :: Physics", "Typing :: Typed", "Programming Language :: Rust"} <= set(classifiers)
+    assert metadata["License-Expression"] == "MIT OR Apache-2.0"
+    files = {Path(str(file)).name: file.locate() for file in importlib.metadata.files("tumble") if "licenses" in file.parts}
+    assert sorted(metadata.get_all("License-File")) == sorted(files) == ["LICENSE-APACHE", "LICENSE-MIT"]
+    assert all(Path(copy).read_bytes() == (root / name).read_bytes() for name, copy in files.items())
 
 
 def public():
