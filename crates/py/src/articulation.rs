@@ -2,22 +2,22 @@
 
 use crate::body::{Place, hash};
 use crate::collect::{Anchor, anchor};
-use crate::convert::{Numbers, array, numbers, vec3, vector};
+use crate::convert::{array, vec3, vector};
 use crate::description::alone;
 use crate::errors::{Error, Result};
-use crate::inner::Inner;
+use crate::joints::{drive, result};
 use crate::pool;
-use crate::robot::{Robot, Rows};
+use crate::robot::Robot;
 use crate::spot::{Now, Source, Spot, Which, locked, start};
 use crate::words::{COLLISION_MESHES, MISSING_MESHES, meaning, word};
-use numpy::{IxDyn, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use tumble::collide::{Pose, Vec3};
-use tumble::core::{ArticulatedBody, Drive, Freedom};
+use tumble::core::{ArticulatedBody, Freedom};
 use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A tree of links: a robot, a chain, a skeleton.
@@ -30,7 +30,7 @@ use tumble::scene::urdf::{self, UrdfOptions};
 /// tree alone: no limits, damping, drives or contacts.
 #[pyclass(frozen, module = "tumble")]
 pub struct Articulation {
-    name: Arc<str>,
+    pub name: Arc<str>,
     pub robot: Arc<Robot>,
     pub spot: Spot,
     anchor: Option<Py<Anchor>>,
@@ -54,104 +54,6 @@ impl Articulation {
             Spot::Free { .. } => None,
         }
     }
-
-    /// The body to be put into a world, in the state that the description has, and what is to be said of its files.
-    pub fn body(
-        &self,
-        py: Python<'_>,
-        base: Pose,
-        name: Option<&str>,
-    ) -> Result<(ArticulatedBody, Robot, Vec<String>)> {
-        let Spot::Free { source, now } = &self.spot else {
-            return Err(Error::value(format!(
-                "'{}' is in a world already; add the description that it was made of",
-                self.name
-            )));
-        };
-        let (body, notes) = py.detach(|| pool::run(|| source.body()))?;
-        let body = body.at(base).named(name.unwrap_or(&self.name));
-        let Now { mut q, qd, .. } = locked(now).clone();
-        // where a floating root is, is said from the base
-        let model = body.model();
-        for link in model.links().iter().filter(|link| link.joint == tumble::core::Joint::Floating) {
-            let own = Pose::from_parts(
-                Vec3::from_column_slice(&q[link.q..link.q + 3]).into(),
-                crate::convert::unit(&q[link.q + 3..link.q + 7]),
-            );
-            q[link.q..link.q + 7].copy_from_slice(&crate::convert::pose_numbers(&(base * own)));
-        }
-        let body = body.with_positions(&q)?.with_velocities(&qd)?;
-        let robot = Robot { model: body.model().clone(), base, joints: self.robot.joints.clone() };
-        Ok((body, robot, notes))
-    }
-
-    /// Arguments of an algorithm: what is not given is what it is now.
-    fn rows(&self, arguments: &[(Which, &'static str, Option<&Bound<'_, PyAny>>)]) -> Result<Rows> {
-        let read = |&(which, name, value): &(Which, &'static str, Option<&Bound<'_, PyAny>>)| {
-            let width = which.width(&self.robot);
-            let numbers = match value {
-                Some(value) => numbers(value, name)?,
-                None => Numbers { shape: vec![width], data: self.spot.get(which, &self.robot)? },
-            };
-            Ok((name, numbers, width))
-        };
-        Rows::new(arguments.iter().map(read).collect::<Result<Vec<_>>>()?)
-    }
-
-    fn in_world(&self) -> Result<&Place> {
-        self.place().ok_or_else(|| {
-            Error::value(format!(
-                "'{}' is in no world; World.add_articulation gives the handle of one that is",
-                self.name
-            ))
-        })
-    }
-
-    /// The freedom of a hinge or slider, by the name of its joint.
-    fn freedom(&self, joint: &str) -> Result<usize> {
-        let number = self.robot.joints.iter().position(|name| name == joint).ok_or_else(|| {
-            let names: Vec<&str> = self.robot.joints.iter().map(String::as_str).take(12).collect();
-            Error::Name(format!("there is no joint named '{joint}'; there are {}", names.join(", ")))
-        })?;
-        let link = &self.robot.model.links()[number];
-        if link.joint.dof() != 1 {
-            return Err(Error::value(format!(
-                "joint '{joint}' has {} freedoms; drives are of hinges and sliders",
-                link.joint.dof()
-            )));
-        }
-        Ok(link.v)
-    }
-
-    /// The part that carries a frame.
-    fn part(&self, link: &str) -> Result<usize> {
-        let links = self.robot.model.links().len();
-        Ok(self.robot.frame(link)?.link.unwrap_or(links))
-    }
-
-    /// Something at a point of a link, by default the origin of its frame.
-    fn push(
-        &self,
-        py: Python<'_>,
-        link: &str,
-        point: Option<&Bound<'_, PyAny>>,
-        apply: impl FnOnce(&mut Inner, &Place, usize, Vec3) -> Result<()>,
-    ) -> Result<()> {
-        let (place, part) = (self.in_world()?, self.part(link)?);
-        let point = point.map(|p| vec3(p, "point")).transpose()?;
-        let frame = self.robot.frame(link)?.pose;
-        place.write(py, |inner| {
-            let site = inner.world.site(place.id, part).ok_or_else(|| place.removed())?;
-            let at = point.unwrap_or((site.pose * frame).translation.vector);
-            apply(inner, place, part, at)
-        })
-    }
-}
-
-/// Results in the shape that their arguments ask for.
-fn result<'py>(py: Python<'py>, rows: &Rows, data: Vec<f64>, shape: &[usize]) -> Result<Bound<'py, PyArrayDyn<f64>>> {
-    let shape: Vec<usize> = rows.batch.iter().chain(shape).copied().collect();
-    Ok(PyArray1::from_vec(py, data).reshape(IxDyn(&shape))?)
 }
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -399,21 +301,7 @@ impl Articulation {
     ) -> Result<()> {
         let limit = limit.unwrap_or(f64::INFINITY);
         let (place, index) = (self.in_world()?, self.freedom(joint)?);
-        let stiff = stiffness != 0.0 || damping != 0.0;
-        let drive = match (target, velocity) {
-            (None, None) if !stiff => Drive::None,
-            (Some(_), _) if !stiff => {
-                return Err(Error::value("target: a drive to a position wants a stiffness or a damping above 0"));
-            }
-            (None, Some(target)) if !stiff => Drive::Velocity { target, limit },
-            _ => Drive::Position {
-                stiffness,
-                damping,
-                target: target.unwrap_or(0.0),
-                velocity: velocity.unwrap_or(0.0),
-                limit,
-            },
-        };
+        let drive = drive(target, velocity, stiffness, damping, limit)?;
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
             let freedom = Freedom { drive, ..body.freedoms()[index].clone() };

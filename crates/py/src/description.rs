@@ -3,11 +3,47 @@
 use crate::articulation::Articulation;
 use crate::convert::{array, path};
 use crate::errors::{Error, Result};
-use crate::spot::Which;
+use crate::pool;
+use crate::robot::Robot;
+use crate::spot::{Now, Spot, Which, locked};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use tumble::collide::{Pose, Vec3};
+use tumble::core::ArticulatedBody;
+
+impl Articulation {
+    /// The body to be put into a world, in the state that the description has, and what is to be said of its files.
+    pub fn body(
+        &self,
+        py: Python<'_>,
+        base: Pose,
+        name: Option<&str>,
+    ) -> Result<(ArticulatedBody, Robot, Vec<String>)> {
+        let Spot::Free { source, now } = &self.spot else {
+            return Err(Error::value(format!(
+                "'{}' is in a world already; add the description that it was made of",
+                self.name
+            )));
+        };
+        let (body, notes) = py.detach(|| pool::run(|| source.body()))?;
+        let body = body.at(base).named(name.unwrap_or(&self.name));
+        let Now { mut q, qd, .. } = locked(now).clone();
+        // where a floating root is, is said from the base
+        let model = body.model();
+        for link in model.links().iter().filter(|link| link.joint == tumble::core::Joint::Floating) {
+            let own = Pose::from_parts(
+                Vec3::from_column_slice(&q[link.q..link.q + 3]).into(),
+                crate::convert::unit(&q[link.q + 3..link.q + 7]),
+            );
+            q[link.q..link.q + 7].copy_from_slice(&crate::convert::pose_numbers(&(base * own)));
+        }
+        let body = body.with_positions(&q)?.with_velocities(&qd)?;
+        let robot = Robot { model: body.model().clone(), base, joints: self.robot.joints.clone() };
+        Ok((body, robot, notes))
+    }
+}
 
 /// What a pickled description becomes: its file is read anew.
 #[pyfunction]

@@ -15,6 +15,7 @@ mod extension;
 mod faults;
 mod inner;
 mod interrupt;
+mod joints;
 mod layout;
 mod looks;
 mod pickling;
