@@ -52,7 +52,7 @@ def last_line(folder, facet):
 def tumble(*args, timeout=36000):
     done = subprocess.run([TUMBLE, *map(str, args)], timeout=timeout, capture_output=True, text=True)
     if done.returncode != 0:
-        sys.exit(f"tumble {' '.join(map(str, args))} ended with {done.returncode}:\n{done.stderr[-2000:]}")
+        sys.exit(f"error: tumble {' '.join(map(str, args))} ended with {done.returncode}:\n{done.stderr[-2000:]}")
     return done.stdout
 
 
@@ -110,7 +110,7 @@ def wait_for(ready, seconds=60):
     until = time.time() + seconds
     while not ready():
         if time.time() > until:
-            sys.exit(f"it did not come within {seconds} s")
+            sys.exit(f"error: it did not come within {seconds} s")
         time.sleep(0.01)
 
 
@@ -389,7 +389,7 @@ def cuts(options):
 def namespace(options):
     """Two facets on a machine that is a network namespace, started by the cave file's launch command; nothing of them is left. Needs root."""
     if os.geteuid() != 0 or not shutil.which("ip"):
-        sys.exit("namespace: needs root and the command ip (on Debian: apt-get install iproute2)")
+        sys.exit("error: namespace: needs root and the command ip (on Debian: apt-get install iproute2)")
     space, folder = f"tumble-cave-{os.getpid()}", OUT / "namespace"
     key = OUT / "key"
     key.write_text(secrets.token_hex(32))

@@ -21,11 +21,11 @@ while [ $# -gt 0 ]; do
             exit 2
             ;;
     esac
-    [ $# -ge 2 ] || { echo "Error: $1 needs a value" >&2; exit 2; }
+    [ $# -ge 2 ] || { echo "error: $1 needs a value" >&2; exit 2; }
     shift 2
 done
-[ "$(id -u)" -eq 0 ] || { echo "Error: network namespaces need root; run it with sudo" >&2; exit 2; }
-command -v ip >/dev/null || { echo "Error: no ip command; on Debian: apt-get install iproute2" >&2; exit 1; }
+[ "$(id -u)" -eq 0 ] || { echo "error: network namespaces need root; run it with sudo" >&2; exit 2; }
+command -v ip >/dev/null || { echo "error: no ip command; on Debian: apt-get install iproute2" >&2; exit 1; }
 
 cargo build --quiet --release --locked -p tumble-net --example link_trial
 trial="$PWD/target/release/examples/link_trial"

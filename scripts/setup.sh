@@ -82,7 +82,7 @@ has_window_libraries || missing="$missing libx11-6 libx11-xcb1 libxcursor1 libxi
 [ -z "$missing" ] || install_packages $missing
 
 if ! has_compiler; then
-    echo "Error: no C compiler (cc) that links; on Debian: apt-get install gcc libc6-dev" >&2
+    echo "error: no C compiler (cc) that links; on Debian: apt-get install gcc libc6-dev" >&2
     exit 1
 fi
 if ! { has_vulkan_loader && has_vulkan_driver; }; then
@@ -92,14 +92,14 @@ if ! { has_window_tools && has_window_libraries; }; then
     echo "No Xvfb, xdotool or import, or no X libraries: tests of windows are left out." >&2
 fi
 if ! command -v cargo >/dev/null 2>&1; then
-    echo "Error: no cargo; a Rust toolchain comes from https://rustup.rs" >&2
+    echo "error: no cargo; a Rust toolchain comes from https://rustup.rs" >&2
     exit 1
 fi
 
 wanted="$(sed -n 's/^rust-version = "1\.\([0-9]*\).*"/\1/p' Cargo.toml)"
 found="$(rustc -V | sed -n 's/^rustc 1\.\([0-9]*\).*/\1/p')"
 if [ "${found:-0}" -lt "${wanted:-0}" ]; then
-    echo "Error: Rust 1.$wanted or newer is wanted, and $(rustc -V) is here; run: rustup update stable" >&2
+    echo "error: Rust 1.$wanted or newer is wanted, and $(rustc -V) is here; run: rustup update stable" >&2
     exit 1
 fi
 

@@ -7,7 +7,7 @@
 wanted="crates/py/tests/requirements.txt"
 wheels="target/wheels/tested"
 builder="target/py-tests/bin/python"
-[ -x "$builder" ] || { echo "Error: run scripts/test_python.sh first; it makes $builder, which builds the wheel." >&2; exit 1; }
+[ -x "$builder" ] || { echo "error: run scripts/test_python.sh first; it makes $builder, which builds the wheel." >&2; exit 1; }
 
 export PIP_DISABLE_PIP_VERSION_CHECK=1 MPLBACKEND=Agg PYTHONSAFEPATH=1
 rm -rf "$wheels"
@@ -35,4 +35,4 @@ for version in 3.10 3.11 3.12 3.13 3.14; do
     echo "==> Python $version ($("$venv/bin/python" -V))"
     "$venv/bin/python" -m pytest --rootdir=. -p no:cacheprovider "$@" || failed="$failed $version"
 done
-[ -z "$failed" ] || { echo "Failed on:$failed" >&2; exit 1; }
+[ -z "$failed" ] || { echo "error: the tests failed on:$failed" >&2; exit 1; }

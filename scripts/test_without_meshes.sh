@@ -24,7 +24,7 @@ unset TUMBLE_MESHES
 cd "$clone" || exit 1
 for crate in collide core tumble; do
     filters="$(modules "$crate")"
-    [ -n "$filters" ] || { echo "Error: no test of crates/$crate looks for the meshes any more; take it out of $0" >&2; exit 1; }
+    [ -n "$filters" ] || { echo "error: no test of crates/$crate looks for the meshes any more; take it out of $0" >&2; exit 1; }
     # shellcheck disable=SC2086  # one word per module
     cargo test --release --locked --manifest-path "crates/$crate/Cargo.toml" --test it -- $filters || exit 1
 done

@@ -8,7 +8,7 @@
 
 python="$PWD/target/py-tests/bin/python"
 wheels="target/wheels/manylinux"
-[ -x "$python" ] || { echo "Error: run scripts/test_python.sh first; it makes $python, which builds the wheel." >&2; exit 1; }
+[ -x "$python" ] || { echo "error: run scripts/test_python.sh first; it makes $python, which builds the wheel." >&2; exit 1; }
 
 rm -rf "$wheels"
 "$python" -m maturin build --quiet --locked --auditwheel check --out "$wheels" || exit 1
@@ -16,7 +16,7 @@ wheel="$(ls "$wheels"/tumble-*.whl)"
 case "$wheel" in
 *manylinux*) ;;
 *)
-    echo "Error: $wheel is not tagged manylinux: it needs libraries or symbols that no manylinux version has; maturin's messages above name them." >&2
+    echo "error: $wheel is not tagged manylinux: it needs libraries or symbols that no manylinux version has; maturin's messages above name them." >&2
     exit 1
     ;;
 esac

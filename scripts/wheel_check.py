@@ -50,5 +50,5 @@ def runs() -> bool:
 if __name__ == "__main__":
     wrong = problems(Path(sys.argv[1])) + ([] if runs() else ["a ball does not fall by g t²/2"])
     for sentence in wrong:
-        print(f"Error: {sys.argv[1]}: {sentence}", file=sys.stderr)
+        print(f"error: {sys.argv[1]}: {sentence}", file=sys.stderr)
     sys.exit(bool(wrong))

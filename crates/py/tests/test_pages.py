@@ -36,6 +36,7 @@ NOT_RUN = {
     "python3 -m venv .venv && . .venv/bin/activate": "scripts/test_python.sh makes an environment in the same way",
     "pip install .": "scripts/test_python.sh installs the package so, and these tests use it",
     "tumble view stack": "opens a window: crates/tumble/tests/it/view_windows.rs",
+    "tumble view scenes/robot/arm.urdf": "opens a window: crates/tumble/tests/it/view_sliders.rs",
     "tumble view billiards --cave cube4 --preview": "opens a window: crates/tumble/tests/it/view_windows.rs",
     "tumble view billiards --cave cube4 --facet front": "opens a window: crates/tumble/tests/it/view_windows.rs",
     "tumble cave bowling --cave cube4": "opens windows: crates/tumble/tests/it/cave_windows.rs",

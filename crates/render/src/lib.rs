@@ -31,6 +31,7 @@ mod image;
 mod list;
 mod material;
 mod mesh;
+mod sliders;
 mod viewpoint;
 mod window;
 
@@ -47,6 +48,7 @@ pub use list::{
 };
 pub use material::{Material, Pattern, Shader, Texture};
 pub use mesh::{MAX_MESH_VERTICES, MeshData};
+pub use sliders::{Slider, SliderPanel};
 pub use viewpoint::{Lens, Part, Viewpoint};
 pub use window::{Next, WindowApp, WindowOptions, run_window};
 pub use winit;

@@ -95,7 +95,7 @@ fn furnished(
     }
     keep_apart_across_stacks(spec, &mut body)?;
     if spec.part_overlaps && spec.self_collision && maker.purpose == Purpose::Stepped {
-        let poses = link_poses(spec, &body, &positions, &velocities);
+        let poses = link_poses(spec, body.model(), &positions);
         part_overlaps(spec, shapes, &poses, &mut body, maker)?;
     }
     Ok(body)
@@ -202,12 +202,19 @@ impl Solid<'_> {
     }
 }
 
+/// Poses of all links in the world at time 0, without shapes.
+pub(crate) fn link_poses_at_start(spec: &ArticulatedSpec) -> Result<Vec<Pose>, ModelError> {
+    let masses: Vec<LinkMass> = spec.links.iter().map(LinkSpec::given_mass).collect();
+    let positions: Vec<f64> =
+        spec.links.iter().filter(|link| moves(link)).flat_map(|link| position(link, &spec.base)).collect();
+    Ok(link_poses(spec, &model(&spec.links, &masses)?, &positions))
+}
+
 /// Poses of all links in the world.
-fn link_poses(spec: &ArticulatedSpec, body: &ArticulatedBody, q: &[f64], v: &[f64]) -> Vec<Pose> {
-    let model = body.model();
+fn link_poses(spec: &ArticulatedSpec, model: &Model, q: &[f64]) -> Vec<Pose> {
     let mut kinematics = Kinematics::new(model);
-    kinematics.refresh(model, q, v);
-    let carrier = |link: Option<usize>| link.map_or(*body.base(), |l| kinematics.links()[l].pose);
+    kinematics.refresh(model, q, &vec![0.0; model.dof()]);
+    let carrier = |link: Option<usize>| link.map_or(spec.base, |l| kinematics.links()[l].pose);
     spec.links
         .iter()
         .map(|link| model.frame(&link.name).map_or(Pose::identity(), |f| carrier(f.link) * f.pose))

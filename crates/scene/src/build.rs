@@ -112,7 +112,7 @@ impl SceneFile {
     }
 
     fn build_for(&self, purpose: Purpose) -> Result<(World, Notes), BuildError> {
-        let mut notes = Notes::new();
+        let mut notes = self.notes.clone();
         let world = |source| BuildError::World { scene: self.file.clone(), source };
         let meshes =
             self.meshes.iter().map(|mesh| self.solid(mesh, purpose, &mut notes)).collect::<Result<Vec<_>, _>>()?;

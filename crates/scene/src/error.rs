@@ -8,6 +8,8 @@ use std::path::PathBuf;
 use ariadne::{CharSet, Config, IndexType, Label, Report, ReportKind, Source};
 use thiserror::Error;
 
+use crate::urdf::UrdfError;
+
 /// Problems told in full; the rest are counted.
 const SHOWN_PROBLEMS: usize = 40;
 /// A line longer than this many bytes is not drawn in a report.
@@ -42,6 +44,17 @@ pub enum SceneError {
         /// Offset of the first bad byte, from 0.
         byte: usize,
     },
+    /// The file is of a format that is not read, or no text.
+    #[error("{}: {why}", file.display())]
+    Format {
+        /// The path that was tried.
+        file: PathBuf,
+        /// What it is, and what is read.
+        why: String,
+    },
+    /// A robot's URDF cannot be used.
+    #[error(transparent)]
+    Urdf(#[from] UrdfError),
     /// Neither a path nor the name of a shipped scene.
     #[error("no scene `{name}`: {hint}")]
     Unknown {
@@ -61,7 +74,8 @@ impl SceneError {
     pub fn report(&self, color: bool) -> String {
         match self {
             SceneError::Invalid(invalid) => invalid.report(color),
-            other => format!("Error: {other}\n"),
+            SceneError::Urdf(error) => error.report(color),
+            other => format!("error: {other}\n"),
         }
     }
 
@@ -134,7 +148,7 @@ impl Invalid {
 
     fn plain(&self, problem: &Problem) -> String {
         let Problem { line, column, message, wanted, .. } = problem;
-        format!("Error: {message}\n  {}:{line}:{column}: {wanted}\n", self.file)
+        format!("error: {message}\n  {}:{line}:{column}: {wanted}\n", self.file)
     }
 
     /// The problem with its line of the file; `None` where the line is too long to show.
@@ -159,7 +173,7 @@ impl Invalid {
             .finish()
             .write((name, source), &mut bytes)
             .ok()?;
-        let drawn = String::from_utf8(bytes).ok()?;
+        let drawn = String::from_utf8(bytes).ok()?.replacen("Error", "error", 1);
         Some(drawn.lines().map(|line| line.trim_end().to_owned() + "\n").collect())
     }
 }

@@ -12,10 +12,13 @@ use crate::body::{BodySpec, Library};
 use crate::closure::{ClosureSpec, PartSpec, Parts};
 use crate::error::{Invalid, SceneError};
 use crate::fields::Fields;
+use crate::format::FileKind;
 use crate::grid::{self, MOST_BODIES};
 use crate::log::Log;
 use crate::material::MaterialSpec;
 use crate::mesh::MeshSpec;
+use crate::on_floor;
+use crate::urdf::UrdfOptions;
 use crate::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::world::WorldSettings;
 use tumble_core::collide::ContactMode;
@@ -24,6 +27,8 @@ use tumble_core::collide::ContactMode;
 pub const MOST_BYTES: u64 = 16 << 20;
 /// In a longer text only the first slip of syntax is told: the parser keeps every one it finds.
 const RECOVERED_BYTES: usize = 256 << 10;
+/// A text with more slips of syntax is no TOML: only the first is told.
+const MOST_SLIPS: usize = 5;
 /// Most articulated bodies of a scene.
 const MOST_ARTICULATED: usize = 10_000;
 /// Most closures of a scene.
@@ -60,20 +65,49 @@ pub struct SceneFile {
     pub sky: SkySpec,
     /// `[ground]`; `None` draws no floor.
     pub ground: Option<GroundSpec>,
+    /// What is to be said of the file.
+    pub notes: Vec<String>,
+}
+
+/// How a robot or a mesh file is opened as a scene. Scene files say all of this themselves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoadOptions {
+    /// How a URDF is read.
+    pub urdf: UrdfOptions,
+    /// Whether holes and other defects of a mesh are repaired; otherwise they are an error.
+    pub repair: bool,
 }
 
 impl SceneFile {
-    /// Reads the file at `path`, or `scene.toml` in the folder `path`.
+    /// Reads the file at `path`, or `scene.toml` in the folder `path`. A URDF (`.urdf`) becomes a scene of the robot on a floor through its
+    /// lowest point; a mesh (`.obj`, `.stl`, `.ply`, `.dae`) one of a dynamic body of 1000 kg/m³ above a floor, in the frame of its file.
     ///
     /// # Errors
-    /// [`SceneError`]: the file cannot be read, is larger than 16 MiB or not UTF-8, or has problems,
+    /// [`SceneError`]: the file cannot be read, is larger than 16 MiB, not UTF-8 or of another format, or has problems,
     /// all of which are told at once.
     pub fn load(path: impl AsRef<Path>) -> Result<SceneFile, SceneError> {
+        SceneFile::load_with(path, &LoadOptions::default())
+    }
+
+    /// The same, with options for robots and meshes.
+    ///
+    /// # Errors
+    /// As [`SceneFile::load`].
+    pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<SceneFile, SceneError> {
         let mut path = path.as_ref().to_path_buf();
         if path.is_dir() {
             path.push("scene.toml");
         }
+        match FileKind::of(&path).map_err(|why| SceneError::Format { file: path.clone(), why })? {
+            FileKind::Scene => {}
+            FileKind::Urdf => return on_floor::robot(&path, &options.urdf),
+            FileKind::Mesh => return on_floor::mesh(&path, options.repair),
+        }
         let bytes = read_capped(&path)?;
+        if let Some(at) = bytes.iter().position(|b| *b == 0) {
+            let why = format!("byte {at} of the file is 0, so it is no text; a scene is a UTF-8 text in TOML");
+            return Err(SceneError::Format { file: path, why });
+        }
         match std::str::from_utf8(&bytes) {
             Ok(text) => SceneFile::parse(text, &path.display().to_string()),
             Err(error) => {
@@ -145,6 +179,7 @@ impl SceneFile {
             lights,
             sky,
             ground,
+            notes: Vec::new(),
         }
     }
 }
@@ -166,8 +201,12 @@ pub(crate) fn parse_toml<'a>(log: &Log<'_>, text: &'a str) -> Option<DeTable<'a>
             (Some(root), errors)
         }
     };
-    for error in &errors {
-        let (message, wanted) = in_our_words(error.message());
+    let no_toml = errors.len() > MOST_SLIPS;
+    for error in errors.iter().take(if no_toml { 1 } else { MOST_SLIPS }) {
+        let (message, mut wanted) = in_our_words(error.message());
+        if no_toml {
+            wanted += &format!("; {} more slips of syntax follow, so this may be no TOML at all", errors.len() - 1);
+        }
         log.report(error.span().unwrap_or(0..0), message, wanted);
     }
     root.filter(|_| errors.is_empty()).map(toml::Spanned::into_inner)

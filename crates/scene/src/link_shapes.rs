@@ -187,11 +187,11 @@ impl<'m> ShapeMaker<'m> {
 }
 
 pub(crate) fn read_file(path: &Path) -> Result<TriMesh, String> {
-    read_triangles(path, &read_bytes(path)?)
+    read_triangles(path, &read_mesh_bytes(path)?)
 }
 
-/// The bytes of a mesh file. A pipe or device, which could keep its reader waiting, is refused.
-pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, String> {
+/// The bytes of a mesh file, at most 1 GiB. A pipe or device, which could keep its reader waiting, is refused. The error is a sentence without the file's name.
+pub fn read_mesh_bytes(path: &Path) -> Result<Vec<u8>, String> {
     let unread = |error: std::io::Error| format!("cannot be read: {error}");
     let about = std::fs::metadata(path).map_err(unread)?;
     if !about.is_file() {

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::SceneError;
-use crate::file::{SceneFile, description};
+use crate::file::{LoadOptions, SceneFile, description};
+use crate::format::is_file_name;
 use crate::suggest::{listed, nearest};
 
 /// A scene that is built into the library.
@@ -78,23 +79,31 @@ impl SceneSource {
     /// # Errors
     /// As [`SceneFile::load`].
     pub fn load(&self) -> Result<SceneFile, SceneError> {
+        self.load_with(&LoadOptions::default())
+    }
+
+    /// Reads the scene; a robot or a mesh file as the options say.
+    ///
+    /// # Errors
+    /// As [`SceneFile::load`].
+    pub fn load_with(&self, options: &LoadOptions) -> Result<SceneFile, SceneError> {
         match self {
-            SceneSource::Path(path) => SceneFile::load(path),
+            SceneSource::Path(path) => SceneFile::load_with(path, options),
             SceneSource::Shipped(scene) => scene.read(),
         }
     }
 }
 
-/// Finds a scene: the path of a file, the path of a folder with a `scene.toml`, or a name, which is
+/// Finds a scene: the path of a file (a scene, a URDF or a mesh), the path of a folder with a `scene.toml`, or a name, which is
 /// looked for as a folder in each of `search_dirs` and then among the shipped scenes. What looks like a
-/// path (it has a separator or ends in `.toml`) is never taken for a name.
+/// path (it has a separator, or the extension of a scene, robot or mesh) is never taken for a name.
 ///
 /// # Errors
 /// [`SceneError::Unknown`] for a name that is found nowhere; [`SceneError::Read`] for a path where
 /// nothing is.
 pub fn resolve_scene(name_or_path: &str, search_dirs: &[PathBuf]) -> Result<SceneSource, SceneError> {
     let path = Path::new(name_or_path);
-    let like_a_path = name_or_path.contains(['/', '\\']) || name_or_path.ends_with(".toml");
+    let like_a_path = name_or_path.contains(['/', '\\']) || is_file_name(path);
     if path.is_file() || path.join("scene.toml").is_file() {
         return Ok(SceneSource::Path(path.to_path_buf()));
     }

@@ -8,7 +8,7 @@ use tumble_core::VisualMesh;
 use tumble_core::collide::TriMesh;
 
 use crate::build::read_triangles;
-use crate::link_shapes::{read_bytes, stretched};
+use crate::link_shapes::{read_mesh_bytes, stretched};
 
 /// BLAKE3 of a file, its extension, and the bits of its scale.
 type Content = ([u8; 32], String, [u64; 3]);
@@ -23,7 +23,7 @@ pub(crate) fn of_file(path: &Path, scale: [f64; 3]) -> VisualMesh {
 }
 
 fn read(path: &Path, scale: [f64; 3]) -> Result<Arc<TriMesh>, String> {
-    let bytes = read_bytes(path)?;
+    let bytes = read_mesh_bytes(path)?;
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let content = (*blake3::hash(&bytes).as_bytes(), extension, scale.map(f64::to_bits));
     let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);

@@ -6,8 +6,8 @@ use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use tumble::collide::Builder;
 use tumble::render::{CalibrationPattern, DebugDraw, MAX_PIXELS, MAX_SIDE, Quality};
-use tumble::scene::urdf::MissingMeshes;
-use tumble::scene::{Integrator, SceneFile, Solver, Stepper, resolve_scene};
+use tumble::scene::urdf::{MissingMeshes, UrdfOptions};
+use tumble::scene::{FileKind, Integrator, LoadOptions, SceneFile, Solver, Stepper, resolve_scene};
 
 /// Real-time dynamics for interactive and immersive environments.
 #[derive(Parser)]
@@ -19,55 +19,59 @@ pub struct Tumble {
 
 #[derive(Subcommand)]
 pub enum Command {
-    /// Simulate a scene; record it, sum it up, take a picture of its end.
+    /// Simulate a scene; write a recording, a summary, pictures or a video
     Run(RunOptions),
-    /// Show a scene in a window: keys and mouse move the user, time stands and goes, bodies are pulled.
+    /// Show a scene in a window, with keys, mouse and sliders for joints
     View(ViewOptions),
-    /// Show a scene in a cave: a server that simulates, and a process per facet that draws.
+    /// Run a scene in a cave: one process that simulates, one per facet that draws
     Cave(Box<CaveOptions>),
-    /// The server of `tumble cave` alone; facets are started by hand, here or on other machines.
+    /// Run the server of a cave alone; facets are started by hand
     Serve(Box<ServeOptions>),
-    /// One facet of a run, for a server that is there or will be.
+    /// Draw one facet of a cave, from a server that runs or will run
     Facet(Box<FacetOptions>),
-    /// Drive the facets of a cave from a recording, and compare what they show with what they showed.
+    /// Show a recording in a cave, and compare its pictures with those recorded
     Replay(Box<ReplayOptions>),
-    /// Save what can be saved of a recording that was cut or damaged.
+    /// Save the intact part of a recording that was cut or damaged
     Recover(RecoverOptions),
-    /// Check scenes, caves, URDF robots and meshes; nothing is run.
+    /// Check scenes, caves, URDF robots and meshes without running them
     Check(CheckOptions),
-    /// Build a sphere tree around a mesh, or replace a robot's collision geometry by spheres; say how good they are.
+    /// Build a sphere tree around a mesh, or a robot of spheres
     #[command(name = "spheretree")]
     SphereTree(SphereTreeOptions),
-    /// List the scenes that are shipped.
+    /// List the shipped scenes
     Scenes,
-    /// List the caves that are shipped, or draw a calibration pattern for a facet.
+    /// List the shipped caves, or draw a calibration pattern for a facet
     Caves(CavesOptions),
+    /// Print a script that completes commands and options in a shell
+    Completions(CompletionOptions),
 }
 
-/// A scene, and how it is stepped.
+/// What is simulated, and how it is stepped.
 #[derive(Args)]
 pub struct SceneOptions {
-    /// A scene file, a folder that holds a scene.toml, or the name of a shipped scene.
+    /// A scene file, a folder that holds a scene.toml, the name of a shipped scene, a robot (.urdf) or a mesh (.obj, .stl, .ply, .dae).
     #[arg(value_name = "SCENE")]
     pub name: String,
     /// Length of a step, s (default: what the scene says).
-    #[arg(long, value_name = "S", value_parser = frame)]
+    #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = frame)]
     pub dt: Option<f64>,
     /// time_stepping or backtracking.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, help_heading = "Stepping", value_name = "NAME")]
     pub stepper: Option<Stepper>,
     /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
-    #[arg(long, value_name = "NAME", value_parser = solver)]
+    #[arg(long, help_heading = "Stepping", value_name = "NAME", value_parser = solver)]
     pub solver: Option<Solver>,
     /// verlet, symplectic_euler, explicit_euler, rk4 or dormand_prince; time_stepping is the midpoint rule whatever is chosen.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, help_heading = "Stepping", value_name = "NAME")]
     pub integrator: Option<Integrator>,
+    #[command(flatten)]
+    pub opening: OpeningOptions,
 }
 
 impl SceneOptions {
-    /// The scene, with what the command line says instead.
+    /// The scene, with the settings that the command line gives.
     pub fn load(&self) -> Result<SceneFile, Failure> {
-        let mut scene = resolve_scene(&self.name, &[])?.load()?;
+        let mut scene = self.opening.load(&self.name)?;
         let w = &mut scene.world;
         w.dt_s = self.dt.unwrap_or(w.dt_s);
         w.stepper = self.stepper.unwrap_or(w.stepper);
@@ -77,57 +81,123 @@ impl SceneOptions {
     }
 }
 
+/// How a robot or a mesh file is opened.
+#[derive(Args, Clone)]
+#[command(next_help_heading = "Robots and meshes")]
+pub struct OpeningOptions {
+    /// The root link of a URDF floats.
+    #[arg(long, conflicts_with = "fixed_base")]
+    pub floating: bool,
+    /// The root link of a URDF is fixed to the world (default).
+    #[arg(long)]
+    pub fixed_base: bool,
+    /// Where a package of package://NAME/... is; may be given several times. Others are looked for in the folders above the URDF.
+    #[arg(long = "package", value_name = "NAME=DIR", value_parser = package)]
+    pub packages: Vec<(String, PathBuf)>,
+    /// What to do where a collision mesh of a URDF is not there: error, or skip it with a note.
+    #[arg(long, value_name = "error|skip", value_parser = missing)]
+    pub missing_meshes: Option<MissingMeshes>,
+    /// Repair a mesh that is no solid: holes, fins, inner walls, debris. What was done is told; the file stays as it is.
+    #[arg(long)]
+    pub repair: bool,
+}
+
+impl OpeningOptions {
+    /// The scene of that name or path; notes tell of a base that is fixed unasked.
+    pub fn load(&self, name: &str) -> Result<SceneFile, Failure> {
+        let mut scene = self.read(name)?;
+        if kind(name) == FileKind::Urdf && !self.fixed_base && scene.has_fixed_base() {
+            scene.notes.push(format!("{name}: the root link is fixed to the world; --floating frees it"));
+        }
+        Ok(scene)
+    }
+
+    /// The scene of that name or path.
+    pub fn read(&self, name: &str) -> Result<SceneFile, Failure> {
+        self.check(kind(name)).map_err(|option| Failure::input(format!("{name}: {option}")))?;
+        let urdf = UrdfOptions {
+            floating: self.floating,
+            packages: self.packages.iter().cloned().collect(),
+            missing_meshes: self.missing_meshes.unwrap_or_default(),
+            ..UrdfOptions::default()
+        };
+        Ok(resolve_scene(name, &[])?.load_with(&LoadOptions { urdf, repair: self.repair })?)
+    }
+
+    /// An option that says nothing about a file of this kind is refused.
+    fn check(&self, kind: FileKind) -> Result<(), &'static str> {
+        let robot = self.floating || self.fixed_base || !self.packages.is_empty() || self.missing_meshes.is_some();
+        match kind {
+            FileKind::Urdf if self.repair => {
+                Err("--repair goes with a mesh; open meshes of a URDF collide by their hulls")
+            }
+            FileKind::Mesh | FileKind::Scene if robot => Err(
+                "--floating, --fixed-base, --package and --missing-meshes go with a .urdf; a scene says so itself, under [[articulated]]",
+            ),
+            FileKind::Scene if self.repair => {
+                Err("--repair goes with a mesh; a scene says `repair = true` under [meshes.NAME]")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What a name stands for; a name without an extension for a scene.
+pub fn kind(name: &str) -> FileKind {
+    FileKind::of(Path::new(name)).unwrap_or(FileKind::Scene)
+}
+
 #[derive(Args)]
 pub struct RunOptions {
     #[command(flatten)]
     pub scene: SceneOptions,
     /// Simulated time to run for, s (default: what the scene says).
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
     /// Write a recording (MCAP; opens in Foxglove).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub record: Option<PathBuf>,
     /// Write a summary (JSON).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub summary: Option<PathBuf>,
     /// Write a picture of the last frame (PNG).
-    #[arg(long, value_name = "FILE", value_parser = png)]
+    #[arg(long, help_heading = "Pictures", value_name = "FILE", value_parser = png)]
     pub picture: Option<PathBuf>,
     /// Size of the picture, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
-    #[arg(long, value_name = "WxH", value_parser = size)]
+    #[arg(long, help_heading = "Pictures", value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
     /// Draw for a cave: all its facets, unfolded into one picture. A cave file or the name of a shipped cave.
-    #[arg(long, value_name = "CAVE")]
+    #[arg(long, help_heading = "Pictures", value_name = "CAVE")]
     pub cave: Option<String>,
     /// Draw this facet of the cave alone, as its projector gets it.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, help_heading = "Pictures", value_name = "NAME")]
     pub facet: Option<String>,
     /// Write pictures of the run into a folder: frame_000000.png and so on.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, help_heading = "Pictures", value_name = "DIR")]
     pub frames_dir: Option<PathBuf>,
     /// Write a video of the run (needs the program ffmpeg; the ending says the kind, such as .mp4).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = "Pictures", value_name = "FILE")]
     pub video: Option<PathBuf>,
     /// Frames of the video, and pictures in the folder, per simulated second.
-    #[arg(long, value_name = "N", default_value = "30", value_parser = pace)]
+    #[arg(long, help_heading = "Pictures", value_name = "N", default_value = "30", value_parser = pace)]
     pub fps: f64,
     /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL, all; with commas between them.
-    #[arg(long, value_name = "WHAT", default_value = "")]
+    #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
     /// Speed against looks: usual, fast, fastest, and shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them.
-    #[arg(long, value_name = "WHAT", default_value = "usual")]
+    #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "usual")]
     pub quality: tumble::render::Quality,
     /// See from this camera: scene, or the name of an object that carries one.
-    #[arg(long, value_name = "NAME", conflicts_with = "cave")]
+    #[arg(long, help_heading = "Pictures", value_name = "NAME", conflicts_with = "cave")]
     pub camera: Option<String>,
     /// Restore a saved state before the first step.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub restore: Option<PathBuf>,
     /// Save the state after the last step.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub save: Option<PathBuf>,
     /// Say nothing but errors.
-    #[arg(long, short)]
+    #[arg(long, short, help_heading = "Results")]
     pub quiet: bool,
 }
 
@@ -137,50 +207,50 @@ pub struct ViewOptions {
     #[command(flatten)]
     pub scene: SceneOptions,
     /// Size of the window, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
-    #[arg(long, value_name = "WxH", value_parser = size)]
+    #[arg(long, help_heading = "Window", value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
     /// Look through the screens of a cave that moves with the user: a file or the name of a shipped cave.
-    #[arg(long, value_name = "CAVE")]
+    #[arg(long, help_heading = "Window", value_name = "CAVE")]
     pub cave: Option<String>,
     /// Show this facet of the cave alone, as its projector gets it, in a window without a frame.
-    #[arg(long, value_name = "NAME", requires = "cave", conflicts_with = "preview")]
+    #[arg(long, help_heading = "Window", value_name = "NAME", requires = "cave", conflicts_with = "preview")]
     pub facet: Option<String>,
     /// Show all facets of the cave, unfolded; so does --cave without --facet.
-    #[arg(long, requires = "cave")]
+    #[arg(long, help_heading = "Window", requires = "cave")]
     pub preview: bool,
     /// The camera to begin with: scene, one that a body or link carries, front, left, back, right or top.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, help_heading = "Window", value_name = "NAME")]
     pub camera: Option<String>,
     /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL, all; with commas between them.
-    #[arg(long, value_name = "WHAT", default_value = "")]
+    #[arg(long, help_heading = "Window", value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
     /// usual, fast or fastest, or parts of it: shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them (default: usual; fast
     /// where a software driver draws).
-    #[arg(long, value_name = "WORDS")]
+    #[arg(long, help_heading = "Window", value_name = "WORDS")]
     pub quality: Option<Quality>,
     /// Begin with time standing.
-    #[arg(long)]
+    #[arg(long, help_heading = "Session")]
     pub paused: bool,
     /// Begin without text over the picture.
-    #[arg(long)]
+    #[arg(long, help_heading = "Window")]
     pub plain: bool,
     /// Pictures per second at most (default: what the desktop shows).
-    #[arg(long, value_name = "N", value_parser = pace)]
+    #[arg(long, help_heading = "Window", value_name = "N", value_parser = pace)]
     pub fps: Option<f64>,
     /// End at this simulated time, s.
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
     /// End after so many pictures.
-    #[arg(long, value_name = "N")]
+    #[arg(long, help_heading = "Session", value_name = "N")]
     pub frames: Option<u64>,
     /// Write what is shown at the end (PNG).
-    #[arg(long, value_name = "FILE", value_parser = png)]
+    #[arg(long, help_heading = "Session", value_name = "FILE", value_parser = png)]
     pub picture: Option<PathBuf>,
     /// Where the key P leaves pictures: SCENE_000123.png, by the number of the step.
-    #[arg(long, value_name = "DIR", default_value = ".")]
+    #[arg(long, help_heading = "Session", value_name = "DIR", default_value = ".")]
     pub shots: PathBuf,
     /// Write what is shown as JSON, a line whenever the user changes something and four a second; - for stdout.
-    #[arg(long, value_name = "FILE|-")]
+    #[arg(long, help_heading = "Session", value_name = "FILE|-")]
     pub status: Option<PathBuf>,
     /// Lose the graphics device after so many pictures, as a driver that crashes does: to see what comes then.
     #[arg(long, value_name = "N", hide = true)]
@@ -189,19 +259,15 @@ pub struct ViewOptions {
 
 #[derive(Args)]
 pub struct CheckOptions {
-    /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf robots; .obj, .stl and .ply meshes.
+    /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf robots; .obj, .stl, .ply and .dae meshes.
     #[arg(required = true)]
     pub files: Vec<String>,
-    /// Repair meshes that are no solids: holes, fins, inner walls, debris. What was done is told; the file stays as it is.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub opening: OpeningOptions,
 }
 
 #[derive(Args)]
-#[command(
-    override_usage = "tumble spheretree [OPTIONS] MESH\n       tumble spheretree [OPTIONS] --urdf ROBOT",
-    after_help = "Exit codes: 0 success, 1 failure while running, such as a full disk, 2 bad usage or input."
-)]
+#[command(override_usage = "tumble spheretree [OPTIONS] MESH\n       tumble spheretree [OPTIONS] --urdf ROBOT")]
 pub struct SphereTreeOptions {
     /// A closed mesh: .obj, .stl, .ply or .dae.
     #[arg(conflicts_with = "urdf")]
@@ -226,16 +292,16 @@ pub struct SphereTreeOptions {
     #[arg(long, short, value_name = "FILE", visible_alias = "json")]
     pub output: Option<PathBuf>,
     /// Write a picture (PNG) of a level over the mesh.
-    #[arg(long, value_name = "FILE", conflicts_with = "urdf", value_parser = png)]
+    #[arg(long, help_heading = "Picture", value_name = "FILE", conflicts_with = "urdf", value_parser = png)]
     pub picture: Option<PathBuf>,
     /// The level of the picture, the root being 0 (default: the last).
-    #[arg(long, value_name = "N", requires = "picture")]
+    #[arg(long, help_heading = "Picture", value_name = "N", requires = "picture")]
     pub level: Option<u32>,
     /// The axis that is up in the picture.
-    #[arg(long, value_name = "x|y|z", default_value = "z", value_parser = ["x", "y", "z"])]
+    #[arg(long, help_heading = "Picture", value_name = "x|y|z", default_value = "z", value_parser = ["x", "y", "z"])]
     pub up: String,
     /// Size of the picture, pixels.
-    #[arg(long, value_name = "WxH", default_value = "960x720", value_parser = size)]
+    #[arg(long, help_heading = "Picture", value_name = "WxH", default_value = "960x720", value_parser = size)]
     pub size: (u32, u32),
     /// Keep built trees in this folder (default: $TUMBLE_CACHE, else the user's cache folder).
     #[arg(long, value_name = "DIR", value_parser = folder)]
@@ -244,19 +310,19 @@ pub struct SphereTreeOptions {
     #[arg(long, conflicts_with = "cache")]
     pub no_cache: bool,
     /// Replace the collision geometry of every link of this robot by spheres.
-    #[arg(long, value_name = "ROBOT")]
+    #[arg(long, help_heading = "Robots", value_name = "ROBOT")]
     pub urdf: Option<PathBuf>,
     /// Where a package of package://NAME/... is; may be given several times. Others are looked for in the folders above the URDF.
-    #[arg(long = "package", value_name = "NAME=DIR", requires = "urdf", value_parser = package)]
+    #[arg(long = "package", help_heading = "Robots", value_name = "NAME=DIR", requires = "urdf", value_parser = package)]
     pub packages: Vec<(String, PathBuf)>,
     /// What to do where a collision mesh is not there: error, or skip it with a note.
-    #[arg(long, value_name = "error|skip", requires = "urdf", default_value = "error", value_parser = missing)]
+    #[arg(long, help_heading = "Robots", value_name = "error|skip", requires = "urdf", default_value = "error", value_parser = missing)]
     pub missing_meshes: MissingMeshes,
     /// Most spheres per link, at least one per collision element; a link gets fewer where all reach out less than --error (default 32, or 10000 with --error).
-    #[arg(long, value_name = "N", requires = "urdf", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, help_heading = "Robots", value_name = "N", requires = "urdf", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub spheres: Option<u32>,
     /// Also write the spheres for motion planners: yaml (cuRobo) or json (foam, VAMP) beside the output, or a file that ends in .yml or .json.
-    #[arg(long, value_name = "yaml|json|FILE", requires = "urdf", value_parser = planner)]
+    #[arg(long, help_heading = "Robots", value_name = "yaml|json|FILE", requires = "urdf", value_parser = planner)]
     pub planner: Option<PathBuf>,
     /// More figures, and what the stages of the builder did.
     #[arg(long, short)]
@@ -264,6 +330,15 @@ pub struct SphereTreeOptions {
     /// Say nothing but errors.
     #[arg(long, short, conflicts_with = "verbose")]
     pub quiet: bool,
+}
+
+#[derive(Args)]
+#[command(
+    after_help = "bash:  tumble completions bash > ~/.local/share/bash-completion/completions/tumble\nzsh:   tumble completions zsh > DIR/_tumble, with DIR in $fpath\nfish:  tumble completions fish > ~/.config/fish/completions/tumble.fish"
+)]
+pub struct CompletionOptions {
+    /// The shell.
+    pub shell: clap_complete::Shell,
 }
 
 #[derive(Args)]

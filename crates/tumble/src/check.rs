@@ -1,20 +1,22 @@
 //! `tumble check`: reads and builds, runs nothing.
 
-use crate::args::CheckOptions;
+use crate::args::{CheckOptions, OpeningOptions, kind};
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{RepairSettings, Shape, TreeSettings};
-use tumble::core::{Object, Visual};
+use tumble::core::{ArticulatedBody, World};
 use tumble::net::sync::udp::SharedKey;
 use tumble::render::{Blend, DebugDraw, Drawing, RenderError, Warp};
 use tumble::scene::cave::{Cave, MOST_BYTES, is_cave, resolve_cave, shipped_caves};
-use tumble::scene::{SceneError, overlap_notes, read_solid, resolve_scene, shipped, urdf, visual_notes};
+use tumble::scene::{
+    FileKind, SceneError, overlap_notes, read_mesh_bytes, read_solid, resolve_scene, shipped, visual_notes,
+};
 
 /// Checks every file; all are looked at, and the first failure's code is kept.
 pub fn check(options: &CheckOptions) -> Result<(), Failure> {
     let mut outcome = Ok(());
     for file in &options.files {
-        match one(file, options.repair) {
+        match one(file, &options.opening) {
             Ok(said) => println!("{file}: {said}"),
             Err(failure) => {
                 if let Err(earlier) = std::mem::replace(&mut outcome, Err(failure)) {
@@ -26,32 +28,34 @@ pub fn check(options: &CheckOptions) -> Result<(), Failure> {
     outcome
 }
 
-fn one(file: &str, repair: bool) -> Result<String, Failure> {
-    let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    match extension.as_str() {
-        "obj" | "stl" | "ply" | "dae" => mesh(Path::new(file), repair),
-        "urdf" => robot(Path::new(file)),
-        _ if looks_like_cave(file) => cave(file),
-        _ => scene(file),
+fn one(file: &str, opening: &OpeningOptions) -> Result<String, Failure> {
+    match kind(file) {
+        FileKind::Mesh => mesh(Path::new(file), opening.repair),
+        FileKind::Urdf => robot(file, opening),
+        FileKind::Scene if looks_like_cave(file) => cave(file),
+        FileKind::Scene => scene(file),
     }
 }
 
-fn robot(path: &Path) -> Result<String, Failure> {
-    let (body, notes) = urdf::load(path, &urdf::UrdfOptions::default())?;
-    let visuals = body.renderable().map_or(&[][..], |r| r.visuals());
-    notes.into_iter().chain(read_visuals(visuals)).for_each(|note| println!("{note}"));
-    let (links, model) = (body.model().frames().len(), body.model());
+fn robot(name: &str, opening: &OpeningOptions) -> Result<String, Failure> {
+    let scene = OpeningOptions { repair: false, ..opening.clone() }.read(name)?;
+    let (world, notes) = scene.build().map_err(Failure::input)?;
+    notes.into_iter().chain(read_visuals(&world)).for_each(|note| println!("{note}"));
+    let body = scene.articulated.first().and_then(|spec| world.get::<ArticulatedBody>(world.find(&spec.name)?));
+    let model = body.ok_or_else(|| Failure::input(format!("{name}: the file has no robot")))?.model();
     Ok(format!(
-        "a robot of {links} links, {} degrees of freedom on a fixed base, {:.6} kg that move",
+        "a robot of {} links, {} degrees of freedom on a {} base, {:.6} kg that move",
+        model.frames().len(),
         model.dof(),
+        if scene.has_fixed_base() { "fixed" } else { "floating" },
         model.mass()
     ))
 }
 
 /// Reads the meshes that are only drawn; what is to be said of those that cannot be read.
-fn read_visuals<'v>(visuals: impl IntoIterator<Item = &'v Visual> + Clone) -> Vec<String> {
-    visuals.clone().into_iter().for_each(|visual| _ = visual.drawn());
-    visual_notes(visuals)
+fn read_visuals(world: &World) -> Vec<String> {
+    world.visuals().for_each(|visual| _ = visual.drawn());
+    visual_notes(world.visuals())
 }
 
 /// A file is a cave where it has a table that caves have and scenes have not; a name where it is a shipped cave's and no scene's.
@@ -106,7 +110,7 @@ fn neither(name: &str, error: &SceneError) -> Failure {
     Failure::input(format!("{error}{cave}"))
 }
 
-fn degrees(world: &tumble::core::World) -> usize {
+fn degrees(world: &World) -> usize {
     let view = world.view();
     let moving = world.ids().iter().filter(|id| view.status(**id).is_some_and(|s| s.moves()));
     moving.filter_map(|id| view.span(*id)).map(|span| span.v.len()).sum()
@@ -114,7 +118,7 @@ fn degrees(world: &tumble::core::World) -> usize {
 
 fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
-    let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let bytes = read_mesh_bytes(path).map_err(wrong)?;
     let (mesh, notes) = read_solid(path, &bytes, repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
     notes.iter().for_each(|note| println!("{}: {note}", path.display()));
     let (triangles, diagonal) = (mesh.triangles.len(), mesh.diagonal());

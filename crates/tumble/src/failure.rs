@@ -16,12 +16,12 @@ pub enum Failure {
 impl Failure {
     /// Bad input.
     pub fn input(why: impl ToString) -> Failure {
-        Failure::Input(format!("Error: {}\n", why.to_string()))
+        Failure::Input(format!("error: {}\n", why.to_string()))
     }
 
     /// Failure at run time, with what was being done.
     pub fn run(doing: &str, why: impl ToString) -> Failure {
-        Failure::Run(format!("Error: {doing}: {}\n", why.to_string()))
+        Failure::Run(format!("error: {doing}: {}\n", why.to_string()))
     }
 
     /// The whole message, ending in a line feed.

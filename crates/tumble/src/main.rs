@@ -7,6 +7,7 @@ mod cave;
 mod caves;
 mod check;
 mod failure;
+mod help;
 mod progress;
 mod run;
 mod shots;
@@ -16,7 +17,7 @@ mod video;
 mod view;
 
 use args::{Command, Tumble};
-use clap::Parser;
+use clap::FromArgMatches;
 use failure::Failure;
 use std::io::Write;
 use std::process::ExitCode;
@@ -24,7 +25,11 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     quiet_drivers();
     end_with_the_reader();
-    let outcome = match Tumble::parse().command {
+    let command = match Tumble::from_arg_matches(&help::command().get_matches()) {
+        Ok(typed) => typed.command,
+        Err(error) => error.exit(),
+    };
+    let outcome = match command {
         Command::Run(options) => run::run(&options),
         Command::View(options) => view::view(&options),
         Command::Cave(options) => cave::cave(&options),
@@ -36,6 +41,7 @@ fn main() -> ExitCode {
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),
         Command::Caves(options) => caves::caves(&options),
+        Command::Completions(options) => completions(options.shell),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -66,7 +72,7 @@ fn end_with_the_reader() {
             Some(why) if why.contains("Broken pipe") => std::process::exit(0),
             Some(why) => {
                 // where stderr fails too there is nobody to tell
-                let _ = writeln!(std::io::stderr(), "Error: stdout: {why}");
+                let _ = writeln!(std::io::stderr(), "error: stdout: {why}");
                 std::process::exit(1)
             }
             None if message.is_some_and(|m| m.starts_with("failed printing to stderr")) => std::process::exit(1),
@@ -79,5 +85,12 @@ fn scenes() -> Result<(), Failure> {
     for scene in tumble::scene::shipped() {
         println!("{:<12} {}", scene.name, scene.description());
     }
+    Ok(())
+}
+
+fn completions(shell: clap_complete::Shell) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut help::command(), "tumble", &mut script);
+    print!("{}", String::from_utf8_lossy(&script));
     Ok(())
 }

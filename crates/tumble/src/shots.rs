@@ -59,7 +59,7 @@ impl Shots {
         let renderer = match Renderer::new() {
             Ok(renderer) => renderer,
             Err(error @ RenderError::NoAdapter { .. }) => {
-                eprintln!("No picture: {error}");
+                eprintln!("no picture: {error}");
                 return Ok(None);
             }
             Err(error) => return Err(Failure::run("the picture", error)),

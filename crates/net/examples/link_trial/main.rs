@@ -31,7 +31,7 @@ fn clock_ns() -> u64 {
 fn main() {
     let result = Options::read(std::env::args().skip(1)).and_then(run);
     if let Err(why) = result {
-        eprintln!("Error: {why}");
+        eprintln!("error: {why}");
         std::process::exit(1);
     }
 }

@@ -218,7 +218,7 @@ pub(super) fn put(image: &mut Image, x: i64, y: i64, color: [u8; 4]) {
     }
 }
 
-pub(super) fn rect(image: &mut Image, x: i64, y: i64, w: i64, h: i64, color: [u8; 4]) {
+pub(crate) fn rect(image: &mut Image, x: i64, y: i64, w: i64, h: i64, color: [u8; 4]) {
     let rows = y.max(0)..(y + h).min(i64::from(image.height));
     for row in rows {
         (x.max(0)..(x + w).min(i64::from(image.width))).for_each(|column| put(image, column, row, color));

@@ -14,6 +14,7 @@ mod warp;
 
 pub use blend::Blend;
 pub(crate) use blend::encoded;
+pub(crate) use calibration::rect;
 pub use calibration::{CalibrationPattern, calibration_picture};
 pub(crate) use compose::blank;
 pub use perspective::FacetView;

@@ -33,6 +33,7 @@ pub struct Screen {
     renderer: Renderer,
     copies: Copies,
     caption: Option<(Image, wgpu::Texture)>,
+    panel: Option<(Image, wgpu::Texture)>,
     losses: u32,
     software: bool,
 }
@@ -87,7 +88,18 @@ impl Screen {
         surface.configure(&renderer.gpu.device, &config);
         let copies = Copies::new(&renderer.gpu.device, config.format);
         renderer.gpu.complaint()?;
-        Ok(Screen { window, instance, surface, config, renderer, copies, caption: None, losses: 0, software })
+        Ok(Screen {
+            window,
+            instance,
+            surface,
+            config,
+            renderer,
+            copies,
+            caption: None,
+            panel: None,
+            losses: 0,
+            software,
+        })
     }
 
     /// The window.
@@ -137,16 +149,15 @@ impl Screen {
 
     /// Writing in the upper left corner of what is shown, blended over the picture by its alpha.
     pub fn set_caption(&mut self, caption: Option<Image>) {
-        let same = self.caption.as_ref().map(|(image, _)| image) == caption.as_ref();
-        if !same {
-            self.caption = caption.map(|image| {
-                let texture = upload(&self.renderer.gpu, &image);
-                (image, texture)
-            });
-        }
+        replace(&self.renderer.gpu, &mut self.caption, caption);
     }
 
-    /// Shows the picture that was drawn last, its upper left corner in that of the window, with the caption. What is larger than the window is cut off. Waits
+    /// A picture in the upper right corner of what is shown, blended over all else by its alpha.
+    pub fn set_panel(&mut self, panel: Option<Image>) {
+        replace(&self.renderer.gpu, &mut self.panel, panel);
+    }
+
+    /// Shows the picture that was drawn last, its upper left corner in that of the window, with caption and panel. What is larger than the window is cut off. Waits
     /// until the device is at most one picture behind. Where the surface is lost it is made anew.
     ///
     /// # Errors
@@ -168,10 +179,12 @@ impl Screen {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let encode = !self.config.format.is_srgb();
         drop(pass(&mut encoder, &target, wgpu::LoadOp::Clear(wgpu::Color::BLACK)));
-        let picture = self.renderer.picture().map(|texture| (texture, &self.copies.show));
-        let caption = self.caption.as_ref().map(|(_, texture)| (texture, &self.copies.blend));
-        for (texture, pipeline) in picture.into_iter().chain(caption) {
-            self.copies.copy(gpu, &mut encoder, pipeline, texture, (&target, frame.texture.size()), encode)?;
+        let right = |image: &Image| frame.texture.width().saturating_sub(image.width);
+        let picture = self.renderer.picture().map(|texture| (texture, &self.copies.show, 0));
+        let caption = self.caption.as_ref().map(|(_, texture)| (texture, &self.copies.blend, 0));
+        let panel = self.panel.as_ref().map(|(image, texture)| (texture, &self.copies.blend, right(image)));
+        for (texture, pipeline, left) in picture.into_iter().chain(caption).chain(panel) {
+            self.copies.copy(gpu, &mut encoder, pipeline, (texture, left), (&target, frame.texture.size()), encode)?;
         }
         gpu.queue.submit([encoder.finish()]);
         self.window.pre_present_notify();
@@ -265,19 +278,19 @@ impl Copies {
         Copies { show: make(None), blend: make(Some(wgpu::BlendState::ALPHA_BLENDING)), layout }
     }
 
-    /// A texture into the upper left corner of a target.
+    /// A texture to the upper edge of a target, so many pixels from its left one.
     fn copy(
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,
         pipeline: &wgpu::RenderPipeline,
-        source: &wgpu::Texture,
+        (source, left): (&wgpu::Texture, u32),
         (target, bounds): (&TextureView, wgpu::Extent3d),
         encode: bool,
     ) -> Result<(), RenderError> {
-        let (w, h) = (source.width().min(bounds.width), source.height().min(bounds.height));
+        let (w, h) = (source.width().min(bounds.width - left), source.height().min(bounds.height));
         let source = source.create_view(&wgpu::TextureViewDescriptor::default());
-        let contents = [f32::from(u8::from(encode)), 0.0, 0.0, 0.0];
+        let contents = [f32::from(u8::from(encode)), left as f32, 0.0, 0.0];
         let uniform = uniform_buffer(gpu, &contents, "place")?;
         let entries = [
             wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
@@ -289,7 +302,7 @@ impl Copies {
             entries: &entries,
         });
         let mut pass = pass(encoder, target, wgpu::LoadOp::Load);
-        pass.set_scissor_rect(0, 0, w, h);
+        pass.set_scissor_rect(left, 0, w, h);
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..3, 0..1);
@@ -309,6 +322,16 @@ fn pass<'e>(
         color_attachments: &[Some(attachment)],
         ..Default::default()
     })
+}
+
+/// Uploads a picture where it is not the one that is there.
+fn replace(gpu: &Gpu, there: &mut Option<(Image, wgpu::Texture)>, image: Option<Image>) {
+    if there.as_ref().map(|(image, _)| image) != image.as_ref() {
+        *there = image.map(|image| {
+            let texture = upload(gpu, &image);
+            (image, texture)
+        });
+    }
 }
 
 fn upload(gpu: &Gpu, image: &Image) -> wgpu::Texture {

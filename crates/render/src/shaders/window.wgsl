@@ -1,6 +1,6 @@
-// A picture into the corner of a window, pixel by pixel.
+// A picture into a window, pixel by pixel.
 struct Place {
-    how: vec4f, // x: 1 where the target keeps numbers as they are and wants sRGB
+    how: vec4f, // x: 1 where the target keeps numbers as they are and wants sRGB; y, z: the picture's upper left corner, pixels
 };
 @group(0) @binding(0) var<uniform> place: Place;
 @group(0) @binding(1) var picture: texture_2d<f32>;
@@ -16,6 +16,6 @@ fn srgb(c: vec3f) -> vec3f {
 
 @fragment
 fn fs_place(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    let c = textureLoad(picture, vec2i(at.xy), 0);
+    let c = textureLoad(picture, vec2i(at.xy - place.how.yz), 0);
     return vec4f(select(c.rgb, srgb(c.rgb), place.how.x > 0.5), c.a);
 }

@@ -63,7 +63,7 @@ impl CaveError {
     pub fn report(&self, color: bool) -> String {
         match self {
             CaveError::Invalid(invalid) => invalid.report(color),
-            other => format!("Error: {other}\n"),
+            other => format!("error: {other}\n"),
         }
     }
 

@@ -206,7 +206,7 @@ impl UrdfError {
     pub fn report(&self, color: bool) -> String {
         match self {
             UrdfError::Invalid(invalid) => invalid.report(color),
-            other => format!("Error: {other}\n"),
+            other => format!("error: {other}\n"),
         }
     }
 }

@@ -414,10 +414,23 @@ fn many_problems_are_counted_not_all_told() {
 }
 
 #[test]
+fn a_text_that_is_no_toml_is_told_once() {
+    let slips = |count: usize| SceneFile::parse(&"no toml\n".repeat(count), "s.toml").unwrap_err();
+    let (few, many) = (slips(2), slips(50));
+    assert!((2..=5).contains(&few.problems().len()), "{few}");
+    assert_eq!(many.problems().len(), 1, "{many}");
+    let told = many.to_string();
+    assert!(
+        told.starts_with("s.toml:1:") && told.ends_with("more slips of syntax follow, so this may be no TOML at all"),
+        "{told}"
+    );
+}
+
+#[test]
 fn a_report_draws_the_line_and_marks_the_place() {
     let error = SceneFile::parse(&body_with("frction = 0.1"), "s.toml").unwrap_err();
     let wanted = "\
-Error: unknown key `frction` in body \"b\"
+error: unknown key `frction` in body \"b\"
    ,-[ s.toml:5:1 ]
    |
  5 | frction = 0.1
@@ -434,6 +447,6 @@ s.toml: 1 error
 fn a_line_too_long_to_draw_is_only_named() {
     let text = format!("[world]\ndt_s = -1 # {}\n", "x".repeat(1000));
     let report = SceneFile::parse(&text, "s.toml").unwrap_err().report(false);
-    let wanted = "Error: `dt_s` of [world] is -1\n  s.toml:2:8: wanted a time from 1e-6 to 1 s\ns.toml: 1 error\n";
+    let wanted = "error: `dt_s` of [world] is -1\n  s.toml:2:8: wanted a time from 1e-6 to 1 s\ns.toml: 1 error\n";
     assert_eq!(report, wanted);
 }

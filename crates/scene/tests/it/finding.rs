@@ -59,7 +59,7 @@ fn what_is_not_there() {
     let error = resolve_scene("no/such.toml", &[]).unwrap_err();
     assert!(error.to_string().starts_with("no/such.toml: cannot read the scene: "), "{error}");
     assert!(matches!(SceneFile::load("no/such.toml"), Err(SceneError::Read { .. })));
-    assert_eq!(error.report(false), format!("Error: {error}\n"));
+    assert_eq!(error.report(false), format!("error: {error}\n"));
 }
 
 #[test]

@@ -98,6 +98,7 @@ pub struct ServeOptions {
 
 /// How facets draw.
 #[derive(Args, Clone, Default)]
+#[command(next_help_heading = "Pictures")]
 pub struct DrawOptions {
     /// Write every frame that is shown into a folder for each facet, frame_000000.png and so on, with frames.jsonl beside them.
     #[arg(long, value_name = "DIR")]

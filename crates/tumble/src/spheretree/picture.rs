@@ -24,7 +24,7 @@ pub fn picture(mesh: &TriMesh, tree: &SphereTree, path: &Path, options: &SphereT
     let image = match Renderer::new() {
         Ok(mut renderer) => renderer.render(&list, options.size.0, options.size.1).map_err(failed)?,
         Err(error @ RenderError::NoAdapter { .. }) => {
-            eprintln!("No picture: {error}");
+            eprintln!("no picture: {error}");
             return Ok(());
         }
         Err(error) => return Err(failed(error)),

@@ -18,17 +18,29 @@ pub enum Command {
     Overlay(usize),
     Statistics,
     Help,
+    Sliders,
+    Hold,
+    NextJoint,
+    JointUp,
+    JointDown,
     Picture,
     Quality,
     Fullscreen,
     Quit,
 }
 
+impl Command {
+    /// Whether a key that is held goes on asking for it.
+    pub fn repeats(self) -> bool {
+        matches!(self, Command::NextJoint | Command::JointUp | Command::JointDown)
+    }
+}
+
 /// Overlays by number key from 1 on, as `--debug-draw` names them.
 pub const OVERLAYS: [&str; 8] = ["contacts", "normals", "velocities", "forces", "joints", "frames", "islands", "tree"];
 
 /// What is told of keys and mouse.
-pub const HELP: [&str; 20] = [
+pub const HELP: [&str; 23] = [
     "W A S D     walk; arrows too, left and right turn",
     "E Q         up and down; also page up, page down",
     "shift       four times as fast",
@@ -38,6 +50,9 @@ pub const HELP: [&str; 20] = [
     "wheel       faster or slower on foot",
     "C, shift C  next camera, the one before",
     "home        the scene's camera",
+    "J, drag     sliders of joints; tab chooses one",
+    "[ ]         chosen joint down, up; shift faster",
+    "K           hold all joints by drives, free them",
     "space       pause, go on",
     ". or N      one step",
     "R           back to time 0",
@@ -56,6 +71,7 @@ pub fn command(key: &Key) -> Option<Command> {
     let letter = match key {
         Key::Named(NamedKey::Space) => return Some(Command::Pause),
         Key::Named(NamedKey::Escape) => return Some(Command::Quit),
+        Key::Named(NamedKey::Tab) => return Some(Command::NextJoint),
         Key::Named(NamedKey::Home) => return Some(Command::Home),
         Key::Named(NamedKey::F1) => return Some(Command::Help),
         Key::Named(NamedKey::F11) => return Some(Command::Fullscreen),
@@ -73,6 +89,10 @@ pub fn command(key: &Key) -> Option<Command> {
         "f" | "F" => Command::Fly,
         "t" | "T" => Command::Statistics,
         "h" | "H" | "?" => Command::Help,
+        "j" | "J" => Command::Sliders,
+        "k" | "K" => Command::Hold,
+        "[" | "{" => Command::JointDown,
+        "]" | "}" => Command::JointUp,
         "p" | "P" => Command::Picture,
         "g" | "G" => Command::Quality,
         digit => match digit.parse::<usize>() {

@@ -4,6 +4,7 @@
 //! that of `tumble run`.
 
 mod hand;
+mod joints;
 mod keys;
 mod overlays;
 mod pace;

@@ -37,8 +37,23 @@ pub struct Status {
     pub quality: Option<String>,
     pub overlays: Vec<String>,
     pub caption: bool,
+    /// Joints with sliders, and whether drives hold them.
+    pub joints: Vec<JointStatus>,
+    pub joints_held: bool,
     /// BLAKE3 of what `tumble run --save` writes of the same state, in hexadecimal.
     pub state_blake3: String,
+}
+
+/// A joint with a slider.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JointStatus {
+    pub name: String,
+    /// rad or m.
+    pub position: f64,
+    /// Where a drive moves it, if one holds it.
+    pub target: Option<f64>,
+    /// Left and right end of its bar and the bar's middle from the top, pixels of the window; none where it is not shown.
+    pub slider_px: Option<[f64; 3]>,
 }
 
 impl Status {
@@ -51,6 +66,7 @@ impl Status {
             shown: 0,
             held_at_m: None,
             state_blake3: String::new(),
+            joints: s.joints.iter().map(|joint| JointStatus { position: 0.0, ..joint.clone() }).collect(),
             ..s.clone()
         };
         still(self) != still(other)

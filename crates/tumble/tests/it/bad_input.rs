@@ -189,7 +189,7 @@ fn a_full_disk_is_a_failure_at_run_time() {
         let out = command(args).stdout(full()).output().unwrap();
         let said = String::from_utf8(out.stderr).unwrap();
         assert_eq!(out.status.code(), Some(1), "{args:?}: {said}");
-        assert!(said.contains("Error: stdout: No space left") && !said.contains("panicked"), "{args:?}: {said}");
+        assert!(said.contains("error: stdout: No space left") && !said.contains("panicked"), "{args:?}: {said}");
         assert!(
             command(args).stdout(full()).stderr(full()).output().unwrap().status.code() == Some(1),
             "{args:?}: nobody to tell"

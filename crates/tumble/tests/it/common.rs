@@ -62,7 +62,7 @@ pub fn succeed(args: &[&str]) -> String {
 /// Runs, expects failure with one message that does not look like a panic, and gives the message.
 pub fn fail(args: &[&str], code: i32) -> String {
     let wrong = fail_often(args, code);
-    let messages = wrong.lines().filter(|line| line.to_lowercase().starts_with("error")).count();
+    let messages = wrong.lines().filter(|line| line.starts_with("error: ")).count();
     assert_eq!(messages, 1, "tumble {args:?} gives {messages} messages:\n{wrong}");
     assert!(wrong.lines().count() <= 12, "tumble {args:?} is long-winded:\n{wrong}");
     wrong
@@ -73,7 +73,7 @@ pub fn fail_often(args: &[&str], code: i32) -> String {
     let out = tumble(args);
     let wrong = String::from_utf8_lossy(&out.stderr).into_owned();
     assert_eq!(out.status.code(), Some(code), "tumble {args:?} says: {wrong}");
-    assert!(wrong.contains("rror") && !wrong.contains("panicked"), "tumble {args:?} says: {wrong}");
+    assert!(wrong.contains("error: ") && !wrong.contains("panicked"), "tumble {args:?} says: {wrong}");
     wrong
 }
 

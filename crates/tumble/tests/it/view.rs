@@ -232,7 +232,7 @@ fn without_a_desktop_there_is_one_clear_message() {
     let said = String::from_utf8(out.stderr).unwrap();
     assert_eq!((out.status.code(), said.lines().count()), (Some(1), 1), "{said}");
     assert!(
-        said.starts_with("Error: ")
+        said.starts_with("error: ")
             && ["DISPLAY", "WAYLAND_DISPLAY", "tumble run SCENE --picture"].iter().all(|word| said.contains(word)),
         "{said}"
     );

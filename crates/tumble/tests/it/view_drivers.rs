@@ -23,7 +23,7 @@ fn loses_its_device(desktop: &Desktop, name: &str, interface: &str, environment:
         return skip(&said);
     }
     assert!(
-        code == Some(1) && said.starts_with("Error: the window: the graphics device ") && said.contains("lost"),
+        code == Some(1) && said.starts_with("error: the window: the graphics device ") && said.contains("lost"),
         "{code:?}: {said}"
     );
     assert!(said.contains(interface) && said.lines().count() == 1, "{said}");
@@ -120,5 +120,5 @@ fn windows_open_on_wayland() {
     }
     drop(weston);
     let (code, said) = view.end();
-    assert!(code == Some(1) && said.contains("Error: the window: "), "{code:?}: {said}");
+    assert!(code == Some(1) && said.contains("error: the window: "), "{code:?}: {said}");
 }

@@ -141,7 +141,7 @@ fn a_display_that_does_not_answer_is_named() {
         let said = String::from_utf8(out.stderr).unwrap();
         assert_eq!((out.status.code(), said.lines().count()), (Some(1), 1), "{said}");
         assert!(
-            said.starts_with("Error: ") && said.contains(&format!("{variable}={value}")) && said.contains("--picture"),
+            said.starts_with("error: ") && said.contains(&format!("{variable}={value}")) && said.contains("--picture"),
             "{said}"
         );
     }

@@ -22,16 +22,16 @@ impl Viewer {
                     if down { self.user.press(way) } else { self.user.release(way) }
                 }
                 if down
-                    && !event.repeat
                     && let Some(command) = keys::command(&event.logical_key)
+                    && (!event.repeat || command.repeats())
                 {
                     self.act(screen, command)?;
                 }
             }
             WindowEvent::ModifiersChanged(modifiers) => self.user.fast = modifiers.state().shift_key(),
-            WindowEvent::CursorMoved { position, .. } => self.pointed(screen, [position.x, position.y]),
+            WindowEvent::CursorMoved { position, .. } => self.pointed(screen, [position.x, position.y])?,
             WindowEvent::MouseInput { state, button, .. } => {
-                self.button(screen, *button, *state == ElementState::Pressed)
+                self.button(screen, *button, *state == ElementState::Pressed)?
             }
             WindowEvent::MouseWheel { delta, .. } => {
                 let up = match delta {
@@ -48,6 +48,7 @@ impl Viewer {
                 self.user.release_all();
                 self.clockwork.lock().hand = None;
                 self.pointer.turning = false;
+                self.panel.let_go();
             }
             WindowEvent::Resized(_) => self.stale = true,
             WindowEvent::CloseRequested => self.take_last(screen)?,
@@ -60,7 +61,11 @@ impl Viewer {
         match command {
             Command::Pause => self.clockwork.lock().pace.toggle(),
             Command::Step => self.clockwork.lock().pace.step_once(),
-            Command::Reset => self.clockwork.lock().reset()?,
+            Command::Reset => {
+                let mut simulation = self.clockwork.lock();
+                self.joints.let_go(&mut simulation.world);
+                simulation.reset()?;
+            }
             Command::Faster => self.clockwork.lock().pace.change_speed(1),
             Command::Slower => self.clockwork.lock().pace.change_speed(-1),
             Command::NextCamera => self.go_to(1),
@@ -75,6 +80,11 @@ impl Viewer {
                 (self.show.any, self.show.statistics) = (true, !(self.show.any && self.show.statistics))
             }
             Command::Help => (self.show.any, self.show.help) = (true, !self.show.help),
+            Command::Sliders => (self.show.any, self.panel.wanted) = (true, !(self.show.any && self.panel.wanted)),
+            Command::Hold => self.switch_hold(),
+            Command::NextJoint => self.choose_joint(if self.user.fast { -1 } else { 1 }),
+            Command::JointUp => self.nudge_joint(1.0)?,
+            Command::JointDown => self.nudge_joint(-1.0)?,
             Command::Picture => self.save_picture(screen)?,
             Command::Quality => {
                 let all = [Quality::default(), Quality::fast(), Quality::fastest()];
@@ -98,15 +108,19 @@ impl Viewer {
         }
     }
 
-    fn pointed(&mut self, screen: &Screen, at_px: [f64; 2]) {
+    fn pointed(&mut self, screen: &Screen, at_px: [f64; 2]) -> Result<(), Failure> {
         let [dx, dy] = std::array::from_fn(|k| at_px[k] - self.pointer.at_px[k]);
         self.pointer.at_px = at_px;
+        if self.drag_slider()? {
+            return Ok(());
+        }
         if self.pointer.turning {
             self.presets.let_go();
             self.user.turn(-TURN_RAD_PER_PX * dx, -TURN_RAD_PER_PX * dy);
             self.stale = true;
         }
         self.move_hand(screen);
+        Ok(())
     }
 
     /// The line of sight below the pointer.
@@ -123,8 +137,9 @@ impl Viewer {
         }
     }
 
-    fn button(&mut self, screen: &Screen, button: MouseButton, down: bool) {
+    fn button(&mut self, screen: &Screen, button: MouseButton, down: bool) -> Result<(), Failure> {
         match button {
+            MouseButton::Left if down && self.press_panel()? => {}
             MouseButton::Left if down => {
                 let ray = self.ray(screen);
                 let mut simulation = self.clockwork.lock();
@@ -134,11 +149,13 @@ impl Viewer {
             MouseButton::Left => {
                 self.clockwork.lock().hand = None;
                 self.pointer.turning = false;
+                self.panel.let_go();
             }
             MouseButton::Right => self.pointer.turning = down,
             _ => {}
         }
         self.stale = true;
+        Ok(())
     }
 
     fn wheel(&mut self, screen: &Screen, up: f64) {

@@ -1,9 +1,11 @@
-//! The program in the window: what is shown, and when. Keys and mouse are in `events.rs`, what is told of it in `told.rs`; steps are taken on another thread
+//! The program in the window: what is shown, and when. Keys and mouse are in `events.rs`, sliders in `panel.rs`, what is told of it in `told.rs`; steps are taken on another thread
 //! ([`Clockwork`]).
 
 mod events;
+mod panel;
 mod told;
 
+use super::joints::Joints;
 use super::keys::{self, Command};
 use super::overlays::Overlays;
 use super::pace::Pace;
@@ -15,12 +17,13 @@ use super::status::Log;
 use super::user::User;
 use crate::args::ViewOptions;
 use crate::failure::Failure;
+use panel::Panel;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tumble::core::World;
+use tumble::core::{World, WorldError};
 use tumble::render::winit::event::WindowEvent;
 use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, Shown, WindowApp, caption};
-use tumble::scene::{SceneFile, visual_notes};
+use tumble::scene::{FileKind, SceneFile, visual_notes};
 
 /// Between two status lines while nothing but time changes.
 const IDLE: Duration = Duration::from_millis(250);
@@ -41,6 +44,8 @@ pub struct Viewer {
     user: User,
     presets: Presets,
     overlays: Overlays,
+    joints: Joints,
+    panel: Panel,
     pointer: Pointer,
     statistics: Statistics,
     log: Log,
@@ -112,16 +117,22 @@ impl Viewer {
             presets.camera(&world, &list).iter().for_each(|camera| user.look_from(camera));
         }
         let now = Instant::now();
+        let robot = crate::args::kind(&options.scene.name) == FileKind::Urdf;
+        // a robot of a file has no drives: time would let it fall before anybody has seen it
+        let paused = options.paused || (robot && options.seconds.is_none());
+        let joints = Joints::new(scene, &world);
         let last = options.seconds.map(|s| (s / world.settings().dt).round() as u64);
         Ok(Viewer {
             name: options.scene.name.clone(),
-            clockwork: Clockwork::new(Simulation::new(world, Pace::new(options.paused), last)),
+            clockwork: Clockwork::new(Simulation::new(world, Pace::new(paused), last)),
             drawing,
             list,
             sight,
             user,
             presets,
             overlays: Overlays { draw: options.debug_draw.0 },
+            joints,
+            panel: Panel::new(robot),
             pointer: Pointer::default(),
             statistics: Statistics::new(now),
             log: Log::create(options.status.as_deref())?,
@@ -178,8 +189,8 @@ impl Viewer {
         self.update_list()?;
         self.sight.draw(screen, &self.list)?;
         let lines = self.lines();
-        screen
-            .set_caption((!lines.is_empty()).then(|| caption(&lines, if screen.size_px()[0] >= 960 { 2 } else { 1 })));
+        screen.set_caption((!lines.is_empty()).then(|| caption(&lines, panel::scale(screen.size_px()[0]))));
+        screen.set_panel(self.panel_image());
         if screen.show()? == Shown::Yes {
             self.stale = false;
             self.shown += 1;

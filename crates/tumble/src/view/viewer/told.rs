@@ -69,6 +69,8 @@ impl Viewer {
             quality: self.quality.map(|q| q.to_string()),
             overlays: self.overlays.names(),
             caption: self.show.any && (self.show.statistics || self.show.help),
+            joints: self.joint_status(world),
+            joints_held: self.joints.held(),
             state_blake3: blake3::hash(&world.save()).to_hex().to_string(),
         }
     }

@@ -1,0 +1,64 @@
+//! `tumble --help`: commands in groups, and exit codes below the help of each.
+
+use crate::args::Tumble;
+use clap::{Command, CommandFactory};
+
+/// Commands by what they are for; clap prints one list.
+const GROUPS: [(&str, &[&str]); 5] = [
+    ("Simulate", &["run", "view"]),
+    ("Caves", &["cave", "serve", "facet", "caves"]),
+    ("Recordings", &["replay", "recover"]),
+    ("Files", &["check", "spheretree", "scenes"]),
+    ("Shell", &["completions", "help"]),
+];
+
+/// Commands that take signals.
+const RUNS: [&str; 4] = ["cave", "serve", "facet", "replay"];
+
+const EXIT_CODES: &str = "Exit codes:
+  0    success
+  1    failure at run time, such as a full disk or a lost graphics device
+  2    bad usage or input, such as an unknown option or a file with a mistake";
+const SECOND_SIGNAL: &str = "\n  130  ended at once by a second Ctrl-C";
+
+/// The command line with its help.
+pub fn command() -> Command {
+    let bare = Tumble::command().mut_subcommands(with_exit_codes);
+    let template = format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}Options:\n{{options}}{{after-help}}",
+        groups(&bare)
+    );
+    bare.help_template(template)
+        .after_help(format!("{EXIT_CODES}{SECOND_SIGNAL}\n\nOptions of a command: tumble COMMAND --help"))
+}
+
+fn with_exit_codes(command: Command) -> Command {
+    let own = command.get_after_help().map_or(String::new(), |help| format!("{help}\n\n"));
+    let second = if RUNS.contains(&command.get_name()) { SECOND_SIGNAL } else { "" };
+    command.after_help(format!("{own}{EXIT_CODES}{second}"))
+}
+
+/// The commands with their descriptions, group by group.
+fn groups(command: &Command) -> String {
+    let about = |name: &str| match command.find_subcommand(name).and_then(Command::get_about) {
+        Some(about) => about.to_string(),
+        None => "Print the help of a command".into(), // clap adds `help` itself
+    };
+    let line = |name: &&str| format!("  {name:<12} {}\n", about(name));
+    GROUPS.iter().map(|(group, names)| format!("{group}:\n{}\n", names.iter().map(line).collect::<String>())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_stands_in_one_group() {
+        let mut grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        let command = Tumble::command();
+        let mut all: Vec<&str> = command.get_subcommands().map(Command::get_name).chain(["help"]).collect();
+        grouped.sort_unstable();
+        all.sort_unstable();
+        assert_eq!(grouped, all);
+    }
+}

@@ -1,0 +1,129 @@
+//! The panel of sliders: mouse and keys move joints.
+
+use super::*;
+use crate::view::simulation::Simulation;
+use crate::view::status::JointStatus;
+use tumble::render::SliderPanel;
+
+/// Share of its range that a key moves a joint by; with Shift ten times that.
+const NUDGE: f64 = 0.01;
+
+/// What of the panel the user has changed.
+pub(super) struct Panel {
+    /// Whether it is wanted.
+    pub(super) wanted: bool,
+    /// The joint that keys move.
+    chosen: usize,
+    /// The first one shown.
+    first: usize,
+    /// The joint whose slider is dragged.
+    dragged: Option<usize>,
+}
+
+impl Panel {
+    pub(super) fn new(wanted: bool) -> Panel {
+        Panel { wanted, chosen: 0, first: 0, dragged: None }
+    }
+
+    pub(super) fn let_go(&mut self) {
+        self.dragged = None;
+    }
+}
+
+impl Viewer {
+    /// The panel, where it is shown.
+    fn panel(&self) -> Option<SliderPanel> {
+        let [width, height] = self.size_px;
+        let panel =
+            || SliderPanel::fitting(self.joints.len(), self.panel.chosen, self.panel.first, scale(width), height);
+        (self.show.any && self.panel.wanted && self.joints.len() > 0).then(panel)
+    }
+
+    /// Its left edge in the window, pixels.
+    fn panel_left(&self, panel: &SliderPanel) -> f64 {
+        f64::from(self.size_px[0].saturating_sub(panel.size_px()[0]))
+    }
+
+    pub(super) fn panel_image(&self) -> Option<Image> {
+        let panel = self.panel()?;
+        let sliders = self.joints.sliders(&self.clockwork.lock().world, self.panel.chosen);
+        let title = if self.joints.held() { "joints held, K frees" } else { "joints free, K holds" };
+        Some(panel.draw(title, &sliders))
+    }
+
+    /// A press of the left button; whether it was on the panel.
+    pub(super) fn press_panel(&mut self) -> Result<bool, Failure> {
+        let Some(panel) = self.panel() else { return Ok(false) };
+        let [x, y] = self.pointer.at_px;
+        let own = [x - self.panel_left(&panel), y];
+        let [width, height] = panel.size_px().map(f64::from);
+        if let Some((index, _)) = panel.at(own) {
+            (self.panel.chosen, self.panel.first, self.panel.dragged) = (index, panel.first, Some(index));
+            self.drag_slider()?;
+        }
+        Ok((0.0..width).contains(&own[0]) && own[1] < height)
+    }
+
+    /// The pointer moved; whether a slider goes with it.
+    pub(super) fn drag_slider(&mut self) -> Result<bool, Failure> {
+        let (Some(index), Some(panel)) = (self.panel.dragged, self.panel()) else { return Ok(false) };
+        let share = panel.share(self.pointer.at_px[0] - self.panel_left(&panel));
+        self.move_joint(|joints, simulation| {
+            joints.slide(&mut simulation.world, index, share, simulation.pace.paused)
+        })?;
+        Ok(true)
+    }
+
+    /// Keys choose the next joint, or the one before.
+    pub(super) fn choose_joint(&mut self, by: isize) {
+        let count = self.joints.len().max(1) as isize;
+        self.panel.wanted |= self.joints.len() > 0;
+        self.panel.chosen = (self.panel.chosen as isize + by).rem_euclid(count) as usize;
+        self.panel.first = self.panel().map_or(0, |panel| panel.first);
+    }
+
+    /// Keys move the chosen joint.
+    pub(super) fn nudge_joint(&mut self, sign: f64) -> Result<(), Failure> {
+        let (index, share) = (self.panel.chosen, sign * NUDGE * if self.user.fast { 10.0 } else { 1.0 });
+        self.move_joint(|joints, simulation| joints.nudge(&mut simulation.world, index, share, simulation.pace.paused))
+    }
+
+    /// Holds all joints where they are, or lets them go.
+    pub(super) fn switch_hold(&mut self) {
+        let world = &mut self.clockwork.lock().world;
+        if self.joints.held() { self.joints.let_go(world) } else { self.joints.hold(world) }
+    }
+
+    fn move_joint(
+        &mut self,
+        change: impl FnOnce(&mut Joints, &mut Simulation) -> Result<(), WorldError>,
+    ) -> Result<(), Failure> {
+        let mut simulation = self.clockwork.lock();
+        change(&mut self.joints, &mut simulation).map_err(|e| Failure::run("moving a joint", e))?;
+        simulation.changes += 1;
+        self.stale = true;
+        Ok(())
+    }
+
+    /// Joints and their sliders, for programs.
+    pub(super) fn joint_status(&self, world: &World) -> Vec<JointStatus> {
+        let panel = self.panel();
+        let place = |index: usize| {
+            let panel = panel?;
+            let [left, right] = panel.bar_px().map(|x| x + self.panel_left(&panel));
+            Some([left, right, panel.middle_px(index)?])
+        };
+        let status = |(index, slider): (usize, tumble::render::Slider)| JointStatus {
+            name: slider.name,
+            position: slider.value,
+            target: slider.target,
+            slider_px: place(index),
+        };
+        self.joints.sliders(world, self.panel.chosen).into_iter().enumerate().map(status).collect()
+    }
+}
+
+/// Pixels to a dot of writing, by the width of the window.
+pub(super) fn scale(width_px: u32) -> u32 {
+    if width_px >= 960 { 2 } else { 1 }
+}
