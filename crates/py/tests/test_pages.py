@@ -35,7 +35,7 @@ NOT_RUN = {
     "make test": "runs this test",
     "python3 -m venv .venv && . .venv/bin/activate": "scripts/test_python.sh makes an environment in the same way",
     "pip install .": "scripts/test_python.sh installs the package so, and these tests use it",
-    "tumble view …": "opens a window: crates/tumble/tests/it/view_windows.rs",
+    "tumble view …": "opens a window: crates/tumble/tests/it/view_windows.rs and view_sliders.rs",
     "tumble cave bowling --cave cube4": "opens windows: crates/tumble/tests/it/cave_windows.rs",
     "tumble cave billiards --cave cube4": "opens windows: crates/tumble/tests/it/cave_windows.rs",
     "sudo scripts/netns.sh --frames 6000": "root, 100 s",
@@ -244,8 +244,8 @@ def test_tests_and_programs_that_pages_name_are_there():
             assert (ROOT / program).is_file(), f"{page}: no program {program}"
 
 
-FOREIGN = set("GLIBC_TUNABLES glibc malloc hugetlb timehist strace rustfmt mj_forward".split())  # of other programs
-STAND_INS = set("frame_000042 tumble_UID tumble_UID_ pin_k name_count my_wall".split())
+FOREIGN = set("compinit zfunc zshrc GLIBC_TUNABLES glibc malloc hugetlb timehist strace rustfmt mj_forward".split())  # of other programs
+STAND_INS = set("RECORDING frame_000042 tumble_UID tumble_UID_ pin_k name_count my_wall".split())
 
 
 def test_words_in_backticks_stand_in_the_sources():
