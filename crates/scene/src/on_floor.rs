@@ -13,6 +13,7 @@ use crate::error::SceneError;
 use crate::file::SceneFile;
 use crate::link::{Geometry, LinkShape, LinkSpec};
 use crate::link_shapes;
+use crate::look::Look;
 use crate::mesh::{MeshSource, MeshSpec};
 use crate::shape::ShapeSpec;
 use crate::urdf::{self, UrdfError, UrdfOptions, Wanted};
@@ -36,6 +37,8 @@ const PROBABLY_MILLIMETRES_M: f64 = 10.0;
 /// The direction in which the camera looks.
 const VIEW: [f64; 3] = [-0.55, 1.0, -0.45];
 const FOV_DEG: f64 = 40.0;
+/// Of a mesh, sRGB: a color that floor and sky do not have.
+const COLOR: [f64; 3] = [0.78, 0.45, 0.20];
 
 /// A URDF on a floor through its lowest point. Joints start at 0, or at the nearest limit where 0 is beyond it. A robot without a joint that moves floats.
 pub(crate) fn robot(path: &Path, options: &UrdfOptions) -> Result<SceneFile, SceneError> {
@@ -85,6 +88,7 @@ pub(crate) fn mesh(path: &Path, repair: bool) -> Result<SceneFile, SceneError> {
         shape: ShapeSpec::Mesh { mesh: 0 },
         mass: Some(MassSpec::Density(DENSITY)),
         visible: true,
+        look: Look { color: COLOR, ..Look::default() },
         ..scene.bodies[0].clone()
     };
     scene.bodies.push(body);
@@ -107,15 +111,16 @@ fn empty(path: &Path, name: &str) -> Result<SceneFile, SceneError> {
     Ok(scene)
 }
 
-/// Puts the floor at a height and the camera before the bounds of what stands on it. Squares of the floor are 10ⁿ m, the largest such below its diagonal.
+/// Puts the floor at a height and the camera before what is between it and the top of the bounds. Squares of the floor are 10ⁿ m, the largest such below its diagonal.
 fn stand(scene: &mut SceneFile, bounds: &Aabb, floor_m: f64) {
-    let radius = (0.5 * (bounds.max - bounds.min).norm()).max(1e-3);
+    let min = Vec3::new(bounds.min.x, bounds.min.y, floor_m);
+    let radius = (0.5 * (bounds.max - min).norm()).max(1e-3);
     scene.bodies[0].position_m[2] = floor_m;
     if let Some(ground) = &mut scene.ground {
         ground.height_m = floor_m;
         ground.look.pattern_scale_m = libm::pow(10.0, libm::floor(libm::log10(2.0 * radius)));
     }
-    let target = 0.5 * (bounds.min + bounds.max);
+    let target = 0.5 * (min + bounds.max);
     let distance = radius / (0.5 * FOV_DEG).to_radians().sin();
     let eye = target - distance * Vec3::from(VIEW).normalize();
     scene.camera = Some(CameraSpec {
