@@ -1,18 +1,16 @@
-//! Tells the cache of sphere trees which builders it belongs to: a hash of the sources that a tree depends on.
+//! Tells the cache of sphere trees and shapes which builders it belongs to: a hash of the sources of this crate.
 
 use std::path::{Path, PathBuf};
 
 fn main() {
     let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
-    for folder in ["src/tree", "src/mesh"] {
-        println!("cargo::rerun-if-changed={folder}");
-        for file in sources(Path::new(folder)) {
-            // what cannot be read counts as empty: the compiler will say so
-            let bytes = std::fs::read(&file).unwrap_or_default();
-            let name = file.to_string_lossy().replace('\\', "/");
-            for byte in name.bytes().chain(bytes).filter(|b| *b != b'\r') {
-                hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-            }
+    println!("cargo::rerun-if-changed=src");
+    for file in sources(Path::new("src")) {
+        // what cannot be read counts as empty: the compiler will say so
+        let bytes = std::fs::read(&file).unwrap_or_default();
+        let name = file.to_string_lossy().replace('\\', "/");
+        for byte in name.bytes().chain(bytes).filter(|b| *b != b'\r') {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
         }
     }
     println!("cargo::rustc-env=TUMBLE_BUILDERS={hash:016x}");

@@ -21,6 +21,8 @@
 
 mod archive;
 mod broad;
+mod bytes;
+mod cache;
 mod contact;
 mod error;
 mod mass;
@@ -36,6 +38,7 @@ mod tree;
 #[doc(hidden)]
 pub use archive::shared;
 pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
+pub use cache::TreeCache;
 pub use contact::{Contact, ContactMode, NormalFrom};
 pub use error::{MeshError, ShapeError};
 pub use mass::MassProperties;
@@ -49,5 +52,5 @@ pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
 pub use tree::{
     Builder, CachedTree, Covering, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree,
-    StageCount, TreeCache, TreeFile, TreeFileError, TreeSettings, grow_to_cover,
+    StageCount, TreeFile, TreeFileError, TreeSettings, grow_to_cover,
 };

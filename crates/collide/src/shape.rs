@@ -77,7 +77,8 @@ impl Shape {
         Ok((Shape::Mesh(Arc::new(shape)), offset))
     }
 
-    /// [`Shape::mesh`] with its tree from the cache where it has one. Also returns what is to be said of the cache.
+    /// [`Shape::mesh`] from the cache, if it was made before of the same vertices, triangles and settings; else it is made and kept there. The same bits
+    /// either way. Also returns what is to be said of the cache.
     pub fn mesh_cached(
         mesh: TriMesh,
         settings: &TreeSettings,

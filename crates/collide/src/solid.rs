@@ -1,10 +1,14 @@
 //! The shapes that carry a sphere tree: meshes and cylinders.
 
+mod stored;
+
+use crate::cache::{Entry, Kind};
 use crate::shape::axis;
 use crate::surface::Surface;
 use crate::surface::parts::parts;
 use crate::{
-    Aabb, ClosedReport, MassProperties, MeshError, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3,
+    Aabb, ClosedReport, MassProperties, MeshDistance, MeshError, MeshId, Pose, ShapeError, SphereTree, TreeCache,
+    TreeSettings, TriMesh, Vec3,
 };
 use std::sync::OnceLock;
 
@@ -53,21 +57,17 @@ impl MeshShape {
     /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
     /// tree. Also returns the offset that was subtracted from the vertices (metres).
     pub fn new(mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
-        let (shape, offset, _) = MeshShape::new_cached(mesh, settings, &TreeCache::off())?;
+        let (shape, offset) = MeshShape::new_lazy(mesh, settings, &TreeCache::off())?;
+        let tree = shape.build_tree()?;
+        let shape = MeshShape { tree: OnceLock::from(Tree::from(tree)), ..shape };
+        shape.surfaces();
         Ok((shape, offset))
     }
 
-    /// The same with a tree from the cache where it has one; also returns what is to be said of the cache.
-    pub fn new_cached(
-        mesh: TriMesh,
-        settings: &TreeSettings,
-        cache: &TreeCache,
-    ) -> Result<(MeshShape, Vec3, Option<String>), MeshError> {
-        let (shape, offset) = MeshShape::new_lazy(mesh, settings, cache)?;
-        let cached = SphereTree::build_cached(&shape.mesh, settings, cache)?;
-        let shape = MeshShape { tree: OnceLock::from(Tree::from(cached.tree)), ..shape };
-        shape.surfaces();
-        Ok((shape, offset, cached.note))
+    fn build_tree(&self) -> Result<SphereTree, MeshError> {
+        let crosses = self.report.crossing_faces > 0 || self.report.crossing_capped;
+        let distance = if crosses { MeshDistance::new(&self.mesh) } else { MeshDistance::uncrossed(&self.mesh) };
+        Ok(SphereTree::build_by(&self.mesh, &distance, &self.settings, &())?.0)
     }
 
     /// The same with tree and surface built when first asked for: for what is drawn and not stepped. A tree that cannot be built is then one ball.
@@ -116,6 +116,33 @@ impl MeshShape {
             bounding_radius,
             report,
         }
+    }
+
+    /// The same from the cache where it has it; also returns what is to be said of the cache.
+    pub fn new_cached(
+        mesh: TriMesh,
+        settings: &TreeSettings,
+        cache: &TreeCache,
+    ) -> Result<(MeshShape, Vec3, Option<String>), MeshError> {
+        let entry = Entry::new(cache, Kind::Shape, &MeshId::of(&mesh), settings);
+        let mut note = None;
+        match entry.as_ref().map(MeshShape::read) {
+            Some(Ok(Some((shape, offset)))) => return Ok((shape, offset, None)),
+            Some(Err(why)) => note = Some(why),
+            None | Some(Ok(None)) => {}
+        }
+        let (shape, offset) = MeshShape::new(mesh, settings)?;
+        if let Some(entry) = entry
+            && let Err(why) = entry.write(&shape.to_bytes(&offset))
+        {
+            note.get_or_insert(why);
+        }
+        Ok((shape, offset, note))
+    }
+
+    fn read(entry: &Entry) -> Result<Option<(MeshShape, Vec3)>, String> {
+        let Some(body) = entry.read()? else { return Ok(None) };
+        MeshShape::of_bytes(&body).map(Some).ok_or_else(|| entry.refused("it holds no shape"))
     }
 
     /// The surface; its centre of mass is the origin.

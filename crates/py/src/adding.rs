@@ -9,6 +9,7 @@ use crate::errors::{Error, Result};
 use crate::looks;
 use crate::shapes::Shape;
 use crate::shared::Shared;
+use crate::slow;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Pose;
@@ -63,6 +64,7 @@ pub fn articulated(
     let description = described(description)?;
     let description = description.get();
     let (body, robot, notes) = description.body(py, base.map_or(Ok(Pose::identity()), base_pose)?, name)?;
+    slow::warn(py)?;
     let (robot, efforts) = (Arc::new(robot), description.spot.efforts());
     let place = shared.write(py, |inner| {
         let id = inner.world.add(body)?;

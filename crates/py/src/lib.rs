@@ -28,6 +28,7 @@ mod rollout;
 mod saved;
 mod shapes;
 mod shared;
+mod slow;
 mod spheretree;
 mod spot;
 mod state;
@@ -72,6 +73,7 @@ mod _native {
     /// Adds what is not a class or a function.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        slow::listen();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -4,13 +4,14 @@ use crate::convert::{number, numbers, path, shown, some, vec3_or};
 use crate::errors::{Error, Result, caught};
 use crate::pickling::{ShapeRecord, write_shape};
 use crate::pool;
+use crate::slow;
 use nalgebra::Translation3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::PyClass;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use tumble::collide::{Pose, Quat, Shape as Solid, TreeCache, TreeSettings, TriMesh, Vec3};
-use tumble::scene::read_solid;
+use tumble::scene::{building_surface, read_solid};
 
 /// A solid that bodies are made of. Made by ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` or ``Mesh``.
 #[pyclass(frozen, subclass, module = "tumble")]
@@ -197,9 +198,11 @@ impl Mesh {
         }
         let mesh = triangles(py, vertices, faces)?.scaled(scale);
         let count = mesh.triangles.len();
-        let (solid, center, _) = py.detach(|| {
-            pool::run(|| Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?))
-        })?;
+        let build = || Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?);
+        let name = vertices.extract::<std::path::PathBuf>().unwrap_or_else(|_| "Mesh".into());
+        let (solid, center, _) =
+            py.detach(|| pool::run(|| building_surface(&name.display().to_string(), count, build)))?;
+        slow::warn(py)?;
         Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh { center }))
     }
 

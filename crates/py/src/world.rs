@@ -18,7 +18,7 @@ use crate::rollout::Plan;
 use crate::shapes::Shape;
 use crate::shared::Shared;
 use crate::words::meaning;
-use crate::{bodies, contacts, pickling, saved};
+use crate::{bodies, contacts, pickling, saved, slow};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -49,6 +49,7 @@ pub struct World {
 impl World {
     /// A world of its own.
     pub fn of(py: Python<'_>, inner: Inner) -> Result<World> {
+        slow::warn(py)?;
         let shared = Shared::new(inner);
         Ok(World { anchor: anchor(py, &shared)?, shared })
     }

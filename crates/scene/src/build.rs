@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
-use tumble_collide::{Pose, RepairSettings, Shape, TreeCache, TreeSettings, TriMesh, Vec3, text_of};
+use tumble_collide::{Pose, RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3, text_of};
 use tumble_core::solver::{self, Accuracy};
 use tumble_core::{
     ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, RigidBody, Settings, Sleep, Visual,
@@ -20,6 +20,7 @@ use crate::file::SceneFile;
 use crate::link_shapes::{self, Purpose, ShapeMaker};
 use crate::look::Look;
 use crate::mesh::{MeshSource, MeshSpec};
+use crate::slow::building_surface;
 
 /// Most bytes of a mesh file: 1 GiB.
 pub(crate) const MOST_MESH_BYTES: u64 = 1 << 30;
@@ -207,13 +208,25 @@ impl SceneFile {
             why,
         };
         let (mut mesh, lines) = self.triangles(spec, &wrong)?;
-        let told = make_solid(&mut mesh, &lines, spec.repair.then(RepairSettings::default).as_ref()).map_err(&wrong)?;
-        notes.extend(told.into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
+        let mut told = match spec.repair {
+            true => make_solid(&mut mesh, &lines, Some(&RepairSettings::default())).map_err(&wrong)?,
+            false => Vec::new(),
+        };
         let mut settings = TreeSettings::octree();
         settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
         settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
-        let (shape, center, note) =
-            purpose.mesh(mesh, &settings, &TreeCache::of_environment()).map_err(|e| wrong(e.to_string()))?;
+        let (called, count) = (spec.called(), mesh.triangles.len());
+        let made = building_surface(&called, count, || purpose.mesh(mesh, &settings, &TreeCache::of_environment()));
+        let (shape, center, note) = made.map_err(|error| match error {
+            ShapeError::Mesh(error) if !spec.repair => wrong(error.at_line(&lines).to_string()),
+            error => wrong(error.to_string()),
+        })?;
+        if let Shape::Mesh(solid) = &shape
+            && !spec.repair
+        {
+            told = solid.report().notes();
+        }
+        notes.extend(told.into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
         notes.extend(note.filter(|note| !notes.contains(note)));
         Ok((shape, center))
     }

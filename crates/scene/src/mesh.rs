@@ -109,6 +109,14 @@ const KINDS: Names<Kind> = &[
 ];
 
 impl MeshSpec {
+    /// The name of its file, else its own.
+    pub(crate) fn called(&self) -> String {
+        match &self.source {
+            MeshSource::File { path, .. } => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            _ => self.name.clone(),
+        }
+    }
+
     /// Reads a mesh; files are looked for beside `folder`.
     pub(crate) fn read(name: &str, mut f: Fields<'_>, folder: &Path) -> Option<Self> {
         let Some(kind) = f.choice("type", KINDS) else {

@@ -9,7 +9,8 @@ use tumble::net::sync::udp::SharedKey;
 use tumble::render::{Blend, DebugDraw, Drawing, RenderError, Warp};
 use tumble::scene::cave::{Cave, MOST_BYTES, is_cave, resolve_cave, shipped_caves};
 use tumble::scene::{
-    FileKind, SceneError, overlap_notes, read_mesh_bytes, read_solid, resolve_scene, shipped, visual_notes,
+    FileKind, SceneError, building_surface, overlap_notes, read_mesh_bytes, read_solid, resolve_scene, shipped,
+    visual_notes,
 };
 
 /// Checks every file; all are looked at, and the first failure's code is kept.
@@ -122,7 +123,9 @@ fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {
     let (mesh, notes) = read_solid(path, &bytes, repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
     notes.iter().for_each(|note| println!("{}: {note}", path.display()));
     let (triangles, diagonal) = (mesh.triangles.len(), mesh.diagonal());
-    let (shape, center) = Shape::mesh(mesh, &TreeSettings::octree()).map_err(|e| wrong(e.to_string()))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let made = building_surface(&name, triangles, || Shape::mesh(mesh, &TreeSettings::octree()));
+    let (shape, center) = made.map_err(|e| wrong(e.to_string()))?;
     let error = shape.tree().map_or(0.0, |tree| tree.outward_error());
     Ok(format!(
         "a closed mesh of {triangles} triangles, volume {:.6e} m³, centre of mass ({:.6}, {:.6}, {:.6}) m, sphere tree within {:.3} % of its diagonal",

@@ -25,6 +25,8 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     quiet_drivers();
     end_with_the_reader();
+    // where stderr is closed there is nobody to tell
+    tumble::scene::set_slow_load_listener(|line| _ = writeln!(std::io::stderr(), "{line} …"));
     let command = match Tumble::from_arg_matches(&help::command().get_matches()) {
         Ok(typed) => typed.command,
         Err(error) => error.exit(),

@@ -7,7 +7,7 @@ const LEAF: usize = 4;
 
 /// The tree, in pre-order.
 #[derive(Clone, Debug)]
-pub(super) struct BoxTree {
+pub(crate) struct BoxTree {
     pub nodes: Vec<BoxNode>,
     /// The triangles in the order of the leaves.
     pub ids: Vec<u32>,
@@ -15,7 +15,7 @@ pub(super) struct BoxTree {
 
 /// One box.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct BoxNode {
+pub(crate) struct BoxNode {
     pub bounds: Aabb,
     /// Leaf: a range of `ids`. Inner (`count` is 0): the left child is the next node, the right one is `second`.
     pub first: u32,

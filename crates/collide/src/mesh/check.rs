@@ -262,8 +262,18 @@ pub(crate) struct EdgeUse {
     pub forward: bool,
 }
 
+/// The uses of all edges, in ascending order of the undirected edges.
+pub(crate) struct EdgeGroups(Vec<EdgeUse>);
+
+impl EdgeGroups {
+    /// The uses of each undirected edge.
+    pub fn iter(&self) -> impl Iterator<Item = &[EdgeUse]> {
+        self.0.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
+    }
+}
+
 /// The uses of each undirected edge, edges in ascending order.
-pub(crate) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
+pub(crate) fn edge_groups(mesh: &TriMesh) -> EdgeGroups {
     let mut uses: Vec<EdgeUse> = Vec::with_capacity(3 * mesh.triangles.len());
     for (face, t) in mesh.triangles.iter().enumerate() {
         for k in 0..3 {
@@ -272,16 +282,16 @@ pub(crate) fn edge_groups(mesh: &TriMesh) -> Vec<Vec<EdgeUse>> {
         }
     }
     uses.sort_unstable();
-    uses.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)).map(<[EdgeUse]>::to_vec).collect()
+    EdgeGroups(uses)
 }
 
-pub(super) fn unbalanced(groups: &[Vec<EdgeUse>]) -> impl Iterator<Item = &Vec<EdgeUse>> {
+pub(super) fn unbalanced(groups: &EdgeGroups) -> impl Iterator<Item = &[EdgeUse]> {
     groups.iter().filter(|g| 2 * g.iter().filter(|u| u.forward).count() != g.len())
 }
 
 /// `face_of` gives the numbers that faces have for the user.
-fn refuse_unbalanced(groups: &[Vec<EdgeUse>], face_of: &[usize]) -> Result<(), MeshError> {
-    let bad: Vec<&Vec<EdgeUse>> = unbalanced(groups).collect();
+fn refuse_unbalanced(groups: &EdgeGroups, face_of: &[usize]) -> Result<(), MeshError> {
+    let bad: Vec<&[EdgeUse]> = unbalanced(groups).collect();
     if bad.is_empty() {
         return Ok(());
     }

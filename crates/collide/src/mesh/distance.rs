@@ -11,7 +11,8 @@
 
 use super::TriMesh;
 use super::boxes::BoxTree;
-use super::check::edge_groups;
+use super::check::{EdgeGroups, edge_groups};
+use super::crossing::Crossings;
 use super::union::{Boundary, Trust};
 use super::winding::WindingNumber;
 use crate::{Aabb, Vec3};
@@ -43,8 +44,16 @@ pub struct MeshDistance {
 impl MeshDistance {
     /// Prepares a closed, outward-wound mesh (see [`TriMesh::check_closed`]) of at least one triangle.
     pub fn new(mesh: &TriMesh) -> MeshDistance {
-        let (boundary, winding) = Boundary::of(mesh);
-        let normals = pseudonormals(mesh);
+        MeshDistance::within_boundary(mesh, Boundary::of(mesh))
+    }
+
+    /// The same of a mesh that is known not to cross itself: that is not looked for, which takes longer than all else.
+    pub(crate) fn uncrossed(mesh: &TriMesh) -> MeshDistance {
+        MeshDistance::within_boundary(mesh, Boundary::by(mesh, &Crossings::default()))
+    }
+
+    fn within_boundary(mesh: &TriMesh, (boundary, winding): (Boundary, Option<WindingNumber>)) -> MeshDistance {
+        let normals = pseudonormals(mesh, &edge_groups(mesh));
         let tree = BoxTree::new(&boundary.pieces.iter().map(|p| p.corners).collect::<Vec<_>>());
         let sorted: Vec<_> = tree.ids.iter().map(|&n| &boundary.pieces[n as usize]).collect();
         MeshDistance {
@@ -169,22 +178,23 @@ fn trusted(normals: &[Vec3; 7], trust: Trust) -> [Vec3; 7] {
     }
 }
 
-fn box_distance_squared(b: &Aabb, p: &Vec3) -> f64 {
+pub(crate) fn box_distance_squared(b: &Aabb, p: &Vec3) -> f64 {
     (p - p.zip_zip_map(&b.min, &b.max, |x, low, high| x.clamp(low, high))).norm_squared()
 }
 
-/// Face (0), edges (1–3) and vertices (4–6) of every triangle.
-pub(crate) fn pseudonormals(mesh: &TriMesh) -> Vec<[Vec3; 7]> {
-    let face: Vec<Vec3> = (0..mesh.triangles.len())
-        .map(|t| {
-            let [a, b, c] = mesh.corners(t);
-            (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
-        })
-        .collect();
+/// Outward unit normals of the triangles; zero where there is no area.
+pub(crate) fn face_normals(mesh: &TriMesh) -> Vec<Vec3> {
+    let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+    (0..mesh.triangles.len()).map(|t| normal(mesh.corners(t))).collect()
+}
+
+/// Face (0), edges (1–3) and vertices (4–6) of every triangle. `groups`: the edges of the mesh.
+pub(crate) fn pseudonormals(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<[Vec3; 7]> {
+    let face = face_normals(mesh);
     let mut all: Vec<[Vec3; 7]> = face.iter().map(|n| [*n; 7]).collect();
-    for group in edge_groups(mesh) {
+    for group in groups.iter() {
         let sum: Vec3 = group.iter().map(|u| face[u.face]).sum();
-        for u in &group {
+        for u in group {
             let t = mesh.triangles[u.face];
             let from = if u.forward { u.low } else { u.high };
             let k = (0..3).find(|&k| t[k] == from).unwrap_or(0);

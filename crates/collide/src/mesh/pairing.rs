@@ -38,7 +38,7 @@ impl Pairing {
             let (a, b) = (use_of(mesh, a), use_of(mesh, b));
             (partner[a], partner[b]) = (b as u32, a as u32);
         };
-        for group in &groups {
+        for group in groups.iter() {
             pair_group(group, &sheet, &area, &mut join);
         }
         let over_pairs = (0..3 * faces).filter(|&u| partner[u] != RIM).map(|u| (u / 3, partner[u] as usize / 3));

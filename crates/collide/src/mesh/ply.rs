@@ -1,4 +1,4 @@
-//! PLY, text and binary of either byte order: positions and faces. Every other property and element is passed over.
+//! PLY, text and binary of either byte order: positions, faces and triangle strips. Every other property and element is passed over.
 //!
 //! ```text
 //! ply
@@ -7,6 +7,8 @@
 //! property float x                          and y, z
 //! element face 6
 //! property list uchar int vertex_indices    or vertex_index
+//! element tristrips 1                       beside or instead of `face`
+//! property list int int vertex_indices      strips, each ended by -1
 //! end_header
 //! ```
 //!
@@ -15,20 +17,22 @@
 
 use super::TriMesh;
 use super::polygon::FaceCutter;
+use super::strip::strip_triangles;
 use crate::{MeshError, Vec3};
 
 /// Lines of a header.
 const MOST_LINES: usize = 10_000;
 
 impl TriMesh {
-    /// Reads the bytes of a PLY file. A face of more than three corners is cut into triangles ([`FaceCutter`](crate::FaceCutter)).
+    /// Reads the bytes of a PLY file. A face of more than three corners is cut into triangles ([`FaceCutter`](crate::FaceCutter)). Triangle strips
+    /// turn every second triangle, start again after -1, and leave out triangles that name a vertex twice.
     ///
     /// # Errors
-    /// [`MeshError`] names the line of the header, or the vertex or face (from 1).
+    /// [`MeshError`] names the line of the header, or the vertex, face or strip (from 1).
     pub fn from_ply(bytes: &[u8]) -> Result<TriMesh, MeshError> {
         let (header, body) = Header::read(bytes)?;
         let mut mesh = TriMesh::default();
-        let mut faces = Vec::new();
+        let (mut faces, mut strips) = (Vec::new(), Vec::new());
         let mut values = Values { encoding: header.encoding, rest: body };
         for element in header.elements.iter().filter(|e| e.count > 0) {
             let kind = element.kind()?;
@@ -41,6 +45,9 @@ impl TriMesh {
                     Kind::Face(at) => {
                         faces.push(read_face(element, at, &mut values).map_err(|why| refused(&place(), &why))?)
                     }
+                    Kind::Strips(at) => {
+                        strips.push(read_indices(element, at, &mut values).map_err(|why| refused(&place(), &why))?)
+                    }
                     Kind::Other => element
                         .properties
                         .iter()
@@ -52,6 +59,13 @@ impl TriMesh {
         let mut cutter = FaceCutter::default();
         for (n, corners) in faces.iter().enumerate() {
             mesh.push_face(corners, n + 1, &mut cutter)?;
+        }
+        for (n, strip) in strips.iter().enumerate() {
+            let triangles = strip_triangles(strip, mesh.vertices.len());
+            mesh.triangles.extend(triangles.map_err(|why| refused(&format!("tristrips {}", n + 1), &why))?);
+        }
+        if mesh.triangles.is_empty() {
+            return Err(header.without_triangles());
         }
         mesh.check_data()?;
         Ok(mesh)
@@ -139,6 +153,7 @@ struct Element {
 enum Kind {
     Vertex([usize; 3]),
     Face(usize),
+    Strips(usize),
     Other,
 }
 
@@ -151,9 +166,10 @@ impl Element {
                 [Some(x), Some(y), Some(z)] => Ok(Kind::Vertex([x, y, z])),
                 _ => Err(refused("the element `vertex`", "wanted properties x, y and z")),
             },
-            "face" => match at("vertex_indices", true).or_else(|| at("vertex_index", true)) {
-                Some(list) => Ok(Kind::Face(list)),
-                None => Err(refused("the element `face`", "wanted `property list … vertex_indices`")),
+            name @ ("face" | "tristrips") => match at("vertex_indices", true).or_else(|| at("vertex_index", true)) {
+                Some(list) if name == "face" => Ok(Kind::Face(list)),
+                Some(list) => Ok(Kind::Strips(list)),
+                None => Err(refused(&format!("the element `{name}`"), "wanted `property list … vertex_indices`")),
             },
             _ => Ok(Kind::Other),
         }
@@ -213,6 +229,15 @@ impl Header {
             }
         }
         Err(refused(&format!("line {MOST_LINES}"), "the header has no end"))
+    }
+
+    /// The error of a file whose elements hold no triangle, such as a cloud of points.
+    fn without_triangles(&self) -> MeshError {
+        let names: Vec<String> = self.elements.iter().take(10).map(|e| format!("{} {}", e.count, e.name)).collect();
+        refused(
+            "the file has no triangles",
+            &format!("wanted elements `face` or `tristrips`; there are: {}", names.join(", ")),
+        )
     }
 }
 
@@ -297,19 +322,28 @@ fn read_vertex(element: &Element, at: [usize; 3], values: &mut Values<'_>) -> Re
 
 /// Corners as numbers from 1.
 fn read_face(element: &Element, at: usize, values: &mut Values<'_>) -> Result<Vec<i64>, String> {
-    let mut corners = Vec::new();
+    let mut corners = read_indices(element, at, values)?;
+    if corners.len() < 3 {
+        return Err(format!("{} corners, but it needs at least 3", corners.len()));
+    }
+    corners.iter_mut().for_each(|corner| *corner = corner.saturating_add(1));
+    Ok(corners)
+}
+
+/// The list at place `at` of an element's properties: numbers of vertices, from 0 as in the file.
+fn read_indices(element: &Element, at: usize, values: &mut Values<'_>) -> Result<Vec<i64>, String> {
+    let mut indices = Vec::new();
     let mut odd = None;
     for (n, property) in element.properties.iter().enumerate() {
         values.property(property, |value| {
             if n == at {
-                corners.push((value as i64).saturating_add(1));
+                indices.push(value as i64);
                 odd = odd.or((value.fract() != 0.0).then_some(value));
             }
         })?;
     }
     match odd {
         Some(value) => Err(format!("{value} where the number of a vertex should be")),
-        None if corners.len() < 3 => Err(format!("{} corners, but it needs at least 3", corners.len())),
-        None => Ok(corners),
+        None => Ok(indices),
     }
 }

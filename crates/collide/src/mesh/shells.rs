@@ -4,7 +4,7 @@
 //! inside out. It is turned, and with it the shells that lie wholly within it, which were wound to suit it.
 
 use super::TriMesh;
-use super::check::EdgeUse;
+use super::check::EdgeGroups;
 use super::winding::{WindingNumber, solid_angle};
 use crate::Vec3;
 use std::f64::consts::PI;
@@ -14,7 +14,7 @@ const SAMPLES: usize = 32;
 
 /// The shell of each face, counted from 0 in the order of their first faces, and how many there are. Faces are
 /// connected over edges.
-pub(crate) fn shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> (Vec<u32>, usize) {
+pub(crate) fn shells(mesh: &TriMesh, groups: &EdgeGroups) -> (Vec<u32>, usize) {
     let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
     fn root(parent: &mut [usize], mut f: usize) -> usize {
         while parent[f] != f {
@@ -23,7 +23,7 @@ pub(crate) fn shells(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> (Vec<u32>, usiz
         }
         f
     }
-    for group in groups {
+    for group in groups.iter() {
         for pair in group.windows(2) {
             let (a, b) = (root(&mut parent, pair[0].face), root(&mut parent, pair[1].face));
             parent[a.max(b)] = a.min(b);

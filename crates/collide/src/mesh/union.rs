@@ -15,7 +15,7 @@
 //! Integrals over the boundary's pieces are exact for the union, whatever the number of times it is gone around.
 
 use super::TriMesh;
-use super::check::{EdgeUse, edge_groups};
+use super::check::{EdgeGroups, edge_groups};
 use super::closest_on_triangle;
 use super::crossing::Crossings;
 use super::integrals::Moments;
@@ -73,9 +73,13 @@ pub(super) struct Boundary {
 impl Boundary {
     /// Of a closed mesh (see [`TriMesh::check_closed`]).
     pub fn of(mesh: &TriMesh) -> (Boundary, Option<WindingNumber>) {
-        let crossings = Crossings::of(mesh);
+        Boundary::by(mesh, &Crossings::of(mesh))
+    }
+
+    /// The same of a mesh whose crossing faces are known.
+    pub fn by(mesh: &TriMesh, crossings: &Crossings) -> (Boundary, Option<WindingNumber>) {
         let groups = edge_groups(mesh);
-        let patches = patches(mesh, &groups, &crossings);
+        let patches = patches(mesh, &groups, crossings);
         let split = pinched(mesh, &groups);
         let simple = crossings.pairs.is_empty() && !crossings.capped && patches.count == 1;
         let winding = (!simple || split.contains(&true)).then(|| WindingNumber::new(mesh));
@@ -87,7 +91,7 @@ impl Boundary {
             doubtful_area: 0.0,
         };
         match &winding {
-            Some(winding) if !simple => boundary.cut(mesh, &crossings, &patches, winding),
+            Some(winding) if !simple => boundary.cut(mesh, crossings, &patches, winding),
             _ => (0..mesh.triangles.len()).for_each(|t| boundary.keep(t, mesh.corners(t), Told::Bounds(1.0))),
         }
         if boundary.pieces.is_empty() {
@@ -285,7 +289,7 @@ struct Patches {
     count: usize,
 }
 
-fn patches(mesh: &TriMesh, groups: &[Vec<EdgeUse>], crossings: &Crossings) -> Patches {
+fn patches(mesh: &TriMesh, groups: &EdgeGroups, crossings: &Crossings) -> Patches {
     let mut crosses = vec![false; mesh.triangles.len()];
     for &(a, b) in &crossings.pairs {
         (crosses[a as usize], crosses[b as usize]) = (true, true);
@@ -322,7 +326,7 @@ fn patches(mesh: &TriMesh, groups: &[Vec<EdgeUse>], crossings: &Crossings) -> Pa
 }
 
 /// Which vertices have more than one fan of faces around them, an edge of more than two, or a face without area.
-fn pinched(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> Vec<bool> {
+fn pinched(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<bool> {
     let mut pinched = vec![false; mesh.vertices.len()];
     for (_, triangle) in
         mesh.triangles.iter().enumerate().filter(|(t, _)| area_vector(&mesh.corners(*t)) == Vec3::zeros())
@@ -340,7 +344,7 @@ fn pinched(mesh: &TriMesh, groups: &[Vec<EdgeUse>]) -> Vec<bool> {
     }
     let corner =
         |face: usize, v: u32| (3 * face + mesh.triangles[face].iter().position(|&w| w == v).unwrap_or(0)) as u32;
-    for group in groups {
+    for group in groups.iter() {
         for v in [group[0].low, group[0].high] {
             if group.len() != 2 {
                 pinched[v as usize] = true;

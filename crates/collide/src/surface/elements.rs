@@ -16,7 +16,8 @@
 //! A short edge that turns little is [`Edge::spared`]: it makes no contact of its own where one of its ends is on a face and at most `ε`
 //! further from the other body. The least gap is then known to the same `ε`.
 
-use crate::mesh::{edge_groups, pseudonormals};
+use crate::bytes::{Reader, Write};
+use crate::mesh::{EdgeGroups, face_normals};
 use crate::tree::around_points;
 use crate::{Aabb, SphereTree, TriMesh, Vec3};
 use nalgebra::ComplexField;
@@ -106,6 +107,19 @@ impl Group {
     pub fn reach(&self, fine: bool) -> f64 {
         f64::from(self.reach[usize::from(fine)])
     }
+
+    pub fn write(&self, to: &mut Vec<u8>) {
+        self.center.iter().chain(&self.reach).for_each(|x| to.single(*x));
+        to.u32(self.first);
+        to.u32(self.count);
+        to.flag(self.parted);
+    }
+
+    pub fn read(from: &mut Reader) -> Option<Group> {
+        let center = [from.single()?, from.single()?, from.single()?];
+        let reach = [from.single()?, from.single()?];
+        Some(Group { center, reach, first: from.u32()?, count: from.u32()?, parted: from.flag()? })
+    }
 }
 
 /// A group on the way to [`Group`]: each before its parts, all that it holds up to `end`.
@@ -118,19 +132,21 @@ struct Halved {
 const FEW: usize = 4;
 /// Parts of a group: as many as are looked at side by side, unless a ball of the tree has more children.
 pub(crate) const PARTS: usize = 8;
+/// Groups that are read are nested no deeper.
+const MOST_NESTED: u32 = 100;
 /// Rounds up to single precision.
 const ABOVE: f64 = 1.0 + 1e-6;
 
 impl Elements {
-    /// Also returns, per triangle, which of its edges (k to k+1) are among the elements.
-    pub fn new(mesh: &TriMesh, tree: &SphereTree) -> (Elements, Vec<[bool; 3]>) {
-        let face: Vec<Vec3> = pseudonormals(mesh).iter().map(|n| n[0]).collect();
+    /// The points in the order of the mesh's vertices, and the edges; no groups yet. Also returns, per triangle, which of its edges (k to k+1) are among the
+    /// elements.
+    fn ungrouped(mesh: &TriMesh, groups: &EdgeGroups) -> (Elements, Vec<[bool; 3]>) {
+        let face = face_normals(mesh);
         let mut all = Elements::default();
-        let (mut edges, searched) = gather_edges(mesh, &face);
-        let mut points = all.gather_points(mesh, &face, tree, &searched);
-        points.sort_by_key(|p| (p.0, p.1.index));
+        let (mut edges, searched) = gather_edges(mesh, groups, &face);
+        all.gather_points(mesh, &face, &searched);
         edges.sort_by_key(|e| (e.points[0], e.fine, e.index));
-        for (_, point) in &mut points {
+        for point in &mut all.points {
             let of = |fine: bool| {
                 (
                     edges.partition_point(|e| (e.points[0], e.fine) < (point.index, fine)),
@@ -143,6 +159,15 @@ impl Elements {
                 (a as u32, [(b - a) as u32, (c - b) as u32], [longest(b), longest(c)]);
         }
         all.edges = edges;
+        (all, searched)
+    }
+
+    /// Also returns, per triangle, which of its edges (k to k+1) are among the elements. `groups`: the edges of the mesh.
+    pub fn new(mesh: &TriMesh, groups: &EdgeGroups, tree: &SphereTree) -> (Elements, Vec<[bool; 3]>) {
+        let (mut all, searched) = Elements::ungrouped(mesh, groups);
+        let mut points: Vec<(u32, Point)> =
+            std::mem::take(&mut all.points).into_iter().map(|p| (holder(tree, &p.at), p)).collect();
+        points.sort_by_key(|p| (p.0, p.1.index));
         let held: Vec<[usize; 2]> = (0..tree.nodes().len() as u32)
             .map(|node| [node, node + 1].map(|n| points.partition_point(|p| p.0 < n)))
             .collect();
@@ -155,6 +180,47 @@ impl Elements {
             all.file(&halved, 0, 0);
         }
         (all, searched)
+    }
+
+    /// The same with groups that were made before of the same mesh and tree; `order` names the points in theirs. `None` where they do not fit the mesh.
+    pub fn regrouped(
+        mesh: &TriMesh,
+        edges: &EdgeGroups,
+        order: &[u32],
+        groups: Vec<Group>,
+    ) -> Option<(Elements, Vec<[bool; 3]>)> {
+        let (mut all, searched) = Elements::ungrouped(mesh, edges);
+        let mut left: Vec<Option<Point>> = vec![None; mesh.vertices.len()];
+        let count = all.points.len();
+        all.points.drain(..).for_each(|p| left[p.index as usize] = Some(p));
+        all.points = order.iter().map(|&v| left.get_mut(v as usize)?.take()).collect::<Option<_>>()?;
+        all.groups = groups;
+        (all.points.len() == count && all.is_grouped()).then_some((all, searched))
+    }
+
+    /// Whether each group but the first is a part of one before it, each point is held by one group, and nothing is nested too deep.
+    fn is_grouped(&self) -> bool {
+        let mut depth = vec![None; self.groups.len()];
+        let mut held = vec![false; self.points.len()];
+        if let Some(first) = depth.first_mut() {
+            *first = Some(0);
+        }
+        for (n, group) in self.groups.iter().enumerate() {
+            let Some(own) = depth[n].filter(|own| *own < MOST_NESTED) else { return false };
+            let range = group.first as usize..group.first as usize + group.count as usize;
+            let taken = match group.parted {
+                true => depth
+                    .get_mut(range)
+                    .is_some_and(|parts| parts.iter_mut().all(|part| part.replace(own + 1).is_none())),
+                false => held
+                    .get_mut(range)
+                    .is_some_and(|points| points.iter_mut().all(|point| !std::mem::replace(point, true))),
+            };
+            if !taken {
+                return false;
+            }
+        }
+        held.iter().all(|held| *held)
     }
 
     /// The points that a group holds itself; none where it has parts.
@@ -258,14 +324,8 @@ impl Elements {
         }
     }
 
-    /// The vertices, each with the ball that holds it.
-    fn gather_points(
-        &mut self,
-        mesh: &TriMesh,
-        face: &[Vec3],
-        tree: &SphereTree,
-        searched: &[[bool; 3]],
-    ) -> Vec<(u32, Point)> {
+    /// The vertices.
+    fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], searched: &[[bool; 3]]) {
         let mut ways: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for k in (0..3).filter(|&k| searched[t][k]) {
@@ -283,7 +343,6 @@ impl Elements {
                 }
             }
         }
-        let mut points = Vec::new();
         for (v, normals) in around.iter().enumerate() {
             if normals.is_empty() {
                 continue;
@@ -302,9 +361,8 @@ impl Elements {
             };
             self.normals.extend(normals);
             self.ways.extend(&ways[v]);
-            points.push((holder(tree, &at), point));
+            self.points.push(point);
         }
-        points
     }
 }
 
@@ -333,12 +391,12 @@ fn parts_of(halved: &[Halved], group: usize) -> Vec<usize> {
 }
 
 /// The edges that turn outwards.
-fn gather_edges(mesh: &TriMesh, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
+fn gather_edges(mesh: &TriMesh, groups: &EdgeGroups, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
     let mut searched = vec![[false; 3]; mesh.triangles.len()];
     let mut edges = Vec::new();
     let diagonal = mesh.diagonal();
     let error = EDGE_ERROR * diagonal;
-    for (index, group) in edge_groups(mesh).iter().enumerate() {
+    for (index, group) in groups.iter().enumerate() {
         let ends = [group[0].low, group[0].high].map(|v| mesh.vertices[v as usize]);
         let normals = [face[group[0].face], face[group[group.len() - 1].face]];
         let apart = mesh.corners(group[group.len() - 1].face);

@@ -17,11 +17,13 @@ pub(crate) mod field;
 pub(crate) mod parts;
 pub(crate) mod primitive;
 
+use crate::bytes::{Reader, Write};
+use crate::mesh::edge_groups;
 use crate::{SphereTree, TriMesh, Vec3};
-use elements::Elements;
-use field::MeshField;
+use elements::{Elements, Group};
+use field::{MeshField, is_convex};
 
-/// Elements and field of a mesh; in the mesh's frame.
+/// Elements and field of a mesh; in the mesh's frame. What takes long to make can be kept ([`Surface::write`]).
 #[derive(Clone, Debug)]
 pub(crate) struct Surface {
     pub elements: Elements,
@@ -32,8 +34,27 @@ impl Surface {
     /// Of a closed, outward-wound mesh and the tree around it.
     pub fn new(mesh: &TriMesh, tree: &SphereTree) -> Surface {
         let mesh = mesh.ordered();
-        let (elements, searched) = Elements::new(&mesh, tree);
-        Surface { elements, field: MeshField::new(&mesh, searched) }
+        let edges = edge_groups(&mesh);
+        let (elements, searched) = Elements::new(&mesh, &edges, tree);
+        let convex = is_convex(&mesh, &edges);
+        Surface { elements, field: MeshField::new(mesh, &edges, searched, convex) }
+    }
+
+    /// The mesh in its order, how its points are grouped, and whether it is convex.
+    pub fn write(&self, to: &mut Vec<u8>) {
+        self.field.mesh().write(to);
+        to.list(&self.elements.points, |to, point| to.u32(point.index));
+        to.list(&self.elements.groups, |to, group| group.write(to));
+        to.flag(self.field.convex());
+    }
+
+    pub fn read(from: &mut Reader) -> Option<Surface> {
+        let mesh = TriMesh::read(from)?;
+        let (order, groups) = (from.list(Reader::u32)?, from.list(Group::read)?);
+        let convex = from.flag()?;
+        let edges = edge_groups(&mesh);
+        let (elements, searched) = Elements::regrouped(&mesh, &edges, &order, groups)?;
+        Some(Surface { elements, field: MeshField::new(mesh, &edges, searched, convex) })
     }
 }
 

@@ -19,13 +19,12 @@
 //! capped, numbers finite, parents there and in order, children inside their parents.
 
 use super::{LevelQuality, SphereNode, SphereTree, StageCount, TreeSettings};
+use crate::cache::MOST_BYTES;
 use crate::{TriMesh, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use thiserror::Error;
 
-/// Most bytes of a text that is read: 512 MiB.
-pub const MOST_BYTES: usize = 512 << 20;
 /// Most balls of a tree that is read.
 const MOST_BALLS: usize = 1 << 23;
 /// Most levels of a tree that is read.
@@ -161,8 +160,11 @@ impl MeshId {
     pub fn of(mesh: &TriMesh) -> MeshId {
         let mut hash = blake3::Hasher::new();
         hash.update(&(mesh.vertices.len() as u64).to_le_bytes());
-        mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]).for_each(|x| _ = hash.update(&x.to_bits().to_le_bytes()));
-        mesh.triangles.iter().flatten().for_each(|n| _ = hash.update(&n.to_le_bytes()));
+        // the hash is quick where it gets much at once
+        hash.update(
+            &mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]).flat_map(f64::to_le_bytes).collect::<Vec<u8>>(),
+        );
+        hash.update(&mesh.triangles.as_flattened().iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>());
         MeshId {
             blake3: hash.finalize().to_hex().to_string(),
             triangles: mesh.triangles.len(),

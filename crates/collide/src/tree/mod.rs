@@ -12,6 +12,7 @@
 
 mod ball;
 mod builder;
+mod bytes;
 mod cache;
 mod close;
 mod covering;
@@ -30,7 +31,7 @@ mod simplex;
 mod verify;
 
 pub use builder::{Progress, StageCount};
-pub use cache::{CachedTree, TreeCache};
+pub use cache::CachedTree;
 pub use covering::Covering;
 pub use cut::grow_to_cover;
 pub use file::{MeshId, TreeFile, TreeFileError};
@@ -93,17 +94,27 @@ impl SphereTree {
     ) -> Result<(SphereTree, Vec<StageCount>), MeshError> {
         settings.check()?;
         mesh.check_data()?;
-        let distance = MeshDistance::new(mesh);
-        go_on(progress)?;
+        SphereTree::build_by(mesh, &MeshDistance::new(mesh), settings, progress)
+    }
+
+    /// The same of a mesh whose distance is there already.
+    pub(crate) fn build_by(
+        mesh: &TriMesh,
+        distance: &MeshDistance,
+        settings: &TreeSettings,
+        progress: &dyn Progress,
+    ) -> Result<(SphereTree, Vec<StageCount>), MeshError> {
+        settings.check()?;
         let builder: &dyn TreeBuilder = match settings.builder {
             Builder::Octree => &octree::Octree,
             Builder::Medial => &medial::Medial,
             Builder::Hubbard => &hubbard::Hubbard,
             Builder::Grid => &grid::Grid,
         };
-        let built = builder.build(&Job { mesh, distance: &distance, settings, progress })?;
         go_on(progress)?;
-        let tree = SphereTree::flatten(&built.root, &distance, settings.builder != Builder::Octree, progress);
+        let built = builder.build(&Job { mesh, distance, settings, progress })?;
+        go_on(progress)?;
+        let tree = SphereTree::flatten(&built.root, distance, settings.builder != Builder::Octree, progress);
         go_on(progress)?;
         tree.check_nesting()?;
         tree.check_coverage_watched(mesh, progress)?;

@@ -15,6 +15,7 @@ mod quality;
 mod rays;
 mod referee;
 mod rng;
+mod shape_cache;
 mod shared_meshes;
 mod surface;
 mod surface_parry;

@@ -529,3 +529,86 @@ fn ply_errors_name_the_place() {
         assert!(error.contains(said), "{from} → {to}: {error}");
     }
 }
+
+/// A tetrahedron as one strip of six, in the given encoding.
+fn ply_of_strips(encoding: &str, strips: &[&[i32]]) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat {encoding} 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+         element tristrips {}\nproperty list int int vertex_indices\nend_header\n",
+        strips.len()
+    )
+    .into_bytes();
+    let mut put = |little: [u8; 4], word: String| match encoding {
+        "ascii" => bytes.extend(format!("{word} ").bytes()),
+        "binary_big_endian" => bytes.extend(little.iter().rev()),
+        _ => bytes.extend(little),
+    };
+    for x in [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].as_flattened() {
+        put((*x as f32).to_le_bytes(), x.to_string());
+    }
+    for strip in strips {
+        put((strip.len() as i32).to_le_bytes(), strip.len().to_string());
+        strip.iter().for_each(|v| put(v.to_le_bytes(), v.to_string()));
+    }
+    bytes
+}
+
+/// However its strips are cut, the tetrahedron has four faces that wind outwards and a sixth of a cube's volume.
+#[test]
+fn ply_triangle_strips_are_read() {
+    let cases: [&[&[i32]]; 5] = [
+        // 0 2 1, then 1 2 3 by its turn, then 1 3 0, then 0 3 2
+        &[&[0, 2, 1, 3, 0, 2]],
+        &[&[0, 2, 1, 3, -1, 1, 3, 0, 2]],
+        &[&[0, 2, 1, -1, 1, 2, 3, -1, 1, 3, 0, -1, 0, 3, 2, -1]],
+        &[&[0, 2, 1, 3], &[-1, 1, 3, 0, 2, -1, -1]],
+        // vertices named twice lead from one strip to the next without a restart
+        &[&[0, 2, 1, 3, 3, 1, 1, 3, 0, 2]],
+    ];
+    for encoding in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        for strips in cases {
+            let mesh = TriMesh::from_ply(&ply_of_strips(encoding, strips)).unwrap();
+            assert_eq!(mesh.triangles.len(), 4, "{encoding} {strips:?}");
+            let report = mesh.clone().check_closed().unwrap();
+            assert_eq!((report.flipped_faces, report.turned, report.notes()), (0, false, vec![]), "{strips:?}");
+            assert_near(mesh.signed_volume(), 1.0 / 6.0, 1e-15, encoding);
+        }
+        let bytes = ply_of_strips(encoding, cases[2]);
+        for end in 0..bytes.len() - 1 {
+            assert!(TriMesh::from_ply(&bytes[..end]).is_err(), "{encoding} cut at {end}");
+        }
+        for at in 0..bytes.len() {
+            for with in [0, 9, b'-', b'9', 0xff] {
+                let mut bytes = bytes.clone();
+                bytes[at] = with;
+                let _ = TriMesh::from_ply(&bytes);
+            }
+        }
+    }
+}
+
+#[test]
+fn ply_errors_of_strips_name_the_place() {
+    let said = |strips: &[&[i32]]| TriMesh::from_ply(&ply_of_strips("ascii", strips)).unwrap_err().to_string();
+    let there = "there are 4 vertices";
+    assert!(
+        said(&[&[0, 2, 1, 3], &[0, 1, 4]])
+            .contains(&format!("tristrips 2: it points at vertex 4 (from 0), but {there}"))
+    );
+    assert!(said(&[&[0, 2, -2, 3]]).contains(&format!("tristrips 1: it points at vertex -2 (from 0), but {there}")));
+    assert!(said(&[&[0, 2, 1, -1, 0, 1]]).contains("tristrips 1: a strip of 2 vertices, but it needs at least 3"));
+    assert!(said(&[&[0, 1, 1]]).contains("wanted elements `face` or `tristrips`; there are: 4 vertex, 1 tristrips"));
+    let text = String::from_utf8(ply_of_strips("ascii", &[&[0, 2, 1, 3]])).unwrap();
+    let cases = [
+        ("vertex_indices", "corners", "the element `tristrips`: wanted `property list … vertex_indices`"),
+        ("4 0 2 1 3", "2000000000 0 2 1 3", "tristrips 1: a list of 2000000000 numbers"),
+        ("4 0 2 1 3", "1000000000 0 2 1 3", "tristrips 1: the file ends before it"),
+        ("4 0 2 1 3", "4 0 2 1 0.5", "tristrips 1: 0.5 where the number of a vertex should be"),
+        ("tristrips 1", "tristrips 99999999999", "tristrips 2: the file ends before it"),
+        ("tristrips", "trifans", "wanted elements `face` or `tristrips`; there are: 4 vertex, 1 trifans"),
+    ];
+    for (from, to, said) in cases {
+        let error = TriMesh::from_ply(text.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
+        assert!(error.contains(said), "{from} → {to}: {error}");
+    }
+}

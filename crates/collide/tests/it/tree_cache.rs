@@ -6,20 +6,20 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use tumble_collide::{CachedTree, Shape, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3};
 
 /// A folder of its own for one test; removed at the end.
-struct Folder(PathBuf);
+pub struct Folder(pub PathBuf);
 
 impl Folder {
-    fn new() -> Folder {
+    pub fn new() -> Folder {
         static COUNTER: AtomicU32 = AtomicU32::new(0);
         let name = format!("tumble-cache-{}-{}", std::process::id(), COUNTER.fetch_add(1, Ordering::Relaxed));
         Folder(std::env::temp_dir().join(name))
     }
 
-    fn cache(&self) -> TreeCache {
+    pub fn cache(&self) -> TreeCache {
         TreeCache::at(&self.0)
     }
 
-    fn files(&self) -> Vec<PathBuf> {
+    pub fn files(&self) -> Vec<PathBuf> {
         let mut files: Vec<PathBuf> =
             fs::read_dir(&self.0).map(|entries| entries.map(|e| e.unwrap().path()).collect()).unwrap_or_default();
         files.sort();
@@ -59,6 +59,8 @@ fn a_tree_from_the_cache_has_the_bits_of_a_fresh_one() {
     let (shape, _, note) = Shape::mesh_cached(ring(), &settings(), &folder.cache()).unwrap();
     let (plain, _) = Shape::mesh(ring(), &settings()).unwrap();
     assert_eq!((shape.tree(), note), (plain.tree(), None));
+    // shapes have files of their own
+    assert_eq!(folder.files().len(), 2);
 }
 
 #[test]

@@ -7,28 +7,28 @@ use crate::mesh::{Descent, closest_on_triangle};
 impl MeshField {
     /// Corners of all triangles.
     pub fn faces(&self) -> &[[Vec3; 3]] {
-        &self.corners
+        &self.triangles.corners
     }
 
     /// Outward, of triangle `t`; zero if that has no area.
     pub fn face_normal(&self, t: usize) -> Vec3 {
-        self.normals[t][0]
+        self.triangles.normals[t][0]
     }
 
     /// Signed distance of `p` and the closest triangle.
     pub fn closest_face(&self, p: &Vec3) -> (f64, usize) {
-        let listed = self.tree.locate(p).and_then(|place| self.closest(p, &place));
-        let closest = listed.unwrap_or_else(|| self.closest_of(p, self.boxes.closest(p).triangle));
-        (self.describe(p, &closest).distance, closest.triangle)
+        let listed = self.tree.locate(p, &self.triangles).and_then(|place| self.closest(p, &place));
+        let closest = listed.unwrap_or_else(|| self.closest_of_all(p));
+        (self.triangles.describe(p, &closest).distance, closest.triangle)
     }
 
     /// Distance of `p` from triangle `t`.
     pub fn distance_from_face(&self, t: usize, p: &Vec3) -> f64 {
-        (p - closest_on_triangle(p, &self.corners[t]).0).norm()
+        (p - closest_on_triangle(p, &self.triangles.corners[t]).0).norm()
     }
 
     /// Goes down the tree of boxes around the triangles.
     pub fn faces_by_boxes(&self, to: &mut impl Descent) {
-        self.boxes.descend(to);
+        self.boxes().descend(to);
     }
 }

@@ -1,28 +1,30 @@
 //! The signed distance of a mesh by an [`octree`]: each cell near the surface lists the few triangles that can be closest to
 //! a point in it.
 //!
-//! So distances are exact: nothing is interpolated. A query where there is no list asks the tree of boxes ([`MeshDistance`]).
+//! So distances are exact: nothing is interpolated. A query where there is no list asks the tree of boxes ([`MeshDistance`]). Cells and boxes are
+//! made by the first query that needs them ([`blocks`]).
 //!
 //! A cell also lists triangles a little further away that face another way: from an element on a ridge the closest face
 //! may be one that it cannot meet, and the next one is taken.
 
+mod blocks;
 mod builder;
 mod faces;
 mod octree;
+mod triangles;
+mod view;
 
-use super::{Feature, Field, Hit, TOUCHING, facing, opposition};
-use crate::mesh::{closest_on_triangle, edge_groups, pseudonormals, shells};
-use crate::{Aabb, Mat3, MeshDistance, TriMesh, Vec3};
+use super::{Feature, Field, Hit, facing, opposition};
+use crate::mesh::{EdgeGroups, closest_on_triangle, shells};
+use crate::{Mat3, MeshDistance, TriMesh, Vec3};
 use arrayvec::ArrayVec;
 pub(crate) use octree::Way;
-use octree::{Cell, Octree, Place};
+use octree::{Octree, Place};
+use std::sync::OnceLock;
+use triangles::Triangles;
 
-/// Triangles up to this much further than the closest are listed if they face another way, as a part of the diagonal.
-const AROUND: f64 = 0.01;
 /// Relative difference of squared distances that is rounding's.
 const SAME: f64 = 1e-11;
-/// As much of the squared distance as is along a face's normal counts as straight above the face.
-const ABOVE: f64 = 1.0 - 1e-6;
 /// Faces that an element faces as squarely but for rounding.
 const SQUARE: f64 = 1e-9;
 /// Sides of a convex solid that each bound asks.
@@ -38,27 +40,19 @@ struct Listed {
 /// The field of a mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct MeshField {
-    triangles: Vec<[u32; 3]>,
-    corners: Vec<[Vec3; 3]>,
+    /// No faces of one shell cross.
+    mesh: TriMesh,
+    triangles: Triangles,
     /// Triangles around each vertex.
     valence: Vec<u32>,
-    /// Pseudonormals of the face, its edges and its corners: [`pseudonormals`].
-    normals: Vec<[Vec3; 7]>,
-    /// Whether the edges of each triangle (k to k+1) are elements.
-    searched: Vec<[bool; 3]>,
     tree: Octree,
-    lists: Vec<Listed>,
     /// A ball around each triangle, about the middle of the bounds, and its radius.
     balls: Vec<[f32; 4]>,
-    bounds: Aabb,
-    boxes: MeshDistance,
+    /// Made when it is first asked.
+    boxes: OnceLock<MeshDistance>,
     convex: bool,
     /// Of a convex solid of few sides: their outward normals and how far they are from the origin. Below these a bound is better than a cell's.
     sides: ArrayVec<(Vec3, f64), MOST_SIDES>,
-    touching: f64,
-    diagonal: f64,
-    /// How much further than the closest face another one may be that is taken instead.
-    around: f64,
 }
 
 /// A triangle's closest point.
@@ -71,43 +65,40 @@ struct Closest {
 }
 
 impl MeshField {
-    /// `searched`: which edges of each triangle are elements.
-    pub fn new(mesh: &TriMesh, searched: Vec<[bool; 3]>) -> MeshField {
-        let (bounds, diagonal) = (mesh.aabb(), mesh.diagonal());
+    /// `groups`: the edges of the mesh. `searched`: which edges of each triangle are elements. `convex`: [`is_convex`].
+    pub fn new(mesh: TriMesh, groups: &EdgeGroups, searched: Vec<[bool; 3]>, convex: bool) -> MeshField {
+        let triangles = Triangles::new(&mesh, groups, searched);
+        let (center, half, deepest) = triangles.outermost(&mesh.aabb());
         let mut field = MeshField {
-            triangles: mesh.triangles.clone(),
-            valence: valence(mesh),
-            corners: (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect(),
-            normals: pseudonormals(mesh)
-                .into_iter()
-                .map(|n| n.map(|v| v.try_normalize(0.0).unwrap_or_default()))
-                .collect(),
-            searched,
-            tree: Octree::new(Vec3::zeros(), 1.0),
-            lists: Vec::new(),
-            balls: Vec::new(),
-            bounds,
-            boxes: MeshDistance::new(mesh),
-            convex: is_convex(mesh),
+            valence: valence(&mesh),
+            balls: triangles.corners.iter().map(|c| ball_around(c, &center, triangles.diagonal)).collect(),
+            mesh,
+            triangles,
+            tree: Octree::new(center, half, deepest),
+            boxes: OnceLock::new(),
+            convex,
             sides: ArrayVec::new(),
-            touching: TOUCHING * diagonal,
-            diagonal,
-            around: AROUND * diagonal,
         };
-        let center = 0.5 * (bounds.min + bounds.max);
-        field.balls = field.corners.iter().map(|c| ball_around(c, &center, diagonal)).collect();
-        builder::build(&mut field);
         field.sides = field.few_sides();
         field
+    }
+
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+
+    fn boxes(&self) -> &MeshDistance {
+        self.boxes.get_or_init(|| MeshDistance::uncrossed(&self.mesh))
     }
 
     /// The planes of a convex solid's sides; none where it is not convex or they are many.
     fn few_sides(&self) -> ArrayVec<(Vec3, f64), MOST_SIDES> {
         let mut sides = ArrayVec::new();
-        for (corners, normals) in self.corners.iter().zip(&self.normals) {
+        for (corners, normals) in self.triangles.corners.iter().zip(&self.triangles.normals) {
             // as high as its highest corner, so that rounding leaves none outside
             let side = (normals[0], corners.iter().map(|c| normals[0].dot(c)).fold(f64::NEG_INFINITY, f64::max));
-            let known = |s: &(Vec3, f64)| (s.0 - side.0).norm() < 1e-12 && (s.1 - side.1).abs() < 1e-12 * self.diagonal;
+            let known =
+                |s: &(Vec3, f64)| (s.0 - side.0).norm() < 1e-12 && (s.1 - side.1).abs() < 1e-12 * self.diagonal();
             if !self.convex || !(sides.iter().any(known) || sides.try_push(side).is_ok()) {
                 return ArrayVec::new();
             }
@@ -124,7 +115,7 @@ impl MeshField {
     /// How far `p` is above the highest side, at most: a convex solid is below all.
     #[inline(never)]
     fn above_sides(&self, p: &Vec3) -> f64 {
-        let slack = 1e-11 * self.diagonal;
+        let slack = 1e-11 * self.diagonal();
         self.sides.iter().map(|(n, height)| n.dot(p) - height - slack).fold(f64::NEG_INFINITY, f64::max)
     }
 
@@ -141,7 +132,7 @@ impl MeshField {
         let mut best: Option<Closest> = None;
         let (mut limit, mut reach, mut furthest) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
         let (aside, from_center) = (f64::from(place.aside()) + self.tree.rounding(), p - self.tree.center);
-        for listed in self.list(place.cell) {
+        for listed in place.list() {
             if f64::from(listed.nearer) > furthest {
                 break;
             }
@@ -150,14 +141,15 @@ impl MeshField {
             if (from_center - Vec3::new(x, y, z)).norm_squared() > (reach + radius).powi(2) {
                 continue;
             }
-            let (point, feature) = closest_on_triangle(p, &self.corners[t]);
+            let (point, feature) = closest_on_triangle(p, &self.triangles.corners[t]);
             let square = (p - point).norm_squared();
             if square > limit {
                 continue;
             }
             let better = |b: &Closest| {
                 square < b.square * (1.0 - SAME)
-                    || (square <= b.square * (1.0 + SAME) && self.above(p, t) > self.above(p, b.triangle))
+                    || (square <= b.square * (1.0 + SAME)
+                        && self.triangles.above(p, t) > self.triangles.above(p, b.triangle))
             };
             if best.as_ref().is_none_or(better) {
                 best = Some(Closest { square, point, triangle: t, feature });
@@ -169,46 +161,43 @@ impl MeshField {
         best
     }
 
-    fn list(&self, cell: &Cell) -> &[Listed] {
-        if cell.count == 0 { &[] } else { &self.lists[cell.link as usize..][..cell.count as usize] }
-    }
-
     /// The closest part of the surface, whatever an element faces.
     pub fn nearest(&self, p: &Vec3) -> Hit {
-        self.nearest_in(p, self.tree.locate(p).as_ref())
+        self.nearest_in(p, self.tree.locate(p, &self.triangles).as_ref())
     }
 
     /// The same where it may be less than `limit`; else a bound.
     pub fn nearest_within(&self, p: &Vec3, limit: f64) -> Result<Hit, f64> {
-        let place = self.tree.locate(p);
-        let bound = self.below_sides(p, place.map_or_else(|| self.tree.bound(p), |place| self.tree.bound_at(&place)));
+        let place = self.tree.locate(p, &self.triangles);
+        let bound = place.map_or_else(|| self.tree.bound(p, &self.triangles), |place| self.tree.bound_at(&place));
+        let bound = self.below_sides(p, bound);
         if bound > limit { Err(bound) } else { Ok(self.nearest_in(p, place.as_ref())) }
     }
 
     fn nearest_in(&self, p: &Vec3, place: Option<&Place>) -> Hit {
         let closest = place.and_then(|place| self.closest(p, place));
-        self.describe(p, &closest.unwrap_or_else(|| self.closest_of(p, self.boxes.closest(p).triangle)))
+        self.triangles.describe(p, &closest.unwrap_or_else(|| self.closest_of_all(p)))
     }
 
     /// Of the mesh, metres.
     pub fn diagonal(&self) -> f64 {
-        self.diagonal
+        self.triangles.diagonal
     }
 
     /// How far beside a face a place on an edge still counts as above it, metres.
     pub fn touching(&self) -> f64 {
-        self.touching
+        self.triangles.touching
     }
 
     /// [`Field::hit`], told [`MeshField::nearest`].
     pub fn hit_by(&self, p: &Vec3, hit: Hit, normals: &[Vec3], beside: f64) -> Hit {
-        let beside = beside * self.diagonal;
+        let beside = beside * self.diagonal();
         let faces = facing(normals, &hit.normal);
         let clear = faces && (hit.feature == Feature::Face || hit.distance.abs() > beside);
         if clear || hit.distance > beside {
             return Hit { facing: clear, ..hit };
         }
-        let list = self.tree.locate(p).map_or(&[][..], |place| self.list(place.cell));
+        let list = self.tree.locate(p, &self.triangles).map_or(&[][..], |place| place.list());
         self.behind(p, normals, list, hit.distance, beside).unwrap_or(Hit { facing: faces, ..hit })
     }
 
@@ -220,43 +209,12 @@ impl MeshField {
     /// At most the signed distance of a point told in another frame.
     #[inline]
     pub fn bound_on(&self, way: &Way, p: &[f32; 3]) -> f64 {
-        self.tree.bound_on(way, p)
+        self.tree.bound_on(way, p, &self.triangles)
     }
 
-    fn closest_of(&self, p: &Vec3, triangle: usize) -> Closest {
-        let (point, feature) = closest_on_triangle(p, &self.corners[triangle]);
-        Closest { square: (p - point).norm_squared(), point, triangle, feature }
-    }
-
-    /// Square of the distance from a triangle's plane.
-    fn above(&self, p: &Vec3, triangle: usize) -> f64 {
-        self.normals[triangle][0].dot(&(p - self.corners[triangle][0])).powi(2)
-    }
-
-    /// What a triangle's closest point makes of `p`.
-    fn describe(&self, p: &Vec3, found: &Closest) -> Hit {
-        let (face, normal) = (self.normals[found.triangle][0], self.normals[found.triangle][found.feature]);
-        let (offset, length) = (p - found.point, found.square.sqrt());
-        let sign = if normal.dot(&offset) < 0.0 { -1.0 } else { 1.0 };
-        let flat = found.feature == 0
-            || normal.dot(&face) > 1.0 - 1e-9
-            || (length > self.touching && self.above(p, found.triangle) > ABOVE * found.square);
-        let normal = match flat {
-            true => face,
-            false if length > self.touching => offset * (sign / length),
-            false => normal,
-        };
-        let feature = match found.feature {
-            _ if flat => Feature::Face,
-            k @ 1..=3 => {
-                let c = &self.corners[found.triangle];
-                let along = (c[k % 3] - c[k - 1]).normalize();
-                if self.searched[found.triangle][k - 1] { Feature::Edge(along) } else { Feature::Line(along) }
-            }
-            _ => Feature::Point,
-        };
-        let distance = sign * length;
-        Hit { distance, nearest: distance, normal, core: 0.0, feature, facing: true }
+    /// The closest by the tree of boxes.
+    fn closest_of_all(&self, p: &Vec3) -> Closest {
+        self.triangles.closest_of(p, self.boxes().closest(p).triangle)
     }
 
     /// The closest face among those listed that faces the element, has `p` behind it (or on it), and is not much further
@@ -265,14 +223,14 @@ impl MeshField {
         let mut best: Option<(f64, f64, Hit)> = None;
         for listed in list {
             let t = listed.triangle as usize;
-            let normal = self.normals[t][0];
-            let above = normal.dot(&(p - self.corners[t][0]));
+            let normal = self.triangles.normals[t][0];
+            let above = normal.dot(&(p - self.triangles.corners[t][0]));
             if above > aside || !facing(normals, &normal) {
                 continue;
             }
-            let (point, _) = closest_on_triangle(p, &self.corners[t]);
+            let (point, _) = closest_on_triangle(p, &self.triangles.corners[t]);
             let (distance, square) = ((p - point).norm(), opposition(normals, &normal));
-            if distance > nearest.abs() + self.around {
+            if distance > nearest.abs() + self.triangles.around {
                 continue;
             }
             // of two triangles of one side, the one that has it below
@@ -294,16 +252,16 @@ impl MeshField {
     /// the solid) within `radius`: a closest point inside a triangle, or on an edge or corner if all triangles there agree
     /// that it is closest. Where very many are in reach, only those nearest.
     pub fn minima(&self, p: &Vec3, mut radius: f64, each: &mut dyn FnMut(u64, Hit)) {
-        let closest = self.boxes.closest(p);
+        let closest = self.boxes().closest(p);
         let least = closest.signed_distance;
         if least < 0.0 {
-            return each(closest.triangle as u64, self.describe(p, &self.closest_of(p, closest.triangle)));
+            return each(closest.triangle as u64, self.described(p, closest.triangle));
         }
         let mut near = ArrayVec::<(u64, u32), MOST_NEAR>::new();
         for _ in 0..8 {
             near.clear();
             let mut all = true;
-            self.boxes.within(p, radius, &mut |t, _, feature| {
+            self.boxes().within(p, radius, &mut |t, _, feature| {
                 all &= near.try_push((self.name(t, feature), t as u32)).is_ok();
             });
             if all {
@@ -313,7 +271,7 @@ impl MeshField {
             near.clear();
         }
         if near.is_empty() && radius >= least {
-            return each(closest.triangle as u64, self.describe(p, &self.closest_of(p, closest.triangle)));
+            return each(closest.triangle as u64, self.described(p, closest.triangle));
         }
         near.sort_unstable();
         for same in near.chunk_by(|a, b| a.0 == b.0) {
@@ -323,7 +281,7 @@ impl MeshField {
                 _ => self.valence[(same[0].0 & 0xffff_ffff) as usize] as usize,
             };
             if same.len() >= wanted {
-                let hit = self.describe(p, &self.closest_of(p, same[0].1 as usize));
+                let hit = self.described(p, same[0].1 as usize);
                 if hit.distance >= 0.0 {
                     each(same[0].0, hit);
                 }
@@ -331,9 +289,13 @@ impl MeshField {
         }
     }
 
+    fn described(&self, p: &Vec3, triangle: usize) -> Hit {
+        self.triangles.describe(p, &self.triangles.closest_of(p, triangle))
+    }
+
     /// A number for a feature of triangle `t`, the same from all triangles that share it.
     fn name(&self, t: usize, feature: usize) -> u64 {
-        let v = self.triangles[t];
+        let v = self.mesh.triangles[t];
         match feature {
             0 => t as u64,
             k @ 1..=3 => {
@@ -350,7 +312,7 @@ const MOST_NEAR: usize = 512;
 
 impl Field for MeshField {
     fn bound(&self, p: &Vec3) -> f64 {
-        self.below_sides(p, self.tree.bound(p))
+        self.below_sides(p, self.tree.bound(p, &self.triangles))
     }
 
     fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit {
@@ -383,13 +345,12 @@ fn valence(mesh: &TriMesh) -> Vec<u32> {
 }
 
 /// Whether every edge is convex or flat and the surface is one piece.
-fn is_convex(mesh: &TriMesh) -> bool {
+pub(super) fn is_convex(mesh: &TriMesh, groups: &EdgeGroups) -> bool {
     let slack = 1e-9 * mesh.diagonal();
-    let groups = edge_groups(mesh);
     groups.iter().all(|group| {
         let [a, b] = group[..] else { return false };
         let [p, q, r] = mesh.corners(a.face);
         let normal = (q - p).cross(&(r - p)).normalize();
         mesh.corners(b.face).iter().all(|x| normal.dot(&(x - p)) <= slack)
-    }) && shells(mesh, &groups).1 == 1
+    }) && shells(mesh, groups).1 == 1
 }

@@ -8,10 +8,11 @@
 //!
 //! The last holds since `p − q` makes no acute angle with the way from `q` to anything in that cell.
 
+use super::Listed;
+use super::blocks::{Block, Blocks};
+use super::triangles::Triangles;
 use crate::{Mat3, Vec3};
 
-/// Divisions that are passed at once on the way down, at most.
-const TOP: u32 = 6;
 /// Of single precision in a place and in a bound, in half sides of the outermost cell.
 const ROUNDING: f64 = 2e-6;
 /// The greatest number below 2, and the digits of a number behind the first one.
@@ -42,15 +43,6 @@ impl Cell {
         if self.count == 0 { self.link as usize } else { 0 }
     }
 
-    /// Takes it that other cells and lists were put before those that it refers to.
-    pub fn shift(&mut self, cells: u32, lists: u32) {
-        match (self.count, self.link) {
-            (0, 0) => {}
-            (0, _) => self.link += cells,
-            _ => self.link += lists,
-        }
-    }
-
     /// Takes `d_c`, which may be rounded down by the caller.
     pub fn set_distance(&mut self, distance: f64) {
         self.distance = distance as f32;
@@ -72,12 +64,19 @@ impl Cell {
 /// A place in a cell.
 #[derive(Clone, Copy)]
 pub(super) struct Place<'a> {
-    pub cell: &'a Cell,
+    cell: &'a Cell,
+    block: &'a Block,
     /// From the cell's centre; the fourth is 1.
     offset: [f32; 4],
 }
 
-impl Place<'_> {
+impl<'a> Place<'a> {
+    /// The triangles that can be closest here; none where the cell has no list.
+    pub fn list(&self) -> &'a [Listed] {
+        let (link, count) = (self.cell.link as usize, self.cell.count as usize);
+        if count == 0 { &[] } else { &self.block.lists[link..][..count] }
+    }
+
     /// At most the signed distance here, but for rounding.
     #[inline(always)]
     fn bound(&self) -> f64 {
@@ -117,15 +116,12 @@ fn single(v: &Vec3) -> [f32; 4] {
 /// Cells within a cube.
 #[derive(Clone, Debug)]
 pub(super) struct Octree {
-    pub cells: Vec<Cell>,
+    pub(super) blocks: Blocks,
     pub center: Vec3,
     /// Half the side.
-    pub half: f64,
-    /// How often the outermost cell is divided for `top`, and how many of the outermost cells go into a metre.
-    level: u32,
+    half: f64,
+    /// How many of the outermost cells go into a metre.
     per_metre: f32,
-    /// The cell, times 16, plus its depth, at or above each of these cubes.
-    top: Vec<u32>,
     /// Half the side of a cell by its depth.
     halves: [f32; 16],
     /// What single precision may add to a bound, metres.
@@ -133,17 +129,14 @@ pub(super) struct Octree {
 }
 
 impl Octree {
-    /// One cell.
-    pub fn new(center: Vec3, half: f64) -> Octree {
-        let halves = std::array::from_fn(|depth| (half / f64::from(1_u32 << depth)) as f32);
+    /// A cube that is divided so often at most.
+    pub fn new(center: Vec3, half: f64, deepest: u32) -> Octree {
         Octree {
-            cells: vec![Cell::empty()],
+            blocks: Blocks::new(center, half, deepest),
             center,
             half,
-            level: 0,
             per_metre: (0.5 / half) as f32,
-            top: Vec::new(),
-            halves,
+            halves: std::array::from_fn(|depth| (half / f64::from(1_u32 << depth)) as f32),
             rounding: ROUNDING * half,
         }
     }
@@ -153,38 +146,20 @@ impl Octree {
         self.rounding
     }
 
-    /// To be called once all cells are there, and divided so often at most.
-    pub fn finish(&mut self, deepest: u32) {
-        self.cells.shrink_to_fit();
-        self.level = TOP.min(deepest);
-        self.top = (0..1 << (3 * self.level)).map(|n| self.cell_above(n)).collect();
-    }
-
-    /// The cell at or above a cube of the top.
-    fn cell_above(&self, cube: usize) -> u32 {
-        let (mut cell, mut depth, level) = (0, 0, self.level as usize);
-        while depth < level && self.cells[cell].children() > 0 {
-            depth += 1;
-            let octant: usize = (0..3).map(|k| (cube >> (k * level + level - depth) & 1) << k).sum();
-            cell = self.cells[cell].children() + octant;
-        }
-        (cell << 4 | depth) as u32
-    }
-
     /// The smallest cell that holds `p`; `None` outside all.
-    pub fn locate(&self, p: &Vec3) -> Option<Place<'_>> {
+    pub fn locate(&self, p: &Vec3, triangles: &Triangles) -> Option<Place<'_>> {
         // written so that what is not a number is outside
         let from_low = (p - self.center).add_scalar(self.half);
         let within = from_low.iter().all(|x| *x >= 0.0 && *x <= 2.0 * self.half);
-        within.then(|| self.descend(&single(&from_low)))
+        within.then(|| self.descend(&single(&from_low), triangles))
     }
 
     /// At most the signed distance at `p`.
-    pub fn bound(&self, p: &Vec3) -> f64 {
+    pub fn bound(&self, p: &Vec3, triangles: &Triangles) -> f64 {
         let from_low = (p - self.center).add_scalar(self.half);
         let most = 2.0 * self.half;
         let inside = from_low.map(|x| if x > 0.0 { if x < most { x } else { most } } else { 0.0 });
-        let bound = self.bound_at(&self.descend(&single(&inside)));
+        let bound = self.bound_at(&self.descend(&single(&inside), triangles));
         let outside = (from_low - inside).norm_squared();
         if outside == 0.0 { bound } else { (outside + bound.max(0.0).powi(2)).sqrt() }
     }
@@ -203,11 +178,11 @@ impl Octree {
 
     /// [`Octree::bound`] of a point in that other frame, a little less.
     #[inline(always)]
-    pub fn bound_on(&self, way: &Way, p: &[f32; 3]) -> f64 {
+    pub fn bound_on(&self, way: &Way, p: &[f32; 3], triangles: &Triangles) -> f64 {
         let [a, b, c] = &way.columns;
         let from_low: [f32; 4] = std::array::from_fn(|k| (a[k] * p[0] + b[k] * p[1]) + (c[k] * p[2] + way.offset[k]));
         let inside = from_low.map(|x| if x > 0.0 { if x < way.most { x } else { way.most } } else { 0.0 });
-        let bound = self.descend(&inside).bound();
+        let bound = self.descend(&inside, triangles).bound();
         let squares: [f32; 4] = std::array::from_fn(|k| (from_low[k] - inside[k]) * (from_low[k] - inside[k]));
         let outside = f64::from((squares[0] + squares[1]) + squares[2]);
         (if outside == 0.0 { bound } else { (outside + bound.max(0.0).powi(2)).sqrt() }) - way.rounding
@@ -223,16 +198,17 @@ impl Octree {
     /// for the neighbour's; then the offset is more than half the side by rounding.
     /// Inlined: on the way through memory four numbers at once wait for each other.
     #[inline(always)]
-    fn descend(&self, low: &[f32; 4]) -> Place<'_> {
-        let level = self.level;
+    fn descend(&self, low: &[f32; 4], triangles: &Triangles) -> Place<'_> {
+        let level = self.blocks.top();
         // which cube: the first binary digits of the place, as a part of the side, behind the 1 that is added
         let place: [u32; 4] = std::array::from_fn(|k| {
             let x = low[k] * self.per_metre + 1.0;
             let x = if x < LAST { x } else { LAST };
             (x.to_bits() & MANTISSA) >> (23 - level)
         });
-        let top = self.top[(place[0] | place[1] << level | place[2] << (2 * level)) as usize];
-        let (mut cell, depth) = (&self.cells[(top >> 4) as usize], top & 15);
+        let (block, cube) = self.blocks.at(&place, triangles);
+        let top = block.top[cube];
+        let (mut cell, depth) = (&block.cells[(top >> 4) as usize], top & 15);
         let mut half = self.halves[depth as usize];
         let above = level - depth;
         let mut offset: [f32; 4] = std::array::from_fn(|k| low[k] - ((place[k] >> above) * 2 + 1) as i32 as f32 * half);
@@ -240,9 +216,9 @@ impl Octree {
             half *= 0.5;
             let octant: usize = (0..3).map(|k| usize::from(offset[k].is_sign_positive()) << k).sum();
             offset = std::array::from_fn(|k| offset[k] - half.copysign(offset[k]));
-            cell = &self.cells[cell.children() + octant];
+            cell = &block.cells[cell.children() + octant];
         }
         offset[3] = 1.0;
-        Place { cell, offset }
+        Place { cell, block, offset }
     }
 }

@@ -1,0 +1,135 @@
+//! A mesh shape as bytes, for the cache: what the checks found, the tree, and how the surface's points are grouped.
+//!
+//! What is quick to make of those (edges, normals) is made anew, and the cells of fields are made where they are asked for. What is read is checked
+//! as if it came from an enemy: counts are bounded by the bytes that are there, indices in range, nothing nested in itself.
+
+use super::{MeshShape, Tree};
+use crate::bytes::{Reader, Write};
+use crate::surface::Surface;
+use crate::{ClosedReport, MassProperties, Mat3, SphereTree, TriMesh, Vec3};
+use std::sync::OnceLock;
+
+impl MeshShape {
+    /// The shape and the offset that was subtracted from its vertices.
+    pub(super) fn to_bytes(&self, offset: &Vec3) -> Vec<u8> {
+        let mut to = Vec::new();
+        to.vector(offset);
+        write_report(&self.report, &mut to);
+        self.mesh.write(&mut to);
+        self.tree().write(&mut to);
+        to.number(self.unit_mass.mass);
+        to.vector(&self.unit_mass.center_of_mass);
+        self.unit_mass.inertia.iter().for_each(|x| to.number(*x));
+        to.list(self.surfaces(), |to, surface| surface.write(to));
+        to
+    }
+
+    /// `None` where the bytes are no shape.
+    pub(super) fn of_bytes(bytes: &[u8]) -> Option<(MeshShape, Vec3)> {
+        let mut from = Reader(bytes);
+        let offset = from.vector()?;
+        let report = read_report(&mut from)?;
+        let (mesh, tree) = (TriMesh::read(&mut from)?, SphereTree::read(&mut from)?);
+        let (mass, center_of_mass) = (from.number().filter(|m| *m > 0.0)?, from.vector()?);
+        let columns = [from.vector()?, from.vector()?, from.vector()?];
+        let unit_mass = MassProperties { mass, center_of_mass, inertia: Mat3::from_columns(&columns) };
+        let surfaces = from.list(Surface::read)?;
+        let (tree, surfaces) = (OnceLock::from(Tree::from(tree)), OnceLock::from(surfaces));
+        let shape = MeshShape { tree, surfaces, ..MeshShape::of_checked(mesh, unit_mass, report) };
+        from.0.is_empty().then_some((shape, offset))
+    }
+}
+
+fn write_report(report: &ClosedReport, to: &mut Vec<u8>) {
+    let ClosedReport { turned, crossing_capped, volume, doubtful, .. } = *report;
+    counts(report).for_each(|n| to.size(n));
+    to.flag(turned);
+    to.flag(crossing_capped);
+    to.number(volume);
+    to.number(doubtful);
+}
+
+fn counts(report: &ClosedReport) -> impl Iterator<Item = usize> {
+    let ClosedReport { welded_vertices, degenerate_faces, duplicate_faces, flipped_faces, .. } = *report;
+    let ClosedReport { nonmanifold_edges, shells, turned_shells, crossing_faces, .. } = *report;
+    let first = [welded_vertices, degenerate_faces, duplicate_faces, flipped_faces];
+    first.into_iter().chain([nonmanifold_edges, shells, turned_shells, crossing_faces])
+}
+
+fn read_report(from: &mut Reader) -> Option<ClosedReport> {
+    Some(ClosedReport {
+        welded_vertices: from.size()?,
+        degenerate_faces: from.size()?,
+        duplicate_faces: from.size()?,
+        flipped_faces: from.size()?,
+        nonmanifold_edges: from.size()?,
+        shells: from.size()?,
+        turned_shells: from.size()?,
+        crossing_faces: from.size()?,
+        turned: from.flag()?,
+        crossing_capped: from.flag()?,
+        volume: from.number()?,
+        doubtful: from.number()?,
+    })
+}
+
+impl TriMesh {
+    pub(crate) fn write(&self, to: &mut Vec<u8>) {
+        to.list(&self.vertices, |to, v| to.vector(v));
+        to.list(&self.triangles, |to, t| t.iter().for_each(|v| to.u32(*v)));
+    }
+
+    /// `None` where it has no triangle, or one that points nowhere.
+    pub(crate) fn read(from: &mut Reader) -> Option<TriMesh> {
+        let vertices = from.list(Reader::vector)?;
+        let triangles = from.list(|from| Some([from.u32()?, from.u32()?, from.u32()?]))?;
+        let mesh = TriMesh { vertices, triangles };
+        mesh.check_data().is_ok().then_some(mesh)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TreeSettings;
+
+    fn shapes() -> Vec<TriMesh> {
+        let ball = |x: f64| TriMesh::icosphere(0.5, 2).translated(&Vec3::new(x, 0.1, 0.0));
+        let mut two = ball(0.0);
+        let other = ball(0.6);
+        two.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + two.vertices.len() as u32)));
+        two.vertices.extend(other.vertices);
+        vec![TriMesh::torus(1.0, 0.3, 12, 8), TriMesh::box_(Vec3::new(0.1, 0.2, 0.3)), two]
+    }
+
+    #[test]
+    fn bytes_give_the_same_shape_back() {
+        for mesh in shapes() {
+            let (shape, offset) = MeshShape::new(mesh, &TreeSettings::octree()).unwrap();
+            let (read, its_offset) = MeshShape::of_bytes(&shape.to_bytes(&offset)).unwrap();
+            // every number of every part, as text that tells all bits apart
+            assert_eq!((format!("{read:?}"), its_offset), (format!("{shape:?}"), offset));
+            assert!(!shape.surfaces().is_empty());
+        }
+    }
+
+    /// Whatever stands in a file whose checksum is right: a shape that can be asked, or none.
+    #[test]
+    fn no_bytes_are_a_panic() {
+        let (shape, offset) = MeshShape::new(shapes().remove(0), &TreeSettings::octree()).unwrap();
+        let good = shape.to_bytes(&offset);
+        for end in (0..good.len()).step_by(13).chain([good.len() - 1]) {
+            assert!(MeshShape::of_bytes(&good[..end]).is_none(), "cut at {end}");
+        }
+        assert!(MeshShape::of_bytes(&[&good[..], &[0]].concat()).is_none());
+        for at in 0..good.len() {
+            for with in [0, 1, 0x7f, 0xff] {
+                let mut bad = good.clone();
+                bad[at] = with;
+                if let Some((read, _)) = MeshShape::of_bytes(&bad) {
+                    read.surfaces().iter().for_each(|s| _ = s.field.nearest(&Vec3::new(1.0, 0.1, 0.2)));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! A tree as bytes, for the cache of shapes.
+
+use super::{SphereNode, SphereTree};
+use crate::bytes::{Reader, Write};
+
+/// Levels of a tree that is read, at most.
+const MOST_LEVELS: u32 = 64;
+
+impl SphereTree {
+    pub(crate) fn write(&self, to: &mut Vec<u8>) {
+        to.list(&self.nodes, |to, node| {
+            to.vector(&node.center);
+            to.number(node.radius);
+            to.number(node.outward);
+            to.u32(node.children);
+        });
+    }
+
+    /// `None` where it is no tree of nested balls.
+    pub(crate) fn read(from: &mut Reader) -> Option<SphereTree> {
+        let mut nodes = from.list(read_node)?;
+        // breadth first: the children of each follow those of the one before
+        let mut next = 1.min(nodes.len());
+        for n in 0..nodes.len() {
+            let first = if nodes[n].children == 0 { 0 } else { next as u32 };
+            let level = nodes[n].level + 1;
+            let end = next + nodes[n].children as usize;
+            if (nodes[n].children > 0 && next <= n) || level > MOST_LEVELS {
+                return None;
+            }
+            nodes[n].first_child = first;
+            nodes.get_mut(next..end)?.iter_mut().for_each(|child| child.level = level);
+            next = end;
+        }
+        if nodes.is_empty() || next != nodes.len() {
+            return None;
+        }
+        let tree = SphereTree::of_nodes(nodes);
+        tree.check_nesting().is_ok().then_some(tree)
+    }
+}
+
+fn read_node(from: &mut Reader) -> Option<SphereNode> {
+    let (center, radius, outward) = (from.vector()?, from.number()?, from.number()?);
+    let node = SphereNode { center, radius, outward, first_child: 0, children: from.u32()?, level: 0 };
+    (radius >= 0.0).then_some(node)
+}

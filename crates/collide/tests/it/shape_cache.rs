@@ -1,0 +1,199 @@
+//! Mesh shapes from the cache: the same contacts to the last bit, and no file in it is trusted.
+
+use crate::tree_cache::Folder;
+use std::fs;
+use std::process::Command;
+use tumble_collide::{Pose, Quat, Shape, TreeCache, TreeSettings, TriMesh, Vec3, contacts};
+
+/// A ring with bumps: no two of its points are alike.
+fn bumpy() -> TriMesh {
+    let mut mesh = TriMesh::torus(1.0, 0.35, 40, 20);
+    mesh.vertices.iter_mut().for_each(|v| *v *= 1.0 + 0.03 * (7.0 * v.x + 5.0 * v.y + 9.0 * v.z).sin());
+    mesh
+}
+
+fn cached(mesh: TriMesh, cache: &TreeCache) -> (Shape, Vec3, Option<String>) {
+    Shape::mesh_cached(mesh, &TreeSettings::octree(), cache).unwrap()
+}
+
+/// All that two of a shape say of each other in many places, deep, close and apart, and of a ball, a block and a cylinder; as text that tells all bits apart.
+fn said(shape: &Shape) -> String {
+    let cylinder = Shape::cylinder(0.3, 0.6).unwrap();
+    let others =
+        [shape.clone(), Shape::sphere(0.3).unwrap(), Shape::cuboid(Vec3::new(0.2, 0.3, 0.4)).unwrap(), cylinder];
+    let mut found = Vec::new();
+    for n in 0..60 {
+        let place = |step: u32, span: f64| span * (f64::from(n * step % 61) / 30.0 - 1.0);
+        let turn = Quat::from_euler_angles(place(7, 3.0), place(11, 1.5), place(29, 3.0));
+        let pose = Pose::from_parts(Vec3::new(place(1, 2.4), place(17, 1.0), place(23, 0.8)).into(), turn);
+        others.iter().for_each(|other| contacts(shape, &Pose::identity(), other, &pose, 0.05, &mut found));
+    }
+    assert!(found.len() > 300, "{} contacts", found.len());
+    format!("{found:?}")
+}
+
+#[test]
+fn a_shape_from_the_cache_has_the_bits_of_a_fresh_one() {
+    let folder = Folder::new();
+    let (fresh, its_offset) = Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap();
+    let expected = said(&fresh);
+    for found in [false, true, true] {
+        assert_eq!(folder.files().len(), usize::from(found));
+        let (shape, offset, note) = cached(bumpy(), &folder.cache());
+        assert_eq!((offset, note), (its_offset, None));
+        assert_eq!((shape.volume(), shape.bounding_radius()), (fresh.volume(), fresh.bounding_radius()));
+        assert_eq!(shape.mass_properties(700.0).unwrap(), fresh.mass_properties(700.0).unwrap());
+        assert_eq!(shape.aabb(&Pose::identity()), fresh.aabb(&Pose::identity()));
+        let (Shape::Mesh(a), Shape::Mesh(b)) = (&shape, &fresh) else { panic!("no meshes") };
+        assert_eq!((a, a.report()), (b, b.report()));
+        assert!(said(&shape) == expected, "found: {found}");
+        // asked again, and in a copy, when everything was made
+        assert!(said(&shape.clone()) == expected);
+    }
+}
+
+/// Queries in another order, and from several threads at once, make the same.
+#[test]
+fn contacts_do_not_depend_on_who_asked_first() {
+    let expected = said(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap().0);
+    let shape = Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap().0;
+    let ball = Shape::sphere(0.2).unwrap();
+    for n in (0..40).rev() {
+        let pose = Pose::translation(1.3 - 0.06 * f64::from(n), 0.3, 0.1);
+        contacts(&shape, &Pose::identity(), &ball, &pose, 0.3, &mut Vec::new());
+    }
+    std::thread::scope(|scope| {
+        let each = [(); 4].map(|()| scope.spawn(|| said(&shape)));
+        each.into_iter().for_each(|thread| assert!(thread.join().unwrap() == expected));
+    });
+}
+
+#[test]
+fn what_was_mended_is_told_from_the_cache_too() {
+    let folder = Folder::new();
+    let mut mesh = bumpy();
+    mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    mesh.triangles[5].swap(0, 1);
+    for _ in 0..2 {
+        let (shape, ..) = cached(mesh.clone(), &folder.cache());
+        let Shape::Mesh(solid) = &shape else { panic!("no mesh") };
+        let notes = solid.report().notes();
+        assert!(notes.iter().any(|note| note.contains("faces were reversed")), "{notes:?}");
+    }
+    assert_eq!(folder.files().len(), 1);
+}
+
+/// A mesh that is no solid is the same error, whatever is in the cache.
+#[test]
+fn nothing_is_kept_of_what_cannot_be_built() {
+    let folder = Folder::new();
+    let mut mesh = bumpy();
+    mesh.triangles.pop();
+    let error =
+        |cache: &TreeCache| Shape::mesh_cached(mesh.clone(), &TreeSettings::octree(), cache).unwrap_err().to_string();
+    assert_eq!(error(&folder.cache()), error(&TreeCache::off()));
+    assert!(folder.files().is_empty());
+}
+
+#[test]
+fn a_damaged_cut_or_foreign_file_is_told_and_built_anew() {
+    let folder = Folder::new();
+    let small = || TriMesh::torus(1.0, 0.3, 12, 8);
+    let (fresh, ..) = cached(small(), &folder.cache());
+    let file = folder.files().remove(0);
+    let good = fs::read(&file).unwrap();
+    let other = Folder::new();
+    cached(TriMesh::box_(Vec3::repeat(1.0)), &other.cache());
+    let mut bad: Vec<Vec<u8>> = vec![Vec::new(), b"\n".to_vec(), fs::read(other.files().remove(0)).unwrap()];
+    bad.push([&good[..], b" "].concat());
+    bad.push(String::from_utf8_lossy(&good).replacen("shape 1 ", "shape 0 ", 1).into_bytes());
+    bad.extend((0..200).chain((200..good.len()).step_by(97)).map(|cut| good[..cut].to_vec()));
+    for at in (0..200).chain((200..good.len()).step_by(89)) {
+        let mut turned = good.clone();
+        turned[at] ^= 1 << (at % 8);
+        bad.push(turned);
+    }
+    for content in bad {
+        fs::write(&file, &content).unwrap();
+        let (shape, _, note) = cached(small(), &folder.cache());
+        let note = note.expect("the file was trusted");
+        assert!(note.starts_with("the cached shape") && note.contains("is built anew"), "{note}");
+        assert!(matches!((&shape, &fresh), (Shape::Mesh(a), Shape::Mesh(b)) if a == b));
+        assert!(fs::read(&file).unwrap() == good, "not mended: {note}");
+    }
+}
+
+/// A file whose checksum is right and which holds no shape, such as one that somebody made up.
+#[test]
+fn a_checksum_alone_is_not_trusted() {
+    let folder = Folder::new();
+    let small = || TriMesh::torus(1.0, 0.3, 12, 8);
+    cached(small(), &folder.cache());
+    let file = folder.files().remove(0);
+    let good = fs::read(&file).unwrap();
+    let name = file.file_stem().unwrap().to_str().unwrap().to_owned();
+    for body in [&b""[..], &[0; 1000], &[0xff; 1000]] {
+        let checksum = blake3::Hasher::new().update(name.as_bytes()).update(body).finalize().to_hex();
+        let head = format!("tumble cached shape 1 {name} {checksum}\n");
+        fs::write(&file, [head.as_bytes(), body].concat()).unwrap();
+        let note = cached(small(), &folder.cache()).2.unwrap();
+        assert!(note.contains("it holds no shape"), "{note}");
+        assert!(fs::read(&file).unwrap() == good);
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_a_note_and_the_shape_is_fine() {
+    let folder = Folder::new();
+    fs::create_dir_all(&folder.0).unwrap();
+    // a file where the folder should be: refused for any user, root too
+    let in_the_way = folder.0.join("file");
+    fs::write(&in_the_way, "").unwrap();
+    let (shape, _, note) = cached(bumpy(), &TreeCache::at(in_the_way.join("trees")));
+    let note = note.unwrap();
+    assert!(note.starts_with("the shape is not kept in") && note.contains("trees"), "{note}");
+    assert!(said(&shape) == said(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap().0));
+}
+
+const ITS_FOLDER: &str = "TUMBLE_TEST_SHAPE_CACHE";
+
+/// Run by the next test, in processes of its own.
+#[test]
+#[ignore = "a part of processes_that_write_at_once_leave_one_whole_file"]
+fn one_of_several_processes() {
+    let folder = std::env::var_os(ITS_FOLDER).expect("run by the test that makes the folder");
+    for _ in 0..10 {
+        let (_, _, note) = cached(bumpy(), &TreeCache::at(&folder));
+        assert_eq!(note, None);
+        fs::read_dir(&folder).unwrap().flatten().map(|e| e.path()).for_each(|f| {
+            // all write again and again
+            if f.extension().is_some_and(|e| e == "shape") {
+                _ = fs::remove_file(f);
+            }
+        });
+    }
+    cached(bumpy(), &TreeCache::at(&folder));
+}
+
+#[test]
+fn processes_that_write_at_once_leave_one_whole_file() {
+    let folder = Folder::new();
+    let child = || {
+        Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "--ignored", "shape_cache::one_of_several_processes"])
+            .env(ITS_FOLDER, &folder.0)
+            .output()
+    };
+    std::thread::scope(|scope| {
+        let children = [(); 3].map(|()| scope.spawn(child));
+        for child in children {
+            let output = child.join().unwrap().unwrap();
+            let text = String::from_utf8_lossy(&output.stdout).into_owned();
+            assert!(output.status.success() && text.contains("1 passed"), "{text}");
+        }
+    });
+    assert_eq!(folder.files().len(), 1);
+    let (shape, _, note) = cached(bumpy(), &folder.cache());
+    assert_eq!(note, None);
+    assert!(said(&shape) == said(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap().0));
+}
