@@ -17,6 +17,7 @@ use crate::build::{MOST_MESH_BYTES, read_triangles};
 use crate::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec};
 use crate::notes::NoteList;
 use crate::shape::ShapeSpec;
+use crate::slow::building_surface;
 use crate::visual_mesh;
 
 /// Something in its place on a link.
@@ -169,18 +170,20 @@ impl<'m> ShapeMaker<'m> {
     fn read(&mut self, path: &Path, scale: [f64; 3], hull: bool) -> Result<(Shape, Vec3), String> {
         let mesh = stretched(read_file(path)?, scale);
         if !hull {
-            if let Ok(made) = self.solid(mesh.clone()) {
+            if let Ok(made) = self.solid(path, mesh.clone()) {
                 return Ok(made);
             }
             self.notes.add(path.display().to_string(), "its surface is not closed, so its convex hull collides");
         }
         let hull = mesh.convex_hull().map_err(|e| e.to_string())?;
-        self.solid(hull).map_err(|e| e.to_string())
+        self.solid(path, hull).map_err(|e| e.to_string())
     }
 
-    /// With a tree from the cache, where it is built.
-    fn solid(&mut self, mesh: TriMesh) -> Result<(Shape, Vec3), ShapeError> {
-        let (shape, center, note) = self.purpose.mesh(mesh, &TreeSettings::octree(), &self.cache)?;
+    /// From the cache, where it is built; `path` names the mesh if that takes long.
+    fn solid(&mut self, path: &Path, mesh: TriMesh) -> Result<(Shape, Vec3), ShapeError> {
+        let (name, count) = (path.file_name().unwrap_or_default().to_string_lossy(), mesh.triangles.len());
+        let made = building_surface(&name, count, || self.purpose.mesh(mesh, &TreeSettings::octree(), &self.cache));
+        let (shape, center, note) = made?;
         note.into_iter().for_each(|note| self.notes.add("sphere trees", note));
         Ok((shape, center))
     }
