@@ -122,13 +122,11 @@ mod tests {
             assert!(MeshShape::of_bytes(&good[..end]).is_none(), "cut at {end}");
         }
         assert!(MeshShape::of_bytes(&[&good[..], &[0]].concat()).is_none());
-        for at in 0..good.len() {
-            for with in [0, 1, 0x7f, 0xff] {
-                let mut bad = good.clone();
-                bad[at] = with;
-                if let Some((read, _)) = MeshShape::of_bytes(&bad) {
-                    read.surfaces().iter().for_each(|s| _ = s.field.nearest(&Vec3::new(1.0, 0.1, 0.2)));
-                }
+        for at in (0..300).chain((300..good.len()).step_by(41)) {
+            let mut bad = good.clone();
+            bad[at] = [0, 1, 0x7f, 0xff][at % 4];
+            if let Some((read, _)) = MeshShape::of_bytes(&bad) {
+                read.surfaces().iter().for_each(|s| _ = s.field.nearest(&Vec3::new(1.0, 0.1, 0.2)));
             }
         }
     }

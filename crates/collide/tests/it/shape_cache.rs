@@ -107,8 +107,8 @@ fn a_damaged_cut_or_foreign_file_is_told_and_built_anew() {
     let mut bad: Vec<Vec<u8>> = vec![Vec::new(), b"\n".to_vec(), fs::read(other.files().remove(0)).unwrap()];
     bad.push([&good[..], b" "].concat());
     bad.push(String::from_utf8_lossy(&good).replacen("shape 1 ", "shape 0 ", 1).into_bytes());
-    bad.extend((0..200).chain((200..good.len()).step_by(97)).map(|cut| good[..cut].to_vec()));
-    for at in (0..200).chain((200..good.len()).step_by(89)) {
+    bad.extend((0..200).step_by(9).chain((200..good.len()).step_by(997)).map(|cut| good[..cut].to_vec()));
+    for at in (0..200).step_by(7).chain((200..good.len()).step_by(887)) {
         let mut turned = good.clone();
         turned[at] ^= 1 << (at % 8);
         bad.push(turned);
