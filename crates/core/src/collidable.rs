@@ -27,11 +27,13 @@ pub struct Material {
     pub restitution: f64,
     /// Coefficient of Coulomb friction, at least 0.
     pub friction: f64,
+    /// Number of the material, by which [`World::set_pair_material`](crate::World::set_pair_material) finds its parts; 0 for none.
+    pub id: u32,
 }
 
 impl Default for Material {
     fn default() -> Material {
-        Material { restitution: 0.0, friction: 0.5 }
+        Material { restitution: 0.0, friction: 0.5, id: 0 }
     }
 }
 
@@ -52,6 +54,26 @@ pub enum Combine {
 }
 
 impl Combine {
+    /// All rules with their names, as scene files and Python write them.
+    pub const NAMES: &[(&str, Combine)] = &[
+        ("min", Combine::Min),
+        ("max", Combine::Max),
+        ("average", Combine::Average),
+        ("product", Combine::Product),
+        ("geometric_mean", Combine::GeometricMean),
+    ];
+
+    /// The rule's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Combine::Min => "min",
+            Combine::Max => "max",
+            Combine::Average => "average",
+            Combine::Product => "product",
+            Combine::GeometricMean => "geometric_mean",
+        }
+    }
+
     /// The pair's constant.
     pub fn of(self, a: f64, b: f64) -> f64 {
         match self {

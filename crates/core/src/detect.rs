@@ -1,7 +1,8 @@
 //! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
 
-use crate::collidable::ContactFrame;
+use crate::collidable::{ContactFrame, Material};
 use crate::pair::{Pair, Reach, Recalled, Travel};
+use crate::pair_material::PairMaterials;
 use crate::settings::Settings;
 use crate::site::Site;
 use crate::step::meet_at;
@@ -155,6 +156,7 @@ pub(crate) struct Detector<'a> {
     pub owners: &'a [Owner],
     pub sites: &'a [Site],
     pub settings: &'a Settings,
+    pub pair_materials: &'a PairMaterials,
     pub broad: &'a mut dyn BroadPhase,
     pub scratch: &'a mut Scratch,
     /// Serials of sleepers that something comes near.
@@ -262,9 +264,9 @@ impl Detector<'_> {
             self.stirred.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
-        let (ma, mb) = (body_a.material(part_a), body_b.material(part_b));
-        let friction = self.settings.combine_friction.of(ma.friction, mb.friction);
-        let restitution = self.settings.combine_restitution.of(ma.restitution, mb.restitution);
+        let surface_a = (owner_a.id, part_a, body_a.material(part_a));
+        let surface_b = (owner_b.id, part_b, body_b.material(part_b));
+        let Material { restitution, friction, .. } = self.pair_materials.combine(self.settings, surface_a, surface_b);
         let pair = [owner_a.serial, owner_a.part, owner_b.serial, owner_b.part];
         let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
         let mut frame_of = |contact: &Contact| {

@@ -26,6 +26,7 @@ mod motion;
 mod mounts;
 mod object;
 mod pair;
+mod pair_material;
 mod rigid;
 mod rotation;
 mod row_builder;
@@ -53,6 +54,7 @@ pub use object::{
     Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget,
     SyncError,
 };
+pub use pair_material::{PairMaterial, PairSide};
 pub use rigid::{BodyError, RigidBody};
 pub use row_builder::RowBuilder;
 pub use settings::{Integrator, OutOfReach, Settings, SettingsError, StepReport};

@@ -199,7 +199,13 @@ impl RigidBody {
 
     /// Sets restitution (0 to 1) and friction (at least 0).
     pub fn surface(mut self, restitution: f64, friction: f64) -> Self {
-        self.material = Material { restitution, friction };
+        self.material = Material { restitution, friction, ..self.material };
+        self
+    }
+
+    /// Sets the number of its material, by which pairs of materials are found (see [`Material::id`]).
+    pub fn of_material(mut self, id: u32) -> Self {
+        self.material.id = id;
         self
     }
 

@@ -51,9 +51,9 @@ pub struct Settings {
     pub recovery_speed: f64,
     /// When what lies still is left out of the steps; `None`: never.
     pub sleep: Option<Sleep>,
-    /// How the friction of two bodies combines.
+    /// How the friction of two bodies combines: by default the geometric mean, so that ice is slippery under everything.
     pub combine_friction: Combine,
-    /// How the restitution of two bodies combines.
+    /// How the restitution of two bodies combines: by default the larger, so that a ball bounces off a floor of which nothing is said.
     pub combine_restitution: Combine,
 }
 
@@ -73,7 +73,7 @@ impl Default for Settings {
             recovery_speed: 3.0,
             sleep: None,
             combine_friction: Combine::GeometricMean,
-            combine_restitution: Combine::Min,
+            combine_restitution: Combine::Max,
         }
     }
 }

@@ -18,6 +18,7 @@ mod interrupt;
 mod joints;
 mod layout;
 mod looks;
+mod pairs;
 mod pickling;
 mod picture;
 mod pool;

@@ -11,6 +11,7 @@ use crate::errors::{Error, Result};
 use crate::extension::Extensions;
 use crate::inner::Inner;
 use crate::interrupt::interruptible;
+use crate::pairs::{self, combine};
 use crate::picture::Shot;
 use crate::pool;
 use crate::report::StepReport;
@@ -28,7 +29,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 use tumble::collide::{ContactMode, Vec3};
-use tumble::core::{Mode, RigidBody as Rigid, Settings};
+use tumble::core::{Mode, PairMaterial, RigidBody as Rigid, Settings};
 use tumble::scene::{SceneFile, resolve_scene};
 
 /// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions are (x, y, z, w).
@@ -37,7 +38,8 @@ use tumble::scene::{SceneFile, resolve_scene};
 /// ``"symplectic_euler"``, ``"explicit_euler"``, ``"rk4"`` or ``"dormand_prince"``; solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or
 /// ``"lcp_sliding"``: the words of scene files, with their defaults. integrator: acts in ``"backtracking"`` (``"time_stepping"`` has its own midpoint rule); substeps: parts of each step; iterations: sweeps of the solver at most;
 /// contact_tolerance: metres; integrator_tolerance: of ``dormand_prince``. sleep_after: seconds after which islands that have moved by less than
-/// sleep_within (metres) are left out of the steps until something touches them; None: never.
+/// sleep_within (metres) are left out of the steps until something touches them; None: never. combine_restitution, combine_friction: what the
+/// coefficients of two bodies make for the pair, ``"min"``, ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``.
 ///
 /// One thread at a time: while one steps a world, calls on it from another raise ``BusyError``. The interpreter is let go while a world steps.
 #[pyclass(frozen, weakref, module = "tumble")]
@@ -72,10 +74,11 @@ impl World {
     #[new]
     #[pyo3(
         text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
-        solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5)"
+        solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, \
+        combine_restitution='max', combine_friction='geometric_mean')"
     )]
     #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
-        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5))]
+        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>,
@@ -90,6 +93,8 @@ impl World {
         integrator_tolerance: f64,
         sleep_after: Option<f64>,
         sleep_within: f64,
+        combine_restitution: &str,
+        combine_friction: &str,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
@@ -99,6 +104,8 @@ impl World {
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
         (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
+        world.combine_restitution = combine(combine_restitution, "combine_restitution")?;
+        world.combine_friction = combine(combine_friction, "combine_friction")?;
         World::of(py, build(scene)?)
     }
 
@@ -197,6 +204,53 @@ impl World {
     fn set_gravity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
         let gravity = vec3(value, "gravity")?;
         self.set(py, |s| s.gravity = gravity)
+    }
+
+    /// Rule by which the restitution of two bodies in contact combines: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``.
+    #[getter]
+    fn combine_restitution(&self) -> Result<&'static str> {
+        self.settings(|s| s.combine_restitution.name())
+    }
+
+    #[setter]
+    fn set_combine_restitution(&self, py: Python<'_>, value: &str) -> Result<()> {
+        let rule = combine(value, "combine_restitution")?;
+        self.set(py, |s| s.combine_restitution = rule)
+    }
+
+    /// The same for friction.
+    #[getter]
+    fn combine_friction(&self) -> Result<&'static str> {
+        self.settings(|s| s.combine_friction.name())
+    }
+
+    #[setter]
+    fn set_combine_friction(&self, py: Python<'_>, value: &str) -> Result<()> {
+        let rule = combine(value, "combine_friction")?;
+        self.set(py, |s| s.combine_friction = rule)
+    }
+
+    /// Restitution and friction that contacts of two bodies have from the next step on, in place of what the rules make of their materials.
+    ///
+    /// a, b: handles or names in any order; a link of an articulation, with the links that are fixed to it, is ``"ARTICULATION/LINK"``. What is None goes by
+    /// the rule; with neither given the pair is as any other again. Forks have the same pairs; like materials they are not in ``save``.
+    #[pyo3(signature = (a, b, *, restitution=None, friction=None))]
+    fn set_pair_material(
+        &self,
+        py: Python<'_>,
+        a: &Bound<'_, PyAny>,
+        b: &Bound<'_, PyAny>,
+        restitution: Option<f64>,
+        friction: Option<f64>,
+    ) -> Result<()> {
+        pairs::set(&self.shared, py, [a, b], PairMaterial { restitution, friction })
+    }
+
+    /// Restitution and friction that contacts of two bodies have: by the pair's own constants where it has them, else by the rules.
+    ///
+    /// a, b: as in ``set_pair_material``. Of an articulation the first shape answers.
+    fn pair_material(&self, a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> Result<(f64, f64)> {
+        pairs::get(&self.shared, [a, b])
     }
 
     /// Name of the stepper.

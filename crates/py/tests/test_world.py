@@ -1,6 +1,7 @@
 """Worlds: stepping against closed forms, state, saving, forking, errors."""
 
 import math
+import pathlib
 
 import numpy as np
 import pytest
@@ -44,6 +45,68 @@ def test_a_ball_comes_to_rest_on_the_ground():
     assert len(contacts) == 1
     assert contacts["normal"][0] == pytest.approx(np.array([0, 0, 1.0]) * (1 if contacts["bodies"][0][0] == 1 else -1))
     assert abs(contacts["force"][0][2]) == pytest.approx(2.0 * 9.81, rel=1e-6)
+
+
+def test_the_first_example_of_the_book_bounces():
+    text = (pathlib.Path(__file__).parents[3] / "docs" / "python.md").read_text()
+    names: dict[str, object] = {}
+    exec(text.split("```python\n")[1].split("```")[0], names)
+    # 0.9 m down, up and down again with half the speed, and up once more with a quarter of it, all in one second
+    fall = math.sqrt(2 * 0.9 / 9.81)
+    left = 1.0 - 2 * fall
+    speed = 0.25 * 9.81 * fall
+    assert names["ball"].position[2] == pytest.approx(0.1 + speed * left - 4.905 * left**2, abs=2e-3)
+    assert names["ball"].velocity[2] == pytest.approx(speed - 9.81 * left, abs=1e-2)
+
+
+def rebound(world, ball, height):
+    """How high a ball rises that falls from ``height``: from its energy a little after the impact."""
+    while world.time < math.sqrt(2 * height / 9.81) + 0.01:
+        world.step()
+    return ball.position[2] - 0.1 + ball.velocity[2] ** 2 / (2 * 9.81)
+
+
+@pytest.mark.parametrize(
+    ("rule", "restitution"), [(None, 0.8), ("min", 0.2), ("max", 0.8), ("average", 0.5), ("product", 0.16), ("geometric_mean", 0.4)]
+)
+def test_each_rule_gives_its_bounce(rule, restitution):
+    world = tumble.World(**({} if rule is None else {"combine_restitution": rule}))
+    assert world.combine_restitution == rule or (rule is None and world.combine_restitution == "max")
+    ground = world.add_static("ground", tumble.HalfSpace(), restitution=0.2)
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0, position=(0, 0, 1), restitution=0.8)
+    assert world.pair_material(ground, "ball") == pytest.approx((restitution, 0.5))
+    assert rebound(world, ball, 0.9) == pytest.approx(restitution**2 * 0.9, abs=1e-3)
+
+
+def test_a_pair_has_restitution_and_friction_of_its_own():
+    world = tumble.World(combine_friction="min")
+    assert world.combine_friction == "min"
+    ground = world.add_static("ground", tumble.HalfSpace(), friction=0.2)
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0, position=(0, 0, 1))
+    world.set_pair_material("ball", ground, restitution=0.6)
+    fork = world.fork()
+    assert fork.pair_material(ball.name, "ground") == (0.6, 0.2)
+    assert rebound(world, ball, 0.9) == pytest.approx(0.36 * 0.9, abs=1e-3)
+    world.set_pair_material(ground, ball)
+    assert world.pair_material(ball, ground) == (0.0, 0.2)
+    world.combine_friction = "max"
+    assert world.pair_material(ball, ground) == (0.0, 0.5)
+    with pytest.raises(ValueError, match="restitution of a pair is 1.5; it must be 0 to 1"):
+        world.set_pair_material(ball, ground, restitution=1.5)
+    with pytest.raises(ValueError, match="combine_friction: `mim` is not known; did you mean `min`"):
+        tumble.World(combine_friction="mim")
+
+
+def test_a_link_has_a_pair_of_its_own():
+    world = tumble.World()
+    arm = world.add_articulation(str(pathlib.Path(__file__).parents[3] / "scenes" / "robot" / "arm.urdf"), name="arm")
+    world.add_static("ground", tumble.HalfSpace(offset=-9))
+    world.set_pair_material(arm, "ground", restitution=0.1)
+    world.set_pair_material("arm/paddle", "ground", restitution=0.7)
+    assert world.pair_material("ground", "arm/paddle")[0] == 0.7
+    assert world.pair_material("ground", arm)[0] == 0.1
+    with pytest.raises(KeyError, match="'arm' has no link named 'tail'"):
+        world.set_pair_material("arm/tail", "ground", friction=0.1)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ use tumble_core::collide::{Pose, Shape, contacts};
 use tumble_core::{CameraMount, Joint, Look, Material, Object, Visual};
 
 use crate::articulated::ArticulatedSpec;
-use crate::build::look;
+use crate::build::{look, material_id};
 use crate::link::LinkSpec;
 use crate::link_shapes::{Placed, Purpose, ShapeMaker, mass};
 
@@ -115,7 +115,8 @@ fn position(link: &LinkSpec, base: &Pose) -> Vec<f64> {
 fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result<(), ArticulatedError> {
     let surface = &placed.spec.surface;
     if let Some(shape) = placed.solid().filter(|_| placed.spec.collides) {
-        let material = Material { restitution: surface.restitution, friction: surface.friction };
+        let id = material_id(surface.material);
+        let material = Material { restitution: surface.restitution, friction: surface.friction, id };
         body.add_collider(
             link,
             Collider { material, contact_mode: surface.contacts, ..Collider::new(shape.clone(), placed.pose) },

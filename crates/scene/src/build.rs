@@ -7,8 +7,8 @@ use thiserror::Error;
 use tumble_collide::{Pose, RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3, text_of};
 use tumble_core::solver::{self, Accuracy};
 use tumble_core::{
-    ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, RigidBody, Settings, Sleep, Visual,
-    World, WorldError, stepper_by_name,
+    ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, PairMaterial, PairSide, RigidBody,
+    Settings, Sleep, Visual, World, WorldError, stepper_by_name,
 };
 
 use crate::articulated::ArticulatedSpec;
@@ -20,6 +20,7 @@ use crate::file::SceneFile;
 use crate::link_shapes::{self, Purpose, ShapeMaker};
 use crate::look::Look;
 use crate::mesh::{MeshSource, MeshSpec};
+use crate::pair::{PairSideSpec, PairSpec};
 use crate::slow::building_surface;
 
 /// Most bytes of a mesh file: 1 GiB.
@@ -135,6 +136,9 @@ impl SceneFile {
         for spec in &self.closures {
             self.add_closure(spec, &mut built)?;
         }
+        for spec in &self.pairs {
+            self.add_pair(spec, &mut built).map_err(world)?;
+        }
         Ok((built, notes))
     }
 
@@ -161,6 +165,30 @@ impl SceneFile {
             ClosureKind::Slider => Closure::slider_at(name, world, a, b, point, axis),
         };
         world.add(closure.map_err(|e| wrong(e.to_string()))?).map(drop).map_err(|e| wrong(e.to_string()))
+    }
+
+    fn add_pair(&self, spec: &PairSpec, world: &mut World) -> Result<(), WorldError> {
+        let [a, b] = spec.sides.map(|side| self.sides(world, side));
+        let material = PairMaterial { restitution: spec.restitution, friction: spec.friction };
+        for (a, b) in a.iter().flat_map(|a| b.iter().map(move |b| (*a, *b))) {
+            world.set_pair_material(a, b, material)?;
+        }
+        Ok(())
+    }
+
+    /// What a side of a pair is in the world: several parts where it is a link with several shapes.
+    fn sides(&self, world: &World, side: PairSideSpec) -> Vec<PairSide> {
+        let object = |name: &str| world.find(name).map(PairSide::Object).into_iter().collect();
+        match side {
+            PairSideSpec::Body(body) => object(&self.bodies[body].name),
+            PairSideSpec::Articulated(spec) => object(&self.articulated[spec].name),
+            PairSideSpec::Material(material) => vec![PairSide::Material(material_id(Some(material)))],
+            PairSideSpec::Link(spec, link) => {
+                let Some((id, link)) = self.part(world, &PartSpec::Link(spec, link)) else { return Vec::new() };
+                let body = world.get::<ArticulatedBody>(id);
+                body.into_iter().flat_map(|b| b.colliders_of(b.link_of(link))).map(|p| PairSide::Part(id, p)).collect()
+            }
+        }
     }
 
     /// An object of the world and its part.
@@ -296,6 +324,7 @@ impl SceneFile {
             .at(pose)
             .moving(Vec3::from(spec.velocity_m_per_s), Vec3::from(spec.angular_velocity_rad_per_s))
             .surface(spec.restitution, spec.friction)
+            .of_material(material_id(spec.material))
             .colliding_by(spec.contacts)
             .drawn_as(visuals(spec, shape, &center));
         // the body's own origin is the centre of mass
@@ -360,6 +389,11 @@ fn read_with_lines(path: &std::path::Path, bytes: &[u8]) -> Result<(TriMesh, Vec
         }
         other => Err(format!("the extension is '{other}'; meshes are read from .obj, .stl, .ply and .dae")),
     }
+}
+
+/// The number by which the world knows a material; 0 for none.
+pub(crate) fn material_id(material: Option<usize>) -> u32 {
+    material.map_or(0, |index| index as u32 + 1)
 }
 
 fn visuals(spec: &BodySpec, shape: Shape, center: &Vec3) -> Vec<Visual> {

@@ -54,6 +54,8 @@ pub struct ClosureSpec {
 pub(crate) trait Parts {
     /// The part of that name: `body`, or `object/link`.
     fn part(&self, name: &str) -> Option<PartSpec>;
+    /// The index of the articulated body of that name.
+    fn articulated(&self, name: &str) -> Option<usize>;
     /// Names, for messages.
     fn names(&self) -> Vec<String>;
 }

@@ -19,6 +19,7 @@ use crate::material::MaterialSpec;
 use crate::mesh::MeshSpec;
 use crate::on_floor;
 use crate::urdf::UrdfOptions;
+use crate::pair::PairSpec;
 use crate::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::world::WorldSettings;
 use tumble_core::collide::ContactMode;
@@ -33,6 +34,8 @@ const MOST_SLIPS: usize = 5;
 const MOST_ARTICULATED: usize = 10_000;
 /// Most closures of a scene.
 const MOST_CLOSURES: usize = 100_000;
+/// Most tables `[[pair]]` of a scene.
+const MOST_PAIRS: usize = 1_000;
 /// Most lights of a scene.
 const MOST_LIGHTS: usize = 64;
 
@@ -55,6 +58,8 @@ pub struct SceneFile {
     pub articulated: Vec<ArticulatedSpec>,
     /// `[[closure]]` in the order of the file.
     pub closures: Vec<ClosureSpec>,
+    /// `[[pair]]` in the order of the file.
+    pub pairs: Vec<PairSpec>,
     /// `[camera]`; `None` leaves the view to the renderer.
     pub camera: Option<CameraSpec>,
     /// `[cave]`; `None` leaves the place of a cave to the camera.
@@ -154,7 +159,9 @@ impl SceneFile {
         let mut names = BTreeMap::new();
         let bodies = read_bodies(&mut f, &library, &mut names);
         let articulated = read_articulated(&mut f, &library, &place, &mut names);
-        let closures = read_closures(&mut f, &Objects { bodies: &bodies, articulated: &articulated }, &mut names);
+        let objects = Objects { bodies: &bodies, articulated: &articulated };
+        let closures = read_closures(&mut f, &objects, &mut names);
+        let pairs = read_pairs(&mut f, &library, &objects);
         let camera = read_table(&mut f, "camera", CameraSpec::read);
         let cave = read_table(&mut f, "cave", CavePlace::read);
         let mut lights: Vec<LightSpec> =
@@ -174,6 +181,7 @@ impl SceneFile {
             bodies,
             articulated,
             closures,
+            pairs,
             camera,
             cave,
             lights,
@@ -335,7 +343,13 @@ fn read_closures(f: &mut Fields<'_>, objects: &Objects<'_>, names: &mut Taken) -
     f.tables("closure", MOST_CLOSURES).into_iter().filter_map(one).collect()
 }
 
-/// The objects that closures can join.
+fn read_pairs(f: &mut Fields<'_>, library: &Library<'_>, objects: &Objects<'_>) -> Vec<PairSpec> {
+    let mut lines = BTreeMap::new();
+    let tables = f.tables("pair", MOST_PAIRS);
+    tables.into_iter().filter_map(|table| PairSpec::read(table, library, objects, &mut lines)).collect()
+}
+
+/// The objects that closures can join and pairs can name.
 struct Objects<'a> {
     bodies: &'a [BodySpec],
     articulated: &'a [ArticulatedSpec],
@@ -350,6 +364,10 @@ impl Parts for Objects<'_> {
             let link = name.strip_prefix(spec.name.as_str())?.strip_prefix('/')?;
             spec.link(link).map(|link| PartSpec::Link(k, link))
         })
+    }
+
+    fn articulated(&self, name: &str) -> Option<usize> {
+        self.articulated.iter().position(|spec| spec.name == name)
     }
 
     fn names(&self) -> Vec<String> {

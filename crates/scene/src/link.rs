@@ -110,6 +110,8 @@ pub enum Geometry {
 /// What a shape does in a contact and how it looks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
+    /// Index into [`SceneFile::materials`](crate::SceneFile::materials), where one is named.
+    pub material: Option<usize>,
     /// Coulomb's coefficient.
     pub friction: f64,
     /// Newton's coefficient.
@@ -123,6 +125,7 @@ pub struct Surface {
 impl Default for Surface {
     fn default() -> Surface {
         Surface {
+            material: None,
             friction: DEFAULT_FRICTION,
             restitution: DEFAULT_RESTITUTION,
             contacts: ContactMode::default(),
@@ -134,10 +137,12 @@ impl Default for Surface {
 impl Surface {
     /// The surface whose keys stand in `f`; what is not there is as in `base`, or in the material named.
     pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>, base: &Surface) -> Surface {
-        let material = read_material(f, library).map(|index| &library.materials[index]);
+        let material = read_material(f, library);
+        let named = material.map(|index| &library.materials[index]);
         let (friction, restitution, look) =
-            material.map_or((base.friction, base.restitution, &base.look), |m| (m.friction, m.restitution, &m.look));
+            named.map_or((base.friction, base.restitution, &base.look), |m| (m.friction, m.restitution, &m.look));
         Surface {
+            material: material.or(base.material),
             friction: f.number_or("friction", FRICTION, friction),
             restitution: f.number_or("restitution", RESTITUTION, restitution),
             contacts: f.choice_or("contacts", CONTACTS, base.contacts),

@@ -72,14 +72,6 @@ impl Solver {
     ];
 }
 
-const COMBINE: Names<Combine> = &[
-    ("min", Combine::Min),
-    ("max", Combine::Max),
-    ("average", Combine::Average),
-    ("product", Combine::Product),
-    ("geometric_mean", Combine::GeometricMean),
-];
-
 /// How meshes and cylinders collide: the words of `contacts`.
 pub(crate) const CONTACTS: Names<ContactMode> = ContactMode::NAMES;
 
@@ -142,6 +134,14 @@ macro_rules! written_by_name {
 
 written_by_name!(Stepper, Integrator, Solver);
 
+/// The rule of that name, as scene files write it.
+///
+/// # Errors
+/// [`UnknownName`].
+pub fn combine_by_name(typed: &str) -> Result<Combine, UnknownName> {
+    by_name(typed, Combine::NAMES)
+}
+
 /// `[world]`. All keys have defaults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorldSettings {
@@ -169,7 +169,7 @@ pub struct WorldSettings {
     pub sleep_after_s: Option<f64>,
     /// How far the furthest point of what is still may have moved in that time, metres. Default 1e-5.
     pub sleep_within_m: f64,
-    /// Restitution of a pair from those of its bodies. Default `min`.
+    /// Restitution of a pair from those of its bodies. Default `max`.
     pub combine_restitution: Combine,
     /// Friction of a pair from those of its bodies. Default `geometric_mean`.
     pub combine_friction: Combine,
@@ -192,7 +192,7 @@ impl Default for WorldSettings {
             contact_tolerance_m: 1e-7,
             sleep_after_s: None,
             sleep_within_m: Sleep::default().within,
-            combine_restitution: Combine::Min,
+            combine_restitution: Combine::Max,
             combine_friction: Combine::GeometricMean,
             contacts: ContactMode::Surface,
         }
@@ -221,8 +221,8 @@ impl WorldSettings {
             contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, usual.contact_tolerance_m),
             sleep_after_s: f.optional_number("sleep_after_s", AFTER),
             sleep_within_m: f.number_or("sleep_within_m", TOLERANCE, usual.sleep_within_m),
-            combine_restitution: f.choice_or("combine_restitution", COMBINE, usual.combine_restitution),
-            combine_friction: f.choice_or("combine_friction", COMBINE, usual.combine_friction),
+            combine_restitution: f.choice_or("combine_restitution", Combine::NAMES, usual.combine_restitution),
+            combine_friction: f.choice_or("combine_friction", Combine::NAMES, usual.combine_friction),
             contacts: f.choice_or("contacts", CONTACTS, usual.contacts),
         };
         f.finish();

@@ -68,7 +68,7 @@ impl Bead {
 
     /// Sets restitution and friction.
     pub fn surface(mut self, restitution: f64, friction: f64) -> Bead {
-        self.material = Material { restitution, friction };
+        self.material = Material { restitution, friction, id: 0 };
         self
     }
 

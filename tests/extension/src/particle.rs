@@ -47,7 +47,7 @@ impl Particle {
 
     /// Sets restitution and friction.
     pub fn surface(mut self, restitution: f64, friction: f64) -> Particle {
-        self.material = Material { restitution, friction };
+        self.material = Material { restitution, friction, id: 0 };
         self
     }
 }

@@ -380,6 +380,12 @@ impl ArticulatedBody {
         if part < links { Some(part) } else { self.collider(part)?.link }
     }
 
+    /// The parts that are colliders of a moving link and of what is fixed to it; `None` is the base.
+    pub fn colliders_of(&self, link: Option<usize>) -> impl Iterator<Item = usize> {
+        let first = self.model.links().len() + 1;
+        self.colliders.iter().enumerate().filter(move |(_, part)| part.link == link).map(move |(k, _)| first + k)
+    }
+
     /// The collider that is this part, if it is one.
     pub(super) fn collider(&self, part: usize) -> Option<&Part> {
         self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)

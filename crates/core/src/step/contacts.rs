@@ -91,6 +91,7 @@ pub(crate) fn detect(core: &mut Core, horizon: f64, reach: Reach, out: &mut Vec<
         owners: &core.owners,
         sites: &core.sites,
         settings: &core.settings,
+        pair_materials: &core.pair_materials,
         broad: core.broad.as_mut(),
         scratch: &mut core.detect_scratch,
         stirred: &mut core.sleepers.stirred,

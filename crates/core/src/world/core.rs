@@ -3,6 +3,7 @@
 use super::flat::State;
 use crate::detect::{Owner, Scratch, Touch, WarmStarts};
 use crate::motion::Motion;
+use crate::pair_material::PairMaterials;
 use crate::settings::{Settings, StepReport};
 use crate::site::{Forces, Site, Wrench};
 use crate::sleep::Sleepers;
@@ -104,6 +105,7 @@ pub struct Core {
     pub(crate) unpinned: (Vec<f64>, Vec<Site>),
     pub(crate) forces: Forces,
     pub(crate) settings: Settings,
+    pub(crate) pair_materials: PairMaterials,
     pub(crate) time: f64,
     pub(crate) frame: u64,
     pub(crate) broad: Box<dyn BroadPhase>,

@@ -6,6 +6,7 @@ mod core;
 mod flat;
 mod mirror;
 mod overlaps;
+mod pair_materials;
 mod pull;
 mod snapshot;
 
@@ -19,6 +20,7 @@ pub use snapshot::SnapshotError;
 
 use crate::detect::{Owner, Scratch, WarmStarts};
 use crate::object::{Energy, Momentum, Object};
+use crate::pair_material::PairMaterials;
 use crate::rigid::{BodyError, RigidBody};
 use crate::settings::{Settings, SettingsError, StepReport};
 use crate::site::{Dims, Forces, Site, Span, Wrench};
@@ -118,6 +120,7 @@ impl World {
             unpinned: Default::default(),
             forces: Forces::default(),
             settings,
+            pair_materials: PairMaterials::default(),
             time: 0.0,
             frame: 0,
             broad: Box::<SweepAndPrune>::default(),
@@ -384,6 +387,7 @@ impl World {
             }
         }
         core.warm.forget(gone.serial);
+        core.pair_materials.forget(id);
         core.contacts.retain(|c| c.a != id && c.b != id);
         Ok(gone.object)
     }
@@ -407,6 +411,7 @@ impl World {
                 held_wrenches: c.held_wrenches.clone(),
                 forces: c.forces.clone(),
                 settings: c.settings,
+                pair_materials: c.pair_materials.clone(),
                 time: c.time,
                 frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(),

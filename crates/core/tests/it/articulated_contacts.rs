@@ -29,7 +29,7 @@ fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
             .with_velocities(&[w.x, w.y, w.z, v.x, v.y, v.z])
             .unwrap();
         let mut collider = Collider::new(shape, Pose::identity());
-        collider.material = Material { restitution: 0.6, friction: 0.5 };
+        collider.material = Material { restitution: 0.6, friction: 0.5, id: 0 };
         body.add_collider("box", collider).unwrap();
         world.add(body).unwrap()
     } else {
@@ -141,7 +141,7 @@ fn pendulums(mut world: World, angle: f64) -> World {
             .with_positions(&[q])
             .unwrap();
         let mut ball = Collider::new(sphere(0.05), Pose::translation(0.0, 0.0, -0.5));
-        ball.material = Material { restitution: 1.0, friction: 0.0 };
+        ball.material = Material { restitution: 1.0, friction: 0.0, id: 0 };
         body.add_collider("link 0", ball).unwrap();
         world.add(body).unwrap();
     }

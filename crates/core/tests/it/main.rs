@@ -30,6 +30,7 @@ mod mesh_boxes;
 mod meshes;
 mod out_of_reach;
 mod overlaps;
+mod pair_materials;
 mod paradox;
 mod pull;
 mod regressions;

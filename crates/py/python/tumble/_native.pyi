@@ -567,6 +567,8 @@ class World:
         integrator_tolerance: float = 1e-6,
         sleep_after: float | None = None,
         sleep_within: float = 1e-5,
+        combine_restitution: str = "max",
+        combine_friction: str = "geometric_mean",
     ) -> World: ...
     @staticmethod
     def load(
@@ -614,6 +616,18 @@ class World:
         """Gravity, shape (3,), m/s²."""
     @gravity.setter
     def gravity(self, value: ArrayLike) -> None: ...
+    @property
+    def combine_restitution(self) -> str: ...
+    @combine_restitution.setter
+    def combine_restitution(self, value: str) -> None: ...
+    @property
+    def combine_friction(self) -> str: ...
+    @combine_friction.setter
+    def combine_friction(self, value: str) -> None: ...
+    def set_pair_material(
+        self, a: _Body | str, b: _Body | str, *, restitution: float | None = None, friction: float | None = None
+    ) -> None: ...
+    def pair_material(self, a: _Body | str, b: _Body | str) -> tuple[float, float]: ...
     @property
     def stepper(self) -> Stepper:
         """Name of the stepper."""

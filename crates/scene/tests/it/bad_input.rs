@@ -450,3 +450,39 @@ fn a_line_too_long_to_draw_is_only_named() {
     let wanted = "error: `dt_s` of [world] is -1\n  s.toml:2:8: wanted a time from 1e-6 to 1 s\ns.toml: 1 error\n";
     assert_eq!(report, wanted);
 }
+
+#[test]
+fn pairs() {
+    let balls = "[[body]]\nname = \"ball\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n[materials.ice]\n";
+    let pair = |lines: &str| format!("{balls}[[pair]]\n{lines}");
+    told(
+        &pair("a = \"ball\"\nb = \"bal\"\nfriction = 0.1\n"),
+        &["s.toml:8:5: `b` of pair 1 is \"bal\"; did you mean `ball`?"],
+    );
+    told(
+        &pair("a = \"ball\"\nb = \"ball\"\nfriction = 0.1\n"),
+        &["s.toml:8:5: `b` of pair 1 is \"ball\"; wanted a body other than `a`"],
+    );
+    told(
+        &pair("materials = [\"ice\", \"icy\"]\nrestitution = 2\n"),
+        &[
+            "s.toml:7:21: `materials` of pair 1 is \"icy\"; did you mean `ice`?",
+            "s.toml:8:15: `restitution` of pair 1 is 2; wanted a restitution from 0 (no bounce) to 1 (no loss)",
+        ],
+    );
+    told(
+        &pair("materials = [\"ice\"]\nfriction = 0.1\n"),
+        &[
+            "s.toml:7:13: `materials` of pair 1 is [\"ice\"]; wanted the names of two materials, such as [\"rubber\", \"ice\"]",
+        ],
+    );
+    told(
+        &pair("materials = [\"ice\", \"ice\"]\n"),
+        &["s.toml:6:1: pair 1 has no `friction`; wanted `restitution`, `friction` or both"],
+    );
+    let twice = "materials = [\"ice\", \"ice\"]\nfriction = 0.1\n";
+    told(
+        &format!("{}[[pair]]\n{twice}", pair(twice)),
+        &["s.toml:9:1: pair 2 names the same two as the pair at line 6; wanted each pair once"],
+    );
+}

@@ -30,7 +30,7 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
     assert_eq!(scene.world.stepper, Stepper::TimeStepping);
     assert_eq!(scene.world.integrator, Integrator::Verlet);
     assert_eq!(scene.world.solver, Solver::GaussSeidel);
-    assert_eq!(scene.world.combine_restitution, Combine::Min);
+    assert_eq!(scene.world.combine_restitution, Combine::Max);
     assert_eq!(scene.world.combine_friction, Combine::GeometricMean);
     assert!(scene.bodies.is_empty() && scene.camera.is_none() && scene.ground.is_none());
     // One sun, its direction a unit vector.
@@ -42,7 +42,7 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
 fn every_word_of_the_world() {
     let scene = read(
         "[world]\nstepper = \"backtracking\"\nintegrator = \"dormand_prince\"\nintegrator_tolerance = 1e-9\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
-         seconds = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"max\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\n",
+         seconds = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\n",
     );
     let world = scene.world;
     assert_eq!(
@@ -53,7 +53,7 @@ fn every_word_of_the_world() {
     assert_eq!(world.integrator_tolerance, 1e-9);
     assert_eq!((world.sleep_after_s, world.sleep_within_m), (Some(0.25), 1e-6));
     assert_eq!((world.contact_tolerance_m, world.gravity_m_per_s2), (1e-5, [1.0, 2.0, 3.0]));
-    assert_eq!((world.combine_restitution, world.combine_friction), (Combine::Max, Combine::Product));
+    assert_eq!((world.combine_restitution, world.combine_friction), (Combine::Average, Combine::Product));
 }
 
 #[test]
@@ -73,6 +73,55 @@ fn words_outside_of_files() {
 fn combine_rules_by_hand() {
     let rules = [Combine::Min, Combine::Max, Combine::Average, Combine::Product, Combine::GeometricMean];
     assert_eq!(rules.map(|rule| rule.of(0.25, 1.0)), [0.25, 1.0, 0.625, 0.25, 0.5]);
+}
+
+/// What contacts of two bodies have in the world of a scene.
+fn between(scene: &SceneFile, a: &str, b: &str) -> (f64, f64) {
+    let (world, _) = scene.build().unwrap();
+    let id = |name: &str| (world.find(name).unwrap(), 0);
+    let found = world.pair_material(id(a), id(b)).unwrap();
+    (found.restitution, found.friction)
+}
+
+#[test]
+fn pairs_of_bodies_and_of_materials_have_constants_of_their_own() {
+    let ball = |name: &str, material: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 1\nmaterial = \"{material}\"\n"
+        )
+    };
+    let pairs = "[[pair]]\nmaterials = [\"ice\", \"rubber\"]\nrestitution = 0.3\nfriction = 0.05\n\
+                 [[pair]]\na = \"b\"\nb = \"a\"\nfriction = 0.6\n\
+                 [[pair]]\nmaterials = [\"ice\", \"ice\"]\nrestitution = 0.7\n";
+    let materials = "[materials.ice]\nfriction = 0.01\n[materials.rubber]\nfriction = 1\nrestitution = 0.8\n";
+    let text = format!("{materials}{}{}{}{pairs}", ball("a", "ice"), ball("b", "rubber"), ball("c", "ice"));
+    let scene = read(&text);
+    assert_eq!(between(&scene, "b", "c"), (0.3, 0.05));
+    assert_eq!(between(&scene, "a", "b"), (0.3, 0.6), "bodies go before materials");
+    assert_eq!(between(&scene, "a", "c"), (0.7, 0.01));
+}
+
+#[test]
+fn a_pair_may_name_an_articulated_body_or_one_of_its_links() {
+    let link = |name: &str, parent: &str| {
+        format!(
+            "[[articulated.link]]\nname = \"{name}\"\n{parent}joint = \"revolute\"\naxis = [0, 0, 1]\nmass_kg = 1\nshape = {{ type = \"sphere\", radius_m = 1 }}\n"
+        )
+    };
+    let text = format!(
+        "[[articulated]]\nname = \"arm\"\n{}{}[[body]]\nname = \"floor\"\nmode = \"static\"\nshape = {{ type = \"half_space\" }}\n\
+         [[pair]]\na = \"arm\"\nb = \"floor\"\nrestitution = 0.2\n[[pair]]\na = \"floor\"\nb = \"arm/lower\"\nrestitution = 0.6\n",
+        link("upper", ""),
+        link("lower", "parent = \"upper\"\n")
+    );
+    let (world, _) = read(&text).build().unwrap();
+    let (arm, floor) = (world.find("arm").unwrap(), world.find("floor").unwrap());
+    let body = world.get::<tumble_core::ArticulatedBody>(arm).unwrap();
+    let restitution = |link: usize| {
+        let part = body.colliders_of(Some(link)).next().unwrap();
+        world.pair_material((arm, part), (floor, 0)).unwrap().restitution
+    };
+    assert_eq!((restitution(0), restitution(1)), (0.2, 0.6));
 }
 
 #[test]

@@ -251,6 +251,7 @@ fn the_reference_names_every_key() {
         "[camera]\neye_m = [1, 1, 1]\ntarget_m = [0, 0, 0]\n".to_owned(),
         "[[light]]\ntype = \"point\"\n".to_owned(),
         "[[light]]\ntype = \"directional\"\n".to_owned(),
+        "[[pair]]\n".to_owned(),
         "[sky]\n".to_owned(),
         "[ground]\n".to_owned(),
         format!("[[body]]\n{sphere}"),

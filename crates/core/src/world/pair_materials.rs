@@ -1,0 +1,52 @@
+//! Surface constants of chosen pairs.
+
+use super::{World, WorldError};
+use crate::collidable::Material;
+use crate::pair_material::{PairMaterial, PairSide, Surface};
+use crate::view::ObjectId;
+
+impl World {
+    /// Gives the contacts of two sides restitution and friction of their own, from the next step on: two objects, two parts `(id, part)`, or two
+    /// materials ([`PairSide::Material`]), in any order. A part goes before its object, an object before its material. A constant that is `None` goes by
+    /// the rule of [`Settings`](crate::Settings); both `None` take the pair off. Forks have the same pairs; like materials they are not in
+    /// [`save`](World::save). They go with their objects.
+    pub fn set_pair_material(
+        &mut self,
+        a: impl Into<PairSide>,
+        b: impl Into<PairSide>,
+        material: PairMaterial,
+    ) -> Result<(), WorldError> {
+        let sides = [a.into(), b.into()];
+        material.validate()?;
+        sides.iter().try_for_each(|side| self.check_side(side))?;
+        self.core.wake_all();
+        self.core.pair_materials.set(sides, material);
+        Ok(())
+    }
+
+    /// Restitution and friction that contacts of these two parts have.
+    pub fn pair_material(&self, a: (ObjectId, usize), b: (ObjectId, usize)) -> Result<Material, WorldError> {
+        let (a, b) = (self.surface(a)?, self.surface(b)?);
+        Ok(self.core.pair_materials.combine(&self.core.settings, a, b))
+    }
+
+    fn surface(&self, (id, part): (ObjectId, usize)) -> Result<Surface, WorldError> {
+        self.part(id, part, &[])?;
+        let material = self.object(id).and_then(|o| o.collidable()).map(|c| c.material(part));
+        Ok((id, part, material.unwrap_or_default()))
+    }
+
+    fn check_side(&self, side: &PairSide) -> Result<(), WorldError> {
+        match *side {
+            PairSide::Part(id, part) => self.part(id, part, &[]).map(drop),
+            PairSide::Object(id) => self.object(id).map(drop).ok_or(WorldError::Stale),
+            PairSide::Material(0) => Err(crate::SettingsError {
+                what: "number of a pair's material",
+                value: 0.0,
+                wanted: "above 0; 0 stands for none",
+            }
+            .into()),
+            PairSide::Material(_) => Ok(()),
+        }
+    }
+}
