@@ -9,7 +9,7 @@
 //! What is read is checked where later code would fail on it: indices in range, numbers finite, children behind their parents.
 
 use crate::tree::SphereNode;
-use crate::{ClosedReport, CylinderShape, MassProperties, MeshShape, SphereTree, TriMesh};
+use crate::{ClosedReport, CylinderShape, MassProperties, MeshShape, SphereTree, TriMesh, Vec3};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
@@ -36,6 +36,7 @@ struct MeshRecord<'a> {
     tree: Cow<'a, [SphereNode]>,
     unit_mass: MassProperties,
     report: Cow<'a, ClosedReport>,
+    center: Vec3,
 }
 
 impl Serialize for MeshShape {
@@ -45,6 +46,7 @@ impl Serialize for MeshShape {
             tree: Cow::Borrowed(self.tree().nodes()),
             unit_mass: *self.unit_mass(),
             report: Cow::Borrowed(self.report()),
+            center: self.center_of_mass(),
         };
         record.serialize(serializer)
     }
@@ -52,10 +54,13 @@ impl Serialize for MeshShape {
 
 impl<'de> Deserialize<'de> for MeshShape {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<MeshShape, D::Error> {
-        let MeshRecord { mesh, tree, unit_mass, report } = MeshRecord::deserialize(deserializer)?;
+        let MeshRecord { mesh, tree, unit_mass, report, center } = MeshRecord::deserialize(deserializer)?;
         mesh.check_data().map_err(D::Error::custom)?;
+        if center.iter().any(|x| !x.is_finite()) {
+            return Err(D::Error::custom("the center of mass is not finite"));
+        }
         let tree = SphereTree::of_archive(tree.into_owned()).map_err(D::Error::custom)?;
-        Ok(MeshShape::of_parts(mesh.into_owned(), tree, unit_mass, report.into_owned()))
+        Ok(MeshShape::of_parts(mesh.into_owned(), tree, unit_mass, report.into_owned(), center))
     }
 }
 

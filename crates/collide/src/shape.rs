@@ -149,6 +149,15 @@ impl Shape {
         }
     }
 
+    /// The center of mass in the frame that the shape was described in, metres: that of its file for a mesh, which is kept about its center of mass;
+    /// the origin for all others.
+    pub fn center_of_mass(&self) -> Vec3 {
+        match self {
+            Shape::Mesh(mesh) => mesh.center_of_mass(),
+            _ => Vec3::zeros(),
+        }
+    }
+
     /// Volume in m³; infinite for a half-space.
     pub fn volume(&self) -> f64 {
         match self {

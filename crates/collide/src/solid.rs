@@ -30,6 +30,8 @@ pub struct MeshShape {
     unit_mass: MassProperties,
     bounding_radius: f64,
     report: ClosedReport,
+    /// Where the origin is in the frame that the mesh came in.
+    center: Vec3,
 }
 
 /// A tree, and the radius of the ball about the origin that holds its leaves, metres.
@@ -86,7 +88,7 @@ impl MeshShape {
         let mass = if overlaps { mass } else { mesh.mass_properties(1.0) };
         let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mass };
         let (settings, cache) = (*settings, cache.clone());
-        Ok((MeshShape { settings, cache, ..MeshShape::of_checked(mesh, unit_mass, report) }, offset))
+        Ok((MeshShape { settings, cache, center: offset, ..MeshShape::of_checked(mesh, unit_mass, report) }, offset))
     }
 
     /// Of a mesh that was checked and moved, with its tree: the rest follows from these.
@@ -95,9 +97,13 @@ impl MeshShape {
         tree: SphereTree,
         unit_mass: MassProperties,
         report: ClosedReport,
+        center: Vec3,
     ) -> MeshShape {
-        let shape =
-            MeshShape { tree: OnceLock::from(Tree::from(tree)), ..MeshShape::of_checked(mesh, unit_mass, report) };
+        let shape = MeshShape {
+            tree: OnceLock::from(Tree::from(tree)),
+            center,
+            ..MeshShape::of_checked(mesh, unit_mass, report)
+        };
         shape.surfaces();
         shape
     }
@@ -115,6 +121,7 @@ impl MeshShape {
             unit_mass,
             bounding_radius,
             report,
+            center: Vec3::zeros(),
         }
     }
 
@@ -188,6 +195,11 @@ impl MeshShape {
     /// Volume, m³.
     pub fn volume(&self) -> f64 {
         self.unit_mass.mass
+    }
+
+    /// The center of mass in the frame that the mesh came in, metres: what was subtracted from its vertices.
+    pub fn center_of_mass(&self) -> Vec3 {
+        self.center
     }
 
     /// Radius of the ball about the origin that holds the surface, metres.

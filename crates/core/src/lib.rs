@@ -3,6 +3,9 @@
 //! A step reads a flat state, accumulates forces, finds contacts, turns test impulses into rows, solves all rows at once and writes the state.
 //! Same inputs, same bits: no IO, clock, thread count, file format or GPU in here.
 //!
+//! SI units, radians, z up; boxes, capsules and cylinders are made of *half* extents and half lengths. `docs/conventions.md` has these and the other
+//! conventions beside those of Python and of scene files.
+//!
 //! ```
 //! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};
 //! let mut world = World::new(Settings::default())?;

@@ -70,13 +70,18 @@ impl PairMaterials {
         };
     }
 
+    /// All chosen pairs, in the order of their keys.
+    pub fn iter(&self) -> impl Iterator<Item = (&[PairSide; 2], &PairMaterial)> {
+        self.entries.iter()
+    }
+
     /// Takes off all pairs of an object.
     pub fn forget(&mut self, id: ObjectId) {
         let of = |side: &PairSide| matches!(side, PairSide::Part(other, _) | PairSide::Object(other) if *other == id);
         self.entries.retain(|sides, _| !sides.iter().any(of));
     }
 
-    /// What a contact of two parts has: for each constant the entry that names the pair most closely, or else the rule.
+    /// What a contact of two parts has, `a` the one that was added first: for each constant the entry that names the pair most closely, or else the rule.
     pub fn combine(&self, settings: &Settings, a: Surface, b: Surface) -> Material {
         let chosen = if self.entries.is_empty() { PairMaterial::default() } else { self.of(a, b) };
         let rule = |combine: crate::Combine, of: fn(&Material) -> f64| combine.of(of(&a.2), of(&b.2));
@@ -87,17 +92,20 @@ impl PairMaterials {
         }
     }
 
-    /// A part goes before its object, and that before its material; between entries that name a pair equally closely the lower key decides.
+    /// A part goes before its object, and that before its material; between entries that name a pair equally closely the one that names `a` more
+    /// closely decides.
     fn of(&self, a: Surface, b: Surface) -> PairMaterial {
         let sides = |(id, part, m): Surface| [PairSide::Part(id, part), PairSide::Object(id), PairSide::Material(m.id)];
         let (a, b) = (sides(a), sides(b));
-        let mut keys: [(usize, [PairSide; 2]); 9] = std::array::from_fn(|k| {
-            let mut key = [a[k / 3], b[k % 3]];
-            key.sort_unstable();
-            (k / 3 + k % 3, key)
-        });
-        keys.sort_unstable();
-        let found = || keys.iter().filter_map(|(_, key)| self.entries.get(key));
+        const BY_CLOSENESS: [(usize, usize); 9] =
+            [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (2, 0), (1, 2), (2, 1), (2, 2)];
+        let found = || {
+            BY_CLOSENESS.iter().filter_map(|&(i, j)| {
+                let mut key = [a[i], b[j]];
+                key.sort_unstable();
+                self.entries.get(&key)
+            })
+        };
         PairMaterial {
             restitution: found().find_map(|entry| entry.restitution),
             friction: found().find_map(|entry| entry.friction),

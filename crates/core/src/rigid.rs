@@ -8,7 +8,11 @@
 //! | 10–12 | angular momentum `L` about the centre of mass, world axes, N·m·s |
 //!
 //! Generalized velocity `v = [ω; v]`, world axes at the centre of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Whitening takes
-//! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`. Body origin = centre of mass (thesis §III.A.1).
+//! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`.
+//!
+//! The site is at the center of mass (thesis §III.A.1), with the axes of the body. The body's *frame*, in which users place it, is that of its shape: a mesh
+//! keeps the frame of its file, and the center of mass stands at [`RigidBody::center_of_mass`] in it. State, velocities and sites know the center of
+//! mass alone; [`World::pose`](crate::World::pose), [`World::set_pose`](crate::World::set_pose) and [`RigidBody::at`] convert.
 
 use crate::collidable::{Collidable, CollisionKind, Material};
 use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
@@ -85,13 +89,15 @@ pub struct RigidBody {
     pub kind: CollisionKind,
     /// Kinds it meets, one bit each.
     pub meets: u64,
-    /// Pose at time 0.
+    /// Pose of its frame at time 0.
     pub initial_pose: Pose,
     /// Velocity of the centre of mass at time 0, m/s.
     pub initial_velocity: Vec3,
     /// Angular velocity at time 0, rad/s, world axes.
     pub initial_angular_velocity: Vec3,
     fixture: bool,
+    /// The center of mass in the body's frame, metres.
+    center: Vec3,
     visuals: Vec<Visual>,
     cameras: Vec<CameraMount>,
     lights: Vec<LightMount>,
@@ -119,7 +125,7 @@ struct Cache {
 }
 
 impl RigidBody {
-    /// A body of the given mass and inertia (about the centre of mass, body axes, kg·m²); the shape's frame is the body frame.
+    /// A body of the given mass and inertia (about the center of mass, body axes, kg·m²). Its frame is the shape's, that of its file for a mesh.
     pub fn new(name: impl Into<String>, shape: Shape, mass: f64, inertia: Mat3) -> Result<RigidBody, BodyError> {
         let name = name.into();
         if !(mass.is_finite() && mass > 0.0) {
@@ -130,6 +136,7 @@ impl RigidBody {
         let visuals = vec![Visual::shape(0, Pose::identity(), shape.clone(), Default::default())];
         Ok(RigidBody {
             name,
+            center: shape.center_of_mass(),
             shape,
             mass,
             root_mass: mass.sqrt(),
@@ -184,7 +191,7 @@ impl RigidBody {
         self.fixture
     }
 
-    /// Sets the pose at time 0.
+    /// Sets the pose of its frame at time 0.
     pub fn at(mut self, pose: Pose) -> Self {
         self.initial_pose = pose;
         self
@@ -222,14 +229,22 @@ impl RigidBody {
     }
 
     /// Adds a camera; its pose is in the body's frame.
-    pub fn with_camera(mut self, camera: CameraMount) -> Self {
+    pub fn with_camera(mut self, mut camera: CameraMount) -> Self {
+        camera.pose = Translation3::from(-self.center) * camera.pose;
         self.cameras.push(camera);
         self
     }
 
     /// Adds a light; its pose is in the body's frame.
-    pub fn with_light(mut self, light: LightMount) -> Self {
+    pub fn with_light(mut self, mut light: LightMount) -> Self {
+        light.pose = Translation3::from(-self.center) * light.pose;
         self.lights.push(light);
+        self
+    }
+
+    /// Replaces cameras and lights by others whose poses are in the frame of the site.
+    pub(crate) fn carrying(mut self, cameras: Vec<CameraMount>, lights: Vec<LightMount>) -> Self {
+        (self.cameras, self.lights) = (cameras, lights);
         self
     }
 
@@ -243,7 +258,22 @@ impl RigidBody {
         &self.inertia.tensor
     }
 
-    /// Its geometry, in the body frame.
+    /// The center of mass in the body's frame, metres: the origin but for meshes.
+    pub fn center_of_mass(&self) -> Vec3 {
+        self.center
+    }
+
+    /// Pose of the body's frame, for one of its center of mass (the site's).
+    pub fn frame_of(&self, site: &Pose) -> Pose {
+        site * Translation3::from(-self.center)
+    }
+
+    /// Pose of the center of mass (the site), for one of the body's frame.
+    pub fn site_of(&self, frame: &Pose) -> Pose {
+        frame * Translation3::from(self.center)
+    }
+
+    /// Its geometry, in the frame of its site.
     pub fn shape(&self) -> &Shape {
         &self.shape
     }
@@ -404,9 +434,9 @@ impl Integratable for RigidBody {
     }
 
     fn write_initial(&self, x: &mut [f64]) {
-        let q = Unit::new_normalize(self.initial_pose.rotation.into_inner());
+        let (q, at) = (Unit::new_normalize(self.initial_pose.rotation.into_inner()), self.site_of(&self.initial_pose));
         let l = q * (self.inertia.tensor * q.inverse_transform_vector(&self.initial_angular_velocity));
-        x[..3].copy_from_slice(self.initial_pose.translation.vector.as_slice());
+        x[..3].copy_from_slice(at.translation.vector.as_slice());
         write_orientation(x, &q);
         x[7..10].copy_from_slice((self.mass * self.initial_velocity).as_slice());
         x[10..13].copy_from_slice(l.as_slice());

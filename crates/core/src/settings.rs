@@ -27,7 +27,7 @@ pub enum Integrator {
 pub struct Settings {
     /// Gravity, m/s².
     pub gravity: Vec3,
-    /// Length of a frame, s.
+    /// Length of a step, s; 1/240 by default, as in scenes and Python.
     pub dt: f64,
     /// Equal sub-steps that `time_stepping` divides a frame into, at least 1.
     pub substeps: u32,
@@ -61,7 +61,7 @@ impl Default for Settings {
     fn default() -> Settings {
         Settings {
             gravity: Vec3::new(0.0, 0.0, -9.81),
-            dt: 1.0 / 60.0,
+            dt: 1.0 / 240.0,
             substeps: 1,
             integrator: Integrator::default(),
             integrator_tolerance: 1e-6,

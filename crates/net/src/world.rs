@@ -1,9 +1,9 @@
 //! What of a world goes into a recording.
 
 use crate::record::{Entity, Pose, Shape, VisualPart};
-use tumble_collide::Shape as Solid;
-use tumble_collide::TriMesh;
-use tumble_core::{Drawn, ObjectId, World};
+use nalgebra::Translation3;
+use tumble_collide::{Shape as Solid, TriMesh, Vec3};
+use tumble_core::{Drawn, ObjectId, RigidBody, World};
 
 /// Half the side of the square that stands for a half-space, metres.
 const PLANE_M: f64 = 20.0;
@@ -15,7 +15,7 @@ pub fn entities(world: &World) -> Vec<Entity> {
 
 /// The poses of the same parts in the same order.
 pub fn poses(world: &World) -> Vec<Pose> {
-    sites(world).filter_map(|(id, part)| world.site(id, part)).map(|site| pose(&site.pose)).collect()
+    sites(world).filter_map(|(id, part)| world.pose(id, part)).map(|frame| pose(&frame)).collect()
 }
 
 /// Their names, without the rest.
@@ -37,10 +37,12 @@ fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {
 fn entity(world: &World, id: ObjectId, part: usize) -> Entity {
     let object = world.object(id);
     let visuals = object.and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
+    let center = world.get::<RigidBody>(id).map_or(Vec3::zeros(), RigidBody::center_of_mass);
     let parts = visuals.iter().filter(|v| v.part == part).filter_map(|v| {
         let [r, g, b] = v.look.color;
         let color = [r, g, b, 1.0].map(f64::from).map(|c| c as _);
-        Some(VisualPart { shape: drawn(v.drawn()?), pose: pose(&v.pose), color })
+        let placed = Translation3::from(center) * v.pose;
+        Some(VisualPart { shape: drawn(v.drawn()?), pose: pose(&placed), color })
     });
     Entity { name: name(world, id, part), parts: parts.collect() }
 }

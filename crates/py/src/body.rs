@@ -55,13 +55,18 @@ impl Place {
         self.read(|inner| inner.world.site(self.id, part).copied())
     }
 
+    /// Pose of a rigid body's frame.
+    pub fn pose(&self) -> Result<Pose> {
+        self.read(|inner| inner.world.pose(self.id, 0))
+    }
+
     /// Whether two handles point at the same.
     pub fn same(&self, other: &Place) -> bool {
         Arc::ptr_eq(&self.shared, &other.shared) && self.id == other.id
     }
 }
 
-/// A rigid body, or static geometry, of a world. Its frame has its origin at the centre of mass; all vectors are in world axes.
+/// A rigid body, or static geometry, of a world. Its frame is that of its shape, of a mesh that of its file; all vectors are in world axes.
 ///
 /// A handle: it holds no numbers of its own. After the body was removed every use raises ``RemovedError``.
 #[pyclass(frozen, module = "tumble")]
@@ -107,7 +112,7 @@ impl RigidBody {
     fn set_place(&self, py: Python<'_>, change: impl FnOnce(Pose) -> Pose) -> Result<()> {
         let place = &self.place;
         place.write(py, |inner| {
-            let now = inner.world.site(place.id, 0).ok_or_else(|| place.removed())?.pose;
+            let now = inner.world.pose(place.id, 0).ok_or_else(|| place.removed())?;
             Ok(inner.world.set_pose(place.id, change(now))?)
         })
     }
@@ -139,10 +144,11 @@ impl RigidBody {
         symmetric(py, &self.constant(|body| *body.inertia())?)
     }
 
-    /// Position of the centre of mass, shape (3,), metres. Setting it keeps the velocity.
+    /// Where the origin of its frame is, shape (3,), metres: the middle of a sphere, box, capsule or cylinder, the origin of a mesh's file. Setting it
+    /// keeps the velocity.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.site(0)?.position()))
+        Ok(vector(py, &self.place.pose()?.translation.vector))
     }
 
     #[setter]
@@ -151,10 +157,23 @@ impl RigidBody {
         self.set_place(py, |now| Pose::from_parts(position.into(), now.rotation))
     }
 
-    /// Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it keeps the velocity.
+    /// The center of mass in the body's frame, shape (3,), metres: zeros but for meshes.
+    #[getter]
+    fn center_of_mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.constant(Rigid::center_of_mass)?))
+    }
+
+    /// The center of mass in the world, shape (3,), metres.
+    #[getter]
+    fn world_center_of_mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.site(0)?.position()))
+    }
+
+    /// Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it turns the body about the origin of its frame and keeps
+    /// the velocity.
     #[getter]
     fn orientation<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(quaternion(py, &self.place.site(0)?.pose.rotation))
+        Ok(quaternion(py, &self.place.pose()?.rotation))
     }
 
     #[setter]
@@ -330,7 +349,7 @@ impl RigidBody {
         })
     }
 
-    /// Gives a kinematic body the velocity that brings it to a pose by the end of the next frame. What is not given stays as it is.
+    /// Gives a kinematic body the velocity that brings its frame to a pose by the end of the next frame. What is not given stays as it is.
     #[pyo3(signature = (position=None, orientation=None))]
     fn move_to(
         &self,
@@ -341,18 +360,18 @@ impl RigidBody {
         let target = pose(position, orientation)?;
         let (moves, turns) = (position.is_some(), orientation.is_some());
         self.place.write(py, |inner| {
-            let now = inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.pose;
+            let now = inner.world.pose(self.place.id, 0).ok_or_else(|| self.place.removed())?;
             let translation = if moves { target.translation } else { now.translation };
             let rotation = if turns { target.rotation } else { now.rotation };
             Ok(inner.world.move_to(self.place.id, Pose::from_parts(translation, rotation))?)
         })
     }
 
-    /// Position of a point of the body in the world. point: shape (3,), body axes, metres.
+    /// Position of a point of the body in the world. point: shape (3,), in the body's frame, metres (default: its origin).
     #[pyo3(signature = (point=None))]
     fn to_world<'py>(&self, py: Python<'py>, point: Option<&Bound<'_, PyAny>>) -> Result<Bound<'py, PyArray1<f64>>> {
         let point = vec3_or(point, "point", Vec3::zeros())?;
-        Ok(vector(py, &self.place.site(0)?.pose.transform_point(&point.into()).coords))
+        Ok(vector(py, &self.place.pose()?.transform_point(&point.into()).coords))
     }
 
     fn __repr__(&self) -> String {

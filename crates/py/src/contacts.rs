@@ -32,7 +32,7 @@ pub fn bytes(inner: &Inner) -> Vec<u8> {
         whole.iter().for_each(|k| out.extend_from_slice(&k.to_le_bytes()));
         let (first, last) =
             (c.point.iter().chain(c.normal.iter()), c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()));
-        let real = first.copied().chain([-c.gap]).chain(last.copied());
+        let real = first.copied().chain([c.depth]).chain(last.copied());
         real.for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
     }
     out

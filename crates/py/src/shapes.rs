@@ -173,7 +173,7 @@ impl HalfSpace {
     }
 }
 
-/// A closed mesh, moved so that its centre of mass is the origin of the body.
+/// A closed mesh. A body of it has the frame that its vertices are given in: ``position`` is where their origin is.
 ///
 /// ``Mesh(vertices, faces)``: shapes (n, 3) in metres and (m, 3) of indices from 0, counter-clockwise seen from outside.
 /// ``Mesh(path)``: an OBJ, STL or COLLADA file in metres; ``scale`` multiplies its coordinates. An object with ``vertices`` and ``faces``
@@ -206,18 +206,19 @@ impl Mesh {
         Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh { center }))
     }
 
-    /// The centre of mass in the axes that the vertices were given in, shape (3,), metres. A body of this mesh has its origin there.
+    /// The center of mass in the frame of the vertices, shape (3,), metres.
     #[getter]
     fn center_of_mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         crate::convert::vector(py, &self.center)
     }
 
-    /// The vertices about the centre of mass, shape (n, 3), metres.
+    /// The vertices after mending, to rounding as they were given, shape (n, 3), metres.
     #[getter]
     fn vertices<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray2<f64>>> {
         let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
         let Solid::Mesh(mesh) = &base.solid else { return Err(Error::value("not a mesh")) };
-        let flat: Vec<f64> = mesh.mesh().vertices.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+        let center = mesh.center_of_mass();
+        let flat: Vec<f64> = mesh.mesh().vertices.iter().map(|v| v + center).flat_map(|v| [v.x, v.y, v.z]).collect();
         Ok(PyArray1::from_vec(slf.py(), flat).reshape([mesh.mesh().vertices.len(), 3])?)
     }
 

@@ -4,7 +4,7 @@ use crate::errors::{Error, Result};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use tumble::collide::{Builder, ContactMode};
-use tumble::core::Mode;
+use tumble::core::{Combine, Mode};
 use tumble::scene::urdf::{CollisionMeshes, MissingMeshes};
 use tumble::scene::{Integrator, Solver, Stepper};
 
@@ -45,6 +45,7 @@ pub fn _words() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("Stepper", names(Stepper::NAMES)),
         ("Integrator", names(Integrator::NAMES)),
         ("Solver", names(Solver::NAMES)),
+        ("Combine", names(Combine::NAMES)),
         ("Contacts", names(ContactMode::NAMES)),
         ("Mode", names(MODES)),
         ("MissingMeshes", names(MISSING_MESHES)),

@@ -398,7 +398,7 @@ impl World {
 
     /// The flat state, shape (n,): a read-only view of the world's own memory, until bodies are added or removed; then it keeps what it showed last.
     ///
-    /// A rigid body has 13 numbers: position, quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Nothing
+    /// A rigid body has 13 numbers: position of the center of mass (``body.world_center_of_mass``), quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Nothing
     /// is copied, neither here nor by steps. While a view is held, a step holds the interpreter but for other threads' turns between two frames.
     /// Setting it writes every body's numbers.
     #[getter]
@@ -417,7 +417,7 @@ impl World {
 
     /// Adds a body that moves.
     ///
-    /// mass: kg, or density: kg/m³, one of the two; position: of the centre of mass, metres; orientation: unit quaternion (x, y, z, w); velocity,
+    /// mass: kg, or density: kg/m³, one of the two; position: of the shape's frame, the file's for a mesh, metres; orientation: unit quaternion (x, y, z, w); velocity,
     /// m/s, and angular_velocity, rad/s, world axes; restitution: 0 to 1; friction: at least 0; kinematic: follows the velocity it is given.
     /// contacts: by its ``"surface"``, or as in the thesis by the ``"spheres"`` of its tree; a pair goes by spheres if either asks for it.
     #[pyo3(signature = (name, shape, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,

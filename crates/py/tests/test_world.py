@@ -2,6 +2,7 @@
 
 import math
 import pathlib
+import pickle
 
 import numpy as np
 import pytest
@@ -86,6 +87,7 @@ def test_a_pair_has_restitution_and_friction_of_its_own():
     world.set_pair_material("ball", ground, restitution=0.6)
     fork = world.fork()
     assert fork.pair_material(ball.name, "ground") == (0.6, 0.2)
+    assert pickle.loads(pickle.dumps(world)).pair_material("ground", "ball") == (0.6, 0.2)
     assert rebound(world, ball, 0.9) == pytest.approx(0.36 * 0.9, abs=1e-3)
     world.set_pair_material(ground, ball)
     assert world.pair_material(ball, ground) == (0.0, 0.2)
@@ -139,6 +141,60 @@ def test_a_ball_rests_where_its_half_space_ends(normal):
     ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0, position=2 * n)
     world.step(480)
     assert ball.position == pytest.approx(0.6 * n, abs=1e-6)
+
+
+def corner_cube():
+    """A cube of edge 1 whose corner is the origin of its vertices."""
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, tumble.Mesh(corners, [t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
+
+
+def test_a_mesh_keeps_the_frame_of_its_vertices(tmp_path):
+    corners, cube = corner_cube()
+    assert cube.vertices == pytest.approx(np.array(corners), abs=1e-15)
+    assert cube.center_of_mass == pytest.approx([0.5, 0.5, 0.5])
+    world = tumble.World(gravity=(0, 0, 0))
+    quarter = (0, 0, math.sqrt(0.5), math.sqrt(0.5))  # about z: (x, y, z) -> (-y, x, z)
+    body = world.add_rigid("cube", cube, mass=2.0, position=(3, -2, 5), orientation=quarter, angular_velocity=(0, 0, 2))
+    assert body.position == pytest.approx([3, -2, 5], abs=1e-14)
+    assert body.center_of_mass == pytest.approx([0.5, 0.5, 0.5])
+    assert body.world_center_of_mass == pytest.approx([2.5, -1.5, 5.5], abs=1e-14)
+    assert world.state[:3] == pytest.approx(body.world_center_of_mass)
+    for corner in corners:
+        assert body.to_world(corner) == pytest.approx([3 - corner[1], -2 + corner[0], 5 + corner[2]], abs=1e-14)
+    momentum = world.momentum()
+    with tumble.Recorder(tmp_path / "run.mcap") as recorder:
+        recorder.frame(world)
+        world.step(240)
+        recorder.frame(world)
+    # the middle stands still, and the corner goes round it at 2 rad/s
+    assert body.world_center_of_mass == pytest.approx([2.5, -1.5, 5.5], abs=1e-12)
+    s, c = math.sin(2.0), math.cos(2.0)
+    assert body.position == pytest.approx([2.5 + 0.5 * c + 0.5 * s, -1.5 + 0.5 * s - 0.5 * c, 5], abs=1e-9)
+    assert world.momentum().angular == pytest.approx(momentum.angular, abs=1e-12)
+    recorded = tumble.read(tmp_path / "run.mcap").position("cube")
+    assert recorded[0] == pytest.approx([3, -2, 5], abs=1e-14) and (recorded[1] == body.position).all()
+    body.position = (1, 1, 1)
+    assert body.position == pytest.approx([1, 1, 1], abs=1e-14)
+    body.orientation = (0, 0, 0, 1)
+    assert body.position == pytest.approx([1, 1, 1], abs=1e-14)
+    assert body.world_center_of_mass == pytest.approx([1.5, 1.5, 1.5], abs=1e-14)
+
+
+def test_a_mesh_stands_where_its_frame_is_put():
+    world = tumble.World()
+    world.add_static("ground", tumble.HalfSpace())
+    body = world.add_rigid("cube", corner_cube()[1], mass=1.0)  # its lowest face lies in z = 0
+    world.step(240)
+    assert body.position == pytest.approx([0, 0, 0], abs=1e-6)
+    text = (
+        '[meshes.cone]\ntype = "lathe"\nprofile_m = [[0, 0], [1, 0], [0, 1]]\n'
+        '[[body]]\nname = "cone"\nshape = { type = "mesh", mesh = "cone" }\nmass_kg = 1\nposition_m = [1, 2, 3]\n'
+    )
+    cone = tumble.World.parse(text)["cone"]
+    assert cone.position == pytest.approx([1, 2, 3], abs=1e-14)
+    assert cone.world_center_of_mass == pytest.approx([1, 2, 3.25], abs=1e-9)  # a quarter of its height up
 
 
 def test_a_pair_goes_by_spheres_if_either_asks_for_it():

@@ -119,7 +119,7 @@ fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Resul
         let material = Material { restitution: surface.restitution, friction: surface.friction, id };
         body.add_collider(
             link,
-            Collider { material, contact_mode: surface.contacts, ..Collider::new(shape.clone(), placed.pose) },
+            Collider { material, contact_mode: surface.contacts, ..Collider::new(shape.clone(), placed.spec.pose) },
         )?;
     }
     if placed.visible {

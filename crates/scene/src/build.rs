@@ -7,8 +7,8 @@ use thiserror::Error;
 use tumble_collide::{Pose, RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3, text_of};
 use tumble_core::solver::{self, Accuracy};
 use tumble_core::{
-    ArticulatedBody, CameraMount, Closure, LightMount, Look as CoreLook, ObjectId, PairMaterial, PairSide, RigidBody,
-    Settings, Sleep, Visual, World, WorldError, stepper_by_name,
+    ArticulatedBody, Closure, Look as CoreLook, ObjectId, PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual,
+    World, WorldError, stepper_by_name,
 };
 
 use crate::articulated::ArticulatedSpec;
@@ -278,8 +278,8 @@ impl SceneFile {
                 TriMesh::torus(*radius_m, *tube_radius_m, *segments as usize, *tube_segments as usize)
             }
             MeshSource::Icosphere { radius_m, subdivisions } => TriMesh::icosphere(*radius_m, *subdivisions),
-            MeshSource::Cylinder { radius_m, height_m, segments } => {
-                TriMesh::cylinder(*radius_m, 0.5 * height_m, *segments as usize)
+            MeshSource::Cylinder { radius_m, length_m, segments } => {
+                TriMesh::cylinder(*radius_m, 0.5 * length_m, *segments as usize)
             }
             MeshSource::Capsule { radius_m, length_m, segments } => {
                 TriMesh::capsule(*radius_m, 0.5 * length_m, *segments as usize, (*segments as usize / 4).max(2))
@@ -318,7 +318,7 @@ impl SceneFile {
         };
         let [x, y, z, w] = spec.orientation_xyzw;
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-        let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m) + rotation * center), rotation);
+        let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m)), rotation);
         let mut body = body
             .map_err(|e| self.body_error(spec, e))?
             .at(pose)
@@ -327,13 +327,11 @@ impl SceneFile {
             .of_material(material_id(spec.material))
             .colliding_by(spec.contacts)
             .drawn_as(visuals(spec, shape, &center));
-        // the body's own origin is the centre of mass
-        let from_center = Translation3::from(-center);
         if let Some(camera) = &spec.mounts.camera {
-            body = body.with_camera(CameraMount { pose: from_center * camera.pose, ..camera.clone() });
+            body = body.with_camera(camera.clone());
         }
         if let Some(light) = &spec.mounts.light {
-            body = body.with_light(LightMount { pose: from_center * light.pose, ..light.clone() });
+            body = body.with_light(light.clone());
         }
         body.linear_damping = spec.linear_damping_per_s;
         body.angular_damping = spec.angular_damping_per_s;

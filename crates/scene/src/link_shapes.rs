@@ -92,7 +92,7 @@ pub(crate) fn make(spec: &ShapeSpec, meshes: &[(Shape, Vec3)]) -> Result<(Shape,
         ShapeSpec::Sphere { radius_m } => Shape::sphere(radius_m),
         ShapeSpec::Box { size_m } => Shape::cuboid(0.5 * Vec3::from(size_m)),
         ShapeSpec::Capsule { radius_m, length_m } => Shape::capsule(radius_m, 0.5 * length_m),
-        ShapeSpec::Cylinder { radius_m, height_m } => Shape::cylinder(radius_m, 0.5 * height_m),
+        ShapeSpec::Cylinder { radius_m, length_m } => Shape::cylinder(radius_m, 0.5 * length_m),
     };
     Ok((shape?, Vec3::zeros()))
 }

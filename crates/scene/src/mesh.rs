@@ -64,8 +64,8 @@ pub enum MeshSource {
     Cylinder {
         /// Metres.
         radius_m: f64,
-        /// Whole height, metres.
-        height_m: f64,
+        /// Whole length, metres.
+        length_m: f64,
         /// Sides around the axis.
         segments: u32,
     },
@@ -150,7 +150,7 @@ impl MeshSource {
             },
             Kind::Cylinder => MeshSource::Cylinder {
                 radius_m: f.number("radius_m", Bound::POSITIVE),
-                height_m: f.number("height_m", Bound::POSITIVE),
+                length_m: f.number("length_m", Bound::POSITIVE),
                 segments: read_segments(f, "segments", 48),
             },
             Kind::Capsule => MeshSource::Capsule {

@@ -29,8 +29,8 @@ pub enum ShapeSpec {
     Cylinder {
         /// Metres.
         radius_m: f64,
-        /// Whole height, metres.
-        height_m: f64,
+        /// Whole length, metres.
+        length_m: f64,
     },
     /// All of space at and below z = 0.
     HalfSpace,
@@ -91,7 +91,7 @@ impl ShapeSpec {
             }),
             Kind::Cylinder => Some(ShapeSpec::Cylinder {
                 radius_m: f.number("radius_m", Bound::POSITIVE),
-                height_m: f.number("height_m", Bound::POSITIVE),
+                length_m: f.number("length_m", Bound::POSITIVE),
             }),
             Kind::HalfSpace => Some(ShapeSpec::HalfSpace),
             Kind::Mesh => read_mesh(f, meshes),

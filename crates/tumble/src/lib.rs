@@ -1,7 +1,7 @@
 //! Real-time dynamics for interactive and immersive environments.
 //!
 //! One library over its crates: geometry ([`collide`]), dynamics ([`core`](mod@core)), scene files ([`scene`]), recordings ([`net`]) and
-//! pictures ([`render`]). The `tumble` command is built on it.
+//! pictures ([`render`]). The `tumble` command is built on it. Units, sizes, frames and signs, beside those of Python and scenes: `docs/conventions.md`.
 //!
 //! ```
 //! let scene = tumble::scene::resolve_scene("stack", &[])?.load()?;

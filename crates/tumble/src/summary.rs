@@ -182,11 +182,11 @@ impl Summary {
 
 fn bodies(world: &World) -> Vec<Body> {
     let body = |&id| {
-        let (object, site) = (world.object(id)?, world.site(id, 0)?);
+        let (object, pose) = (world.object(id)?, world.pose(id, 0)?);
         Some(Body {
             name: object.name().to_string(),
-            position_m: site.position().into(),
-            orientation_xyzw: site.pose.rotation.coords.into(),
+            position_m: pose.translation.vector.into(),
+            orientation_xyzw: pose.rotation.coords.into(),
             asleep: world.asleep(id),
         })
     };

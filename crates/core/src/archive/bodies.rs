@@ -62,8 +62,7 @@ impl RigidRecord {
         let [velocity, angular_velocity] = self.initial_velocity;
         let visuals = self.visuals.into_iter().map(|v| v.visual(known)).collect::<Result<_, _>>()?;
         let body = body.at(self.initial_pose).moving(velocity, angular_velocity).drawn_as(visuals);
-        let body = self.cameras.into_iter().fold(body, RigidBody::with_camera);
-        Ok(self.lights.into_iter().fold(body, RigidBody::with_light))
+        Ok(body.carrying(self.cameras, self.lights))
     }
 }
 

@@ -2,9 +2,9 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleA1`; the last is the number of the format | 8 |
+//! | `tumbleA2`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
-//! | settings, methods, shapes, visual meshes, objects, snapshot, contacts, report in postcard | any |
+//! | settings, methods, shapes, visual meshes, objects, pairs, snapshot, contacts, report in postcard | any |
 //!
 //! The same world gives the same bytes. Objects of kinds of their own are written by name alone; the caller makes them anew. Shapes that objects
 //! share are written once and are shared again; meshes that are only drawn are read for it, so that no file is needed later. The order of objects is kept, ids are not: they are new.
@@ -19,14 +19,14 @@ use crate::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, World};
 use crate::{ArticulatedBody, Closure, Object, OutOfReach, RigidBody};
 use bodies::{ArticulatedRecord, RigidRecord};
-use records::{ClosureRecord, ContactRecord, Known, MeshRecord, Places, ReportRecord, Tables, meshes};
+use records::{ClosureRecord, ContactRecord, Known, MeshRecord, PairRecord, Places, ReportRecord, Tables, meshes};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Shape;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What an archive of a world begins with. The number is raised with every change of what is in it.
-const HEAD: &[u8; 8] = b"tumbleA1";
+const HEAD: &[u8; 8] = b"tumbleA2";
 
 /// Why an archive was not written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -62,6 +62,7 @@ struct Archive {
     shapes: Vec<Shape>,
     meshes: Vec<MeshRecord>,
     objects: Vec<Record>,
+    pairs: Vec<PairRecord>,
     snapshot: Vec<u8>,
     contacts: Vec<ContactRecord>,
     report: ReportRecord,
@@ -98,6 +99,9 @@ impl World {
         if let Some(name) = unknown {
             return Err(ArchiveError::Foreign(name));
         }
+        let mut pairs: Vec<PairRecord> =
+            self.pair_materials().filter_map(|(sides, material)| PairRecord::of(sides, material, &places)).collect();
+        pairs.sort_unstable_by_key(|pair| pair.sides);
         let archive = Archive {
             settings: *self.settings(),
             stepper: stepper.into(),
@@ -105,6 +109,7 @@ impl World {
             shapes: tables.shapes.list,
             meshes: tables.meshes.list,
             objects,
+            pairs,
             snapshot: self.save(),
             contacts: self.contacts().iter().map(|c| ContactRecord::of(c, &places)).collect(),
             report: ReportRecord::of(self.report(), &places),
@@ -135,6 +140,7 @@ impl World {
             };
             ids.push(world.add_boxed(object, Mode::Dynamic).map_err(damaged)?);
         }
+        archive.pairs.into_iter().try_for_each(|pair| pair.put(&mut world, &ids)).map_err(damaged)?;
         world.restore(&archive.snapshot).map_err(damaged)?;
         let contacts = archive.contacts.into_iter().map(|c| c.contact(&ids)).collect();
         world.publish(contacts, archive.report.report(&ids));

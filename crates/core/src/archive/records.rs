@@ -3,8 +3,10 @@
 use super::{ArchiveError, ContactPoint, OutOfReach, StepReport, damaged};
 use crate::closure::{Anchor, Closure, ClosureKind};
 use crate::object::{Look, Object};
+use crate::pair_material::{PairMaterial, PairSide};
 use crate::view::ObjectId;
 use crate::visual::{Visual, VisualGeometry, VisualMesh};
+use crate::world::{World, WorldError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -119,7 +121,7 @@ pub(super) struct ContactRecord {
     sides: [(Option<u32>, usize); 2],
     /// Point, normal, velocity, impulse, force.
     vectors: [Vec3; 5],
-    gap: f64,
+    depth: f64,
 }
 
 impl ContactRecord {
@@ -127,7 +129,7 @@ impl ContactRecord {
         ContactRecord {
             sides: [(places.of_id(c.a), c.part_a), (places.of_id(c.b), c.part_b)],
             vectors: [c.point, c.normal, c.velocity, c.impulse, c.force],
-            gap: c.gap,
+            depth: c.depth,
         }
     }
 
@@ -141,11 +143,55 @@ impl ContactRecord {
             part_b,
             point,
             normal,
-            gap: self.gap,
+            depth: self.depth,
             velocity,
             impulse,
             force,
         }
+    }
+}
+
+/// A side of a pair with constants of its own; objects by their places.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub(super) enum PairSideRecord {
+    Part(u32, usize),
+    Object(u32),
+    Material(u32),
+}
+
+/// A pair with constants of its own.
+#[derive(Serialize, Deserialize)]
+pub(super) struct PairRecord {
+    /// In order.
+    pub sides: [PairSideRecord; 2],
+    restitution: Option<f64>,
+    friction: Option<f64>,
+}
+
+impl PairRecord {
+    /// `None` of a pair whose object is gone.
+    pub fn of(sides: &[PairSide; 2], material: &PairMaterial, places: &Places) -> Option<PairRecord> {
+        let side = |side: PairSide| {
+            Some(match side {
+                PairSide::Part(id, part) => PairSideRecord::Part(places.of_id(id)?, part),
+                PairSide::Object(id) => PairSideRecord::Object(places.of_id(id)?),
+                PairSide::Material(material) => PairSideRecord::Material(material),
+            })
+        };
+        let PairMaterial { restitution, friction } = *material;
+        let mut sides = [side(sides[0])?, side(sides[1])?];
+        sides.sort_unstable();
+        Some(PairRecord { sides, restitution, friction })
+    }
+
+    /// Puts it into a world of these objects.
+    pub fn put(self, world: &mut World, ids: &[ObjectId]) -> Result<(), WorldError> {
+        let [a, b] = self.sides.map(|side| match side {
+            PairSideRecord::Part(place, part) => PairSide::Part(id(ids, Some(place)), part),
+            PairSideRecord::Object(place) => PairSide::Object(id(ids, Some(place))),
+            PairSideRecord::Material(material) => PairSide::Material(material),
+        });
+        world.set_pair_material(a, b, PairMaterial { restitution: self.restitution, friction: self.friction })
     }
 }
 

@@ -12,7 +12,7 @@ use super::model::Model;
 use crate::collidable::{CollisionKind, Material};
 use crate::mounts::{CameraMount, LightMount};
 use crate::visual::Visual;
-use nalgebra::Quaternion;
+use nalgebra::{Quaternion, Translation3};
 use std::sync::{Mutex, MutexGuard};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
@@ -70,7 +70,7 @@ pub enum ArticulatedError {
 /// A shape on a link.
 #[derive(Clone, Debug)]
 pub struct Collider {
-    /// Pose in the frame of the link that it is put on.
+    /// Pose of the shape in the frame of the link that it is put on; of a mesh that of its file's frame. On the body it is that of the part's site.
     pub pose: Pose,
     /// Geometry.
     pub shape: Shape,
@@ -273,7 +273,8 @@ impl ArticulatedBody {
     /// Puts a shape on a link, given by the name it was added under (folded links too).
     pub fn add_collider(&mut self, link: &str, mut collider: Collider) -> Result<(), ArticulatedError> {
         let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
-        collider.pose = frame.pose * collider.pose;
+        let center = Translation3::from(collider.shape.center_of_mass());
+        collider.pose = frame.pose * (collider.pose * center);
         self.colliders.push(Part { link: frame.link, collider });
         Ok(())
     }

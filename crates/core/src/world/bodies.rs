@@ -63,6 +63,13 @@ impl World {
         self.core.sites[entry.span.site.clone()].get(part)
     }
 
+    /// Pose of the frame by which a part is placed: that of a rigid body, of whose mesh the file's frame is kept (its site is at the center of mass);
+    /// the site's for any other part.
+    pub fn pose(&self, id: ObjectId, part: usize) -> Option<Pose> {
+        let pose = self.site(id, part)?.pose;
+        Some(self.get::<RigidBody>(id).map_or(pose, |body| body.frame_of(&pose)))
+    }
+
     /// An object's slice of the state.
     pub fn state_of(&self, id: ObjectId) -> Option<&[f64]> {
         Some(&self.core.x[self.core.table.slots.get(id)?.span.x.clone()])
@@ -81,11 +88,12 @@ impl World {
         Ok(())
     }
 
-    /// Puts a rigid body at a pose; its velocity stays what it was.
+    /// Puts the frame of a rigid body at a pose; the velocity of its center of mass stays what it was.
     pub fn set_pose(&mut self, id: ObjectId, pose: Pose) -> Result<(), WorldError> {
         self.edit_rigid(id, |body, x| {
             let mut v = [0.0; 6];
             body.velocity(x, &mut v);
+            let pose = body.site_of(&pose);
             x[..3].copy_from_slice(pose.translation.vector.as_slice());
             x[3..7].copy_from_slice(pose.rotation.coords.as_slice());
             body.write_velocity(x, &v);
@@ -98,7 +106,7 @@ impl World {
         self.edit_rigid(id, |body, x| body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]))
     }
 
-    /// Gives a kinematic body the velocity that brings it to `target` at the end of the next frame.
+    /// Gives a kinematic body the velocity that brings its frame to `target` at the end of the next step.
     pub fn move_to(&mut self, id: ObjectId, target: Pose) -> Result<(), WorldError> {
         let dt = self.core.settings.dt;
         if !target.to_homogeneous().iter().all(|x| x.is_finite()) {
@@ -106,6 +114,7 @@ impl World {
             return Err(WorldError::NotFinite(name));
         }
         self.edit_rigid(id, |body, x| {
+            let target = body.site_of(&target);
             let v = (target.translation.vector - vec3(x)) / dt;
             let w = (target.rotation * orientation(x).inverse()).scaled_axis() / dt;
             body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]);

@@ -75,8 +75,8 @@ pub struct ContactPoint {
     pub point: Vec3,
     /// Unit normal from `b` to `a`.
     pub normal: Vec3,
-    /// Signed distance when it was detected, metres.
-    pub gap: f64,
+    /// Depth of the overlap when it was detected, metres; negative while apart.
+    pub depth: f64,
     /// Relative velocity of `a` against `b` when it was detected, m/s.
     pub velocity: Vec3,
     /// Impulse on `a` over the last sub-step, N·s.
@@ -197,7 +197,7 @@ impl Core {
                 force,
                 point: touch.contact.point,
                 normal: touch.contact.normal,
-                gap: touch.contact.gap,
+                depth: -touch.contact.gap,
             });
         }
         let contacts = &self.contacts;

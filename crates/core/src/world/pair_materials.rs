@@ -24,16 +24,22 @@ impl World {
         Ok(())
     }
 
+    /// All pairs that were chosen, in the order of their sides.
+    pub(crate) fn pair_materials(&self) -> impl Iterator<Item = (&[PairSide; 2], &PairMaterial)> {
+        self.core.pair_materials.iter()
+    }
+
     /// Restitution and friction that contacts of these two parts have.
     pub fn pair_material(&self, a: (ObjectId, usize), b: (ObjectId, usize)) -> Result<Material, WorldError> {
-        let (a, b) = (self.surface(a)?, self.surface(b)?);
+        let in_order = self.part(a.0, a.1, &[])? <= self.part(b.0, b.1, &[])?;
+        let (a, b) = if in_order { (a, b) } else { (b, a) };
+        let (a, b) = (self.surface(a), self.surface(b));
         Ok(self.core.pair_materials.combine(&self.core.settings, a, b))
     }
 
-    fn surface(&self, (id, part): (ObjectId, usize)) -> Result<Surface, WorldError> {
-        self.part(id, part, &[])?;
+    fn surface(&self, (id, part): (ObjectId, usize)) -> Surface {
         let material = self.object(id).and_then(|o| o.collidable()).map(|c| c.material(part));
-        Ok((id, part, material.unwrap_or_default()))
+        (id, part, material.unwrap_or_default())
     }
 
     fn check_side(&self, side: &PairSide) -> Result<(), WorldError> {

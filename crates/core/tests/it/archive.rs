@@ -41,6 +41,10 @@ fn everything(stepper: &str) -> World {
     chain.set_freedom(1, Freedom { limits: Some([-0.3, 0.2]), friction: 0.05, ..Freedom::default() }).unwrap();
     chain.couple(Coupling { freedom: 5, of: 1, multiplier: 0.5, offset: 0.1 }).unwrap();
     world.add(chain).unwrap();
+    world.set_pair_material(ids[2], ids[0], PairMaterial { restitution: Some(0.7), friction: Some(0.1) }).unwrap();
+    world
+        .set_pair_material(PairSide::Material(3), (ids[4], 0), PairMaterial { restitution: None, friction: Some(0.9) })
+        .unwrap();
     world.set_mode(ids[9], Mode::Kinematic).unwrap();
     world.set_alive(ids[8], false).unwrap();
     world

@@ -27,6 +27,7 @@ mod friction;
 mod impacts;
 mod limits;
 mod mesh_boxes;
+mod mesh_frame;
 mod meshes;
 mod out_of_reach;
 mod overlaps;

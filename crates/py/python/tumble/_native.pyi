@@ -11,7 +11,7 @@ from typing_extensions import disjoint_base
 
 from tumble._extension import Behaviour, Force
 from tumble._values import Energy, Momentum, SphereLevel
-from tumble.typing import Axis, CollisionMeshes, Contacts, Integrator, MissingMeshes, Mode, Solver, Stepper, TreeMethod
+from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, MissingMeshes, Mode, Solver, Stepper, TreeMethod
 
 _Floats: TypeAlias = NDArray[np.float64]
 _Path: TypeAlias = str | PathLike[str]
@@ -85,7 +85,7 @@ class HalfSpace(Shape):
 
 @final
 class Mesh(Shape):
-    """A closed mesh, moved so that its centre of mass is the origin of the body.
+    """A closed mesh. A body of it has the frame that its vertices are given in: ``position`` is where their origin is.
 
     ``Mesh(vertices, faces)``: shapes (n, 3) in metres and (m, 3) of indices from 0, counter-clockwise seen from outside.
     ``Mesh(path)``: an OBJ, STL or COLLADA file in metres; ``scale`` multiplies its coordinates. An object with ``vertices`` and ``faces``
@@ -94,17 +94,17 @@ class Mesh(Shape):
     def __new__(cls, vertices: Any, faces: ArrayLike | None = None, *, scale: float = 1.0) -> Mesh: ...
     @property
     def center_of_mass(self) -> _Floats:
-        """The centre of mass in the axes that the vertices were given in, shape (3,), metres. A body of this mesh has its origin there."""
+        """The center of mass in the frame of the vertices, shape (3,), metres."""
     @property
     def vertices(self) -> _Floats:
-        """The vertices about the centre of mass, shape (n, 3), metres."""
+        """The vertices after mending, to rounding as they were given, shape (n, 3), metres."""
     @property
     def faces(self) -> NDArray[np.uint32]:
         """The triangles, shape (m, 3), indices into ``vertices``."""
 
 @final
 class RigidBody:
-    """A rigid body, or static geometry, of a world. Its frame has its origin at the centre of mass; all vectors are in world axes.
+    """A rigid body, or static geometry, of a world. Its frame is that of its shape, of a mesh that of its file; all vectors are in world axes.
 
     A handle: it holds no numbers of its own. After the body was removed every use raises ``RemovedError``.
     """
@@ -122,12 +122,22 @@ class RigidBody:
         """Inertia about the centre of mass, body axes, shape (3, 3), kg·m²."""
     @property
     def position(self) -> _Floats:
-        """Position of the centre of mass, shape (3,), metres. Setting it keeps the velocity."""
+        """Where the origin of its frame is, shape (3,), metres: the middle of a sphere, box, capsule or cylinder, the origin of a mesh's file. Setting it
+        keeps the velocity.
+        """
     @position.setter
     def position(self, value: ArrayLike) -> None: ...
     @property
+    def center_of_mass(self) -> _Floats:
+        """The center of mass in the body's frame, shape (3,), metres: zeros but for meshes."""
+    @property
+    def world_center_of_mass(self) -> _Floats:
+        """The center of mass in the world, shape (3,), metres."""
+    @property
     def orientation(self) -> _Floats:
-        """Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it keeps the velocity."""
+        """Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it turns the body about the origin of its frame and keeps
+        the velocity.
+        """
     @orientation.setter
     def orientation(self, value: ArrayLike) -> None: ...
     @property
@@ -193,9 +203,9 @@ class RigidBody:
     def apply_impulse(self, impulse: ArrayLike, point: ArrayLike | None = None) -> None:
         """An impulse, at once. impulse: shape (3,), N·s, world axes; point: where in the world it acts, metres (default: the centre of mass)."""
     def move_to(self, position: ArrayLike | None = None, orientation: ArrayLike | None = None) -> None:
-        """Gives a kinematic body the velocity that brings it to a pose by the end of the next frame. What is not given stays as it is."""
+        """Gives a kinematic body the velocity that brings its frame to a pose by the end of the next frame. What is not given stays as it is."""
     def to_world(self, point: ArrayLike | None = None) -> _Floats:
-        """Position of a point of the body in the world. point: shape (3,), body axes, metres."""
+        """Position of a point of the body in the world. point: shape (3,), in the body's frame, metres (default: its origin)."""
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
@@ -549,7 +559,8 @@ class World:
     ``"symplectic_euler"``, ``"explicit_euler"``, ``"rk4"`` or ``"dormand_prince"``; solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or
     ``"lcp_sliding"``: the words of scene files, with their defaults. integrator: acts in ``"backtracking"`` (``"time_stepping"`` has its own midpoint rule); substeps: parts of each step; iterations: sweeps of the solver at most;
     contact_tolerance: metres; integrator_tolerance: of ``dormand_prince``. sleep_after: seconds after which islands that have moved by less than
-    sleep_within (metres) are left out of the steps until something touches them; None: never.
+    sleep_within (metres) are left out of the steps until something touches them; None: never. combine_restitution, combine_friction: what the
+    coefficients of two bodies make for the pair, ``"min"``, ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``.
 
     One thread at a time: while one steps a world, calls on it from another raise ``BusyError``. The interpreter is let go while a world steps.
     """
@@ -567,8 +578,8 @@ class World:
         integrator_tolerance: float = 1e-6,
         sleep_after: float | None = None,
         sleep_within: float = 1e-5,
-        combine_restitution: str = "max",
-        combine_friction: str = "geometric_mean",
+        combine_restitution: Combine = "max",
+        combine_friction: Combine = "geometric_mean",
     ) -> World: ...
     @staticmethod
     def load(
@@ -617,17 +628,28 @@ class World:
     @gravity.setter
     def gravity(self, value: ArrayLike) -> None: ...
     @property
-    def combine_restitution(self) -> str: ...
+    def combine_restitution(self) -> Combine:
+        """Rule by which the restitution of two bodies in contact combines: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``."""
     @combine_restitution.setter
-    def combine_restitution(self, value: str) -> None: ...
+    def combine_restitution(self, value: Combine) -> None: ...
     @property
-    def combine_friction(self) -> str: ...
+    def combine_friction(self) -> Combine:
+        """The same for friction."""
     @combine_friction.setter
-    def combine_friction(self, value: str) -> None: ...
+    def combine_friction(self, value: Combine) -> None: ...
     def set_pair_material(
         self, a: _Body | str, b: _Body | str, *, restitution: float | None = None, friction: float | None = None
-    ) -> None: ...
-    def pair_material(self, a: _Body | str, b: _Body | str) -> tuple[float, float]: ...
+    ) -> None:
+        """Restitution and friction that contacts of two bodies have from the next step on, in place of what the rules make of their materials.
+
+        a, b: handles or names in any order; a link of an articulation, with the links that are fixed to it, is ``"ARTICULATION/LINK"``. What is None goes by
+        the rule; with neither given the pair is as any other again. Forks have the same pairs; like materials they are not in ``save``.
+        """
+    def pair_material(self, a: _Body | str, b: _Body | str) -> tuple[float, float]:
+        """Restitution and friction that contacts of two bodies have: by the pair's own constants where it has them, else by the rules.
+
+        a, b: as in ``set_pair_material``. Of an articulation the first shape answers.
+        """
     @property
     def stepper(self) -> Stepper:
         """Name of the stepper."""
@@ -691,7 +713,7 @@ class World:
     def state(self) -> _Floats:
         """The flat state, shape (n,): a read-only view of the world's own memory, until bodies are added or removed; then it keeps what it showed last.
 
-        A rigid body has 13 numbers: position, quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Nothing
+        A rigid body has 13 numbers: position of the center of mass (``body.world_center_of_mass``), quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Nothing
         is copied, neither here nor by steps. While a view is held, a step holds the interpreter but for other threads' turns between two frames.
         Setting it writes every body's numbers.
         """
@@ -718,7 +740,7 @@ class World:
     ) -> RigidBody:
         """Adds a body that moves.
 
-        mass: kg, or density: kg/m³, one of the two; position: of the centre of mass, metres; orientation: unit quaternion (x, y, z, w); velocity,
+        mass: kg, or density: kg/m³, one of the two; position: of the shape's frame, the file's for a mesh, metres; orientation: unit quaternion (x, y, z, w); velocity,
         m/s, and angular_velocity, rad/s, world axes; restitution: 0 to 1; friction: at least 0; kinematic: follows the velocity it is given.
         contacts: by its ``"surface"``, or as in the thesis by the ``"spheres"`` of its tree; a pair goes by spheres if either asks for it.
         """

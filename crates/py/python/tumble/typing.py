@@ -11,6 +11,9 @@ Integrator: TypeAlias = Literal["verlet", "symplectic_euler", "explicit_euler", 
 Solver: TypeAlias = Literal["gauss_seidel", "lcp_pyramid", "lcp_sliding"]
 """``World(solver=…)``: finds contact forces."""
 
+Combine: TypeAlias = Literal["min", "max", "average", "product", "geometric_mean"]
+"""``World(combine_restitution=…, combine_friction=…)``: what two bodies' coefficients make for the pair."""
+
 Contacts: TypeAlias = Literal["surface", "spheres"]
 """``World.add_rigid(contacts=…)``: by the surface, or by the spheres of its tree."""
 

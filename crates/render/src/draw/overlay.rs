@@ -95,7 +95,7 @@ impl DebugDraw {
     pub(super) fn draw(&self, world: &World, list: &mut DrawList) {
         let size = ARROW * list.bounding_ball(true).map_or(1.0, |(_, r)| r).clamp(0.05, 5.0);
         let largest = world.contacts().iter().map(|c| c.force.norm()).fold(0.0, f64::max);
-        for contact in world.contacts().iter().filter(|c| c.gap <= 1e-3 || c.force.norm() > 0.0) {
+        for contact in world.contacts().iter().filter(|c| c.depth >= -1e-3 || c.force.norm() > 0.0) {
             let point = Point3::from(small(&contact.point));
             let toward = toward_shown(world, contact);
             if self.contacts {
@@ -202,7 +202,7 @@ pub(super) fn islands(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
         let [a, b] = c.sides();
         Some((a.part?.0, b.part?.0))
     });
-    let contacts = world.contacts().iter().filter(|c| c.gap <= 1e-3 || c.force.norm() > 0.0).map(|c| (c.a, c.b));
+    let contacts = world.contacts().iter().filter(|c| c.depth >= -1e-3 || c.force.norm() > 0.0).map(|c| (c.a, c.b));
     let pairs: Vec<(ObjectId, ObjectId)> =
         contacts.chain(closures).filter(|(a, b)| moves(*a) && moves(*b) && a != b).collect();
     let mut root: BTreeMap<ObjectId, ObjectId> =

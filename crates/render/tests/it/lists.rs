@@ -186,7 +186,7 @@ fn every_preset_is_known_and_others_are_not() {
 const CARRIER: &str = "[camera]\neye_m = [0, -5, 2]\ntarget_m = [0, 0, 0]\n\
     [[body]]\nname = \"cart\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [2, 0, 1]\nrotation_deg = [0, 0, 90]\nquality = \"wireframe\"\n\
     camera = { position_m = [0.5, 0, 0.5], vertical_fov_deg = 60 }\nlight = { type = \"point\", position_m = [0, 0, 1], color = \"#ff0000\", intensity = 2 }\n\
-    [[body]]\nname = \"post\"\nmode = \"static\"\nshape = { type = \"cylinder\", radius_m = 0.2, height_m = 2 }\nquality = \"simplified\"\n";
+    [[body]]\nname = \"post\"\nmode = \"static\"\nshape = { type = \"cylinder\", radius_m = 0.2, length_m = 2 }\nquality = \"simplified\"\n";
 
 #[test]
 fn bodies_carry_cameras_and_lights_with_them() {
@@ -314,4 +314,38 @@ fn what_stands_still_is_told_from_what_moves() {
     let list = Drawing::new(&scene).list(&world, &"resting".parse().unwrap()).unwrap();
     let awake = list.instances[0].material.color;
     assert!(awake[1] > awake[0] && awake[0] > awake[2], "olive when woken: {awake:?}");
+}
+
+/// A cube whose file has one corner at the origin is drawn where `position_m` puts that corner.
+#[test]
+fn a_mesh_is_drawn_in_the_frame_of_its_file() {
+    let folder = std::env::temp_dir().join(format!("tumble-mesh-frame-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let mut obj = String::new();
+    for v in 0..8 {
+        obj += &format!("v {} {} {}\n", v & 1, v >> 1 & 1, v >> 2 & 1);
+    }
+    for [a, b, c, d] in [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]] {
+        obj += &format!("f {a} {b} {c} {d}\n");
+    }
+    std::fs::write(folder.join("cube.obj"), obj).expect("a file");
+    let text = "[meshes.cube]\ntype = \"file\"\nfile = \"cube.obj\"\n\
+        [[body]]\nname = \"cube\"\nshape = { type = \"mesh\", mesh = \"cube\" }\nmass_kg = 1\n\
+        position_m = [3, -2, 5]\nrotation = { axis = [0, 0, 1], angle_deg = 90 }\n";
+    let scene = SceneFile::parse(text, &folder.join("scene.toml").display().to_string()).expect("a scene");
+    let (world, _) = scene.build().expect("a world");
+    let id = world.find("cube").expect("the cube");
+    let pose = world.pose(id, 0).expect("its pose");
+    assert!((pose.translation.vector - Vector3::new(3.0, -2.0, 5.0)).norm() < 1e-14, "{pose}");
+    let center = world.site(id, 0).expect("its site").position();
+    assert!((center - Vector3::new(2.5, -1.5, 5.5)).norm() < 1e-14, "a quarter turn takes (½, ½, ½) to (-½, ½, ½)");
+    let list = Drawing::new(&scene).list(&world, &DebugDraw::default()).expect("a list");
+    let instance = &list.instances[0];
+    let points = list.meshes[instance.mesh.0].positions.iter().map(|p| instance.pose * Point3::from(*p));
+    let (low, high) = points.fold(([f32::MAX; 3], [f32::MIN; 3]), |(low, high), p| {
+        ([0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k])))
+    });
+    let near = |a: [f32; 3], b: [f32; 3]| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-5);
+    assert!(near(low, [2.0, -2.0, 5.0]) && near(high, [3.0, -1.0, 6.0]), "{low:?} {high:?}");
+    std::fs::remove_dir_all(folder).expect("the folder");
 }

@@ -152,7 +152,7 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
             form.required_text("size", "three lengths, m")?;
             ShapeSpec::Box { size_m: form.numbers("size", Bound::POSITIVE)? }
         }
-        "cylinder" => ShapeSpec::Cylinder { radius_m: length("radius"), height_m: length("length") },
+        "cylinder" => ShapeSpec::Cylinder { radius_m: length("radius"), length_m: length("length") },
         "sphere" => ShapeSpec::Sphere { radius_m: length("radius") },
         "capsule" => ShapeSpec::Capsule { radius_m: length("radius"), length_m: length("length") },
         "mesh" => return read_mesh(&form, collides, context),

@@ -149,10 +149,10 @@ fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, St
         Geometry::Shape(ShapeSpec::Sphere { radius_m }) => Ok(Surface::Sphere(*radius_m)),
         Geometry::Shape(ShapeSpec::Capsule { radius_m, length_m }) => Ok(Surface::Capsule(*radius_m, *length_m)),
         Geometry::Shape(ShapeSpec::Box { size_m }) => Ok(closed(TriMesh::box_(0.5 * Vec3::from(*size_m)), 0.0)),
-        Geometry::Shape(ShapeSpec::Cylinder { radius_m, height_m }) => {
+        Geometry::Shape(ShapeSpec::Cylinder { radius_m, length_m }) => {
             // around the cylinder, so that what covers the prism covers it
             let outer = radius_m / libm::cos(std::f64::consts::PI / SIDES as f64);
-            Ok(closed(TriMesh::cylinder(outer, 0.5 * height_m, SIDES), outer - radius_m))
+            Ok(closed(TriMesh::cylinder(outer, 0.5 * length_m, SIDES), outer - radius_m))
         }
         Geometry::Shape(other) => Err(format!("{other:?} is no shape of a URDF")),
         Geometry::File { path, scale, hull, .. } => {

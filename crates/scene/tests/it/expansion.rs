@@ -163,21 +163,21 @@ fn a_body_with_every_key() {
 #[test]
 fn shapes_and_meshes() {
     let scene = read(
-        "[meshes.c]\ntype = \"cylinder\"\nradius_m = 1\nheight_m = 2\nsphere_tree_depth = 4\nsphere_tree_error = 0.02\n[meshes.b]\ntype = \"box\"\nsize_m = [1, 2, 3]\n\
+        "[meshes.c]\ntype = \"cylinder\"\nradius_m = 1\nlength_m = 2\nsphere_tree_depth = 4\nsphere_tree_error = 0.02\n[meshes.b]\ntype = \"box\"\nsize_m = [1, 2, 3]\n\
          [meshes.p]\ntype = \"capsule\"\nradius_m = 1\nlength_m = 2\nsegments = 12\n\
          [[body]]\nname = \"1\"\ndensity_kg_per_m3 = 7800\nshape = { type = \"mesh\", mesh = \"c\" }\n\
          [[body]]\nname = \"2\"\nmass_kg = 1\nshape = { type = \"capsule\", radius_m = 1, length_m = 2 }\n\
-         [[body]]\nname = \"3\"\nmass_kg = 1\nshape = { type = \"cylinder\", radius_m = 1, height_m = 2 }\n\
+         [[body]]\nname = \"3\"\nmass_kg = 1\nshape = { type = \"cylinder\", radius_m = 1, length_m = 2 }\n\
          [[body]]\nname = \"4\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n",
     );
     let ShapeSpec::Mesh { mesh } = scene.bodies[0].shape else { panic!("a mesh") };
     assert_eq!((scene.meshes[mesh].name.as_str(), scene.meshes[mesh].sphere_tree_depth), ("c", Some(4)));
     assert_eq!(scene.meshes[mesh].sphere_tree_error, Some(0.02));
-    assert_eq!(scene.meshes[mesh].source, MeshSource::Cylinder { radius_m: 1.0, height_m: 2.0, segments: 48 });
+    assert_eq!(scene.meshes[mesh].source, MeshSource::Cylinder { radius_m: 1.0, length_m: 2.0, segments: 48 });
     assert_eq!(scene.meshes[2].source, MeshSource::Capsule { radius_m: 1.0, length_m: 2.0, segments: 12 });
     assert_eq!(scene.bodies[0].mass, Some(MassSpec::Density(7800.0)));
     assert_eq!(scene.bodies[1].shape, ShapeSpec::Capsule { radius_m: 1.0, length_m: 2.0 });
-    assert_eq!(scene.bodies[2].shape, ShapeSpec::Cylinder { radius_m: 1.0, height_m: 2.0 });
+    assert_eq!(scene.bodies[2].shape, ShapeSpec::Cylinder { radius_m: 1.0, length_m: 2.0 });
     assert_eq!((&scene.bodies[3].shape, scene.bodies[3].mass), (&ShapeSpec::HalfSpace, None));
 }
 

@@ -83,13 +83,13 @@ fn reach(scene: &SceneFile, body: &BodySpec) -> f64 {
         ShapeSpec::Sphere { radius_m } => *radius_m,
         ShapeSpec::Box { size_m: [x, y, z] } => 0.5 * (x * x + y * y + z * z).sqrt(),
         ShapeSpec::Capsule { radius_m, length_m } => radius_m + 0.5 * length_m,
-        ShapeSpec::Cylinder { radius_m, height_m } => radius_m.hypot(0.5 * height_m),
+        ShapeSpec::Cylinder { radius_m, length_m } => radius_m.hypot(0.5 * length_m),
         ShapeSpec::HalfSpace => f64::INFINITY,
         ShapeSpec::Mesh { mesh } => match &scene.meshes[*mesh].source {
             MeshSource::Lathe { profile_m, .. } => profile_m.iter().map(|[r, z]| r.hypot(*z)).fold(0.0, f64::max),
             MeshSource::Torus { radius_m, tube_radius_m, .. } => radius_m + tube_radius_m,
             MeshSource::Icosphere { radius_m, .. } => *radius_m,
-            MeshSource::Cylinder { radius_m, height_m, .. } => radius_m.hypot(0.5 * height_m),
+            MeshSource::Cylinder { radius_m, length_m, .. } => radius_m.hypot(0.5 * length_m),
             other => panic!("no such mesh in this scene: {other:?}"),
         },
     }

@@ -104,7 +104,7 @@ impl Bodies {
 }
 
 fn advance(world: &mut World, id: ObjectId, wanted: Pose, most: f64) -> Result<(), WorldError> {
-    let at = world.site(id, 0).ok_or(WorldError::Stale)?.position();
+    let at = world.pose(id, 0).ok_or(WorldError::Stale)?.translation.vector;
     let by = wanted.translation.vector - at;
     let to = at + by * (most / by.norm().max(most));
     world.move_to(id, Pose::from_parts(to.into(), wanted.rotation))

@@ -1,0 +1,39 @@
+//! A recording places a mesh by the frame of its file.
+
+use crate::support::Scratch;
+use nalgebra::{Point3, Quaternion, UnitQuaternion};
+use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::{RigidBody, Settings, World};
+use tumble_net::record::{self, Recorder, RecorderOptions, read};
+use tumble_net::world::{entities, poses};
+
+fn isometry(pose: &record::Pose) -> Pose {
+    let [x, y, z, w] = pose.rotation;
+    Pose::from_parts(Vec3::from(pose.position).into(), UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)))
+}
+
+#[test]
+fn a_recorded_mesh_stands_where_its_file_says() {
+    let mesh = TriMesh::box_(Vec3::repeat(0.5)).translated(&Vec3::repeat(0.5));
+    let file = mesh.vertices.clone();
+    let (shape, _) = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
+    let frame = Pose::from_parts(Vec3::new(3.0, -2.0, 5.0).into(), UnitQuaternion::from_euler_angles(0.3, -0.8, 1.9));
+    let mut world = World::new(Settings::default()).unwrap();
+    world.add(RigidBody::with_mass("cube", shape, 1.0).unwrap().at(frame)).unwrap();
+    let scratch = Scratch::new("mesh_frame");
+    let path = scratch.file("a.mcap");
+    let mut recorder = Recorder::create(&path, "", &entities(&world), RecorderOptions::default()).unwrap();
+    recorder.frame(world.time(), world.frame(), &poses(&world), &world.save()).unwrap();
+    recorder.finish().unwrap();
+    let mut reader = read(&path).unwrap();
+    let entity = reader.entities()[0].clone();
+    let first = reader.next_frame().unwrap().unwrap();
+    let at = isometry(&first.poses[0]);
+    assert!((at.translation.vector - frame.translation.vector).norm() < 1e-14, "{at}");
+    let record::Shape::Mesh { vertices, .. } = &entity.parts[0].shape else { panic!("a mesh") };
+    let placed = at * isometry(&entity.parts[0].pose);
+    for (recorded, file) in vertices.iter().zip(&file) {
+        let off = placed * Point3::from(*recorded) - frame * Point3::from(*file);
+        assert!(off.norm() < 1e-6, "vertices are recorded in single precision: {off}");
+    }
+}
