@@ -7,6 +7,8 @@ use tumble_core::*;
 /// Every shape, a chain of links with limits, drives and a coupling, loops, cameras; one body was removed, one sleeps.
 fn everything(stepper: &str) -> World {
     let mut world = world(stepper, 1.0 / 240.0);
+    let settings = Settings { combine_restitution: Combine::Min, ..*world.settings() };
+    world.set_settings(settings).unwrap();
     ground(&mut world, 0.3, 0.4);
     let gone = world.add(RigidBody::with_mass("gone", sphere(0.1), 1.0).unwrap()).unwrap();
     let (mesh, _) = Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap();
