@@ -16,11 +16,7 @@ fi
 if ! cmp -s "$wanted" "$venv/requirements.txt"; then
     [ -x "$python" ] || python3 -m venv "$venv" || exit 1
     if ! timeout 600 "$python" -m pip install --quiet --disable-pip-version-check --timeout 20 --retries 2 -r "$wanted" </dev/null; then
-<<<<<<< HEAD
         echo "error: pip could not install what $wanted lists; the tests of the Python module need it once." >&2
-=======
-        echo "error: pip could not install what $wanted lists; the tests of the Python module need it once from PyPI." >&2
->>>>>>> 85a386a (tumble: robots and meshes open as scenes, sliders for joints, completions, commands in groups; errors begin with error:)
         exit 1
     fi
     cp "$wanted" "$venv/requirements.txt"
