@@ -35,7 +35,7 @@ impl MeshShape {
         let unit_mass = MassProperties { mass, center_of_mass, inertia: Mat3::from_columns(&columns) };
         let surfaces = from.list(Surface::read)?;
         let (tree, surfaces) = (OnceLock::from(Tree::from(tree)), OnceLock::from(surfaces));
-        let shape = MeshShape { tree, surfaces, ..MeshShape::of_checked(mesh, unit_mass, report) };
+        let shape = MeshShape { tree, surfaces, center: offset, ..MeshShape::of_checked(mesh, unit_mass, report) };
         from.0.is_empty().then_some((shape, offset))
     }
 }

@@ -41,6 +41,8 @@ fn a_shape_from_the_cache_has_the_bits_of_a_fresh_one() {
         assert_eq!(folder.files().len(), usize::from(found));
         let (shape, offset, note) = cached(bumpy(), &folder.cache());
         assert_eq!((offset, note), (its_offset, None));
+        assert!(its_offset.norm() > 1e-6);
+        assert_eq!(shape.center_of_mass(), its_offset);
         assert_eq!((shape.volume(), shape.bounding_radius()), (fresh.volume(), fresh.bounding_radius()));
         assert_eq!(shape.mass_properties(700.0).unwrap(), fresh.mass_properties(700.0).unwrap());
         assert_eq!(shape.aabb(&Pose::identity()), fresh.aabb(&Pose::identity()));
