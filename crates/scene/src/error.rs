@@ -19,7 +19,7 @@ const DRAWN_LINE_BYTES: usize = 400;
 #[derive(Debug, Error)]
 pub enum SceneError {
     /// The file could not be opened or read.
-    #[error("{}: cannot read the scene: {source}; give the path of a scene.toml or of its folder", file.display())]
+    #[error("{}: cannot read it: {source}; give the path of a scene.toml or its folder, a URDF or a mesh", file.display())]
     Read {
         /// The path that was tried.
         file: PathBuf,

@@ -57,7 +57,7 @@ fn what_is_not_there() {
         "no scene `biliards`: did you mean `billiards`? Shipped are `falling`, `stack`, `billiards`, `bowling`, `incline`, `pendulum`, `chain`, `piston`, `skeleton` and `robot`"
     );
     let error = resolve_scene("no/such.toml", &[]).unwrap_err();
-    assert!(error.to_string().starts_with("no/such.toml: cannot read the scene: "), "{error}");
+    assert!(error.to_string().starts_with("no/such.toml: cannot read it: "), "{error}");
     assert!(matches!(SceneFile::load("no/such.toml"), Err(SceneError::Read { .. })));
     assert_eq!(error.report(false), format!("error: {error}\n"));
 }
