@@ -798,7 +798,7 @@ class World:
     def _repr_png_(self) -> bytes | None:
         """How a notebook shows the world: a PNG, or nothing where there is no graphics adapter."""
     def plot_energy(self, seconds: float = 5.0, *, ax: Any = None) -> Any:
-        """Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib.
+        """Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib, the extra ``plot``.
 
         ax: the axes to plot on, by default new ones. Returns the axes.
         """
