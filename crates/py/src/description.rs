@@ -55,7 +55,7 @@ pub fn _unpickle_articulation(
     words: [String; 2],
     numbers: [Vec<f64>; 4],
 ) -> Result<Articulation> {
-    let file = file.into_pyobject(py).map_err(PyErr::from)?.into_any();
+    let file = file.into_pyobject(py)?.into_any();
     let [missing, collision] = words;
     let description = Articulation::from_urdf(py, &file, floating, Some(packages), &missing, &collision)?;
     let [gravity, q, qd, tau] = numbers.map(|row| array(py, &row).into_any());

@@ -11,6 +11,7 @@ use crate::inner::Inner;
 use crate::layout::Layout;
 use crate::view::View;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use std::sync::{Arc, Mutex, MutexGuard};
 use tumble::core::{Checkpoint, ForceGenerator, Forces, Mode, Object, ObjectId, Span, WorldView, Wrench};
 
@@ -145,6 +146,9 @@ pub fn empty_force(name: &str) -> Box<dyn Object> {
 
 /// Names and objects of forces; names, objects and bodies of behaviours.
 pub type Extensions = (Vec<(String, Py<PyAny>)>, Vec<(String, Py<PyAny>, Vec<String>)>);
+
+/// What pickle asks of a world: the function that makes it anew, its arguments, and what is set afterwards.
+pub type Reduced<'py> = (Bound<'py, PyAny>, (Bound<'py, PyBytes>,), Option<Extensions>);
 
 /// A behaviour and the bodies it was given.
 struct Attached {

@@ -66,7 +66,7 @@ pub fn write(inner: &Inner) -> Result<Vec<u8>> {
         Some((place, robot.joints.clone(), inner.efforts.get(id).cloned()))
     });
     let record = Record {
-        archive: inner.world.archive(&inner.forces())?,
+        archive: inner.world.archive(inner.forces())?,
         scene: SceneRecord::of(&inner.scene),
         robots: robots.collect(),
         notes: inner.notes.clone(),

@@ -8,7 +8,7 @@ use crate::building::{Choices, build};
 use crate::collect::{Anchor, anchor};
 use crate::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
 use crate::errors::{Error, Result};
-use crate::extension::Extensions;
+use crate::extension::{Extensions, Reduced};
 use crate::inner::Inner;
 use crate::interrupt::interruptible;
 use crate::pairs::{self, combine};
@@ -352,10 +352,7 @@ impl World {
     }
 
     /// For pickle: the whole world, with its forces and behaviours.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,), Option<Extensions>)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Result<Reduced<'py>> {
         let (bytes, state) = self.shared.read(|inner| Ok((pickling::write(inner)?, inner.pickled_extensions(py))))?;
         let unpickle = py.import("tumble._native")?.getattr("_unpickle_world")?;
         Ok((unpickle, (PyBytes::new(py, &bytes),), state))

@@ -69,7 +69,8 @@ fn an_archived_world_goes_the_same_way() {
                 assert_eq!((other.methods(), other.settings()), (world.methods(), world.settings()));
                 let mut ours = world.fork();
                 for _ in 0..100 {
-                    (ours.step().unwrap(), other.step().unwrap());
+                    ours.step().unwrap();
+                    other.step().unwrap();
                     assert_eq!(other.save(), ours.save(), "{stepper}: written at frame {frame}");
                 }
             }
@@ -129,7 +130,8 @@ fn objects_of_other_kinds_are_made_by_the_caller() {
     assert_eq!(refused, Err(ArchiveError::Foreign("lift".into())));
     let mut other = World::from_archive(&bytes, &mut |name| (name == "lift").then(|| Box::new(Lift) as _)).unwrap();
     for _ in 0..50 {
-        (world.step().unwrap(), other.step().unwrap());
+        world.step().unwrap();
+        other.step().unwrap();
     }
     assert_eq!(other.save(), world.save());
 }
