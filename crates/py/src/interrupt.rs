@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, ScopedJoinHandle};
+use std::thread::{self, Thread};
 use std::time::Duration;
 use tumble::collide::Progress;
 
@@ -25,6 +25,10 @@ impl Stop {
     /// An error once the work shall end.
     pub fn check(&self) -> Result<()> {
         if self.stopped() { Err(Error::Stopped) } else { Ok(()) }
+    }
+
+    fn stop(&self) {
+        self.0.store(true, Ordering::Relaxed);
     }
 
     /// Runs `work` as a part of this piece of work: what it starts ends with it.
@@ -47,30 +51,58 @@ impl Progress for Stop {
 /// Runs `work` with the interpreter let go. Where the interpreter answers a signal with an exception, `work` is told to stop, and the exception
 /// is the outcome once it has.
 pub fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + Send) -> Result<T> {
-    // a thread of a pool must not wait for others of its pool; the thread that waits for it looks at signals
-    if rayon::current_thread_index().is_some() {
-        let stop = AROUND.with_borrow(|around| around.clone().unwrap_or_default());
+    if let Some(stop) = around() {
         return py.detach(|| caught(|| work(&stop)));
     }
     let (stop, done, caller) = (Stop::default(), AtomicBool::new(false), thread::current());
-    let body = || {
-        let outcome = caught(|| work(&stop));
-        done.store(true, Ordering::Release);
-        caller.unpark();
-        outcome
-    };
+    let body = || finish(caught(|| work(&stop)), &done, &caller);
     thread::scope(|scope| {
-        let worker = thread::Builder::new()
-            .name("tumble".into())
-            .spawn_scoped(scope, body)
-            .map_err(|e| Error::Internal(e.to_string()))?;
+        let worker = named().spawn_scoped(scope, body).map_err(|e| Error::Internal(e.to_string()))?;
         let signal = watch(py, &done);
         if signal.is_err() {
-            stop.0.store(true, Ordering::Relaxed);
+            stop.stop();
         }
-        let outcome = py.detach(|| joined(worker));
+        let outcome = py.detach(|| joined(worker.join()));
         signal.and(outcome)
     })
+}
+
+/// As [`interruptible`], for work that owns what it works on: the exception is the outcome at once, and the work ends behind it at its next look at
+/// the stop. For work that looks seldom.
+pub fn abandonable<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(&Stop) -> Result<T> + Send + 'static,
+) -> Result<T> {
+    if let Some(stop) = around() {
+        return py.detach(|| caught(|| work(&stop)));
+    }
+    let (stop, done) = (Stop::default(), Arc::new(AtomicBool::new(false)));
+    let shared = (stop.clone(), done.clone(), thread::current());
+    let worker = named()
+        .spawn(move || {
+            let (stop, done, caller) = shared;
+            finish(caught(|| work(&stop)), &done, &caller)
+        })
+        .map_err(|e| Error::Internal(e.to_string()))?;
+    watch(py, &done).inspect_err(|_| stop.stop())?;
+    py.detach(|| joined(worker.join()))
+}
+
+/// The stop of the work that this thread is part of, where it is of a pool: such a thread must not wait for others of its pool, and the thread that
+/// waits for it looks at signals.
+fn around() -> Option<Stop> {
+    rayon::current_thread_index().map(|_| AROUND.with_borrow(|around| around.clone().unwrap_or_default()))
+}
+
+fn named() -> thread::Builder {
+    thread::Builder::new().name("tumble".into())
+}
+
+/// Says that the work is done and wakes who waits for it.
+fn finish<T>(outcome: T, done: &AtomicBool, caller: &Thread) -> T {
+    done.store(true, Ordering::Release);
+    caller.unpark();
+    outcome
 }
 
 /// Waits for the work; an error is what the interpreter made of a signal.
@@ -82,6 +114,6 @@ fn watch(py: Python<'_>, done: &AtomicBool) -> Result<()> {
     Ok(())
 }
 
-fn joined<T>(worker: ScopedJoinHandle<'_, Result<T>>) -> Result<T> {
-    worker.join().unwrap_or_else(|_| Err(Error::Internal("a thread ended by a panic".into())))
+fn joined<T>(outcome: thread::Result<Result<T>>) -> Result<T> {
+    outcome.unwrap_or_else(|_| Err(Error::Internal("a thread ended by a panic".into())))
 }

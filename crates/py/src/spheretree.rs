@@ -2,7 +2,7 @@
 
 use crate::convert::{path, whole_number};
 use crate::errors::{Error, Result, caught};
-use crate::interrupt::interruptible;
+use crate::interrupt::abandonable;
 use crate::pool;
 use crate::shapes::triangles;
 use crate::words::{BUILDERS, meaning, word};
@@ -123,7 +123,7 @@ impl SphereTree {
         let settings = settings(method, branch, depth, error)?;
         let (name, mut mesh) = (name_of(vertices, faces), triangles(py, vertices, faces)?);
         let cache = if cache { TreeCache::of_environment() } else { TreeCache::off() };
-        interruptible(py, |stop| {
+        abandonable(py, move |stop| {
             pool::run(|| {
                 mesh.check_closed()?;
                 let CachedTree { tree, stages, .. } = Tree::build_cached_watched(&mesh, &settings, &cache, stop)?;

@@ -171,9 +171,10 @@ fn a_file_that_cannot_be_written_whole_stays_as_it_was() {
     let (mesh, out) = (folder.write("ring.obj", obj(&ring())), folder.path("tree.json"));
     std::fs::write(&out, "what was there").unwrap();
     // a limit on the size of files stands for a full disk
-    let words = [&["spheretree", &mesh, "--no-cache", "-o", &text(&out)][..], &QUICK].concat().join(" ");
-    let run = format!("trap '' XFSZ; ulimit -f 1; exec {} {words}", env!("CARGO_BIN_EXE_tumble"));
-    let done = std::process::Command::new("sh").args(["-c", &run]).output().unwrap();
+    let tree = text(&out);
+    let words = [&["spheretree", &mesh, "--no-cache", "-o", &tree][..], &QUICK].concat();
+    let run = ["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_tumble")];
+    let done = std::process::Command::new("sh").args(run).args(words).output().unwrap();
     assert_eq!(done.status.code(), Some(1), "{done:?}");
     assert!(String::from_utf8_lossy(&done.stderr).contains("writing"), "{done:?}");
     assert_eq!(std::fs::read_to_string(&out).unwrap(), "what was there");
