@@ -219,7 +219,9 @@ mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
 
-    const NOBODY: u32 = 4_000_000_000; // a user that there is not
+    // users that there are not; a test that cleans up has one of its own
+    const NOBODY: u32 = 4_000_000_000;
+    const NOBODY_ELSE: u32 = 4_000_000_001;
 
     #[test]
     fn one_ring_wakes_all_and_only_the_last_answer_wakes_the_server() {
@@ -287,12 +289,12 @@ mod tests {
     #[test]
     fn a_bell_that_others_may_open_is_not_touched() {
         let run = format!("bell-{}-open", std::process::id());
-        let path = file(&file_name(&run).unwrap(), &configuration(NOBODY).unwrap());
+        let path = file(&file_name(&run).unwrap(), &configuration(NOBODY_ELSE).unwrap());
         std::fs::write(&path, "not a bell").unwrap();
         std::fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o666)).unwrap();
-        assert!(Bell::join(&run, NOBODY).unwrap().is_none());
-        assert!(Bell::serve(&run, NOBODY).err().unwrap().to_string().contains("mode 600; remove it"));
-        clean_up(NOBODY);
+        assert!(Bell::join(&run, NOBODY_ELSE).unwrap().is_none());
+        assert!(Bell::serve(&run, NOBODY_ELSE).err().unwrap().to_string().contains("mode 600; remove it"));
+        clean_up(NOBODY_ELSE);
         assert_eq!(std::fs::read(&path).unwrap(), b"not a bell");
         std::fs::remove_file(&path).unwrap();
     }
