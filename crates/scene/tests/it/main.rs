@@ -15,5 +15,6 @@ mod robots;
 mod robust;
 mod shipped;
 mod spheres;
+mod state_hashes;
 mod urdf;
 mod visuals;
