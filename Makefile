@@ -4,7 +4,7 @@
 
 help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/, run an example in Python"
-	@echo "make test       install what is missing, run all tests, check the papers"
+	@echo "make test       install what is missing, run all tests, check the documentation"
 	@echo "make test-slow  the same, and determinism and energy over a minute"
 	@echo "make wheel      a wheel to hand on, in target/wheels/manylinux: tagged with the oldest glibc that it runs on, and checked"
 	@echo "make cave-trial a cave of five processes: frames, kills, freezes, a recording shown again and cut; minutes (scripts/cave_trial.py --long: all of it)"

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Everything that can fail, in the profile that users run: set-up, build, tests, doc tests, the Python module, papers.
+# Everything that can fail, in the profile that users run: set-up, build, tests, doc tests, the Python module, documentation.
 #   scripts/test.sh          all of them
 #   scripts/test.sh --slow   and again at their full length those that TUMBLE_SLOW=1 lengthens, and geometry and dynamics with assertions
 . "$(dirname "$0")/env.sh"
@@ -28,7 +28,7 @@ stage tests cargo test $tests --no-fail-fast
 [ "${1:-}" != --slow ] || stage assertions cargo test --profile checked --locked -p tumble-collide -p tumble-core -p tumble-scene --no-fail-fast
 stage "doc tests" cargo test --no-fail-fast --release --workspace --locked --doc
 stage python scripts/test_python.sh
-stage papers python3 scripts/check_papers.py
+stage docs python3 scripts/check_docs.py
 
 echo
 stages

@@ -222,7 +222,7 @@ def test_what_a_page_says_happens(page, folder, command, adapter, monkeypatch):
             read_json(block, folder)
         elif block.language == "xml":
             ElementTree.fromstring(block.text)
-        else:  # Rust is compiled where it stands in a crate's documentation: scripts/check_papers.py
+        else:  # Rust is compiled where it stands in a crate's documentation: scripts/check_docs.py
             assert block.language in ("rust", "text"), f"{where}: a block of no known language: {block.language!r}"
     if skipped:
         pytest.skip("SKIPPED: " + "; ".join(skipped))

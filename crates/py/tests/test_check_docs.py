@@ -1,0 +1,92 @@
+"""The check of the documentation finds the faults that it is for, and no others."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+SPEC = importlib.util.spec_from_file_location("check_docs", ROOT / "scripts/check_docs.py")
+check_docs = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(check_docs)
+
+TABLE = f"""
+{check_docs.WORDS_HEADING}
+
+| not used | instead | allowed | only in |
+|---|---|---|---|
+| `closure` | loop joint | `Rust closure` | |
+| `but for` | except | | |
+| `ball`, `balls` | sphere | `ball joint` | `crates/collide` |
+"""
+
+
+def words(name, text):
+    faults = []
+    check_docs.check_words(name, text, check_docs.rules_of(TABLE), faults)
+    return faults
+
+
+def sentences(text):
+    faults = []
+    check_docs.check_sentences("docs/some.md", text, faults)
+    return faults
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line"),
+    [
+        ("docs/some.md", "one line\nA Closure joins two parts.", 2),
+        ("docs/some.md", "all of them but\nfor one", 1),
+        ("docs/some.md", "`closure` as code", 1),
+        ("crates/core/src/some.rs", "fn f() {}\n/// A closure.\nfn g() {}", 2),
+        ("crates/core/src/some.rs", '// no "quote here\nlet a = "the closure is open";', 2),
+        ("crates/core/src/some.rs", 'let a = r#"kind = "closure""#;', 1),
+        ("crates/core/src/some.rs", "let quote = '\"'; // closure", 1),
+        ("crates/collide/src/some.rs", "/// A ball.", 1),
+        ("some.py", 'def f():\n    """All\n    but for one."""\n', 3),
+        ("some.py", "x = 1  # a closure\n", 1),
+        ("some.toml", "[[closure]]", 1),
+        ("some.sh", "echo closure", 1),
+    ],
+)
+def test_a_word_that_is_ruled_out_is_found(name, text, line):
+    assert [fault.split(": ")[0] for fault in words(name, text)] == [f"{name}:{line}"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("docs/some.md", "A Rust closure, a\nRust closure, an enclosure, disclosures."),
+        ("docs/some.md", "<!-- names of others -->\nclosure\n<!-- end -->"),
+        ("crates/core/src/some.rs", "let closure = |x| x; // a ball"),
+        ("crates/collide/src/some.rs", "/// A ball joint."),
+        ("crates/core/src/some.rs", "fn f<'a>(closure: &'a str, c: char) -> bool { c == 'x' }"),
+        ("some.py", "closure = 1\n"),
+        ("some.json", '{"closure": 1}'),
+    ],
+)
+def test_other_words_pass(name, text):
+    assert words(name, text) == []
+
+
+def test_every_row_of_the_glossary_is_a_rule():
+    glossary = (ROOT / check_docs.GLOSSARY).read_text()
+    rows = [line for line in glossary.partition(check_docs.WORDS_HEADING)[2].splitlines() if line.startswith("|")]
+    rules = check_docs.rules_of(glossary)
+    assert len(rules) == len(rows) - 2 > 20
+    assert any(rule.words.search("the loop closure") for rule in rules)
+
+
+def test_sentences_of_more_than_45_words_are_found():
+    assert sentences("word " * 45 + "end.")[0].startswith("docs/some.md:1: a sentence of 46 words")
+    assert len(sentences("- " + "word " * 23 + "\n  " + "word " * 23)) == 1
+    assert len(sentences("| a | " + "word " * 46 + " |")) == 1
+    assert sentences("Title\n\n" + "`code with many words` " * 46)[0].startswith("docs/some.md:3")
+
+
+def test_shorter_sentences_pass():
+    assert sentences("word " * 45 + ". " + "word " * 45) == []
+    assert sentences("```sh\n" + "word " * 60 + "\n```") == []
+    assert sentences("\n".join("- " + "word " * 30 for _ in range(3))) == []
+    assert sentences("[" + "word " * 40 + "](" + "a/" * 60 + ")") == []
