@@ -4,15 +4,11 @@
 //! |---|---|
 //! | primitives | their sizes |
 //! | cylinder | radius and half length; the tree is built anew |
-//! | mesh | the mesh about its center of mass, its tree, its mass properties, what was mended; elements and fields are made anew |
-//!
-//! What is read is checked where later code would fail on it: indices in range, numbers finite, children behind their parents.
+//! | mesh | the bytes of the cache (`solid/stored.rs`), which check themselves when they are read |
 
-use crate::tree::SphereNode;
-use crate::{ClosedReport, CylinderShape, MassProperties, MeshShape, SphereTree, TriMesh, Vec3};
+use crate::{CylinderShape, MeshShape};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::borrow::Cow;
 
 /// Shared values are written as if they were not shared.
 pub mod shared {
@@ -30,37 +26,17 @@ pub mod shared {
     }
 }
 
-#[derive(Serialize, Deserialize)]
-struct MeshRecord<'a> {
-    mesh: Cow<'a, TriMesh>,
-    tree: Cow<'a, [SphereNode]>,
-    unit_mass: MassProperties,
-    report: Cow<'a, ClosedReport>,
-    center: Vec3,
-}
-
 impl Serialize for MeshShape {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let record = MeshRecord {
-            mesh: Cow::Borrowed(self.mesh()),
-            tree: Cow::Borrowed(self.tree().nodes()),
-            unit_mass: *self.unit_mass(),
-            report: Cow::Borrowed(self.report()),
-            center: self.center_of_mass(),
-        };
-        record.serialize(serializer)
+        self.to_bytes(&self.center_of_mass()).serialize(serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for MeshShape {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<MeshShape, D::Error> {
-        let MeshRecord { mesh, tree, unit_mass, report, center } = MeshRecord::deserialize(deserializer)?;
-        mesh.check_data().map_err(D::Error::custom)?;
-        if center.iter().any(|x| !x.is_finite()) {
-            return Err(D::Error::custom("the center of mass is not finite"));
-        }
-        let tree = SphereTree::of_archive(tree.into_owned()).map_err(D::Error::custom)?;
-        Ok(MeshShape::of_parts(mesh.into_owned(), tree, unit_mass, report.into_owned(), center))
+        let bytes = Vec::deserialize(deserializer)?;
+        let shape = MeshShape::of_bytes(&bytes).map(|(shape, _)| shape);
+        shape.ok_or_else(|| D::Error::custom("the bytes of a mesh shape are cut off or out of range"))
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{Mat3, Vec3};
 use std::f64::consts::PI;
 
 /// Mass, centre of mass and inertia of a solid of uniform density.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
     /// Mass, kg.
     pub mass: f64,

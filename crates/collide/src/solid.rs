@@ -91,23 +91,6 @@ impl MeshShape {
         Ok((MeshShape { settings, cache, center: offset, ..MeshShape::of_checked(mesh, unit_mass, report) }, offset))
     }
 
-    /// Of a mesh that was checked and moved, with its tree: the rest follows from these.
-    pub(crate) fn of_parts(
-        mesh: TriMesh,
-        tree: SphereTree,
-        unit_mass: MassProperties,
-        report: ClosedReport,
-        center: Vec3,
-    ) -> MeshShape {
-        let shape = MeshShape {
-            tree: OnceLock::from(Tree::from(tree)),
-            center,
-            ..MeshShape::of_checked(mesh, unit_mass, report)
-        };
-        shape.surfaces();
-        shape
-    }
-
     fn of_checked(mesh: TriMesh, unit_mass: MassProperties, report: ClosedReport) -> MeshShape {
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
         let buried = report.crossing_faces > 0 || (unit_mass.mass - mesh.signed_volume()).abs() > 1e-9 * unit_mass.mass;

@@ -17,8 +17,8 @@ use tumble::core::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
 use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
 
 /// What a pickled world and a pickled shape begin with. The number is raised with every change of what is in them.
-const WORLD: &[u8; 8] = b"tumbleW1";
-const SHAPE: &[u8; 8] = b"tumbleG1";
+const WORLD: &[u8; 8] = b"tumbleW2";
+const SHAPE: &[u8; 8] = b"tumbleG2";
 
 /// A world.
 #[derive(Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use super::union::Boundary;
 use crate::{MeshError, Vec3};
 
 /// What [`TriMesh::check_closed`] found and did.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClosedReport {
     /// Vertices merged with another at exactly the same place.
     pub welded_vertices: usize,

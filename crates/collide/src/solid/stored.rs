@@ -1,4 +1,4 @@
-//! A mesh shape as bytes, for the cache: what the checks found, the tree, and how the surface's points are grouped.
+//! A mesh shape as bytes, for the cache and for archives: what the checks found, the tree, and how the surface's points are grouped.
 //!
 //! What is quick to make of those (edges, normals) is made anew, and the cells of fields are made where they are asked for. What is read is checked
 //! as if it came from an enemy: counts are bounded by the bytes that are there, indices in range, nothing nested in itself.
@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 
 impl MeshShape {
     /// The shape and the offset that was subtracted from its vertices.
-    pub(super) fn to_bytes(&self, offset: &Vec3) -> Vec<u8> {
+    pub(crate) fn to_bytes(&self, offset: &Vec3) -> Vec<u8> {
         let mut to = Vec::new();
         to.vector(offset);
         write_report(&self.report, &mut to);
@@ -25,7 +25,7 @@ impl MeshShape {
     }
 
     /// `None` where the bytes are no shape.
-    pub(super) fn of_bytes(bytes: &[u8]) -> Option<(MeshShape, Vec3)> {
+    pub(crate) fn of_bytes(bytes: &[u8]) -> Option<(MeshShape, Vec3)> {
         let mut from = Reader(bytes);
         let offset = from.vector()?;
         let report = read_report(&mut from)?;

@@ -45,7 +45,7 @@ pub(crate) use ball::around_points;
 use builder::{Cell, Job, TreeBuilder, go_on};
 
 /// One ball of a tree, in the mesh's frame.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereNode {
     /// Metres.
     pub center: Vec3,
@@ -199,19 +199,6 @@ impl SphereTree {
     }
 
     /// Of nodes that are already a tree: breadth first, children neighbours.
-    /// The tree of nodes that were written: numbers finite, children behind their parents.
-    pub(crate) fn of_archive(nodes: Vec<SphereNode>) -> Result<SphereTree, MeshError> {
-        let sound = |(n, node): (usize, &SphereNode)| {
-            let numbers = node.center.iter().chain([&node.radius, &node.outward]).all(|x| x.is_finite());
-            let end = u64::from(node.first_child) + u64::from(node.children);
-            numbers && (node.is_leaf() || (node.first_child as usize > n && end <= nodes.len() as u64))
-        };
-        match !nodes.is_empty() && nodes.iter().enumerate().all(sound) {
-            true => Ok(SphereTree::of_nodes(nodes)),
-            false => Err(MeshError::Tree { what: "its nodes are out of order or not finite".into() }),
-        }
-    }
-
     fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()

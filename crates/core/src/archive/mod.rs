@@ -2,7 +2,7 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleA2`; the last is the number of the format | 8 |
+//! | `tumbleA3`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, methods, shapes, visual meshes, objects, pairs, snapshot, contacts, report in postcard | any |
 //!
@@ -26,7 +26,7 @@ use tumble_collide::Shape;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What an archive of a world begins with. The number is raised with every change of what is in it.
-const HEAD: &[u8; 8] = b"tumbleA2";
+const HEAD: &[u8; 8] = b"tumbleA3";
 
 /// Why an archive was not written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
