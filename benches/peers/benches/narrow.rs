@@ -246,7 +246,7 @@ fn body(name: &str, mesh: TriMesh) -> Body {
     let mesh = mesh.scaled(scale);
     let clock = Clock::new();
     let before = clock.seconds();
-    let (ours, _) = Shape::mesh(mesh, &TreeSettings::octree()).expect("a closed mesh");
+    let ours = Shape::mesh(mesh, &TreeSettings::octree()).expect("a closed mesh");
     let Shape::Mesh(solid) = &ours else { unreachable!("a mesh was made") };
     let mesh = solid.mesh();
     println!("{name}: {} triangles, shape made in {:.2} s of CPU", mesh.triangles.len(), clock.seconds() - before);

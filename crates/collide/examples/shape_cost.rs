@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Loads a mesh, then brings it up to itself in some places, and prints what either took in all.
 fn measure(file: &str) -> Result<(), Box<dyn Error>> {
     let mesh = TriMesh::from_obj(&std::fs::read_to_string(file)?)?;
-    let (shape, _, note) = Shape::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?;
+    let (shape, note) = Shape::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?;
     if let Some(note) = note {
         return Err(note.into());
     }

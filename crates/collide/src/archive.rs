@@ -28,15 +28,15 @@ pub mod shared {
 
 impl Serialize for MeshShape {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.to_bytes(&self.center_of_mass()).serialize(serializer)
+        self.to_bytes().serialize(serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for MeshShape {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<MeshShape, D::Error> {
         let bytes = Vec::deserialize(deserializer)?;
-        let shape = MeshShape::of_bytes(&bytes).map(|(shape, _)| shape);
-        shape.ok_or_else(|| D::Error::custom("the bytes of a mesh shape are cut off or out of range"))
+        MeshShape::of_bytes(&bytes)
+            .ok_or_else(|| D::Error::custom("the bytes of a mesh shape are cut off or out of range"))
     }
 }
 

@@ -12,7 +12,7 @@
 //! ```
 //! use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, contacts};
 //!
-//! let (ring, _offset) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree())?;
+//! let ring = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree())?;
 //! let mut found = Vec::new();
 //! contacts(&ring, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.001, &mut found);
 //! assert!(found.len() >= 3 && found.iter().all(|c| c.normal.z == 1.0));

@@ -71,10 +71,9 @@ impl Shape {
     }
 
     /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its centre of mass
-    /// is the origin. Also returns the offset that was subtracted from its vertices, metres.
-    pub fn mesh(mesh: TriMesh, settings: &TreeSettings) -> Result<(Shape, Vec3), ShapeError> {
-        let (shape, offset) = MeshShape::new(mesh, settings)?;
-        Ok((Shape::Mesh(Arc::new(shape)), offset))
+    /// is the origin; [`Shape::center_of_mass`] is where it was.
+    pub fn mesh(mesh: TriMesh, settings: &TreeSettings) -> Result<Shape, ShapeError> {
+        Ok(Shape::Mesh(Arc::new(MeshShape::new(mesh, settings)?)))
     }
 
     /// [`Shape::mesh`] from the cache, if it was made before of the same vertices, triangles and settings; else it is made and kept there. The same bits
@@ -83,16 +82,15 @@ impl Shape {
         mesh: TriMesh,
         settings: &TreeSettings,
         cache: &TreeCache,
-    ) -> Result<(Shape, Vec3, Option<String>), ShapeError> {
-        let (shape, offset, note) = MeshShape::new_cached(mesh, settings, cache)?;
-        Ok((Shape::Mesh(Arc::new(shape)), offset, note))
+    ) -> Result<(Shape, Option<String>), ShapeError> {
+        let (shape, note) = MeshShape::new_cached(mesh, settings, cache)?;
+        Ok((Shape::Mesh(Arc::new(shape)), note))
     }
 
     /// [`Shape::mesh`] with its tree and surface built when first asked for: for a world that is drawn and not stepped. The tree then comes from the cache
     /// where it has it.
-    pub fn mesh_lazy(mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<(Shape, Vec3), ShapeError> {
-        let (shape, offset) = MeshShape::new_lazy(mesh, settings, cache)?;
-        Ok((Shape::Mesh(Arc::new(shape)), offset))
+    pub fn mesh_lazy(mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<Shape, ShapeError> {
+        Ok(Shape::Mesh(Arc::new(MeshShape::new_lazy(mesh, settings, cache)?)))
     }
 
     /// Whether a tree or surface of it is built; no other shape has any.

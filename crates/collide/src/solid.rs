@@ -57,13 +57,13 @@ impl PartialEq for MeshShape {
 
 impl MeshShape {
     /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
-    /// tree. Also returns the offset that was subtracted from the vertices (metres).
-    pub fn new(mesh: TriMesh, settings: &TreeSettings) -> Result<(MeshShape, Vec3), MeshError> {
-        let (shape, offset) = MeshShape::new_lazy(mesh, settings, &TreeCache::off())?;
+    /// tree.
+    pub fn new(mesh: TriMesh, settings: &TreeSettings) -> Result<MeshShape, MeshError> {
+        let shape = MeshShape::new_lazy(mesh, settings, &TreeCache::off())?;
         let tree = shape.build_tree()?;
         let shape = MeshShape { tree: OnceLock::from(Tree::from(tree)), ..shape };
         shape.surfaces();
-        Ok((shape, offset))
+        Ok(shape)
     }
 
     fn build_tree(&self) -> Result<SphereTree, MeshError> {
@@ -73,22 +73,18 @@ impl MeshShape {
     }
 
     /// The same with tree and surface built when first asked for: for what is drawn and not stepped. A tree that cannot be built is then one ball.
-    pub fn new_lazy(
-        mut mesh: TriMesh,
-        settings: &TreeSettings,
-        cache: &TreeCache,
-    ) -> Result<(MeshShape, Vec3), MeshError> {
+    pub fn new_lazy(mut mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<MeshShape, MeshError> {
         settings.check()?;
         let report = mesh.check_closed()?;
         let overlaps = report.crossing_faces > 0 || report.shells > 1;
         let mass = if overlaps { mesh.union_mass_properties(1.0) } else { mesh.mass_properties(1.0) };
-        let offset = mass.center_of_mass;
-        let mesh = mesh.translated(&-offset);
-        // what rounding left of the offset is not worth a second shift
+        let center = mass.center_of_mass;
+        let mesh = mesh.translated(&-center);
+        // what rounding left of it is not worth a second shift
         let mass = if overlaps { mass } else { mesh.mass_properties(1.0) };
         let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mass };
         let (settings, cache) = (*settings, cache.clone());
-        Ok((MeshShape { settings, cache, center: offset, ..MeshShape::of_checked(mesh, unit_mass, report) }, offset))
+        Ok(MeshShape { settings, cache, center, ..MeshShape::of_checked(mesh, unit_mass, report) })
     }
 
     fn of_checked(mesh: TriMesh, unit_mass: MassProperties, report: ClosedReport) -> MeshShape {
@@ -113,24 +109,24 @@ impl MeshShape {
         mesh: TriMesh,
         settings: &TreeSettings,
         cache: &TreeCache,
-    ) -> Result<(MeshShape, Vec3, Option<String>), MeshError> {
+    ) -> Result<(MeshShape, Option<String>), MeshError> {
         let entry = Entry::new(cache, Kind::Shape, &MeshId::of(&mesh), settings);
         let mut note = None;
         match entry.as_ref().map(MeshShape::read) {
-            Some(Ok(Some((shape, offset)))) => return Ok((shape, offset, None)),
+            Some(Ok(Some(shape))) => return Ok((shape, None)),
             Some(Err(why)) => note = Some(why),
             None | Some(Ok(None)) => {}
         }
-        let (shape, offset) = MeshShape::new(mesh, settings)?;
+        let shape = MeshShape::new(mesh, settings)?;
         if let Some(entry) = entry
-            && let Err(why) = entry.write(&shape.to_bytes(&offset))
+            && let Err(why) = entry.write(&shape.to_bytes())
         {
             note.get_or_insert(why);
         }
-        Ok((shape, offset, note))
+        Ok((shape, note))
     }
 
-    fn read(entry: &Entry) -> Result<Option<(MeshShape, Vec3)>, String> {
+    fn read(entry: &Entry) -> Result<Option<MeshShape>, String> {
         let Some(body) = entry.read()? else { return Ok(None) };
         MeshShape::of_bytes(&body).map(Some).ok_or_else(|| entry.refused("it holds no shape"))
     }
@@ -163,11 +159,6 @@ impl MeshShape {
             true => parts(&self.mesh, self.tree()).unwrap_or_default(),
             false => vec![Surface::new(&self.mesh, self.tree())],
         })
-    }
-
-    /// At density 1, about the center of mass.
-    pub(crate) fn unit_mass(&self) -> &MassProperties {
-        &self.unit_mass
     }
 
     /// What was found and mended when the mesh was read; its notes are for the user.

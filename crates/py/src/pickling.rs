@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use tumble::collide::{Pose, Shape as Solid, Vec3};
+use tumble::collide::{Pose, Shape as Solid};
 use tumble::core::archive::{open, seal};
 use tumble::core::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
 use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
@@ -104,8 +104,6 @@ pub struct ShapeRecord {
     pub solid: Solid,
     pub placement: Pose,
     pub words: String,
-    /// Of a mesh, the center of mass that was subtracted.
-    pub center: Option<Vec3>,
 }
 
 /// The bytes of a shape.

@@ -31,8 +31,7 @@ impl Shape {
 
     /// The shape of a record, as an object of its class.
     pub fn of_record(py: Python<'_>, record: ShapeRecord) -> Result<Py<PyAny>> {
-        let ShapeRecord { solid, placement, words, center } = record;
-        let center = center.unwrap_or_else(Vec3::zeros);
+        let ShapeRecord { solid, placement, words } = record;
         let shape = Shape { solid, placement, words };
         Ok(match &shape.solid {
             Solid::Sphere { .. } => Py::new(py, shape.into_a(Sphere))?.into_any(),
@@ -40,7 +39,7 @@ impl Shape {
             Solid::Capsule { .. } => Py::new(py, shape.into_a(Capsule))?.into_any(),
             Solid::Cylinder(_) => Py::new(py, shape.into_a(Cylinder))?.into_any(),
             Solid::HalfSpace => Py::new(py, shape.into_a(HalfSpace))?.into_any(),
-            Solid::Mesh(_) => Py::new(py, shape.into_a(Mesh { center }))?.into_any(),
+            Solid::Mesh(_) => Py::new(py, shape.into_a(Mesh))?.into_any(),
         })
     }
 
@@ -67,9 +66,7 @@ impl Shape {
     /// For pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let (py, own) = (slf.py(), slf.get());
-        let center = slf.as_any().cast::<Mesh>().ok().map(|mesh| mesh.get().center);
-        let record =
-            ShapeRecord { solid: own.solid.clone(), placement: own.placement, words: own.words.clone(), center };
+        let record = ShapeRecord { solid: own.solid.clone(), placement: own.placement, words: own.words.clone() };
         let unpickle = py.import("tumble._native")?.getattr("_unpickle_shape")?;
         Ok((unpickle, (PyBytes::new(py, &write_shape(&record)?),)))
     }
@@ -179,9 +176,7 @@ impl HalfSpace {
 /// ``Mesh(path)``: an OBJ, STL or COLLADA file in metres; ``scale`` multiplies its coordinates. An object with ``vertices`` and ``faces``
 /// (trimesh) is taken as such. What is open, or encloses nothing, is a ``ValueError`` that names the place.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
-pub struct Mesh {
-    center: Vec3,
-}
+pub struct Mesh;
 
 #[pymethods]
 impl Mesh {
@@ -200,16 +195,16 @@ impl Mesh {
         let count = mesh.triangles.len();
         let build = || Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?);
         let name = vertices.extract::<std::path::PathBuf>().unwrap_or_else(|_| "Mesh".into());
-        let (solid, center, _) =
-            py.detach(|| pool::run(|| building_surface(&name.display().to_string(), count, build)))?;
+        let (solid, _) = py.detach(|| pool::run(|| building_surface(&name.display().to_string(), count, build)))?;
         slow::warn(py)?;
-        Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh { center }))
+        Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh))
     }
 
     /// The center of mass in the frame of the vertices, shape (3,), metres.
     #[getter]
-    fn center_of_mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        crate::convert::vector(py, &self.center)
+    fn center_of_mass<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray1<f64>>> {
+        let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
+        Ok(crate::convert::vector(slf.py(), &base.solid.center_of_mass()))
     }
 
     /// The vertices after mending, to rounding as they were given, shape (n, 3), metres.

@@ -123,7 +123,7 @@ fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Resul
         )?;
     }
     if placed.visible {
-        let look: Look = look(&surface.look, &placed.center);
+        let look: Look = look(&surface.look, &placed.center());
         let (geometry, stands_in_for) = (placed.geometry.clone(), placed.stands_in_for.clone());
         body.add_visual(link, Visual { part: 0, pose: placed.pose, geometry, look, stands_in_for })?;
     }

@@ -223,8 +223,8 @@ impl SceneFile {
         }
     }
 
-    /// A mesh as a solid about its centre of mass, with the place of that centre in the mesh's own axes.
-    fn solid(&self, spec: &MeshSpec, purpose: Purpose, notes: &mut Notes) -> Result<(Shape, Vec3), BuildError> {
+    /// A mesh as a solid about its center of mass.
+    fn solid(&self, spec: &MeshSpec, purpose: Purpose, notes: &mut Notes) -> Result<Shape, BuildError> {
         let file = match &spec.source {
             MeshSource::File { path, .. } => Some(path.clone()),
             _ => None,
@@ -245,7 +245,7 @@ impl SceneFile {
         settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
         let (called, count) = (spec.called(), mesh.triangles.len());
         let made = building_surface(&called, count, || purpose.mesh(mesh, &settings, &TreeCache::of_environment()));
-        let (shape, center, note) = made.map_err(|error| match error {
+        let (shape, note) = made.map_err(|error| match error {
             ShapeError::Mesh(error) if !spec.repair => wrong(error.at_line(&lines).to_string()),
             error => wrong(error.to_string()),
         })?;
@@ -256,7 +256,7 @@ impl SceneFile {
         }
         notes.extend(told.into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
         notes.extend(note.filter(|note| !notes.contains(note)));
-        Ok((shape, center))
+        Ok(shape)
     }
 
     /// With the file's line of each triangle, where it has any.
@@ -309,8 +309,8 @@ impl SceneFile {
         read_with_lines(path, &bytes).map_err(wrong)
     }
 
-    fn body(&self, spec: &BodySpec, meshes: &[(Shape, Vec3)]) -> Result<RigidBody, BuildError> {
-        let (shape, center) = link_shapes::make(&spec.shape, meshes).map_err(|e| self.body_error(spec, e))?;
+    fn body(&self, spec: &BodySpec, meshes: &[Shape]) -> Result<RigidBody, BuildError> {
+        let shape = link_shapes::make(&spec.shape, meshes).map_err(|e| self.body_error(spec, e))?;
         let body = match spec.mass {
             Some(MassSpec::Mass(mass)) => RigidBody::with_mass(&spec.name, shape.clone(), mass),
             Some(MassSpec::Density(density)) => RigidBody::with_density(&spec.name, shape.clone(), density),
@@ -326,7 +326,7 @@ impl SceneFile {
             .surface(spec.restitution, spec.friction)
             .of_material(material_id(spec.material))
             .colliding_by(spec.contacts)
-            .drawn_as(visuals(spec, shape, &center));
+            .drawn_as(visuals(spec, shape));
         if let Some(camera) = &spec.mounts.camera {
             body = body.with_camera(camera.clone());
         }
@@ -394,11 +394,12 @@ pub(crate) fn material_id(material: Option<usize>) -> u32 {
     material.map_or(0, |index| index as u32 + 1)
 }
 
-fn visuals(spec: &BodySpec, shape: Shape, center: &Vec3) -> Vec<Visual> {
+fn visuals(spec: &BodySpec, shape: Shape) -> Vec<Visual> {
     if !spec.visible {
         return Vec::new();
     }
-    vec![Visual::shape(0, Pose::identity(), shape, look(&spec.look, center))]
+    let look = look(&spec.look, &shape.center_of_mass());
+    vec![Visual::shape(0, Pose::identity(), shape, look)]
 }
 
 /// The look in body axes, whose origin is the centre of mass.

@@ -26,8 +26,6 @@ pub(crate) struct Placed<'s> {
     pub(crate) geometry: VisualGeometry,
     /// In the link's frame.
     pub(crate) pose: Pose,
-    /// Where the geometry's origin was in the axes of the description.
-    pub(crate) center: Vec3,
     pub(crate) spec: &'s LinkShape,
     pub(crate) visible: bool,
     /// Drawn only where none of these can be read.
@@ -35,6 +33,11 @@ pub(crate) struct Placed<'s> {
 }
 
 impl Placed<'_> {
+    /// The geometry's origin in the axes of the description, metres.
+    pub(crate) fn center(&self) -> Vec3 {
+        center(&self.geometry)
+    }
+
     /// What collides and has a mass; a visual mesh has neither.
     pub(crate) fn solid(&self) -> Option<&Shape> {
         match &self.geometry {
@@ -46,9 +49,9 @@ impl Placed<'_> {
 
 /// Makes shapes, and remembers those from files. Trees come from the cache that the environment names.
 pub(crate) struct ShapeMaker<'m> {
-    /// Meshes of the scene as solids, with the place of the centre of each.
-    meshes: &'m [(Shape, Vec3)],
-    solids: BTreeMap<SolidKey, Result<(Shape, Vec3), String>>,
+    /// Meshes of the scene as solids.
+    meshes: &'m [Shape],
+    solids: BTreeMap<SolidKey, Result<Shape, String>>,
     pictures: BTreeMap<FileKey, Arc<VisualMesh>>,
     cache: TreeCache,
     pub(crate) purpose: Purpose,
@@ -65,16 +68,16 @@ pub(crate) enum Purpose {
 }
 
 impl Purpose {
-    /// A closed mesh as a shape, where its centre of mass was, and what is to be said of the cache of trees.
+    /// A closed mesh as a shape, and what is to be said of the cache of trees.
     pub(crate) fn mesh(
         self,
         mesh: TriMesh,
         settings: &TreeSettings,
         cache: &TreeCache,
-    ) -> Result<(Shape, Vec3, Option<String>), ShapeError> {
+    ) -> Result<(Shape, Option<String>), ShapeError> {
         match self {
             Purpose::Stepped => Shape::mesh_cached(mesh, settings, cache),
-            Purpose::Drawn => Shape::mesh_lazy(mesh, settings, cache).map(|(shape, center)| (shape, center, None)),
+            Purpose::Drawn => Shape::mesh_lazy(mesh, settings, cache).map(|shape| (shape, None)),
         }
     }
 }
@@ -84,21 +87,27 @@ type FileKey = (PathBuf, [u64; 3]);
 /// The same, and whether its convex hull collides instead of itself.
 type SolidKey = (FileKey, bool);
 
-/// A shape of the scene and the place of its centre of mass in the axes of the description.
-pub(crate) fn make(spec: &ShapeSpec, meshes: &[(Shape, Vec3)]) -> Result<(Shape, Vec3), ShapeError> {
-    let shape = match *spec {
-        ShapeSpec::Mesh { mesh } => return Ok(meshes[mesh].clone()),
+/// The shape of a description.
+pub(crate) fn make(spec: &ShapeSpec, meshes: &[Shape]) -> Result<Shape, ShapeError> {
+    match *spec {
+        ShapeSpec::Mesh { mesh } => Ok(meshes[mesh].clone()),
         ShapeSpec::HalfSpace => Ok(Shape::half_space()),
         ShapeSpec::Sphere { radius_m } => Shape::sphere(radius_m),
         ShapeSpec::Box { size_m } => Shape::cuboid(0.5 * Vec3::from(size_m)),
         ShapeSpec::Capsule { radius_m, length_m } => Shape::capsule(radius_m, 0.5 * length_m),
         ShapeSpec::Cylinder { radius_m, length_m } => Shape::cylinder(radius_m, 0.5 * length_m),
-    };
-    Ok((shape?, Vec3::zeros()))
+    }
+}
+
+fn center(geometry: &VisualGeometry) -> Vec3 {
+    match geometry {
+        VisualGeometry::Shape(shape) => shape.center_of_mass(),
+        VisualGeometry::Mesh(_) => Vec3::zeros(),
+    }
 }
 
 impl<'m> ShapeMaker<'m> {
-    pub(crate) fn new(meshes: &'m [(Shape, Vec3)], purpose: Purpose) -> Self {
+    pub(crate) fn new(meshes: &'m [Shape], purpose: Purpose) -> Self {
         ShapeMaker {
             meshes,
             solids: BTreeMap::new(),
@@ -118,10 +127,10 @@ impl<'m> ShapeMaker<'m> {
             |spec: &&LinkShape| matches!(spec.geometry, Geometry::File { .. }) && !spec.collides && !spec.visible;
         for spec in link.shapes.iter().filter(|spec| !unused(spec)) {
             match self.geometry(spec)? {
-                Some((geometry, center)) => {
-                    let pose = spec.pose * Pose::from_parts(center.into(), nalgebra::one());
+                Some(geometry) => {
+                    let pose = spec.pose * Pose::from_parts(center(&geometry).into(), nalgebra::one());
                     let visible = spec.visible;
-                    placed.push(Placed { geometry, pose, center, spec, visible, stands_in_for: Vec::new() });
+                    placed.push(Placed { geometry, pose, spec, visible, stands_in_for: Vec::new() });
                 }
                 None => lost_picture |= spec.visible,
             }
@@ -140,14 +149,14 @@ impl<'m> ShapeMaker<'m> {
         Ok(placed)
     }
 
-    fn geometry(&mut self, spec: &LinkShape) -> Result<Option<(VisualGeometry, Vec3)>, String> {
-        let as_shape = |(shape, center)| Some((VisualGeometry::Shape(shape), center));
+    fn geometry(&mut self, spec: &LinkShape) -> Result<Option<VisualGeometry>, String> {
+        let as_shape = |shape| Some(VisualGeometry::Shape(shape));
         match &spec.geometry {
             Geometry::Shape(shape) => make(shape, self.meshes).map(as_shape).map_err(|e| e.to_string()),
             Geometry::File { path, scale, .. } if !spec.collides => {
                 let key = (path.clone(), scale.map(f64::to_bits));
                 let mesh = self.pictures.entry(key).or_insert_with(|| Arc::new(visual_mesh::of_file(path, *scale)));
-                Ok(Some((VisualGeometry::Mesh(mesh.clone()), Vec3::zeros())))
+                Ok(Some(VisualGeometry::Mesh(mesh.clone())))
             }
             Geometry::File { path, scale, place, hull, required } => {
                 let key = ((path.clone(), scale.map(f64::to_bits)), *hull);
@@ -167,7 +176,7 @@ impl<'m> ShapeMaker<'m> {
         }
     }
 
-    fn read(&mut self, path: &Path, scale: [f64; 3], hull: bool) -> Result<(Shape, Vec3), String> {
+    fn read(&mut self, path: &Path, scale: [f64; 3], hull: bool) -> Result<Shape, String> {
         let mesh = stretched(read_file(path)?, scale);
         if !hull {
             if let Ok(made) = self.solid(path, mesh.clone()) {
@@ -180,12 +189,12 @@ impl<'m> ShapeMaker<'m> {
     }
 
     /// From the cache, where it is built; `path` names the mesh if that takes long.
-    fn solid(&mut self, path: &Path, mesh: TriMesh) -> Result<(Shape, Vec3), ShapeError> {
+    fn solid(&mut self, path: &Path, mesh: TriMesh) -> Result<Shape, ShapeError> {
         let (name, count) = (path.file_name().unwrap_or_default().to_string_lossy(), mesh.triangles.len());
         let made = building_surface(&name, count, || self.purpose.mesh(mesh, &TreeSettings::octree(), &self.cache));
-        let (shape, center, note) = made?;
+        let (shape, note) = made?;
         note.into_iter().for_each(|note| self.notes.add("sphere trees", note));
-        Ok((shape, center))
+        Ok(shape)
     }
 }
 

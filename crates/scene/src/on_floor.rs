@@ -173,7 +173,7 @@ impl Extent {
         match &shape.geometry {
             Geometry::Shape(spec) => {
                 let made = link_shapes::make(spec, &[]).ok();
-                points.extend(made.map(|(shape, _)| shape.aabb(pose)).into_iter().flat_map(|b| [b.min, b.max]));
+                points.extend(made.map(|shape| shape.aabb(pose)).into_iter().flat_map(|b| [b.min, b.max]));
             }
             Geometry::File { path, scale, .. } => {
                 let read = self.files.entry(path.clone()).or_insert_with(|| link_shapes::read_file(path).ok());

@@ -125,7 +125,8 @@ fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {
     let (triangles, diagonal) = (mesh.triangles.len(), mesh.diagonal());
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let made = building_surface(&name, triangles, || Shape::mesh(mesh, &TreeSettings::octree()));
-    let (shape, center) = made.map_err(|e| wrong(e.to_string()))?;
+    let shape = made.map_err(|e| wrong(e.to_string()))?;
+    let center = shape.center_of_mass();
     let error = shape.tree().map_or(0.0, |tree| tree.outward_error());
     Ok(format!(
         "a closed mesh of {triangles} triangles, volume {:.6e} m³, centre of mass ({:.6}, {:.6}, {:.6}) m, sphere tree within {:.3} % of its diagonal",

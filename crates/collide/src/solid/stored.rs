@@ -6,14 +6,14 @@
 use super::{MeshShape, Tree};
 use crate::bytes::{Reader, Write};
 use crate::surface::Surface;
-use crate::{ClosedReport, MassProperties, Mat3, SphereTree, TriMesh, Vec3};
+use crate::{ClosedReport, MassProperties, Mat3, SphereTree, TriMesh};
 use std::sync::OnceLock;
 
 impl MeshShape {
-    /// The shape and the offset that was subtracted from its vertices.
-    pub(crate) fn to_bytes(&self, offset: &Vec3) -> Vec<u8> {
+    /// The whole shape; builds its tree and surface if they are not built yet.
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let mut to = Vec::new();
-        to.vector(offset);
+        to.vector(&self.center);
         write_report(&self.report, &mut to);
         self.mesh.write(&mut to);
         self.tree().write(&mut to);
@@ -24,10 +24,10 @@ impl MeshShape {
         to
     }
 
-    /// `None` where the bytes are no shape.
-    pub(crate) fn of_bytes(bytes: &[u8]) -> Option<(MeshShape, Vec3)> {
+    /// `None` if the bytes are not those of a shape.
+    pub(crate) fn of_bytes(bytes: &[u8]) -> Option<MeshShape> {
         let mut from = Reader(bytes);
-        let offset = from.vector()?;
+        let center = from.vector()?;
         let report = read_report(&mut from)?;
         let (mesh, tree) = (TriMesh::read(&mut from)?, SphereTree::read(&mut from)?);
         let (mass, center_of_mass) = (from.number().filter(|m| *m > 0.0)?, from.vector()?);
@@ -35,8 +35,8 @@ impl MeshShape {
         let unit_mass = MassProperties { mass, center_of_mass, inertia: Mat3::from_columns(&columns) };
         let surfaces = from.list(Surface::read)?;
         let (tree, surfaces) = (OnceLock::from(Tree::from(tree)), OnceLock::from(surfaces));
-        let shape = MeshShape { tree, surfaces, center: offset, ..MeshShape::of_checked(mesh, unit_mass, report) };
-        from.0.is_empty().then_some((shape, offset))
+        let shape = MeshShape { tree, surfaces, center, ..MeshShape::of_checked(mesh, unit_mass, report) };
+        from.0.is_empty().then_some(shape)
     }
 }
 
@@ -91,7 +91,7 @@ impl TriMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::TreeSettings;
+    use crate::{TreeSettings, Vec3};
 
     fn shapes() -> Vec<TriMesh> {
         let ball = |x: f64| TriMesh::icosphere(0.5, 2).translated(&Vec3::new(x, 0.1, 0.0));
@@ -105,10 +105,10 @@ mod tests {
     #[test]
     fn bytes_give_the_same_shape_back() {
         for mesh in shapes() {
-            let (shape, offset) = MeshShape::new(mesh, &TreeSettings::octree()).unwrap();
-            let (read, its_offset) = MeshShape::of_bytes(&shape.to_bytes(&offset)).unwrap();
+            let shape = MeshShape::new(mesh, &TreeSettings::octree()).unwrap();
+            let read = MeshShape::of_bytes(&shape.to_bytes()).unwrap();
             // every number of every part, as text that tells all bits apart
-            assert_eq!((format!("{read:?}"), its_offset), (format!("{shape:?}"), offset));
+            assert_eq!(format!("{read:?}"), format!("{shape:?}"));
             assert!(!shape.surfaces().is_empty());
         }
     }
@@ -116,8 +116,8 @@ mod tests {
     /// Whatever stands in a file whose checksum is right: a shape that can be asked, or none.
     #[test]
     fn no_bytes_are_a_panic() {
-        let (shape, offset) = MeshShape::new(shapes().remove(0), &TreeSettings::octree()).unwrap();
-        let good = shape.to_bytes(&offset);
+        let shape = MeshShape::new(shapes().remove(0), &TreeSettings::octree()).unwrap();
+        let good = shape.to_bytes();
         for end in (0..good.len()).step_by(13).chain([good.len() - 1]) {
             assert!(MeshShape::of_bytes(&good[..end]).is_none(), "cut at {end}");
         }
@@ -125,7 +125,7 @@ mod tests {
         for at in (0..300).chain((300..good.len()).step_by(41)) {
             let mut bad = good.clone();
             bad[at] = [0, 1, 0x7f, 0xff][at % 4];
-            if let Some((read, _)) = MeshShape::of_bytes(&bad) {
+            if let Some(read) = MeshShape::of_bytes(&bad) {
                 read.surfaces().iter().for_each(|s| _ = s.field.nearest(&Vec3::new(1.0, 0.1, 0.2)));
             }
         }

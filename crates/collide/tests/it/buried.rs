@@ -17,7 +17,7 @@ fn boxes(all: &[(Vec3, Vec3)]) -> TriMesh {
 
 /// The shape, and the pose that puts the mesh's own origin at the world's.
 fn shape(mesh: &TriMesh) -> (Shape, Pose) {
-    let shape = Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap().0;
+    let shape = Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap();
     let Shape::Mesh(made) = &shape else { panic!("no mesh") };
     let offset = mesh.aabb().min - made.mesh().aabb().min;
     (shape, Pose::from_parts(offset.into(), Default::default()))

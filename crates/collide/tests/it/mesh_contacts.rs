@@ -20,7 +20,7 @@ struct Both {
 fn solid(name: &'static str, mesh: TriMesh) -> Both {
     // about 1 m across, whatever the file's unit
     let scale = 1.0 / mesh.diagonal();
-    let (ours, _) = Shape::mesh(mesh.scaled(scale), &TreeSettings::octree()).unwrap();
+    let ours = Shape::mesh(mesh.scaled(scale), &TreeSettings::octree()).unwrap();
     let Shape::Mesh(shape) = &ours else { panic!("{name} is no mesh") };
     let vertices = shape.mesh().vertices.iter().map(vector).collect();
     let theirs = Box::new(ParryMesh::new(vertices, shape.mesh().triangles.clone()).unwrap());
@@ -110,7 +110,7 @@ fn tree_contacts_agree_with_the_distance_to_the_mesh() {
 
 #[test]
 fn a_ring_hangs_on_a_peg_through_its_hole_without_contact() {
-    let (ring, _) = Shape::mesh(TriMesh::torus(1.0, 0.25, 64, 32), &TreeSettings::octree()).unwrap();
+    let ring = Shape::mesh(TriMesh::torus(1.0, 0.25, 64, 32), &TreeSettings::octree()).unwrap();
     let peg = Shape::capsule(0.6, 2.0).unwrap();
     let here = Pose::identity();
     assert!(ask(&ring, &here, &peg, &here, 0.0).is_empty(), "the hole is 0.75 wide");
@@ -123,7 +123,7 @@ fn a_ring_hangs_on_a_peg_through_its_hole_without_contact() {
 
 #[test]
 fn a_box_mesh_lies_flat_on_a_wide_base() {
-    let (shape, _) = Shape::mesh(TriMesh::box_(Vec3::new(0.5, 0.5, 0.25)), &TreeSettings::octree()).unwrap();
+    let shape = Shape::mesh(TriMesh::box_(Vec3::new(0.5, 0.5, 0.25)), &TreeSettings::octree()).unwrap();
     let error = shape.tree().unwrap().outward_error();
     let found = ask(&shape, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.005);
     assert!((4..=9).contains(&found.len()), "{found:?}");
@@ -154,10 +154,15 @@ fn a_pin_stands_upright_on_its_base() {
         (0.015, 0.375),
         (0.0, 0.381),
     ];
-    let (pin, offset) = Shape::mesh(TriMesh::lathe(&profile, 32).unwrap(), &TreeSettings::octree()).unwrap();
+    let pin = Shape::mesh(TriMesh::lathe(&profile, 32).unwrap(), &TreeSettings::octree()).unwrap();
     let error = pin.tree().unwrap().outward_error();
-    let found =
-        ask(&pin, &Pose::translation(0.0, 0.0, offset.z + error), &Shape::half_space(), &Pose::identity(), 0.001);
+    let found = ask(
+        &pin,
+        &Pose::translation(0.0, 0.0, pin.center_of_mass().z + error),
+        &Shape::half_space(),
+        &Pose::identity(),
+        0.001,
+    );
     let standing: Vec<_> = found.iter().filter(|c| c.gap.abs() < 1e-9).collect();
     assert!(standing.len() >= 3, "{found:?}");
     // its support reaches at least 15 mm from the axis in every direction
@@ -173,11 +178,17 @@ fn a_ball_lies_in_a_cup() {
     let cup = TriMesh::lathe(&[(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.5, 2.0), (1.5, 0.5), (0.0, 0.5)], 64).unwrap();
     let expected = std::f64::consts::PI * (4.0 * 2.0 - 2.25 * 1.5);
     assert!((cup.signed_volume() / expected - 1.0).abs() < 2e-3);
-    let (cup, offset) = Shape::mesh(cup, &TreeSettings::octree()).unwrap();
+    let cup = Shape::mesh(cup, &TreeSettings::octree()).unwrap();
     let error = cup.tree().unwrap().outward_error();
     let ball = Shape::sphere(0.4).unwrap();
     let at_height = |above: f64| {
-        ask(&ball, &Pose::translation(0.3, 0.2, 0.5 + 0.4 + above - offset.z), &cup, &Pose::identity(), 0.0)
+        ask(
+            &ball,
+            &Pose::translation(0.3, 0.2, 0.5 + 0.4 + above - cup.center_of_mass().z),
+            &cup,
+            &Pose::identity(),
+            0.0,
+        )
     };
     let touching = at_height(0.0);
     assert!(
@@ -305,16 +316,16 @@ fn same_input_gives_the_same_bits() {
     let first = run();
     assert!(first.len() > 1000);
     assert_eq!(first, run());
-    let rebuilt = Shape::mesh(TriMesh::torus(1.0, 0.3, 48, 24), &TreeSettings::octree()).unwrap().0;
-    let again = Shape::mesh(TriMesh::torus(1.0, 0.3, 48, 24), &TreeSettings::octree()).unwrap().0;
+    let rebuilt = Shape::mesh(TriMesh::torus(1.0, 0.3, 48, 24), &TreeSettings::octree()).unwrap();
+    let again = Shape::mesh(TriMesh::torus(1.0, 0.3, 48, 24), &TreeSettings::octree()).unwrap();
     assert_eq!(rebuilt.tree(), again.tree());
 }
 
 #[test]
 fn mesh_shape_is_moved_to_its_centre_of_mass() {
     let mesh = TriMesh::box_(Vec3::new(0.1, 0.2, 0.3)).translated(&Vec3::new(5.0, 6.0, 7.0));
-    let (shape, offset) = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
-    assert!((offset - Vec3::new(5.0, 6.0, 7.0)).norm() < 1e-12);
+    let shape = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
+    assert!((shape.center_of_mass() - Vec3::new(5.0, 6.0, 7.0)).norm() < 1e-12);
     let mass = shape.mass_properties(1000.0).unwrap();
     let expected = Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)).unwrap().mass_properties(1000.0).unwrap();
     assert!((mass.mass - 48.0).abs() < 1e-9 && mass.center_of_mass == Vec3::zeros());

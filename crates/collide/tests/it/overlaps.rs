@@ -4,7 +4,7 @@
 use tumble_collide::{Contact, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
 
 fn mesh(mesh: TriMesh) -> Shape {
-    Shape::mesh(mesh, &TreeSettings::octree()).unwrap().0
+    Shape::mesh(mesh, &TreeSettings::octree()).unwrap()
 }
 
 fn cube() -> Shape {

@@ -43,7 +43,7 @@ fn rays_agree_with_parry() {
         ),
         // parry's stands on y
         (Shape::cylinder(0.4, 0.5).unwrap(), Box::new(Cylinder::new(0.5, 0.4))),
-        (Shape::mesh(sharp, &TreeSettings::octree()).unwrap().0, Box::new(Cuboid::new(Vector::new(0.3, 0.5, 0.7)))),
+        (Shape::mesh(sharp, &TreeSettings::octree()).unwrap(), Box::new(Cuboid::new(Vector::new(0.3, 0.5, 0.7)))),
     ];
     for (index, (shape, theirs)) in cases.iter().enumerate() {
         let mut met = 0;

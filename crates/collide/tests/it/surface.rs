@@ -21,7 +21,7 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> 
 }
 
 fn mesh_box(x: f64, y: f64, z: f64) -> Shape {
-    Shape::mesh(TriMesh::box_(Vec3::new(x, y, z)), &TreeSettings::octree()).unwrap().0
+    Shape::mesh(TriMesh::box_(Vec3::new(x, y, z)), &TreeSettings::octree()).unwrap()
 }
 
 fn turned(z: f64, angle: f64) -> Pose {
@@ -182,7 +182,7 @@ fn a_cylinder_on_a_block_touches_as_on_a_plane() {
 #[test]
 fn a_ball_in_a_groove_touches_both_sides() {
     // two blocks turned by 45° make a groove; here one concave mesh would do as well: a ring's hole and a ball in it
-    let (ring, _) = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree()).unwrap();
+    let ring = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree()).unwrap();
     let ball = Shape::sphere(0.9).unwrap();
     // the ball sits on the hole: its centre is (0.9 + 0.25) from the tube's middle circle
     let height = (1.15_f64.powi(2) - 1.0).sqrt();
@@ -212,7 +212,7 @@ fn the_round_side_of_a_cylinder_beside_an_edge_is_not_lost() {
 #[test]
 fn a_cylinder_across_the_straight_lines_of_a_smooth_surface_meets_their_middle() {
     // lines 0.2 m long that turn by 2π/1000: their ends are 41 mm from the cylinder that touches their middles
-    let (drum, _) = Shape::mesh(TriMesh::cylinder(1.0, 0.1, 1000), &TreeSettings::octree()).unwrap();
+    let drum = Shape::mesh(TriMesh::cylinder(1.0, 0.1, 1000), &TreeSettings::octree()).unwrap();
     let across = Quat::from_scaled_axis(Vec3::x() * FRAC_PI_2);
     for gap in [1e-3, 1e-5, -1e-5] {
         let pose = Pose::from_parts(Vec3::new(1.1 + gap, 0.0, 0.0).into(), across);
@@ -232,7 +232,7 @@ fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
     // the triangles of either end, then two per side
     let mut triangles = vec![[0, 4, 1], [1, 4, 3], [1, 3, 2], [5, 6, 9], [6, 8, 9], [6, 7, 8]];
     triangles.extend((0..5_u32).flat_map(|n| [[n, (n + 1) % 5, n + 5], [(n + 1) % 5, (n + 1) % 5 + 5, n + 5]]));
-    let trough = Shape::mesh(TriMesh { vertices, triangles }, &TreeSettings::octree()).unwrap().0;
+    let trough = Shape::mesh(TriMesh { vertices, triangles }, &TreeSettings::octree()).unwrap();
     let cylinder = Shape::cylinder(r, 0.15).unwrap();
     // the mesh's frame is its centre of mass
     let Shape::Mesh(shape) = &trough else { panic!("no mesh") };
@@ -255,7 +255,7 @@ fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
 #[test]
 fn contacts_do_not_depend_on_what_was_asked_before() {
     let shapes = [
-        Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap().0,
+        Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap(),
         mesh_box(0.3, 0.2, 0.1),
         Shape::cylinder(0.2, 0.3).unwrap(),
         Shape::capsule(0.1, 0.2).unwrap(),
@@ -306,7 +306,7 @@ fn dented_block() -> Shape {
     let edges: Vec<[u32; 2]> = side.iter().flat_map(|t| (0..3).map(|k| [t[k], t[(k + 1) % 3]])).collect();
     let rim = edges.iter().filter(|[a, b]| !edges.contains(&[*b, *a]));
     mesh.triangles.extend(rim.map(|[a, b]| [*a, *b, middle]));
-    Shape::mesh(mesh, &TreeSettings::octree()).unwrap().0
+    Shape::mesh(mesh, &TreeSettings::octree()).unwrap()
 }
 
 /// The same bar and a block without a dent, both convex: the least way out is over the block's upper side, `1 + 0.4`, or `1 + 0.3` for the raised one.

@@ -35,7 +35,7 @@ struct Body {
 
 fn solid(name: &'static str, mesh: TriMesh) -> Body {
     let scale = 1.0 / mesh.diagonal();
-    let (ours, _) = Shape::mesh(mesh.scaled(scale), &TreeSettings::octree()).unwrap();
+    let ours = Shape::mesh(mesh.scaled(scale), &TreeSettings::octree()).unwrap();
     let Shape::Mesh(shape) = &ours else { panic!("{name} is no mesh") };
     let mesh = shape.mesh();
     let vertices = mesh.vertices.iter().map(vector).collect();

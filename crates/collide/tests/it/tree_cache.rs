@@ -56,8 +56,8 @@ fn a_tree_from_the_cache_has_the_bits_of_a_fresh_one() {
     assert_eq!(folder.files().len(), 1);
     let off = cached(&ring(), &TreeCache::off());
     assert_eq!((off.found, off.note, off.tree), (false, None, fresh));
-    let (shape, _, note) = Shape::mesh_cached(ring(), &settings(), &folder.cache()).unwrap();
-    let (plain, _) = Shape::mesh(ring(), &settings()).unwrap();
+    let (shape, note) = Shape::mesh_cached(ring(), &settings(), &folder.cache()).unwrap();
+    let plain = Shape::mesh(ring(), &settings()).unwrap();
     assert_eq!((shape.tree(), note), (plain.tree(), None));
     // shapes have files of their own
     assert_eq!(folder.files().len(), 2);

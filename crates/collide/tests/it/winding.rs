@@ -240,7 +240,7 @@ fn shell_in_a_shell_is_a_cavity_or_buried_by_its_winding() {
     near(report.volume, big.mass - small.mass, 1e-12, "hollow");
     assert_eq!((report.turned, report.turned_shells, report.shells, report.crossing_faces), (false, 0, 2, 0));
     let distance = MeshDistance::new(&hollow);
-    let shape = Shape::mesh(hollow, &TreeSettings { depth: 3, ..TreeSettings::octree() }).unwrap().0;
+    let shape = Shape::mesh(hollow, &TreeSettings { depth: 3, ..TreeSettings::octree() }).unwrap();
     let mass = shape.mass_properties(1.0).unwrap();
     near(mass.mass, big.mass - small.mass, 1e-12, "mass");
     // parallel axes about the common centre

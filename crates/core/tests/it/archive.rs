@@ -11,7 +11,7 @@ fn everything(stepper: &str) -> World {
     world.set_settings(settings).unwrap();
     ground(&mut world, 0.3, 0.4);
     let gone = world.add(RigidBody::with_mass("gone", sphere(0.1), 1.0).unwrap()).unwrap();
-    let (mesh, _) = Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap();
+    let mesh = Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap();
     let shapes = [sphere(0.1), cube(0.2), Shape::capsule(0.1, 0.1).unwrap(), Shape::cylinder(0.1, 0.1).unwrap(), mesh];
     let ids: Vec<ObjectId> = (0..10)
         .map(|i| {
@@ -82,7 +82,7 @@ fn an_archived_world_goes_the_same_way() {
 
 #[test]
 fn shared_shapes_are_written_once_and_shared_again() {
-    let (mesh, _) = Shape::mesh(TriMesh::torus(0.3, 0.1, 48, 24), &TreeSettings::octree()).unwrap();
+    let mesh = Shape::mesh(TriMesh::torus(0.3, 0.1, 48, 24), &TreeSettings::octree()).unwrap();
     let of = |count: usize| {
         let mut world = world(STEPPERS[0], 1.0 / 240.0);
         (0..count).for_each(|i| {

@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
 fn mesh_cube(edge: f64) -> Shape {
-    Shape::mesh(TriMesh::box_(Vec3::repeat(0.5 * edge)), &TreeSettings::octree()).unwrap().0
+    Shape::mesh(TriMesh::box_(Vec3::repeat(0.5 * edge)), &TreeSettings::octree()).unwrap()
 }
 
 fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
@@ -82,7 +82,7 @@ fn a_cylinder_stands_and_rolls_on_a_block() {
     for stepper in STEPPERS {
         for block in [
             Shape::cuboid(Vec3::new(5.0, 1.0, 0.1)).unwrap(),
-            Shape::mesh(TriMesh::box_(Vec3::new(5.0, 1.0, 0.1)), &TreeSettings::octree()).unwrap().0,
+            Shape::mesh(TriMesh::box_(Vec3::new(5.0, 1.0, 0.1)), &TreeSettings::octree()).unwrap(),
         ] {
             let mut world = world(stepper, 1.0 / 60.0);
             world.add_static(RigidBody::fixture("floor", block).surface(0.0, 0.5)).unwrap();

@@ -9,7 +9,7 @@ use tumble_core::*;
 fn corner_cube() -> (Shape, Vec<Vec3>) {
     let mesh = TriMesh::box_(Vec3::repeat(0.5)).translated(&Vec3::repeat(0.5));
     let vertices = mesh.vertices.clone();
-    (Shape::mesh(mesh, &TreeSettings::octree()).unwrap().0, vertices)
+    (Shape::mesh(mesh, &TreeSettings::octree()).unwrap(), vertices)
 }
 
 fn turned() -> Pose {

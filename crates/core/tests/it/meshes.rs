@@ -28,7 +28,7 @@ fn comes_to_rest(name: &str, mesh: &TriMesh, turn: Vec3, height: f64, seconds: f
 fn falls(mode: ContactMode, rest: f64, name: &str, mesh: &TriMesh, turn: Vec3, height: f64, seconds: f64) {
     for stepper in STEPPERS {
         let mut fastest = 0.0f64;
-        let (shape, _) = Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap();
+        let shape = Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap();
         let (error, Shape::Mesh(solid)) = (shape.tree().unwrap().outward_error(), &shape) else {
             unreachable!("made as a mesh")
         };

@@ -5,7 +5,7 @@ use tumble_core::collide::{self, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3}
 use tumble_core::*;
 
 fn mesh(mesh: TriMesh) -> Shape {
-    Shape::mesh(mesh, &TreeSettings::octree()).unwrap().0
+    Shape::mesh(mesh, &TreeSettings::octree()).unwrap()
 }
 
 fn mesh_cube() -> Shape {

@@ -31,7 +31,7 @@ fn a_standing_cylinder_does_not_creep() {
 /// Two mesh balls of 0.1 m that fly at each other at 50 m/s each, 0.8 m a step, `beside` each other; A and B.
 fn fly(beside: f64) -> (World, [ObjectId; 2]) {
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
-    let (shape, _) = Shape::mesh(TriMesh::icosphere(0.1, 2), &TreeSettings::octree()).unwrap();
+    let shape = Shape::mesh(TriMesh::icosphere(0.1, 2), &TreeSettings::octree()).unwrap();
     let ids = [(-1.0, 0.0), (1.0, beside)].map(|(x, y)| {
         let ball = RigidBody::with_mass(format!("ball {x}"), shape.clone(), 1.0).unwrap().surface(1.0, 0.0);
         world.add(ball.at(Pose::translation(x, y, 0.0)).moving(Vec3::new(-50.0 * x, 0.0, 0.0), Vec3::zeros())).unwrap()

@@ -16,7 +16,7 @@ fn isometry(pose: &record::Pose) -> Pose {
 fn a_recorded_mesh_stands_where_its_file_says() {
     let mesh = TriMesh::box_(Vec3::repeat(0.5)).translated(&Vec3::repeat(0.5));
     let file = mesh.vertices.clone();
-    let (shape, _) = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
+    let shape = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
     let frame = Pose::from_parts(Vec3::new(3.0, -2.0, 5.0).into(), UnitQuaternion::from_euler_angles(0.3, -0.8, 1.9));
     let mut world = World::new(Settings::default()).unwrap();
     world.add(RigidBody::with_mass("cube", shape, 1.0).unwrap().at(frame)).unwrap();

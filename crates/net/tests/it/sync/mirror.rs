@@ -162,7 +162,7 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
         vertices: [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3::from).to_vec(),
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
     };
-    let (shape, _) = Shape::mesh(tetrahedron, &TreeSettings::octree()).unwrap();
+    let shape = Shape::mesh(tetrahedron, &TreeSettings::octree()).unwrap();
     let body = |name: &str, shape: &Shape| RigidBody::with_mass(name, shape.clone(), 1.0).unwrap();
     let build = || {
         let mut world = scene();
@@ -185,7 +185,7 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
         other = mesh.mesh().clone();
         other.vertices.iter_mut().for_each(|v| *v *= 2.0);
     }
-    let (other, _) = Shape::mesh(other, &TreeSettings::octree()).unwrap();
+    let other = Shape::mesh(other, &TreeSettings::octree()).unwrap();
     world.add(body("boulder", &other)).unwrap();
     publisher.publish(&world, &viewer(0), 2).unwrap();
     mirror.apply_snapshot(&publisher.snapshot()).unwrap();
