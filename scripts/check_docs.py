@@ -3,7 +3,7 @@
 
 Looks at every file that git tracks or would track, and prints each fault as `file:line: what`. The exit code is 1 if there is any.
 
-- Paths, links, commands and names of tests in pages exist; no path of one machine stands anywhere.
+- Paths, links, commands and names of tests in pages exist, and so do types named in ARCHITECTURE.md. No path of one machine stands anywhere.
 - No word that `docs/glossary.md` rules out stands in a page, a comment, a string of Rust or Python, a TOML file or a script.
 - No sentence of the README, ARCHITECTURE.md, CONTRIBUTING.md or `docs/` has more than 45 words.
 
@@ -34,6 +34,8 @@ GLOSSARY = "docs/glossary.md"
 WORDS_HEADING = "## Words that are not used"
 LONGEST = 45  # words in a sentence
 BOOK = re.compile(r"(README|ARCHITECTURE|CONTRIBUTING)\.md|docs/[\w.-]+\.md")
+# Pages whose names of types and functions must occur in the sources.
+NAMING = ("ARCHITECTURE.md", "CONTRIBUTING.md")
 # These hold former names and words of others by their nature.
 FORMER = ("scripts/migrate_0_1.py", "scripts/check_docs.py", "crates/py/tests/test_check_docs.py")
 # Files and folders whose words are not clean yet. Remove an entry when `--todo` counts no fault in it.
@@ -255,6 +257,15 @@ def check_tests(name, lines, functions, faults):
                 faults.append(f"{name}:{number}: there is no test {code}")
 
 
+def check_names(name, lines, identifiers, faults):
+    """Refuses names of types and functions in backticks that occur in no source file."""
+    for number, line in enumerate(without_fences(lines), 1):
+        for code in CODE.findall(line):
+            if re.fullmatch(r"[A-Z]\w*[a-z]\w*(::\w+)*", code):
+                missing = [part for part in code.split("::") if part not in identifiers]
+                faults.extend(f"{name}:{number}: `{code}`: there is no {part} in the sources" for part in missing)
+
+
 def check_rust(name, lines, pages, faults):
     """Refuses Rust on a page that does not stand, line for line, in the documentation of a crate, where it is compiled and run."""
     for block in re.findall(r"^```rust\n(.*?)^```", "\n".join(lines) + "\n", re.S | re.M):
@@ -298,6 +309,7 @@ def main():
     enum = re.search(r"pub enum Command \{(.*?)\n\}", source, re.S)
     subcommands = {word.lower() for word in re.findall(r"^    (\w+)", enum.group(1), re.M)} if enum else set()
     sources = [text for text in (text_of(name) for name in names if name.endswith(".rs")) if text]
+    identifiers = {found for text in sources for found in re.findall(r"\b[A-Za-z_]\w*", text)}
     functions = {found for text in sources for found in re.findall(r"\bfn (\w+)", text)}
     pages = [documentation(text) for text in sources]
     rules = rules_of((ROOT / GLOSSARY).read_text())
@@ -317,6 +329,8 @@ def main():
             check_words(name, text, rules, found)
         if BOOK.fullmatch(name):
             check_sentences(name, text, found)
+        if name in NAMING:
+            check_names(name, lines, identifiers, found)
         if name.endswith(".md"):
             pages_checked += 1
             check_links(name, lines, faults)

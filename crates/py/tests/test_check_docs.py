@@ -90,3 +90,9 @@ def test_shorter_sentences_pass():
     assert sentences("```sh\n" + "word " * 60 + "\n```") == []
     assert sentences("\n".join("- " + "word " * 30 for _ in range(3))) == []
     assert sentences("[" + "word " * 40 + "](" + "a/" * 60 + ")") == []
+
+
+def test_a_name_that_is_in_no_source_is_found():
+    faults = []
+    check_docs.check_names("ARCHITECTURE.md", ["`World::step` and `World::leap`", "`Wurld`, `x`, `a b`"], {"World", "step"}, faults)
+    assert [fault.split(":")[1] for fault in faults] == ["1", "2"]
