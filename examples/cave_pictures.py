@@ -1,4 +1,4 @@
-"""What the screens of a CAVE show: each facet by itself, all of them unfolded, and what tells them from a plain camera.
+"""The pictures of the screens of a CAVE: each facet by itself, all of them unfolded, and their difference from a plain camera.
 
     python examples/cave_pictures.py [FOLDER]
 """
@@ -27,7 +27,7 @@ for name, picture in pictures.items():
     print(f"{name:<6} {picture.shape[1]} x {picture.shape[0]} pixels")
 tumble.save_png(folder / "unfolded.png", world.render(800, 600, cave="cube4"))
 
-# neighbouring screens meet at an edge: there both must show the same
+# neighboring screens meet at an edge: there both must show the same
 left, front = (pictures[name][..., :3].astype(float) for name in ("left", "front"))
 seam = np.abs(left[:, -1] - front[:, 0]).mean()
 usual = np.abs(left[:, -1] - front[:, front.shape[1] // 2]).mean()

@@ -1,10 +1,10 @@
-"""Control by sampling: a robot arm leads its paddle past a post to a point, by trying many futures at each turn.
+"""Control by sampling: a robot arm moves its paddle past a post to a point, by simulating many futures at each turn.
 
     python examples/rollout_control.py
 
-Model predictive path integral control (Williams et al., 2017). The futures are forks of the world, contacts included, that run on all cores. What is
-sampled are accelerations: inverse dynamics makes torques of them, which hold the arm against gravity too. Torques sampled about zero would let every
-future sag, and the arm would stall below its goal.
+Model predictive path integral control (Williams et al., 2017). The futures are forks of the world, contacts included, that run on all cores. The
+samples are accelerations: inverse dynamics turns them into torques, which also hold the arm against gravity. With torques sampled about zero every
+future would sag, and the arm would stall below its goal.
 """
 
 from pathlib import Path
@@ -26,7 +26,7 @@ start = 13  # of the arm's numbers in the state: the post has 13
 
 
 def torques(accelerations):
-    """Of a batch, shape (…, 6): what accelerates the arm so from where it is, in place of its present speed, which it gives up within half a second."""
+    """Torques of a batch, shape (…, 6), that accelerate the arm from its present position and let its present speed decay within half a second."""
     wanted = (accelerations - 2 * arm.qd).reshape(-1, 6)
     return np.clip(arm.inverse_dynamics(qd=np.zeros(6), qdd=wanted), -STRONGEST, STRONGEST).reshape(accelerations.shape)
 

@@ -57,7 +57,7 @@ install_packages() {
     if ! command -v apt-get >/dev/null 2>&1; then
         echo "There is no apt-get here; install by hand what these Debian packages hold: $*" >&2
     elif [ "$(id -u)" -ne 0 ] && ! command -v sudo >/dev/null 2>&1; then
-        echo "Neither root nor sudo; as root, run: apt-get install $*" >&2
+        echo "There is no root or sudo; as root, run: apt-get install $*" >&2
     else
         echo "installing $*"
         apt install --no-install-recommends "$@" && return

@@ -19,7 +19,7 @@ STUB = Path(__file__).resolve().parents[1] / "crates/py/python/tumble/_native.py
 
 
 def documented(source: str, module: Any) -> str:
-    """The stub's text with the docstrings of the module in place of its own."""
+    """Returns the stub's text with the docstrings of the module."""
     lines = source.splitlines()
     for node, doc in reversed(definitions(ast.parse(source), module)):
         first = node.body[0]

@@ -1,11 +1,11 @@
-"""What Python costs: stepping against Rust, forces in Python, rollouts on two cores against one, setting the state, property reads.
+"""The cost of Python: stepping against Rust, forces in Python, rollouts on two cores against one, setting the state, property reads.
 
     cargo build --release -p tumble --example steps && target/py-tests/bin/python benches/python/costs.py [NAME ...]
 
-Needs the package installed (`scripts/test_python.sh` leaves it in target/py-tests). What is compared takes turns of some milliseconds, in changing order, and is
-measured as processor time of the thread. Each pair of turns gives a ratio, and each round, which begins with worlds and processes anew since where memory lies
-matters too, the median of its ratios; told is the median of the rounds with the interval that holds it at 95 %. Other work on the machine changes little.
-With NAMEs only what begins with one of them is run.
+Needs the package installed (`scripts/test_python.sh` leaves it in target/py-tests). The programs take turns of some milliseconds, in changing order, measured as
+processor time of the thread. Each pair of turns gives a ratio, and each round the median of its ratios. A round begins with new worlds and processes, because the
+place of memory matters too. The result is the median of the rounds with its 95 % interval. Other work on the machine changes little.
+With NAMEs only the programs that begin with one of them run.
 """
 
 import os
@@ -122,7 +122,7 @@ def stepping():
 
 
 class Child:
-    """A program that steps a scene as it is told: in Rust, of the same crates in the same profile, or in Python."""
+    """A program that steps a scene on command: in Rust, of the same crates in the same profile, or in Python."""
 
     def __init__(self, scene, words):
         self.child = subprocess.Popen([*words, scene], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)

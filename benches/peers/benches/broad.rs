@@ -104,7 +104,7 @@ fn all(kind: Kind, n: usize) -> [Cost; 3] {
     })
 }
 
-/// So many that the clock's ticks do not show.
+/// Enough that the resolution of the clock does not matter.
 fn steps(n: usize) -> usize {
     (2_000_000 / n).clamp(60, 1000)
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo bench --bench narrow                                the table
-//! cargo bench --bench narrow -- --tumble 2000               the surface mode alone, so many rounds, for a profiler
+//! cargo bench --bench narrow -- --tumble 2000               the surface mode alone, that number of rounds, for a profiler
 //! ```
 //!
 //! Two tori, and two bunnies where the public meshes are (`TUMBLE_MESHES`, or a `shared/meshes` above), each 0.1 m in diagonal. They are turned at
@@ -20,13 +20,13 @@ use std::path::PathBuf;
 use tumble_collide::{ContactMode, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in};
 use tumble_peers::clock::Clock;
 
-/// Margin, and what the bodies are apart or overlap by, metres.
+/// Margin, and what the bodies are apart or overlap by, meters.
 const MARGIN: f64 = 1e-3;
 /// Poses per row, of which the median counts.
 const POSES: u64 = 5;
 /// Poses of a row in which they change.
 const CHANGING: u64 = 256;
-/// Steps in which a body comes near, metres; in the end it touches to this by two to the power of this.
+/// Steps in which a body comes near, meters; in the end it touches to this by two to the power of this.
 const STEP: f64 = 2e-3;
 const HALVINGS: u32 = 24;
 /// Seconds of CPU that one figure takes, about.
@@ -162,7 +162,7 @@ fn moved(pose: &Pose, way: &Vec3, into: f64) -> Pose {
     Pose::from_parts((pose.translation.vector - way * into).into(), pose.rotation)
 }
 
-/// The `n`th pose of the first body where it touches the second, moved `into` it, metres.
+/// The `n`th pose of the first body where it touches the second, moved `into` it, meters.
 fn touching(body: &Body, n: u64, into: f64) -> Pose {
     let (mut pose, way) = far(n);
     // parry's distance says how far the way is free

@@ -14,7 +14,7 @@ impl Clock {
         Clock { since: Instant::now() }
     }
 
-    /// Seconds of CPU this thread has had; of wall time where the system does not tell.
+    /// Returns the CPU seconds of this thread, or wall time if the system has no such clock.
     pub fn seconds(&self) -> f64 {
         on_cpu().unwrap_or_else(|| self.since.elapsed().as_secs_f64())
     }

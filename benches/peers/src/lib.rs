@@ -21,7 +21,7 @@ pub const DENSITY: f64 = 1000.0;
 pub trait Engine {
     /// Advances by one frame of [`DT`].
     fn step(&mut self);
-    /// Centre of body `i` (in the order of the scene), metres.
+    /// Center of body `i` (in the order of the scene), meters.
     fn center(&self, i: usize) -> [f64; 3];
     /// What the engine says of its last solve, m/s; `None` if it says nothing.
     fn residual(&self) -> Option<f64> {

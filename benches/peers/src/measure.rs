@@ -14,10 +14,10 @@ const TO: f64 = 4.0;
 pub struct Run {
     /// CPU seconds per simulated second.
     pub cpu: f64,
-    /// Worst error of position, metres. Spheres: deepest overlap of two of them or of one with a plane. Boxes: how far the one
+    /// Worst error of position, meters. Spheres: deepest overlap of two of them or of one with a plane. Boxes: how far the one
     /// that sank most is below its place in the pyramid.
     pub penetration: f64,
-    /// Largest movement of a body from `t = 1` to `t = 4 s`, metres.
+    /// Largest movement of a body from `t = 1` to `t = 4 s`, meters.
     pub movement: f64,
     /// Largest residual that the engine reported, m/s.
     pub residual: Option<f64>,

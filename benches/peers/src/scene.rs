@@ -1,8 +1,8 @@
 //! The scenes: equal bodies between planes.
 
-/// Radius of every sphere, metres.
+/// Radius of every sphere, meters.
 pub const RADIUS: f64 = 0.1;
-/// Edge of every box, metres.
+/// Edge of every box, meters.
 pub const EDGE: f64 = 0.4;
 
 /// What all bodies of a scene are.
@@ -17,7 +17,7 @@ pub enum Body {
 /// A half-space: everything with `(p − point)·normal ≤ 0` is solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
-    /// A point of its surface, metres.
+    /// A point of its surface, meters.
     pub point: [f64; 3],
     /// Outward unit normal.
     pub normal: [f64; 3],
@@ -30,7 +30,7 @@ pub struct Scene {
     pub name: String,
     /// What the bodies are.
     pub body: Body,
-    /// Where their centres start, metres.
+    /// Where their centers start, meters.
     pub centers: Vec<[f64; 3]>,
     /// The planes.
     pub planes: Vec<Plane>,
@@ -59,7 +59,7 @@ pub fn spheres(n: usize) -> Scene {
     }
 }
 
-/// A wall of cubes on the floor, `rows` at its foot and one at its top, 20 mm between neighbours; 10 rows are 55 cubes, 20 are 210.
+/// A wall of cubes on the floor, `rows` at its foot and one at its top, 20 mm between neighbors; 10 rows are 55 cubes, 20 are 210.
 pub fn pyramid(rows: usize) -> Scene {
     let row = |k: usize| {
         let count = rows - k;

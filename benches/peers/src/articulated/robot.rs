@@ -7,13 +7,13 @@ pub struct Part {
     pub parent: Option<usize>,
     /// How it moves.
     pub motion: Motion,
-    /// Joint's origin in the parent, metres.
+    /// Joint's origin in the parent, meters.
     pub at: [f64; 3],
     /// Turn of the joint's axes about the parent's x, y and z in this order (URDF's `rpy`), rad.
     pub turn: [f64; 3],
     /// Mass, kg.
     pub mass: f64,
-    /// Centre of mass, metres.
+    /// Center of mass, meters.
     pub center: [f64; 3],
     /// Principal moments of inertia about it, link axes, kg·m².
     pub moments: [f64; 3],
@@ -48,7 +48,7 @@ impl Robot {
     }
 }
 
-/// Mass, centre and moments of a floating base.
+/// Mass, center and moments of a floating base.
 pub fn base() -> (f64, [f64; 3], [f64; 3]) {
     (12.0, [0.01, -0.02, 0.03], [0.3, 0.5, 0.6])
 }

@@ -3,7 +3,7 @@
 use crate::scene::{RADIUS, Random};
 use tumble_collide::{Aabb, Vec3};
 
-/// Space per ball, an edge in metres: as dense as the piles' start.
+/// Space per ball, an edge in meters: as dense as the piles' start.
 const PITCH: f64 = 0.24;
 
 /// What a crowd is like.
@@ -43,7 +43,7 @@ impl Kind {
 
 /// Boxes, and how they move.
 pub struct Crowd {
-    /// World boxes, metres.
+    /// World boxes, meters.
     pub boxes: Vec<Aabb>,
     /// Whether each moves.
     pub moving: Vec<bool>,

@@ -12,11 +12,11 @@ use rapier3d_f64::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use std::time::Instant;
 use tumble_collide::{Aabb, BroadPhase, SweepAndPrune};
 
-/// Something that is told of boxes and tells pairs.
+/// A broad phase that follows a crowd of boxes and counts its pairs.
 pub trait Follower {
-    /// Takes in all boxes.
+    /// Adds all boxes.
     fn start(&mut self, crowd: &Crowd);
-    /// Takes in those that moved, and tells how many pairs there are now.
+    /// Updates the boxes that moved and returns the number of pairs.
     fn step(&mut self, crowd: &Crowd) -> usize;
 }
 
@@ -57,13 +57,13 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// A margin in metres, the same as tumble's fat boxes have.
+    /// A margin in meters, the same as tumble's fat boxes have.
     pub fn new(margin: f64) -> Tree {
         Tree { tree: Bvh::new(), workspace: BvhWorkspace::default(), margin, pairs: Vec::new(), steps: 0 }
     }
 }
 
-/// The tree's quality is looked after once in so many steps.
+/// Steps between two optimizations of the tree.
 const OPTIMIZED: u32 = 8;
 
 impl Follower for Tree {
@@ -92,8 +92,8 @@ impl Follower for Tree {
     }
 }
 
-/// What nobody can do without who keeps a list of near pairs: every box is written down in 32 bytes, and both boxes of every pair are read. The list stays as it was at the
-/// start, so that all that grows is memory.
+/// The least work of any broad phase that keeps a list of near pairs. It writes every box in 32 bytes and reads both boxes of
+/// every pair. The list stays as it was at the start, so only the memory grows.
 #[derive(Default)]
 pub struct Plain {
     boxes: Vec<[f32; 8]>,
@@ -103,7 +103,7 @@ pub struct Plain {
 }
 
 impl Plain {
-    /// Boxes are near that overlap when grown by a margin in metres.
+    /// Boxes are near if they overlap when grown by a margin, meters.
     pub fn new(margin: f64) -> Plain {
         Plain { margin, ..Plain::default() }
     }
