@@ -4,6 +4,7 @@
 Looks at every file that git tracks or would track, and prints each fault as `file:line: what`. The exit code is 1 if there is any.
 
 - Paths, links, commands and names of tests in pages exist, and so do types named in ARCHITECTURE.md. No path of one machine stands anywhere.
+- No doc comment of Rust begins with "What", "Who", "Whose", "Where" or "Of".
 - No word that `docs/glossary.md` rules out stands in a page, a comment, a string of Rust or Python, a TOML file or a script.
 - No sentence of the README, ARCHITECTURE.md, CONTRIBUTING.md or `docs/` has more than 45 words.
 
@@ -33,6 +34,7 @@ BUILT = {".git", "target", "out", "__pycache__", ".venv"}
 GLOSSARY = "docs/glossary.md"
 WORDS_HEADING = "## Words that are not used"
 LONGEST = 45  # words in a sentence
+HEADLESS = re.compile(r"\s*//[/!]\s+(What|Who|Whose|Where|Of)\s")
 BOOK = re.compile(r"(README|ARCHITECTURE|CONTRIBUTING)\.md|docs/[\w.-]+\.md")
 # Pages whose names of types and functions must occur in the sources.
 NAMING = ("ARCHITECTURE.md", "CONTRIBUTING.md")
@@ -187,6 +189,14 @@ def check_words(name, text, rules, faults):
                     faults.append(f"{name}:{number}: not '{found.group()}' but: {rule.instead}")
 
 
+def check_doc_comments(name, lines, faults):
+    """Refuses doc comments of Rust that begin with a relative clause or a genitive instead of a noun or a verb."""
+    for number, (before, line) in enumerate(zip(["", *lines], lines), 1):
+        found = HEADLESS.match(line)
+        if found and not before.lstrip().startswith(("///", "//!")):
+            faults.append(f"{name}:{number}: a doc comment begins with '{found.group(1)}': begin with a noun, or a verb in the third person")
+
+
 def sentences(text):
     """(line, words) of every sentence of a page: of paragraphs, items of lists, quotes and cells of tables."""
     paragraph, first = [], 0
@@ -321,6 +331,8 @@ def main():
         found = faults if entry is None else todo[entry]
         if not name.startswith(FORMER):
             check_words(name, text, rules, found)
+            if name.endswith(".rs"):
+                check_doc_comments(name, lines, found)
         if BOOK.fullmatch(name):
             check_sentences(name, text, found)
         if name in NAMING:

@@ -125,7 +125,7 @@ fn line(robot: &Robot, rounds: usize, scale: f64) -> String {
     )
 }
 
-/// What the engine asks at each step, µs.
+/// Times the maps that an engine calls at each step, µs.
 fn parts(robot: &Robot, rounds: usize) -> String {
     let mut maps = Maps::new(robot);
     let single = Single::new(robot);

@@ -10,7 +10,7 @@ use tumble_peers::measure::{Run, run, stands};
 use tumble_peers::scene::{Scene, pyramid, spheres};
 use tumble_peers::{Engine, rapier::Rapier, tumble::Tumble};
 
-/// What the command line asks for.
+/// Options of the command line.
 struct Options {
     names: Vec<String>,
     runs: usize,

@@ -23,7 +23,7 @@ pub trait Engine {
     fn step(&mut self);
     /// Center of body `i` (in the order of the scene), meters.
     fn center(&self, i: usize) -> [f64; 3];
-    /// What the engine says of its last solve, m/s; `None` if it says nothing.
+    /// Returns the residual that the engine reports for its last solve, m/s; `None` if it reports none.
     fn residual(&self) -> Option<f64> {
         None
     }

@@ -9,7 +9,7 @@ const FROM: f64 = 1.0;
 /// When it ends, s.
 const TO: f64 = 4.0;
 
-/// What a run showed.
+/// The result of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Run {
     /// CPU seconds per simulated second.

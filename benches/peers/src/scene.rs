@@ -5,7 +5,7 @@ pub const RADIUS: f64 = 0.1;
 /// Edge of every box, meters.
 pub const EDGE: f64 = 0.4;
 
-/// What all bodies of a scene are.
+/// The shape of all bodies of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Body {
     /// A ball of [`RADIUS`].
@@ -28,9 +28,9 @@ pub struct Plane {
 pub struct Scene {
     /// Name on the command line and in the table.
     pub name: String,
-    /// What the bodies are.
+    /// The shape of the bodies.
     pub body: Body,
-    /// Where their centers start, meters.
+    /// Centers at the start, meters.
     pub centers: Vec<[f64; 3]>,
     /// The planes.
     pub planes: Vec<Plane>,

@@ -96,3 +96,10 @@ def test_a_name_that_is_in_no_source_is_found():
     faults = []
     check_docs.check_names("ARCHITECTURE.md", ["`World::step` and `World::leap`", "`Wurld`, `x`, `a b`"], {"World", "step"}, faults)
     assert [fault.split(":")[1] for fault in faults] == ["1", "2"]
+
+
+def test_doc_comments_that_begin_with_a_clause_are_found():
+    faults = []
+    text = "//! What is read.\n\n/// Whatever. What is read\n/// Where it is.\nfn f() {}\n/// Of a body.\n// What for"
+    check_docs.check_doc_comments("some.rs", text.split("\n"), faults)
+    assert [fault.split(":")[1] for fault in faults] == ["1", "6"]

@@ -118,7 +118,7 @@ pub struct Batch<const N: usize> {
     q: Vec<Lanes<N>>,
     v: Vec<Lanes<N>>,
     tau: Vec<Lanes<N>>,
-    /// What came out.
+    /// The accelerations.
     pub qdd: Vec<Lanes<N>>,
 }
 

@@ -6,7 +6,7 @@ use tumble_collide::{Aabb, Vec3};
 /// Space per ball, an edge in meters: as dense as the piles' start.
 const PITCH: f64 = 0.24;
 
-/// What a crowd is like.
+/// The kind of a crowd.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// In a cube, 1 % of a radius per step.

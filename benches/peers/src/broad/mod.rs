@@ -140,7 +140,7 @@ fn theirs(b: &Aabb) -> ParryBox {
     ParryBox::new(corner(&b.min), corner(&b.max))
 }
 
-/// What following a crowd costs.
+/// The cost of following a crowd.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
     /// Microseconds of CPU per step, the motion of the boxes taken off.
