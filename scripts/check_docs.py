@@ -232,6 +232,13 @@ def check_sentences(name, text, faults):
             faults.append(f"{name}:{number}: a sentence of {len(words)} words begins '{' '.join(words[:6])} …'; at most {LONGEST}")
 
 
+def check_sources(name, lines, faults):
+    """Refuses a page that cites a section of the thesis and does not link to the references."""
+    cited = [number for number, line in enumerate(lines, 1) if re.search(r"thesis,? (?:§|fig\.)", line, re.I)]
+    if cited and not any("references.md" in line for line in lines):
+        faults.append(f"{name}:{cited[0]}: the page cites the thesis and does not link to references.md#the-thesis")
+
+
 def check_links(name, lines, faults):
     for number, line in enumerate(without_fences(lines), 1):
         for target in LINK.findall(line):
@@ -335,6 +342,7 @@ def main():
                 check_doc_comments(name, lines, found)
         if BOOK.fullmatch(name):
             check_sentences(name, text, found)
+            check_sources(name, lines, found)
         if name in NAMING:
             check_names(name, lines, identifiers, found)
         if name.endswith(".md"):

@@ -103,3 +103,11 @@ def test_doc_comments_that_begin_with_a_clause_are_found():
     text = "//! What is read.\n\n/// Whatever. What is read\n/// Where it is.\nfn f() {}\n/// Of a body.\n// What for"
     check_docs.check_doc_comments("some.rs", text.split("\n"), faults)
     assert [fault.split(":")[1] for fault in faults] == ["1", "6"]
+
+
+def test_a_page_that_cites_the_thesis_without_a_link_is_found():
+    faults = []
+    check_docs.check_sources("docs/some.md", ["Text.", "See thesis §IV.B."], faults)
+    assert [fault.split(":")[1] for fault in faults] == ["2"]
+    check_docs.check_sources("docs/some.md", ["[thesis](references.md#the-thesis) §IV.B"], faults)
+    assert len(faults) == 1
