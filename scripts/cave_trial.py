@@ -2,7 +2,7 @@
 """Trials of `tumble cave`: the same frames on all facets, kills and freezes at random times, a long run, a recording shown again and cut, nodes with a
 launch command in a network namespace.
 
-usage: scripts/cave_trial.py [--long] [--seed 1] [--quality usual] [--frames N] [--kills N] [--soak N] [--minute N] [TRIAL ...]
+usage: scripts/cave_trial.py [--long] [--seed 1] [--quality default] [--frames N] [--kills N] [--soak N] [--minute N] [TRIAL ...]
 
 Without names the short ones run that need neither root nor another build: frames, kills, freezes, launchers, servers, minute, cuts. --long has the full numbers,
 and all but `namespace` (root) and `viewers` (a build with --features foxglove).
@@ -141,7 +141,7 @@ def spread(values, unit=1e3):
 def frames(options):
     """Five processes, lockstep: 0 missing, duplicated or torn frames; the same numbers and states on all facets."""
     count, folder = options.frames, OUT / "frames"
-    said = tumble("cave", "billiards", "--cave", "cube4", "--seconds", count / 60, "--fast", "--offscreen", "--quality", options.quality, "--stamp", "--wait", 60,
+    said = tumble("cave", "billiards", "--cave", "cube4", "--duration", count / 60, "--no-realtime", "--offscreen", "--quality", options.quality, "--stamp", "--wait", 60,
                   "--log-dir", folder, "--quiet", "--summary", OUT / "frames.json")
     logs = [log(folder, facet) for facet in FACETS]
     numbers = [[line["frame"] for line in lines] for lines in logs]
@@ -159,7 +159,7 @@ def frames(options):
 
 def bowling(options):
     """The pin strike: the worst frame."""
-    tumble("cave", "bowling", "--cave", "cube4", "--seconds", 5, "--fast", "--no-pictures", "--wait", 60, "--quiet", "--summary", OUT / "bowling.json")
+    tumble("cave", "bowling", "--cave", "cube4", "--duration", 5, "--no-realtime", "--no-pictures", "--wait", 60, "--quiet", "--summary", OUT / "bowling.json")
     summary = json.loads((OUT / "bowling.json").read_text())
     for what in ["simulation", "barrier", "frame"]:
         f = summary[what]
@@ -286,7 +286,7 @@ def soak(options):
     folder = OUT / "soak"
     cave = small_cave("soak")
     began = time.time()
-    run = start("cave", options.scene, "--cave", cave, "--no-pictures", "--fast", "--seconds", options.soak / 60, "--log-dir", folder, "--quiet", "--wait", 60,
+    run = start("cave", options.scene, "--cave", cave, "--no-pictures", "--no-realtime", "--duration", options.soak / 60, "--log-dir", folder, "--quiet", "--wait", 60,
                 "--summary", OUT / "soak.json")
     samples = []
     while run.poll() is None:
@@ -317,8 +317,8 @@ def soak(options):
 def minute(options):
     """A recording of a minute, shown twice: the same states and the same pictures, bit by bit."""
     cave, file = small_cave("minute", sync="ready_timeout_ms = 10000\ndrop_timeout_ms = 10000\nconnect_timeout_ms = 60000"), OUT / "minute.mcap"
-    common = ["billiards", "--cave", cave, "--fast", "--offscreen", "--quality", "fastest", "--quiet", "--wait", 60]
-    tumble("cave", *common, "--seconds", options.minute / 60, "--record", file, "--log-dir", OUT / "minute_run")
+    common = ["billiards", "--cave", cave, "--no-realtime", "--offscreen", "--quality", "fastest", "--quiet", "--wait", 60]
+    tumble("cave", *common, "--duration", options.minute / 60, "--record", file, "--log-dir", OUT / "minute_run")
     counts = []
     for k in range(2):
         tumble("replay", file, *common, "--log-dir", OUT / f"minute_{k}", "--summary", OUT / f"minute_{k}.json")
@@ -362,7 +362,7 @@ def frames_by_chunk(data):
 def cuts(options):
     """A recording cut at every structural boundary, beside it, and at random bytes: all frames of chunks that are whole are saved, and none that is not there."""
     file, cut, mended = OUT / "cuts.mcap", OUT / "cut.mcap", OUT / "mended.mcap"
-    tumble("cave", "billiards", "--cave", small_cave("cuts"), "--fast", "--no-pictures", "--quiet", "--wait", 60, "--seconds", 4, "--record", file)
+    tumble("cave", "billiards", "--cave", small_cave("cuts"), "--no-realtime", "--no-pictures", "--quiet", "--wait", 60, "--duration", 4, "--record", file)
     data, rng = file.read_bytes(), random.Random(options.seed)
     chunks = frames_by_chunk(data)
     points = {p for begin, stop, _ in records(data) for p in (begin, begin + 1, begin + 9, (begin + stop) // 2, stop - 1)}
@@ -409,7 +409,7 @@ def namespace(options):
         ip("link", "set", f"tc{os.getpid()}", "up")
         ip("-n", space, "address", "add", "10.78.1.2/24", "dev", "far0")
         ip("-n", space, "link", "set", "far0", "up")
-        said = subprocess.run([TUMBLE, "cave", "billiards", "--cave", cave, "--seconds", str(options.frames / 60), "--fast", "--no-pictures", "--log-dir", folder,
+        said = subprocess.run([TUMBLE, "cave", "billiards", "--cave", cave, "--duration", str(options.frames / 60), "--no-realtime", "--no-pictures", "--log-dir", folder,
                                "--listen", "10.78.1.1:47100", "--wait", "60"], capture_output=True, text=True, timeout=600)
         logs = {facet: [(line["frame"], line["state"]) for line in log(folder, facet)] for facet in FACETS}
         same = said.returncode == 0 and all(lines == logs["front"] and len(lines) == options.frames + 1 for lines in logs.values())

@@ -52,5 +52,5 @@ pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
 pub use tree::{
     Builder, CachedTree, Covering, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree,
-    StageCount, TreeFile, TreeFileError, TreeSettings, grow_to_cover,
+    StageCount, TreeFile, TreeFileError, TreeSettings, align_columns, grow_to_cover,
 };

@@ -13,7 +13,7 @@ use crate::slow;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Pose;
-use tumble::core::{Mode, RigidBody as Rigid};
+use tumble::dynamics::{Mode, RigidBody as Rigid};
 
 /// Where a body of this world is, given as a handle or by name.
 pub fn own_place(shared: &Arc<Shared>, body: &Bound<'_, PyAny>) -> Result<Place> {

@@ -7,7 +7,7 @@ use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Vec3;
-use tumble::core::{Site, Wrench};
+use tumble::dynamics::{Site, Wrench};
 
 /// Numbers of a row: position, quaternion, velocity, angular velocity, acceleration, angular acceleration.
 const WIDTHS: [usize; 6] = [3, 4, 3, 3, 3, 3];

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use tumble::collide::{Pose, Vec3};
-use tumble::core::{ArticulatedBody, Freedom};
+use tumble::dynamics::{ArticulatedBody, Freedom};
 use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A tree of links: a robot, a chain, a skeleton.

@@ -12,7 +12,7 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyInt, PyIterator, PyList};
 use std::sync::Arc;
-use tumble::core::{ArticulatedBody, ObjectId, RigidBody as Rigid, World as Core};
+use tumble::dynamics::{ArticulatedBody, ObjectId, RigidBody as Rigid, World as Core};
 
 /// The bodies of a world in the order in which they were added: a sequence that also takes names, ``world.bodies["ball"]``.
 ///

@@ -13,7 +13,7 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::{Pose, Vec3};
-use tumble::core::{Mode, ObjectId, RigidBody as Rigid, Site, Status};
+use tumble::dynamics::{Mode, ObjectId, RigidBody as Rigid, Site, Status};
 
 /// Where a handle points: a world, an object of it, and the name it had.
 #[derive(Clone)]

@@ -4,7 +4,7 @@ use crate::errors::{Error, Result, caught};
 use crate::inner::Inner;
 use crate::robot::Robot;
 use std::sync::Arc;
-use tumble::core::{ArticulatedBody, Joint};
+use tumble::dynamics::{ArticulatedBody, Joint};
 use tumble::scene::{SceneFile, WorldSettings};
 
 /// What the words and numbers of a constructor make of settings.

@@ -7,7 +7,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyList;
-use tumble::core::{ArticulatedBody, ObjectId};
+use tumble::dynamics::{ArticulatedBody, ObjectId};
 
 /// Fields of a contact: name, format, how many. All have 8 bytes, so that there is no padding.
 const FIELDS: [(&str, &str, usize); 8] = [

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tumble::collide::{Pose, Vec3};
-use tumble::core::ArticulatedBody;
+use tumble::dynamics::ArticulatedBody;
 
 impl Articulation {
     /// The body to be put into a world, in the state that the description has, and what is to be said of its files.
@@ -32,7 +32,7 @@ impl Articulation {
         let Now { mut q, qd, .. } = locked(now).clone();
         // where a floating root is, is said from the base
         let model = body.model();
-        for link in model.links().iter().filter(|link| link.joint == tumble::core::Joint::Floating) {
+        for link in model.links().iter().filter(|link| link.joint == tumble::dynamics::Joint::Floating) {
             let own = Pose::from_parts(
                 Vec3::from_column_slice(&q[link.q..link.q + 3]).into(),
                 crate::convert::unit(&q[link.q + 3..link.q + 7]),

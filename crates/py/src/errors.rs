@@ -7,7 +7,7 @@ use pyo3::types::PyType;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use tumble::collide::{MeshError, ShapeError};
-use tumble::core::{
+use tumble::dynamics::{
     ArchiveError, ArticulatedError, BodyError, ModelError, SettingsError, SnapshotError, StepError, WorldError,
 };
 use tumble::net::record::RecordError;

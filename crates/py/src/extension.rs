@@ -13,7 +13,7 @@ use crate::view::View;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::{Arc, Mutex, MutexGuard};
-use tumble::core::{Checkpoint, ForceGenerator, Forces, Mode, Object, ObjectId, Span, WorldView, Wrench};
+use tumble::dynamics::{Checkpoint, ForceGenerator, Forces, Mode, Object, ObjectId, Span, WorldView, Wrench};
 
 /// A Python object that is called, which rows are whose, and what it raised.
 struct Code {
@@ -252,7 +252,7 @@ impl Inner {
 
     fn check_new(&self, name: &str) -> Result<()> {
         match self.world.find(name).is_some() || self.extension.behaviours.iter().any(|b| b.code.name == name) {
-            true => Err(tumble::core::WorldError::DuplicateName(name.into()).into()),
+            true => Err(tumble::dynamics::WorldError::DuplicateName(name.into()).into()),
             false => Ok(()),
         }
     }

@@ -8,7 +8,7 @@ use crate::state::Shown;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tumble::core::{ObjectId, World};
+use tumble::dynamics::{ObjectId, World};
 use tumble::scene::{SceneFile, overlap_notes, visual_notes};
 
 /// A world and what belongs to it on Python's side.

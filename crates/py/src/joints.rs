@@ -10,7 +10,7 @@ use crate::spot::Which;
 use numpy::{IxDyn, PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use tumble::collide::Vec3;
-use tumble::core::Drive;
+use tumble::dynamics::Drive;
 
 impl Articulation {
     /// Arguments of an algorithm: what is not given is what it is now.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use tumble::collide::Vec3;
-use tumble::core::{ArticulatedBody, ObjectId, RigidBody as Rigid, Site, WorldView, Wrench};
+use tumble::dynamics::{ArticulatedBody, ObjectId, RigidBody as Rigid, Site, WorldView, Wrench};
 
 /// Which rows belong to whom: made once and kept until objects come or go.
 pub struct Layout {

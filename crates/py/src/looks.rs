@@ -1,7 +1,7 @@
 //! What bodies look like that are made in a program and not by a scene.
 
 use tumble::collide::Shape;
-use tumble::core::{Look, Renderable, RigidBody as Rigid};
+use tumble::dynamics::{Look, Renderable, RigidBody as Rigid};
 
 /// Colours that new bodies take in turn, sRGB.
 const PALETTE: [[f32; 3]; 7] = [
@@ -39,8 +39,12 @@ pub fn colored(body: Rigid, color: [f64; 3]) -> Rigid {
 }
 
 fn looking(body: Rigid, look: Look) -> Rigid {
-    let visuals =
-        body.visuals().iter().cloned().map(|visual| tumble::core::Visual { look: look.clone(), ..visual }).collect();
+    let visuals = body
+        .visuals()
+        .iter()
+        .cloned()
+        .map(|visual| tumble::dynamics::Visual { look: look.clone(), ..visual })
+        .collect();
     body.drawn_as(visuals)
 }
 

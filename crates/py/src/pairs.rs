@@ -7,7 +7,7 @@ use crate::inner::Inner;
 use crate::shared::Shared;
 use pyo3::prelude::*;
 use std::sync::Arc;
-use tumble::core::{ArticulatedBody, Combine, ObjectId, PairMaterial, PairSide};
+use tumble::dynamics::{ArticulatedBody, Combine, ObjectId, PairMaterial, PairSide};
 use tumble::scene::combine_by_name;
 
 /// A rule by its name.

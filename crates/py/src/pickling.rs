@@ -12,8 +12,8 @@ use pyo3::pybacked::PyBackedBytes;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tumble::collide::{Pose, Shape as Solid};
-use tumble::core::archive::{open, seal};
-use tumble::core::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
+use tumble::dynamics::archive::{open, seal};
+use tumble::dynamics::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
 use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
 
 /// What a pickled world and a pickled shape begin with. The number is raised with every change of what is in them.

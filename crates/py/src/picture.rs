@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use tumble::collide::Vec3;
-use tumble::core::World;
+use tumble::dynamics::World;
 use tumble::render::{Camera, CaveView, DebugDraw, DrawList, Drawing, Image, RenderError, Renderer};
 use tumble::scene::cave::resolve_cave;
 use tumble::scene::{SceneFile, SceneFile as Scene};

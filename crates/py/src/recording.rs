@@ -11,7 +11,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use tumble::core::ObjectId;
+use tumble::dynamics::ObjectId;
 use tumble::net::record::{Ending, Pose, Recorder as Writer, RecorderOptions, read};
 use tumble::net::world::{entities, poses};
 

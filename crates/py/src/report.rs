@@ -1,7 +1,7 @@
 //! What the last frame took and how well it went.
 
 use pyo3::prelude::*;
-use tumble::core::{StepReport as Core, World};
+use tumble::dynamics::{StepReport as Core, World};
 
 /// What one frame took and how well it went; see ``World.report``.
 #[pyclass(frozen, get_all, module = "tumble")]

@@ -8,7 +8,7 @@ use crate::errors::{Error, Result, caught};
 use crate::pool;
 use rayon::prelude::*;
 use tumble::collide::{Pose, Vec3};
-use tumble::core::articulated::{
+use tumble::dynamics::articulated::{
     BatchDynamics, Dynamics, Frame, InverseDynamics, Kinematics, Lanes, MassMatrix, Model, center_of_mass,
     forward_dynamics, inverse_dynamics, link_jacobian, normalize,
 };

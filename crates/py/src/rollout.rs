@@ -10,7 +10,7 @@ use pyo3::exceptions::PyRecursionError;
 use rayon::prelude::*;
 use std::cell::Cell;
 use std::sync::Mutex;
-use tumble::core::ObjectId;
+use tumble::dynamics::ObjectId;
 
 /// Most numbers that one call returns: 4 GiB of them.
 const MOST: usize = 1 << 29;

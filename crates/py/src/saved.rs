@@ -11,7 +11,7 @@
 
 use crate::errors::Result;
 use crate::inner::Inner;
-use tumble::core::{ObjectId, SnapshotError};
+use tumble::dynamics::{ObjectId, SnapshotError};
 
 const MAGIC: [u8; 8] = *b"tumbleT1";
 

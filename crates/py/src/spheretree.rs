@@ -16,7 +16,7 @@ use tumble::collide::{
     Builder, CachedTree, LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree as Tree, TreeCache, TreeFile,
     TreeSettings, TriMesh,
 };
-use tumble::core::archive::{open, seal};
+use tumble::dynamics::archive::{open, seal};
 
 /// Nested balls around a closed mesh: every ball holds the balls of its children, and the balls of each level cover the surface.
 ///
@@ -243,7 +243,7 @@ impl SphereTree {
     /// The figures as the table that ``tumble spheretree`` prints; verbose: with more columns and what the builder's stages did.
     #[pyo3(signature = (verbose=false))]
     fn report(&self, py: Python<'_>, verbose: bool) -> Result<String> {
-        Ok(tumble::table::table(&self.whole(py)?, verbose))
+        Ok(self.whole(py)?.table(verbose))
     }
 
     /// For pickle: the tree, the figures that were measured, and the mesh that others are measured with.

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard};
 use tumble::collide::Vec3;
-use tumble::core::{ArticulatedBody, Freedom};
+use tumble::dynamics::{ArticulatedBody, Freedom};
 use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A description by itself, or one in a world.
@@ -157,7 +157,7 @@ pub fn locked(now: &Mutex<Now>) -> MutexGuard<'_, Now> {
 
 /// The state that a body starts in.
 pub fn start(body: &ArticulatedBody) -> Vec<f64> {
-    use tumble::core::Object;
+    use tumble::dynamics::Object;
     let Some(own) = body.integratable() else { return Vec::new() };
     let mut x = vec![0.0; own.dims().x];
     own.write_initial(&mut x);

@@ -19,7 +19,7 @@ use numpy::ndarray::ArrayView1;
 use pyo3::prelude::*;
 use pyo3::types::{PyWeakrefMethods, PyWeakrefReference};
 use std::sync::Arc;
-use tumble::core::{StateHold, World};
+use tumble::dynamics::{StateHold, World};
 
 /// Keeps alive what an array looks into.
 #[pyclass(frozen, module = "tumble", name = "_Memory")]

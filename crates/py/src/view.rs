@@ -16,7 +16,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tumble::collide::Vec3;
-use tumble::core::WorldView;
+use tumble::dynamics::WorldView;
 
 /// The world as a force or a behaviour sees it while it is called: a row for every rigid body and every link, in world axes.
 ///

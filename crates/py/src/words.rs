@@ -4,7 +4,7 @@ use crate::errors::{Error, Result};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use tumble::collide::{Builder, ContactMode};
-use tumble::core::{Combine, Mode};
+use tumble::dynamics::{Combine, Mode};
 use tumble::scene::urdf::{CollisionMeshes, MissingMeshes};
 use tumble::scene::{Integrator, Solver, Stepper};
 

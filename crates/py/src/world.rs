@@ -29,7 +29,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 use tumble::collide::{ContactMode, Vec3};
-use tumble::core::{Mode, PairMaterial, RigidBody as Rigid, Settings};
+use tumble::dynamics::{Mode, PairMaterial, RigidBody as Rigid, Settings};
 use tumble::scene::{SceneFile, resolve_scene};
 
 /// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions are (x, y, z, w).

@@ -11,7 +11,7 @@ import tumble
 @pytest.mark.parametrize("scene", ["stack", "billiards", "chain", "robot"])
 def test_python_and_the_command_end_in_the_same_bytes(command, tmp_path, scene):
     saved, summary = tmp_path / "end.state", tmp_path / "end.json"
-    subprocess.run([command, "run", scene, "--seconds", "0.5", "--save", saved, "--summary", summary, "--quiet"], check=True, timeout=120)
+    subprocess.run([command, "run", scene, "--duration", "0.5", "--save", saved, "--summary", summary, "--quiet"], check=True, timeout=120)
     world = tumble.World.load(scene)
     world.step(round(0.5 / world.dt))
     assert world.save() == saved.read_bytes()

@@ -44,7 +44,7 @@ NOT_RUN = {
 LONG = {  # run where TUMBLE_SLOW=1
     "examples/link_trial --transport shm --facets 6 --bytes 65536 --rate 500 --frames 2000": "seven processes that want cores of their own",
 }
-DRAWS = ("--picture", "--frames-dir", "--pattern", "tumble cave ")
+DRAWS = ("--screenshot", "--frames-dir", "--pattern", "tumble cave ")
 # Tests of Rust run in their own stage; that one of the name is there is looked up here.
 RUST_TEST = re.compile(r"cargo test --release (?:--workspace|-p ([\w-]+))((?: (?!--\s)--?[\w-]+(?: it)?)*)(?: --(?: --nocapture)?)?(?: ([a-z_:0-9]+))?")
 RUST_EXAMPLE = re.compile(r"cargo run --release (?:-p ([\w-]+) )?--example (\w+)")
@@ -144,7 +144,7 @@ def run_toml(block, folder, command):
     of_cave = re.search(r"^\[+(node|tracker|sync|security|screen|facet|user)\b", block.text, re.M)
     cave = re.sub(r"^\[sync\]\n[^\[]*", "", (ROOT / "caves" / "cube4.toml").read_text(), flags=re.M) + CAVE_OF_MACHINES
     path.write_text((cave if of_cave else "") + block.text)
-    for words in (["check", path],) if of_cave else (["check", path], ["run", path, "--seconds", "0.1", "--quiet"]):
+    for words in (["check", path],) if of_cave else (["check", path], ["run", path, "--duration", "0.1", "--quiet"]):
         done = subprocess.run([command, *words], cwd=folder, capture_output=True, text=True, timeout=60)
         assert done.returncode == 0, f"{block.page}:{block.line}: {done.stdout}{done.stderr}"
 

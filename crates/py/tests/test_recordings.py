@@ -38,7 +38,7 @@ def test_what_is_read_is_what_was_recorded(tmp_path):
 
 
 def test_the_file_is_the_command_s(command, tmp_path):
-    words = ["run", "billiards", "--seconds", "0.1", "--quiet", "--record", tmp_path / "theirs.mcap"]
+    words = ["run", "billiards", "--duration", "0.1", "--quiet", "--record", tmp_path / "theirs.mcap"]
     subprocess.run([command, *words], check=True, timeout=60)
     world = tumble.World.load("billiards")
     with tumble.Recorder(tmp_path / "ours.mcap") as recorder:

@@ -2,7 +2,7 @@
 //!
 //! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn.
 //! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes less than five minutes on
-//! two idle cores: after a frame to warm up a row runs for `--seconds S` (default 1.5) and three frames, but begins none after six seconds. Other options: `--only WORDS` (rows that
+//! two idle cores: after a frame to warm up a row runs for `--duration S` (default 1.5) and three frames, but begins none after six seconds. Other options: `--only WORDS` (rows that
 //! contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the way back to memory), `--stages` (where the time of each row goes),
 //! `--pictures FOLDER` (the last picture of each row).
 
@@ -53,7 +53,7 @@ fn main() -> Result<(), Failure> {
     );
     let words: Vec<String> = match &options.quality {
         Some(words) => vec![words.clone()],
-        None => ["fastest", "fastest,samples=4", "fast", "fast,samples=4", "usual"].map(String::from).to_vec(),
+        None => ["fastest", "fastest,samples=4", "fast", "fast,samples=4", "default"].map(String::from).to_vec(),
     };
     let qualities: Vec<Quality> = words.iter().map(|words| words.parse()).collect::<Result<_, _>>()?;
     let mut summary = Vec::new();
@@ -94,13 +94,13 @@ fn options() -> Result<Options, Failure> {
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} wants a value"));
         match word.as_str() {
-            "--seconds" => options.seconds = value()?.parse()?,
+            "--duration" => options.seconds = value()?.parse()?,
             "--only" => options.only = value()?,
             "--quality" => options.quality = Some(value()?),
             "--readback" => options.readback = true,
             "--pictures" => options.pictures = Some(value()?.into()),
             "--stages" => options.stages = true,
-            _ => return Err(format!("no option {word}; wanted --seconds S, --only WORDS, --quality WORDS, --readback, --stages or --pictures FOLDER").into()),
+            _ => return Err(format!("no option {word}; wanted --duration S, --only WORDS, --quality WORDS, --readback, --stages or --pictures FOLDER").into()),
         }
     }
     Ok(options)

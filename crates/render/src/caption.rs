@@ -7,7 +7,7 @@ use crate::facet::{blank, font};
 const LINE: i64 = 10;
 const RIM: i64 = 4;
 /// Letters of a line and lines, at most.
-const MOST: usize = 120;
+const MAX_LINES: usize = 120;
 
 const GROUND: [u8; 4] = [12, 14, 18, 170];
 const INK: [u8; 4] = [236, 238, 240, 255];
@@ -17,7 +17,7 @@ const INK: [u8; 4] = [236, 238, 240, 255];
 pub fn caption<S: AsRef<str>>(lines: &[S], scale: u32) -> Image {
     let scale = i64::from(scale.clamp(1, 8));
     let lines: Vec<String> =
-        lines.iter().take(MOST).map(|l| l.as_ref().to_uppercase().chars().take(MOST).collect()).collect();
+        lines.iter().take(MAX_LINES).map(|l| l.as_ref().to_uppercase().chars().take(MAX_LINES).collect()).collect();
     let width = lines.iter().map(|l| font::text_width(l, scale)).max().unwrap_or(0) + 2 * RIM * scale;
     let height = (LINE * lines.len() as i64 - 3).max(0) * scale + 2 * RIM * scale;
     let mut image = blank(width as u32, height as u32, GROUND);

@@ -24,7 +24,7 @@ pub enum RenderError {
     /// There is no desktop to open a window on, or it would not open one.
     #[error(
         "no window can be opened ({reason}). A window needs a desktop: X11, named by DISPLAY, or Wayland, named by WAYLAND_DISPLAY; \
-         `tumble run SCENE --picture out.png` needs none"
+         `tumble run SCENE --screenshot out.png` needs none"
     )]
     NoWindow {
         /// What the window system said.
@@ -44,6 +44,9 @@ pub enum RenderError {
         /// Largest product of the sides that would be accepted.
         max_pixels: u64,
     },
+    /// An image cannot be encoded as PNG: it has no pixels, or a number of bytes that its sides do not give.
+    #[error("the picture cannot be written as PNG: {0}")]
+    Png(String),
     /// More of something than the cap.
     #[error("{count} {what} in the draw list, at most {cap} can be drawn")]
     TooMany {

@@ -2,7 +2,7 @@
 
 use crate::RenderError;
 use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 
 /// A picture: 8-bit sRGB with alpha, rows from the top, four bytes `r, g, b, a` per pixel.
@@ -34,14 +34,28 @@ impl Image {
         let path = path.as_ref();
         let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
         let file = File::create(path).map_err(|e| fail(e.to_string()))?;
-        let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
+        self.encode(BufWriter::new(file)).map_err(|e| fail(e.to_string()))
+    }
+
+    /// Returns the bytes that [`Image::write_png`] writes.
+    ///
+    /// # Errors
+    /// [`RenderError::Png`] for an image without pixels, or with more or fewer bytes than its sides say.
+    pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
+        let mut bytes = Vec::new();
+        self.encode(&mut bytes).map_err(|e| RenderError::Png(e.to_string()))?;
+        Ok(bytes)
+    }
+
+    fn encode(&self, to: impl Write) -> Result<(), png::EncodingError> {
+        let mut encoder = png::Encoder::new(to, self.width, self.height);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::High);
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        let mut writer = encoder.write_header().map_err(|e| fail(e.to_string()))?;
-        writer.write_image_data(&self.rgba).map_err(|e| fail(e.to_string()))?;
-        writer.finish().map_err(|e| fail(e.to_string()))
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgba)?;
+        writer.finish()
     }
 
     /// Reads any PNG as a picture to put on surfaces: grey, palettes and 16 bits are made 8-bit RGBA. Sides are at most 8192 pixels.

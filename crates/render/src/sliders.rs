@@ -1,7 +1,7 @@
 //! Sliders to be laid over a picture: for each a name, its number and a bar from the least to the greatest value.
 
 use crate::Image;
-use crate::facet::{blank, font, rect};
+use crate::facet::{blank, fill_rect, font};
 
 /// Dots of the panel: its width, the rim around all, the height of the title and of a slider.
 const WIDTH: i64 = 180;
@@ -133,7 +133,7 @@ impl Panel {
 
     fn rect(&mut self, x: i64, y: i64, w: i64, h: i64, color: [u8; 4]) {
         let s = self.scale;
-        rect(&mut self.image, x * s, y * s, w * s, h * s, color);
+        fill_rect(&mut self.image, x * s, y * s, w * s, h * s, color);
     }
 
     fn slider(&mut self, slider: &Slider, top: i64) {

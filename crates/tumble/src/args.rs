@@ -53,7 +53,7 @@ pub struct SceneOptions {
     #[arg(value_name = "SCENE")]
     pub name: String,
     /// Length of a step, s (default: what the scene says).
-    #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = frame)]
+    #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = time_step)]
     pub dt: Option<f64>,
     /// time_stepping or backtracking.
     #[arg(long, help_heading = "Stepping", value_name = "NAME")]
@@ -153,7 +153,7 @@ pub struct RunOptions {
     pub scene: SceneOptions,
     /// Simulated time to run for, s (default: what the scene says).
     #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = seconds)]
-    pub seconds: Option<f64>,
+    pub duration: Option<f64>,
     /// Write a recording (MCAP; opens in Foxglove).
     #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub record: Option<PathBuf>,
@@ -162,7 +162,7 @@ pub struct RunOptions {
     pub summary: Option<PathBuf>,
     /// Write a picture of the last frame (PNG).
     #[arg(long, help_heading = "Pictures", value_name = "FILE", value_parser = png)]
-    pub picture: Option<PathBuf>,
+    pub screenshot: Option<PathBuf>,
     /// Size of the picture, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
     #[arg(long, help_heading = "Pictures", value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
@@ -179,13 +179,13 @@ pub struct RunOptions {
     #[arg(long, help_heading = "Pictures", value_name = "FILE")]
     pub video: Option<PathBuf>,
     /// Frames of the video, and pictures in the folder, per simulated second.
-    #[arg(long, help_heading = "Pictures", value_name = "N", default_value = "30", value_parser = pace)]
+    #[arg(long, help_heading = "Pictures", value_name = "N", default_value = "30", value_parser = rate)]
     pub fps: f64,
-    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL, all; with commas between them.
+    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL, all; with commas between them.
     #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
     /// Speed against looks: usual, fast, fastest, and shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them.
-    #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "usual")]
+    #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "default")]
     pub quality: tumble::render::Quality,
     /// See from this camera: scene, or the name of an object that carries one.
     #[arg(long, help_heading = "Pictures", value_name = "NAME", conflicts_with = "cave")]
@@ -221,7 +221,7 @@ pub struct ViewOptions {
     /// The camera to begin with: scene, one that a body or link carries, front, left, back, right or top.
     #[arg(long, help_heading = "Window", value_name = "NAME")]
     pub camera: Option<String>,
-    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL, all; with commas between them.
+    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL, all; with commas between them.
     #[arg(long, help_heading = "Window", value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
     /// usual, fast or fastest, or parts of it: shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them (default: usual; fast
@@ -233,22 +233,22 @@ pub struct ViewOptions {
     pub paused: bool,
     /// Begin without text over the picture.
     #[arg(long, help_heading = "Window")]
-    pub plain: bool,
+    pub no_hud: bool,
     /// Pictures per second at most (default: what the desktop shows).
-    #[arg(long, help_heading = "Window", value_name = "N", value_parser = pace)]
+    #[arg(long, help_heading = "Window", value_name = "N", value_parser = rate)]
     pub fps: Option<f64>,
     /// End at this simulated time, s.
     #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = seconds)]
-    pub seconds: Option<f64>,
+    pub duration: Option<f64>,
     /// End after so many pictures.
     #[arg(long, help_heading = "Session", value_name = "N")]
     pub frames: Option<u64>,
     /// Write what is shown at the end (PNG).
     #[arg(long, help_heading = "Session", value_name = "FILE", value_parser = png)]
-    pub picture: Option<PathBuf>,
+    pub screenshot: Option<PathBuf>,
     /// Where the key P leaves pictures: SCENE_000123.png, by the number of the step.
     #[arg(long, help_heading = "Session", value_name = "DIR", default_value = ".")]
-    pub shots: PathBuf,
+    pub screenshot_dir: PathBuf,
     /// Write what is shown as JSON, a line whenever the user changes something and four a second; - for stdout.
     #[arg(long, help_heading = "Session", value_name = "FILE|-")]
     pub status: Option<PathBuf>,
@@ -277,14 +277,14 @@ pub struct SphereTreeOptions {
     pub method: Option<Builder>,
     /// Greatest number of children of a ball, 2 to 64 (default 8; an octree has 8).
     #[arg(long, value_name = "N")]
-    pub branch: Option<u32>,
+    pub branching: Option<u32>,
     /// Greatest number of subdivisions, 1 to 9 (default 3; of an octree 7).
     #[arg(long, value_name = "N")]
     pub depth: Option<u32>,
     /// Balls that reach at most this far outside are not divided further: a share of the mesh's diagonal, 0.0001 to 1 (default 0.0001; of an octree 0.01, which its leaves
     /// are all grown to; with --urdf 0.001).
-    #[arg(long, value_name = "SHARE", value_parser = share)]
-    pub error: Option<f64>,
+    #[arg(long, value_name = "SHARE", value_parser = fraction)]
+    pub max_error: Option<f64>,
     /// Close holes and drop what dangles before building; what was done is said.
     #[arg(long, conflicts_with = "urdf")]
     pub repair: bool,
@@ -293,9 +293,9 @@ pub struct SphereTreeOptions {
     pub output: Option<PathBuf>,
     /// Write a picture (PNG) of a level over the mesh.
     #[arg(long, help_heading = "Picture", value_name = "FILE", conflicts_with = "urdf", value_parser = png)]
-    pub picture: Option<PathBuf>,
+    pub screenshot: Option<PathBuf>,
     /// The level of the picture, the root being 0 (default: the last).
-    #[arg(long, help_heading = "Picture", value_name = "N", requires = "picture")]
+    #[arg(long, help_heading = "Picture", value_name = "N", requires = "screenshot")]
     pub level: Option<u32>,
     /// The axis that is up in the picture.
     #[arg(long, help_heading = "Picture", value_name = "x|y|z", default_value = "z", value_parser = ["x", "y", "z"])]
@@ -318,7 +318,7 @@ pub struct SphereTreeOptions {
     /// What to do where a collision mesh is not there: error, or skip it with a note.
     #[arg(long, help_heading = "Robots", value_name = "error|skip", requires = "urdf", default_value = "error", value_parser = missing)]
     pub missing_meshes: MissingMeshes,
-    /// Most spheres per link, at least one per collision element; a link gets fewer where all reach out less than --error (default 32, or 10000 with --error).
+    /// Most spheres per link, at least one per collision element; a link gets fewer where all reach out less than --max-error (default 32, or 10000 with --max-error).
     #[arg(long, help_heading = "Robots", value_name = "N", requires = "urdf", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub spheres: Option<u32>,
     /// Also write the spheres for motion planners: yaml (cuRobo) or json (foam, VAMP) beside the output, or a file that ends in .yml or .json.
@@ -344,7 +344,7 @@ pub struct CompletionOptions {
 #[derive(Args)]
 pub struct CavesOptions {
     /// Draw a calibration pattern: grid, corners, colours or name.
-    #[arg(long, value_name = "WHAT", requires_all = ["cave", "facet", "picture"])]
+    #[arg(long, value_name = "WHAT", requires_all = ["cave", "facet", "screenshot"])]
     pub pattern: Option<CalibrationPattern>,
     /// A cave file or the name of a shipped cave.
     #[arg(long, value_name = "CAVE", requires = "pattern")]
@@ -354,7 +354,7 @@ pub struct CavesOptions {
     pub facet: Option<String>,
     /// Where the picture goes (PNG).
     #[arg(long, value_name = "FILE", requires = "pattern", value_parser = png)]
-    pub picture: Option<PathBuf>,
+    pub screenshot: Option<PathBuf>,
 }
 
 /// Overlays, or none for an empty word.
@@ -380,11 +380,11 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1e6)
 }
 
-pub fn frame(text: &str) -> Result<f64, String> {
+pub fn time_step(text: &str) -> Result<f64, String> {
     number(text, 1e-6, 1.0)
 }
 
-pub fn pace(text: &str) -> Result<f64, String> {
+pub fn rate(text: &str) -> Result<f64, String> {
     number(text, 0.01, 1000.0)
 }
 
@@ -393,7 +393,7 @@ pub fn solver(text: &str) -> Result<Solver, String> {
     name.parse().map_err(|e: tumble::scene::UnknownName| e.to_string())
 }
 
-fn share(text: &str) -> Result<f64, String> {
+fn fraction(text: &str) -> Result<f64, String> {
     number(text, 1e-4, 1.0)
 }
 

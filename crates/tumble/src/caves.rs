@@ -1,8 +1,8 @@
 //! `tumble caves`: what is shipped, and calibration pictures.
 
 use crate::args::CavesOptions;
+use crate::capture::write_png;
 use crate::failure::Failure;
-use crate::shots::write_png;
 use tumble::render::calibration_picture;
 use tumble::scene::cave::{resolve_cave, shipped_caves};
 
@@ -15,8 +15,8 @@ pub fn caves(options: &CavesOptions) -> Result<(), Failure> {
         return Ok(());
     };
     // clap lets no pattern through without these
-    let (Some(name), Some(facet), Some(path)) = (&options.cave, &options.facet, &options.picture) else {
-        return Err(Failure::input("--pattern wants --cave FILE, --facet NAME and --picture FILE"));
+    let (Some(name), Some(facet), Some(path)) = (&options.cave, &options.facet, &options.screenshot) else {
+        return Err(Failure::input("--pattern wants --cave FILE, --facet NAME and --screenshot FILE"));
     };
     let cave = resolve_cave(name)?.load()?;
     let facet = cave.facet(facet)?;

@@ -4,7 +4,7 @@ use crate::args::{CheckOptions, OpeningOptions, kind};
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{RepairSettings, Shape, TreeSettings};
-use tumble::core::{ArticulatedBody, World};
+use tumble::dynamics::{ArticulatedBody, World};
 use tumble::net::sync::udp::SharedKey;
 use tumble::render::{Blend, DebugDraw, Drawing, RenderError, Warp};
 use tumble::scene::cave::{Cave, MOST_BYTES, is_cave, resolve_cave, shipped_caves};

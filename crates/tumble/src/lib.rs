@@ -1,7 +1,16 @@
 //! Real-time dynamics for interactive and immersive environments.
 //!
-//! One library over its crates: geometry ([`collide`]), dynamics ([`core`](mod@core)), scene files ([`scene`]), recordings ([`net`]) and
-//! pictures ([`render`]). The `tumble` command is built on it. Units, sizes, frames and signs, beside those of Python and scenes: `docs/conventions.md`.
+//! Reexports the crates: geometry ([`collide`]), dynamics ([`dynamics`]), scene files ([`scene`]), networking and
+//! recordings (`net`) and pictures (`render`). The `tumble` command is built on this library. `docs/conventions.md`
+//! compares units, sizes, frames and signs with those of Python and of scene files.
+//!
+//! | feature | adds | default |
+//! |---|---|---|
+//! | `render` | the module `render`: draw lists, the wgpu renderer, windows | yes |
+//! | `net` | the module `net`: recordings (MCAP), facets of a cave over shared memory and UDP | yes |
+//! | `command` | the dependencies of the `tumble` command; implies `render` and `net` | yes |
+//!
+//! With `default-features = false` the library holds `collide`, `dynamics` and `scene` only.
 //!
 //! ```
 //! let scene = tumble::scene::resolve_scene("stack", &[])?.load()?;
@@ -12,10 +21,9 @@
 //! ```
 
 pub use tumble_collide as collide;
-pub use tumble_core as core;
+pub use tumble_core as dynamics;
+#[cfg(feature = "net")]
 pub use tumble_net as net;
+#[cfg(feature = "render")]
 pub use tumble_render as render;
 pub use tumble_scene as scene;
-
-pub mod table;
-pub mod whole;

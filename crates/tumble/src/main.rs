@@ -3,6 +3,8 @@
 //! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
 
 mod args;
+mod atomic_file;
+mod capture;
 mod cave;
 mod caves;
 mod check;
@@ -10,7 +12,6 @@ mod failure;
 mod help;
 mod progress;
 mod run;
-mod shots;
 mod spheretree;
 mod summary;
 mod video;
@@ -23,8 +24,8 @@ use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    quiet_drivers();
-    end_with_the_reader();
+    set_runtime_dir();
+    exit_on_closed_stdout();
     // where stderr is closed there is nobody to tell
     tumble::scene::set_slow_load_listener(|line| _ = writeln!(std::io::stderr(), "{line} …"));
     let command = match Tumble::from_arg_matches(&help::command().get_matches()) {
@@ -57,7 +58,7 @@ fn main() -> ExitCode {
 
 /// Graphics drivers complain on stderr where no runtime directory is named, as over ssh or in a container; any folder satisfies them.
 #[allow(unsafe_code)]
-fn quiet_drivers() {
+fn set_runtime_dir() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
         // SAFETY: the first thing that the process does; no other thread exists that could read the environment.
         unsafe { std::env::set_var("XDG_RUNTIME_DIR", std::env::temp_dir()) };
@@ -66,8 +67,8 @@ fn quiet_drivers() {
 
 /// Who reads what is printed may have enough before the end, as `head` has: the process then ends, without a word. A stdout that fails otherwise, as a full
 /// disk does, is a failure like any other.
-fn end_with_the_reader() {
-    let usual = std::panic::take_hook();
+fn exit_on_closed_stdout() {
+    let default_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         let message = panic.payload().downcast_ref::<String>();
         match message.and_then(|m| m.strip_prefix("failed printing to stdout: ")) {
@@ -78,7 +79,7 @@ fn end_with_the_reader() {
                 std::process::exit(1)
             }
             None if message.is_some_and(|m| m.starts_with("failed printing to stderr")) => std::process::exit(1),
-            None => usual(panic),
+            None => default_hook(panic),
         }
     }));
 }

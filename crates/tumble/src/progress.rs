@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Between two plain lines.
-const EVERY: Duration = Duration::from_secs(5);
+const LINE_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Shows how far a run is.
 pub enum Progress {
@@ -36,7 +36,7 @@ impl Progress {
                 bar.set_message(format!("t = {time:.2} s"));
                 bar.set_position(done);
             }
-            Progress::Lines { total, last } if last.elapsed() >= EVERY => {
+            Progress::Lines { total, last } if last.elapsed() >= LINE_INTERVAL => {
                 *last = Instant::now();
                 eprintln!("frame {done} of {total}, t = {time:.2} s");
             }
@@ -53,48 +53,48 @@ impl Progress {
 }
 
 /// Shows what share of a piece of work is done, from whichever thread does it.
-pub enum Share {
+pub enum WorkProgress {
     Quiet,
     Bar(ProgressBar),
     Lines { what: String, last: Mutex<Instant> },
 }
 
 /// Parts of a bar.
-const PARTS: f64 = 1000.0;
+const BAR_STEPS: f64 = 1000.0;
 
-impl Share {
+impl WorkProgress {
     /// For the work named.
-    pub fn new(what: &str, quiet: bool) -> Share {
+    pub fn new(what: &str, quiet: bool) -> WorkProgress {
         if quiet {
-            return Share::Quiet;
+            return WorkProgress::Quiet;
         }
         if !std::io::stderr().is_terminal() {
-            return Share::Lines { what: what.to_owned(), last: Mutex::new(Instant::now()) };
+            return WorkProgress::Lines { what: what.to_owned(), last: Mutex::new(Instant::now()) };
         }
         let style = ProgressStyle::with_template("{msg} {bar:40} {percent} %  {elapsed}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
-        let bar = ProgressBar::new(PARTS as u64).with_style(style).with_message(what.to_owned());
+        let bar = ProgressBar::new(BAR_STEPS as u64).with_style(style).with_message(what.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
-        Share::Bar(bar)
+        WorkProgress::Bar(bar)
     }
 
     /// Takes the bar away.
     pub fn done(self) {
-        if let Share::Bar(bar) = self {
+        if let WorkProgress::Bar(bar) = self {
             bar.finish_and_clear();
         }
     }
 }
 
-impl tumble::collide::Progress for Share {
+impl tumble::collide::Progress for WorkProgress {
     fn at(&self, share: f64) {
         match self {
-            Share::Quiet => {}
-            Share::Bar(bar) => bar.set_position((PARTS * share) as u64),
-            Share::Lines { what, last } => {
+            WorkProgress::Quiet => {}
+            WorkProgress::Bar(bar) => bar.set_position((BAR_STEPS * share) as u64),
+            WorkProgress::Lines { what, last } => {
                 // a line that another thread is about to write is enough
                 let Ok(mut last) = last.try_lock() else { return };
-                if last.elapsed() >= EVERY {
+                if last.elapsed() >= LINE_INTERVAL {
                     *last = Instant::now();
                     eprintln!("{what}: {:.0} %", 100.0 * share);
                 }

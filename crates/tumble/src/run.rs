@@ -1,47 +1,50 @@
 //! `tumble run`: simulate, record, sum up, take a picture.
 
 use crate::args::RunOptions;
+use crate::atomic_file::{check_writable, write_file};
+use crate::capture::{Capture, write_png};
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::shots::{Shots, may_be_written, write_png};
 use crate::summary::{State, Summary, Tally};
 use std::io::Read;
 use std::path::Path;
 use std::time::Instant;
-use tumble::core::World;
+use tumble::dynamics::World;
 use tumble::net::record::{Recorder, RecorderOptions};
 use tumble::net::world::{entities, poses};
 use tumble::scene::{SceneFile, visual_notes};
 
 /// Most bytes of a saved state: a thousand times what ten thousand bodies take.
-const MOST_RESTORED: u64 = 1 << 30;
+const MAX_STATE_BYTES: u64 = 1 << 30;
 
 /// Runs a scene.
 pub fn run(options: &RunOptions) -> Result<(), Failure> {
-    [&options.summary, &options.picture, &options.save, &options.video].into_iter().flatten().try_for_each(|path| {
-        may_be_written(path).map_err(|why| Failure::run(&format!("writing {}", path.display()), why))
-    })?;
+    let outputs = [&options.summary, &options.screenshot, &options.save, &options.video];
+    outputs
+        .into_iter()
+        .flatten()
+        .try_for_each(|path| check_writable(path).map_err(|why| Failure::run("the results", why)))?;
     let mut scene = options.scene.load()?;
-    scene.world.seconds = options.seconds.unwrap_or(scene.world.seconds);
+    scene.world.seconds = options.duration.unwrap_or(scene.world.seconds);
     let (mut world, notes) = scene.build().map_err(Failure::input)?;
     notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     restore(&mut world, options)?;
-    let mut shots = Shots::new(&scene, &world, options)?;
+    let mut capture = Capture::new(&scene, &world, options)?;
     let mut recorder = recorder(&world, &scene, options)?;
     // both have read the meshes that are only drawn
     visual_notes(world.visuals()).iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     let start = State::of(&world);
-    let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), shots.as_mut(), &scene, options)?;
+    let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), capture.as_mut(), &scene, options)?;
     finish_recording(recorder, options)?;
     if let Some(path) = &options.save {
-        write(path, &world.save())?;
+        write_file(path, &world.save())?;
     }
     let summary = tally.summary(&scene.file, &world, start, simulated, wall);
     if !options.quiet {
         print!("{}", summary.lines());
     }
     write_summary(&summary, options)?;
-    pictures(&world, shots, options)
+    pictures(&world, capture, options)
 }
 
 fn restore(world: &mut World, options: &RunOptions) -> Result<(), Failure> {
@@ -49,10 +52,10 @@ fn restore(world: &mut World, options: &RunOptions) -> Result<(), Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let mut bytes = Vec::new();
     // what never ends is read no further
-    let read = std::fs::File::open(path).and_then(|file| file.take(MOST_RESTORED + 1).read_to_end(&mut bytes));
+    let read = std::fs::File::open(path).and_then(|file| file.take(MAX_STATE_BYTES + 1).read_to_end(&mut bytes));
     read.map_err(|e| wrong(format!("cannot be read: {e}")))?;
-    if bytes.len() as u64 > MOST_RESTORED {
-        return Err(wrong(format!("is larger than {MOST_RESTORED} bytes, the most that a saved state may have")));
+    if bytes.len() as u64 > MAX_STATE_BYTES {
+        return Err(wrong(format!("is larger than {MAX_STATE_BYTES} bytes, the most that a saved state may have")));
     }
     world.restore(&bytes).map_err(|e| wrong(e.to_string()))
 }
@@ -67,7 +70,7 @@ fn recorder(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<Op
 fn simulate(
     world: &mut World,
     mut recorder: Option<&mut Recorder>,
-    mut shots: Option<&mut Shots>,
+    mut capture: Option<&mut Capture>,
     scene: &SceneFile,
     options: &RunOptions,
 ) -> Result<(Tally, f64, f64), Failure> {
@@ -80,7 +83,7 @@ fn simulate(
         }
         None => Ok(()),
     };
-    let mut shoot = |world: &World| shots.as_mut().map_or(Ok(()), |shots| shots.frame(world, begin));
+    let mut shoot = |world: &World| capture.as_mut().map_or(Ok(()), |capture| capture.frame(world, begin));
     record(world)?;
     shoot(world)?;
     for frame in 1..=frames {
@@ -107,30 +110,26 @@ fn finish_recording(recorder: Option<Recorder>, options: &RunOptions) -> Result<
 fn write_summary(summary: &Summary, options: &RunOptions) -> Result<(), Failure> {
     let Some(path) = &options.summary else { return Ok(()) };
     let text = serde_json::to_string_pretty(summary).map_err(|e| Failure::run("the summary", e))?;
-    write(path, (text + "\n").as_bytes())?;
+    write_file(path, (text + "\n").as_bytes())?;
     say(options, "summary", path);
     Ok(())
 }
 
 /// Ends the video and takes the picture of the last frame.
-fn pictures(world: &World, shots: Option<Shots>, options: &RunOptions) -> Result<(), Failure> {
-    let Some(mut shots) = shots else { return Ok(()) };
-    let count = shots.finish_frames()?;
+fn pictures(world: &World, capture: Option<Capture>, options: &RunOptions) -> Result<(), Failure> {
+    let Some(mut capture) = capture else { return Ok(()) };
+    let count = capture.finish_frames()?;
     if let Some(folder) = &options.frames_dir {
         say(options, &format!("{count} frames"), folder);
     }
     if let Some(path) = &options.video {
         say(options, "video", path);
     }
-    if let Some(path) = &options.picture {
-        write_png(&shots.take(world)?, path)?;
+    if let Some(path) = &options.screenshot {
+        write_png(&capture.take(world)?, path)?;
         say(options, "picture", path);
     }
     Ok(())
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, bytes).map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
 }
 
 fn say(options: &RunOptions, what: &str, path: &Path) {

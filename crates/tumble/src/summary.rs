@@ -1,7 +1,7 @@
 //! `--summary`: what a run took and how well it went, as JSON.
 
 use serde::Serialize;
-use tumble::core::{Energy, OutOfReach, StepReport, World};
+use tumble::dynamics::{Energy, OutOfReach, StepReport, World};
 
 /// The whole summary. Units stand in the names; quaternions are `x, y, z, w`.
 #[derive(Serialize)]

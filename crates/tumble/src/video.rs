@@ -1,6 +1,6 @@
 //! A video by the `ffmpeg` program: frames go in through its standard input, its complaints come out.
 //!
-//! Nothing waits for ever: a frame that is not taken within [`PATIENCE`], or an end that takes longer, is a failure, and the child is always
+//! Nothing waits for ever: a frame that is not taken within [`TIMEOUT`], or an end that takes longer, is a failure, and the child is always
 //! ended and reaped.
 
 use crate::failure::Failure;
@@ -13,18 +13,18 @@ use std::time::{Duration, Instant};
 use tumble::render::Image;
 
 /// How long ffmpeg may take for one frame, or for the end.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 /// Between two looks.
-const PAUSE: Duration = Duration::from_millis(2);
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 /// Bytes of ffmpeg's complaints that are kept.
-const MOST_SAID: usize = 4096;
+const MAX_MESSAGE_BYTES: usize = 4096;
 
 /// A video that is being written.
 pub struct Video {
     child: Child,
     frames: Option<SyncSender<Vec<u8>>>,
     writer: Option<JoinHandle<()>>,
-    said: Option<JoinHandle<String>>,
+    messages: Option<JoinHandle<String>>,
     size: [u32; 2],
 }
 
@@ -38,7 +38,7 @@ impl Video {
             .stderr(Stdio::null())
             .spawn();
         match started {
-            Ok(mut child) => wait(&mut child, PATIENCE).map(|_| ()),
+            Ok(mut child) => wait(&mut child, TIMEOUT).map(|_| ()),
             Err(e) => Err(missing(&e)),
         }
     }
@@ -60,10 +60,10 @@ impl Video {
             .spawn()
             .map_err(|e| missing(&e))?;
         let (send, receive) = sync_channel(2);
-        let (input, complaints) = (child.stdin.take(), child.stderr.take());
-        let writer = input.map(|input| std::thread::spawn(move || pour(input, &receive)));
-        let said = complaints.map(|from| std::thread::spawn(move || listen(from)));
-        Ok(Video { child, frames: Some(send), writer, said, size })
+        let (input, stderr) = (child.stdin.take(), child.stderr.take());
+        let writer = input.map(|input| std::thread::spawn(move || feed(input, &receive)));
+        let messages = stderr.map(|from| std::thread::spawn(move || collect_messages(from)));
+        Ok(Video { child, frames: Some(send), writer, messages, size })
     }
 
     /// The next frame.
@@ -83,19 +83,19 @@ impl Video {
             match frames.try_send(frame) {
                 Ok(()) => return Ok(()),
                 Err(TrySendError::Disconnected(_)) => return Err(self.failed("ffmpeg ended early")),
-                Err(TrySendError::Full(_)) if begin.elapsed() > PATIENCE => {
+                Err(TrySendError::Full(_)) if begin.elapsed() > TIMEOUT => {
                     return Err(self.failed("ffmpeg takes no more frames"));
                 }
                 Err(TrySendError::Full(back)) => frame = back,
             }
-            std::thread::sleep(PAUSE);
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 
     /// Waits for the last frames to be written.
     pub fn finish(mut self) -> Result<(), Failure> {
         drop(self.frames.take());
-        match wait(&mut self.child, PATIENCE) {
+        match wait(&mut self.child, TIMEOUT) {
             Ok(true) => Ok(()),
             Ok(false) => Err(self.failed("ffmpeg failed")),
             Err(_) => Err(self.failed("ffmpeg does not come to an end")),
@@ -105,11 +105,11 @@ impl Video {
     /// Ends the child and tells what it said.
     fn failed(&mut self, what: &str) -> Failure {
         self.end();
-        let said = self.said.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
-        let said = said.trim();
+        let messages = self.messages.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        let messages = messages.trim();
         Failure::run(
             "the video",
-            if said.is_empty() { format!("{what}, and said nothing") } else { format!("{what}: {said}") },
+            if messages.is_empty() { format!("{what}, and said nothing") } else { format!("{what}: {messages}") },
         )
     }
 
@@ -129,7 +129,7 @@ impl Drop for Video {
     }
 }
 
-fn pour(mut input: std::process::ChildStdin, frames: &Receiver<Vec<u8>>) {
+fn feed(mut input: std::process::ChildStdin, frames: &Receiver<Vec<u8>>) {
     // a child that is gone breaks the pipe; whoever sends next hears of it
     while let Ok(frame) = frames.recv() {
         if input.write_all(&frame).is_err() {
@@ -139,23 +139,23 @@ fn pour(mut input: std::process::ChildStdin, frames: &Receiver<Vec<u8>>) {
 }
 
 /// The last of what was said.
-fn listen(mut from: std::process::ChildStderr) -> String {
-    let (mut said, mut piece) = (Vec::new(), [0; 1024]);
+fn collect_messages(mut from: std::process::ChildStderr) -> String {
+    let (mut messages, mut piece) = (Vec::new(), [0; 1024]);
     while let Ok(count @ 1..) = from.read(&mut piece) {
-        said.extend_from_slice(&piece[..count]);
-        let extra = said.len().saturating_sub(MOST_SAID);
-        said.drain(..extra);
+        messages.extend_from_slice(&piece[..count]);
+        let extra = messages.len().saturating_sub(MAX_MESSAGE_BYTES);
+        messages.drain(..extra);
     }
-    String::from_utf8_lossy(&said).into_owned()
+    String::from_utf8_lossy(&messages).into_owned()
 }
 
 /// Whether the child succeeded; one that takes too long is ended.
-fn wait(child: &mut Child, patience: Duration) -> Result<bool, Failure> {
+fn wait(child: &mut Child, timeout: Duration) -> Result<bool, Failure> {
     let begin = Instant::now();
     loop {
         match child.try_wait() {
             Ok(Some(status)) => return Ok(status.success()),
-            Ok(None) if begin.elapsed() < patience => std::thread::sleep(PAUSE),
+            Ok(None) if begin.elapsed() < timeout => std::thread::sleep(POLL_INTERVAL),
             Ok(None) => {
                 let _ = child.kill(); // it may have ended just now
                 let _ = child.wait();

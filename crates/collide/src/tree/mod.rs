@@ -28,6 +28,7 @@ mod quality;
 mod regions;
 mod settings;
 mod simplex;
+mod table;
 mod verify;
 
 pub use builder::{Progress, StageCount};
@@ -38,6 +39,7 @@ pub use file::{MeshId, TreeFile, TreeFileError};
 pub use levels::LevelBall;
 pub use quality::{LevelQuality, QualitySettings};
 pub use settings::{Builder, TreeSettings};
+pub use table::align_columns;
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
 use ball::Ball;

@@ -10,7 +10,7 @@ const CELLS: f32 = 10.0;
 /// Edges whose faces turn by less than this are no edges of a wireframe, as cosine.
 const FLAT_COS: f32 = 0.999;
 /// Most edges drawn of one mesh.
-const MOST_EDGES: usize = 50_000;
+const MAX_EDGES: usize = 50_000;
 
 /// The same mesh with the vertices of each cell of a grid made one, and the triangles that this leaves.
 pub(super) fn simplified(mesh: &MeshData) -> MeshData {
@@ -68,7 +68,7 @@ pub(super) fn edges(mesh: &MeshData) -> Vec<[[f32; 3]; 2]> {
         }
     }
     let open = |edge: &[[u32; 3]; 2]| seen.get(edge).is_some_and(|count| *count == 1);
-    let shown = faces.iter().filter(|(edge, (_, sharp))| *sharp || open(edge)).take(MOST_EDGES);
+    let shown = faces.iter().filter(|(edge, (_, sharp))| *sharp || open(edge)).take(MAX_EDGES);
     shown.map(|(edge, _)| edge.map(|p| p.map(f32::from_bits))).collect()
 }
 
@@ -80,7 +80,7 @@ pub(super) fn draw_edges(list: &mut DrawList, edges: &[[[f32; 3]; 2]], pose: &Is
 }
 
 /// The balls of a level; a branch that ended before it shows its leaf. `None` where there is no tree.
-pub(super) fn draw_balls(
+pub(super) fn draw_tree_spheres(
     list: &mut DrawList,
     shape: &Shape,
     level: u32,

@@ -15,7 +15,7 @@ use crate::{
     Camera, DebugStyle, DrawList, Ground, Image, Light, Material, MeshData, MeshId, Pattern, RenderError, Sky, Texture,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
-use overlay::{islands, resting};
+use overlay::{island_colors, sleep_colors};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -113,7 +113,8 @@ impl Drawing {
         let mut list = self.base.clone();
         list.spheres.reserve(self.spheres);
         let mut placed = Placed::default();
-        let tints = if overlays.resting { Some(resting(world)) } else { overlays.islands.then(|| islands(world)) };
+        let tints =
+            if overlays.sleep { Some(sleep_colors(world)) } else { overlays.islands.then(|| island_colors(world)) };
         for &id in world.ids() {
             let Some(object) = world.object(id) else { continue };
             if !world.status(id).is_some_and(|s| s.alive) {
@@ -149,7 +150,7 @@ impl Drawing {
         let detail = self.detail.unwrap_or(visual.look.detail);
         let mut material = match tint {
             Some(color) => Material::matte(color),
-            None => surface::of_look(&visual.look, name),
+            None => surface::of_appearance(&visual.look, name),
         };
         if detail == Detail::Full && tint.is_none() {
             material.texture = self.texture(list, placed, &visual.look)?;
@@ -157,7 +158,7 @@ impl Drawing {
             material = Material { pattern: Pattern::Plain, clearcoat: 0.0, ..material };
         }
         if let (Detail::SphereTree(level), Drawn::Shape(shape)) = (detail, drawn)
-            && detail::draw_balls(list, shape, level, pose, material).is_some()
+            && detail::draw_tree_spheres(list, shape, level, pose, material).is_some()
         {
             return Ok(());
         }

@@ -26,7 +26,7 @@ pub struct DebugDraw {
     /// Objects that are solved together, each group in a colour of its own.
     pub islands: bool,
     /// Sleepers in blue-grey, what stands still awake in olive, what moves in orange.
-    pub resting: bool,
+    pub sleep: bool,
     /// A level of every sphere tree, 0 for the root.
     pub tree_level: Option<u32>,
 }
@@ -34,7 +34,7 @@ pub struct DebugDraw {
 /// A word that names no overlay.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, resting, tree=LEVEL or all, with commas between them"
+    "no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL or all, with commas between them"
 )]
 pub struct UnknownOverlay(String);
 
@@ -52,7 +52,7 @@ impl FromStr for DebugDraw {
                 "joints" => draw.joints = true,
                 "frames" => draw.frames = true,
                 "islands" => draw.islands = true,
-                "resting" => draw.resting = true,
+                "sleep" => draw.sleep = true,
                 "all" => {
                     draw = DebugDraw {
                         contacts: true,
@@ -79,7 +79,7 @@ const ARROW: f32 = 0.2;
 /// Length of a normal, as a share of the longest arrow.
 const NORMAL: f32 = 0.4;
 /// A velocity's arrow is where the body would be after this time, s.
-const LOOK_AHEAD: f64 = 0.1;
+const VELOCITY_ARROW_S: f64 = 0.1;
 
 /// Neighbouring balls of a tree take these in turn, so that each is told from the next.
 pub(super) const SHELL_COLORS: [[f32; 3]; 6] = [
@@ -93,7 +93,7 @@ pub(super) const SHELL_COLORS: [[f32; 3]; 6] = [
 
 impl DebugDraw {
     pub(super) fn draw(&self, world: &World, list: &mut DrawList) {
-        let size = ARROW * list.bounding_ball(true).map_or(1.0, |(_, r)| r).clamp(0.05, 5.0);
+        let size = ARROW * list.bounding_sphere(true).map_or(1.0, |(_, r)| r).clamp(0.05, 5.0);
         let largest = world.contacts().iter().map(|c| c.force.norm()).fold(0.0, f64::max);
         for contact in world.contacts().iter().filter(|c| c.depth >= -1e-3 || c.force.norm() > 0.0) {
             let point = Point3::from(small(&contact.point));
@@ -118,7 +118,7 @@ impl DebugDraw {
             let Some(site) = world.site(id, 0).filter(|s| s.velocity.norm() > 1e-3) else { continue };
             list.arrow(
                 Point3::from(small(&site.position())),
-                small(&(LOOK_AHEAD * site.velocity)),
+                small(&(VELOCITY_ARROW_S * site.velocity)),
                 DebugStyle::new([0.1, 0.9, 0.3]).width(3.0).on_top(),
             );
         }
@@ -149,9 +149,9 @@ fn frames(world: &World, list: &mut DrawList, length: f32) {
     }
 }
 
-const HINGE: [f32; 3] = [1.0, 0.55, 0.05];
-const SLIDER: [f32; 3] = [0.1, 0.8, 0.85];
-const BALL: [f32; 3] = [0.85, 0.25, 0.9];
+const REVOLUTE_COLOR: [f32; 3] = [1.0, 0.55, 0.05];
+const PRISMATIC_COLOR: [f32; 3] = [0.1, 0.8, 0.85];
+const SPHERICAL_COLOR: [f32; 3] = [0.85, 0.25, 0.9];
 
 /// Joints: a dot, and an arrow along the axis of a hinge or slider. Closures: a dot at both ends, and a line that shows how far they are apart.
 fn joints(world: &World, list: &mut DrawList, length: f32) {
@@ -169,9 +169,9 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
                 let (at, along) =
                     (Point3::from(small(&site.position())), |axis: &Vec3| Some(small(&(site.pose.rotation * axis))));
                 match &l.joint {
-                    Joint::Revolute { axis } => joint(at, along(axis), HINGE),
-                    Joint::Prismatic { axis } => joint(at, along(axis), SLIDER),
-                    Joint::Spherical => joint(at, None, BALL),
+                    Joint::Revolute { axis } => joint(at, along(axis), REVOLUTE_COLOR),
+                    Joint::Prismatic { axis } => joint(at, along(axis), PRISMATIC_COLOR),
+                    Joint::Spherical => joint(at, None, SPHERICAL_COLOR),
                     Joint::Fixed | Joint::Floating => {}
                 }
             }
@@ -186,9 +186,9 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
                 let axis = Some(small(&(frame.rotation * Vec3::z())));
                 let at = Point3::from(small(&frame.translation.vector));
                 match closure.kind() {
-                    ClosureKind::Hinge => joint(at, axis, HINGE),
-                    ClosureKind::Slider => joint(at, axis, SLIDER),
-                    ClosureKind::Point | ClosureKind::Weld => joint(at, None, BALL),
+                    ClosureKind::Hinge => joint(at, axis, REVOLUTE_COLOR),
+                    ClosureKind::Slider => joint(at, axis, PRISMATIC_COLOR),
+                    ClosureKind::Point | ClosureKind::Weld => joint(at, None, SPHERICAL_COLOR),
                 }
             }
         }
@@ -196,7 +196,7 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
 }
 
 /// A colour for each moving object: the same where contacts or closures join them, directly or through others that move. Objects that nothing joins are grey.
-pub(super) fn islands(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
+pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moves = |id: ObjectId| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic);
     let closures = world.ids().iter().filter_map(|&id| world.get::<Closure>(id)).filter_map(|c| {
         let [a, b] = c.sides();
@@ -232,13 +232,14 @@ pub(super) fn islands(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
 }
 
 /// An object stands still below this speed of each of its parts, m/s and rad/s.
-const STILL: f64 = 5e-3;
+const REST_SPEED: f64 = 5e-3;
 
 /// Blue-grey for each dynamic object that sleeps, olive for those that stand still awake, orange for those that move.
-pub(super) fn resting(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
+pub(super) fn sleep_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moving = world.ids().iter().copied().filter(|&id| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic));
     let parts = |id| (0..).map_while(move |part| world.site(id, part));
-    let still = |id| parts(id).all(|site| site.velocity.norm() < STILL && site.angular_velocity.norm() < STILL);
+    let still =
+        |id| parts(id).all(|site| site.velocity.norm() < REST_SPEED && site.angular_velocity.norm() < REST_SPEED);
     let color = |id| match (world.asleep(id), still(id)) {
         (true, _) => [0.32, 0.42, 0.60],
         (_, true) => [0.50, 0.58, 0.30],

@@ -4,11 +4,11 @@ use crate::{Material, Pattern};
 use tumble_core::Look;
 
 /// The material of a look. A ball's number is the one at the end of the body's name (`ball_12`); none leaves the spots blank.
-pub(super) fn of_look(look: &Look, name: &str) -> Material {
+pub(super) fn of_appearance(appearance: &Look, name: &str) -> Material {
     let mut numbers = Numbers { second: [1.0; 3], scale_m: 0.1, offset_m: 0.0, name };
     let mut clearcoat = 0.0;
     // of equal names the first counts
-    for (key, value) in look.properties.iter().rev() {
+    for (key, value) in appearance.properties.iter().rev() {
         let value = *value as f32;
         match key.as_str() {
             "second_r" => numbers.second[0] = value,
@@ -21,29 +21,29 @@ pub(super) fn of_look(look: &Look, name: &str) -> Material {
         }
     }
     Material {
-        color: look.color,
-        roughness: look.roughness,
-        metallic: look.metallic,
+        color: appearance.color,
+        roughness: appearance.roughness,
+        metallic: appearance.metallic,
         clearcoat,
-        pattern: pattern(&look.shader, &numbers),
+        pattern: pattern(&appearance.shader, &numbers),
         ..Material::default()
     }
 }
 
 /// The material of a look in a scene file.
-pub(super) fn of_spec(look: &tumble_scene::Look) -> Material {
+pub(super) fn of_spec(appearance: &tumble_scene::Look) -> Material {
     let numbers = Numbers {
-        second: look.second_color.map(|c| c as f32),
-        scale_m: look.pattern_scale_m as f32,
-        offset_m: look.pattern_offset_m as f32,
+        second: appearance.second_color.map(|c| c as f32),
+        scale_m: appearance.pattern_scale_m as f32,
+        offset_m: appearance.pattern_offset_m as f32,
         name: "",
     };
     Material {
-        color: look.color.map(|c| c as f32),
-        roughness: look.roughness as f32,
-        metallic: look.metallic as f32,
-        clearcoat: look.clearcoat as f32,
-        pattern: pattern(look.pattern.name(), &numbers),
+        color: appearance.color.map(|c| c as f32),
+        roughness: appearance.roughness as f32,
+        metallic: appearance.metallic as f32,
+        clearcoat: appearance.clearcoat as f32,
+        pattern: pattern(appearance.pattern.name(), &numbers),
         ..Material::default()
     }
 }

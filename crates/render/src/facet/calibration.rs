@@ -1,5 +1,6 @@
 //! Pictures to set up projectors by: grid, corners, colours, name. Drawn on the screen's own metres, so that a tape measure checks them.
 
+use super::canvas::{fill_rect, put};
 use super::compose::{blank, combined, flipped};
 use super::font::{text_width, write};
 use crate::Image;
@@ -118,8 +119,8 @@ fn grid(image: &mut Image, screen: &Screen) {
 /// A frame at the rim, and in each corner a mark and its place in the cave.
 fn corners(image: &mut Image, screen: &Screen) {
     let (w, h) = (i64::from(image.width), i64::from(image.height));
-    rect(image, 0, 0, w, h, WHITE);
-    rect(image, 1, 1, w - 2, h - 2, DARK);
+    fill_rect(image, 0, 0, w, h, WHITE);
+    fill_rect(image, 1, 1, w - 2, h - 2, DARK);
     let arm = w.min(h) / 6;
     let thick = (w.min(h) / 160).max(1);
     let scale = (w / 420).max(1);
@@ -130,8 +131,8 @@ fn corners(image: &mut Image, screen: &Screen) {
         ("LOWER RIGHT", screen.lower_right_m, true, true, YELLOW),
     ];
     for (name, place, right, low, color) in named {
-        rect(image, if right { w - arm } else { 0 }, if low { h - thick } else { 0 }, arm, thick, color);
-        rect(image, if right { w - thick } else { 0 }, if low { h - arm } else { 0 }, thick, arm, color);
+        fill_rect(image, if right { w - arm } else { 0 }, if low { h - thick } else { 0 }, arm, thick, color);
+        fill_rect(image, if right { w - thick } else { 0 }, if low { h - arm } else { 0 }, thick, arm, color);
         for (line, text) in
             [name.to_owned(), format!("{:.3} {:.3} {:.3} M", place.x, place.y, place.z)].iter().enumerate()
         {
@@ -160,7 +161,7 @@ fn colours(image: &mut Image) {
     ];
     for (i, color) in bars.iter().enumerate() {
         let (from, to) = (w * i as i64 / 8, w * (i as i64 + 1) / 8);
-        rect(image, from, 0, to - from, h / 3, *color);
+        fill_rect(image, from, 0, to - from, h / 3, *color);
     }
     for (row, mask) in [[1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]].iter().enumerate() {
         let (top, bottom) = (h / 3 + h * row as i64 / 6, h / 3 + h * (row as i64 + 1) / 6);
@@ -169,8 +170,8 @@ fn colours(image: &mut Image) {
             let level = (255 * x / (w - 1).max(1)) as u8;
             let step = (17 * (16 * x / w)) as u8;
             let color = |v: u8| [v * mask[0], v * mask[1], v * mask[2], 255];
-            rect(image, x, top, 1, (bottom - top) / 2, color(level));
-            rect(image, x, (top + bottom) / 2, 1, bottom - (top + bottom) / 2, color(step));
+            fill_rect(image, x, top, 1, (bottom - top) / 2, color(level));
+            fill_rect(image, x, (top + bottom) / 2, 1, bottom - (top + bottom) / 2, color(step));
         }
     }
 }
@@ -201,26 +202,19 @@ fn caption(image: &mut Image, cave: &Cave, facet: &Facet, screen: &Screen, patte
     let height = 9 * scale + 10 * small * lines.len() as i64;
     let top = (h - height) / 2;
     let pad = 4 * small;
-    rect(image, (w - block) / 2 - pad, top - pad - 8 * small, block + 2 * pad, height + 2 * pad + 8 * small, BLACK);
+    fill_rect(
+        image,
+        (w - block) / 2 - pad,
+        top - pad - 8 * small,
+        block + 2 * pad,
+        height + 2 * pad + 8 * small,
+        BLACK,
+    );
     for row in 0..6 * small {
-        rect(image, w / 2 - row / 2, top - 8 * small + row, row.max(1), 1, RED);
+        fill_rect(image, w / 2 - row / 2, top - 8 * small + row, row.max(1), 1, RED);
     }
     write(image, &name, (w - text_width(&name, scale)) / 2, top, scale, WHITE);
     for (i, line) in lines.iter().enumerate() {
         write(image, line, (w - text_width(line, small)) / 2, top + 9 * scale + 10 * small * i as i64, small, YELLOW);
-    }
-}
-
-pub(super) fn put(image: &mut Image, x: i64, y: i64, color: [u8; 4]) {
-    if (0..i64::from(image.width)).contains(&x) && (0..i64::from(image.height)).contains(&y) {
-        let at = 4 * (y as usize * image.width as usize + x as usize);
-        image.rgba[at..at + 4].copy_from_slice(&color);
-    }
-}
-
-pub(crate) fn rect(image: &mut Image, x: i64, y: i64, w: i64, h: i64, color: [u8; 4]) {
-    let rows = y.max(0)..(y + h).min(i64::from(image.height));
-    for row in rows {
-        (x.max(0)..(x + w).min(i64::from(image.width))).for_each(|column| put(image, column, row, color));
     }
 }

@@ -1,6 +1,6 @@
 //! Capital letters and digits of 5 x 7 dots, for calibration pictures and captions.
 
-use super::calibration::rect;
+use super::canvas::fill_rect;
 use crate::Image;
 
 /// Dots from one letter to the next.
@@ -74,7 +74,14 @@ pub(crate) fn write(image: &mut Image, text: &str, x: i64, y: i64, scale: i64, c
         let Some((_, rows)) = find(letter).or_else(|| find('?')) else { continue };
         for (row, bits) in rows.iter().enumerate() {
             for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
-                rect(image, x + scale * (ADVANCE * i as i64 + column), y + scale * row as i64, scale, scale, color);
+                fill_rect(
+                    image,
+                    x + scale * (ADVANCE * i as i64 + column),
+                    y + scale * row as i64,
+                    scale,
+                    scale,
+                    color,
+                );
             }
         }
     }

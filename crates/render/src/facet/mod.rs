@@ -5,6 +5,7 @@
 
 mod blend;
 mod calibration;
+mod canvas;
 mod compose;
 pub(crate) mod font;
 mod perspective;
@@ -14,8 +15,8 @@ mod warp;
 
 pub use blend::Blend;
 pub(crate) use blend::encoded;
-pub(crate) use calibration::rect;
 pub use calibration::{CalibrationPattern, calibration_picture};
+pub(crate) use canvas::fill_rect;
 pub(crate) use compose::blank;
 pub use perspective::FacetView;
 pub use unfold::{Tile, unfold};

@@ -57,7 +57,7 @@ impl CaveView {
     }
 
     /// Puts it elsewhere in the scene.
-    pub fn stand(&mut self, place: CavePlace) {
+    pub fn set_place(&mut self, place: CavePlace) {
         self.place = place;
     }
 

@@ -20,20 +20,25 @@ use nalgebra::{Point3, Vector4};
 use std::ops::Range;
 
 /// Middle and radius, m.
-pub type Ball = (Point3<f32>, f32);
+pub type SphereBounds = (Point3<f32>, f32);
 
 /// Most cells along a side.
-const MOST_CELLS: usize = 512;
+const MAX_CELLS: usize = 512;
 /// Smallest side of a cell, pixels.
 const CELL_PX: usize = 2;
 
 /// Numbers, among `ranges`, of the balls that may have a pixel in what the eye sees, in their order; `samples` of a pixel say how near to its edge one is asked.
-pub fn seen(balls: &[Ball], ranges: impl Iterator<Item = Range<u32>>, eye: &Eye, samples: u32) -> Vec<u32> {
+pub fn visible(
+    spheres: &[SphereBounds],
+    ranges: impl Iterator<Item = Range<u32>>,
+    eye: &Eye,
+    samples: u32,
+) -> Vec<u32> {
     let picture = Picture::of(eye);
     let mut map = Map::new(eye, samples);
-    let mut outlines = Vec::with_capacity(balls.len());
+    let mut outlines = Vec::with_capacity(spheres.len());
     for number in ranges.flatten() {
-        match picture.place(&balls[number as usize]) {
+        match picture.place(&spheres[number as usize]) {
             Place::Outside => {}
             Place::Around => outlines.push((number, None)),
             Place::Before(outline) => {
@@ -92,7 +97,7 @@ impl Picture<'_> {
         }
     }
 
-    fn place(&self, (center, radius): &Ball) -> Place {
+    fn place(&self, (center, radius): &SphereBounds) -> Place {
         let (eye, c, r) = (self.eye, center.coords.cast::<f64>(), f64::from(*radius));
         let depth = eye.view_depth(&c);
         if (eye.perspective && depth + r <= 0.0)
@@ -153,7 +158,7 @@ struct Map {
 impl Map {
     fn new(eye: &Eye, samples: u32) -> Map {
         let [width, height] = eye.size_px();
-        let cell = CELL_PX.max(width.max(height).div_ceil(MOST_CELLS));
+        let cell = CELL_PX.max(width.max(height).div_ceil(MAX_CELLS));
         let (columns, rows) = (width.div_ceil(cell), height.div_ceil(cell));
         // in the middle, or 1/8 from the edge; the rest is for rounding
         let inset = if samples == 1 { 0.4 } else { 0.1 };

@@ -11,7 +11,7 @@ pub const SPHERE_FLOATS: u64 = 20;
 /// Texels that tell of a sphere, of four words each.
 pub const SPHERE_TEXELS: usize = 4;
 /// Middle, radius and number.
-pub const BALL_WORDS: u64 = 5;
+pub const SPHERE_WORDS: u64 = 5;
 pub const CAPSULE_FLOATS: u64 = 24;
 pub const STROKE_FLOATS: u64 = 16;
 
@@ -77,7 +77,7 @@ impl Eye {
     }
 
     /// Whether the eye is in, or near to, one of the balls, or one lies across the plane through the eye: there an outline is no ellipse before it.
-    pub fn near_any<'a>(&self, mut balls: impl Iterator<Item = &'a (Point3<f32>, f32)>) -> bool {
+    pub fn near_any<'a>(&self, mut spheres: impl Iterator<Item = &'a (Point3<f32>, f32)>) -> bool {
         let at: Vector3<f32> = self.origin[0].cast();
         let ahead: Vector3<f32> = self.clip_from_world.row(3).transpose().xyz().cast();
         let sides = self.sides();
@@ -85,7 +85,7 @@ impl Eye {
             sides.iter().any(|side| side.dot(&c.cast().to_homogeneous()) < -1.001 * f64::from(r))
         };
         self.perspective
-            && balls.any(|(center, radius)| {
+            && spheres.any(|(center, radius)| {
                 let to = center.coords - at;
                 // a little more than the shaders' own bounds
                 (to.norm_squared() < 2.1 * radius * radius

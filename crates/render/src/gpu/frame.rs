@@ -48,7 +48,7 @@ impl<'a> Frame<'a> {
             BindingResource::TextureView(&targets.occlusion),
             BindingResource::TextureView(&maps.array),
             BindingResource::TextureView(&targets.ids),
-            BindingResource::TextureView(&stage.spheres.looks),
+            BindingResource::TextureView(&stage.spheres.appearances),
         ];
         Ok(Frame {
             view: bind_view(gpu, pipelines, &eye)?,

@@ -1,7 +1,7 @@
 //! Shaders, binding layouts and pipelines. Layouts and shaders are made once per device, pipelines when a picture first needs them: one for each
 //! pass, pattern and quality, so that none computes what it does not show.
 
-use super::data::{BALL_WORDS, CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, STROKE_FLOATS};
+use super::data::{CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, SPHERE_WORDS, STROKE_FLOATS};
 use crate::{DrawList, Light, Settings, Shadows};
 use std::collections::BTreeMap;
 use wgpu::{
@@ -193,15 +193,15 @@ impl Pipelines {
             depth: [
                 depth(mesh, None, Input::Mesh, None, WRITE),
                 depth(mesh, None, Input::Mesh, None, WRITE),
-                depth("vs_ball", Some("fs_ball_depth"), Input::Ball, None, WRITE),
-                depth("vs_near", Some("fs_near_depth"), Input::Ball, None, WRITE),
+                depth("vs_bounds", Some("fs_bounds_depth"), Input::SphereBounds, None, WRITE),
+                depth("vs_near", Some("fs_near_depth"), Input::SphereBounds, None, WRITE),
                 depth("vs_capsule", Some("fs_capsule_depth"), Input::Capsule, None, WRITE),
             ],
             ids: [
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
-                depth("vs_ball", Some("fs_ball_id"), Input::Ball, Some(ID), WRITE),
-                depth("vs_near", Some("fs_near_id"), Input::Ball, Some(ID), WRITE),
+                depth("vs_bounds", Some("fs_bounds_id"), Input::SphereBounds, Some(ID), WRITE),
+                depth("vs_near", Some("fs_near_id"), Input::SphereBounds, Some(ID), WRITE),
                 depth("vs_capsule", Some("fs_capsule_no_id"), Input::Capsule, Some(ID), WRITE),
             ],
             mesh_first: mesh_first.build(device, &pixels, &picture),
@@ -252,7 +252,7 @@ impl Pipelines {
             Pass::Ground => ("vs_ground", "fs_ground", Input::Mesh, behind, None),
             Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
             Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, seen, None),
-            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::Ball, seen, None),
+            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::SphereBounds, seen, None),
             Pass::Capsule if variant.spheres_first() => ("vs_capsule", "fs_capsule", Input::Capsule, WRITE, None),
             Pass::Capsule => ("vs_capsule", "fs_capsule", Input::Capsule, solid, None),
             Pass::Shell => ("vs_shell", "fs_shell", Input::Sphere, TEST, over),
@@ -311,7 +311,7 @@ enum Input {
     Mesh,
     Sphere,
     /// Middle, radius and number of a sphere.
-    Ball,
+    SphereBounds,
     Capsule,
     Stroke,
     /// Two whole numbers.
@@ -349,8 +349,8 @@ impl Plan<'_> {
             Input::None => vec![],
             Input::Mesh => vec![Some(per_vertex), Some(per_instance)],
             Input::Sphere | Input::Capsule | Input::Stroke => vec![Some(per_instance)],
-            Input::Ball => vec![Some(wgpu::VertexBufferLayout {
-                array_stride: 4 * BALL_WORDS,
+            Input::SphereBounds => vec![Some(wgpu::VertexBufferLayout {
+                array_stride: 4 * SPHERE_WORDS,
                 step_mode: wgpu::VertexStepMode::Instance,
                 attributes: &BALL,
             })],
@@ -360,7 +360,7 @@ impl Plan<'_> {
                 attributes: &RANGE,
             })],
         };
-        let strip = matches!(self.input, Input::Sphere | Input::Ball | Input::Capsule | Input::Stroke);
+        let strip = matches!(self.input, Input::Sphere | Input::SphereBounds | Input::Capsule | Input::Stroke);
         let write_mask =
             if self.fs == Some("fs_nothing") { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
         let targets = [self.color.map(|format| wgpu::ColorTargetState { format, blend: self.blend, write_mask })];
@@ -417,7 +417,7 @@ const RANGE: [wgpu::VertexAttribute; 1] =
 impl Input {
     fn floats(self) -> u64 {
         match self {
-            Input::None | Input::Range | Input::Ball => 0,
+            Input::None | Input::Range | Input::SphereBounds => 0,
             Input::Mesh => INSTANCE_FLOATS,
             Input::Sphere => SPHERE_FLOATS,
             Input::Capsule => CAPSULE_FLOATS,

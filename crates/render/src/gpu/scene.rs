@@ -3,7 +3,7 @@
 use super::data::Eye;
 use super::shadow;
 use super::targets::MAX_LAYERS;
-use crate::list::bounds::{Bounds, ball_of};
+use crate::list::bounds::{Bounds, sphere_around};
 use crate::material::linear3;
 use crate::{DrawList, Light, MAX_LIGHTS, MAX_SHADOWS};
 
@@ -31,14 +31,14 @@ pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>, part: bool) -> f3
         (_, false) => 0.0,
         (Some(reach), _) => reach,
         // all there is may be wide: then the usual size of a thing says how far it darkens its neighbours
-        (None, _) if part => seen.map_or(0.0, |b| (ball_of(b).1 / 12.0).min(4.0 * list.usual_radius())),
-        (None, _) => seen.map_or(0.0, |b| ball_of(b).1 / 12.0),
+        (None, _) if part => seen.map_or(0.0, |b| (sphere_around(b).1 / 12.0).min(4.0 * list.usual_radius())),
+        (None, _) => seen.map_or(0.0, |b| sphere_around(b).1 / 12.0),
     }
 }
 
 /// Middle x and y of the floor, its reach and its height.
 pub fn floor(list: &DrawList, seen: Option<&Bounds>) -> [f32; 4] {
-    let middle = seen.map_or([0.0; 2], |b| ball_of(b).0.xy().into());
+    let middle = seen.map_or([0.0; 2], |b| sphere_around(b).0.xy().into());
     [
         middle[0],
         middle[1],

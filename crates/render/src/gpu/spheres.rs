@@ -1,7 +1,7 @@
 //! The spheres of a stage: what they look like, and which of them a point of view asks for.
 
 use super::Gpu;
-use super::cull::{Ball, seen};
+use super::cull::{SphereBounds, visible};
 use super::data::{self, Eye};
 use super::stage::{Same, group_items};
 use crate::{DrawList, RenderError};
@@ -11,9 +11,9 @@ use wgpu::{Buffer, BufferUsages, TextureView};
 /// All spheres of a list, by surface.
 pub struct Spheres {
     pub groups: Vec<Same>,
-    balls: Vec<Ball>,
+    spheres: Vec<SphereBounds>,
     /// Four texels per sphere, 256 spheres per row.
-    pub looks: TextureView,
+    pub appearances: TextureView,
     /// First and last number of the spheres of each group.
     pub ranges: Buffer,
     /// All balls, where points of view do not choose among them.
@@ -24,7 +24,7 @@ pub struct Spheres {
 /// The spheres that a point of view draws.
 pub struct Choice {
     /// Middle, radius and number of each.
-    pub balls: Buffer,
+    pub spheres: Buffer,
     /// Places in it, a range for each group.
     pub ranges: Vec<Range<u32>>,
     /// Whether one is so near to the eye that its outline is no circle on a plane before it.
@@ -42,17 +42,21 @@ pub enum Which {
 impl Spheres {
     pub(super) fn new(gpu: &Gpu, list: &DrawList) -> Result<Self, RenderError> {
         let (groups, order) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow));
-        let balls: Vec<Ball> = order.iter().map(|&i| (list.spheres[i].center, list.spheres[i].radius)).collect();
+        let spheres: Vec<SphereBounds> =
+            order.iter().map(|&i| (list.spheres[i].center, list.spheres[i].radius)).collect();
         let ranges: Vec<u32> = groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
-        let whole =
-            if gpu.choosy || balls.is_empty() { None } else { Some(ball_buffer(gpu, &balls, 0..balls.len() as u32)?) };
+        let whole = if gpu.choosy || spheres.is_empty() {
+            None
+        } else {
+            Some(sphere_buffer(gpu, &spheres, 0..spheres.len() as u32)?)
+        };
         Ok(Spheres {
-            looks: looks(gpu, list, &order)?,
+            appearances: appearances(gpu, list, &order)?,
             ranges: super::meshes::buffer(gpu, bytemuck::cast_slice(&ranges), BufferUsages::VERTEX, "sphere groups")?,
             samples: list.settings.samples,
             whole,
             groups,
-            balls,
+            spheres,
         })
     }
 
@@ -61,30 +65,34 @@ impl Spheres {
         let of = |same: &Same| if which == Which::All { same.all.clone() } else { same.casters.clone() };
         if let Some(whole) = &self.whole {
             return Ok(Choice {
-                balls: whole.clone(),
+                spheres: whole.clone(),
                 ranges: self.groups.iter().map(of).collect(),
-                near: eye.near_any(self.balls.iter()),
+                near: eye.near_any(self.spheres.iter()),
             });
         }
         let samples = if which == Which::All { self.samples } else { 1 };
-        let chosen = seen(&self.balls, self.groups.iter().map(of), eye, samples);
+        let chosen = visible(&self.spheres, self.groups.iter().map(of), eye, samples);
         let place = |number: u32| chosen.partition_point(|&n| n < number) as u32;
         let ranges = self.groups.iter().map(of).map(|range| place(range.start)..place(range.end)).collect();
-        let near = eye.near_any(chosen.iter().map(|&n| &self.balls[n as usize]));
-        Ok(Choice { balls: ball_buffer(gpu, &self.balls, chosen.iter().copied())?, ranges, near })
+        let near = eye.near_any(chosen.iter().map(|&n| &self.spheres[n as usize]));
+        Ok(Choice { spheres: sphere_buffer(gpu, &self.spheres, chosen.iter().copied())?, ranges, near })
     }
 }
 
-fn ball_buffer(gpu: &Gpu, balls: &[Ball], numbers: impl Iterator<Item = u32>) -> Result<Buffer, RenderError> {
-    let mut words: Vec<u32> = Vec::with_capacity(data::BALL_WORDS as usize * balls.len());
+fn sphere_buffer(
+    gpu: &Gpu,
+    spheres: &[SphereBounds],
+    numbers: impl Iterator<Item = u32>,
+) -> Result<Buffer, RenderError> {
+    let mut words: Vec<u32> = Vec::with_capacity(data::SPHERE_WORDS as usize * spheres.len());
     for number in numbers {
-        let (center, radius) = balls[number as usize];
+        let (center, radius) = spheres[number as usize];
         words.extend([center.x.to_bits(), center.y.to_bits(), center.z.to_bits(), radius.to_bits(), number]);
     }
     super::meshes::buffer(gpu, bytemuck::cast_slice(&words), BufferUsages::VERTEX, "balls")
 }
 
-fn looks(gpu: &Gpu, list: &DrawList, order: &[usize]) -> Result<TextureView, RenderError> {
+fn appearances(gpu: &Gpu, list: &DrawList, order: &[usize]) -> Result<TextureView, RenderError> {
     let row = 256 * 4 * data::SPHERE_TEXELS;
     let rows = order.len().div_ceil(256).max(1);
     let most = gpu.device.limits().max_texture_dimension_2d as usize;

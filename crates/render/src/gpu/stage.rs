@@ -101,7 +101,7 @@ impl Stage {
             shells: list
                 .debug_spheres
                 .iter()
-                .filter(|s| s.look == SphereStyle::Shell && s.radius > 0.0)
+                .filter(|s| s.kind == SphereStyle::Shell && s.radius > 0.0)
                 .cloned()
                 .collect(),
             groups,
@@ -153,7 +153,7 @@ impl Stage {
 
     /// Depth of spheres alone, with or without the number of the nearest.
     pub(super) fn draw_sphere_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], choice: &Choice) {
-        pass.set_vertex_buffer(0, choice.balls.slice(..));
+        pass.set_vertex_buffer(0, choice.spheres.slice(..));
         for pipeline in &by[2..if choice.near { 4 } else { 3 }] {
             pass.set_pipeline(pipeline);
             choice.ranges.iter().filter(|range| !range.is_empty()).for_each(|range| pass.draw(0..4, range.clone()));
@@ -241,7 +241,7 @@ impl Stage {
                 pass.set_vertex_buffer(0, self.spheres.ranges.slice(..));
                 pass.draw(0..3, i as u32..i as u32 + 1);
             } else {
-                pass.set_vertex_buffer(0, choice.balls.slice(..));
+                pass.set_vertex_buffer(0, choice.spheres.slice(..));
                 pass.draw(0..4, choice.ranges[i].clone());
             }
         }

@@ -13,7 +13,7 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
 /// How often in a row a surface may be lost before the window is given up.
-const MOST_LOSSES: u32 = 8;
+const MAX_LOSSES: u32 = 8;
 
 /// Whether a picture came to the eye.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -196,7 +196,7 @@ impl Screen {
     /// A surface that no longer fits is configured again; one that is lost is made anew.
     fn mend(&mut self, lost: bool) -> Result<Shown, RenderError> {
         self.losses += 1;
-        if self.losses > MOST_LOSSES {
+        if self.losses > MAX_LOSSES {
             return Err(self.renderer.gpu.failed("the window's surface is lost again and again".into()));
         }
         if lost {

@@ -17,11 +17,11 @@ const FLOWN_OFF: f32 = 20.0;
 impl DrawList {
     /// A ball `(center, radius)` around all instances and spheres (those that throw shadows, if `casters` is set); `None` when there are none.
     /// The ground and debug drawings do not count.
-    pub fn bounding_ball(&self, casters: bool) -> Option<(Point3<f32>, f32)> {
-        self.bounding_box(casters).map(|b| ball_of(&b))
+    pub fn bounding_sphere(&self, casters: bool) -> Option<(Point3<f32>, f32)> {
+        self.bounding_box(casters).map(|b| sphere_around(&b))
     }
 
-    /// The box `(min, max)` around all instances and spheres, as for [`DrawList::bounding_ball`].
+    /// The box `(min, max)` around all instances and spheres, as for [`DrawList::bounding_sphere`].
     pub fn bounding_box(&self, casters: bool) -> Option<(Point3<f32>, Point3<f32>)> {
         union(self.items(casters).map(|item| item.1))
     }
@@ -29,17 +29,18 @@ impl DrawList {
     /// A camera that looks along `direction` and shows what throws shadows: a wide floor does not count, nor what flew off so far that the
     /// rest would be a dot. Where nothing throws shadows it looks at the middle of what there is, from no farther than shows 5 m around it.
     pub fn framing_camera(&self, direction: Vector3<f32>) -> Camera {
-        let floor = || self.bounding_ball(false).map(|(center, radius)| (center, radius.min(5.0)));
-        let (center, radius) = self.main_box().map(|b| ball_of(&b)).or_else(floor).unwrap_or((Point3::origin(), 1.0));
+        let floor = || self.bounding_sphere(false).map(|(center, radius)| (center, radius.min(5.0)));
+        let (center, radius) =
+            self.main_box().map(|b| sphere_around(&b)).or_else(floor).unwrap_or((Point3::origin(), 1.0));
         Camera::framing(center, radius, direction, 0.9)
     }
 
     /// The box around what throws shadows, without what lies many times farther from their median than half of them do.
     fn main_box(&self) -> Option<Bounds> {
         let boxes: Vec<Bounds> = self.items(true).map(|item| item.1).collect();
-        let balls: Vec<_> = boxes.iter().map(ball_of).collect();
-        let middle = Point3::from(std::array::from_fn(|k| median(balls.iter().map(|(center, _)| center[k]))));
-        let reach: Vec<f32> = balls.iter().map(|(center, radius)| (center - middle).norm() + radius).collect();
+        let spheres: Vec<_> = boxes.iter().map(sphere_around).collect();
+        let middle = Point3::from(std::array::from_fn(|k| median(spheres.iter().map(|(center, _)| center[k]))));
+        let reach: Vec<f32> = spheres.iter().map(|(center, radius)| (center - middle).norm() + radius).collect();
         let limit = FLOWN_OFF * median(reach.iter().copied());
         union(boxes.into_iter().zip(reach).filter(|(_, r)| *r <= limit).map(|(b, _)| b))
     }
@@ -48,7 +49,7 @@ impl DrawList {
     pub(crate) fn visible_box(&self, clip_from_world: &Matrix4<f32>) -> Option<Bounds> {
         let planes = planes(clip_from_world);
         let seen = |b: &Bounds| {
-            let (center, radius) = ball_of(b);
+            let (center, radius) = sphere_around(b);
             planes.iter().all(|p| p.dot(&center.to_homogeneous()) >= -radius)
         };
         union(self.items(true).map(|item| item.1).filter(seen)).or_else(|| self.bounding_box(false))
@@ -61,15 +62,15 @@ impl DrawList {
 
     /// The median radius of what throws shadows, m; 0 where nothing does.
     pub(crate) fn usual_radius(&self) -> f32 {
-        median(self.items(true).map(|item| ball_of(&item.1).1))
+        median(self.items(true).map(|item| sphere_around(&item.1).1))
     }
 
     /// What throws shadows near the `seen` box: each one's corners in the world (eight; a sphere's centre alone, both ends of a capsule's segment), as points to be
     /// transformed, with a radius around them.
     pub(crate) fn casters_near(&self, seen: &Bounds) -> impl Iterator<Item = (Corners, f32, Bounds)> {
-        let (middle, radius) = ball_of(seen);
+        let (middle, radius) = sphere_around(seen);
         self.items(true).filter_map(move |(points, bounds, around)| {
-            let (center, own) = ball_of(&bounds);
+            let (center, own) = sphere_around(&bounds);
             ((center - middle).norm() - own <= FAR_AWAY * radius).then_some((points, around, bounds))
         })
     }
@@ -126,7 +127,7 @@ pub(crate) fn union(boxes: impl Iterator<Item = Bounds>) -> Option<Bounds> {
 }
 
 /// The ball around a box.
-pub(crate) fn ball_of((lo, hi): &Bounds) -> (Point3<f32>, f32) {
+pub(crate) fn sphere_around((lo, hi): &Bounds) -> (Point3<f32>, f32) {
     (nalgebra::center(lo, hi), (hi - lo).norm() / 2.0)
 }
 

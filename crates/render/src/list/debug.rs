@@ -71,7 +71,7 @@ pub struct DebugSphere {
     /// Radius in metres.
     pub radius: f32,
     /// Wire or glass.
-    pub look: SphereStyle,
+    pub kind: SphereStyle,
     /// Colour and layering (`on_top` and the width hold for rings only).
     pub style: DebugStyle,
 }
@@ -106,12 +106,12 @@ impl DrawList {
 
     /// Adds a sphere of three rings.
     pub fn wire_sphere(&mut self, center: Point3<f32>, radius: f32, style: DebugStyle) {
-        self.debug_spheres.push(DebugSphere { center, radius, look: SphereStyle::Rings, style });
+        self.debug_spheres.push(DebugSphere { center, radius, kind: SphereStyle::Rings, style });
     }
 
     /// Adds a translucent sphere.
     pub fn shell(&mut self, center: Point3<f32>, radius: f32, style: DebugStyle) {
-        self.debug_spheres.push(DebugSphere { center, radius, look: SphereStyle::Shell, style });
+        self.debug_spheres.push(DebugSphere { center, radius, kind: SphereStyle::Shell, style });
     }
 }
 
@@ -129,7 +129,7 @@ pub(crate) struct Stroke {
 /// All strokes of a list, in its order.
 pub(crate) fn strokes(list: &DrawList) -> Vec<Stroke> {
     let mut out = Vec::new();
-    list.debug_spheres.iter().filter(|s| s.look == SphereStyle::Rings).for_each(|s| ring_strokes(s, &mut out));
+    list.debug_spheres.iter().filter(|s| s.kind == SphereStyle::Rings).for_each(|s| ring_strokes(s, &mut out));
     list.lines.iter().for_each(|l| line_strokes(l, &mut out));
     list.points.iter().for_each(|p| {
         let px = p.style.width_px;

@@ -30,7 +30,7 @@ impl Shadows {
     }
 }
 
-/// The part of [`Settings`] that trades looks for speed. As words: `usual`, `fast`, `fastest`, and behind it or alone `shadows=off|hard|soft`, `samples=1|4`,
+/// The part of [`Settings`] that trades looks for speed. As words: `default`, `fast`, `fastest`, and behind it or alone `shadows=off|hard|soft`, `samples=1|4`,
 /// `occlusion=on|off`, `reflections=on|off`, `map=TEXELS`, with commas between them.
 ///
 /// ```
@@ -56,7 +56,7 @@ pub struct Quality {
 /// A word that names no quality.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no quality '{0}'; wanted usual, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), with commas between them"
+    "no quality '{0}'; wanted default, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), with commas between them"
 )]
 pub struct UnknownQuality(String);
 
@@ -98,7 +98,7 @@ impl FromStr for Quality {
         for word in words.split(',').map(str::trim) {
             let unknown = || UnknownQuality(word.to_string());
             match word.split_once('=') {
-                None if word == "usual" => quality = Quality::default(),
+                None if word == "default" => quality = Quality::default(),
                 None if word == "fastest" => quality = Quality::fastest(),
                 None if word == "fast" => quality = Quality::fast(),
                 Some(("shadows", name)) => {

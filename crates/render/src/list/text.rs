@@ -97,8 +97,8 @@ impl Display for DrawList {
             writeln!(f, "point {i}: at {} {}", v(p.position.coords.as_slice()), style(&p.style))?;
         }
         for (i, s) in self.debug_spheres.iter().enumerate() {
-            let look = if s.look == SphereStyle::Rings { "rings" } else { "shell" };
-            writeln!(f, "{look} {i}: at {} radius {} {}", v(s.center.coords.as_slice()), n(s.radius), style(&s.style))?;
+            let kind = if s.kind == SphereStyle::Rings { "rings" } else { "shell" };
+            writeln!(f, "{kind} {i}: at {} radius {} {}", v(s.center.coords.as_slice()), n(s.radius), style(&s.style))?;
         }
         Ok(())
     }

@@ -4,9 +4,9 @@
 // passes the segment at the least distance where u = -(c - o)·a' / a'·a' (a' = a less its part along D), clamped to the segment. It enters the
 // round wall where t² A + 2 t B + C = 0 with
 //   A = D·D - (D·a)²,  B = (o - c)·D - (D·a) ((o - c)·a),  C = |o - c|² - ((o - c)·a)² - r²,
-// and where that is beyond an end, the ball around the end.
+// and where that is beyond an end, the sphere around the end.
 struct CapsuleIn {
-    @location(0) ball: vec4f, // centre, radius
+    @location(0) sphere: vec4f, // centre, radius
     @location(1) turn: vec4f, // quaternion x, y, z, w: object to world; the axis is z
     @location(2) color_rough: vec4f,
     @location(3) other_metal: vec4f,
@@ -15,7 +15,7 @@ struct CapsuleIn {
 };
 struct CapsuleOut {
     @builtin(position) clip: vec4f,
-    @location(0) @interpolate(flat) ball: vec4f,
+    @location(0) @interpolate(flat) sphere: vec4f,
     @location(1) @interpolate(flat) turn: vec4f,
     @location(2) @interpolate(flat) color_rough: vec4f,
     @location(3) @interpolate(flat) other_metal: vec4f,
@@ -35,35 +35,35 @@ const STRIP = array<u32, 14>(6u, 7u, 2u, 3u, 1u, 7u, 5u, 6u, 4u, 2u, 0u, 1u, 4u,
     var strip = STRIP;
     let k = strip[index];
     let corner = vec3f(select(-1.0, 1.0, (k & 1u) != 0u), select(-1.0, 1.0, (k & 2u) != 0u), select(-1.0, 1.0, (k & 4u) != 0u));
-    let r = 1.001 * in.ball.w;
-    let at = in.ball.xyz + turned(in.turn, corner * vec3f(r, r, r + in.half_length.x));
+    let r = 1.001 * in.sphere.w;
+    let at = in.sphere.xyz + turned(in.turn, corner * vec3f(r, r, r + in.half_length.x));
     var clip = view.clip_from_world * vec4f(at, 1.0);
     // far sides beyond the far plane are drawn on it
     clip.z = max(clip.z, 0.0);
-    return CapsuleOut(clip, in.ball, in.turn, in.color_rough, in.other_metal, in.pattern, vec4f(turned(in.turn, vec3f(0.0, 0.0, 1.0)), in.half_length.x));
+    return CapsuleOut(clip, in.sphere, in.turn, in.color_rough, in.other_metal, in.pattern, vec4f(turned(in.turn, vec3f(0.0, 0.0, 1.0)), in.half_length.x));
 }
 
 // Ray, its parameter nearest to the middle, the way from there to the middle, and the place on the segment that it passes nearest to.
 struct Passing { ray: Ray, nearest: f32, to: vec3f, u: f32, room: f32 };
 
-fn pass_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> Passing {
+fn pass_capsule(sphere: vec4f, axis: vec4f, pixel: vec2f) -> Passing {
     let ray = ray_at(pixel);
     let per = 1.0 / dot(ray.dir, ray.dir);
-    let whole = ball.xyz - ray.origin;
+    let whole = sphere.xyz - ray.origin;
     let nearest = dot(whole, ray.dir) * per;
     let to = whole - nearest * ray.dir;
     let across = axis.xyz - dot(axis.xyz, ray.dir) * per * ray.dir;
     let u = clamp(-dot(to, across) / max(dot(across, across), 1e-9), -axis.w, axis.w);
     let miss = to + u * across;
-    return Passing(ray, nearest, to, u, ball.w * ball.w - dot(miss, miss));
+    return Passing(ray, nearest, to, u, sphere.w * sphere.w - dot(miss, miss));
 }
 
-fn inside_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> f32 {
-    return pass_capsule(ball, axis, pixel).room;
+fn inside_capsule(sphere: vec4f, axis: vec4f, pixel: vec2f) -> f32 {
+    return pass_capsule(sphere, axis, pixel).room;
 }
 
-fn hit_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> Hit {
-    let p = pass_capsule(ball, axis, pixel);
+fn hit_capsule(sphere: vec4f, axis: vec4f, pixel: vec2f) -> Hit {
+    let p = pass_capsule(sphere, axis, pixel);
     let d = p.ray.dir;
     let a = axis.xyz;
     let d_a = dot(d, a);
@@ -72,7 +72,7 @@ fn hit_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> Hit {
     let o_d = dot(o, d);
     let wide = max(dot(d, d) - d_a * d_a, 1e-9);
     let half = o_d - d_a * o_a;
-    var t = (-half - sqrt(max(half * half - wide * (dot(o, o) - o_a * o_a - ball.w * ball.w), 0.0))) / wide;
+    var t = (-half - sqrt(max(half * half - wide * (dot(o, o) - o_a * o_a - sphere.w * sphere.w), 0.0))) / wide;
     var u = o_a + t * d_a;
     if (p.room <= 0.0) {
         // at the rim the ray may just miss: the normal is that of the nearest point
@@ -84,15 +84,15 @@ fn hit_capsule(ball: vec4f, axis: vec4f, pixel: vec2f) -> Hit {
         let per = 1.0 / dot(d, d);
         let near = dot(end, d) * per;
         let miss = end - near * d;
-        t = near - sqrt(max(ball.w * ball.w - dot(miss, miss), 0.0) * per);
+        t = near - sqrt(max(sphere.w * sphere.w - dot(miss, miss), 0.0) * per);
     }
     let n = normalize(t * d - p.to - u * a);
-    return Hit(p.nearest + t, ball.xyz + u * a + n * ball.w, n, -normalize(d));
+    return Hit(p.nearest + t, sphere.xyz + u * a + n * sphere.w, n, -normalize(d));
 }
 
 fn capsule_depth(in: CapsuleOut) -> f32 {
-    let p = inside_capsule(in.ball, in.axis, in.clip.xy);
-    let h = hit_capsule(in.ball, in.axis, in.clip.xy);
+    let p = inside_capsule(in.sphere, in.axis, in.clip.xy);
+    let h = hit_capsule(in.sphere, in.axis, in.clip.xy);
     let depth = depth_of(h.s);
     if (p < 0.0 || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
     return depth;
@@ -103,18 +103,18 @@ fn capsule_depth(in: CapsuleOut) -> f32 {
 }
 
 // Where the number of the nearest sphere is asked for: it is none.
-@fragment fn fs_capsule_no_id(in: CapsuleOut) -> BallPixel {
-    return BallPixel(0u, capsule_depth(in));
+@fragment fn fs_capsule_no_id(in: CapsuleOut) -> BoundsPixel {
+    return BoundsPixel(0u, capsule_depth(in));
 }
 
 @fragment fn fs_capsule(in: CapsuleOut) -> SpherePixel {
     let pixel = in.clip.xy;
-    let mask = capsule_mask(in.ball, in.axis, pixel);
-    let h = hit_capsule(in.ball, in.axis, pixel);
+    let mask = capsule_mask(in.sphere, in.axis, pixel);
+    let h = hit_capsule(in.sphere, in.axis, pixel);
     let depth = depth_of(h.s);
     if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
-    let color = pixel_color(h.position, h.normal, h.to_eye, unturn(in.turn, h.position - in.ball.xyz), unturn(in.turn, h.normal), h.s, pixel, vec3f(0.0),
-        Look(in.color_rough, in.other_metal, in.pattern));
+    let color = pixel_color(h.position, h.normal, h.to_eye, unturn(in.turn, h.position - in.sphere.xyz), unturn(in.turn, h.normal), h.s, pixel, vec3f(0.0),
+        Appearance(in.color_rough, in.other_metal, in.pattern));
     // a hair nearer than in the pass before, where there is one
     return sphere_pixel(vec4f(color, 1.0), min(depth * 1.000001, 1.0), mask);
 }

@@ -8,10 +8,10 @@ fn sphere_pixel(color: vec4f, depth: f32, mask: u32) -> SpherePixel {
     return SpherePixel(color, depth);
 }
 
-fn sample_mask(ball: vec4f, pixel: vec2f) -> u32 {
-    return select(0u, 15u, inside(ball, pixel) >= 0.0);
+fn sample_mask(sphere: vec4f, pixel: vec2f) -> u32 {
+    return select(0u, 15u, inside(sphere, pixel) >= 0.0);
 }
 
-fn capsule_mask(ball: vec4f, axis: vec4f, pixel: vec2f) -> u32 {
-    return select(0u, 15u, inside_capsule(ball, axis, pixel) >= 0.0);
+fn capsule_mask(sphere: vec4f, axis: vec4f, pixel: vec2f) -> u32 {
+    return select(0u, 15u, inside_capsule(sphere, axis, pixel) >= 0.0);
 }

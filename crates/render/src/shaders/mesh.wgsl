@@ -73,7 +73,7 @@ fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     // seen from behind; triangles thinner than a pixel may be rounded over, so the normal must say so too
     if (!front && dot(normal, to_eye) < 0.0) { normal = -normal; }
     return pixel_color(world, normal, to_eye, in.object / in.one, normalize(in.object_normal), s, in.clip.xy, in.place / in.one,
-        Look(in.color_rough, in.other_metal, in.pattern));
+        Appearance(in.color_rough, in.other_metal, in.pattern));
 }
 
 @fragment fn fs_mesh(in: MeshOut, @builtin(front_facing) front: bool) -> @location(0) vec4f {
@@ -101,7 +101,7 @@ struct GroundOut {
     let dir = ray.dir * inverseSqrt(dot(ray.dir, ray.dir));
     let up = vec3f(0.0, 0.0, 1.0);
     let normal = vec3f(0.0, 0.0, select(-1.0, 1.0, dir.z < 0.0));
-    let color = pixel_color(place, normal, -dir, place, up, s, in.clip.xy, vec3f(0.0), Look(in.color_rough, in.other_metal, in.pattern));
+    let color = pixel_color(place, normal, -dir, place, up, s, in.clip.xy, vec3f(0.0), Appearance(in.color_rough, in.other_metal, in.pattern));
     let away = length(place.xy - scene.floor.xy) / scene.floor.z;
     let fade = select(1.0, smoothstep(0.15, 0.95, away), s > 0.0 && s < 1e6);
     return vec4f(mix(color, backdrop_at(dir), fade), 1.0);

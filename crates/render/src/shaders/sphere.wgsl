@@ -1,7 +1,7 @@
 // Spheres by ray casting inside a square that just covers them. Each sample of a pixel is tested against the exact outline,
 // so edges are as smooth as those of triangles; colour and depth are those of the pixel's middle.
 struct SphereIn {
-    @location(0) ball: vec4f, // centre, radius
+    @location(0) sphere: vec4f, // centre, radius
     @location(1) turn: vec4f, // quaternion x, y, z, w: object to world
     @location(2) color_rough: vec4f,
     @location(3) other_metal: vec4f,
@@ -9,7 +9,7 @@ struct SphereIn {
 };
 struct SphereOut {
     @builtin(position) clip: vec4f,
-    @location(0) @interpolate(flat) ball: vec4f,
+    @location(0) @interpolate(flat) sphere: vec4f,
     @location(1) @interpolate(flat) turn: vec4f,
     @location(2) @interpolate(flat) color_rough: vec4f,
     @location(3) @interpolate(flat) other_metal: vec4f,
@@ -35,7 +35,7 @@ fn clip_row(i: u32) -> vec3f {
     return vec3f(m[0][i], m[1][i], m[2][i]);
 }
 
-// Whether a ball lies wholly to a side of the picture: the planes of the sides are w + x = 0, w - x = 0, w + y = 0 and w - y = 0.
+// Whether a sphere lies wholly to a side of the picture: the planes of the sides are w + x = 0, w - x = 0, w + y = 0 and w - y = 0.
 fn beside(middle: vec4f, radius: f32) -> bool {
     let x = clip_row(0u);
     let y = clip_row(1u);
@@ -45,16 +45,16 @@ fn beside(middle: vec4f, radius: f32) -> bool {
     return any(way < -1.001 * radius * reach);
 }
 
-fn cover(ball: vec4f, index: u32) -> Cover {
+fn cover(sphere: vec4f, index: u32) -> Cover {
     let corner = corner_of(index);
-    let middle = view.clip_from_world * vec4f(ball.xyz, 1.0);
-    let aside = beside(middle, ball.w);
+    let middle = view.clip_from_world * vec4f(sphere.xyz, 1.0);
+    let aside = beside(middle, sphere.w);
     let whole = Cover(select(vec4f(corner, 0.5, 1.0), NOWHERE, aside), vec2f(0.0), vec3f(0.0), !aside);
     var axis = view.dir_0.xyz;
-    let r2 = ball.w * ball.w;
+    let r2 = sphere.w * sphere.w;
     var numbers = vec3f(1.0, 1.0, r2);
     if (view.lens.x > 0.5) {
-        axis = ball.xyz - view.origin_0.xyz;
+        axis = sphere.xyz - view.origin_0.xyz;
         let d2 = dot(axis, axis);
         if (d2 < 2.0 * r2) { return whole; }
         numbers = vec3f(d2, d2 - r2, r2 * d2 / (d2 - r2));
@@ -71,7 +71,7 @@ fn cover(ball: vec4f, index: u32) -> Cover {
         return whole;
     }
     let reach = half * 1.002 * corner;
-    let clip = view.clip_from_world * vec4f(ball.xyz + side * reach.x + up * reach.y, 1.0);
+    let clip = view.clip_from_world * vec4f(sphere.xyz + side * reach.x + up * reach.y, 1.0);
     return Cover(vec4f(clip.xy, 0.5 * clip.w, clip.w), reach, numbers, false);
 }
 
@@ -79,45 +79,45 @@ fn cover(ball: vec4f, index: u32) -> Cover {
 const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
 
 @vertex fn vs_shell(in: SphereIn, @builtin(vertex_index) index: u32) -> SphereOut {
-    let c = cover(in.ball, index);
-    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, in.turn, in.color_rough, in.other_metal, in.pattern);
+    let c = cover(in.sphere, index);
+    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.sphere, in.turn, in.color_rough, in.other_metal, in.pattern);
 }
 
 // A sphere that may be seen, and its number.
-struct BallIn { @location(0) ball: vec4f, @location(1) id: u32 };
+struct BoundsIn { @location(0) sphere: vec4f, @location(1) id: u32 };
 
-// A texel of the four that tell of a sphere: ball; colours, roughness and metal, two to a word; turn; the rest of its look.
-fn told(id: u32, i: u32) -> vec4u {
+// A texel of the four that tell of a sphere: sphere; colours, roughness and metal, two to a word; turn; the rest of its appearance.
+fn sphere_texel(id: u32, i: u32) -> vec4u {
     return textureLoad(sphere_data, vec2i(vec2u((id % 256u) * 4u + i, id / 256u)), 0);
 }
 
-fn look_told(id: u32) -> Look {
-    let t = told(id, 1u);
-    return Look(
+fn read_appearance(id: u32) -> Appearance {
+    let t = sphere_texel(id, 1u);
+    return Appearance(
         vec4f(unpack2x16unorm(t.x), unpack2x16unorm(t.y)),
         vec4f(unpack2x16unorm(t.z), unpack2x16unorm(t.w)),
-        bitcast<vec4f>(told(id, 3u)),
+        bitcast<vec4f>(sphere_texel(id, 3u)),
     );
 }
 
-@vertex fn vs_sphere(in: BallIn, @builtin(vertex_index) index: u32) -> SphereOut {
-    let c = cover(in.ball, index);
-    let look = look_told(in.id);
-    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.ball, bitcast<vec4f>(told(in.id, 2u)), look.color_rough, look.other_metal, look.pattern);
+@vertex fn vs_sphere(in: BoundsIn, @builtin(vertex_index) index: u32) -> SphereOut {
+    let c = cover(in.sphere, index);
+    let appearance = read_appearance(in.id);
+    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.sphere, bitcast<vec4f>(sphere_texel(in.id, 2u)), appearance.color_rough, appearance.other_metal, appearance.pattern);
 }
 
 // With d the ray's direction, of length 1, and c the way to the centre: m = c - (c·d) d is the way from the nearest point of the ray to the centre, the ray enters
 // q = sqrt(r² - m²) before that point, and the normal there is -(m + q d) / r.
 struct Crossing { room: f32, before: f32, miss: vec3f, dir: vec3f, per_length: f32 };
 
-fn cross_sphere(ball: vec4f, pixel: vec2f) -> Crossing {
+fn cross_sphere(sphere: vec4f, pixel: vec2f) -> Crossing {
     let ray = ray_at(pixel);
     let per_length = inverseSqrt(dot(ray.dir, ray.dir));
     let dir = ray.dir * per_length;
-    let to = ball.xyz - ray.origin;
+    let to = sphere.xyz - ray.origin;
     let before = dot(to, dir);
     let miss = to - before * dir;
-    return Crossing(ball.w * ball.w - dot(miss, miss), before, miss, dir, per_length);
+    return Crossing(sphere.w * sphere.w - dot(miss, miss), before, miss, dir, per_length);
 }
 
 // View depth at which the ray enters; where it just misses, that of its nearest point.
@@ -126,14 +126,14 @@ fn entry(c: Crossing) -> f32 {
 }
 
 // Square of the radius less the square of the ray's distance from the centre.
-fn inside(ball: vec4f, pixel: vec2f) -> f32 {
-    return cross_sphere(ball, pixel).room;
+fn inside(sphere: vec4f, pixel: vec2f) -> f32 {
+    return cross_sphere(sphere, pixel).room;
 }
 
-fn hit(ball: vec4f, pixel: vec2f) -> Hit {
-    let c = cross_sphere(ball, pixel);
-    let n = -(c.miss + sqrt(max(c.room, 0.0)) * c.dir) / sqrt(ball.w * ball.w - min(c.room, 0.0));
-    return Hit(entry(c), ball.xyz + n * ball.w, n, -c.dir);
+fn hit(sphere: vec4f, pixel: vec2f) -> Hit {
+    let c = cross_sphere(sphere, pixel);
+    let n = -(c.miss + sqrt(max(c.room, 0.0)) * c.dir) / sqrt(sphere.w * sphere.w - min(c.room, 0.0));
+    return Hit(entry(c), sphere.xyz + n * sphere.w, n, -c.dir);
 }
 
 fn unturn(q: vec4f, v: vec3f) -> vec3f {
@@ -143,13 +143,13 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
 
 @fragment fn fs_sphere(in: SphereOut) -> SpherePixel {
     let pixel = in.clip.xy;
-    let mask = sample_mask(in.ball, pixel);
-    let h = hit(in.ball, pixel);
+    let mask = sample_mask(in.sphere, pixel);
+    let h = hit(in.sphere, pixel);
     let depth = depth_of(h.s);
     if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
     let object_normal = unturn(in.turn, h.normal);
-    let color = pixel_color(h.position, h.normal, h.to_eye, object_normal * in.ball.w, object_normal, h.s, pixel, vec3f(0.0),
-        Look(in.color_rough, in.other_metal, in.pattern));
+    let color = pixel_color(h.position, h.normal, h.to_eye, object_normal * in.sphere.w, object_normal, h.s, pixel, vec3f(0.0),
+        Appearance(in.color_rough, in.other_metal, in.pattern));
     return sphere_pixel(vec4f(color, 1.0), depth, mask);
 }
 
@@ -157,27 +157,27 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
 // enters at the view depth s with 1 / s = (1 + sqrt(k - (1 - k) t²)) / (w (1 - k)). Everything in
 //     1 / s = W + sqrt(S² - T²),   W = 1 / (w (1 - k)),   S = sqrt(k) W,   T = t / (w sqrt(1 - k))
 // is affine in the picture, and depth is affine in 1 / s. In a parallel view -s = W + sqrt(S² - T²) with W = -(view depth of the centre), S = r, T = u.
-struct BallOut {
+struct BoundsOut {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(linear) at: vec4f, // T, W, S
     @location(1) @interpolate(flat) id: u32,
 };
 
-@vertex fn vs_ball(in: BallIn, @builtin(vertex_index) index: u32) -> BallOut {
-    let c = cover(in.ball, index);
+@vertex fn vs_bounds(in: BoundsIn, @builtin(vertex_index) index: u32) -> BoundsOut {
+    let c = cover(in.sphere, index);
     let per_w = 1.0 / c.clip.w;
     var at = vec4f(c.plane, 0.0, sqrt(c.numbers.z));
     if (view.lens.x > 0.5) {
-        let k = in.ball.w * in.ball.w / c.numbers.x;
+        let k = in.sphere.w * in.sphere.w / c.numbers.x;
         let far = per_w * c.numbers.x / c.numbers.y; // 1 / (w (1 - k))
         at = vec4f(c.plane * (per_w * inverseSqrt(c.numbers.y)), far, sqrt(k) * far);
     } else {
-        at.z = -dot(in.ball.xyz - view.origin_0.xyz, view.dir_0.xyz) / dot(view.dir_0.xyz, view.dir_0.xyz);
+        at.z = -dot(in.sphere.xyz - view.origin_0.xyz, view.dir_0.xyz) / dot(view.dir_0.xyz, view.dir_0.xyz);
     }
-    return BallOut(select(vec4f(c.clip.xyz * per_w, 1.0), NOWHERE, c.near), at, in.id);
+    return BoundsOut(select(vec4f(c.clip.xyz * per_w, 1.0), NOWHERE, c.near), at, in.id);
 }
 
-fn ball_depth(at: vec4f) -> f32 {
+fn bounds_depth(at: vec4f) -> f32 {
     let room = at.w * at.w - dot(at.xy, at.xy);
     let line = select(vec2f(view.depth.y, -view.depth.x), view.depth.xy, view.lens.x > 0.5);
     let depth = line.x + line.y * (at.z + sqrt(max(room, 0.0)));
@@ -185,31 +185,31 @@ fn ball_depth(at: vec4f) -> f32 {
     return depth;
 }
 
-@fragment fn fs_ball_depth(in: BallOut) -> @builtin(frag_depth) f32 {
-    return ball_depth(in.at);
+@fragment fn fs_bounds_depth(in: BoundsOut) -> @builtin(frag_depth) f32 {
+    return bounds_depth(in.at);
 }
 
-struct BallPixel { @location(0) id: u32, @builtin(frag_depth) depth: f32 };
+struct BoundsPixel { @location(0) id: u32, @builtin(frag_depth) depth: f32 };
 
 // Which sphere is nearest, from 1 on.
-@fragment fn fs_ball_id(in: BallOut) -> BallPixel {
-    return BallPixel(in.id + 1u, ball_depth(in.at));
+@fragment fn fs_bounds_id(in: BoundsOut) -> BoundsPixel {
+    return BoundsPixel(in.id + 1u, bounds_depth(in.at));
 }
 
 // The few that the eye is too near to, by whole pictures.
 struct NearOut {
     @builtin(position) clip: vec4f,
-    @location(0) @interpolate(flat) ball: vec4f,
+    @location(0) @interpolate(flat) sphere: vec4f,
     @location(1) @interpolate(flat) id: u32,
 };
 
-@vertex fn vs_near(in: BallIn, @builtin(vertex_index) index: u32) -> NearOut {
-    let c = cover(in.ball, index);
-    return NearOut(select(NOWHERE, c.clip, c.near), in.ball, in.id);
+@vertex fn vs_near(in: BoundsIn, @builtin(vertex_index) index: u32) -> NearOut {
+    let c = cover(in.sphere, index);
+    return NearOut(select(NOWHERE, c.clip, c.near), in.sphere, in.id);
 }
 
-fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
-    let c = cross_sphere(ball, pixel);
+fn near_depth(sphere: vec4f, pixel: vec2f) -> f32 {
+    let c = cross_sphere(sphere, pixel);
     let s = entry(c);
     let depth = depth_of(s);
     if (c.room < 0.0 || behind(s) || depth > 1.0 || depth < 0.0) { discard; }
@@ -217,23 +217,23 @@ fn near_depth(ball: vec4f, pixel: vec2f) -> f32 {
 }
 
 @fragment fn fs_near_depth(in: NearOut) -> @builtin(frag_depth) f32 {
-    return near_depth(in.ball, in.clip.xy);
+    return near_depth(in.sphere, in.clip.xy);
 }
 
-@fragment fn fs_near_id(in: NearOut) -> BallPixel {
-    return BallPixel(in.id + 1u, near_depth(in.ball, in.clip.xy));
+@fragment fn fs_near_id(in: NearOut) -> BoundsPixel {
+    return BoundsPixel(in.id + 1u, near_depth(in.sphere, in.clip.xy));
 }
 
 // All spheres of one surface at once, where the nearest is known: each pixel is lit once.
 @fragment fn fs_sphere_seen(@builtin(position) at: vec4f, @location(0) @interpolate(flat) range: vec2u) -> @location(0) vec4f {
     let id = textureLoad(seen_id, vec2i(at.xy), 0).x - 1u;
     if (id < range.x || id >= range.y) { discard; }
-    let ball = bitcast<vec4f>(told(id, 0u));
-    let turn = bitcast<vec4f>(told(id, 2u));
-    let look = look_told(id);
-    let h = hit(ball, at.xy);
+    let sphere = bitcast<vec4f>(sphere_texel(id, 0u));
+    let turn = bitcast<vec4f>(sphere_texel(id, 2u));
+    let appearance = read_appearance(id);
+    let h = hit(sphere, at.xy);
     let object_normal = unturn(turn, h.normal);
-    return vec4f(pixel_color(h.position, h.normal, h.to_eye, object_normal * ball.w, object_normal, h.s, at.xy, vec3f(0.0), look), 1.0);
+    return vec4f(pixel_color(h.position, h.normal, h.to_eye, object_normal * sphere.w, object_normal, h.s, at.xy, vec3f(0.0), appearance), 1.0);
 }
 
 struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat) range: vec2u };
@@ -246,8 +246,8 @@ struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat)
 // A translucent shell: clear in the middle, denser at the rim.
 @fragment fn fs_shell(in: SphereOut) -> SpherePixel {
     let pixel = in.clip.xy;
-    let mask = sample_mask(in.ball, pixel);
-    let h = hit(in.ball, pixel);
+    let mask = sample_mask(in.sphere, pixel);
+    let h = hit(in.sphere, pixel);
     let depth = depth_of(h.s);
     if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
     let rim = 1.0 - clamp(dot(h.normal, h.to_eye), 0.0, 1.0);

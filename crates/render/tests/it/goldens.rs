@@ -2,7 +2,7 @@
 //! they differ in edges. `TUMBLE_KEEP_PICTURES=1` writes them anew (`make goldens`, and `VK_ICD_FILENAMES=/none make goldens` for OpenGL); then look at them before they are committed.
 //!
 //! The measure: pictures are made 4 times smaller in linear light, which forgives a pixel's edge, and may then differ by [`MEAN_LEVELS`] on the average and by
-//! [`MOST_LEVELS`] anywhere.
+//! [`MAX_LEVELS`] anywhere.
 
 use crate::support::renderer;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use tumble_scene::cave::resolve_cave;
 
 const SIZE: [u32; 2] = [192, 108];
 const MEAN_LEVELS: f64 = 1.0;
-const MOST_LEVELS: f64 = 24.0;
+const MAX_LEVELS: f64 = 24.0;
 /// Moments of a scene that are looked at, frames.
 const FRAMES: u64 = 24;
 
@@ -116,7 +116,7 @@ fn compare(only: Option<&str>) {
         let (a, b) = (small(&image), small(&kept));
         let off: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).collect();
         let (mean, most) = (off.iter().sum::<f64>() / off.len() as f64, off.iter().copied().fold(0.0, f64::max));
-        if mean > MEAN_LEVELS || most > MOST_LEVELS {
+        if mean > MEAN_LEVELS || most > MAX_LEVELS {
             let seen = std::env::temp_dir().join(format!("tumble-{name}.png"));
             image.write_png(&seen).unwrap();
             wrong.push(format!(
@@ -144,5 +144,5 @@ fn the_measure_sees_what_moved() {
             .collect(),
     };
     let most = |a: &Image, b: &Image| small(a).iter().zip(small(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    assert!(most(&square(8), &square(8)) == 0.0 && most(&square(8), &square(12)) > MOST_LEVELS);
+    assert!(most(&square(8), &square(8)) == 0.0 && most(&square(8), &square(12)) > MAX_LEVELS);
 }

@@ -301,7 +301,7 @@ fn what_stands_still_is_told_from_what_moves() {
     (0..60).for_each(|_| {
         world.step().unwrap();
     });
-    let list = Drawing::new(&scene).list(&world, &"resting".parse().unwrap()).unwrap();
+    let list = Drawing::new(&scene).list(&world, &"sleep".parse().unwrap()).unwrap();
     let [box_, ball, capsule] =
         [list.instances[0].material.color, list.spheres[0].material.color, list.capsules[0].material.color];
     assert!(world.asleep(world.find("lies").unwrap()));
@@ -311,7 +311,7 @@ fn what_stands_still_is_told_from_what_moves() {
         "{box_:?} {ball:?} {capsule:?}"
     );
     world.get_mut::<tumble_core::RigidBody>(world.find("lies").unwrap()).unwrap();
-    let list = Drawing::new(&scene).list(&world, &"resting".parse().unwrap()).unwrap();
+    let list = Drawing::new(&scene).list(&world, &"sleep".parse().unwrap()).unwrap();
     let awake = list.instances[0].material.color;
     assert!(awake[1] > awake[0] && awake[0] > awake[2], "olive when woken: {awake:?}");
 }

@@ -37,9 +37,9 @@ pub struct ServeOptions {
     pub stage: Stage,
     /// Simulated time to run for, s (default: until Ctrl-C).
     #[arg(long, value_name = "S", value_parser = crate::args::seconds)]
-    pub seconds: Option<f64>,
+    pub duration: Option<f64>,
     /// Length of a frame, s (default: what the scene says).
-    #[arg(long, value_name = "S", value_parser = crate::args::frame)]
+    #[arg(long, value_name = "S", value_parser = crate::args::time_step)]
     pub dt: Option<f64>,
     /// time_stepping or backtracking.
     #[arg(long, value_name = "NAME")]
@@ -48,11 +48,11 @@ pub struct ServeOptions {
     #[arg(long, value_name = "NAME", value_parser = crate::args::solver)]
     pub solver: Option<Solver>,
     /// Frames shown per simulated second, at most; a frame holds as many steps as fit, at least one.
-    #[arg(long, value_name = "N", default_value = "60", value_parser = crate::args::pace)]
+    #[arg(long, value_name = "N", default_value = "60", value_parser = crate::args::rate)]
     pub fps: f64,
     /// Do not keep to the clock: the next frame begins when the last one is shown, and waits for its facets as long as the start does.
     #[arg(long)]
-    pub fast: bool,
+    pub no_realtime: bool,
     /// What carries the frames (default: what the cave says).
     #[arg(long, value_name = "NAME")]
     pub transport: Option<Carrier>,

@@ -8,7 +8,7 @@
 
 use crate::failure::Failure;
 use tumble::collide::{Pose, Shape, Vec3};
-use tumble::core::{Mode, ObjectId, RigidBody, World, WorldError};
+use tumble::dynamics::{Mode, ObjectId, RigidBody, World, WorldError};
 use tumble::net::sync::{User, Viewer};
 
 /// Of a user's body, m.

@@ -5,7 +5,7 @@ use super::stamp::stamp;
 use crate::failure::Failure;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
-use tumble::core::World;
+use tumble::dynamics::World;
 use tumble::net::sync::Viewer;
 use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer};
 use tumble::scene::cave::Facet;

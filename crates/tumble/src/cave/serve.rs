@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::time::{Duration, Instant};
-use tumble::core::World;
+use tumble::dynamics::World;
 use tumble::net::record::RecorderOptions;
 use tumble::net::sync::awake::Awake;
 use tumble::net::sync::shm::{ShmServer, clean_up};
@@ -105,7 +105,7 @@ fn told(options: &ServeOptions, setting: &Setting, run: u64, seats: &[Seat]) -> 
     let ms = |ms: u32| Duration::from_millis(ms.into());
     ServerOptions {
         pace: if sync.mode == Mode::Lockstep { Pace::Lockstep } else { Pace::Latest },
-        ready_after: if options.fast { wait } else { ms(sync.ready_timeout_ms) },
+        ready_after: if options.no_realtime { wait } else { ms(sync.ready_timeout_ms) },
         first_after: wait,
         drop_after: ms(sync.drop_timeout_ms),
         history: sync.history_frames as usize,
@@ -179,7 +179,7 @@ impl<'a> Host<'a> {
             recorded: false,
             cave,
             scene: scene.file,
-            seconds: options.seconds,
+            seconds: options.duration,
             meter: Meter::new(seats.len()),
             seats,
             status: Status::new(options.quiet),
@@ -213,7 +213,7 @@ impl<'a> Host<'a> {
             if last.map_or(self.devices.over(), |last| last == frame) || self.signals.end() || !self.look_after(crew)? {
                 return Ok(());
             }
-            if !self.options.fast {
+            if !self.options.no_realtime {
                 due = self.keep_time(due, dt)?;
             }
             self.meter.frame.add(begin.elapsed().as_secs_f64(), frame, self.time_s);

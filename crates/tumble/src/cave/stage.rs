@@ -4,7 +4,7 @@ use super::args::Stage;
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::Pose;
-use tumble::core::{Mode, World};
+use tumble::dynamics::{Mode, World};
 use tumble::net::sync::transport::MAX_FACETS;
 use tumble::net::sync::{User, Viewer, scene_hash};
 use tumble::render::CaveView;
@@ -125,7 +125,7 @@ fn joined_hash(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
 
 /// Stands the cave and its users in the view as the viewer of a frame has them.
 pub fn follow(view: &mut CaveView, viewer: &Viewer) {
-    view.stand(place_of(&viewer.cave, viewer.scale));
+    view.set_place(place_of(&viewer.cave, viewer.scale));
     for (user, seen) in view.users_mut().iter_mut().zip(&viewer.users) {
         user.eye_m = seen.head.translation.vector.into();
         user.forward = seen.head.rotation * nalgebra::Vector3::y();

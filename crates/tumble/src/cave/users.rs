@@ -7,7 +7,7 @@ use super::bodies::{Bodies, Hand};
 use crate::failure::Failure;
 use std::collections::BTreeMap;
 use tumble::collide::{Pose, Vec3};
-use tumble::core::{ObjectId, Pull, World, WorldError};
+use tumble::dynamics::{ObjectId, Pull, World, WorldError};
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{Input, Viewer};
 use tumble::scene::cave::{Cave, Screen};

@@ -2,7 +2,7 @@
 
 use super::args::ServeOptions;
 use crate::failure::Failure;
-use tumble::core::World;
+use tumble::dynamics::World;
 
 /// Those who watch.
 pub struct Viewers {

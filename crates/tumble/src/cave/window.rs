@@ -7,11 +7,11 @@ use super::painter::{PREVIEW_PX, draw_list, seat_name};
 use super::stage::{Setting, follow};
 use super::stamp;
 use crate::failure::Failure;
-use crate::view::sight::Sight;
+use crate::view::view_mode::ViewMode;
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 use tumble::collide::Pose;
-use tumble::core::World;
+use tumble::dynamics::World;
 use tumble::net::sync::{Input, Task, Waiting};
 use tumble::render::winit::event::{ElementState, MouseButton, WindowEvent};
 use tumble::render::winit::keyboard::{KeyCode, PhysicalKey};
@@ -55,7 +55,7 @@ fn too_high(display: &str) -> bool {
 
 /// What a facet shows itself by.
 pub struct Parts {
-    sight: Sight,
+    view_mode: ViewMode,
     drawing: Drawing,
     quality: Option<Quality>,
     options: WindowOptions,
@@ -75,11 +75,11 @@ impl Parts {
             _ => WindowOptions { resizable: facet.is_none(), ..plain },
         };
         let user = facet.map_or(0, |f| f.user) as u16;
-        let sight = match facet {
-            Some(facet) => Sight::Facet(view, Box::new(facet.clone())),
-            None => Sight::Unfolded(view),
+        let view_mode = match facet {
+            Some(facet) => ViewMode::Facet(view, Box::new(facet.clone())),
+            None => ViewMode::Unfolded(view),
         };
-        Ok(Parts { sight, drawing: Drawing::new(&setting.scene), quality, options, user })
+        Ok(Parts { view_mode, drawing: Drawing::new(&setting.scene), quality, options, user })
     }
 
     /// Opens the window and runs the facet in it until the run is over or the window is closed.
@@ -126,9 +126,9 @@ impl Window<'_> {
         let (world, viewer): (&World, _) = (self.running.facet.world(), self.running.facet.viewer());
         let time_s = world.time();
         self.list = draw_list(&mut self.parts.drawing, world, self.parts.quality.as_ref())?;
-        let (Sight::Facet(view, _) | Sight::Unfolded(view)) = &mut self.parts.sight else { return Ok(()) };
+        let (ViewMode::Facet(view, _) | ViewMode::Unfolded(view)) = &mut self.parts.view_mode else { return Ok(()) };
         follow(view, viewer);
-        self.parts.sight.draw(screen, &self.list)?;
+        self.parts.view_mode.draw(screen, &self.list)?;
         // drawn is what the device has finished; read back only where somebody wants it
         let image = match self.running.log.is_some() {
             true => Some(screen.renderer().read()?),
@@ -178,7 +178,7 @@ impl Window<'_> {
 
     /// The line of sight below the pointer, in the cave's frame: it starts at the eye and goes along its y axis.
     fn wand(&self, screen: &Screen) -> Option<Pose> {
-        let ray = self.parts.sight.ray(&self.list, screen.size_px(), self.at_px)?;
+        let ray = self.parts.view_mode.ray(&self.list, screen.size_px(), self.at_px)?;
         let viewer = self.running.facet.viewer();
         let origin = viewer.cave.inverse() * nalgebra::Point3::from(ray.origin);
         let direction = viewer.cave.rotation.inverse() * ray.direction;
@@ -199,7 +199,7 @@ impl WindowApp for Window<'_> {
         self.parts.quality.get_or_insert(usual);
         // the first picture takes seconds where pipelines are compiled; the server does not know of us yet
         self.list = draw_list(&mut self.parts.drawing, self.running.facet.world(), self.parts.quality.as_ref())?;
-        self.parts.sight.draw(screen, &self.list)?;
+        self.parts.view_mode.draw(screen, &self.list)?;
         Ok(screen.renderer().wait()?)
     }
 

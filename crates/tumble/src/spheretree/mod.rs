@@ -4,16 +4,15 @@ mod picture;
 mod robot;
 
 use crate::args::SphereTreeOptions;
+use crate::atomic_file::{check_writable, write_file};
 use crate::failure::Failure;
-use crate::progress::Share;
+use crate::progress::WorkProgress;
 use std::path::Path;
 use std::time::Instant;
 use tumble::collide::{
     Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh,
 };
 use tumble::scene::read_solid;
-use tumble::table::table;
-use tumble::whole::{check_writable, write_whole};
 
 /// Builds, measures, prints and writes.
 pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
@@ -27,8 +26,8 @@ pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
 
 /// What would be refused after the work is refused before it.
 fn check_outputs(options: &SphereTreeOptions) -> Result<(), Failure> {
-    for path in options.output.iter().chain(&options.picture) {
-        check_writable(path).map_err(|why| Failure::input(format!("{} cannot be written: {why}", path.display())))?;
+    for path in options.output.iter().chain(&options.screenshot) {
+        check_writable(path).map_err(Failure::input)?;
     }
     let depth = settings(options).depth;
     match options.level {
@@ -43,7 +42,7 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let mesh = read(path, options)?;
     let settings = settings(options);
-    let (clock, progress) = (Instant::now(), Share::new("building", options.quiet));
+    let (clock, progress) = (Instant::now(), WorkProgress::new("building", options.quiet));
     let built = SphereTree::build_cached_watched(&mesh, &settings, &cache(options), &progress);
     progress.done();
     let built = built.map_err(|e| wrong(e.to_string()))?;
@@ -61,13 +60,13 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
             mesh.triangles.len(),
             length(mesh.diagonal())
         );
-        print!("{}", table(&file, options.verbose));
+        print!("{}", file.table(options.verbose));
     }
     if let Some(output) = &options.output {
-        write(output, file.to_json().as_bytes())?;
+        write_file(output, file.to_json().as_bytes())?;
         say(options, "tree", output);
     }
-    match &options.picture {
+    match &options.screenshot {
         Some(output) => picture::picture(&mesh, &file.tree, output, options),
         None => Ok(()),
     }
@@ -85,16 +84,16 @@ fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
 
 /// The method's usual settings with what the command line says instead.
 fn settings(options: &SphereTreeOptions) -> TreeSettings {
-    let usual = match options.method {
+    let defaults = match options.method {
         Some(Builder::Octree) => TreeSettings::octree(),
         Some(builder) => TreeSettings { builder, ..TreeSettings::default() },
         None => TreeSettings::default(),
     };
     TreeSettings {
-        branch: options.branch.unwrap_or(usual.branch),
-        depth: options.depth.unwrap_or(usual.depth),
-        error: options.error.unwrap_or(usual.error),
-        ..usual
+        branch: options.branching.unwrap_or(defaults.branch),
+        depth: options.depth.unwrap_or(defaults.depth),
+        error: options.max_error.unwrap_or(defaults.error),
+        ..defaults
     }
 }
 
@@ -109,11 +108,6 @@ fn cache(options: &SphereTreeOptions) -> TreeCache {
 /// Metres; those that six places would not show by their power of ten.
 fn length(metres: f64) -> String {
     if metres >= 1e-3 { format!("{metres:.6}") } else { format!("{metres:.6e}") }
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    write_whole(path, |path| std::fs::write(path, bytes))
-        .map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
 }
 
 fn say(options: &SphereTreeOptions, what: &str, path: &Path) {

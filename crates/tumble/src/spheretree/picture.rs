@@ -1,13 +1,13 @@
-//! A level of a tree over its mesh (thesis Fig. 16).
+//! `tumble spheretree --screenshot`: draws a level of the tree over its mesh and writes the picture.
 
 use crate::args::SphereTreeOptions;
+use crate::capture::{open_renderer, write_png};
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{SphereTree, TriMesh};
-use tumble::render::{RenderError, Renderer, UpAxis, tree_over_mesh};
-use tumble::whole::write_whole;
+use tumble::render::{RenderError, UpAxis, tree_over_mesh};
 
-/// Draws and writes. Without a graphics adapter all else still counts, and the message says what brings one.
+/// Draws the level and writes it to `path`. Without a graphics adapter it prints a note and writes nothing.
 pub fn picture(mesh: &TriMesh, tree: &SphereTree, path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     let last = tree.levels() - 1;
     let level = options.level.unwrap_or(last);
@@ -21,16 +21,9 @@ pub fn picture(mesh: &TriMesh, tree: &SphereTree, path: &Path, options: &SphereT
         _ => UpAxis::Z,
     };
     let list = tree_over_mesh(mesh, tree, level, up).map_err(failed)?;
-    let image = match Renderer::new() {
-        Ok(mut renderer) => renderer.render(&list, options.size.0, options.size.1).map_err(failed)?,
-        Err(error @ RenderError::NoAdapter { .. }) => {
-            eprintln!("no picture: {error}");
-            return Ok(());
-        }
-        Err(error) => return Err(failed(error)),
-    };
-    write_whole(path, |path| image.write_png(path).map_err(std::io::Error::other))
-        .map_err(|e| Failure::run(&format!("writing {}", path.display()), e))?;
+    let Some(mut renderer) = open_renderer()? else { return Ok(()) };
+    let image = renderer.render(&list, options.size.0, options.size.1).map_err(failed)?;
+    write_png(&image, path)?;
     super::say(options, "picture", path);
     Ok(())
 }

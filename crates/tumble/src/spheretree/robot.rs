@@ -1,26 +1,30 @@
 //! `--urdf`: a robot whose collision geometry is spheres, and the lists that motion planners read.
 
 use crate::args::SphereTreeOptions;
+use crate::atomic_file::{check_writable, write_file};
 use crate::failure::Failure;
-use crate::progress::Share;
+use crate::progress::WorkProgress;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use tumble::collide::align_columns;
 use tumble::scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfOptions, spherize as cover};
-use tumble::table::{aligned, percent};
-use tumble::whole::check_writable;
 
 /// Spheres per link unless told otherwise.
-const MOST: u32 = 32;
+const DEFAULT_MAX_SPHERES: u32 = 32;
 /// Most spheres per link where only an error is asked for.
-const MOST_FOR_ERROR: u32 = 10_000;
+const MAX_SPHERES_FOR_ERROR: u32 = 10_000;
 /// The error that is good enough unless told otherwise, as a share of a shape's diagonal.
-const ERROR: f64 = 1e-3;
+const DEFAULT_MAX_ERROR: f64 = 1e-3;
 
 /// Reads a robot, covers its links by spheres, prints and writes.
 pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
-    let most = options.spheres.unwrap_or(if options.error.is_some() { MOST_FOR_ERROR } else { MOST });
-    let error = options.error.unwrap_or(ERROR);
+    let most = options.spheres.unwrap_or(if options.max_error.is_some() {
+        MAX_SPHERES_FOR_ERROR
+    } else {
+        DEFAULT_MAX_SPHERES
+    });
+    let error = options.max_error.unwrap_or(DEFAULT_MAX_ERROR);
     let settings = super::settings(options);
     let how = SphereOptions {
         most: most as usize,
@@ -35,9 +39,9 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
     };
     let planner = planner_file(path, options)?;
     if let Some((file, _)) = &planner {
-        check_writable(file).map_err(|why| Failure::input(format!("{} cannot be written: {why}", file.display())))?;
+        check_writable(file).map_err(Failure::input)?;
     }
-    let progress = Share::new("covering", options.quiet);
+    let progress = WorkProgress::new("covering", options.quiet);
     let robot = cover(path, &how, &progress);
     progress.done();
     let robot = robot?;
@@ -52,12 +56,12 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
         print!("{}", table(&robot));
     }
     if let Some(output) = &options.output {
-        super::write(output, robot.text.as_bytes())?;
+        write_file(output, robot.text.as_bytes())?;
         super::say(options, "robot", output);
     }
     if let Some((output, yaml)) = planner {
         let text = if yaml { planner_yaml(&robot) } else { planner_json(&robot) };
-        super::write(&output, text.as_bytes())?;
+        write_file(&output, text.as_bytes())?;
         super::say(options, "spheres", &output);
     }
     Ok(())
@@ -95,12 +99,12 @@ fn table(robot: &SphereRobot) -> String {
             spheres,
             format!("{:.2}", 1e3 * worst(link)),
             format!("{:.2}", 1e3 * mean(link)),
-            percent(1.0),
+            "100.000".into(),
         ]
     };
     let rows = std::iter::once(heads.map(str::to_owned).to_vec()).chain(robot.links.iter().map(row));
     let total: usize = robot.links.iter().map(|l| l.spheres.len()).sum();
-    let mut text = aligned(rows);
+    let mut text = align_columns(rows);
     _ = writeln!(
         text,
         "{total} spheres; 100 % of the collision surface of each link lies inside the spheres of that link: proved piece by piece, not sampled"

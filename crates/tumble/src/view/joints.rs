@@ -4,8 +4,8 @@
 //! The drives hold all joints with sliders: critically damped, of [`FREQUENCY`] in proportion to the inertia that the joint moves at that moment (the
 //! diagonal of the mass matrix), within the joint's effort.
 
-use tumble::core::articulated::{ArticulatedBody, Drive, Freedom, Kinematics, MassMatrix};
-use tumble::core::{ObjectId, World, WorldError};
+use tumble::dynamics::articulated::{ArticulatedBody, Drive, Freedom, Kinematics, MassMatrix};
+use tumble::dynamics::{ObjectId, World, WorldError};
 use tumble::render::Slider;
 use tumble::scene::SceneFile;
 
@@ -15,7 +15,7 @@ const FREQUENCY: f64 = 60.0;
 const UNLIMITED: [f64; 2] = [std::f64::consts::PI, 1.0];
 
 /// A joint of one freedom that follows no other.
-pub struct SlidJoint {
+pub struct SliderJoint {
     name: String,
     body: ObjectId,
     /// Its place in `v` and in `q`.
@@ -33,7 +33,7 @@ pub struct SlidJoint {
 
 /// All joints with sliders.
 pub struct Joints {
-    joints: Vec<SlidJoint>,
+    joints: Vec<SliderJoint>,
     /// Targets, while the joints are held.
     targets: Option<Vec<f64>>,
 }
@@ -53,13 +53,13 @@ impl Joints {
             for (number, link) in spec.links.iter().enumerate().filter(|(_, link)| link.joint.mimic.is_none()) {
                 let Some((freedom, position)) = place(number) else { continue };
                 let joint = &link.joint;
-                let slides = matches!(joint.kind, tumble::core::Joint::Prismatic { .. });
+                let slides = matches!(joint.kind, tumble::dynamics::Joint::Prismatic { .. });
                 let most = UNLIMITED[usize::from(slides)];
                 let follower = |(k, link): (usize, &tumble::scene::LinkSpec)| {
                     let mimic = link.joint.mimic.filter(|mimic| mimic.link == number)?;
                     Some((place(k)?.1, mimic.multiplier, mimic.offset))
                 };
-                joints.push(SlidJoint {
+                joints.push(SliderJoint {
                     name: if several { format!("{}/{}", spec.name, joint.name) } else { joint.name.clone() },
                     body: id,
                     freedom,
@@ -87,7 +87,7 @@ impl Joints {
 
     /// The sliders for a world as it is.
     pub fn sliders(&self, world: &World, chosen: usize) -> Vec<Slider> {
-        let slider = |(index, joint): (usize, &SlidJoint)| Slider {
+        let slider = |(index, joint): (usize, &SliderJoint)| Slider {
             name: joint.name.clone(),
             value: joint.value(world).unwrap_or(f64::NAN),
             range: joint.range,
@@ -99,23 +99,29 @@ impl Joints {
     }
 
     /// Moves a joint to a share of its range.
-    pub fn slide(&mut self, world: &mut World, index: usize, share: f64, stands: bool) -> Result<(), WorldError> {
+    pub fn set_fraction(
+        &mut self,
+        world: &mut World,
+        index: usize,
+        share: f64,
+        paused: bool,
+    ) -> Result<(), WorldError> {
         let Some(joint) = self.joints.get(index) else { return Ok(()) };
         let [least, greatest] = joint.range;
-        self.set(world, index, least + share.clamp(0.0, 1.0) * (greatest - least), stands)
+        self.set(world, index, least + share.clamp(0.0, 1.0) * (greatest - least), paused)
     }
 
     /// Moves a joint by a share of its range, from its target where it is held.
-    pub fn nudge(&mut self, world: &mut World, index: usize, share: f64, stands: bool) -> Result<(), WorldError> {
+    pub fn nudge(&mut self, world: &mut World, index: usize, share: f64, paused: bool) -> Result<(), WorldError> {
         let Some(joint) = self.joints.get(index) else { return Ok(()) };
         let [least, greatest] = joint.range;
         let from = self.targets.as_ref().map(|targets| targets[index]).or_else(|| joint.value(world)).unwrap_or(least);
-        self.set(world, index, (from + share * (greatest - least)).clamp(least, greatest), stands)
+        self.set(world, index, (from + share * (greatest - least)).clamp(least, greatest), paused)
     }
 
     /// The position where time stands, else the target of the drive; all are then held.
-    fn set(&mut self, world: &mut World, index: usize, value: f64, stands: bool) -> Result<(), WorldError> {
-        if stands {
+    fn set(&mut self, world: &mut World, index: usize, value: f64, paused: bool) -> Result<(), WorldError> {
+        if paused {
             self.joints[index].put(world, value)?;
         } else if !self.held() {
             self.hold(world);
@@ -134,7 +140,7 @@ impl Joints {
     }
 
     /// Joints have the drives again that the scene gives them.
-    pub fn let_go(&mut self, world: &mut World) {
+    pub fn release(&mut self, world: &mut World) {
         self.targets = None;
         self.drive(world);
     }
@@ -155,7 +161,7 @@ impl Joints {
     }
 }
 
-impl SlidJoint {
+impl SliderJoint {
     fn value(&self, world: &World) -> Option<f64> {
         world.state_of(self.body)?.get(self.position).copied()
     }

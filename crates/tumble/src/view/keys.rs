@@ -1,6 +1,6 @@
 //! What keys do.
 
-use super::user::Way;
+use super::user::Movement;
 use tumble::render::winit::keyboard::{Key, KeyCode, NamedKey};
 
 /// What a key asks for.
@@ -12,7 +12,7 @@ pub enum Command {
     Faster,
     Slower,
     NextCamera,
-    LastCamera,
+    PreviousCamera,
     Home,
     Fly,
     Overlay(usize),
@@ -85,7 +85,7 @@ pub fn command(key: &Key) -> Option<Command> {
         "+" | "=" => Command::Faster,
         "-" | "_" => Command::Slower,
         "c" => Command::NextCamera,
-        "C" => Command::LastCamera,
+        "C" => Command::PreviousCamera,
         "f" | "F" => Command::Fly,
         "t" | "T" => Command::Statistics,
         "h" | "H" | "?" => Command::Help,
@@ -103,16 +103,16 @@ pub fn command(key: &Key) -> Option<Command> {
 }
 
 /// Which way a key moves the user, by its place on the keyboard, whatever is printed on it.
-pub fn way(code: KeyCode) -> Option<Way> {
+pub fn movement(code: KeyCode) -> Option<Movement> {
     Some(match code {
-        KeyCode::KeyW | KeyCode::ArrowUp => Way::Ahead,
-        KeyCode::KeyS | KeyCode::ArrowDown => Way::Back,
-        KeyCode::KeyA => Way::Left,
-        KeyCode::KeyD => Way::Right,
-        KeyCode::KeyE | KeyCode::PageUp => Way::Up,
-        KeyCode::KeyQ | KeyCode::PageDown => Way::Down,
-        KeyCode::ArrowLeft => Way::TurnLeft,
-        KeyCode::ArrowRight => Way::TurnRight,
+        KeyCode::KeyW | KeyCode::ArrowUp => Movement::Ahead,
+        KeyCode::KeyS | KeyCode::ArrowDown => Movement::Back,
+        KeyCode::KeyA => Movement::Left,
+        KeyCode::KeyD => Movement::Right,
+        KeyCode::KeyE | KeyCode::PageUp => Movement::Up,
+        KeyCode::KeyQ | KeyCode::PageDown => Movement::Down,
+        KeyCode::ArrowLeft => Movement::TurnLeft,
+        KeyCode::ArrowRight => Movement::TurnRight,
         _ => return None,
     })
 }

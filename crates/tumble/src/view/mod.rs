@@ -3,63 +3,67 @@
 //! Time goes by the clock, in whole steps: which steps are taken depends on the clock, what a step does does not. When nobody pulls, the state after n steps is
 //! that of `tumble run`.
 
-mod hand;
 mod joints;
 mod keys;
 mod overlays;
-mod pace;
+mod picker;
 mod presets;
-pub mod sight;
-mod simulation;
+mod real_time;
+mod simulation_thread;
 mod statistics;
 mod status;
 mod user;
+pub mod view_mode;
 mod viewer;
 
 use crate::args::ViewOptions;
+use crate::atomic_file::check_writable;
+use crate::capture::write_png;
 use crate::failure::Failure;
-use crate::shots::{may_be_written, write_png};
-use sight::Sight;
 use tumble::render::{CaveView, RenderError, WindowOptions, run_window};
 use tumble::scene::SceneFile;
 use tumble::scene::cave::{Output, resolve_cave};
+use view_mode::ViewMode;
 use viewer::Viewer;
 
 /// Size of the window where nothing is said, pixels.
-const USUAL: [u32; 2] = [1280, 720];
+const DEFAULT_SIZE_PX: [u32; 2] = [1280, 720];
 
 /// Shows a scene until the window is closed.
 pub fn view(options: &ViewOptions) -> Result<(), Failure> {
-    pictures_may_be_written(options)?;
+    check_outputs(options)?;
     let scene = options.scene.load()?;
     let (world, notes) = scene.build().map_err(Failure::input)?;
     notes.iter().for_each(|note| eprintln!("{note}"));
-    let sight = sight(&scene, options)?;
-    let window = window(&sight, options);
-    let mut viewer = Viewer::new(&scene, world, sight, options)?;
+    let view_mode = view_mode(&scene, options)?;
+    let window = window(&view_mode, options);
+    let mut viewer = Viewer::new(&scene, world, view_mode, options)?;
     run_window(&window, &mut viewer)?;
     let image = viewer.finish()?;
-    match (&options.picture, image) {
+    match (&options.screenshot, image) {
         (Some(path), Some(image)) => write_png(&image, path),
         _ => Ok(()),
     }
 }
 
-/// What can be known of `--picture` and `--shots` before a window opens.
-fn pictures_may_be_written(options: &ViewOptions) -> Result<(), Failure> {
-    if let Some(path) = &options.picture {
-        may_be_written(path).map_err(|why| Failure::input(format!("--picture {}: {why}", path.display())))?;
+/// What can be known of `--screenshot` and `--screenshot-dir` before a window opens.
+fn check_outputs(options: &ViewOptions) -> Result<(), Failure> {
+    if let Some(path) = &options.screenshot {
+        check_writable(path).map_err(|why| Failure::input(format!("--screenshot: {why}")))?;
     }
-    if !options.shots.is_dir() {
-        return Err(Failure::input(format!("--shots {}: there is no such folder", options.shots.display())));
+    if !options.screenshot_dir.is_dir() {
+        return Err(Failure::input(format!(
+            "--screenshot-dir {}: there is no such folder",
+            options.screenshot_dir.display()
+        )));
     }
     Ok(())
 }
 
-fn sight(scene: &SceneFile, options: &ViewOptions) -> Result<Sight, Failure> {
+fn view_mode(scene: &SceneFile, options: &ViewOptions) -> Result<ViewMode, Failure> {
     let Some(name) = &options.cave else {
         // clap lets neither --facet nor --preview through without it
-        return Ok(Sight::Camera);
+        return Ok(ViewMode::Camera);
     };
     let cave = resolve_cave(name)?.load()?;
     let facet = options.facet.as_ref().map(|facet| cave.facet(facet).cloned()).transpose()?;
@@ -68,20 +72,20 @@ fn sight(scene: &SceneFile, options: &ViewOptions) -> Result<Sight, Failure> {
         Some(_) if options.size.is_some() => Err(Failure::input(
             "the cave says how large a facet is (size_px); --size goes with --preview or without a cave",
         )),
-        Some(facet) => Ok(Sight::Facet(view, Box::new(facet))),
-        None => Ok(Sight::Unfolded(view)),
+        Some(facet) => Ok(ViewMode::Facet(view, Box::new(facet))),
+        None => Ok(ViewMode::Unfolded(view)),
     }
 }
 
-fn window(sight: &Sight, options: &ViewOptions) -> WindowOptions {
-    let most = options.size.map_or(USUAL, |(w, h)| [w, h]);
+fn window(view_mode: &ViewMode, options: &ViewOptions) -> WindowOptions {
+    let most = options.size.map_or(DEFAULT_SIZE_PX, |(w, h)| [w, h]);
     let name = &options.scene.name;
-    match sight {
-        Sight::Camera => WindowOptions::new(format!("tumble: {name}"), most),
-        Sight::Unfolded(view) => {
+    match view_mode {
+        ViewMode::Camera => WindowOptions::new(format!("tumble: {name}"), most),
+        ViewMode::Unfolded(view) => {
             WindowOptions::new(format!("tumble: {name} in {}", view.cave().file), view.size_px(None, most))
         }
-        Sight::Facet(view, facet) => {
+        ViewMode::Facet(view, facet) => {
             let title = format!("tumble: {name} on {}", facet.name);
             let position_px = match facet.output {
                 Output::Window { position_px } => Some(position_px),

@@ -4,7 +4,7 @@ use super::keys::OVERLAYS;
 use tumble::render::DebugDraw;
 
 /// The deepest level of sphere trees that keys go through.
-const DEEPEST: u32 = 5;
+const MAX_LEVEL: u32 = 5;
 
 /// Debug drawing that keys switch.
 pub struct Overlays {
@@ -24,7 +24,9 @@ impl Overlays {
             "joints" => draw.joints = !draw.joints,
             "frames" => draw.frames = !draw.frames,
             "islands" => draw.islands = !draw.islands,
-            _ => draw.tree_level = Some(draw.tree_level.map_or(0, |level| level + 1)).filter(|level| *level <= DEEPEST),
+            _ => {
+                draw.tree_level = Some(draw.tree_level.map_or(0, |level| level + 1)).filter(|level| *level <= MAX_LEVEL)
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! Named points of view that a key goes through.
 
 use nalgebra::Vector3;
-use tumble::core::World;
+use tumble::dynamics::World;
 use tumble::render::{Camera, DrawList};
 
 /// Where a view comes from.
@@ -70,7 +70,7 @@ impl Presets {
     }
 
     /// The user goes by himself from here.
-    pub fn let_go(&mut self) {
+    pub fn release(&mut self) {
         self.attached = false;
     }
 
@@ -81,7 +81,7 @@ impl Presets {
             Source::Carried => {
                 list.views(world).into_iter().find(|view| view.name == self.name()).map(|view| view.camera)
             }
-            Source::Framing(direction) => Some(usual_depths(list.framing_camera(*direction))),
+            Source::Framing(direction) => Some(walking_depths(list.framing_camera(*direction))),
         }
     }
 
@@ -93,7 +93,7 @@ impl Presets {
 }
 
 /// Whoever walks off from a framing camera comes nearer and goes farther than it was made for.
-fn usual_depths(mut camera: Camera) -> Camera {
+fn walking_depths(mut camera: Camera) -> Camera {
     if let Camera::LookAt { near_m, far_m, .. } = &mut camera {
         (*near_m, *far_m) = (near_m.min(0.05), far_m.max(500.0));
     }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// Figures are means over this time, so that they can be read.
-const OVER: Duration = Duration::from_millis(500);
+const AVERAGING_TIME: Duration = Duration::from_millis(500);
 
 /// How often something was done, and how long it took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -55,7 +55,7 @@ impl Statistics {
     /// Whether it is time for new figures; they are then made, with those of the steps.
     pub fn count(&mut self, now: Instant, steps: &mut Meter) -> bool {
         let over = now - self.since;
-        if over < OVER {
+        if over < AVERAGING_TIME {
             return false;
         }
         let (pictures_per_s, drawing_ms) = self.pictures.take(over.as_secs_f64());

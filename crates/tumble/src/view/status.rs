@@ -30,9 +30,9 @@ pub struct Status {
     /// How far a tap on a key moves the eye.
     pub step_m: f64,
     /// The body that is pulled, where it is held, and where the hand is.
-    pub held: Option<String>,
-    pub held_at_m: Option<[f64; 3]>,
-    pub hand_at_m: Option<[f64; 3]>,
+    pub picked: Option<String>,
+    pub picked_point_m: Option<[f64; 3]>,
+    pub pick_target_m: Option<[f64; 3]>,
     /// As `--quality` takes it.
     pub quality: Option<String>,
     pub overlays: Vec<String>,
@@ -64,7 +64,7 @@ impl Status {
             time_s: 0.0,
             behind_s: 0.0,
             shown: 0,
-            held_at_m: None,
+            picked_point_m: None,
             state_blake3: String::new(),
             joints: s.joints.iter().map(|joint| JointStatus { position: 0.0, ..joint.clone() }).collect(),
             ..s.clone()
@@ -99,7 +99,7 @@ impl Log {
     }
 
     /// A line, if something differs from the last one or `anyway`.
-    pub fn tell(&mut self, status: Status, anyway: bool) -> Result<(), Failure> {
+    pub fn write(&mut self, status: Status, anyway: bool) -> Result<(), Failure> {
         let Some(to) = &mut self.to else { return Ok(()) };
         if anyway || self.last.as_ref().is_none_or(|last| status.differs(last)) {
             let failed = |e: &dyn std::fmt::Display| Failure::run("the status", e.to_string());

@@ -11,11 +11,11 @@ const TAP_S: f64 = 0.1;
 /// Holding longer than this goes on after the tap's step, s.
 const HOLD_S: f64 = 0.3;
 /// What of a turn counts at most for a key that is held, s.
-const MOST_TURN_S: f64 = 0.1;
+const MAX_TURN_S: f64 = 0.1;
 /// Turning by keys, rad/s.
 const TURN_RAD_PER_S: f64 = 1.5;
 /// Steepest look up or down, rad.
-const STEEPEST_RAD: f64 = 1.55;
+const MAX_PITCH_RAD: f64 = 1.55;
 /// Factor of the speed with Shift.
 const FAST: f64 = 4.0;
 
@@ -23,7 +23,7 @@ type Vec3 = Vector3<f64>;
 
 /// Ways in which a key can move the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum Movement {
     Ahead,
     Back,
     Left,
@@ -36,7 +36,7 @@ pub enum Way {
 
 /// What the user sees by.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Body {
+pub enum Rig {
     /// One eye: a camera.
     Eye(Camera),
     /// The eye of a cave, with its place in the cave and the way it faces there.
@@ -45,19 +45,19 @@ pub enum Body {
 
 /// The user.
 pub struct User {
-    body: Body,
+    rig: Rig,
     /// Whether he goes where he looks; else along the floor.
     pub flies: bool,
     /// While a key is held, m/s.
     pub speed: f64,
     /// Whether Shift is held.
     pub fast: bool,
-    held: Vec<Held>,
+    keys: Vec<HeldKey>,
 }
 
 /// A key that moves: seconds since it went down, seconds of motion done, whether it is up again.
-struct Held {
-    way: Way,
+struct HeldKey {
+    movement: Movement,
     down_s: f64,
     done_s: f64,
     released: bool,
@@ -65,20 +65,20 @@ struct Held {
 
 impl User {
     /// At a place; `distance_m` is from the eye to what there is to see, and sets the speed.
-    pub fn new(body: Body, distance_m: f64) -> User {
-        User { body, flies: false, speed: round_speed(distance_m / 4.0), fast: false, held: Vec::new() }
+    pub fn new(rig: Rig, distance_m: f64) -> User {
+        User { rig, flies: false, speed: round_speed(distance_m / 4.0), fast: false, keys: Vec::new() }
     }
 
     /// What he sees by.
-    pub fn body(&self) -> &Body {
-        &self.body
+    pub fn rig(&self) -> &Rig {
+        &self.rig
     }
 
     /// Looks from a camera's eye along it; a cave stays upright.
     pub fn look_from(&mut self, camera: &Camera) {
-        match &mut self.body {
-            Body::Eye(own) => *own = *camera,
-            Body::Cave { place, eye_m, forward } => {
+        match &mut self.rig {
+            Rig::Eye(own) => *own = *camera,
+            Rig::Cave { place, eye_m, forward } => {
                 if let Camera::LookAt { eye, target, .. } = camera {
                     let scale = place.scale;
                     let towards: [f64; 3] = (target - eye).cast().into();
@@ -92,99 +92,99 @@ impl User {
 
     /// Where his eye is, world axes, m.
     pub fn eye(&self) -> [f64; 3] {
-        match &self.body {
-            Body::Eye(Camera::LookAt { eye, .. }) => eye.cast().into(),
-            Body::Eye(Camera::Raw { .. }) => [0.0; 3],
-            Body::Cave { place, eye_m, .. } => place.to_scene(*eye_m),
+        match &self.rig {
+            Rig::Eye(Camera::LookAt { eye, .. }) => eye.cast().into(),
+            Rig::Eye(Camera::Raw { .. }) => [0.0; 3],
+            Rig::Cave { place, eye_m, .. } => place.to_scene(*eye_m),
         }
     }
 
     /// The way he looks, a unit vector in world axes.
     pub fn forward(&self) -> [f64; 3] {
-        match &self.body {
-            Body::Eye(Camera::LookAt { eye, target, .. }) => (target - eye).cast::<f64>().normalize().into(),
-            Body::Eye(Camera::Raw { .. }) => [0.0; 3],
-            Body::Cave { place, forward, .. } => place.turned(*forward),
+        match &self.rig {
+            Rig::Eye(Camera::LookAt { eye, target, .. }) => (target - eye).cast::<f64>().normalize().into(),
+            Rig::Eye(Camera::Raw { .. }) => [0.0; 3],
+            Rig::Cave { place, forward, .. } => place.turned(*forward),
         }
     }
 
     /// A key that moves goes down.
-    pub fn press(&mut self, way: Way) {
-        match self.held.iter_mut().find(|h| h.way == way) {
-            Some(held) if held.released => {
-                *held = Held { way, down_s: 0.0, done_s: held.done_s - TAP_S, released: false }
+    pub fn press(&mut self, movement: Movement) {
+        match self.keys.iter_mut().find(|h| h.movement == movement) {
+            Some(keys) if keys.released => {
+                *keys = HeldKey { movement, down_s: 0.0, done_s: keys.done_s - TAP_S, released: false }
             }
             Some(_) => {}
-            None => self.held.push(Held { way, down_s: 0.0, done_s: 0.0, released: false }),
+            None => self.keys.push(HeldKey { movement, down_s: 0.0, done_s: 0.0, released: false }),
         }
     }
 
     /// It comes up again.
-    pub fn release(&mut self, way: Way) {
-        self.held.iter_mut().filter(|h| h.way == way).for_each(|h| h.released = true);
+    pub fn release(&mut self, movement: Movement) {
+        self.keys.iter_mut().filter(|h| h.movement == movement).for_each(|h| h.released = true);
     }
 
     /// All keys come up, as when another window gets them.
     pub fn release_all(&mut self) {
-        self.held.iter_mut().for_each(|h| h.released = true);
+        self.keys.iter_mut().for_each(|h| h.released = true);
     }
 
     /// Whether a key moves him.
     pub fn moves(&self) -> bool {
-        !self.held.is_empty()
+        !self.keys.is_empty()
     }
 
     /// The clock went on: what held keys do.
     pub fn pass(&mut self, clock_s: f64) {
-        let turn = clock_s.clamp(0.0, MOST_TURN_S);
-        let mut held = std::mem::take(&mut self.held);
-        for key in &mut held {
+        let turn = clock_s.clamp(0.0, MAX_TURN_S);
+        let mut keys = std::mem::take(&mut self.keys);
+        for key in &mut keys {
             key.down_s += turn;
             // the tap's step first; beyond it only what is held on
-            let going_on = !key.released && key.down_s > HOLD_S;
-            let part = if going_on { turn } else { turn.min((TAP_S - key.done_s).max(0.0)) };
+            let repeats = !key.released && key.down_s > HOLD_S;
+            let part = if repeats { turn } else { turn.min((TAP_S - key.done_s).max(0.0)) };
             key.done_s += part;
-            self.go(key.way, part);
+            self.go(key.movement, part);
         }
-        held.retain(|key| !key.released || key.done_s < TAP_S);
-        self.held = held;
+        keys.retain(|key| !key.released || key.done_s < TAP_S);
+        self.keys = keys;
     }
 
-    fn go(&mut self, way: Way, seconds: f64) {
+    fn go(&mut self, movement: Movement, seconds: f64) {
         let step = self.speed * if self.fast { FAST } else { 1.0 } * seconds;
         let forward = Vec3::from(self.forward());
         let level = Vec3::new(forward.x, forward.y, 0.0).try_normalize(1e-6).unwrap_or(Vec3::y());
         let ahead = if self.flies { forward } else { level };
         let right = level.cross(&Vec3::z());
-        match way {
-            Way::Ahead => self.shift(ahead * step),
-            Way::Back => self.shift(-ahead * step),
-            Way::Right => self.shift(right * step),
-            Way::Left => self.shift(-right * step),
-            Way::Up => self.shift(Vec3::z() * step),
-            Way::Down => self.shift(-Vec3::z() * step),
-            Way::TurnLeft => self.turn(TURN_RAD_PER_S * seconds, 0.0),
-            Way::TurnRight => self.turn(-TURN_RAD_PER_S * seconds, 0.0),
+        match movement {
+            Movement::Ahead => self.shift(ahead * step),
+            Movement::Back => self.shift(-ahead * step),
+            Movement::Right => self.shift(right * step),
+            Movement::Left => self.shift(-right * step),
+            Movement::Up => self.shift(Vec3::z() * step),
+            Movement::Down => self.shift(-Vec3::z() * step),
+            Movement::TurnLeft => self.turn(TURN_RAD_PER_S * seconds, 0.0),
+            Movement::TurnRight => self.turn(-TURN_RAD_PER_S * seconds, 0.0),
         }
     }
 
     /// Moves without turning, m, world axes.
     pub fn shift(&mut self, by: Vec3) {
-        match &mut self.body {
-            Body::Eye(Camera::LookAt { eye, target, .. }) => {
+        match &mut self.rig {
+            Rig::Eye(Camera::LookAt { eye, target, .. }) => {
                 *eye += by.cast();
                 *target += by.cast();
             }
-            Body::Eye(Camera::Raw { .. }) => {}
-            Body::Cave { place, .. } => (0..3).for_each(|k| place.origin_m[k] += by[k]),
+            Rig::Eye(Camera::Raw { .. }) => {}
+            Rig::Cave { place, .. } => (0..3).for_each(|k| place.origin_m[k] += by[k]),
         }
     }
 
     /// Turns to the left and looks up, rad. A cave stays upright: it only turns.
     pub fn turn(&mut self, left: f64, up: f64) {
         let forward = Vec3::from(self.forward());
-        match &mut self.body {
-            Body::Eye(Camera::LookAt { eye, target, up: upright, .. }) => {
+        match &mut self.rig {
+            Rig::Eye(Camera::LookAt { eye, target, up: upright, .. }) => {
                 let from: Point3<f64> = eye.cast();
                 let distance = (target.cast::<f64>() - from).norm();
                 let heading = if forward.x.hypot(forward.y) > 1e-6 {
@@ -192,13 +192,13 @@ impl User {
                 } else {
                     f64::from(upright.y).atan2(f64::from(upright.x))
                 };
-                let (heading, pitch) = (heading + left, (forward.z.asin() + up).clamp(-STEEPEST_RAD, STEEPEST_RAD));
+                let (heading, pitch) = (heading + left, (forward.z.asin() + up).clamp(-MAX_PITCH_RAD, MAX_PITCH_RAD));
                 let (sin, cos) = pitch.sin_cos();
                 let to = from + Vec3::new(cos * heading.cos(), cos * heading.sin(), sin) * distance;
                 (*target, *upright) = (to.cast(), Vector3::z());
             }
-            Body::Eye(Camera::Raw { .. }) => {}
-            Body::Cave { place, eye_m, .. } => {
+            Rig::Eye(Camera::Raw { .. }) => {}
+            Rig::Cave { place, eye_m, .. } => {
                 let eye = place.to_scene(*eye_m);
                 place.heading_deg += left.to_degrees();
                 set_eye(place, *eye_m, eye);

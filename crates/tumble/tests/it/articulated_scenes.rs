@@ -1,8 +1,8 @@
 //! What the pages of the articulated scenes promise, by hand-made numbers.
 
 use tumble::collide::Vec3;
-use tumble::core::articulated::{InverseDynamics, Kinematics, inverse_dynamics};
-use tumble::core::{ArticulatedBody, Drive, World};
+use tumble::dynamics::articulated::{InverseDynamics, Kinematics, inverse_dynamics};
+use tumble::dynamics::{ArticulatedBody, Drive, World};
 use tumble::scene::{SceneFile, resolve_scene};
 
 const G: f64 = 9.81;

@@ -108,9 +108,9 @@ fn bad_usage_is_told_apart_from_failure() {
         (&["run", "stack", "--stepper", "warp"], "warp"),
         (&["run", "stack", "--solver", "magic"], "magic"),
         (&["run", "stack", "--integrator", "euler"], "euler"),
-        (&["run", "stack", "--seconds", "nan"], "nan"),
-        (&["run", "stack", "--seconds", "-1"], "-1"),
-        (&["run", "stack", "--seconds", "inf"], "inf"),
+        (&["run", "stack", "--duration", "nan"], "nan"),
+        (&["run", "stack", "--duration", "-1"], "-1"),
+        (&["run", "stack", "--duration", "inf"], "inf"),
         (&["run", "stack", "--dt", "0"], "0"),
         (&["run", "stack", "--dt", "soon"], "soon"),
         (&["run", "stack", "--size", "0x0"], "0x0"),
@@ -132,7 +132,7 @@ fn bad_usage_is_told_apart_from_failure() {
 fn a_damaged_or_foreign_snapshot_is_bad_input() {
     let folder = Folder::new("bad-snapshots");
     let (saved, quiet) = (text(&folder.path("stack.state")), "--quiet");
-    succeed(&["run", "stack", "--seconds", "0.1", quiet, "--save", &saved]);
+    succeed(&["run", "stack", "--duration", "0.1", quiet, "--save", &saved]);
     let bytes = std::fs::read(&saved).unwrap();
     let mut wrong_magic = bytes.clone();
     wrong_magic[0] ^= 1;
@@ -145,10 +145,10 @@ fn a_damaged_or_foreign_snapshot_is_bad_input() {
         ("nan", not_finite),
         ("garbage", vec![0xff; 1000]),
     ] {
-        let said = fail(&["run", "stack", "--seconds", "0.1", quiet, "--restore", &folder.write(file, bytes)], 2);
+        let said = fail(&["run", "stack", "--duration", "0.1", quiet, "--restore", &folder.write(file, bytes)], 2);
         assert!(said.contains(file) && said.contains("snapshot"), "{file}: {said}");
     }
-    let said = fail(&["run", "incline", "--seconds", "0.1", quiet, "--restore", &saved], 2);
+    let said = fail(&["run", "incline", "--duration", "0.1", quiet, "--restore", &saved], 2);
     assert!(said.contains("another world") && said.contains("crate_1"), "{said}");
     fail(&["run", "stack", "--restore", "/nonexistent/state"], 2);
     #[cfg(target_os = "linux")]
@@ -164,14 +164,14 @@ fn what_cannot_be_written_is_a_failure_at_run_time() {
     let file = folder.write("file", "in the way");
     let below = format!("{file}/out");
     for option in ["--summary", "--record", "--save"] {
-        let said = fail(&["run", "stack", "--seconds", "0.02", "--quiet", option, &below], 1);
+        let said = fail(&["run", "stack", "--duration", "0.02", "--quiet", option, &below], 1);
         assert!(said.contains(&below), "{option}: {said}");
     }
     // what is known is said before a run of eleven days begins
-    for option in ["--summary", "--save", "--picture", "--video"] {
-        let said = fail(&["run", "stack", "--seconds", "1e6", "--quiet", option, &text(&folder.path("."))], 1);
+    for option in ["--summary", "--save", "--screenshot", "--video"] {
+        let said = fail(&["run", "stack", "--duration", "1e6", "--quiet", option, &text(&folder.path("."))], 1);
         assert!(said.contains("it is a folder"), "{option}: {said}");
-        let said = fail(&["run", "stack", "--seconds", "1e6", "--quiet", option, "/nonexistent/out"], 1);
+        let said = fail(&["run", "stack", "--duration", "1e6", "--quiet", option, "/nonexistent/out"], 1);
         assert!(said.contains("there is no folder /nonexistent"), "{option}: {said}");
     }
 }
@@ -181,10 +181,10 @@ fn what_cannot_be_written_is_a_failure_at_run_time() {
 #[test]
 fn a_full_disk_is_a_failure_at_run_time() {
     for option in ["--summary", "--record", "--save"] {
-        let said = fail(&["run", "stack", "--seconds", "0.02", "--quiet", option, "/dev/full"], 1);
+        let said = fail(&["run", "stack", "--duration", "0.02", "--quiet", option, "/dev/full"], 1);
         assert!(said.contains("/dev/full") && said.contains("No space left"), "{option}: {said}");
     }
-    for args in [&["run", "stack", "--seconds", "0.02"][..], &["scenes"], &["check", "stack"]] {
+    for args in [&["run", "stack", "--duration", "0.02"][..], &["scenes"], &["check", "stack"]] {
         let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let out = command(args).stdout(full()).output().unwrap();
         let said = String::from_utf8(out.stderr).unwrap();

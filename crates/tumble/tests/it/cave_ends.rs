@@ -71,7 +71,7 @@ fn a_full_disk_is_told_with_the_file_and_ends_the_run() {
 fn a_recording_that_is_played_or_whose_run_does_not_begin_is_not_written_over() {
     let place = Place::new("cave-kept", &wall());
     let record = place.path("run.mcap");
-    place.succeed("cave", &["--no-pictures", "--fast", "--seconds", "0.2", "--record", &record]);
+    place.succeed("cave", &["--no-pictures", "--no-realtime", "--duration", "0.2", "--record", &record]);
     let before = std::fs::read(&record).unwrap();
     let link = place.path("link.mcap");
     symlink(&record, &link).unwrap();
@@ -209,7 +209,7 @@ fn a_run_of_long_paths_has_a_name_and_is_found() {
         let mut command = in_place(&place.folder, &[&[what, &text(&scene), "--cave", &text(&cave)], more].concat());
         command.stdin(Stdio::null()).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap()
     };
-    let mut server = start("serve", &["--seconds", "0.3", "--quiet"]);
+    let mut server = start("serve", &["--duration", "0.3", "--quiet"]);
     wait("the lock", || {
         lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
     });
@@ -255,8 +255,10 @@ fn replacing_a_run_signals_nobody_who_only_has_its_number() {
 fn a_run_goes_on_when_nobody_reads_its_stderr() {
     let place = Place::new("cave-unheard", &wall());
     let (summary, record) = (place.path("summary.json"), place.path("run.mcap"));
-    let mut command = place
-        .command("cave", &["--no-pictures", "--fast", "--seconds", "0.3", "--summary", &summary, "--record", &record]);
+    let mut command = place.command(
+        "cave",
+        &["--no-pictures", "--no-realtime", "--duration", "0.3", "--summary", &summary, "--record", &record],
+    );
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop((child.stdout.take(), child.stderr.take()));
     assert_eq!(child.wait().unwrap().code(), Some(0));

@@ -91,7 +91,7 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
     let (code, _, wrong) = r.end();
     assert_eq!(code, Some(0), "{wrong}");
     // what kill -9 left is taken away by the next run
-    place.succeed("cave", &["--no-pictures", "--seconds", "0.1", "--quiet"]);
+    place.succeed("cave", &["--no-pictures", "--duration", "0.1", "--quiet"]);
     place.assert_clean();
 }
 
@@ -172,7 +172,7 @@ fn a_second_signal_ends_a_run_at_once() {
     let locks: Vec<_> =
         locks.map(|file| file.file_name()).filter(|name| name.to_str().unwrap().starts_with("cave-")).collect();
     assert!(locks.is_empty(), "{locks:?}");
-    place.succeed("cave", &["--no-pictures", "--seconds", "0.1", "--quiet"]);
+    place.succeed("cave", &["--no-pictures", "--duration", "0.1", "--quiet"]);
     place.assert_clean();
 }
 
@@ -197,7 +197,7 @@ fn what_a_killed_start_has_recorded_goes_with_the_next_recording() {
     signal(run.pid(), Signal::KILL);
     let _ = run.end();
     assert_eq!(hidden(), 1);
-    place.succeed("cave", &["--no-pictures", "--fast", "--seconds", "0.1", "--record", &record]);
+    place.succeed("cave", &["--no-pictures", "--no-realtime", "--duration", "0.1", "--record", &record]);
     assert_eq!(hidden(), 0);
     place.assert_clean();
 }

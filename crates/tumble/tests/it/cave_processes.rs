@@ -22,9 +22,9 @@ fn all_facets_show_the_same_frames(test: &str, frames: u64) {
         .start(
             "cave",
             &[
-                "--seconds",
+                "--duration",
                 &seconds,
-                "--fast",
+                "--no-realtime",
                 "--stamp",
                 "--frames-dir",
                 &place.path("out"),
@@ -76,9 +76,9 @@ fn all_facets_show_the_same_frames(test: &str, frames: u64) {
         &place.cave,
         "--facet",
         "left",
-        "--seconds",
+        "--duration",
         &seconds,
-        "--picture",
+        "--screenshot",
         &alone,
         "--quiet",
     ]);
@@ -113,9 +113,9 @@ fn datagrams_carry_the_same_states_as_shared_memory() {
         let summary = place.succeed(
             "cave",
             &[
-                "--seconds",
+                "--duration",
                 "0.4",
-                "--fast",
+                "--no-realtime",
                 "--no-pictures",
                 "--log-dir",
                 &place.path(folder),
@@ -156,7 +156,7 @@ fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
     let place = Place::new("cave-lock", &wall());
     let first = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out")]);
     place.wait_for("out", "r", 5);
-    let (code, _, wrong) = place.start("cave", &["--no-pictures", "--seconds", "0.1"]).end();
+    let (code, _, wrong) = place.start("cave", &["--no-pictures", "--duration", "0.1"]).end();
     assert_eq!(code, Some(1), "{wrong}");
     for word in [format!("process {}", first.pid()), place.scene.clone(), "since 20".into(), "--replace".into()] {
         assert!(wrong.contains(&word), "'{word}' is not said: {wrong}");
@@ -164,10 +164,10 @@ fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
     // another cave is another matter
     let elsewhere = place.folder.write("elsewhere.toml", wall());
     let mut other =
-        command(&["cave", &place.scene, "--cave", &elsewhere, "--no-pictures", "--seconds", "0.1", "--quiet"]);
+        command(&["cave", &place.scene, "--cave", &elsewhere, "--no-pictures", "--duration", "0.1", "--quiet"]);
     assert!(other.env("XDG_RUNTIME_DIR", place.folder.path("run")).status().unwrap().success());
     let facets = first.facets();
-    let summary = place.succeed("cave", &["--no-pictures", "--seconds", "0.1", "--replace"]);
+    let summary = place.succeed("cave", &["--no-pictures", "--duration", "0.1", "--replace"]);
     assert_eq!(summary["frames"], 11);
     let (code, _, wrong) = first.end();
     assert_eq!(code, Some(0), "{wrong}");
@@ -214,7 +214,7 @@ fn an_environment_brings_lights_camera_and_what_stands_still() {
     let place = Place::new("cave-environment", &wall());
     let hall = "[[body]]\nname = \"column\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 1, 3] }\nposition_m = [0.3, 0.6, 1.5]\n[[body]]\nname = \"loose\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 1.0\n[camera]\neye_m = [0, -3, 2]\ntarget_m = [0, 0, 1]\n";
     let environment = place.folder.write("hall.toml", hall);
-    let args = ["--no-pictures", "--seconds", "0.2", "--fast", "--environment", &environment, "--log-dir"];
+    let args = ["--no-pictures", "--duration", "0.2", "--no-realtime", "--environment", &environment, "--log-dir"];
     let (code, _, wrong) = place.start("cave", &[&args[..], &[&place.path("with")]].concat()).end();
     assert_eq!(code, Some(0), "{wrong}");
     assert!(

@@ -189,7 +189,7 @@ fn the_picture_follows_the_tracked_eye() {
             .map(str::to_owned)
     };
     for (cave, log) in [(&cave, "before"), (&moved, "after")] {
-        let args = [&args(cave, log)[..], &["--seconds".into(), "0.02".into(), "--fast".into()]].concat();
+        let args = [&args(cave, log)[..], &["--duration".into(), "0.02".into(), "--no-realtime".into()]].concat();
         assert!(in_place(&folder, &args.iter().map(String::as_str).collect::<Vec<_>>()).status().unwrap().success());
     }
     let (before, after) = (lines("before")[0]["image"].clone(), lines("after")[0]["image"].clone());
@@ -250,7 +250,7 @@ fn what_users_did_is_done_again_bit_by_bit() {
             &scene,
             "--cave",
             &cave,
-            "--fast",
+            "--no-realtime",
             "--no-pictures",
             "--input-from",
             &path("first.mcap"),
@@ -292,7 +292,7 @@ fn what_users_did_is_done_again_bit_by_bit() {
             &scene,
             "--cave",
             &cave,
-            "--fast",
+            "--no-realtime",
             "--no-pictures",
             "--input-from",
             &path("first.mcap"),

@@ -60,7 +60,7 @@ pub fn place(test: &str) -> (Folder, String, String) {
 
 /// Starts a server that waits for its facets, and where it is.
 fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, SocketAddr, BufReader<ChildStderr>) {
-    let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--fast"], args].concat())
+    let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--no-realtime"], args].concat())
         .stderr(Stdio::piped())
         .stdout(Stdio::null())
         .spawn()
@@ -247,7 +247,7 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
     let (folder, _, cave) = place("cave-replay");
     let file = text(&folder.path("run.mcap"));
     let run = |args: &[&str]| {
-        let out = in_place(&folder, &[args, &["--cave", &cave, "--fast", "--quiet", "--offscreen"]].concat())
+        let out = in_place(&folder, &[args, &["--cave", &cave, "--no-realtime", "--quiet", "--offscreen"]].concat())
             .output()
             .unwrap();
         let wrong = String::from_utf8_lossy(&out.stderr).into_owned();
@@ -270,7 +270,7 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
         );
         return;
     }
-    run(&["cave", &moving, "--seconds", "0.6", "--record", &file, "--log-dir", &path("a")]);
+    run(&["cave", &moving, "--duration", "0.6", "--record", &file, "--log-dir", &path("a")]);
     let recorded = lines("a");
     assert_eq!(recorded.len(), 61);
     run(&["replay", &file, &moving, "--log-dir", &path("b"), "--summary", &path("b.json")]);

@@ -134,7 +134,7 @@ fn a_desktop_that_does_not_answer_is_said_and_drawn_for_in_memory() {
     let folder = Folder::new("cave-no-desktop");
     make_runtime(&folder);
     let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave()));
-    let args = ["cave", &scene, "--cave", &cave, "--seconds", "0.04", "--fast", "--quality", "fastest"];
+    let args = ["cave", &scene, "--cave", &cave, "--duration", "0.04", "--no-realtime", "--quality", "fastest"];
     // one that nobody has here, and one that there cannot be
     for display in [":4711", ":59999"] {
         let out = in_place(&folder, &args).env("DISPLAY", display).output().unwrap();

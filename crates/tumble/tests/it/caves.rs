@@ -79,9 +79,9 @@ fn a_check_reads_the_files_that_caves_and_scenes_name() {
 #[test]
 fn a_picture_with_another_ending_is_refused() {
     for args in [
-        &["run", "stack", "--picture", "q.jpg"][..],
-        &["view", "stack", "--picture", "q.jpg"],
-        &["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "front", "--picture", "q.jpg"],
+        &["run", "stack", "--screenshot", "q.jpg"][..],
+        &["view", "stack", "--screenshot", "q.jpg"],
+        &["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "front", "--screenshot", "q.jpg"],
     ] {
         assert!(fail_often(args, 2).contains("wanted a file that ends in .png"), "{args:?}");
     }
@@ -91,31 +91,31 @@ fn a_picture_with_another_ending_is_refused() {
 fn what_is_wrong_with_a_cave_ends_with_code_2_before_anything_runs() {
     let folder = Folder::new("cave-wrong");
     let picture = text(&folder.path("out.png"));
-    let run = |more: &[&str]| fail(&[&["run", "stack", "--quiet", "--seconds", "1000"], more].concat(), 2);
-    assert!(run(&["--cave", "cube4", "--facet", "fronts", "--picture", &picture]).contains("did you mean `front`?"));
-    assert!(run(&["--cave", "cube5", "--picture", &picture]).contains("no cave `cube5`"));
-    assert!(run(&["--cave", "/nowhere/a.toml", "--picture", &picture]).contains("cannot read the cave"));
-    assert!(run(&["--facet", "front", "--picture", &picture]).contains("--cave FILE"));
-    assert!(run(&["--cave", "cube4"]).contains("--picture FILE"));
+    let run = |more: &[&str]| fail(&[&["run", "stack", "--quiet", "--duration", "1000"], more].concat(), 2);
+    assert!(run(&["--cave", "cube4", "--facet", "fronts", "--screenshot", &picture]).contains("did you mean `front`?"));
+    assert!(run(&["--cave", "cube5", "--screenshot", &picture]).contains("no cave `cube5`"));
+    assert!(run(&["--cave", "/nowhere/a.toml", "--screenshot", &picture]).contains("cannot read the cave"));
+    assert!(run(&["--facet", "front", "--screenshot", &picture]).contains("--cave FILE"));
+    assert!(run(&["--cave", "cube4"]).contains("--screenshot FILE"));
     assert!(
-        run(&["--cave", "cube4", "--facet", "front", "--size", "80x60", "--picture", &picture]).contains("size_px")
+        run(&["--cave", "cube4", "--facet", "front", "--size", "80x60", "--screenshot", &picture]).contains("size_px")
     );
     let with = |line: &str| folder.write("a.toml", cave(&format!("size_px = [80, 60]\n{line}")));
     assert!(
-        run(&["--cave", &with("warp_file = \"none.obj\""), "--picture", &picture])
+        run(&["--cave", &with("warp_file = \"none.obj\""), "--screenshot", &picture])
             .contains("none.obj: the warp grid cannot be read")
     );
     assert!(
-        run(&["--cave", &with("blend_file = \"none.png\""), "--picture", &picture])
+        run(&["--cave", &with("blend_file = \"none.png\""), "--screenshot", &picture])
             .contains("none.png: the blend mask cannot be read")
     );
     folder.write("bad.obj", "v 0 0\nv 1 x\n");
-    assert!(run(&["--cave", &with("warp_file = \"bad.obj\""), "--picture", &picture]).contains("bad.obj: line 2"));
+    assert!(run(&["--cave", &with("warp_file = \"bad.obj\""), "--screenshot", &picture]).contains("bad.obj: line 2"));
     let empty = folder.write("b.toml", cave("size_px = [80, 0]"));
-    assert!(run(&["--cave", &empty, "--picture", &picture]).contains("from 1 to 16384"));
+    assert!(run(&["--cave", &empty, "--screenshot", &picture]).contains("from 1 to 16384"));
     assert!(!folder.path("out.png").exists());
     assert!(
-        fail(&["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "fron", "--picture", &picture], 2)
+        fail(&["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "fron", "--screenshot", &picture], 2)
             .contains("did you mean `front`?")
     );
     assert!(fail(&["caves", "--pattern", "grid"], 2).contains("--cave"));
@@ -130,8 +130,11 @@ fn facets_have_their_size_and_unfolded_caves_fit() {
         [(stereo.as_str(), vec!["--facet", "f"], [160, 60]), ("cube6", vec!["--size", "200x200"], [200, 150])]
     {
         let out = tumble(
-            &[&["run", "stack", "--quiet", "--seconds", "0", "--cave", cave, "--picture", &text(&picture)], &more[..]]
-                .concat(),
+            &[
+                &["run", "stack", "--quiet", "--duration", "0", "--cave", cave, "--screenshot", &text(&picture)],
+                &more[..],
+            ]
+            .concat(),
         );
         let said = String::from_utf8(out.stderr).unwrap();
         assert!(out.status.success(), "{said}");
@@ -140,7 +143,7 @@ fn facets_have_their_size_and_unfolded_caves_fit() {
         }
         assert_eq!(png_size(&picture), size, "{cave}");
     }
-    succeed(&["caves", "--pattern", "name", "--cave", &stereo, "--facet", "f", "--picture", &text(&picture)]);
+    succeed(&["caves", "--pattern", "name", "--cave", &stereo, "--facet", "f", "--screenshot", &text(&picture)]);
     assert_eq!(png_size(&picture), [160, 60]);
 }
 
@@ -151,7 +154,7 @@ fn frames_come_at_an_even_pace_of_simulated_time() {
         "run",
         "incline",
         "--quiet",
-        "--seconds",
+        "--duration",
         "0.25",
         "--size",
         "32x24",
@@ -193,7 +196,7 @@ fn with_ffmpeg(folder: &Folder, script: Option<&str>) -> (Option<i32>, String) {
         "run",
         "incline",
         "--quiet",
-        "--seconds",
+        "--duration",
         "0.2",
         "--size",
         "31x24",
@@ -246,7 +249,7 @@ fn a_video_plays_the_run() {
         "run",
         "incline",
         "--quiet",
-        "--seconds",
+        "--duration",
         "0.2",
         "--size",
         "161x120",
@@ -254,7 +257,7 @@ fn a_video_plays_the_run() {
         "20",
         "--video",
         &video,
-        "--picture",
+        "--screenshot",
         &text(&picture),
     ];
     let out = tumble(&args);

@@ -67,8 +67,8 @@ fn completions_complete() {
     assert!(said.contains("cobol") && said.contains("zsh"), "{said}");
     let folder = Folder::new("completions");
     let script = folder.write("tumble.bash", succeed(&["completions", "bash"]));
-    // what bash asks for after "tumble sph<tab>" and "tumble run --pic<tab>"
-    for (words, answer) in [("tumble sph", "spheretree"), ("tumble run --pic", "--picture")] {
+    // what bash asks for after "tumble sph<tab>" and "tumble run --scr<tab>"
+    for (words, answer) in [("tumble sph", "spheretree"), ("tumble run --scr", "--screenshot")] {
         let last = words.split(' ').next_back().unwrap();
         let count = words.split(' ').count() - 1;
         let asked = format!(

@@ -32,7 +32,7 @@ fn two_runs_of_every_shipped_scene_give_the_same_bytes() {
     for scene in SCENES {
         for stepper in STEPPERS {
             let length = seconds(scene).to_string();
-            let args = [scene, "--seconds", &length, "--stepper", stepper];
+            let args = [scene, "--duration", &length, "--stepper", stepper];
             let (a, b) = (state(&folder, "a", &args), state(&folder, "b", &args));
             assert!(!a.is_empty() && a == b, "{scene} in {stepper}: two runs differ");
         }
@@ -46,9 +46,10 @@ fn a_state_saved_in_mid_contact_goes_on_in_another_process_as_if_nothing_had_hap
         for stepper in STEPPERS {
             // both halves are whole numbers of frames of 1/240 s
             let half = seconds(scene) / 2.0;
-            let whole = state(&folder, "whole", &[scene, "--seconds", &(2.0 * half).to_string(), "--stepper", stepper]);
+            let whole =
+                state(&folder, "whole", &[scene, "--duration", &(2.0 * half).to_string(), "--stepper", stepper]);
             let summary = text(&folder.path("half.json"));
-            let first = [scene, "--seconds", &half.to_string(), "--stepper", stepper, "--summary", &summary];
+            let first = [scene, "--duration", &half.to_string(), "--stepper", stepper, "--summary", &summary];
             let halfway = state(&folder, "half", &first);
             let free = ["pendulum", "piston"].contains(&scene);
             assert!(
@@ -59,7 +60,7 @@ fn a_state_saved_in_mid_contact_goes_on_in_another_process_as_if_nothing_had_hap
             let resumed = state(
                 &folder,
                 "rest",
-                &[scene, "--seconds", &half.to_string(), "--stepper", stepper, "--restore", &from],
+                &[scene, "--duration", &half.to_string(), "--stepper", stepper, "--restore", &from],
             );
             assert!(resumed != halfway, "{scene} in {stepper}: nothing happened after the restore");
             assert!(resumed == whole, "{scene} in {stepper}: the restored run goes another way");
@@ -72,7 +73,7 @@ fn two_recordings_are_the_same_file() {
     let folder = Folder::new("recordings");
     let paths = ["a.mcap", "b.mcap"].map(|name| text(&folder.path(name)));
     for path in &paths {
-        succeed(&["run", "falling", "--seconds", "0.7", "--quiet", "--record", path]);
+        succeed(&["run", "falling", "--duration", "0.7", "--quiet", "--record", path]);
     }
     assert!(std::fs::read(&paths[0]).unwrap() == std::fs::read(&paths[1]).unwrap());
 }
@@ -82,7 +83,7 @@ fn two_recordings_are_the_same_file() {
 fn the_recording_of_a_killed_run_is_readable() {
     let folder = Folder::new("killed");
     let path = folder.path("killed.mcap");
-    let mut run = command(&["run", "stack", "--seconds", "100000", "--quiet", "--record", &text(&path)])
+    let mut run = command(&["run", "stack", "--duration", "100000", "--quiet", "--record", &text(&path)])
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
@@ -100,6 +101,6 @@ fn the_recording_of_a_killed_run_is_readable() {
     assert_eq!(reader.entities().len(), 11);
     // what was recorded before the kill is what a whole run records
     let frame = &frames[10];
-    let whole = state(&folder, "whole", &["stack", "--seconds", &(10.0 / 240.0).to_string()]);
+    let whole = state(&folder, "whole", &["stack", "--duration", &(10.0 / 240.0).to_string()]);
     assert!(frame.state == whole, "frame 10 differs from that of a whole run");
 }

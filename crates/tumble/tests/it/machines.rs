@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 use tumble::collide::Vec3;
-use tumble::core::{ArticulatedBody, Site, World};
+use tumble::dynamics::{ArticulatedBody, Site, World};
 use tumble::scene::{SceneFile, resolve_scene};
 
 const G: f64 = 9.81;

@@ -37,13 +37,13 @@ fn a_urdf_stands_on_a_floor_through_its_lowest_point() {
     let folder = Folder::new("open-urdf");
     for shape in ["collision", "visual"] {
         let path = folder.write("p.urdf", pendulum(shape));
-        let run = summary(&folder, &[&path, "--seconds", "0.5"]);
+        let run = summary(&folder, &[&path, "--duration", "0.5"]);
         let floor = run["bodies"].as_array().unwrap().iter().find(|b| b["name"] == "floor").unwrap();
         assert!((floor["position_m"][2].as_f64().unwrap() - 1.0).abs() < 1e-12, "{shape}: {floor}");
         // it hangs in its rest position
         assert!(run["end"]["kinetic_energy_j"].as_f64().unwrap() < 1e-12, "{run}");
     }
-    let said = succeed(&["run", &folder.write("p.urdf", pendulum("visual")), "--seconds", "0"]);
+    let said = succeed(&["run", &folder.write("p.urdf", pendulum("visual")), "--duration", "0"]);
     assert!(said.contains("--floating frees it"), "{said}");
 }
 
@@ -51,7 +51,7 @@ fn a_urdf_stands_on_a_floor_through_its_lowest_point() {
 fn a_root_that_floats_falls_as_free_bodies_do() {
     let folder = Folder::new("open-floating");
     let path = folder.write("crate.urdf", CRATE);
-    let fall = summary(&folder, &[&path, "--floating", "--seconds", "0.5"]);
+    let fall = summary(&folder, &[&path, "--floating", "--duration", "0.5"]);
     let speed = 9.81 * 0.5;
     assert!((fall["end"]["kinetic_energy_j"].as_f64().unwrap() - 0.5 * speed * speed).abs() < 1e-9, "{fall}");
     // what has no joints floats by itself
@@ -69,7 +69,7 @@ fn a_root_that_floats_falls_as_free_bodies_do() {
 fn a_mesh_falls_on_a_floor() {
     let folder = Folder::new("open-mesh");
     let path = folder.write("cube.obj", cube(1));
-    let run = summary(&folder, &[&path, "--seconds", "5"]);
+    let run = summary(&folder, &[&path, "--duration", "5"]);
     let lost =
         run["start"]["potential_energy_j"].as_f64().unwrap() - run["end"]["potential_energy_j"].as_f64().unwrap();
     let wanted = 1000.0 * 9.81 * 0.1 * 3f64.sqrt();
@@ -84,17 +84,17 @@ fn a_mesh_falls_on_a_floor() {
 fn a_mesh_of_hundreds_of_metres_is_noted() {
     let folder = Folder::new("open-large");
     let path = folder.write("part.obj", cube(100));
-    let said = succeed(&["run", &path, "--seconds", "0"]);
+    let said = succeed(&["run", &path, "--duration", "0"]);
     assert!(said.contains("diagonal is 173.2 m") && said.contains("millimetres"), "{said}");
-    assert!(!succeed(&["run", &folder.write("cube.obj", cube(1)), "--seconds", "0"]).contains("millimetres"));
+    assert!(!succeed(&["run", &folder.write("cube.obj", cube(1)), "--duration", "0"]).contains("millimetres"));
 }
 
 #[test]
 fn an_open_mesh_is_refused_and_repaired_where_asked() {
     let folder = Folder::new("open-repair");
     let path = folder.write("open.obj", cube(1).replace("f 4 1 5 8\n", ""));
-    assert!(fail(&["run", &path, "--seconds", "0"], 2).contains("open.obj"));
-    assert!(succeed(&["run", &path, "--seconds", "0", "--repair"]).contains("open.obj"));
+    assert!(fail(&["run", &path, "--duration", "0"], 2).contains("open.obj"));
+    assert!(succeed(&["run", &path, "--duration", "0", "--repair"]).contains("open.obj"));
 }
 
 #[test]

@@ -51,7 +51,7 @@ fn every_shipped_scene_runs_and_leaves_a_whole_summary_and_a_recording_that_ends
         let said = succeed(&[
             "run",
             name,
-            "--seconds",
+            "--duration",
             "0.25",
             "--summary",
             &summary,
@@ -181,6 +181,6 @@ fn check_passes_what_is_good_and_scenes_lists_what_is_shipped() {
 fn a_run_says_what_it_wrote() {
     let folder = Folder::new("says");
     let path = text(&folder.path("out.json"));
-    let said = succeed(&["run", "incline", "--seconds", "0.1", "--summary", &path]);
+    let said = succeed(&["run", "incline", "--duration", "0.1", "--summary", &path]);
     assert!(said.contains(&path) && said.contains("times real time"), "{said}");
 }

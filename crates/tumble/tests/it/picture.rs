@@ -1,4 +1,4 @@
-//! `--picture` with and without a graphics adapter.
+//! `--screenshot` with and without a graphics adapter.
 
 use crate::common::*;
 use std::path::Path;
@@ -28,9 +28,9 @@ fn without_an_adapter_everything_but_the_picture_succeeds_and_the_message_names_
     let out = without_adapter(&[
         "run",
         "incline",
-        "--seconds",
+        "--duration",
         "0.1",
-        "--picture",
+        "--screenshot",
         &picture,
         "--record",
         &recording,
@@ -62,14 +62,14 @@ fn with_an_adapter_every_scene_gets_a_picture() {
         let out = tumble(&[
             "run",
             scene,
-            "--seconds",
+            "--duration",
             "0.05",
             "--quiet",
             "--size",
             "64x48",
             "--debug-draw",
             "all",
-            "--picture",
+            "--screenshot",
             &text(&path),
         ]);
         let said = String::from_utf8(out.stderr).unwrap();

@@ -2,7 +2,7 @@
 
 use crate::common::SCENES;
 use tumble::collide::Vec3;
-use tumble::core::{ObjectId, World};
+use tumble::dynamics::{ObjectId, World};
 use tumble::scene::{Mode, SceneFile, Solver, Stepper, resolve_scene};
 
 const G: f64 = 9.81;

@@ -88,7 +88,7 @@ fn a_picture_of_a_level_is_written() {
     let (mesh, picture) = (folder.write("ring.obj", obj(&ring())), text(&folder.path("level.png")));
     let out = tumble(
         &[
-            &["spheretree", &mesh, "-q", "--no-cache", "--picture", &picture, "--level", "1", "--size", "64x48"][..],
+            &["spheretree", &mesh, "-q", "--no-cache", "--screenshot", &picture, "--level", "1", "--size", "64x48"][..],
             &QUICK,
         ]
         .concat(),
@@ -123,11 +123,11 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
         (&[&none], "none.obj: cannot be read"),
         (&[&open], "the mesh is open: 3 edges"),
         (&[&mesh, "--method", "foo"], "unknown method foo, expected one of"),
-        (&[&mesh, "--branch", "100"], "ring.obj: the branching of a sphere tree is 100, but must be 2 to 64"),
+        (&[&mesh, "--branching", "100"], "ring.obj: the branching of a sphere tree is 100, but must be 2 to 64"),
         (&[&mesh, "--depth", "0"], "the depth of a sphere tree is 0, but must be 1 to 9"),
-        (&[&mesh, "--error", "2"], "wanted a number from 0.0001 to 1"),
+        (&[&mesh, "--max-error", "2"], "wanted a number from 0.0001 to 1"),
         (
-            &[&mesh, "--method", "octree", "--depth", "2", "--picture", &level, "--level", "7"],
+            &[&mesh, "--method", "octree", "--depth", "2", "--screenshot", &level, "--level", "7"],
             "--level is 7; a tree of --depth 2 has levels 0 to 2 at most",
         ),
         (&[], "wanted a mesh, or --urdf ROBOT"),

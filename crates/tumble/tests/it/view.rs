@@ -31,7 +31,7 @@ fn close(a: [f64; 3], b: [f64; 3], within: f64) -> bool {
 /// The hash of the state after so many seconds of `tumble run`.
 fn state_of_run(folder: &Folder, scene: &str, seconds: &str) -> String {
     let path = text(&folder.path("run.state"));
-    succeed(&["run", scene, "--quiet", "--seconds", seconds, "--save", &path]);
+    succeed(&["run", scene, "--quiet", "--duration", seconds, "--save", &path]);
     blake3::hash(&std::fs::read(path).unwrap()).to_hex().to_string()
 }
 
@@ -136,7 +136,7 @@ fn a_run_that_nobody_touches_is_the_run_of_the_command() {
     let folder = Folder::new("view-same");
     for scene in ["billiards", "robot"] {
         // it may end before anyone finds its window
-        let args = [scene, "--size", "64x48", "--fps", "15", "--seconds", "0.5"];
+        let args = [scene, "--size", "64x48", "--fps", "15", "--duration", "0.5"];
         let mut view = Session::spawn(&desktop, Folder::new("view-same-status"), &args);
         let (code, said) = view.end();
         if said.contains("no graphics adapter") {
@@ -158,23 +158,24 @@ fn a_body_is_pulled_to_the_pointer() {
     // the middle of the ball's front is 3.5 m away
     view.mouse([100, 100]);
     view.button("mousedown", "1");
-    let held = view.until("the ball in the hand", |s| s["held"] == "ball");
-    assert!(close(three(&held["hand_at_m"]), [0.0, -0.5, 1.0], 0.03), "{held}");
+    let held = view.until("the ball in the hand", |s| s["picked"] == "ball");
+    assert!(close(three(&held["pick_target_m"]), [0.0, -0.5, 1.0], 0.03), "{held}");
     // tan 26.565° = 1/2: the picture's half height is 1.75 m there, 100 pixels
     view.mouse([140, 60]);
     let hand = [0.4 * 1.75, -0.5, 1.0 + 0.4 * 1.75];
-    view.until("the hand below the pointer", |s| close(three(&s["hand_at_m"]), hand, 0.03));
-    let there = view.until("the ball at the hand", |s| close(three(&s["held_at_m"]), three(&s["hand_at_m"]), 0.005));
-    assert_eq!(there["held"], "ball");
+    view.until("the hand below the pointer", |s| close(three(&s["pick_target_m"]), hand, 0.03));
+    let there =
+        view.until("the ball at the hand", |s| close(three(&s["picked_point_m"]), three(&s["pick_target_m"]), 0.005));
+    assert_eq!(there["picked"], "ball");
     view.button("mouseup", "1");
-    view.until("the ball let go", |s| s["held"].is_null());
+    view.until("the ball let go", |s| s["picked"].is_null());
     // beside the ball there is nothing to hold: the view turns
     view.mouse([5, 195]);
     view.button("mousedown", "1");
     view.mouse([25, 195]);
     view.button("mouseup", "1");
     let turned = view.until("the turn", |s| close(three(&s["forward"]), [0.1f64.sin(), 0.1f64.cos(), 0.0], 1e-5));
-    assert!(turned["held"].is_null());
+    assert!(turned["picked"].is_null());
 }
 
 /// The first picture takes seconds where a software driver makes its pipelines; the scene begins with it.
@@ -182,7 +183,7 @@ fn a_body_is_pulled_to_the_pointer() {
 fn time_begins_with_the_first_picture() {
     let Some(desktop) = Desktop::open() else { return };
     let mut view =
-        Session::spawn(&desktop, Folder::new("view-begin"), &["billiards", "--size", "64x48", "--seconds", "0.3"]);
+        Session::spawn(&desktop, Folder::new("view-begin"), &["billiards", "--size", "64x48", "--duration", "0.3"]);
     let (code, said) = view.end();
     if said.contains("no graphics adapter") {
         return skip(&format!("this machine has no graphics adapter; {said}"));
@@ -205,7 +206,7 @@ fn a_picture_that_cannot_be_written_ends_no_session() {
     let shots = folder.path("shots");
     std::fs::create_dir(&shots).unwrap();
     let Some(mut view) =
-        Session::open(&desktop, "view-shots-status", &["stack", "--size", "64x48", "--shots", &text(&shots)])
+        Session::open(&desktop, "view-shots-status", &["stack", "--size", "64x48", "--screenshot-dir", &text(&shots)])
     else {
         return;
     };
@@ -233,7 +234,7 @@ fn without_a_desktop_there_is_one_clear_message() {
     assert_eq!((out.status.code(), said.lines().count()), (Some(1), 1), "{said}");
     assert!(
         said.starts_with("error: ")
-            && ["DISPLAY", "WAYLAND_DISPLAY", "tumble run SCENE --picture"].iter().all(|word| said.contains(word)),
+            && ["DISPLAY", "WAYLAND_DISPLAY", "tumble run SCENE --screenshot"].iter().all(|word| said.contains(word)),
         "{said}"
     );
 }
@@ -243,10 +244,12 @@ fn what_cannot_be_shown_ends_with_code_2_before_a_window_opens() {
     assert!(fail(&["view", "stack", "--camera", "below"], 2).contains("scene, front, left, back, right, top"));
     assert!(fail(&["view", "stack", "--cave", "cube4", "--facet", "fron"], 2).contains("did you mean `front`?"));
     assert!(fail(&["view", "stack", "--cave", "cube4", "--facet", "front", "--size", "80x60"], 2).contains("size_px"));
-    assert!(fail(&["view", "stack", "--picture", "/nonexistent/x.png"], 2).contains("there is no folder /nonexistent"));
     assert!(
-        fail(&["view", "stack", "--shots", "/nonexistent/dir"], 2)
-            .contains("--shots /nonexistent/dir: there is no such folder")
+        fail(&["view", "stack", "--screenshot", "/nonexistent/x.png"], 2).contains("there is no folder /nonexistent")
+    );
+    assert!(
+        fail(&["view", "stack", "--screenshot-dir", "/nonexistent/dir"], 2)
+            .contains("--screenshot-dir /nonexistent/dir: there is no such folder")
     );
     assert!(fail(&["view", "stack", "--size", "16384x16384"], 2).contains("at most"));
     assert!(fail_often(&["view", "stack", "--size", "0x10"], 2).contains("1 to 16384"));

@@ -104,6 +104,6 @@ fn the_sliders_of_a_scene_come_when_asked_for() {
     view.mouse(pixel(bar, 0.8));
     view.button("mousedown", "1");
     view.until("a slider", |s| joint(s, 0).0 != joint(&status, 0).0);
-    assert!(view.status().unwrap()["held"].is_null());
+    assert!(view.status().unwrap()["picked"].is_null());
     view.button("mouseup", "1");
 }

@@ -11,7 +11,7 @@ fn a_window_shows_the_picture_that_run_takes() {
     let Some(mut view) = Session::open(
         &desktop,
         "view-picture",
-        &["bowling", "--size", "160x90", "--quality", "usual", "--plain", "--paused"],
+        &["bowling", "--size", "160x90", "--quality", "default", "--no-hud", "--paused"],
     ) else {
         return;
     };
@@ -20,7 +20,7 @@ fn a_window_shows_the_picture_that_run_takes() {
         view.until("a step", |s| s["frame"] == n);
     }
     let picture = view.folder.path("run.png");
-    succeed(&["run", "bowling", "--quiet", "--seconds", "0.05", "--size", "160x90", "--picture", &text(&picture)]);
+    succeed(&["run", "bowling", "--quiet", "--duration", "0.05", "--size", "160x90", "--screenshot", &text(&picture)]);
     let image = tumble::render::Image::read_png(&picture).unwrap();
     view.comes_to_show(&image);
     let bright = image.rgba.chunks_exact(4).map(|p| u64::from(p[1])).collect::<Vec<_>>();
@@ -77,13 +77,13 @@ fn facets_and_unfolded_caves_show_what_run_takes() {
         let Some(view) = Session::open(
             &desktop,
             "view-cave-status",
-            &[&args[..], &["--quality", "usual", "--plain", "--paused"]].concat(),
+            &[&args[..], &["--quality", "default", "--no-hud", "--paused"]].concat(),
         ) else {
             return;
         };
         let picture = view.folder.path("run.png");
         let run: Vec<&str> = args.into_iter().filter(|word| *word != "--preview").collect();
-        succeed(&[&["run"], &run[..], &["--quiet", "--seconds", "0", "--picture", &text(&picture)]].concat());
+        succeed(&[&["run"], &run[..], &["--quiet", "--duration", "0", "--screenshot", &text(&picture)]].concat());
         let image = Image::read_png(&picture).unwrap();
         assert_eq!([image.width, image.height], size, "{cave}");
         view.comes_to_show(&image);
@@ -141,7 +141,9 @@ fn a_display_that_does_not_answer_is_named() {
         let said = String::from_utf8(out.stderr).unwrap();
         assert_eq!((out.status.code(), said.lines().count()), (Some(1), 1), "{said}");
         assert!(
-            said.starts_with("error: ") && said.contains(&format!("{variable}={value}")) && said.contains("--picture"),
+            said.starts_with("error: ")
+                && said.contains(&format!("{variable}={value}"))
+                && said.contains("--screenshot"),
             "{said}"
         );
     }

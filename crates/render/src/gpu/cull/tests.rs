@@ -86,7 +86,7 @@ fn eye(camera: &Camera) -> Eye {
 #[test]
 fn most_of_a_pile_is_left_out() {
     // 20 layers of touching balls, seen from above: an octahedral arrangement lets see no deeper than the first few
-    let balls: Vec<Ball> = (0..20 * 400)
+    let spheres: Vec<SphereBounds> = (0..20 * 400)
         .map(|i| (i / 400, i / 20 % 20, i % 20))
         .map(|(z, y, x)| {
             (
@@ -100,7 +100,7 @@ fn most_of_a_pile_is_left_out() {
         })
         .collect();
     let eye = eye(&Camera::look_at(Point3::new(1.0, 0.9, 5.0), Point3::new(1.0, 1.0, 0.0)));
-    let count = seen(&balls, std::iter::once(0..8000), &eye, 1).len();
+    let count = visible(&spheres, std::iter::once(0..8000), &eye, 1).len();
     assert!(count > 400 && count < 2400, "{count} of 8000 are drawn");
 }
 
@@ -125,9 +125,9 @@ fn a_ball_is_hidden_in_the_shadow_of_a_larger_one() {
                 Point3::new(10.0 * angle.cos(), 10.0 * angle.sin() * turn.cos(), 10.0 * angle.sin() * turn.sin());
             // and in front it hides
             for (place, count) in [(behind, if hidden { 1 } else { 2 }), (Point3::from(behind.coords * 0.35), 2)] {
-                let balls = [(place, 0.3 * place.coords.norm() / 10.0), (Point3::new(5.0, 0.0, 0.0), 1.0)];
+                let spheres = [(place, 0.3 * place.coords.norm() / 10.0), (Point3::new(5.0, 0.0, 0.0), 1.0)];
                 assert_eq!(
-                    seen(&balls, std::iter::once(0..2), &eye, 1).len(),
+                    visible(&spheres, std::iter::once(0..2), &eye, 1).len(),
                     count,
                     "{angle} rad, turned {turn}: {place}"
                 );
@@ -137,8 +137,8 @@ fn a_ball_is_hidden_in_the_shadow_of_a_larger_one() {
     // behind the eye, beside the picture, beyond the far plane: none; around the eye: drawn
     let outside = [([-3.0, 0.0, 0.0], 1.0), ([5.0, 6.0, 0.0], 1.0), ([5.0, 0.0, -7.0], 2.0), ([200.0, 0.0, 0.0], 1.0)]
         .map(|(at, r): ([f32; 3], f32)| (Point3::from(at), r));
-    assert!(seen(&outside, std::iter::once(0..4), &eye, 1).is_empty());
-    assert_eq!(seen(&[(Point3::new(0.2, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1), [0]);
+    assert!(visible(&outside, std::iter::once(0..4), &eye, 1).is_empty());
+    assert_eq!(visible(&[(Point3::new(0.2, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1), [0]);
 }
 
 /// Four layers of 50 x 50 balls from in front and above, as in the example `frames`. Which have a pixel is told by rays through the middles of all pixels.
@@ -147,14 +147,14 @@ fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
     let (width, height, fov) = (1024usize, 768usize, 40f64.to_radians());
     let at =
         |i: usize| [0.21 * ((i / 200) as f64 - 24.5), 0.23 * ((i / 4 % 50) as f64 - 24.5), 0.1 + 0.22 * (i % 4) as f64];
-    let balls: Vec<Ball> = (0..10_000).map(|i| (Point3::from(at(i).map(|x| x as f32)), 0.1)).collect();
+    let spheres: Vec<SphereBounds> = (0..10_000).map(|i| (Point3::from(at(i).map(|x| x as f32)), 0.1)).collect();
     let (from, to) = (Vector3::new(0.0, -14.175, 8.4), Vector3::new(0.0, -0.84, 0.2));
     let ahead = (to - from).normalize();
     let right = ahead.cross(&Vector3::z()).normalize();
     let up = right.cross(&ahead);
     let pixels_per_tangent = 0.5 * height as f64 / (0.5 * fov).tan();
     let mut nearest = vec![(f64::MAX, usize::MAX); width * height];
-    for i in 0..balls.len() {
+    for i in 0..spheres.len() {
         let c = Vector3::from(at(i)) - from;
         let depth = c.dot(&ahead);
         let middle = [
@@ -174,7 +174,7 @@ fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
             }
         }
     }
-    let mut met: Vec<usize> = nearest.iter().map(|n| n.1).filter(|i| *i < balls.len()).collect();
+    let mut met: Vec<usize> = nearest.iter().map(|n| n.1).filter(|i| *i < spheres.len()).collect();
     met.sort_unstable();
     met.dedup();
     let eye = Camera::LookAt {
@@ -186,8 +186,8 @@ fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
         far_m: 500.0,
     };
     let lens = eye.lens(width as f32 / height as f32).unwrap();
-    let drawn = seen(
-        &balls,
+    let drawn = visible(
+        &spheres,
         std::iter::once(0..10_000),
         &Eye::new(&lens.view, &lens.projection, width as u32, height as u32),
         1,

@@ -1,8 +1,8 @@
 //! What keys and mouse do.
 
 use super::*;
-use crate::view::hand::Hand;
-use crate::view::sight::Ray;
+use crate::view::picker::Picker;
+use crate::view::view_mode::Ray;
 use tumble::render::winit::event::{ElementState, MouseButton, MouseScrollDelta};
 use tumble::render::winit::keyboard::PhysicalKey;
 use tumble::render::winit::window::Fullscreen;
@@ -12,14 +12,14 @@ const TURN_RAD_PER_PX: f64 = 0.005;
 
 impl Viewer {
     /// Something happened to the window.
-    pub(super) fn heard(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
+    pub(super) fn handle(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
         match event {
             WindowEvent::KeyboardInput { event, .. } => {
                 let down = event.state == ElementState::Pressed;
                 if let PhysicalKey::Code(code) = event.physical_key
-                    && let Some(way) = keys::way(code)
+                    && let Some(movement) = keys::movement(code)
                 {
-                    if down { self.user.press(way) } else { self.user.release(way) }
+                    if down { self.user.press(movement) } else { self.user.release(movement) }
                 }
                 if down
                     && let Some(command) = keys::command(&event.logical_key)
@@ -29,7 +29,7 @@ impl Viewer {
                 }
             }
             WindowEvent::ModifiersChanged(modifiers) => self.user.fast = modifiers.state().shift_key(),
-            WindowEvent::CursorMoved { position, .. } => self.pointed(screen, [position.x, position.y])?,
+            WindowEvent::CursorMoved { position, .. } => self.pointer_moved(screen, [position.x, position.y])?,
             WindowEvent::MouseInput { state, button, .. } => {
                 self.button(screen, *button, *state == ElementState::Pressed)?
             }
@@ -46,9 +46,9 @@ impl Viewer {
             WindowEvent::Focused(false) => {
                 self.focused = false;
                 self.user.release_all();
-                self.clockwork.lock().hand = None;
+                self.simulation_thread.lock().picker = None;
                 self.pointer.turning = false;
-                self.panel.let_go();
+                self.panel.release();
             }
             WindowEvent::Resized(_) => self.stale = true,
             WindowEvent::CloseRequested => self.take_last(screen)?,
@@ -59,17 +59,17 @@ impl Viewer {
 
     fn act(&mut self, screen: &mut Screen, command: Command) -> Result<(), Failure> {
         match command {
-            Command::Pause => self.clockwork.lock().pace.toggle(),
-            Command::Step => self.clockwork.lock().pace.step_once(),
+            Command::Pause => self.simulation_thread.lock().real_time.toggle(),
+            Command::Step => self.simulation_thread.lock().real_time.step_once(),
             Command::Reset => {
-                let mut simulation = self.clockwork.lock();
-                self.joints.let_go(&mut simulation.world);
+                let mut simulation = self.simulation_thread.lock();
+                self.joints.release(&mut simulation.world);
                 simulation.reset()?;
             }
-            Command::Faster => self.clockwork.lock().pace.change_speed(1),
-            Command::Slower => self.clockwork.lock().pace.change_speed(-1),
+            Command::Faster => self.simulation_thread.lock().real_time.change_speed(1),
+            Command::Slower => self.simulation_thread.lock().real_time.change_speed(-1),
             Command::NextCamera => self.go_to(1),
-            Command::LastCamera => self.go_to(-1),
+            Command::PreviousCamera => self.go_to(-1),
             Command::Home => {
                 self.presets.home();
                 self.go_to(0);
@@ -103,36 +103,36 @@ impl Viewer {
 
     fn go_to(&mut self, by: isize) {
         self.presets.go(by);
-        if let Some(camera) = self.presets.camera(&self.clockwork.lock().world, &self.list) {
+        if let Some(camera) = self.presets.camera(&self.simulation_thread.lock().world, &self.list) {
             self.user.look_from(&camera);
         }
     }
 
-    fn pointed(&mut self, screen: &Screen, at_px: [f64; 2]) -> Result<(), Failure> {
+    fn pointer_moved(&mut self, screen: &Screen, at_px: [f64; 2]) -> Result<(), Failure> {
         let [dx, dy] = std::array::from_fn(|k| at_px[k] - self.pointer.at_px[k]);
         self.pointer.at_px = at_px;
         if self.drag_slider()? {
             return Ok(());
         }
         if self.pointer.turning {
-            self.presets.let_go();
+            self.presets.release();
             self.user.turn(-TURN_RAD_PER_PX * dx, -TURN_RAD_PER_PX * dy);
             self.stale = true;
         }
-        self.move_hand(screen);
+        self.move_picker(screen);
         Ok(())
     }
 
     /// The line of sight below the pointer.
     fn ray(&self, screen: &Screen) -> Option<Ray> {
-        self.sight.ray(&self.list, screen.size_px(), self.pointer.at_px)
+        self.view_mode.ray(&self.list, screen.size_px(), self.pointer.at_px)
     }
 
     /// The hand stays below the pointer, wherever user and pointer go.
-    pub(super) fn move_hand(&mut self, screen: &Screen) {
+    pub(super) fn move_picker(&mut self, screen: &Screen) {
         let ray = self.ray(screen);
-        if let Some(hand) = &mut self.clockwork.lock().hand {
-            ray.iter().for_each(|ray| hand.follow(ray));
+        if let Some(picker) = &mut self.simulation_thread.lock().picker {
+            ray.iter().for_each(|ray| picker.follow(ray));
             self.stale = true;
         }
     }
@@ -142,14 +142,14 @@ impl Viewer {
             MouseButton::Left if down && self.press_panel()? => {}
             MouseButton::Left if down => {
                 let ray = self.ray(screen);
-                let mut simulation = self.clockwork.lock();
-                simulation.hand = ray.and_then(|ray| Hand::pick(&simulation.world, &ray));
-                self.pointer.turning = simulation.hand.is_none();
+                let mut simulation = self.simulation_thread.lock();
+                simulation.picker = ray.and_then(|ray| Picker::pick(&simulation.world, &ray));
+                self.pointer.turning = simulation.picker.is_none();
             }
             MouseButton::Left => {
-                self.clockwork.lock().hand = None;
+                self.simulation_thread.lock().picker = None;
                 self.pointer.turning = false;
-                self.panel.let_go();
+                self.panel.release();
             }
             MouseButton::Right => self.pointer.turning = down,
             _ => {}
@@ -159,14 +159,20 @@ impl Viewer {
     }
 
     fn wheel(&mut self, screen: &Screen, up: f64) {
-        let held = self.clockwork.lock().hand.as_mut().map(|hand| hand.reach(1.1f64.powf(-up))).is_some();
+        let held = self
+            .simulation_thread
+            .lock()
+            .picker
+            .as_mut()
+            .map(|picker| picker.scale_distance(1.1f64.powf(-up)))
+            .is_some();
         if !held {
             self.pointer.wheel += up;
             let notches = self.pointer.wheel.trunc();
             self.pointer.wheel -= notches;
             self.user.change_speed(notches as i32);
         }
-        self.move_hand(screen);
+        self.move_picker(screen);
         self.stale = true;
     }
 }

@@ -1,46 +1,46 @@
-//! The program in the window: what is shown, and when. Keys and mouse are in `events.rs`, sliders in `panel.rs`, what is told of it in `told.rs`; steps are taken on another thread
-//! ([`Clockwork`]).
+//! The program in the window: what is shown, and when. Keys and mouse are in `events.rs`, sliders in `panel.rs`, what is told of it in `hud.rs`; steps are taken on another thread
+//! ([`SimulationThread`]).
 
 mod events;
+mod hud;
 mod panel;
-mod told;
 
 use super::joints::Joints;
 use super::keys::{self, Command};
 use super::overlays::Overlays;
-use super::pace::Pace;
 use super::presets::{Presets, distance};
-use super::sight::Sight;
-use super::simulation::{Clockwork, Simulation};
+use super::real_time::RealTime;
+use super::simulation_thread::{Simulation, SimulationThread};
 use super::statistics::Statistics;
 use super::status::Log;
 use super::user::User;
+use super::view_mode::ViewMode;
 use crate::args::ViewOptions;
 use crate::failure::Failure;
 use panel::Panel;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tumble::core::{World, WorldError};
+use tumble::dynamics::{World, WorldError};
 use tumble::render::winit::event::WindowEvent;
 use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, Shown, WindowApp, caption};
 use tumble::scene::{FileKind, SceneFile, visual_notes};
 
 /// Between two status lines while nothing but time changes.
-const IDLE: Duration = Duration::from_millis(250);
+const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 /// Between two looks at what is to be done while nothing is.
-const LOOK: Duration = Duration::from_millis(20);
+const IDLE_INTERVAL: Duration = Duration::from_millis(20);
 /// Time begins after so long even where the desktop shows no picture, as in a window that was opened hidden.
-const UNSEEN: Duration = Duration::from_secs(5);
+const FIRST_PICTURE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Pictures per second where the desktop does not say how many it shows.
-const USUAL_RATE: f64 = 60.0;
+const DEFAULT_RATE: f64 = 60.0;
 
 /// A scene that is looked at.
 pub struct Viewer {
     name: String,
-    clockwork: Clockwork,
+    simulation_thread: SimulationThread,
     drawing: Drawing,
     list: DrawList,
-    sight: Sight,
+    view_mode: ViewMode,
     user: User,
     presets: Presets,
     overlays: Overlays,
@@ -49,11 +49,11 @@ pub struct Viewer {
     pointer: Pointer,
     statistics: Statistics,
     log: Log,
-    show: Captions,
+    show: Hud,
     limits: Limits,
     /// `None` until it is known what draws.
     quality: Option<Quality>,
-    shots: PathBuf,
+    screenshot_dir: PathBuf,
     picture_wanted: bool,
     last_picture: Option<Image>,
     /// Whether what is shown is no longer what is.
@@ -78,7 +78,7 @@ struct Pointer {
 }
 
 /// Text over the picture.
-struct Captions {
+struct Hud {
     any: bool,
     statistics: bool,
     help: bool,
@@ -95,18 +95,18 @@ struct Limits {
 /// Moments of the last turn and status line, and of the opening.
 struct Times {
     turn: Instant,
-    told: Option<Instant>,
+    hud: Option<Instant>,
     opened: Instant,
 }
 
 impl Viewer {
     /// Of a world at time 0.
-    pub fn new(scene: &SceneFile, world: World, sight: Sight, options: &ViewOptions) -> Result<Viewer, Failure> {
+    pub fn new(scene: &SceneFile, world: World, view_mode: ViewMode, options: &ViewOptions) -> Result<Viewer, Failure> {
         let mut drawing = Drawing::new(scene);
         let list = drawing.list(&world, &DebugDraw::default()).map_err(Failure::input)?;
         visual_notes(world.visuals()).iter().for_each(|note| eprintln!("{note}"));
         let mut presets = Presets::new(&world, &list);
-        let mut user = User::new(sight.body(&list), distance(&list.camera));
+        let mut user = User::new(view_mode.rig(&list), distance(&list.camera));
         if let Some(name) = &options.camera {
             if !presets.find(name) {
                 return Err(Failure::input(format!(
@@ -119,15 +119,15 @@ impl Viewer {
         let now = Instant::now();
         let robot = crate::args::kind(&options.scene.name) == FileKind::Urdf;
         // a robot of a file has no drives: time would let it fall before anybody has seen it
-        let paused = options.paused || (robot && options.seconds.is_none());
+        let paused = options.paused || (robot && options.duration.is_none());
         let joints = Joints::new(scene, &world);
-        let last = options.seconds.map(|s| (s / world.settings().dt).round() as u64);
+        let last = options.duration.map(|s| (s / world.settings().dt).round() as u64);
         Ok(Viewer {
             name: options.scene.name.clone(),
-            clockwork: Clockwork::new(Simulation::new(world, Pace::new(paused), last)),
+            simulation_thread: SimulationThread::new(Simulation::new(world, RealTime::new(paused), last)),
             drawing,
             list,
-            sight,
+            view_mode,
             user,
             presets,
             overlays: Overlays { draw: options.debug_draw.0 },
@@ -136,11 +136,11 @@ impl Viewer {
             pointer: Pointer::default(),
             statistics: Statistics::new(now),
             log: Log::create(options.status.as_deref())?,
-            show: Captions { any: !options.plain, statistics: true, help: false },
+            show: Hud { any: !options.no_hud, statistics: true, help: false },
             limits: Limits { pictures: options.frames, per_second: options.fps, device: options.lose_device },
             quality: options.quality,
-            shots: options.shots.clone(),
-            picture_wanted: options.picture.is_some(),
+            screenshot_dir: options.screenshot_dir.clone(),
+            picture_wanted: options.screenshot.is_some(),
             last_picture: None,
             stale: true,
             drawn: 0,
@@ -148,7 +148,7 @@ impl Viewer {
             shown: 0,
             size_px: [0; 2],
             focused: false,
-            times: Times { turn: now, told: None, opened: now },
+            times: Times { turn: now, hud: None, opened: now },
         })
     }
 
@@ -156,17 +156,17 @@ impl Viewer {
     pub fn finish(&mut self) -> Result<Option<Image>, Failure> {
         if self.log.wanted() {
             let status = self.status();
-            self.log.tell(status, true)?;
+            self.log.write(status, true)?;
         }
-        match self.clockwork.lock().trouble.take() {
-            Some(trouble) => Err(Failure::run("the simulation stopped", trouble)),
+        match self.simulation_thread.lock().error.take() {
+            Some(error) => Err(Failure::run("the simulation stopped", error)),
             None => Ok(self.last_picture.take()),
         }
     }
 
     /// The draw list of this moment.
     fn update_list(&mut self) -> Result<(), Failure> {
-        let simulation = self.clockwork.lock();
+        let simulation = self.simulation_thread.lock();
         let world = &simulation.world;
         self.list = self.drawing.list(world, &self.overlays.draw).map_err(|e| Failure::run("the picture", e))?;
         self.drawn = simulation.changes;
@@ -176,10 +176,10 @@ impl Viewer {
         if let Some(quality) = &self.quality {
             quality.apply(&mut self.list.settings);
         }
-        self.sight.widen_shadows(&mut self.list);
-        self.sight.stand(self.user.body(), &mut self.list);
-        if let Some(hand) = &simulation.hand {
-            hand.draw(world, &mut self.list);
+        self.view_mode.widen_shadows(&mut self.list);
+        self.view_mode.set_place(self.user.rig(), &mut self.list);
+        if let Some(picker) = &simulation.picker {
+            picker.draw(world, &mut self.list);
         }
         Ok(())
     }
@@ -187,7 +187,7 @@ impl Viewer {
     fn draw(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let clock = Instant::now();
         self.update_list()?;
-        self.sight.draw(screen, &self.list)?;
+        self.view_mode.draw(screen, &self.list)?;
         let lines = self.lines();
         screen.set_caption((!lines.is_empty()).then(|| caption(&lines, panel::scale(screen.size_px()[0]))));
         screen.set_panel(self.panel_image());
@@ -204,10 +204,10 @@ impl Viewer {
 
     /// A picture for the user. Where it cannot be written that is said, and the session goes on.
     fn save_picture(&mut self, screen: &mut Screen) -> Result<(), Failure> {
-        let frame = self.clockwork.lock().world.frame();
+        let frame = self.simulation_thread.lock().world.frame();
         self.update_list()?;
-        let path = self.shots.join(format!("{}_{frame:06}.png", file_name(&self.name)));
-        match self.sight.picture(screen, &self.list)?.write_png(&path) {
+        let path = self.screenshot_dir.join(format!("{}_{frame:06}.png", file_name(&self.name)));
+        match self.view_mode.picture(screen, &self.list)?.write_png(&path) {
             Ok(()) => eprintln!("picture: {}", path.display()),
             Err(error) => eprintln!("no picture: {error}"),
         }
@@ -218,7 +218,7 @@ impl Viewer {
     fn take_last(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         if self.picture_wanted {
             self.update_list()?;
-            self.last_picture = Some(self.sight.picture(screen, &self.list)?);
+            self.last_picture = Some(self.view_mode.picture(screen, &self.list)?);
         }
         Ok(())
     }
@@ -226,27 +226,27 @@ impl Viewer {
     /// Time from one picture to the next.
     fn interval(&self, screen: &Screen) -> Duration {
         let desktop = || Some(f64::from(screen.window().current_monitor()?.refresh_rate_millihertz()?) / 1000.0);
-        let rate = self.limits.per_second.or_else(desktop).filter(|rate| *rate >= 0.01).unwrap_or(USUAL_RATE);
+        let rate = self.limits.per_second.or_else(desktop).filter(|rate| *rate >= 0.01).unwrap_or(DEFAULT_RATE);
         Duration::from_secs_f64(1.0 / rate.max(0.01))
     }
 
     /// Time begins when the first picture is on the screen: until then pipelines are made, and nobody would see what happens.
     fn begin(&mut self, screen: &mut Screen) -> Result<(), Failure> {
-        if self.clockwork.runs() || (self.shown == 0 && self.times.opened.elapsed() < UNSEEN) {
+        if self.simulation_thread.runs() || (self.shown == 0 && self.times.opened.elapsed() < FIRST_PICTURE_TIMEOUT) {
             return Ok(());
         }
         screen.renderer().wait()?;
         self.times.turn = Instant::now();
-        self.clockwork.start()
+        self.simulation_thread.start()
     }
 
     /// The clock went on: the user moves by the keys that he holds.
     fn walk(&mut self, screen: &Screen, passed_s: f64) {
         if self.user.moves() {
-            self.presets.let_go();
+            self.presets.release();
             self.user.pass(passed_s);
-            self.sight.stand(self.user.body(), &mut self.list);
-            self.move_hand(screen);
+            self.view_mode.set_place(self.user.rig(), &mut self.list);
+            self.move_picker(screen);
             self.stale = true;
         }
     }
@@ -256,8 +256,8 @@ impl WindowApp for Viewer {
     type Error = Failure;
 
     fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
-        let usual = if screen.is_software() { Quality::fast() } else { Quality::default() };
-        self.quality.get_or_insert(usual);
+        let default = if screen.is_software() { Quality::fast() } else { Quality::default() };
+        self.quality.get_or_insert(default);
         // opening took its time; the simulation starts with the first picture
         self.times.turn = Instant::now();
         self.times.opened = self.times.turn;
@@ -265,7 +265,7 @@ impl WindowApp for Viewer {
     }
 
     fn event(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
-        self.heard(screen, event)
+        self.handle(screen, event)
     }
 
     fn turn(&mut self, screen: &mut Screen) -> Result<Next, Failure> {
@@ -274,13 +274,13 @@ impl WindowApp for Viewer {
         let passed = (now - self.times.turn).as_secs_f64();
         self.times.turn = now;
         self.walk(screen, passed);
-        if self.clockwork.is_broken() {
+        if self.simulation_thread.is_broken() {
             return Err(Failure::run("the simulation", "its thread ended; what it said stands above"));
         }
         let (moved, over, paused, counted) = {
-            let mut simulation = self.clockwork.lock();
+            let mut simulation = self.simulation_thread.lock();
             let counted = self.statistics.count(now, &mut simulation.steps);
-            (simulation.changes != self.drawn, simulation.is_over(), simulation.pace.paused, counted)
+            (simulation.changes != self.drawn, simulation.is_over(), simulation.real_time.paused, counted)
         };
         self.stale |= moved;
         if counted {
@@ -290,14 +290,14 @@ impl WindowApp for Viewer {
         if self.stale || self.limits.pictures.is_some() {
             self.draw(screen)?;
         }
-        self.tell(now)?;
+        self.write_status(now)?;
         self.begin(screen)?;
         if over || self.ended || self.limits.pictures.is_some_and(|pictures| self.shown >= pictures) {
             self.take_last(screen)?;
             return Ok(Next::End);
         }
         let active = !paused || self.user.moves() || self.stale || self.limits.pictures.is_some();
-        Ok(Next::At(now + if active { self.interval(screen) } else { LOOK }))
+        Ok(Next::At(now + if active { self.interval(screen) } else { IDLE_INTERVAL }))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The panel of sliders: mouse and keys move joints.
 
 use super::*;
-use crate::view::simulation::Simulation;
+use crate::view::simulation_thread::Simulation;
 use crate::view::status::JointStatus;
 use tumble::render::SliderPanel;
 
@@ -25,7 +25,7 @@ impl Panel {
         Panel { wanted, chosen: 0, first: 0, dragged: None }
     }
 
-    pub(super) fn let_go(&mut self) {
+    pub(super) fn release(&mut self) {
         self.dragged = None;
     }
 }
@@ -46,7 +46,7 @@ impl Viewer {
 
     pub(super) fn panel_image(&self) -> Option<Image> {
         let panel = self.panel()?;
-        let sliders = self.joints.sliders(&self.clockwork.lock().world, self.panel.chosen);
+        let sliders = self.joints.sliders(&self.simulation_thread.lock().world, self.panel.chosen);
         let title = if self.joints.held() { "joints held, K frees" } else { "joints free, K holds" };
         Some(panel.draw(title, &sliders))
     }
@@ -69,7 +69,7 @@ impl Viewer {
         let (Some(index), Some(panel)) = (self.panel.dragged, self.panel()) else { return Ok(false) };
         let share = panel.share(self.pointer.at_px[0] - self.panel_left(&panel));
         self.move_joint(|joints, simulation| {
-            joints.slide(&mut simulation.world, index, share, simulation.pace.paused)
+            joints.set_fraction(&mut simulation.world, index, share, simulation.real_time.paused)
         })?;
         Ok(true)
     }
@@ -85,20 +85,22 @@ impl Viewer {
     /// Keys move the chosen joint.
     pub(super) fn nudge_joint(&mut self, sign: f64) -> Result<(), Failure> {
         let (index, share) = (self.panel.chosen, sign * NUDGE * if self.user.fast { 10.0 } else { 1.0 });
-        self.move_joint(|joints, simulation| joints.nudge(&mut simulation.world, index, share, simulation.pace.paused))
+        self.move_joint(|joints, simulation| {
+            joints.nudge(&mut simulation.world, index, share, simulation.real_time.paused)
+        })
     }
 
     /// Holds all joints where they are, or lets them go.
     pub(super) fn switch_hold(&mut self) {
-        let world = &mut self.clockwork.lock().world;
-        if self.joints.held() { self.joints.let_go(world) } else { self.joints.hold(world) }
+        let world = &mut self.simulation_thread.lock().world;
+        if self.joints.held() { self.joints.release(world) } else { self.joints.hold(world) }
     }
 
     fn move_joint(
         &mut self,
         change: impl FnOnce(&mut Joints, &mut Simulation) -> Result<(), WorldError>,
     ) -> Result<(), Failure> {
-        let mut simulation = self.clockwork.lock();
+        let mut simulation = self.simulation_thread.lock();
         change(&mut self.joints, &mut simulation).map_err(|e| Failure::run("moving a joint", e))?;
         simulation.changes += 1;
         self.stale = true;

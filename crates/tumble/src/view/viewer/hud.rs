@@ -7,12 +7,15 @@ impl Viewer {
     /// Lines over the picture.
     pub(super) fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
-        let simulation = self.clockwork.lock();
-        let (world, pace) = (&simulation.world, &simulation.pace);
+        let simulation = self.simulation_thread.lock();
+        let (world, real_time) = (&simulation.world, &simulation.real_time);
         if self.show.any && self.show.statistics {
             let f = self.statistics.shown;
-            let time =
-                if pace.paused { "paused".to_string() } else { format!("{:.4}x", pace.speed()).replace(".0000", "") };
+            let time = if real_time.paused {
+                "paused".to_string()
+            } else {
+                format!("{:.4}x", real_time.speed()).replace(".0000", "")
+            };
             lines.push(format!("{:.0} fps  t {:.3} s  {time}", f.pictures_per_s, world.time()));
             lines.push(format!(
                 "picture {:.1} ms  step {:.2} ms  {:.0} steps/s",
@@ -21,11 +24,11 @@ impl Viewer {
             lines.push(format!(
                 "contacts {}  behind {:.1} s  camera {}",
                 world.contacts().len(),
-                pace.behind_s,
+                real_time.behind_s,
                 self.presets.name()
             ));
         }
-        lines.extend(simulation.trouble.iter().map(|trouble| format!("stopped: {trouble}. R goes back to time 0")));
+        lines.extend(simulation.error.iter().map(|error| format!("stopped: {error}. R goes back to time 0")));
         if self.show.any && self.show.help {
             lines.extend(keys::HELP.iter().map(|line| line.to_string()));
         }
@@ -33,28 +36,28 @@ impl Viewer {
     }
 
     pub(super) fn title(&self, screen: &Screen) -> String {
-        let simulation = self.clockwork.lock();
-        let on = match &self.sight {
-            Sight::Camera => String::new(),
-            Sight::Facet(_, facet) => format!(" on {}", facet.name),
-            Sight::Unfolded(view) => format!(" in {}", view.cave().file),
+        let simulation = self.simulation_thread.lock();
+        let on = match &self.view_mode {
+            ViewMode::Camera => String::new(),
+            ViewMode::Facet(_, facet) => format!(" on {}", facet.name),
+            ViewMode::Unfolded(view) => format!(" in {}", view.cave().file),
         };
         let [w, h] = screen.size_px();
-        let state = if simulation.pace.paused { "paused" } else { "running" };
+        let state = if simulation.real_time.paused { "paused" } else { "running" };
         let fps = self.statistics.shown.pictures_per_s;
         format!("tumble: {}{on} ({state}, t {:.2} s, {fps:.0} fps, {w}x{h})", self.name, simulation.world.time())
     }
 
     pub(super) fn status(&self) -> Status {
-        let simulation = self.clockwork.lock();
-        let (world, pace) = (&simulation.world, &simulation.pace);
-        let held = simulation.hand.as_ref().and_then(|hand| hand.held(world));
+        let simulation = self.simulation_thread.lock();
+        let (world, real_time) = (&simulation.world, &simulation.real_time);
+        let picked = simulation.picker.as_ref().and_then(|picker| picker.picked(world));
         Status {
             frame: world.frame(),
             time_s: world.time(),
-            paused: pace.paused,
-            speed: pace.speed(),
-            behind_s: pace.behind_s,
+            paused: real_time.paused,
+            speed: real_time.speed(),
+            behind_s: real_time.behind_s,
             shown: self.shown,
             size_px: self.size_px,
             focused: self.focused,
@@ -63,9 +66,9 @@ impl Viewer {
             camera: self.presets.name().to_string(),
             flies: self.user.flies,
             step_m: self.user.step_m(),
-            held: held.as_ref().map(|h| h.0.clone()),
-            held_at_m: held.as_ref().map(|h| h.1.into()),
-            hand_at_m: held.as_ref().map(|h| h.2.into()),
+            picked: picked.as_ref().map(|h| h.0.clone()),
+            picked_point_m: picked.as_ref().map(|h| h.1.into()),
+            pick_target_m: picked.as_ref().map(|h| h.2.into()),
             quality: self.quality.map(|q| q.to_string()),
             overlays: self.overlays.names(),
             caption: self.show.any && (self.show.statistics || self.show.help),
@@ -76,15 +79,15 @@ impl Viewer {
     }
 
     /// A line of the status, where something changed or it is time.
-    pub(super) fn tell(&mut self, now: Instant) -> Result<(), Failure> {
+    pub(super) fn write_status(&mut self, now: Instant) -> Result<(), Failure> {
         if !self.log.wanted() {
             return Ok(());
         }
-        let due = self.times.told.is_none_or(|told| now - told >= IDLE);
+        let due = self.times.hud.is_none_or(|hud| now - hud >= STATUS_INTERVAL);
         let status = self.status();
         if due {
-            self.times.told = Some(now);
+            self.times.hud = Some(now);
         }
-        self.log.tell(status, due)
+        self.log.write(status, due)
     }
 }

@@ -1,29 +1,29 @@
 //! The user's hand: a body is picked by the mouse and pulled by a spring.
 
-use super::sight::Ray;
+use super::view_mode::Ray;
 use tumble::collide::Vec3;
-use tumble::core::{ObjectId, Pull, World, WorldError};
+use tumble::dynamics::{ObjectId, Pull, World, WorldError};
 use tumble::render::{DebugStyle, DrawList};
 
 /// Frequency of the spring, rad/s: the hand has what it pulls after a third of a second, and what hangs from it is 4 cm below.
 pub const FREQUENCY: f64 = 15.0;
 
 /// What is held, and where it is wanted.
-pub struct Hand {
+pub struct Picker {
     pull: Pull,
     /// Depth along the line of sight at which the hand is, m.
     depth_m: f64,
 }
 
-impl Hand {
+impl Picker {
     /// Takes hold of what moves where the ray meets it; `None` where it meets nothing, or first what does not move.
-    pub fn pick(world: &World, ray: &Ray) -> Option<Hand> {
+    pub fn pick(world: &World, ray: &Ray) -> Option<Picker> {
         let (id, part, distance) = first_seen(world, ray)?;
         let moves = world.status(id)?.moves() && world.object(id)?.collidable().is_some_and(|c| c.part_moves(part));
         let site = world.site(id, part).filter(|_| moves)?;
         let target = ray.origin + ray.direction * distance;
         let point = site.pose.rotation.inverse() * (target - site.position());
-        Some(Hand {
+        Some(Picker {
             pull: Pull { id, part, point, target, frequency: FREQUENCY },
             depth_m: distance * ray.direction.dot(&ray.axis),
         })
@@ -38,7 +38,7 @@ impl Hand {
     }
 
     /// Nearer to the user or farther away, by a factor.
-    pub fn reach(&mut self, factor: f64) {
+    pub fn scale_distance(&mut self, factor: f64) {
         self.depth_m = (self.depth_m * factor).clamp(1e-3, 1e4);
     }
 
@@ -48,7 +48,7 @@ impl Hand {
     }
 
     /// Whose body it is, the point that is held, and where it is wanted, world axes, m.
-    pub fn held(&self, world: &World) -> Option<(String, Vec3, Vec3)> {
+    pub fn picked(&self, world: &World) -> Option<(String, Vec3, Vec3)> {
         let site = world.site(self.pull.id, self.pull.part)?;
         let point = site.pose.rotation * self.pull.point + site.position();
         Some((world.object(self.pull.id)?.name().to_string(), point, self.pull.target))
@@ -56,7 +56,7 @@ impl Hand {
 
     /// A line from the point that is held to the hand.
     pub fn draw(&self, world: &World, list: &mut DrawList) {
-        let Some((_, point, target)) = self.held(world) else { return };
+        let Some((_, point, target)) = self.picked(world) else { return };
         let (from, to) = (nalgebra::Point3::from(point.cast::<f32>()), nalgebra::Point3::from(target.cast::<f32>()));
         let style = DebugStyle::new([1.0, 0.55, 0.1]).on_top();
         list.line(from, to, style.width(3.0));

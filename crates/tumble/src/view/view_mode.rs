@@ -1,6 +1,6 @@
 //! What the window shows: the scene's camera, one facet of a cave, or the whole cave unfolded.
 
-use super::user::Body;
+use super::user::Rig;
 use tumble::collide::Vec3;
 use tumble::render::{CaveView, DrawList, Image, RIM_PX, RenderError, Screen, Viewpoint, unfold};
 use tumble::scene::cave::{Facet, Flip, Stereo};
@@ -9,7 +9,7 @@ use tumble::scene::cave::{Facet, Flip, Stereo};
 const CAVE_SHADOWS: u32 = 2;
 
 /// What is shown.
-pub enum Sight {
+pub enum ViewMode {
     /// Through the user's one eye.
     Camera,
     /// A facet, as its projector gets it.
@@ -37,30 +37,30 @@ struct Tile {
     flip: [bool; 2],
 }
 
-impl Sight {
+impl ViewMode {
     /// The body of whoever looks: an eye where the list's camera is, or the cave's user where his cave is.
-    pub fn body(&self, list: &DrawList) -> Body {
+    pub fn rig(&self, list: &DrawList) -> Rig {
         let (view, user) = match self {
-            Sight::Camera => return Body::Eye(list.camera),
-            Sight::Facet(view, facet) => (view, facet.user),
-            Sight::Unfolded(view) => (view, 0),
+            ViewMode::Camera => return Rig::Eye(list.camera),
+            ViewMode::Facet(view, facet) => (view, facet.user),
+            ViewMode::Unfolded(view) => (view, 0),
         };
         let user = &view.cave().users[user];
-        Body::Cave { place: *view.place(), eye_m: user.eye_m.into(), forward: user.forward.into() }
+        Rig::Cave { place: *view.place(), eye_m: user.eye_m.into(), forward: user.forward.into() }
     }
 
     /// Takes the cave to where the user is, or the list's camera to his eye.
-    pub fn stand(&mut self, body: &Body, list: &mut DrawList) {
-        match (self, body) {
-            (Sight::Camera, Body::Eye(camera)) => list.camera = *camera,
-            (Sight::Facet(view, _) | Sight::Unfolded(view), Body::Cave { place, .. }) => view.stand(*place),
+    pub fn set_place(&mut self, rig: &Rig, list: &mut DrawList) {
+        match (self, rig) {
+            (ViewMode::Camera, Rig::Eye(camera)) => list.camera = *camera,
+            (ViewMode::Facet(view, _) | ViewMode::Unfolded(view), Rig::Cave { place, .. }) => view.set_place(*place),
             _ => {}
         }
     }
 
     /// The shadow maps of a cave hold all that its screens show together.
     pub fn widen_shadows(&self, list: &mut DrawList) {
-        if !matches!(self, Sight::Camera) {
+        if !matches!(self, ViewMode::Camera) {
             list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
         }
     }
@@ -70,12 +70,12 @@ impl Sight {
         let [w, h] = screen.size_px();
         let renderer = screen.renderer();
         match self {
-            Sight::Camera => renderer.draw(&list.camera, list, w, h),
-            Sight::Facet(view, facet) => {
+            ViewMode::Camera => renderer.draw(&list.camera, list, w, h),
+            ViewMode::Facet(view, facet) => {
                 let stage = renderer.stage(list)?;
                 view.draw_on_device(renderer, &stage, facet)
             }
-            Sight::Unfolded(view) => {
+            ViewMode::Unfolded(view) => {
                 let stage = renderer.stage(list)?;
                 view.draw_unfolded_on_device(renderer, &stage, [w, h])
             }
@@ -110,16 +110,16 @@ impl Sight {
     }
 
     fn tiles(&self, list: &DrawList, size_px: [u32; 2]) -> Result<Vec<Tile>, RenderError> {
-        let whole =
+        let tile =
             |from: Box<dyn Viewpoint>, position_px, size_px| Tile { from, position_px, size_px, flip: [false; 2] };
         Ok(match self {
-            Sight::Camera => vec![whole(Box::new(list.camera), [0; 2], size_px)],
-            Sight::Facet(view, facet) => eyes(view, facet)?,
-            Sight::Unfolded(view) => {
+            ViewMode::Camera => vec![tile(Box::new(list.camera), [0; 2], size_px)],
+            ViewMode::Facet(view, facet) => eyes(view, facet)?,
+            ViewMode::Unfolded(view) => {
                 let facets = &view.cave().facets;
                 let tile = |t: tumble::render::Tile| -> Result<Tile, RenderError> {
                     let [w, h] = t.size_px;
-                    Ok(whole(Box::new(view.eye(&facets[t.facet], 0.0)?.part(w, h, RIM_PX)), t.position_px, t.size_px))
+                    Ok(tile(Box::new(view.eye(&facets[t.facet], 0.0)?.part(w, h, RIM_PX)), t.position_px, t.size_px))
                 };
                 unfold(view.cave(), size_px).1.into_iter().map(tile).collect::<Result<_, _>>()?
             }

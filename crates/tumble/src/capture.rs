@@ -1,76 +1,70 @@
 //! Pictures of a run: of its end, one after another into a folder, or as a video; by the scene's camera, one facet of a cave, or all of them.
 
 use crate::args::RunOptions;
+use crate::atomic_file::write_file;
 use crate::failure::Failure;
 use crate::video::Video;
 use std::path::Path;
-use tumble::core::World;
+use tumble::dynamics::World;
 use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer};
 use tumble::scene::SceneFile;
 use tumble::scene::cave::{Facet, resolve_cave};
 
 /// Size of a picture where nothing is said, pixels.
-const USUAL: [u32; 2] = [1280, 720];
+const DEFAULT_SIZE_PX: [u32; 2] = [1280, 720];
 /// Shadow maps of a cave, which hold all that its screens show together, are this much wider.
 const CAVE_SHADOWS: u32 = 2;
 
 /// Takes pictures of one scene.
-pub struct Shots {
+pub struct Capture {
     drawing: Drawing,
     renderer: Renderer,
-    from: From,
+    source: Source,
     overlays: DebugDraw,
     quality: Quality,
     camera: Option<String>,
-    frames: Option<Frames>,
+    frames: Option<FrameSeries>,
 }
 
 /// Where pictures are taken from, with the size asked for.
-enum From {
+enum Source {
     Camera([u32; 2]),
     Facet(Box<CaveView>, Box<Facet>),
     Unfolded(Box<CaveView>, [u32; 2]),
 }
 
 /// Pictures at an even pace of simulated time.
-struct Frames {
+struct FrameSeries {
     per_second: f64,
     taken: u64,
     folder: Option<std::path::PathBuf>,
     video: Option<Video>,
 }
 
-impl Shots {
+impl Capture {
     /// Checks all that can be wrong before the simulation starts. `None` where no picture is wanted, or where there is no graphics adapter:
     /// everything else still counts then, and the message says what brings one.
-    pub fn new(scene: &SceneFile, world: &World, options: &RunOptions) -> Result<Option<Shots>, Failure> {
-        let from = from(scene, options)?;
-        if options.picture.is_none() && options.frames_dir.is_none() && options.video.is_none() {
-            return match from {
-                From::Camera(_) => Ok(None),
+    pub fn new(scene: &SceneFile, world: &World, options: &RunOptions) -> Result<Option<Capture>, Failure> {
+        let source = source(scene, options)?;
+        if options.screenshot.is_none() && options.frames_dir.is_none() && options.video.is_none() {
+            return match source {
+                Source::Camera(_) => Ok(None),
                 _ => Err(Failure::input(
-                    "--cave draws pictures; say which: --picture FILE, --frames-dir DIR or --video FILE",
+                    "--cave draws pictures; say which: --screenshot FILE, --frames-dir DIR or --video FILE",
                 )),
             };
         }
         if options.video.is_some() {
             Video::probe()?;
         }
-        let renderer = match Renderer::new() {
-            Ok(renderer) => renderer,
-            Err(error @ RenderError::NoAdapter { .. }) => {
-                eprintln!("no picture: {error}");
-                return Ok(None);
-            }
-            Err(error) => return Err(Failure::run("the picture", error)),
-        };
-        let frames = frames(&from, options)?;
+        let Some(renderer) = open_renderer()? else { return Ok(None) };
+        let frames = frames(&source, options)?;
         let drawing = Drawing::new(scene);
         let (overlays, quality, camera) = (options.debug_draw.0, options.quality, options.camera.clone());
-        let mut shots = Shots { drawing, renderer, from, overlays, quality, camera, frames };
+        let mut capture = Capture { drawing, renderer, source, overlays, quality, camera, frames };
         // textures are read and the camera is found now
-        shots.list(world).map_err(Failure::input)?;
-        Ok(Some(shots))
+        capture.list(world).map_err(Failure::input)?;
+        Ok(Some(capture))
     }
 
     /// What is drawn of the world as it is now.
@@ -88,15 +82,15 @@ impl Shots {
         let failed = |e: RenderError| Failure::run("the picture", e);
         let mut list = self.list(world).map_err(|e| Failure::run("the picture", e))?;
         let renderer = &mut self.renderer;
-        match &self.from {
-            From::Camera([w, h]) => renderer.render(&list, *w, *h),
-            From::Facet(view, facet) => {
+        match &self.source {
+            Source::Camera([w, h]) => renderer.render(&list, *w, *h),
+            Source::Facet(view, facet) => {
                 list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
                 view.draw(renderer, &list, facet)
             }
-            From::Unfolded(view, most) => {
+            Source::Unfolded(view, max_size) => {
                 list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
-                view.draw_unfolded(renderer, &list, *most)
+                view.draw_unfolded(renderer, &list, *max_size)
             }
         }
         .map_err(failed)
@@ -104,7 +98,7 @@ impl Shots {
 
     /// After each frame of a run that began at the time `begin`: takes the pictures that are due.
     pub fn frame(&mut self, world: &World, begin: f64) -> Result<(), Failure> {
-        let due = |frames: &Frames| world.time() - begin >= frames.taken as f64 / frames.per_second - 1e-9;
+        let due = |frames: &FrameSeries| world.time() - begin >= frames.taken as f64 / frames.per_second - 1e-9;
         if !self.frames.as_ref().is_some_and(due) {
             return Ok(());
         }
@@ -134,12 +128,12 @@ impl Shots {
     }
 }
 
-fn from(scene: &SceneFile, options: &RunOptions) -> Result<From, Failure> {
+fn source(scene: &SceneFile, options: &RunOptions) -> Result<Source, Failure> {
     let size = options.size.map(|(w, h)| [w, h]);
     let Some(name) = &options.cave else {
         return match &options.facet {
             Some(_) => Err(Failure::input("--facet names a facet of a cave; say which with --cave FILE")),
-            None => Ok(From::Camera(size.unwrap_or(USUAL))),
+            None => Ok(Source::Camera(size.unwrap_or(DEFAULT_SIZE_PX))),
         };
     };
     let cave = resolve_cave(name)?.load()?;
@@ -149,12 +143,12 @@ fn from(scene: &SceneFile, options: &RunOptions) -> Result<From, Failure> {
         Some(_) if size.is_some() => Err(Failure::input(
             "the cave says how large a facet is (size_px); --size goes with the unfolded cave or without one",
         )),
-        Some(facet) => Ok(From::Facet(view, Box::new(facet))),
-        None => Ok(From::Unfolded(view, size.unwrap_or(USUAL))),
+        Some(facet) => Ok(Source::Facet(view, Box::new(facet))),
+        None => Ok(Source::Unfolded(view, size.unwrap_or(DEFAULT_SIZE_PX))),
     }
 }
 
-fn frames(from: &From, options: &RunOptions) -> Result<Option<Frames>, Failure> {
+fn frames(source: &Source, options: &RunOptions) -> Result<Option<FrameSeries>, Failure> {
     if options.frames_dir.is_none() && options.video.is_none() {
         return Ok(None);
     }
@@ -162,29 +156,29 @@ fn frames(from: &From, options: &RunOptions) -> Result<Option<Frames>, Failure> 
         std::fs::create_dir_all(folder)
             .map_err(|e| Failure::input(format!("{}: cannot be made: {e}", folder.display())))?;
     }
-    let size = match from {
-        From::Camera(size) => *size,
-        From::Facet(view, facet) => view.size_px(Some(facet), [0, 0]),
-        From::Unfolded(view, most) => view.size_px(None, *most),
+    let size = match source {
+        Source::Camera(size) => *size,
+        Source::Facet(view, facet) => view.size_px(Some(facet), [0, 0]),
+        Source::Unfolded(view, max_size) => view.size_px(None, *max_size),
     };
     let start = |path: &std::path::PathBuf| Video::start(path, size, options.fps);
     let video = options.video.as_ref().map(start).transpose()?;
-    Ok(Some(Frames { per_second: options.fps, taken: 0, folder: options.frames_dir.clone(), video }))
+    Ok(Some(FrameSeries { per_second: options.fps, taken: 0, folder: options.frames_dir.clone(), video }))
 }
 
-/// Writes a picture as PNG.
-pub fn write_png(image: &Image, path: &Path) -> Result<(), Failure> {
-    image.write_png(path).map_err(|e| Failure::run("the picture", e))
-}
-
-/// What can be known of a file before it is written at the end.
-///
-/// # Errors
-/// Why it cannot be written.
-pub fn may_be_written(path: &Path) -> Result<(), String> {
-    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        Some(folder) if !folder.is_dir() => Err(format!("there is no folder {}", folder.display())),
-        _ if path.is_dir() => Err("it is a folder; wanted a file".into()),
-        _ => Ok(()),
+/// Opens the renderer. Returns `None` without a graphics adapter, after printing how to get one.
+pub fn open_renderer() -> Result<Option<Renderer>, Failure> {
+    match Renderer::new() {
+        Ok(renderer) => Ok(Some(renderer)),
+        Err(error @ RenderError::NoAdapter { .. }) => {
+            eprintln!("no picture: {error}");
+            Ok(None)
+        }
+        Err(error) => Err(Failure::run("the picture", error)),
     }
+}
+
+/// Writes a picture as PNG, atomically.
+pub fn write_png(image: &Image, path: &Path) -> Result<(), Failure> {
+    write_file(path, &image.to_png().map_err(|e| Failure::run("the picture", e))?)
 }

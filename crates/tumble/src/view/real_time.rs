@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 /// What of a pause between two turns counts at most, s: a window that was hidden or a machine that slept is not caught up with.
-const MOST_LATE_S: f64 = 1.0;
+const MAX_LATE_S: f64 = 1.0;
 /// Speeds, as powers of 2.
 const SPEEDS: std::ops::RangeInclusive<i32> = -6..=4;
 
 /// Keeps simulated time in step with the clock.
-pub struct Pace {
+pub struct RealTime {
     /// Whether time stands.
     pub paused: bool,
     /// Simulated seconds that are due and not yet stepped.
@@ -21,10 +21,10 @@ pub struct Pace {
     single: u32,
 }
 
-impl Pace {
+impl RealTime {
     /// At real time.
-    pub fn new(paused: bool) -> Pace {
-        Pace { paused, owed_s: 0.0, behind_s: 0.0, power: 0, single: 0 }
+    pub fn new(paused: bool) -> RealTime {
+        RealTime { paused, owed_s: 0.0, behind_s: 0.0, power: 0, single: 0 }
     }
 
     /// Simulated seconds per second of the clock.
@@ -53,7 +53,7 @@ impl Pace {
     /// The clock went on by so many seconds.
     pub fn pass(&mut self, clock_s: f64) {
         if !self.paused {
-            let counted = clock_s.clamp(0.0, MOST_LATE_S);
+            let counted = clock_s.clamp(0.0, MAX_LATE_S);
             self.behind_s += (clock_s - counted).max(0.0) * self.speed();
             self.owed_s += counted * self.speed();
         }
@@ -76,8 +76,8 @@ impl Pace {
     pub fn until(&self, dt: f64) -> Duration {
         match (self.single > 0, self.paused) {
             (true, _) => Duration::ZERO,
-            (false, true) => Duration::from_secs_f64(MOST_LATE_S),
-            (false, false) => Duration::from_secs_f64(((dt - self.owed_s) / self.speed()).clamp(0.0, MOST_LATE_S)),
+            (false, true) => Duration::from_secs_f64(MAX_LATE_S),
+            (false, false) => Duration::from_secs_f64(((dt - self.owed_s) / self.speed()).clamp(0.0, MAX_LATE_S)),
         }
     }
 
@@ -92,53 +92,53 @@ impl Pace {
 mod tests {
     use super::*;
 
-    fn steps(pace: &mut Pace, dt: f64) -> u32 {
-        std::iter::from_fn(|| pace.take(dt).then_some(())).count() as u32
+    fn steps(real_time: &mut RealTime, dt: f64) -> u32 {
+        std::iter::from_fn(|| real_time.take(dt).then_some(())).count() as u32
     }
 
     #[test]
     fn a_second_in_uneven_turns_gives_as_many_steps_as_fit_in_it() {
-        let mut pace = Pace::new(false);
+        let mut real_time = RealTime::new(false);
         let turns = [0.25, 0.125, 0.5, 0.0625, 0.0625];
         assert_eq!(
             turns.map(|t| {
-                pace.pass(t);
-                steps(&mut pace, 1.0 / 64.0)
+                real_time.pass(t);
+                steps(&mut real_time, 1.0 / 64.0)
             }),
             [16, 8, 32, 4, 4]
         );
-        pace.change_speed(-1);
-        pace.pass(1.0);
-        assert_eq!(steps(&mut pace, 1.0 / 64.0), 32);
+        real_time.change_speed(-1);
+        real_time.pass(1.0);
+        assert_eq!(steps(&mut real_time, 1.0 / 64.0), 32);
     }
 
     #[test]
     fn time_stands_when_paused_and_single_steps_are_exact() {
-        let mut pace = Pace::new(true);
-        pace.pass(0.5);
-        assert_eq!(steps(&mut pace, 0.01), 0);
-        pace.step_once();
-        pace.step_once();
-        pace.pass(0.5);
-        assert_eq!(steps(&mut pace, 0.01), 2);
-        pace.toggle();
-        assert!(!pace.paused);
-        assert_eq!(steps(&mut pace, 0.01), 0, "what passed while it stood is not owed");
+        let mut real_time = RealTime::new(true);
+        real_time.pass(0.5);
+        assert_eq!(steps(&mut real_time, 0.01), 0);
+        real_time.step_once();
+        real_time.step_once();
+        real_time.pass(0.5);
+        assert_eq!(steps(&mut real_time, 0.01), 2);
+        real_time.toggle();
+        assert!(!real_time.paused);
+        assert_eq!(steps(&mut real_time, 0.01), 0, "what passed while it stood is not owed");
     }
 
     #[test]
     fn the_next_step_is_due_when_the_clock_has_gone_on_by_what_is_missing() {
-        let mut pace = Pace::new(false);
-        pace.pass(0.25);
-        pace.change_speed(1);
+        let mut real_time = RealTime::new(false);
+        real_time.pass(0.25);
+        real_time.change_speed(1);
         // half a second is missing, at twice the speed
-        assert_eq!(pace.until(0.75), Duration::from_millis(250));
-        assert_eq!(pace.until(0.2), Duration::ZERO);
-        pace.step_once();
-        assert_eq!(pace.until(0.75), Duration::ZERO);
-        assert!(pace.take(0.75) && pace.paused);
+        assert_eq!(real_time.until(0.75), Duration::from_millis(250));
+        assert_eq!(real_time.until(0.2), Duration::ZERO);
+        real_time.step_once();
+        assert_eq!(real_time.until(0.75), Duration::ZERO);
+        assert!(real_time.take(0.75) && real_time.paused);
         assert_eq!(
-            pace.until(0.75),
+            real_time.until(0.75),
             Duration::from_secs(1),
             "nothing comes while time stands; a look a second does no harm"
         );
@@ -146,11 +146,11 @@ mod tests {
 
     #[test]
     fn what_is_late_is_given_up_and_counted() {
-        let mut pace = Pace::new(false);
-        pace.pass(10.0);
-        assert_eq!((pace.owed_s, pace.behind_s), (1.0, 9.0));
-        assert!(pace.take(0.25));
-        pace.give_up();
-        assert_eq!((steps(&mut pace, 0.25), pace.behind_s), (0, 9.75));
+        let mut real_time = RealTime::new(false);
+        real_time.pass(10.0);
+        assert_eq!((real_time.owed_s, real_time.behind_s), (1.0, 9.0));
+        assert!(real_time.take(0.25));
+        real_time.give_up();
+        assert_eq!((steps(&mut real_time, 0.25), real_time.behind_s), (0, 9.75));
     }
 }

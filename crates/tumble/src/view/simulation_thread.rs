@@ -1,10 +1,10 @@
 //! The simulation behind the window, on a thread of its own: slow pictures do not hold it up, and slow steps do not hold up keys and mouse.
 //!
-//! Between two steps whoever looks may have the world ([`Clockwork::lock`]); a step is never interrupted, and what it does depends on no clock. Which steps are
-//! taken does: [`Pace`] says. So the state after n steps is that of `tumble run`, whatever the pictures take.
+//! Between two steps whoever looks may have the world ([`SimulationThread::lock`]); a step is never interrupted, and what it does depends on no clock. Which steps are
+//! taken does: [`RealTime`] says. So the state after n steps is that of `tumble run`, whatever the pictures take.
 
-use super::hand::Hand;
-use super::pace::Pace;
+use super::picker::Picker;
+use super::real_time::RealTime;
 use super::statistics::Meter;
 use crate::failure::Failure;
 use std::ops::{Deref, DerefMut};
@@ -12,23 +12,23 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use tumble::core::World;
+use tumble::dynamics::World;
 
 /// Steps that are due at once take at most this long, and then one more; what is still due is given up.
-const MOST_STEPPING: Duration = Duration::from_millis(100);
+const MAX_STEPPING: Duration = Duration::from_millis(100);
 /// Longest sleep between two looks at the clock.
-const NAP: Duration = Duration::from_millis(50);
+const MAX_SLEEP: Duration = Duration::from_millis(50);
 /// Longest wait for those who want the world.
-const ASIDE: Duration = Duration::from_millis(1);
+const MAX_YIELD: Duration = Duration::from_millis(1);
 
 /// A world and what moves it.
 pub struct Simulation {
     pub world: World,
-    pub pace: Pace,
+    pub real_time: RealTime,
     /// What pulls a body.
-    pub hand: Option<Hand>,
+    pub picker: Option<Picker>,
     /// What stopped it.
-    pub trouble: Option<String>,
+    pub error: Option<String>,
     /// How long steps took.
     pub steps: Meter,
     /// Counts whatever changes the world: steps, and going back.
@@ -44,14 +44,14 @@ pub struct Simulation {
 
 impl Simulation {
     /// At time 0; ends after `last` steps.
-    pub fn new(world: World, pace: Pace, last: Option<u64>) -> Simulation {
+    pub fn new(world: World, real_time: RealTime, last: Option<u64>) -> Simulation {
         let start = world.save();
         let steps = Meter::default();
         Simulation {
             world,
-            pace,
-            hand: None,
-            trouble: None,
+            real_time,
+            picker: None,
+            error: None,
             steps,
             changes: 0,
             start,
@@ -63,27 +63,27 @@ impl Simulation {
 
     /// Whether the last step is taken, or no further one can be.
     pub fn is_over(&self) -> bool {
-        self.last.is_some_and(|last| self.world.frame() >= last || self.trouble.is_some())
+        self.last.is_some_and(|last| self.world.frame() >= last || self.error.is_some())
     }
 
     /// Back to time 0.
     pub fn reset(&mut self) -> Result<(), Failure> {
-        (self.hand, self.trouble) = (None, None);
+        (self.picker, self.error) = (None, None);
         self.changes += 1;
         self.world.restore(&self.start).map_err(|e| Failure::run("going back to time 0", e))
     }
 
     /// Takes a step if one is due; whether it did.
     fn advance(&mut self) -> bool {
-        if self.trouble.is_some() || self.is_over() || !self.pace.take(self.world.settings().dt) {
+        if self.error.is_some() || self.is_over() || !self.real_time.take(self.world.settings().dt) {
             return false;
         }
         // what is no longer there lets go
-        self.hand = self.hand.take().filter(|hand| hand.pull(&mut self.world).is_ok());
+        self.picker = self.picker.take().filter(|picker| picker.pull(&mut self.world).is_ok());
         let clock = Instant::now();
         if let Err(error) = self.world.step() {
-            self.pace.paused = true;
-            self.trouble = Some(error.to_string());
+            self.real_time.paused = true;
+            self.error = Some(error.to_string());
         }
         self.steps.add(clock.elapsed());
         self.changes += 1;
@@ -91,21 +91,21 @@ impl Simulation {
     }
 
     /// The clock went on since the last look.
-    fn look_at_the_clock(&mut self) {
+    fn advance_clock(&mut self) {
         let now = Instant::now();
-        self.pace.pass((now - self.turn).as_secs_f64());
+        self.real_time.pass((now - self.turn).as_secs_f64());
         self.turn = now;
     }
 
     /// How long nothing is due.
     fn pause(&self) -> Duration {
-        let standing = self.trouble.is_some() || self.is_over();
-        if standing { NAP } else { NAP.min(self.pace.until(self.world.settings().dt)) }
+        let standing = self.error.is_some() || self.is_over();
+        if standing { MAX_SLEEP } else { MAX_SLEEP.min(self.real_time.until(self.world.settings().dt)) }
     }
 }
 
 /// The thread, and the way to what it works on.
-pub struct Clockwork {
+pub struct SimulationThread {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
@@ -115,21 +115,22 @@ struct Shared {
     /// How many want it: the thread stands aside for them.
     wanted: AtomicUsize,
     /// Rung when somebody had it.
-    bell: Condvar,
+    released: Condvar,
 }
 
-impl Clockwork {
+impl SimulationThread {
     /// Stands until it is [started](Self::start).
-    pub fn new(simulation: Simulation) -> Clockwork {
-        let shared = Shared { simulation: Mutex::new(simulation), wanted: AtomicUsize::new(0), bell: Condvar::new() };
-        Clockwork { shared: Arc::new(shared), thread: None }
+    pub fn new(simulation: Simulation) -> SimulationThread {
+        let shared =
+            Shared { simulation: Mutex::new(simulation), wanted: AtomicUsize::new(0), released: Condvar::new() };
+        SimulationThread { shared: Arc::new(shared), thread: None }
     }
 
     /// From now on time goes by the clock.
     pub fn start(&mut self) -> Result<(), Failure> {
         self.lock().turn = Instant::now();
         let shared = self.shared.clone();
-        let spawned = std::thread::Builder::new().name("simulation".into()).spawn(move || work(&shared));
+        let spawned = std::thread::Builder::new().name("simulation".into()).spawn(move || run_thread(&shared));
         self.thread = Some(spawned.map_err(|e| Failure::run("the simulation", e))?);
         Ok(())
     }
@@ -140,11 +141,11 @@ impl Clockwork {
     }
 
     /// The simulation between two steps; waits for the step that is being taken.
-    pub fn lock(&self) -> Held<'_> {
+    pub fn lock(&self) -> SimulationGuard<'_> {
         self.shared.wanted.fetch_add(1, Ordering::Relaxed);
-        let guard = whole(self.shared.simulation.lock());
+        let guard = ignore_poison(self.shared.simulation.lock());
         self.shared.wanted.fetch_sub(1, Ordering::Relaxed);
-        Held { guard, bell: &self.shared.bell }
+        SimulationGuard { guard, released: &self.shared.released }
     }
 
     /// Whether the thread ended by itself, which only a fault in it can do.
@@ -153,7 +154,7 @@ impl Clockwork {
     }
 }
 
-impl Drop for Clockwork {
+impl Drop for SimulationThread {
     fn drop(&mut self) {
         self.lock().ending = true;
         if let Some(thread) = self.thread.take() {
@@ -163,12 +164,12 @@ impl Drop for Clockwork {
 }
 
 /// The simulation, held between two steps.
-pub struct Held<'a> {
+pub struct SimulationGuard<'a> {
     guard: MutexGuard<'a, Simulation>,
-    bell: &'a Condvar,
+    released: &'a Condvar,
 }
 
-impl Deref for Held<'_> {
+impl Deref for SimulationGuard<'_> {
     type Target = Simulation;
 
     fn deref(&self) -> &Simulation {
@@ -176,39 +177,39 @@ impl Deref for Held<'_> {
     }
 }
 
-impl DerefMut for Held<'_> {
+impl DerefMut for SimulationGuard<'_> {
     fn deref_mut(&mut self) -> &mut Simulation {
         &mut self.guard
     }
 }
 
-impl Drop for Held<'_> {
+impl Drop for SimulationGuard<'_> {
     fn drop(&mut self) {
-        self.bell.notify_one();
+        self.released.notify_one();
     }
 }
 
 /// Takes steps as they come due, until the end.
-fn work(shared: &Shared) {
-    let mut simulation = whole(shared.simulation.lock());
+fn run_thread(shared: &Shared) {
+    let mut simulation = ignore_poison(shared.simulation.lock());
     while !simulation.ending {
-        simulation.look_at_the_clock();
+        simulation.advance_clock();
         let begin = Instant::now();
         while !simulation.ending && simulation.advance() {
-            if begin.elapsed() > MOST_STEPPING {
-                simulation.pace.give_up();
+            if begin.elapsed() > MAX_STEPPING {
+                simulation.real_time.give_up();
                 break;
             }
             if shared.wanted.load(Ordering::Relaxed) > 0 {
-                simulation = whole(shared.bell.wait_timeout(simulation, ASIDE)).0;
+                simulation = ignore_poison(shared.released.wait_timeout(simulation, MAX_YIELD)).0;
             }
         }
         let pause = simulation.pause().max(Duration::from_micros(50));
-        simulation = whole(shared.bell.wait_timeout(simulation, pause)).0;
+        simulation = ignore_poison(shared.released.wait_timeout(simulation, pause)).0;
     }
 }
 
-/// What a lock gives, also where another thread panicked with it: that is told apart by [`Clockwork::is_broken`].
-fn whole<T>(result: Result<T, PoisonError<T>>) -> T {
+/// What a lock gives, also where another thread panicked with it: that is told apart by [`SimulationThread::is_broken`].
+fn ignore_poison<T>(result: Result<T, PoisonError<T>>) -> T {
     result.unwrap_or_else(PoisonError::into_inner)
 }
