@@ -17,7 +17,7 @@ use rapier3d_f64::parry::shape::TriMesh as ParryMesh;
 use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::path::PathBuf;
-use tumble_collide::{ContactMode, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in};
+use tumble_collide::{ContactMode, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in_mode};
 use tumble_peers::clock::Clock;
 
 /// Margin, and what the bodies are apart or overlap by, meters.
@@ -81,7 +81,7 @@ fn changing(body: &Body, name: &str, poses: &[Pose]) {
         time(|| {
             for pose in poses {
                 found.clear();
-                contacts_in(mode, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
+                contacts_in_mode(mode, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
                 black_box(&found);
             }
         }) / poses.len() as f64
@@ -107,7 +107,7 @@ fn measure(body: &Body, pose: &Pose) -> [f64; 4] {
     let mut by = |mode| {
         time(|| {
             found.clear();
-            contacts_in(mode, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
+            contacts_in_mode(mode, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
             black_box(&found);
         })
     };
@@ -209,7 +209,7 @@ fn alone(body: &Body, rounds: usize) {
     let (clock, mut found) = (Clock::new(), Vec::new());
     let mut query = |pose: &Pose| {
         found.clear();
-        contacts_in(ContactMode::Surface, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
+        contacts_in_mode(ContactMode::Surface, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
         black_box(&found);
     };
     let mut figures = Vec::new();

@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .collect();
     files.sort();
     println!(
-        "| mesh | method | balls | worst % | mean % | at most % | covered % | sticking out | volume | CPU s | toolkit worst / mean % | covering and nesting | CPU s |"
+        "| mesh | method | spheres | worst % | mean % | at most % | covered % | sticking out | volume | CPU s | toolkit worst / mean % | covering and nesting | CPU s |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (name, builder) in methods {

@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let mesh = TriMesh::from_obj(&std::fs::read_to_string(mesh)?)?;
     let settings = TreeSettings { builder, depth: depth.parse()?, ..TreeSettings::default() };
-    let (tree, stages) = SphereTree::build_watched(&mesh, &settings, &())?;
+    let (tree, stages) = SphereTree::build_with_progress(&mesh, &settings, &())?;
     for s in stages {
         println!("level {} {}: {}", s.level, s.stage, s.count);
     }
@@ -24,11 +24,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         .level_lists()
         .iter()
         .map(|level| {
-            let ball = |b: &tumble_collide::LevelBall| {
+            let sphere = |b: &tumble_collide::LevelSphere| {
                 let parent = b.parent.map_or(-1, |p| p as i64);
                 serde_json::json!({ "c": [b.center.x, b.center.y, b.center.z], "r": b.radius, "parent": parent })
             };
-            level.iter().map(ball).collect::<Vec<_>>()
+            level.iter().map(sphere).collect::<Vec<_>>()
         })
         .collect();
     std::fs::write(out, serde_json::json!({ "levels": levels }).to_string())?;

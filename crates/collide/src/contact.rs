@@ -5,15 +5,15 @@ use crate::Vec3;
 /// One contact between shape A and shape B, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// Midway between the two surfaces, metres.
+    /// Midway between the two surfaces, meters.
     pub point: Vec3,
     /// Unit normal, from B towards A: A is pushed along it, B against it.
     pub normal: Vec3,
-    /// Signed distance between the surfaces along the normal, metres; negative where they overlap.
+    /// Signed distance between the surfaces along the normal, meters; negative where they overlap.
     pub gap: f64,
     /// Names the features that touch; the same features keep their id while they stay in contact.
     pub feature: u64,
-    /// Distance from A's surface back along the normal to the core feature that carries it, metres:
+    /// Distance from A's surface back along the normal to the core feature that carries it, meters:
     /// the radius of a sphere, capsule or leaf sphere; 0 for a vertex, edge or face.
     pub core_a: f64,
     /// The same for B.
@@ -48,7 +48,7 @@ pub enum ContactMode {
     /// too large by 2e-4 of a diagonal.
     #[default]
     Surface,
-    /// The thesis's mode: point and normal from the two leaf balls. No contact is missed; gaps are too small by at most
+    /// The thesis's mode: point and normal from the two leaf spheres. No contact is missed; gaps are too small by at most
     /// the trees' outward errors ([`crate::SphereTree::outward_error`]).
     Spheres,
 }
@@ -76,7 +76,7 @@ impl Contact {
         Contact { normal: -self.normal, core_a: self.core_b, core_b: self.core_a, normal_from, ..self }
     }
 
-    /// A contact between two balls about core points; coincident centres are pushed apart along z.
+    /// A contact between two spheres about core points; coincident centers are pushed apart along z.
     pub(crate) fn between_cores(core_a: (Vec3, f64), core_b: (Vec3, f64), feature: u64) -> Contact {
         let ((a, radius_a), (b, radius_b)) = (core_a, core_b);
         let offset = a - b;

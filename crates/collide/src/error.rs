@@ -10,13 +10,13 @@ pub enum ShapeError {
     Length {
         /// Which length.
         what: &'static str,
-        /// What was given, metres.
+        /// What was given, meters.
         value: f64,
     },
     /// A density that is zero, negative or not finite.
     #[error("density is {0}, but must be finite and above 0 kg/m³")]
     Density(f64),
-    /// A half-space has no volume, mass or centre.
+    /// A half-space has no volume, mass or center.
     #[error("a half-space is unbounded and has no mass properties; make the body static")]
     Unbounded,
     /// A mesh that makes no shape.
@@ -49,7 +49,7 @@ pub enum MeshError {
     /// A mesh whose size says that its unit is wrong, if it is not a point.
     #[error("the mesh is {diagonal:e} m across, but must be at least 1e-30 m; is the unit right?")]
     TooSmall {
-        /// Diagonal of its bounding box, metres.
+        /// Diagonal of its bounding box, meters.
         diagonal: f64,
     },
     /// Only faces without area.
@@ -91,7 +91,7 @@ pub enum MeshError {
     TooFar {
         /// From 1.
         vertex: usize,
-        /// Its greatest coordinate, metres.
+        /// Its greatest coordinate, meters.
         value: f64,
     },
     /// A corner of an STL facet that is NaN or infinite.

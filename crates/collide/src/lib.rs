@@ -4,10 +4,10 @@
 //! - [`contacts`]: the narrow phase, one small file per family of pairs; what it says is a [`Contact`].
 //! - [`BroadPhase`]: which pairs are worth asking about.
 //! - [`TriMesh`]: triangle meshes, read from OBJ, PLY and STL, checked, generated, integrated.
-//! - [`SphereTree`]: nested balls around a mesh, by which it collides.
+//! - [`SphereTree`]: nested spheres around a mesh, by which it collides.
 //!
 //! What holds throughout: no velocity and no time here; the same input gives the same bits; nothing that comes from a
-//! file or a user panics; metres, world axes unless a line says otherwise.
+//! file or a user panics; meters, world axes unless a line says otherwise.
 //!
 //! ```
 //! use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, contacts};
@@ -30,9 +30,9 @@ mod mesh;
 mod narrow;
 mod pose;
 mod ray;
+mod sdf;
 mod shape;
 mod solid;
-mod surface;
 mod tree;
 
 #[doc(hidden)]
@@ -43,14 +43,14 @@ pub use contact::{Contact, ContactMode, NormalFrom};
 pub use error::{MeshError, ShapeError};
 pub use mass::MassProperties;
 pub use mesh::{
-    ClosedReport, ClosestPoint, FaceCutter, MeshDistance, RepairReport, RepairSettings, TriMesh, WindingNumber,
-    obj_lines, text_of,
+    ClosedReport, ClosestPoint, MeshDistance, PolygonTriangulator, RepairReport, RepairSettings, TriMesh,
+    WindingNumber, decode_text, obj_lines,
 };
-pub use narrow::{contacts, contacts_in};
+pub use narrow::{contacts, contacts_in_mode};
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use shape::Shape;
 pub use solid::{CylinderShape, MeshShape};
 pub use tree::{
-    Builder, CachedTree, Covering, LevelBall, LevelQuality, MeshId, Progress, QualitySettings, SphereNode, SphereTree,
-    StageCount, TreeFile, TreeFileError, TreeSettings, align_columns, grow_to_cover,
+    Builder, CachedTree, Covering, LevelQuality, LevelSphere, MeshId, Progress, QualitySettings, SphereNode,
+    SphereTree, StageCount, TreeFile, TreeFileError, TreeSettings, align_columns, grow_to_cover,
 };

@@ -6,10 +6,10 @@ pub type Vec3 = nalgebra::Vector3<f64>;
 pub type Mat3 = nalgebra::Matrix3<f64>;
 /// A unit quaternion; in flat arrays and files its order is `x, y, z, w`.
 pub type Quat = nalgebra::UnitQuaternion<f64>;
-/// The pose of a body frame in the world, `X_WB`: rotate, then translate (metres).
+/// The pose of a body frame in the world, `X_WB`: rotate, then translate (meters).
 pub type Pose = nalgebra::Isometry3<f64>;
 
-/// An axis-aligned box in world axes, metres. Unbounded sides are `±∞`.
+/// An axis-aligned box in world axes, meters. Unbounded sides are `±∞`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// Least corner.
@@ -24,7 +24,7 @@ impl Aabb {
         (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])
     }
 
-    /// The box grown by `margin` metres on every side.
+    /// The box grown by `margin` meters on every side.
     pub fn grown(&self, margin: f64) -> Aabb {
         Aabb { min: self.min.add_scalar(-margin), max: self.max.add_scalar(margin) }
     }

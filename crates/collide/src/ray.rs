@@ -1,25 +1,25 @@
 //! Where a ray enters a shape: what a pointer points at.
 //!
-//! In the shape's frame the ray is `o + t·d`, `|d| = 1`. A ball: `t² + 2 t o·d + o² − r² = 0`. A slab `|x| ≤ h` is entered and left at `(∓h − o)/d`; a box is
-//! inside while all its slabs are (Kay and Kajiya, 1986). The side of a tube is a ball in the two dimensions across its axis. Triangles by Möller and
+//! In the shape's frame the ray is `o + t·d`, `|d| = 1`. A sphere: `t² + 2 t o·d + o² − r² = 0`. A slab `|x| ≤ h` is entered and left at `(∓h − o)/d`; a box is
+//! inside while all its slabs are (Kay and Kajiya, 1986). The side of a tube is a sphere in the two dimensions across its axis. Triangles by Möller and
 //! Trumbore, 1997: of a solid from outside only, of a bare mesh from either side.
 
 use crate::{Pose, Shape, TriMesh, Vec3};
 
 impl Shape {
-    /// The distance along `direction` (any length above 0) at which a ray from `origin` enters the shape at `pose`, metres; world axes. `None` where it
+    /// The distance along `direction` (any length above 0) at which a ray from `origin` enters the shape at `pose`, meters; world axes. `None` where it
     /// misses, or starts inside.
     pub fn ray(&self, pose: &Pose, origin: &Vec3, direction: &Vec3) -> Option<f64> {
         let d = pose.rotation.inverse() * direction.try_normalize(0.0)?;
         let o = pose.rotation.inverse() * (origin - pose.translation.vector);
         match self {
             Shape::HalfSpace => (o.z > 0.0 && d.z < 0.0).then(|| -o.z / d.z),
-            Shape::Sphere { radius } => ball(&o, &d, *radius),
+            Shape::Sphere { radius } => sphere(&o, &d, *radius),
             Shape::Box { half_extents } => slabs(&o, &d, half_extents),
             Shape::Capsule { radius, half_length } => {
                 let inside = (o - Vec3::z() * o.z.clamp(-half_length, *half_length)).norm() < *radius;
                 let side = tube(&o, &d, *radius).filter(|t| (o.z + t * d.z).abs() <= *half_length);
-                let caps = [-half_length, *half_length].map(|z| ball(&(o - Vec3::z() * z), &d, *radius));
+                let caps = [-half_length, *half_length].map(|z| sphere(&(o - Vec3::z() * z), &d, *radius));
                 side.into_iter().chain(caps.into_iter().flatten()).min_by(f64::total_cmp).filter(|_| !inside)
             }
             Shape::Cylinder(c) => {
@@ -30,7 +30,7 @@ impl Shape {
                 side.into_iter().chain(cap).min_by(f64::total_cmp)
             }
             Shape::Mesh(mesh) => {
-                // what passes the ball around it by misses it
+                // what passes the sphere around it by misses it
                 let near = o - d * o.dot(&d);
                 if near.norm() > mesh.bounding_radius() { None } else { triangles(mesh.mesh(), &o, &d, 0.0) }
             }
@@ -40,7 +40,7 @@ impl Shape {
 
 impl TriMesh {
     /// The distance along `direction` (any length above 0) at which a ray from `origin` first meets a triangle of the mesh at `pose`, from either side,
-    /// metres; world axes.
+    /// meters; world axes.
     pub fn ray(&self, pose: &Pose, origin: &Vec3, direction: &Vec3) -> Option<f64> {
         let d = pose.rotation.inverse() * direction.try_normalize(0.0)?;
         let o = pose.rotation.inverse() * (origin - pose.translation.vector);
@@ -48,8 +48,8 @@ impl TriMesh {
     }
 }
 
-fn ball(o: &Vec3, d: &Vec3, radius: f64) -> Option<f64> {
-    // from the point of the ray that is nearest, so that far balls keep their digits
+fn sphere(o: &Vec3, d: &Vec3, radius: f64) -> Option<f64> {
+    // from the point of the ray that is nearest, so that far spheres keep their digits
     let along = -o.dot(d);
     let left = radius * radius - (o + d * along).norm_squared();
     (left >= 0.0).then(|| along - left.sqrt()).filter(|t| *t >= 0.0)
@@ -61,7 +61,7 @@ fn tube(o: &Vec3, d: &Vec3, radius: f64) -> Option<f64> {
     if across == 0.0 {
         return None;
     }
-    ball(&Vec3::new(o.x, o.y, 0.0), &(Vec3::new(d.x, d.y, 0.0) / across), radius).map(|t| t / across)
+    sphere(&Vec3::new(o.x, o.y, 0.0), &(Vec3::new(d.x, d.y, 0.0) / across), radius).map(|t| t / across)
 }
 
 fn slabs(o: &Vec3, d: &Vec3, half: &Vec3) -> Option<f64> {

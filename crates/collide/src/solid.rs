@@ -3,9 +3,9 @@
 mod stored;
 
 use crate::cache::{Entry, Kind};
+use crate::sdf::Surface;
+use crate::sdf::shells::shell_surfaces;
 use crate::shape::axis;
-use crate::surface::Surface;
-use crate::surface::parts::parts;
 use crate::{
     Aabb, ClosedReport, MassProperties, MeshDistance, MeshError, MeshId, Pose, ShapeError, SphereTree, TreeCache,
     TreeSettings, TriMesh, Vec3,
@@ -68,7 +68,8 @@ impl MeshShape {
 
     fn build_tree(&self) -> Result<SphereTree, MeshError> {
         let crosses = self.report.crossing_faces > 0 || self.report.crossing_capped;
-        let distance = if crosses { MeshDistance::new(&self.mesh) } else { MeshDistance::uncrossed(&self.mesh) };
+        let distance =
+            if crosses { MeshDistance::new(&self.mesh) } else { MeshDistance::without_crossings(&self.mesh) };
         Ok(SphereTree::build_by(&self.mesh, &distance, &self.settings, &())?.0)
     }
 
@@ -143,7 +144,7 @@ impl MeshShape {
 
     fn whole_tree(&self) -> &Tree {
         let build = || SphereTree::build_cached(&self.mesh, &self.settings, &self.cache).map(|cached| cached.tree);
-        self.tree.get_or_init(|| build().unwrap_or_else(|_| SphereTree::ball(&self.mesh)).into())
+        self.tree.get_or_init(|| build().unwrap_or_else(|_| SphereTree::bounding_sphere(&self.mesh)).into())
     }
 
     /// Whether tree and surface are built, which happens where a world is stepped.
@@ -156,7 +157,7 @@ impl MeshShape {
     pub(crate) fn surfaces(&self) -> &[Surface] {
         // buried faces are no surface of the union: such a mesh goes shell by shell, or stands for itself by its balls
         self.surfaces.get_or_init(|| match self.buried {
-            true => parts(&self.mesh, self.tree()).unwrap_or_default(),
+            true => shell_surfaces(&self.mesh, self.tree()).unwrap_or_default(),
             false => vec![Surface::new(&self.mesh, self.tree())],
         })
     }
@@ -264,7 +265,7 @@ impl CylinderShape {
     /// The balls around the surface, built when first asked for; one ball where that fails.
     pub fn tree(&self) -> &SphereTree {
         let build = || SphereTree::build(&self.mesh, &TreeSettings::octree());
-        self.tree.get_or_init(|| build().unwrap_or_else(|_| SphereTree::ball(&self.mesh)))
+        self.tree.get_or_init(|| build().unwrap_or_else(|_| SphereTree::bounding_sphere(&self.mesh)))
     }
 
     /// Whether that has happened.

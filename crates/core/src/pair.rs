@@ -159,7 +159,15 @@ impl Pair<'_> {
     }
 
     fn ask(&self, poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) {
-        tumble_collide::contacts_in(self.mode, self.shapes[0], &poses[0], self.shapes[1], &poses[1], margin, found);
+        tumble_collide::contacts_in_mode(
+            self.mode,
+            self.shapes[0],
+            &poses[0],
+            self.shapes[1],
+            &poses[1],
+            margin,
+            found,
+        );
         found.sort_by_key(|contact| contact.feature);
     }
 }

@@ -41,7 +41,7 @@ impl Stop {
 }
 
 impl Progress for Stop {
-    fn at(&self, _share: f64) {}
+    fn report(&self, _share: f64) {}
 
     fn stopped(&self) -> bool {
         self.0.load(Ordering::Relaxed)

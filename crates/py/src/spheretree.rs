@@ -13,7 +13,7 @@ use pyo3::types::{PyBytes, PyDict, PyTuple};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use tumble::collide::{
-    Builder, CachedTree, LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree as Tree, TreeCache, TreeFile,
+    Builder, CachedTree, LevelQuality, LevelSphere, MeshId, QualitySettings, SphereTree as Tree, TreeCache, TreeFile,
     TreeSettings, TriMesh,
 };
 use tumble::dynamics::archive::{open, seal};
@@ -24,7 +24,7 @@ use tumble::dynamics::archive::{open, seal};
 #[pyclass(frozen, module = "tumble")]
 pub struct SphereTree {
     file: TreeFile,
-    levels: Vec<Vec<LevelBall>>,
+    levels: Vec<Vec<LevelSphere>>,
     /// What it was built around; a tree that was loaded has no mesh.
     mesh: Option<TriMesh>,
     quality: OnceLock<Vec<LevelQuality>>,
@@ -126,7 +126,7 @@ impl SphereTree {
         abandonable(py, move |stop| {
             pool::run(|| {
                 mesh.check_closed()?;
-                let CachedTree { tree, stages, .. } = Tree::build_cached_watched(&mesh, &settings, &cache, stop)?;
+                let CachedTree { tree, stages, .. } = Tree::build_cached_with_progress(&mesh, &settings, &cache, stop)?;
                 let file = TreeFile { name, mesh: MeshId::of(&mesh), settings, stages, quality: Vec::new(), tree };
                 Ok(SphereTree::of(file, Some(mesh)))
             })
@@ -190,7 +190,7 @@ impl SphereTree {
     #[getter]
     fn levels<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
         let class = py.import("tumble._values")?.getattr("SphereLevel")?;
-        let level = |balls: &Vec<LevelBall>| -> Result<Bound<'py, PyAny>> {
+        let level = |balls: &Vec<LevelSphere>| -> Result<Bound<'py, PyAny>> {
             let centers: Vec<f64> = balls.iter().flat_map(|b| [b.center.x, b.center.y, b.center.z]).collect();
             let centers: Bound<'py, PyArray2<f64>> = PyArray1::from_vec(py, centers).reshape([balls.len(), 3])?;
             let radii = PyArray1::from_iter(py, balls.iter().map(|b| b.radius));
@@ -203,7 +203,7 @@ impl SphereTree {
     #[getter]
     fn parents<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
         let parents =
-            |balls: &Vec<LevelBall>| PyArray1::from_iter(py, balls.iter().map(|b| b.parent.map_or(-1, |p| p as i64)));
+            |balls: &Vec<LevelSphere>| PyArray1::from_iter(py, balls.iter().map(|b| b.parent.map_or(-1, |p| p as i64)));
         Ok(PyTuple::new(py, self.levels.iter().map(parents))?)
     }
 

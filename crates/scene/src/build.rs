@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
-use tumble_collide::{Pose, RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3, text_of};
+use tumble_collide::{Pose, RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3, decode_text};
 use tumble_core::solver::{self, Accuracy};
 use tumble_core::{
     ArticulatedBody, Closure, Look as CoreLook, ObjectId, PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual,
@@ -377,7 +377,7 @@ fn read_with_lines(path: &std::path::Path, bytes: &[u8]) -> Result<(TriMesh, Vec
         "stl" => Ok((TriMesh::from_stl(bytes).map_err(|e| e.to_string())?, Vec::new())),
         "ply" => Ok((TriMesh::from_ply(bytes).map_err(|e| e.to_string())?, Vec::new())),
         "obj" => {
-            let text = text_of(bytes).map_err(|at| format!("byte {at} of the file is 0; an OBJ file is text"))?;
+            let text = decode_text(bytes).map_err(|at| format!("byte {at} of the file is 0; an OBJ file is text"))?;
             TriMesh::from_obj_with_lines(&text).map_err(|e| e.to_string())
         }
         "dae" => {

@@ -13,7 +13,7 @@ use std::rc::Rc;
 
 use nalgebra::{Matrix4, Rotation3, Unit};
 use roxmltree::{Document, Node, ParsingOptions};
-use tumble_core::collide::{FaceCutter, TriMesh, Vec3};
+use tumble_core::collide::{PolygonTriangulator, TriMesh, Vec3};
 
 /// Most nodes of a document.
 const MOST_NODES: u32 = 20_000_000;
@@ -149,7 +149,7 @@ impl<'a, 'd> Reader<'a, 'd> {
     }
 
     fn geometry(&self, geometry: Node<'a, 'd>) -> Result<Geometry, String> {
-        let (mut vertices, mut triangles, mut cutter) = (Vec::new(), Vec::new(), FaceCutter::default());
+        let (mut vertices, mut triangles, mut triangulator) = (Vec::new(), Vec::new(), PolygonTriangulator::default());
         let Some(mesh) = child(geometry, "mesh") else { return Ok((vertices, triangles)) };
         for primitive in mesh.children().filter(Node::is_element) {
             let kind = primitive.tag_name().name();
@@ -172,7 +172,8 @@ impl<'a, 'd> Reader<'a, 'd> {
                 if polygons && len > 3 {
                     let corners = (0..len).map(corner).collect::<Result<Vec<u32>, String>>()?;
                     let places: Vec<Vec3> = corners.iter().map(|c| points[(c - first) as usize]).collect();
-                    let cut = cutter.cut(&places).map_err(|why| fault(primitive, format_args!("has {why}")))?;
+                    let cut =
+                        triangulator.triangulate(&places).map_err(|why| fault(primitive, format_args!("has {why}")))?;
                     triangles.extend(cut.iter().map(|t| t.map(|k| corners[k])));
                     continue;
                 }

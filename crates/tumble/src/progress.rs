@@ -87,7 +87,7 @@ impl WorkProgress {
 }
 
 impl tumble::collide::Progress for WorkProgress {
-    fn at(&self, share: f64) {
+    fn report(&self, share: f64) {
         match self {
             WorkProgress::Quiet => {}
             WorkProgress::Bar(bar) => bar.set_position((BAR_STEPS * share) as u64),

@@ -11,22 +11,22 @@
 //! Source of the sweep: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6. Departure: sweeps within cells, because along
 //! one axis of a cube n boxes begin within each other n^(5/3) times.
 
-use super::fat::{Fat, pair};
+use super::fat::{FatBox, pair};
 
 /// A cell is cut when it holds more.
-const FULL: usize = 72;
+const CELL_CAPACITY: usize = 72;
 /// A cut must leave either side with at most this share of the boxes, in percent.
-const WORTH: usize = 80;
-/// Centres that are looked at to place a cut.
-const SAMPLE: usize = 32;
+const MAX_SIDE_PERCENT: usize = 80;
+/// Centers that are looked at to place a cut.
+const MAX_SAMPLES: usize = 32;
 /// A tree is not cut deeper.
-const DEEPEST: u32 = 40;
+const MAX_DEPTH: u32 = 40;
 
 /// A place in the tree.
 #[derive(Clone, Copy, Debug)]
 enum Node {
     /// The low side is node `low`, the high side the one after it.
-    Cut { axis: u8, at: f32, low: u32 },
+    Split { axis: u8, at: f32, low: u32 },
     /// Index of a cell.
     Cell(u32),
 }
@@ -34,17 +34,17 @@ enum Node {
 /// A box and whose it is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
-    pub fat: Fat,
+    pub fat: FatBox,
     pub handle: u32,
 }
 
 /// Boxes that reach one region, and their handles, in no order.
 #[derive(Clone, Debug)]
 struct Cell {
-    region: Fat,
-    boxes: Vec<Fat>,
+    region: FatBox,
+    boxes: Vec<FatBox>,
     handles: Vec<u32>,
-    /// It is cut when it holds more: more than [`FULL`] where that was tried in vain.
+    /// It is cut when it holds more: more than [`CELL_CAPACITY`] where that was tried in vain.
     limit: usize,
     depth: u32,
 }
@@ -56,9 +56,9 @@ pub(super) struct Cells {
     cells: Vec<Cell>,
     /// Cells when it was built; those cut since.
     built: usize,
-    cuts: usize,
+    splits: usize,
     /// A cell of each box, by handle; a hint.
-    homes: Vec<u32>,
+    cell_hints: Vec<u32>,
     /// Working memory.
     buffer: Vec<Entry>,
     places: Vec<(u32, bool, bool)>,
@@ -69,56 +69,57 @@ impl Cells {
     pub fn build(&mut self, entries: impl Iterator<Item = Entry>, pairs: &mut Vec<u64>) {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
-        buffer.extend(entries.filter(|e| e.fat.is_somewhere()));
+        buffer.extend(entries.filter(|e| e.fat.is_valid()));
         self.nodes.clear();
         self.cells.clear();
         self.nodes.push(Node::Cell(0));
-        let mut homes = std::mem::take(&mut self.homes);
-        homes.clear();
-        homes.resize(buffer.iter().map(|e| e.handle as usize + 1).max().unwrap_or(0), 0);
+        let mut cell_hints = std::mem::take(&mut self.cell_hints);
+        cell_hints.clear();
+        cell_hints.resize(buffer.iter().map(|e| e.handle as usize + 1).max().unwrap_or(0), 0);
         let mut cell = 0;
-        self.divide(0, 0, Fat::EVERYWHERE, &mut buffer, 0, &mut |region, entries| {
+        self.subdivide(0, 0, FatBox::UNBOUNDED, &mut buffer, 0, &mut |region, entries| {
             Cell::sweep(region, entries, pairs);
-            entries.iter().for_each(|e| homes[e.handle as usize] = cell);
+            entries.iter().for_each(|e| cell_hints[e.handle as usize] = cell);
             cell += 1;
         });
-        self.homes = homes;
-        (self.built, self.cuts, self.buffer) = (self.cells.len(), 0, buffer);
+        self.cell_hints = cell_hints;
+        (self.built, self.splits, self.buffer) = (self.cells.len(), 0, buffer);
     }
 
     /// A cell where a box was last seen: boxes that are refiled in this order meet cells that others have just met.
-    pub fn home(&self, handle: u32) -> u32 {
-        self.homes.get(handle as usize).copied().unwrap_or(0)
+    pub fn cell_hint(&self, handle: u32) -> u32 {
+        self.cell_hints.get(handle as usize).copied().unwrap_or(0)
     }
 
     /// Whether so many cells were cut one by one that the tree may lean.
-    pub fn is_worn(&self) -> bool {
-        self.cuts > self.built / 2 + 8
+    pub fn needs_rebuild(&self) -> bool {
+        self.splits > self.built / 2 + 8
     }
 
     /// Files one box anew, that was `old`, and tells every other that it meets.
-    pub fn refile(&mut self, handle: u32, old: &Fat, new: &Fat, mut met: impl FnMut(u32)) {
-        self.homes.resize(self.homes.len().max(handle as usize + 1), 0);
+    pub fn update(&mut self, handle: u32, old: &FatBox, new: &FatBox, mut met: impl FnMut(u32)) {
+        self.cell_hints.resize(self.cell_hints.len().max(handle as usize + 1), 0);
         let mut places = std::mem::take(&mut self.places);
         places.push((0, true, true));
-        while let Some((node, was, is)) = places.pop() {
+        while let Some((node, was_here, is_here)) = places.pop() {
             match self.nodes.get(node as usize) {
                 None => {}
-                Some(Node::Cut { axis, at, low }) => {
+                Some(Node::Split { axis, at, low }) => {
                     let k = *axis as usize;
                     let sides = [
-                        (was && old.min(k) < *at, is && new.min(k) < *at),
-                        (was && old.max(k) >= *at, is && new.max(k) >= *at),
+                        (was_here && old.min(k) < *at, is_here && new.min(k) < *at),
+                        (was_here && old.max(k) >= *at, is_here && new.max(k) >= *at),
                     ];
-                    let reached = sides.iter().zip([*low, low + 1]).filter(|((was, is), _)| *was || *is);
-                    places.extend(reached.map(|((was, is), node)| (node, *was, *is)));
+                    let reached =
+                        sides.iter().zip([*low, low + 1]).filter(|((was_here, is_here), _)| *was_here || *is_here);
+                    places.extend(reached.map(|((was_here, is_here), node)| (node, *was_here, *is_here)));
                 }
                 Some(&Node::Cell(index)) => {
                     let cell = &mut self.cells[index as usize];
-                    cell.refile(handle, was, is.then_some(new), &mut met);
-                    self.homes[handle as usize] = index;
+                    cell.update(handle, was_here, is_here.then_some(new), &mut met);
+                    self.cell_hints[handle as usize] = index;
                     if cell.boxes.len() > cell.limit {
-                        self.cut(node, index);
+                        self.split_cell(node, index);
                     }
                 }
             }
@@ -127,7 +128,7 @@ impl Cells {
     }
 
     /// Cuts a cell that has grown too full, where it stands.
-    fn cut(&mut self, node: u32, index: u32) {
+    fn split_cell(&mut self, node: u32, index: u32) {
         let cell = &mut self.cells[index as usize];
         let (boxes, handles, region, depth) =
             (std::mem::take(&mut cell.boxes), std::mem::take(&mut cell.handles), cell.region, cell.depth);
@@ -135,59 +136,60 @@ impl Cells {
         buffer.clear();
         buffer.extend(boxes.into_iter().zip(handles).map(|(fat, handle)| Entry { fat, handle }));
         let before = self.nodes.len();
-        self.divide(node as usize, depth, region, &mut buffer, 0, &mut |_, _| {});
-        self.cuts += usize::from(self.nodes.len() > before);
+        self.subdivide(node as usize, depth, region, &mut buffer, 0, &mut |_, _| {});
+        self.splits += usize::from(self.nodes.len() > before);
         self.buffer = buffer;
     }
 
     /// Makes of a node whatever suits the boxes of `buffer` from `from` on, what lies before is not touched; and shows every new cell.
-    fn divide(
+    fn subdivide(
         &mut self,
         node: usize,
         depth: u32,
-        region: Fat,
+        region: FatBox,
         buffer: &mut Vec<Entry>,
         from: usize,
-        show: &mut impl FnMut(&Fat, &mut [Entry]),
+        visit: &mut impl FnMut(&FatBox, &mut [Entry]),
     ) {
-        let found = if buffer.len() - from > FULL && depth < DEEPEST { place_cut(&buffer[from..]) } else { None };
+        let found =
+            if buffer.len() - from > CELL_CAPACITY && depth < MAX_DEPTH { find_split(&buffer[from..]) } else { None };
         let Some((axis, at)) = found else {
             let entries = &mut buffer[from..];
-            show(&region, entries);
+            visit(&region, entries);
             self.nodes[node] = Node::Cell(self.cells.len() as u32);
             let (boxes, handles) = entries.iter().map(|e| (e.fat, e.handle)).unzip();
-            self.cells.push(Cell { region, limit: 2 * entries.len().max(FULL), boxes, handles, depth });
+            self.cells.push(Cell { region, limit: 2 * entries.len().max(CELL_CAPACITY), boxes, handles, depth });
             return;
         };
         let low = self.nodes.len();
-        self.nodes[node] = Node::Cut { axis: axis as u8, at, low: low as u32 };
+        self.nodes[node] = Node::Split { axis: axis as u8, at, low: low as u32 };
         self.nodes.extend([Node::Cell(0); 2]);
         let end = buffer.len();
-        for (side, part) in region.cut(axis, at).into_iter().enumerate() {
+        for (side, part) in region.split(axis, at).into_iter().enumerate() {
             for i in from..end {
                 let fat = &buffer[i].fat;
                 if if side == 0 { fat.min(axis) < at } else { fat.max(axis) >= at } {
                     buffer.push(buffer[i]);
                 }
             }
-            self.divide(low + side, depth + 1, part, buffer, end, show);
+            self.subdivide(low + side, depth + 1, part, buffer, end, visit);
             buffer.truncate(end);
         }
     }
 }
 
 impl Cell {
-    /// Forgets a box that `was` here, tells whom the new one meets here, and takes that in.
-    fn refile(&mut self, handle: u32, was: bool, new: Option<&Fat>, met: &mut impl FnMut(u32)) {
-        let place = if was { self.handles.iter().position(|h| *h == handle) } else { None };
+    /// Forgets a box that `was_here` here, tells whom the new one meets here, and takes that in.
+    fn update(&mut self, handle: u32, was_here: bool, new: Option<&FatBox>, met: &mut impl FnMut(u32)) {
+        let place = if was_here { self.handles.iter().position(|h| *h == handle) } else { None };
         if let Some(place) = place {
             self.boxes.swap_remove(place);
             self.handles.swap_remove(place);
         }
         if let Some(new) = new {
-            let seeker = new.seeker();
+            let overlap_query = new.overlap_query();
             for (other, fat) in self.handles.iter().zip(&self.boxes) {
-                if fat.meets(&seeker) && is_home(&self.region, fat, new) {
+                if fat.overlaps(&overlap_query) && owns_pair(&self.region, fat, new) {
                     met(*other);
                 }
             }
@@ -197,13 +199,13 @@ impl Cell {
     }
 
     /// All pairs of a cell of these boxes, which are sorted for it.
-    fn sweep(region: &Fat, entries: &mut [Entry], pairs: &mut Vec<u64>) {
+    fn sweep(region: &FatBox, entries: &mut [Entry], pairs: &mut Vec<u64>) {
         let axis = axes(entries)[0].1;
         entries.sort_unstable_by(|a, b| a.fat.min(axis).total_cmp(&b.fat.min(axis)));
         for (n, a) in entries.iter().enumerate() {
-            let (seeker, end) = (a.fat.seeker(), a.fat.max(axis));
+            let (overlap_query, end) = (a.fat.overlap_query(), a.fat.max(axis));
             for b in entries[n + 1..].iter().take_while(|b| b.fat.min(axis) <= end) {
-                if b.fat.meets(&seeker) && is_home(region, &a.fat, &b.fat) {
+                if b.fat.overlaps(&overlap_query) && owns_pair(region, &a.fat, &b.fat) {
                     pairs.push(pair(a.handle, b.handle));
                 }
             }
@@ -212,18 +214,18 @@ impl Cell {
 }
 
 /// Whether the least corner of what two boxes share lies in a region (its high sides do not count, but where they are infinite).
-fn is_home(region: &Fat, a: &Fat, b: &Fat) -> bool {
+fn owns_pair(region: &FatBox, a: &FatBox, b: &FatBox) -> bool {
     (0..3).all(|k| {
         let corner = a.min(k).max(b.min(k));
         corner >= region.min(k) && (corner < region.max(k) || region.max(k) == f32::INFINITY)
     })
 }
 
-/// An axis and a place on it that part the boxes well: the median of a sample of their centres, on the widest axis where that is worth it.
-fn place_cut(entries: &[Entry]) -> Option<(usize, f32)> {
-    let most = entries.len() * WORTH / 100;
+/// An axis and a place on it that part the boxes well: the median of a sample of their centers, on the widest axis where that is worth it.
+fn find_split(entries: &[Entry]) -> Option<(usize, f32)> {
+    let most = entries.len() * MAX_SIDE_PERCENT / 100;
     axes(entries).into_iter().find_map(|(_, axis)| {
-        let mut centers = [0.0; SAMPLE];
+        let mut centers = [0.0; MAX_SAMPLES];
         let mut count = 0;
         for center in sample(entries, axis) {
             centers[count] = center;
@@ -238,7 +240,7 @@ fn place_cut(entries: &[Entry]) -> Option<(usize, f32)> {
     })
 }
 
-/// How far apart the centres are, and on which axis; the widest first.
+/// How far apart the centers are, and on which axis; the widest first.
 fn axes(entries: &[Entry]) -> [(f32, usize); 3] {
     let mut widths = [0, 1, 2].map(|axis| {
         let bounds = |(low, high): (f32, f32), x: f32| (low.min(x), high.max(x));
@@ -249,8 +251,8 @@ fn axes(entries: &[Entry]) -> [(f32, usize); 3] {
     widths
 }
 
-/// Centres of up to [`SAMPLE`] boxes, evenly from the list; without those of unbounded ones.
+/// Centers of up to [`MAX_SAMPLES`] boxes, evenly from the list; without those of unbounded ones.
 fn sample(entries: &[Entry], axis: usize) -> impl Iterator<Item = f32> {
-    let every = entries.len().div_ceil(SAMPLE).max(1);
+    let every = entries.len().div_ceil(MAX_SAMPLES).max(1);
     entries.iter().step_by(every).map(move |e| 0.5 * e.fat.min(axis) + 0.5 * e.fat.max(axis)).filter(|x| x.is_finite())
 }

@@ -2,7 +2,7 @@
 
 use crate::Aabb;
 
-/// A box in `f32`, rounded outwards (metres, world axes), and whether it moves, as eight numbers that are compared at once:
+/// A box in `f32`, rounded outwards (meters, world axes), and whether it moves, as eight numbers that are compared at once:
 ///
 /// ```text
 /// box      min x, y, z   −max x, y, z   0 if it moves, else 1    0
@@ -11,54 +11,58 @@ use crate::Aabb;
 ///
 /// A box whose sides are not numbers is nowhere: it meets nothing.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fat([f32; 8]);
+pub(super) struct FatBox([f32; 8]);
 
 /// How much of the room is shifted ahead.
-const AHEAD: f64 = 0.5;
+const MOTION_SHIFT: f64 = 0.5;
 
 /// A fat box as it looks for others.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seeker([f32; 8]);
+pub(super) struct OverlapQuery([f32; 8]);
 
-impl Fat {
-    pub const NOWHERE: Fat = Fat([f32::NAN; 8]);
-    pub const EVERYWHERE: Fat = Fat([f32::NEG_INFINITY; 8]);
+impl FatBox {
+    pub const EMPTY: FatBox = FatBox([f32::NAN; 8]);
+    pub const UNBOUNDED: FatBox = FatBox([f32::NEG_INFINITY; 8]);
 
     /// The box with room to move by `share` of its smallest extent in every direction, of which part is shifted to the side on which it
     /// left an `old` fat box: what has moved that way may well go on.
-    pub fn around(tight: &Aabb, share: f64, moving: bool, old: &Fat) -> Fat {
+    pub fn around(tight: &Aabb, share: f64, moving: bool, old: &FatBox) -> FatBox {
         let extent = tight.max - tight.min;
         let smallest = extent.x.min(extent.y).min(extent.z);
-        let room = if smallest.is_finite() { share * smallest } else { 0.0 };
+        let margin = if smallest.is_finite() { share * smallest } else { 0.0 };
         let side = |k: usize| {
-            let way = 0.5 * (tight.min[k] + tight.max[k] - f64::from(old.min(k)) - f64::from(old.max(k)));
+            let displacement = 0.5 * (tight.min[k] + tight.max[k] - f64::from(old.min(k)) - f64::from(old.max(k)));
             // false for what is not a number
-            let ahead = if way.abs() < 4.0 * room { (AHEAD * way).clamp(-AHEAD * room, AHEAD * room) } else { 0.0 };
-            (down(tight.min[k] - room + ahead), down(-tight.max[k] - room - ahead))
+            let shift = if displacement.abs() < 4.0 * margin {
+                (MOTION_SHIFT * displacement).clamp(-MOTION_SHIFT * margin, MOTION_SHIFT * margin)
+            } else {
+                0.0
+            };
+            (down(tight.min[k] - margin + shift), down(-tight.max[k] - margin - shift))
         };
         let [x, y, z] = [side(0), side(1), side(2)];
-        Fat([x.0, y.0, z.0, x.1, y.1, z.1, if moving { 0.0 } else { 1.0 }, 0.0])
+        FatBox([x.0, y.0, z.0, x.1, y.1, z.1, if moving { 0.0 } else { 1.0 }, 0.0])
     }
 
     /// Whether the box lies inside.
-    pub fn holds(&self, tight: &Aabb) -> bool {
+    pub fn contains(&self, tight: &Aabb) -> bool {
         let side = |k: usize| (f64::from(self.min(k)) <= tight.min[k]) & (tight.max[k] <= f64::from(self.max(k)));
         side(0) & side(1) & side(2)
     }
 
-    pub fn is_somewhere(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         (0..3).all(|k| self.min(k) <= self.max(k))
     }
 
-    pub fn seeker(&self) -> Seeker {
+    pub fn overlap_query(&self) -> OverlapQuery {
         let [a, b, c, d, e, f, still, _] = self.0;
-        Seeker([-d, -e, -f, -a, -b, -c, 1.0 - still, 0.0])
+        OverlapQuery([-d, -e, -f, -a, -b, -c, 1.0 - still, 0.0])
     }
 
     /// Whether the two share a point and one of them moves. No branches: eight comparisons cost less than one that is guessed wrong.
     #[inline(always)]
-    pub fn meets(&self, seeker: &Seeker) -> bool {
-        self.0.iter().zip(&seeker.0).fold(true, |all, (a, b)| all & (a <= b))
+    pub fn overlaps(&self, overlap_query: &OverlapQuery) -> bool {
+        self.0.iter().zip(&overlap_query.0).fold(true, |all, (a, b)| all & (a <= b))
     }
 
     pub fn min(&self, axis: usize) -> f32 {
@@ -70,25 +74,25 @@ impl Fat {
     }
 
     /// The parts of it to either side of a plane.
-    pub fn cut(&self, axis: usize, at: f32) -> [Fat; 2] {
+    pub fn split(&self, axis: usize, at: f32) -> [FatBox; 2] {
         let (mut low, mut high) = (*self, *self);
         (low.0[axis + 3], high.0[axis]) = (-at, at);
         [low, high]
     }
 }
 
-/// A box in `f32`, rounded to the nearest, in the order of [`Fat`]: half as much to read, and most pairs are told by it. Rounding keeps order: where
+/// A box in `f32`, rounded to the nearest, in the order of [`FatBox`]: half as much to read, and most pairs are told by it. Rounding keeps order: where
 /// the rounded sides differ, the sides do too, and in the same sense.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rounded([f32; 8]);
 
 /// What the rounded boxes know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Guess {
+pub(super) enum RoundedOverlap {
     No,
     Yes,
     /// Sides that are equal but for rounding.
-    Perhaps,
+    Uncertain,
 }
 
 impl Rounded {
@@ -99,17 +103,17 @@ impl Rounded {
 
     /// Whether the boxes share a point.
     #[inline(always)]
-    pub fn overlaps(&self, other: &Rounded) -> Guess {
+    pub fn overlaps(&self, other: &Rounded) -> RoundedOverlap {
         let [a, b, c, d, e, f, g, h] = other.0;
-        let seeker = [-d, -e, -f, -a, -b, -c, -g, -h];
-        let not_above = self.0.iter().zip(&seeker).fold(true, |all, (a, b)| all & (a <= b));
-        let below = self.0.iter().zip(&seeker).fold(true, |all, (a, b)| all & (a < b));
+        let overlap_query = [-d, -e, -f, -a, -b, -c, -g, -h];
+        let not_above = self.0.iter().zip(&overlap_query).fold(true, |all, (a, b)| all & (a <= b));
+        let below = self.0.iter().zip(&overlap_query).fold(true, |all, (a, b)| all & (a < b));
         if not_above != below {
-            Guess::Perhaps
+            RoundedOverlap::Uncertain
         } else if below {
-            Guess::Yes
+            RoundedOverlap::Yes
         } else {
-            Guess::No
+            RoundedOverlap::No
         }
     }
 }

@@ -33,10 +33,10 @@ pub trait BroadPhase: Send {
 }
 
 /// The box that overlaps nothing: no comparison with it holds.
-const NOWHERE: Aabb =
+const EMPTY: Aabb =
     Aabb { min: crate::Vec3::new(f64::NAN, f64::NAN, f64::NAN), max: crate::Vec3::new(f64::NAN, f64::NAN, f64::NAN) };
 
 /// The box as it takes part.
-fn proper(bounds: &Aabb) -> Aabb {
-    if (0..3).all(|k| bounds.min[k] <= bounds.max[k]) { *bounds } else { NOWHERE }
+fn sanitized(bounds: &Aabb) -> Aabb {
+    if (0..3).all(|k| bounds.min[k] <= bounds.max[k]) { *bounds } else { EMPTY }
 }

@@ -5,31 +5,31 @@
 //! | `tight` | the boxes as they were given, and `rounded` the same in short | when they are set |
 //! | `fat` | each box with some room around it | when the box has left it |
 //! | `cells` | space in cells, each with the fat boxes that reach it ([`Cells`]) | with the fat boxes |
-//! | `near` | the pairs of fat boxes that overlap | with the fat boxes |
+//! | `candidates` | the pairs of fat boxes that overlap | with the fat boxes |
 //!
-//! Every pair of boxes that overlap is a pair of fat boxes that do, so the answer is `near`, each pair compared by its tight boxes: linear
+//! Every pair of boxes that overlap is a pair of fat boxes that do, so the answer is `candidates`, each pair compared by its tight boxes: linear
 //! in the boxes that are set and in what is near. A box that left its fat box is filed anew, and meets what lies in its cells.
 //! If many have, all cells are made anew and swept: near O(n) too, as a cell holds a few dozen boxes.
 //!
 //! Boxes that are not set cost nothing. What is remembered changes the speed alone, never the answer.
-//! Sources: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6, for coherence; fat boxes go back to Verlet's neighbour lists (1967).
+//! Sources: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6, for coherence; fat boxes go back to Verlet's neighbor lists (1967).
 
 use super::cells::{Cells, Entry};
-use super::fat::{Fat, Guess, Rounded, pair};
-use super::{BroadPhase, NOWHERE, proper};
+use super::fat::{FatBox, Rounded, RoundedOverlap, pair};
+use super::{BroadPhase, EMPTY, sanitized};
 use crate::Aabb;
 
 /// Room of a fat box in every direction, as a share of the box's smallest extent.
-const ROOM: f64 = 0.1;
+const MARGIN: f64 = 0.1;
 /// Everything is filed anew when one box in so many has left its fat box.
-const CROWD: usize = 4;
+const REBUILD_DIVISOR: usize = 4;
 
 /// The default broad phase.
 #[derive(Clone, Debug, Default)]
 pub struct SweepAndPrune {
     tight: Vec<Aabb>,
     rounded: Vec<Rounded>,
-    fat: Vec<Fat>,
+    fat: Vec<FatBox>,
     state: Vec<State>,
     /// Boxes to be filed anew.
     changed: Vec<u32>,
@@ -38,15 +38,15 @@ pub struct SweepAndPrune {
     count: usize,
     cells: Cells,
     /// Ascending, as [`pair`] writes them.
-    near: Vec<u64>,
+    candidates: Vec<u64>,
     /// Working memory.
-    fresh: Vec<u64>,
+    new_pairs: Vec<u64>,
 }
 
 /// What else is known of a handle.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
-    taken: bool,
+    in_use: bool,
     moving: bool,
     /// It is among those changed.
     changed: bool,
@@ -55,24 +55,24 @@ struct State {
 impl BroadPhase for SweepAndPrune {
     fn insert(&mut self, bounds: &Aabb, moving: bool) -> u32 {
         let handle = self.free.pop().unwrap_or_else(|| {
-            self.tight.push(NOWHERE);
-            self.rounded.push(Rounded::new(&NOWHERE));
-            self.fat.push(Fat::NOWHERE);
+            self.tight.push(EMPTY);
+            self.rounded.push(Rounded::new(&EMPTY));
+            self.fat.push(FatBox::EMPTY);
             self.state.push(State::default());
             self.tight.len() as u32 - 1
         });
         self.count += 1;
-        self.state[handle as usize].taken = true;
+        self.state[handle as usize].in_use = true;
         self.set(handle, bounds, moving);
         handle
     }
 
     fn set(&mut self, handle: u32, bounds: &Aabb, moving: bool) {
         let i = handle as usize;
-        let Some(state) = self.state.get_mut(i).filter(|s| s.taken) else { return };
-        self.tight[i] = proper(bounds);
+        let Some(state) = self.state.get_mut(i).filter(|s| s.in_use) else { return };
+        self.tight[i] = sanitized(bounds);
         self.rounded[i] = Rounded::new(&self.tight[i]);
-        if !state.changed && (state.moving != moving || !self.fat[i].holds(&self.tight[i])) {
+        if !state.changed && (state.moving != moving || !self.fat[i].contains(&self.tight[i])) {
             state.changed = true;
             self.changed.push(handle);
         }
@@ -81,22 +81,22 @@ impl BroadPhase for SweepAndPrune {
 
     fn remove(&mut self, handle: u32) {
         let i = handle as usize;
-        let Some(state) = self.state.get_mut(i).filter(|s| s.taken) else { return };
+        let Some(state) = self.state.get_mut(i).filter(|s| s.in_use) else { return };
         if !state.changed {
             self.changed.push(handle);
         }
-        *state = State { taken: false, moving: false, changed: true };
-        self.tight[i] = NOWHERE;
-        self.rounded[i] = Rounded::new(&NOWHERE);
+        *state = State { in_use: false, moving: false, changed: true };
+        self.tight[i] = EMPTY;
+        self.rounded[i] = Rounded::new(&EMPTY);
         self.free.push(handle);
         self.count -= 1;
     }
 
     fn pairs(&mut self, out: &mut Vec<[u32; 2]>) {
-        if CROWD * self.changed.len() > self.count || self.cells.is_worn() {
-            self.file_all();
+        if REBUILD_DIVISOR * self.changed.len() > self.count || self.cells.needs_rebuild() {
+            self.rebuild();
         } else if !self.changed.is_empty() {
-            self.file_changed();
+            self.update_changed();
         }
         self.compare(out);
     }
@@ -104,30 +104,30 @@ impl BroadPhase for SweepAndPrune {
 
 impl SweepAndPrune {
     /// Fat boxes, cells and near pairs of everything.
-    fn file_all(&mut self) {
+    fn rebuild(&mut self) {
         self.changed.clear();
         self.state.iter_mut().for_each(|s| s.changed = false);
         for ((fat, tight), state) in self.fat.iter_mut().zip(&self.tight).zip(&self.state) {
-            *fat = Fat::around(tight, ROOM, state.moving, fat);
+            *fat = FatBox::around(tight, MARGIN, state.moving, fat);
         }
         let entries = self.fat.iter().enumerate().map(|(i, fat)| Entry { fat: *fat, handle: i as u32 });
-        self.near.clear();
-        self.cells.build(entries, &mut self.near);
-        self.near.sort_unstable();
+        self.candidates.clear();
+        self.cells.build(entries, &mut self.candidates);
+        self.candidates.sort_unstable();
     }
 
     /// The near pairs that overlap indeed. Every pair is written and only then counted or not: whether they do is anybody's guess.
     fn compare(&self, out: &mut Vec<[u32; 2]>) {
         out.clear();
-        out.resize(self.near.len(), [0; 2]);
+        out.resize(self.candidates.len(), [0; 2]);
         let mut count = 0;
-        for pair in &self.near {
+        for pair in &self.candidates {
             let [i, j] = [(pair >> 32) as u32, *pair as u32];
             out[count] = [i, j];
             let (a, b) = (&self.rounded[i as usize], &self.rounded[j as usize]);
             let overlap = match a.overlaps(b) {
-                Guess::Perhaps => self.tight[i as usize].overlaps(&self.tight[j as usize]),
-                guess => guess == Guess::Yes,
+                RoundedOverlap::Uncertain => self.tight[i as usize].overlaps(&self.tight[j as usize]),
+                overlap => overlap == RoundedOverlap::Yes,
             };
             count += usize::from(overlap);
         }
@@ -135,40 +135,40 @@ impl SweepAndPrune {
     }
 
     /// The same, where only the changed boxes have to be looked at. A box is told of those that were filed before it.
-    fn file_changed(&mut self) {
-        let SweepAndPrune { tight, fat, state, changed, cells, near, fresh, .. } = self;
+    fn update_changed(&mut self) {
+        let SweepAndPrune { tight, fat, state, changed, cells, candidates, new_pairs, .. } = self;
         let mut count = 0;
-        for n in 0..near.len() {
-            let pair = near[n];
-            near[count] = pair;
+        for n in 0..candidates.len() {
+            let pair = candidates[n];
+            candidates[count] = pair;
             count += usize::from(!(state[(pair >> 32) as usize].changed | state[pair as u32 as usize].changed));
         }
-        near.truncate(count);
-        fresh.clear();
-        changed.sort_unstable_by_key(|&handle| (cells.home(handle), handle));
+        candidates.truncate(count);
+        new_pairs.clear();
+        changed.sort_unstable_by_key(|&handle| (cells.cell_hint(handle), handle));
         for &handle in changed.iter() {
             let i = handle as usize;
             let old = fat[i];
-            fat[i] = Fat::around(&tight[i], ROOM, state[i].moving, &old);
+            fat[i] = FatBox::around(&tight[i], MARGIN, state[i].moving, &old);
             state[i].changed = false;
-            cells.refile(handle, &old, &fat[i], |other| {
+            cells.update(handle, &old, &fat[i], |other| {
                 if !state[other as usize].changed {
-                    fresh.push(pair(handle, other));
+                    new_pairs.push(pair(handle, other));
                 }
             });
         }
         changed.clear();
-        fresh.sort_unstable();
-        merge(near, fresh);
+        new_pairs.sort_unstable();
+        merge(candidates, new_pairs);
     }
 }
 
-/// Works `fresh` into `list`; both ascend.
-fn merge(list: &mut Vec<u64>, fresh: &[u64]) {
+/// Works `new_pairs` into `list`; both ascend.
+fn merge(list: &mut Vec<u64>, new_pairs: &[u64]) {
     let mut from = list.len();
-    list.resize(list.len() + fresh.len(), 0);
+    list.resize(list.len() + new_pairs.len(), 0);
     let mut to = list.len();
-    for &pair in fresh.iter().rev() {
+    for &pair in new_pairs.iter().rev() {
         while from > 0 && list[from - 1] > pair {
             (from, to) = (from - 1, to - 1);
             list[to] = list[from];

@@ -17,7 +17,7 @@ pub struct ClosedReport {
     pub degenerate_faces: usize,
     /// Faces removed because the same face was there before (coincident shells).
     pub duplicate_faces: usize,
-    /// Faces reversed to agree with their neighbours.
+    /// Faces reversed to agree with their neighbors.
     pub flipped_faces: usize,
     /// Whether the whole mesh was inside out.
     pub turned: bool,
@@ -26,8 +26,8 @@ pub struct ClosedReport {
     /// Connected pieces of the surface.
     pub shells: usize,
     /// Of these, how many lay outside all others and were turned outwards by themselves.
-    pub turned_shells: usize,
-    /// Faces that cross or touch others that are no neighbours (at least so many, where `crossing_capped`).
+    pub inverted_shells: usize,
+    /// Faces that cross or touch others that are no neighbors (at least so many, where `crossing_capped`).
     pub crossing_faces: usize,
     /// Whether the search for those faces ended early, because they are too many.
     pub crossing_capped: bool,
@@ -45,7 +45,7 @@ impl ClosedReport {
             (self.welded_vertices, "vertices at the same place were welded"),
             (self.degenerate_faces, "faces of zero area were dropped"),
             (self.duplicate_faces, "faces that were there twice were dropped"),
-            (self.flipped_faces, "faces were reversed to agree with their neighbours"),
+            (self.flipped_faces, "faces were reversed to agree with their neighbors"),
             (self.nonmanifold_edges, "edges have four or more faces (accepted: the volume is well defined)"),
         ];
         let mut notes: Vec<String> =
@@ -53,8 +53,8 @@ impl ClosedReport {
         if self.turned {
             notes.push("the mesh was inside out and was turned".into());
         }
-        if self.turned_shells > 0 {
-            notes.push(format!("{} shells were inside out and were turned", self.turned_shells));
+        if self.inverted_shells > 0 {
+            notes.push(format!("{} shells were inside out and were turned", self.inverted_shells));
         }
         if self.crossing_faces > 0 {
             let least = if self.crossing_capped { "at least " } else { "" };
@@ -85,12 +85,12 @@ impl TriMesh {
     pub fn check_closed(&mut self) -> Result<ClosedReport, MeshError> {
         self.check_data()?;
         // zero-area faces are first dropped; where that opens a seam that they close, they stay
-        let (mesh, report) = self.mended(true).or_else(|error| self.mended(false).map_err(|_| error))?;
+        let (mesh, report) = self.cleaned(true).or_else(|error| self.cleaned(false).map_err(|_| error))?;
         *self = mesh;
         Ok(report)
     }
 
-    fn mended(&self, drop_collinear: bool) -> Result<(TriMesh, ClosedReport), MeshError> {
+    fn cleaned(&self, drop_collinear: bool) -> Result<(TriMesh, ClosedReport), MeshError> {
         let (mut mesh, welded_vertices) = self.with_shared_vertices();
         let mut report = ClosedReport { welded_vertices, ..ClosedReport::default() };
         // the number that each face of `mesh` has in `self`
@@ -104,16 +104,16 @@ impl TriMesh {
             report.flipped_faces = mesh.unify_winding();
         }
         let groups = edge_groups(&mesh);
-        refuse_unbalanced(&groups, &face_of)?;
+        check_balanced(&groups, &face_of)?;
         report.nonmanifold_edges = groups.iter().filter(|g| g.len() > 2).count();
         let (shell, count) = shells(&mesh, &groups);
         report.shells = count;
         mesh = mesh.compacted();
         report.turned = mesh.signed_volume() < 0.0;
         if report.turned {
-            mesh.turn();
+            mesh.flip_winding();
         }
-        report.turned_shells = mesh.turn_shells(&shell, count);
+        report.inverted_shells = mesh.orient_shells(&shell, count);
         let (boundary, _) = Boundary::of(&mesh);
         report.crossing_faces = boundary.crossing_faces;
         report.crossing_capped = boundary.capped;
@@ -202,29 +202,29 @@ impl TriMesh {
     /// outwards.
     pub(super) fn unify_winding(&mut self) -> usize {
         let groups = edge_groups(self);
-        let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.triangles.len()];
+        let mut neighbors: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.triangles.len()];
         for group in groups.iter().filter(|g| g.len() == 2) {
             let (a, b) = (group[0], group[1]);
-            neighbours[a.face].push((b.face, a.forward == b.forward));
-            neighbours[b.face].push((a.face, a.forward == b.forward));
+            neighbors[a.face].push((b.face, a.forward == b.forward));
+            neighbors[b.face].push((a.face, a.forward == b.forward));
         }
         let original = self.triangles.clone();
         let mut seen = vec![false; original.len()];
         for seed in 0..original.len() {
             if !seen[seed] {
-                self.unify_shell(seed, &neighbours, &mut seen);
+                self.unify_shell(seed, &neighbors, &mut seen);
             }
         }
         (0..original.len()).filter(|&t| original[t] != self.triangles[t]).count()
     }
 
-    fn unify_shell(&mut self, seed: usize, neighbours: &[Vec<(usize, bool)>], seen: &mut [bool]) {
+    fn unify_shell(&mut self, seed: usize, neighbors: &[Vec<(usize, bool)>], seen: &mut [bool]) {
         let mut shell = vec![(seed, false)];
         seen[seed] = true;
         let mut next = 0;
         while next < shell.len() {
             let (face, flip) = shell[next];
-            for &(other, disagree) in &neighbours[face] {
+            for &(other, disagree) in &neighbors[face] {
                 if !seen[other] {
                     seen[other] = true;
                     shell.push((other, flip ^ disagree));
@@ -254,7 +254,7 @@ impl TriMesh {
 
 /// One face's use of an edge.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct EdgeUse {
+pub(crate) struct HalfEdge {
     pub low: u32,
     pub high: u32,
     pub face: usize,
@@ -263,39 +263,39 @@ pub(crate) struct EdgeUse {
 }
 
 /// The uses of all edges, in ascending order of the undirected edges.
-pub(crate) struct EdgeGroups(Vec<EdgeUse>);
+pub(crate) struct EdgeGroups(Vec<HalfEdge>);
 
 impl EdgeGroups {
     /// The uses of each undirected edge.
-    pub fn iter(&self) -> impl Iterator<Item = &[EdgeUse]> {
+    pub fn iter(&self) -> impl Iterator<Item = &[HalfEdge]> {
         self.0.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
     }
 }
 
 /// The uses of each undirected edge, edges in ascending order.
 pub(crate) fn edge_groups(mesh: &TriMesh) -> EdgeGroups {
-    let mut uses: Vec<EdgeUse> = Vec::with_capacity(3 * mesh.triangles.len());
+    let mut half_edges: Vec<HalfEdge> = Vec::with_capacity(3 * mesh.triangles.len());
     for (face, t) in mesh.triangles.iter().enumerate() {
         for k in 0..3 {
             let (u, v) = (t[k], t[(k + 1) % 3]);
-            uses.push(EdgeUse { low: u.min(v), high: u.max(v), face, forward: u < v });
+            half_edges.push(HalfEdge { low: u.min(v), high: u.max(v), face, forward: u < v });
         }
     }
-    uses.sort_unstable();
-    EdgeGroups(uses)
+    half_edges.sort_unstable();
+    EdgeGroups(half_edges)
 }
 
-pub(super) fn unbalanced(groups: &EdgeGroups) -> impl Iterator<Item = &[EdgeUse]> {
+pub(super) fn unbalanced(groups: &EdgeGroups) -> impl Iterator<Item = &[HalfEdge]> {
     groups.iter().filter(|g| 2 * g.iter().filter(|u| u.forward).count() != g.len())
 }
 
 /// `face_of` gives the numbers that faces have for the user.
-fn refuse_unbalanced(groups: &EdgeGroups, face_of: &[usize]) -> Result<(), MeshError> {
-    let bad: Vec<&[EdgeUse]> = unbalanced(groups).collect();
+fn check_balanced(groups: &EdgeGroups, face_of: &[usize]) -> Result<(), MeshError> {
+    let bad: Vec<&[HalfEdge]> = unbalanced(groups).collect();
     if bad.is_empty() {
         return Ok(());
     }
-    let open: Vec<EdgeUse> = bad.iter().filter(|g| g.len() == 1).map(|g| g[0]).collect();
+    let open: Vec<HalfEdge> = bad.iter().filter(|g| g.len() == 1).map(|g| g[0]).collect();
     if let Some(shared) = bad.iter().find(|g| g.len() > 1) {
         // the dangling face is the one at this edge that also has an open edge
         let fin = shared.iter().find(|u| open.iter().any(|o| o.face == u.face)).unwrap_or(&shared[0]);
@@ -308,7 +308,7 @@ fn refuse_unbalanced(groups: &EdgeGroups, face_of: &[usize]) -> Result<(), MeshE
             face: face_of[fin.face] + 1,
         });
     }
-    let loops = joined(open.len(), |a, b| touches(&open[a], &open[b]));
+    let loops = connected_groups(open.len(), |a, b| share_vertex(&open[a], &open[b]));
     let first = (0..open.len()).min_by_key(|&n| face_of[open[n].face]).unwrap_or(0);
     Err(MeshError::Open {
         edges: open.len(),
@@ -320,13 +320,13 @@ fn refuse_unbalanced(groups: &EdgeGroups, face_of: &[usize]) -> Result<(), MeshE
     })
 }
 
-fn touches(a: &EdgeUse, b: &EdgeUse) -> bool {
+fn share_vertex(a: &HalfEdge, b: &HalfEdge) -> bool {
     [a.low, a.high].iter().any(|v| *v == b.low || *v == b.high)
 }
 
 /// Groups `0..count` by a relation; each item gets the least member of its group. Quadratic, but open edges are few
 /// or the answer's wording does not matter; beyond 2000 all count as one group.
-fn joined(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
+fn connected_groups(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     if count > 2000 {
         return vec![0; count];
     }

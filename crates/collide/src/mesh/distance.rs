@@ -10,7 +10,7 @@
 //! are kept whole: next to those, a point inside may be told less than its depth, never more.
 
 use super::TriMesh;
-use super::boxes::BoxTree;
+use super::aabb_tree::AabbTree;
 use super::check::{EdgeGroups, edge_groups};
 use super::crossing::Crossings;
 use super::union::{Boundary, Trust};
@@ -23,7 +23,7 @@ use nalgebra::ComplexField;
 pub struct ClosestPoint {
     /// On the surface.
     pub point: Vec3,
-    /// Metres; negative inside.
+    /// Meters; negative inside.
     pub signed_distance: f64,
     /// Index of a triangle that holds the point.
     pub triangle: usize,
@@ -36,7 +36,7 @@ pub struct MeshDistance {
     ids: Vec<u32>,
     /// Per piece: pseudonormals of its face, its edges (k to k+1) and its vertices; those in doubt are zero.
     normals: Vec<[Vec3; 7]>,
-    tree: BoxTree,
+    tree: AabbTree,
     /// Where the surface crosses itself, is pinched, or has more than one shell.
     winding: Option<WindingNumber>,
 }
@@ -44,21 +44,21 @@ pub struct MeshDistance {
 impl MeshDistance {
     /// Prepares a closed, outward-wound mesh (see [`TriMesh::check_closed`]) of at least one triangle.
     pub fn new(mesh: &TriMesh) -> MeshDistance {
-        MeshDistance::within_boundary(mesh, Boundary::of(mesh))
+        MeshDistance::from_boundary(mesh, Boundary::of(mesh))
     }
 
     /// The same of a mesh that is known not to cross itself: that is not looked for, which takes longer than all else.
-    pub(crate) fn uncrossed(mesh: &TriMesh) -> MeshDistance {
-        MeshDistance::within_boundary(mesh, Boundary::by(mesh, &Crossings::default()))
+    pub(crate) fn without_crossings(mesh: &TriMesh) -> MeshDistance {
+        MeshDistance::from_boundary(mesh, Boundary::from_crossings(mesh, &Crossings::default()))
     }
 
-    fn within_boundary(mesh: &TriMesh, (boundary, winding): (Boundary, Option<WindingNumber>)) -> MeshDistance {
+    fn from_boundary(mesh: &TriMesh, (boundary, winding): (Boundary, Option<WindingNumber>)) -> MeshDistance {
         let normals = pseudonormals(mesh, &edge_groups(mesh));
-        let tree = BoxTree::new(&boundary.pieces.iter().map(|p| p.corners).collect::<Vec<_>>());
+        let tree = AabbTree::new(&boundary.pieces.iter().map(|p| p.corners).collect::<Vec<_>>());
         let sorted: Vec<_> = tree.ids.iter().map(|&n| &boundary.pieces[n as usize]).collect();
         MeshDistance {
             corners: sorted.iter().map(|p| p.corners).collect(),
-            normals: sorted.iter().map(|p| trusted(&normals[p.face as usize], p.trust)).collect(),
+            normals: sorted.iter().map(|p| trusted_normals(&normals[p.face as usize], p.trust)).collect(),
             ids: sorted.iter().map(|p| p.face).collect(),
             tree,
             winding,
@@ -67,43 +67,43 @@ impl MeshDistance {
 
     /// The closest point of the solid's boundary and the signed distance.
     pub fn closest(&self, p: &Vec3) -> ClosestPoint {
-        self.closest_of(p, usize::MAX)
+        self.closest_approximate(p, usize::MAX)
     }
 
-    /// The closest point found when at most about `most` triangles are looked at, near ones first. That is all but always the
-    /// closest there is; from the middle of a ball, all triangles are about as far, and what is found is about that.
-    pub(crate) fn closest_of(&self, p: &Vec3, most: usize) -> ClosestPoint {
+    /// The closest point found when at most about `upper_bound` triangles are looked at, near ones first. That is all but always the
+    /// closest there is; from the middle of a sphere, all triangles are about as far, and what is found is about that.
+    pub(crate) fn closest_approximate(&self, p: &Vec3, max_triangles: usize) -> ClosestPoint {
         let mut best = (f64::INFINITY, Vec3::zeros(), 0, 0);
-        let mut left = most;
+        let mut left = max_triangles;
         self.search(0, p, &mut best, &mut left);
         let (square, point, n, feature) = best;
         let sign = if self.inside(p, &point, &self.normals[n][feature]) { -1.0 } else { 1.0 };
         ClosestPoint { point, signed_distance: sign * square.sqrt(), triangle: self.ids[n] as usize }
     }
 
-    /// Calls `each` with the index of every triangle within `radius` metres of `p`, its closest point and that point's
+    /// Calls `each` with the index of every triangle within `radius` meters of `p`, its closest point and that point's
     /// feature (see [`closest_on_triangle`]).
     pub(crate) fn within(&self, p: &Vec3, radius: f64, each: &mut dyn FnMut(usize, Vec3, usize)) {
         self.search_within(0, p, radius * radius, each);
     }
 
     /// Goes down the tree of boxes where `to` hopes to find something, where most of it first.
-    pub(crate) fn descend(&self, to: &mut impl Descent) {
-        self.enter(0, to);
+    pub(crate) fn descend(&self, to: &mut impl BestFirstSearch) {
+        self.search_node(0, to);
     }
 
-    fn enter(&self, node: usize, to: &mut impl Descent) {
+    fn search_node(&self, node: usize, to: &mut impl BestFirstSearch) {
         let here = &self.tree.nodes[node];
         if here.count > 0 {
-            return here.range().for_each(|n| to.face(self.ids[n] as usize));
+            return here.range().for_each(|n| to.visit_triangle(self.ids[n] as usize));
         }
-        let mut children = [node + 1, here.second as usize].map(|c| (to.most(&self.tree.nodes[c].bounds), c));
+        let mut children = [node + 1, here.second as usize].map(|c| (to.upper_bound(&self.tree.nodes[c].bounds), c));
         if children[1].0 > children[0].0 {
             children.swap(0, 1);
         }
-        for (most, child) in children {
-            if most > to.wanted() {
-                self.enter(child, to);
+        for (upper_bound, child) in children {
+            if upper_bound > to.threshold() {
+                self.search_node(child, to);
             }
         }
     }
@@ -160,17 +160,17 @@ impl MeshDistance {
 }
 
 /// A search for the most of something among the triangles of a mesh.
-pub(crate) trait Descent {
+pub(crate) trait BestFirstSearch {
     /// No less than what any triangle in a box has.
-    fn most(&self, bounds: &Aabb) -> f64;
+    fn upper_bound(&self, bounds: &Aabb) -> f64;
     /// What has no more than this is passed over.
-    fn wanted(&self) -> f64;
+    fn threshold(&self) -> f64;
     /// A triangle that may have more.
-    fn face(&mut self, t: usize);
+    fn visit_triangle(&mut self, t: usize);
 }
 
 /// Normals that tell no side are zero.
-fn trusted(normals: &[Vec3; 7], trust: Trust) -> [Vec3; 7] {
+fn trusted_normals(normals: &[Vec3; 7], trust: Trust) -> [Vec3; 7] {
     match trust {
         Trust::All => *normals,
         Trust::Face => std::array::from_fn(|k| if k == 0 { normals[0] } else { Vec3::zeros() }),

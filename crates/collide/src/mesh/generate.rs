@@ -6,24 +6,24 @@ use nalgebra::ComplexField;
 use std::f64::consts::PI;
 
 /// No generator makes more segments around than this.
-const MOST_SEGMENTS: usize = 4096;
+const MAX_SEGMENTS: usize = 4096;
 
 impl TriMesh {
-    /// A block about the origin: 8 vertices, 12 triangles. Half extents in metres, above 0.
+    /// A block about the origin: 8 vertices, 12 triangles. Half extents in meters, above 0.
     pub fn box_(half_extents: Vec3) -> TriMesh {
         let vertices = (0..8_u32).map(|n| half_extents.zip_map(&signs(n), |h, s| h * s)).collect();
         let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
         TriMesh { vertices, triangles: quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect() }
     }
 
-    /// A ball by meridians and parallels, poles on z. At least 3 segments and 2 rings.
+    /// A sphere by meridians and parallels, poles on z. At least 3 segments and 2 rings.
     pub fn uv_sphere(radius: f64, segments: usize, rings: usize) -> TriMesh {
-        let rings = rings.clamp(2, MOST_SEGMENTS);
+        let rings = rings.clamp(2, MAX_SEGMENTS);
         let profile: Vec<_> = (0..=rings).map(|n| on_arc(radius, 0.0, PI * n as f64 / rings as f64)).collect();
         revolve(&profile, segments)
     }
 
-    /// A ball from an icosahedron whose faces are split 1:4 `subdivisions` times (at most 7).
+    /// A sphere from an icosahedron whose faces are split 1:4 `subdivisions` times (at most 7).
     pub fn icosphere(radius: f64, subdivisions: u32) -> TriMesh {
         let mut mesh = icosahedron();
         for _ in 0..subdivisions.min(7) {
@@ -39,16 +39,16 @@ impl TriMesh {
 
     /// A capsule along z about the origin; `half_length` without the caps, `rings` per cap.
     pub fn capsule(radius: f64, half_length: f64, segments: usize, rings: usize) -> TriMesh {
-        let rings = rings.clamp(1, MOST_SEGMENTS);
+        let rings = rings.clamp(1, MAX_SEGMENTS);
         let angle = |n: usize| 0.5 * PI * n as f64 / rings as f64;
         let lower = (0..=rings).map(|n| on_arc(radius, -half_length, angle(n)));
         let upper = (0..=rings).map(|n| on_arc(radius, half_length, angle(n) + 0.5 * PI));
         revolve(&lower.chain(upper).collect::<Vec<_>>(), segments)
     }
 
-    /// A ring around z: `major` to the middle of the tube, `minor` the tube's radius (below `major`), metres.
+    /// A ring around z: `major` to the middle of the tube, `minor` the tube's radius (below `major`), meters.
     pub fn torus(major: f64, minor: f64, segments: usize, sides: usize) -> TriMesh {
-        let (segments, sides) = (segments.clamp(3, MOST_SEGMENTS), sides.clamp(3, MOST_SEGMENTS));
+        let (segments, sides) = (segments.clamp(3, MAX_SEGMENTS), sides.clamp(3, MAX_SEGMENTS));
         let mut mesh = TriMesh::default();
         for n in 0..segments {
             let (sin, cos) = ComplexField::sin_cos(2.0 * PI * n as f64 / segments as f64);
@@ -67,8 +67,8 @@ impl TriMesh {
         mesh
     }
 
-    /// A closed solid of revolution about z. `profile` holds `(r, z)` in metres, first and last on the axis (`r =
-    /// 0`), all between off it, no two neighbours equal; either direction. The profile must not cross itself (not
+    /// A closed solid of revolution about z. `profile` holds `(r, z)` in meters, first and last on the axis (`r =
+    /// 0`), all between off it, no two neighbors equal; either direction. The profile must not cross itself (not
     /// checked here).
     pub fn lathe(profile: &[(f64, f64)], segments: usize) -> Result<TriMesh, MeshError> {
         let bad = |what: &str| Err(MeshError::Profile { what: what.into() });
@@ -86,11 +86,11 @@ impl TriMesh {
             return bad("must stay off the axis (r > 0) between its ends");
         }
         if profile.windows(2).any(|w| w[0] == w[1]) {
-            return bad("has two equal neighbours");
+            return bad("has two equal neighbors");
         }
         let mut mesh = revolve(profile, segments);
         if mesh.signed_volume() < 0.0 {
-            mesh.turn();
+            mesh.flip_winding();
         }
         Ok(mesh)
     }
@@ -100,7 +100,7 @@ impl TriMesh {
     }
 
     /// Reverses every triangle.
-    pub(crate) fn turn(&mut self) {
+    pub(crate) fn flip_winding(&mut self) {
         self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
 
@@ -141,7 +141,7 @@ fn on_arc(radius: f64, z: f64, angle: f64) -> (f64, f64) {
 
 /// Turns a profile that climbs from the axis to the axis around z: a pole at each end, a ring per point between.
 fn revolve(profile: &[(f64, f64)], segments: usize) -> TriMesh {
-    let segments = segments.clamp(3, MOST_SEGMENTS);
+    let segments = segments.clamp(3, MAX_SEGMENTS);
     let rings = profile.len() - 2;
     let mut mesh =
         TriMesh { vertices: vec![Vec3::z() * profile[0].1, Vec3::z() * profile[rings + 1].1], triangles: Vec::new() };

@@ -8,34 +8,38 @@
 //! W(i, k) = min over m of  max-and-sum( W(i, m), W(m, k), weight of triangle (i, m, k) )
 //! ```
 //!
-//! Longer rims are clipped ear by ear ([`super::ears`]); a rim that crosses itself there is filled all the same.
+//! Longer rims are clipped ear by ear ([`super::ear_clipping`]); a rim that crosses itself there is filled all the same.
 //!
 //! Sources: Barequet and Sharir, *Filling gaps in the boundary of a polyhedron* (1995), for the programme; Liepa,
 //! *Filling holes in meshes* (2003), for the weight.
 
-use super::ears::clipped;
+use super::ear_clipping::clip_ears;
 use crate::Vec3;
 
 /// Rims of up to so many edges are filled by weight: time grows as the cube.
-const BY_WEIGHT: usize = 200;
+const MAX_DP_EDGES: usize = 200;
 /// Corners of longer rims that are looked at before the one of the best shape is taken all the same.
-const TRIES: usize = 64;
+const MAX_TRIES: usize = 64;
 /// Edges times the square of the limit, over all rims of a mesh: many rims are kept from taking long.
-const MOST_WORK: f64 = 1.5e9;
+const MAX_WORK: f64 = 1.5e9;
 /// The fold of a triangle that has no area, worse than any other.
-const WORST: f64 = 4.0;
+const DEGENERATE_FOLD: f64 = 4.0;
 /// Of one that names a vertex twice.
-const IMPOSSIBLE: f64 = 8.0;
+const REPEATED_VERTEX_FOLD: f64 = 8.0;
 
 /// Fills a rim with triangles of indices into it. `normals[n]` is that of the face at the edge from point n to n+1,
 /// unit length or zero. The triangles go round as the points do.
-pub(super) fn fill(points: &[Vec3], normals: &[Vec3], by_weight_up_to: usize) -> Vec<[usize; 3]> {
-    if points.len() <= by_weight_up_to { by_weight(points, normals) } else { clipped(points, TRIES, &mut { u64::MAX }) }
+pub(super) fn fill(points: &[Vec3], normals: &[Vec3], max_dp_edges: usize) -> Vec<[usize; 3]> {
+    if points.len() <= max_dp_edges {
+        min_weight_triangulation(points, normals)
+    } else {
+        clip_ears(points, MAX_TRIES, &mut { u64::MAX })
+    }
 }
 
 /// The longest rim to be filled by weight where all rims of the mesh together have so many edges.
-pub(super) fn longest_by_weight(edges: usize) -> usize {
-    BY_WEIGHT.min((MOST_WORK / edges.max(1) as f64).sqrt() as usize).max(4)
+pub(super) fn max_dp_edges_for(edges: usize) -> usize {
+    MAX_DP_EDGES.min((MAX_WORK / edges.max(1) as f64).sqrt() as usize).max(4)
 }
 
 /// Sharpest fold as 1 − cos of the angle between normals, and area (twice).
@@ -43,44 +47,46 @@ pub(super) fn longest_by_weight(edges: usize) -> usize {
 struct Weight(f64, f64);
 
 impl Weight {
-    fn and(self, other: Weight) -> Weight {
+    fn combined(self, other: Weight) -> Weight {
         Weight(self.0.max(other.0), self.1 + other.1)
     }
 
-    fn less(self, other: Weight) -> bool {
+    fn is_less(self, other: Weight) -> bool {
         // folds that differ by rounding alone are equal
         if (self.0 - other.0).abs() > 1e-9 { self.0 < other.0 } else { self.1 < other.1 }
     }
 }
 
-fn by_weight(points: &[Vec3], rim: &[Vec3]) -> Vec<[usize; 3]> {
+fn min_weight_triangulation(points: &[Vec3], edge_normals: &[Vec3]) -> Vec<[usize; 3]> {
     let n = points.len();
     let at = |i: usize, k: usize| i * n + k;
     let mut best = vec![Weight(0.0, 0.0); n * n];
     let mut apex = vec![0; n * n];
     let mut normal = vec![Vec3::zeros(); n * n];
     for i in 0..n - 1 {
-        normal[at(i, i + 1)] = rim[i];
+        normal[at(i, i + 1)] = edge_normals[i];
     }
     for length in 2..n {
         for i in 0..n - length {
             let k = i + length;
             let mut least = Weight(f64::INFINITY, f64::INFINITY);
             for m in i + 1..k {
-                let before = best[at(i, m)].and(best[at(m, k)]);
+                let before = best[at(i, m)].combined(best[at(m, k)]);
                 if before.0 > least.0 + 1e-9 {
                     continue;
                 }
                 let (own, area) = normal_and_area(&points[i], &points[m], &points[k]);
-                let mut fold = own.map_or(WORST, |n| bend(&n, &normal[at(i, m)]).max(bend(&n, &normal[at(m, k)])));
+                let mut fold = own.map_or(DEGENERATE_FOLD, |n| {
+                    fold_angle(&n, &normal[at(i, m)]).max(fold_angle(&n, &normal[at(m, k)]))
+                });
                 if let (Some(n), true) = (own, length + 1 == points.len()) {
-                    fold = fold.max(bend(&n, &rim[points.len() - 1]));
+                    fold = fold.max(fold_angle(&n, &edge_normals[points.len() - 1]));
                 }
                 if points[i] == points[m] || points[m] == points[k] || points[k] == points[i] {
-                    fold = IMPOSSIBLE;
+                    fold = REPEATED_VERTEX_FOLD;
                 }
-                let weight = before.and(Weight(fold, area));
-                if weight.less(least) {
+                let weight = before.combined(Weight(fold, area));
+                if weight.is_less(least) {
                     least = weight;
                     apex[at(i, k)] = m;
                     normal[at(i, k)] = own.unwrap_or_default();
@@ -102,7 +108,7 @@ fn by_weight(points: &[Vec3], rim: &[Vec3]) -> Vec<[usize; 3]> {
 }
 
 /// 1 − cos of the angle between two faces' normals; none against nothing.
-fn bend(a: &Vec3, b: &Vec3) -> f64 {
+fn fold_angle(a: &Vec3, b: &Vec3) -> f64 {
     if *b == Vec3::zeros() { 0.0 } else { 1.0 - a.dot(b) }
 }
 

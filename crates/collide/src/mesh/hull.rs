@@ -17,12 +17,12 @@ use crate::{MeshError, Vec3};
 use std::collections::BTreeMap;
 
 /// Cells along the longest side.
-const CELLS: f64 = 1_048_576.0;
+const GRID_CELLS: f64 = 1_048_576.0;
 
 type Point = [i64; 3];
 
 /// An edge of a patch's rim: from and to which point, the face beyond it, and the number of the edge there.
-type RimEdge = (u32, u32, usize, usize);
+type HorizonEdge = (u32, u32, usize, usize);
 
 /// A triangle of the hull as it grows.
 struct Face {
@@ -31,7 +31,7 @@ struct Face {
     beyond: [usize; 3],
     /// Points that it sees and no other face is in charge of.
     outside: Vec<u32>,
-    alive: bool,
+    active: bool,
 }
 
 impl TriMesh {
@@ -43,7 +43,7 @@ impl TriMesh {
     pub fn convex_hull(&self) -> Result<TriMesh, MeshError> {
         self.check_data()?;
         let mesh = self.welded();
-        let (least, cell) = (mesh.aabb().min, (mesh.aabb().max - mesh.aabb().min).max() / CELLS);
+        let (least, cell) = (mesh.aabb().min, (mesh.aabb().max - mesh.aabb().min).max() / GRID_CELLS);
         if cell == 0.0 {
             return Err(MeshError::NoVolume { volume: 0.0 });
         }
@@ -51,7 +51,7 @@ impl TriMesh {
             mesh.vertices.iter().map(|v| ((v - least) / cell).map(|x| x.round() as i64).into()).collect();
         points.sort_unstable();
         points.dedup();
-        let faces = Hull::of(&points).ok_or(MeshError::NoVolume { volume: 0.0 })?.finished();
+        let faces = Hull::of(&points).ok_or(MeshError::NoVolume { volume: 0.0 })?.triangles();
         let place = |p: &Point| least + cell * Vec3::new(p[0] as f64, p[1] as f64, p[2] as f64);
         Ok(TriMesh { vertices: points.iter().map(place).collect(), triangles: faces }.welded())
     }
@@ -61,16 +61,16 @@ struct Hull<'p> {
     points: &'p [Point],
     faces: Vec<Face>,
     /// Faces that may have points outside.
-    waiting: Vec<usize>,
+    pending: Vec<usize>,
 }
 
 impl<'p> Hull<'p> {
     /// Grown to the end; `None` where all points lie in a plane.
     fn of(points: &'p [Point]) -> Option<Hull<'p>> {
-        let mut hull = Hull { points, faces: Vec::new(), waiting: Vec::new() };
-        hull.start()?;
-        while let Some(face) = hull.waiting.pop() {
-            if hull.faces[face].alive && !hull.faces[face].outside.is_empty() {
+        let mut hull = Hull { points, faces: Vec::new(), pending: Vec::new() };
+        hull.initial_tetrahedron()?;
+        while let Some(face) = hull.pending.pop() {
+            if hull.faces[face].active && !hull.faces[face].outside.is_empty() {
                 hull.add_farthest(face);
             }
         }
@@ -78,7 +78,7 @@ impl<'p> Hull<'p> {
     }
 
     /// A tetrahedron of points far apart, and all others given to its faces.
-    fn start(&mut self) -> Option<()> {
+    fn initial_tetrahedron(&mut self) -> Option<()> {
         let points = self.points;
         let all = || 0..points.len() as u32;
         let (a, b) = (0, points.len() as u32 - 1);
@@ -89,94 +89,97 @@ impl<'p> Hull<'p> {
                 .sum::<i128>()
         };
         let c = all().max_by_key(area).filter(|p| area(p) > 0)?;
-        let height = |p: &u32| self.sees(&[a, b, c], *p).abs();
+        let height = |p: &u32| self.signed_volume(&[a, b, c], *p).abs();
         let d = all().max_by_key(height).filter(|p| height(p) > 0)?;
-        let [a, b] = if self.sees(&[a, b, c], d) < 0 { [a, b] } else { [b, a] };
+        let [a, b] = if self.signed_volume(&[a, b, c], d) < 0 { [a, b] } else { [b, a] };
         for corners in [[a, b, c], [b, a, d], [c, b, d], [a, c, d]] {
-            self.faces.push(Face { corners, beyond: [0; 3], outside: Vec::new(), alive: true });
+            self.faces.push(Face { corners, beyond: [0; 3], outside: Vec::new(), active: true });
         }
         for (face, beyond) in [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]].into_iter().enumerate() {
             self.faces[face].beyond = beyond;
         }
         let others = all().filter(|p| ![a, b, c, d].contains(p)).collect();
-        self.share(others, 0);
+        self.assign_points(others, 0);
         Some(())
     }
 
     /// `d(f, p)`: positive where the face sees the point.
-    fn sees(&self, corners: &[u32; 3], p: u32) -> i64 {
+    fn signed_volume(&self, corners: &[u32; 3], p: u32) -> i64 {
         let [a, b, c] = corners.map(|v| self.points[v as usize]);
         let (n, p) = (cross(a, b, c), self.points[p as usize]);
         (0..3).map(|k| n[k] * (p[k] - a[k])).sum()
     }
 
     /// Gives each point to the first face from `first` on that sees it; who is seen by none is inside.
-    fn share(&mut self, points: Vec<u32>, first: usize) {
+    fn assign_points(&mut self, points: Vec<u32>, first: usize) {
         for p in points {
-            if let Some(face) = (first..self.faces.len()).find(|&f| self.sees(&self.faces[f].corners, p) > 0) {
+            if let Some(face) = (first..self.faces.len()).find(|&f| self.signed_volume(&self.faces[f].corners, p) > 0) {
                 self.faces[face].outside.push(p);
             }
         }
-        self.waiting.extend((first..self.faces.len()).filter(|&f| !self.faces[f].outside.is_empty()));
+        self.pending.extend((first..self.faces.len()).filter(|&f| !self.faces[f].outside.is_empty()));
     }
 
     /// Replaces all faces that see the farthest point of `face` by a cone from their rim to it.
     fn add_farthest(&mut self, face: usize) {
         let corners = self.faces[face].corners;
-        let Some(apex) = self.faces[face].outside.iter().copied().max_by_key(|&p| (self.sees(&corners, p), p)) else {
+        let Some(apex) = self.faces[face].outside.iter().copied().max_by_key(|&p| (self.signed_volume(&corners, p), p))
+        else {
             return;
         };
-        let (patch, rim) = self.patch(face, apex);
+        let (visible_patch, horizon) = self.visible_patch(face, apex);
         let first = self.faces.len();
-        let number: BTreeMap<u32, usize> = rim.iter().enumerate().map(|(k, (from, ..))| (*from, first + k)).collect();
-        let before: BTreeMap<u32, usize> = rim.iter().enumerate().map(|(k, (_, to, ..))| (*to, first + k)).collect();
-        for (k, &(from, to, beyond, edge)) in rim.iter().enumerate() {
+        let number: BTreeMap<u32, usize> =
+            horizon.iter().enumerate().map(|(k, (from, ..))| (*from, first + k)).collect();
+        let before: BTreeMap<u32, usize> =
+            horizon.iter().enumerate().map(|(k, (_, to, ..))| (*to, first + k)).collect();
+        for (k, &(from, to, beyond, edge)) in horizon.iter().enumerate() {
             self.faces[beyond].beyond[edge] = first + k;
             self.faces.push(Face {
                 corners: [from, to, apex],
                 beyond: [beyond, number[&to], before[&from]],
                 outside: Vec::new(),
-                alive: true,
+                active: true,
             });
         }
         let mut left = Vec::new();
-        for gone in patch {
-            self.faces[gone].alive = false;
+        for gone in visible_patch {
+            self.faces[gone].active = false;
             left.extend(std::mem::take(&mut self.faces[gone].outside).into_iter().filter(|&p| p != apex));
         }
-        self.share(left, first);
+        self.assign_points(left, first);
     }
 
     /// The faces that see `apex`, and their rim.
-    fn patch(&self, face: usize, apex: u32) -> (Vec<usize>, Vec<RimEdge>) {
-        let mut patch = vec![face];
+    fn visible_patch(&self, face: usize, apex: u32) -> (Vec<usize>, Vec<HorizonEdge>) {
+        let mut visible_patch = vec![face];
         let mut inside: BTreeMap<usize, bool> = BTreeMap::from([(face, true)]);
-        let mut rim = Vec::new();
+        let mut horizon = Vec::new();
         let mut next = 0;
-        while next < patch.len() {
-            let here = &self.faces[patch[next]];
+        while next < visible_patch.len() {
+            let here = &self.faces[visible_patch[next]];
             next += 1;
             for k in 0..3 {
                 let other = here.beyond[k];
                 let seen = *inside.entry(other).or_insert_with(|| {
-                    let seen = self.sees(&self.faces[other].corners, apex) > 0;
+                    let seen = self.signed_volume(&self.faces[other].corners, apex) > 0;
                     if seen {
-                        patch.push(other);
+                        visible_patch.push(other);
                     }
                     seen
                 });
                 if !seen {
                     let (from, to) = (here.corners[k], here.corners[(k + 1) % 3]);
                     let edge = self.faces[other].corners.iter().position(|v| *v == to).unwrap_or(0);
-                    rim.push((from, to, other, edge));
+                    horizon.push((from, to, other, edge));
                 }
             }
         }
-        (patch, rim)
+        (visible_patch, horizon)
     }
 
-    fn finished(self) -> Vec<[u32; 3]> {
-        self.faces.into_iter().filter(|face| face.alive).map(|face| face.corners).collect()
+    fn triangles(self) -> Vec<[u32; 3]> {
+        self.faces.into_iter().filter(|face| face.active).map(|face| face.corners).collect()
     }
 }
 

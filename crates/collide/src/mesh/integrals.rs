@@ -18,7 +18,7 @@ impl TriMesh {
         self.moments().volume
     }
 
-    /// Mass, centre of mass and inertia of the solid at a uniform `density` (kg/m³). The mesh must be closed and
+    /// Mass, center of mass and inertia of the solid at a uniform `density` (kg/m³). The mesh must be closed and
     /// wound outwards. What the surface goes around twice counts twice; see [`TriMesh::union_mass_properties`].
     pub fn mass_properties(&self, density: f64) -> MassProperties {
         self.moments().mass_properties(&self.middle(), density)

@@ -1,16 +1,16 @@
 //! Triangle meshes: reading, checking, generating, integrating, measuring distance to.
 
-mod boxes;
+mod aabb_tree;
 mod check;
 mod crossing;
 mod distance;
-mod ears;
+mod ear_clipping;
 mod generate;
 mod holes;
 mod hull;
 mod integrals;
+mod morton;
 mod obj;
-mod order;
 mod pairing;
 mod ply;
 mod polygon;
@@ -22,30 +22,30 @@ mod text;
 mod union;
 mod winding;
 
-pub(crate) use boxes::BoxTree;
+pub(crate) use aabb_tree::AabbTree;
 pub use check::ClosedReport;
 pub(crate) use check::{EdgeGroups, edge_groups};
 pub(crate) use crossing::crossing_shells;
+pub(crate) use distance::{BestFirstSearch, box_distance_squared, closest_on_triangle, face_normals, pseudonormals};
 pub use distance::{ClosestPoint, MeshDistance};
-pub(crate) use distance::{Descent, box_distance_squared, closest_on_triangle, face_normals, pseudonormals};
-pub(crate) use order::along_curve;
-pub use polygon::FaceCutter;
+pub(crate) use morton::morton_codes;
+pub use polygon::PolygonTriangulator;
 pub use repair::{RepairReport, RepairSettings};
 pub(crate) use shells::shells;
-pub use text::{obj_lines, text_of};
+pub use text::{decode_text, obj_lines};
 pub use winding::WindingNumber;
 
 use crate::{Aabb, MeshError, Vec3};
 
-/// Coordinates up to this are taken, metres: their products stay within what floating point can hold.
+/// Coordinates up to this are taken, meters: their products stay within what floating point can hold.
 const FARTHEST: f64 = 1e9;
-/// Meshes whose bounding box has a diagonal of at least this are taken, metres: for the same reason.
+/// Meshes whose bounding box has a diagonal of at least this are taken, meters: for the same reason.
 const SMALLEST: f64 = 1e-30;
 
 /// A surface made of triangles, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TriMesh {
-    /// Positions, metres.
+    /// Positions, meters.
     pub vertices: Vec<Vec3>,
     /// Three indices into `vertices` each.
     pub triangles: Vec<[u32; 3]>,
@@ -62,7 +62,7 @@ impl TriMesh {
         Aabb::around(self.vertices.iter().copied())
     }
 
-    /// Length of the diagonal of the bounding box, metres (0 for an empty mesh).
+    /// Length of the diagonal of the bounding box, meters (0 for an empty mesh).
     pub fn diagonal(&self) -> f64 {
         if self.vertices.is_empty() { 0.0 } else { (self.aabb().max - self.aabb().min).norm() }
     }
@@ -72,7 +72,7 @@ impl TriMesh {
         (0..self.triangles.len()).map(|t| self.corners(t)).map(|[a, b, c]| 0.5 * (b - a).cross(&(c - a)).norm()).sum()
     }
 
-    /// The same mesh moved by `offset` metres.
+    /// The same mesh moved by `offset` meters.
     pub fn translated(mut self, offset: &Vec3) -> TriMesh {
         self.vertices.iter_mut().for_each(|v| *v += offset);
         self

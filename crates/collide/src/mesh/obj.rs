@@ -1,10 +1,10 @@
 //! Wavefront OBJ, the geometry only: `v` and `f` lines. Everything else is passed over.
 //!
 //! Faces may be written `v`, `v/vt`, `v//vn` or `v/vt/vn`; a negative index counts back from the last vertex read;
-//! a polygon is cut into triangles ([`FaceCutter`]).
+//! a polygon is cut into triangles ([`PolygonTriangulator`]).
 
 use super::TriMesh;
-use super::polygon::FaceCutter;
+use super::polygon::PolygonTriangulator;
 use super::text::obj_lines;
 use crate::{MeshError, Vec3};
 
@@ -31,9 +31,9 @@ impl TriMesh {
             }
         }
         let mut lines = Vec::new();
-        let mut cutter = FaceCutter::default();
+        let mut triangulator = PolygonTriangulator::default();
         for (number, (line, corners)) in faces.iter().enumerate() {
-            mesh.push_face(corners, number + 1, &mut cutter)
+            mesh.push_face(corners, number + 1, &mut triangulator)
                 .map_err(|error| MeshError::At { line: *line, error: Box::new(error) })?;
             lines.resize(mesh.triangles.len(), *line);
         }
@@ -41,13 +41,18 @@ impl TriMesh {
     }
 
     /// Adds the triangles of a face; corners are numbers of vertices from 1, as is `face`, the number that errors name.
-    pub(super) fn push_face(&mut self, corners: &[i64], face: usize, cutter: &mut FaceCutter) -> Result<(), MeshError> {
+    pub(super) fn push_face(
+        &mut self,
+        corners: &[i64],
+        face: usize,
+        triangulator: &mut PolygonTriangulator,
+    ) -> Result<(), MeshError> {
         let count = self.vertices.len();
         if let Some(&index) = corners.iter().find(|&&c| c < 1 || c > count as i64 || c > i64::from(u32::MAX)) {
             return Err(MeshError::IndexOutOfRange { face, index, count });
         }
         let points: Vec<Vec3> = corners.iter().map(|c| self.vertices[*c as usize - 1]).collect();
-        let triangles = cutter.cut(&points)?;
+        let triangles = triangulator.triangulate(&points)?;
         self.triangles.extend(triangles.iter().map(|t| t.map(|k| (corners[k] - 1) as u32)));
         Ok(())
     }

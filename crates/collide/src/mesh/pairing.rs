@@ -7,20 +7,20 @@
 //! to loops without choice.
 
 use super::TriMesh;
-use super::check::{EdgeUse, edge_groups};
+use super::check::{HalfEdge, edge_groups};
 
 /// No partner.
-pub(super) const RIM: u32 = u32::MAX;
+pub(super) const BOUNDARY: u32 = u32::MAX;
 
 /// Use `3t + k` is that of edge `k` (corners k to k+1) of triangle `t`.
 pub(super) struct Pairing {
-    /// The use on the other side, or [`RIM`].
+    /// The use on the other side, or [`BOUNDARY`].
     pub partner: Vec<u32>,
     /// The piece of each face: faces connected over pairs, counted from 0.
     pub piece: Vec<u32>,
     pub pieces: usize,
     /// Whether a piece has a rim at an edge where other faces go on.
-    pub dangles: Vec<bool>,
+    pub dangling: Vec<bool>,
 }
 
 impl Pairing {
@@ -33,32 +33,32 @@ impl Pairing {
             let [a, b, c] = mesh.corners(t);
             area[sheet[t] as usize] += (b - a).cross(&(c - a)).norm();
         }
-        let mut partner = vec![RIM; 3 * faces];
-        let mut join = |a: &EdgeUse, b: &EdgeUse| {
-            let (a, b) = (use_of(mesh, a), use_of(mesh, b));
+        let mut partner = vec![BOUNDARY; 3 * faces];
+        let mut join = |a: &HalfEdge, b: &HalfEdge| {
+            let (a, b) = (half_edge_index(mesh, a), half_edge_index(mesh, b));
             (partner[a], partner[b]) = (b as u32, a as u32);
         };
         for group in groups.iter() {
             pair_group(group, &sheet, &area, &mut join);
         }
-        let over_pairs = (0..3 * faces).filter(|&u| partner[u] != RIM).map(|u| (u / 3, partner[u] as usize / 3));
+        let over_pairs = (0..3 * faces).filter(|&u| partner[u] != BOUNDARY).map(|u| (u / 3, partner[u] as usize / 3));
         let (piece, pieces) = components(faces, over_pairs);
-        let mut dangles = vec![false; pieces];
+        let mut dangling = vec![false; pieces];
         for group in groups.iter().filter(|g| g.len() > 1) {
-            for lone in group.iter().filter(|u| partner[use_of(mesh, u)] == RIM) {
-                dangles[piece[lone.face] as usize] = true;
+            for lone in group.iter().filter(|u| partner[half_edge_index(mesh, u)] == BOUNDARY) {
+                dangling[piece[lone.face] as usize] = true;
             }
         }
-        Pairing { partner, piece, pieces, dangles }
+        Pairing { partner, piece, pieces, dangling }
     }
 
     /// Whether each piece has a rim.
-    pub fn open(&self) -> Vec<bool> {
-        let mut open = vec![false; self.pieces];
-        for (u, _) in self.partner.iter().enumerate().filter(|(_, p)| **p == RIM) {
-            open[self.piece[u / 3] as usize] = true;
+    pub fn has_boundary(&self) -> Vec<bool> {
+        let mut has_boundary = vec![false; self.pieces];
+        for (u, _) in self.partner.iter().enumerate().filter(|(_, p)| **p == BOUNDARY) {
+            has_boundary[self.piece[u / 3] as usize] = true;
         }
-        open
+        has_boundary
     }
 
     /// The loops of rims, each as uses in the order in which a face that fills the hole goes round, against the uses.
@@ -66,27 +66,27 @@ impl Pairing {
         let mut seen = vec![false; self.partner.len()];
         let mut loops = Vec::new();
         for start in 0..self.partner.len() as u32 {
-            if self.partner[start as usize] != RIM || seen[start as usize] {
+            if self.partner[start as usize] != BOUNDARY || seen[start as usize] {
                 continue;
             }
-            let (mut rim, mut at) = (Vec::new(), start);
+            let (mut boundary, mut at) = (Vec::new(), start);
             while !seen[at as usize] {
                 seen[at as usize] = true;
-                rim.push(at);
-                at = self.rim_before(at);
+                boundary.push(at);
+                at = self.previous_boundary_edge(at);
             }
-            loops.push(rim);
+            loops.push(boundary);
         }
         loops
     }
 
-    /// The rim that ends where `rim` starts: round the fan of that corner.
-    fn rim_before(&self, rim: u32) -> u32 {
+    /// The rim that ends where `boundary` starts: round the fan of that corner.
+    fn previous_boundary_edge(&self, boundary: u32) -> u32 {
         let before = |u: u32| u / 3 * 3 + (u % 3 + 2) % 3;
-        let mut at = before(rim);
+        let mut at = before(boundary);
         for _ in 0..self.partner.len() {
             match self.partner[at as usize] {
-                RIM => return at,
+                BOUNDARY => return at,
                 other => at = before(other),
             }
         }
@@ -94,26 +94,26 @@ impl Pairing {
     }
 }
 
-fn use_of(mesh: &TriMesh, u: &EdgeUse) -> usize {
+fn half_edge_index(mesh: &TriMesh, u: &HalfEdge) -> usize {
     let (from, to) = if u.forward { (u.low, u.high) } else { (u.high, u.low) };
     let t = mesh.triangles[u.face];
     3 * u.face + (0..3).find(|&k| t[k] == from && t[(k + 1) % 3] == to).unwrap_or(0)
 }
 
-fn opposite(group: &[EdgeUse]) -> bool {
+fn opposite(group: &[HalfEdge]) -> bool {
     group.len() == 2 && group[0].forward != group[1].forward
 }
 
 /// Pairs the uses of one edge.
-fn pair_group(group: &[EdgeUse], sheet: &[u32], area: &[f64], join: &mut impl FnMut(&EdgeUse, &EdgeUse)) {
-    let mut left: Vec<&EdgeUse> = group.iter().collect();
-    let size = |u: &EdgeUse| area[sheet[u.face] as usize];
+fn pair_group(group: &[HalfEdge], sheet: &[u32], area: &[f64], join: &mut impl FnMut(&HalfEdge, &HalfEdge)) {
+    let mut left: Vec<&HalfEdge> = group.iter().collect();
+    let size = |u: &HalfEdge| area[sheet[u.face] as usize];
     left.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.face.cmp(&b.face)));
     for same_sheet in [true, false] {
         let mut n = 0;
         while n < left.len() {
             let fits =
-                |u: &&EdgeUse| u.forward != left[n].forward && (!same_sheet || sheet[u.face] == sheet[left[n].face]);
+                |u: &&HalfEdge| u.forward != left[n].forward && (!same_sheet || sheet[u.face] == sheet[left[n].face]);
             match left[n + 1..].iter().position(fits) {
                 Some(m) => {
                     join(left[n], left[n + 1 + m]);

@@ -16,15 +16,15 @@
 //! believed: memory grows with what the file holds.
 
 use super::TriMesh;
-use super::polygon::FaceCutter;
+use super::polygon::PolygonTriangulator;
 use super::strip::strip_triangles;
 use crate::{MeshError, Vec3};
 
 /// Lines of a header.
-const MOST_LINES: usize = 10_000;
+const MAX_LINES: usize = 10_000;
 
 impl TriMesh {
-    /// Reads the bytes of a PLY file. A face of more than three corners is cut into triangles ([`FaceCutter`](crate::FaceCutter)). Triangle strips
+    /// Reads the bytes of a PLY file. A face of more than three corners is cut into triangles ([`PolygonTriangulator`](crate::PolygonTriangulator)). Triangle strips
     /// turn every second triangle, start again after -1, and leave out triangles that name a vertex twice.
     ///
     /// # Errors
@@ -33,46 +33,46 @@ impl TriMesh {
         let (header, body) = Header::read(bytes)?;
         let mut mesh = TriMesh::default();
         let (mut faces, mut strips) = (Vec::new(), Vec::new());
-        let mut values = Values { encoding: header.encoding, rest: body };
+        let mut values = ValueReader { encoding: header.encoding, rest: body };
         for element in header.elements.iter().filter(|e| e.count > 0) {
             let kind = element.kind()?;
             for number in 1..=element.count {
                 let place = || format!("{} {number}", element.name);
                 match kind {
-                    Kind::Vertex(at) => mesh
+                    ElementKind::Vertex(at) => mesh
                         .vertices
-                        .push(read_vertex(element, at, &mut values).map_err(|why| refused(&place(), &why))?),
-                    Kind::Face(at) => {
-                        faces.push(read_face(element, at, &mut values).map_err(|why| refused(&place(), &why))?)
+                        .push(read_vertex(element, at, &mut values).map_err(|why| ply_error(&place(), &why))?),
+                    ElementKind::Face(at) => {
+                        faces.push(read_face(element, at, &mut values).map_err(|why| ply_error(&place(), &why))?)
                     }
-                    Kind::Strips(at) => {
-                        strips.push(read_indices(element, at, &mut values).map_err(|why| refused(&place(), &why))?)
+                    ElementKind::Strips(at) => {
+                        strips.push(read_indices(element, at, &mut values).map_err(|why| ply_error(&place(), &why))?)
                     }
-                    Kind::Other => element
+                    ElementKind::Other => element
                         .properties
                         .iter()
                         .try_for_each(|p| values.property(p, |_| {}))
-                        .map_err(|why| refused(&place(), &why))?,
+                        .map_err(|why| ply_error(&place(), &why))?,
                 }
             }
         }
-        let mut cutter = FaceCutter::default();
+        let mut triangulator = PolygonTriangulator::default();
         for (n, corners) in faces.iter().enumerate() {
-            mesh.push_face(corners, n + 1, &mut cutter)?;
+            mesh.push_face(corners, n + 1, &mut triangulator)?;
         }
         for (n, strip) in strips.iter().enumerate() {
             let triangles = strip_triangles(strip, mesh.vertices.len());
-            mesh.triangles.extend(triangles.map_err(|why| refused(&format!("tristrips {}", n + 1), &why))?);
+            mesh.triangles.extend(triangles.map_err(|why| ply_error(&format!("tristrips {}", n + 1), &why))?);
         }
         if mesh.triangles.is_empty() {
-            return Err(header.without_triangles());
+            return Err(header.no_triangles_error());
         }
         mesh.check_data()?;
         Ok(mesh)
     }
 }
 
-fn refused(place: &str, what: &str) -> MeshError {
+fn ply_error(place: &str, what: &str) -> MeshError {
     MeshError::Ply { what: format!("{place}: {what}") }
 }
 
@@ -84,7 +84,7 @@ enum Encoding {
 }
 
 #[derive(Clone, Copy)]
-enum Number {
+enum ScalarType {
     I8,
     U8,
     I16,
@@ -95,27 +95,27 @@ enum Number {
     F64,
 }
 
-impl Number {
-    fn named(word: &str) -> Option<Number> {
+impl ScalarType {
+    fn from_name(word: &str) -> Option<ScalarType> {
         Some(match word {
-            "char" | "int8" => Number::I8,
-            "uchar" | "uint8" => Number::U8,
-            "short" | "int16" => Number::I16,
-            "ushort" | "uint16" => Number::U16,
-            "int" | "int32" => Number::I32,
-            "uint" | "uint32" => Number::U32,
-            "float" | "float32" => Number::F32,
-            "double" | "float64" => Number::F64,
+            "char" | "int8" => ScalarType::I8,
+            "uchar" | "uint8" => ScalarType::U8,
+            "short" | "int16" => ScalarType::I16,
+            "ushort" | "uint16" => ScalarType::U16,
+            "int" | "int32" => ScalarType::I32,
+            "uint" | "uint32" => ScalarType::U32,
+            "float" | "float32" => ScalarType::F32,
+            "double" | "float64" => ScalarType::F64,
             _ => return None,
         })
     }
 
     fn bytes(self) -> usize {
         match self {
-            Number::I8 | Number::U8 => 1,
-            Number::I16 | Number::U16 => 2,
-            Number::I32 | Number::U32 | Number::F32 => 4,
-            Number::F64 => 8,
+            ScalarType::I8 | ScalarType::U8 => 1,
+            ScalarType::I16 | ScalarType::U16 => 2,
+            ScalarType::I32 | ScalarType::U32 | ScalarType::F32 => 4,
+            ScalarType::F64 => 8,
         }
     }
 
@@ -123,23 +123,23 @@ impl Number {
     fn value(self, b: [u8; 8]) -> f64 {
         let (two, four) = ([b[0], b[1]], [b[0], b[1], b[2], b[3]]);
         match self {
-            Number::I8 => f64::from(b[0].cast_signed()),
-            Number::U8 => f64::from(b[0]),
-            Number::I16 => f64::from(i16::from_le_bytes(two)),
-            Number::U16 => f64::from(u16::from_le_bytes(two)),
-            Number::I32 => f64::from(i32::from_le_bytes(four)),
-            Number::U32 => f64::from(u32::from_le_bytes(four)),
-            Number::F32 => f64::from(f32::from_le_bytes(four)),
-            Number::F64 => f64::from_le_bytes(b),
+            ScalarType::I8 => f64::from(b[0].cast_signed()),
+            ScalarType::U8 => f64::from(b[0]),
+            ScalarType::I16 => f64::from(i16::from_le_bytes(two)),
+            ScalarType::U16 => f64::from(u16::from_le_bytes(two)),
+            ScalarType::I32 => f64::from(i32::from_le_bytes(four)),
+            ScalarType::U32 => f64::from(u32::from_le_bytes(four)),
+            ScalarType::F32 => f64::from(f32::from_le_bytes(four)),
+            ScalarType::F64 => f64::from_le_bytes(b),
         }
     }
 }
 
 struct Property {
     name: String,
-    number: Number,
+    number: ScalarType,
     /// The kind of a list's length.
-    length: Option<Number>,
+    length: Option<ScalarType>,
 }
 
 struct Element {
@@ -150,7 +150,7 @@ struct Element {
 
 /// What of an element is wanted: the places of its properties.
 #[derive(Clone, Copy)]
-enum Kind {
+enum ElementKind {
     Vertex([usize; 3]),
     Face(usize),
     Strips(usize),
@@ -158,20 +158,20 @@ enum Kind {
 }
 
 impl Element {
-    fn kind(&self) -> Result<Kind, MeshError> {
+    fn kind(&self) -> Result<ElementKind, MeshError> {
         let at =
             |name: &str, list: bool| self.properties.iter().position(|p| p.name == name && p.length.is_some() == list);
         match self.name.as_str() {
             "vertex" => match ["x", "y", "z"].map(|name| at(name, false)) {
-                [Some(x), Some(y), Some(z)] => Ok(Kind::Vertex([x, y, z])),
-                _ => Err(refused("the element `vertex`", "wanted properties x, y and z")),
+                [Some(x), Some(y), Some(z)] => Ok(ElementKind::Vertex([x, y, z])),
+                _ => Err(ply_error("the element `vertex`", "wanted properties x, y and z")),
             },
             name @ ("face" | "tristrips") => match at("vertex_indices", true).or_else(|| at("vertex_index", true)) {
-                Some(list) if name == "face" => Ok(Kind::Face(list)),
-                Some(list) => Ok(Kind::Strips(list)),
-                None => Err(refused(&format!("the element `{name}`"), "wanted `property list … vertex_indices`")),
+                Some(list) if name == "face" => Ok(ElementKind::Face(list)),
+                Some(list) => Ok(ElementKind::Strips(list)),
+                None => Err(ply_error(&format!("the element `{name}`"), "wanted `property list … vertex_indices`")),
             },
-            _ => Ok(Kind::Other),
+            _ => Ok(ElementKind::Other),
         }
     }
 }
@@ -186,11 +186,11 @@ impl Header {
     fn read(bytes: &[u8]) -> Result<(Header, &[u8]), MeshError> {
         let (mut encoding, mut elements) = (None, Vec::<Element>::new());
         let mut rest = bytes;
-        for number in 1..=MOST_LINES {
+        for number in 1..=MAX_LINES {
             let (line, after) = first_line(rest)
-                .ok_or_else(|| refused(&format!("line {number}"), "the file ends before `end_header`"))?;
+                .ok_or_else(|| ply_error(&format!("line {number}"), "the file ends before `end_header`"))?;
             rest = after;
-            let wrong = |what: String| refused(&format!("line {number}"), &what);
+            let wrong = |what: String| ply_error(&format!("line {number}"), &what);
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
             match words.as_slice() {
                 _ if number == 1 && words != ["ply"] => return Err(wrong("wanted `ply`".into())),
@@ -211,9 +211,9 @@ impl Header {
                     elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
                 }
                 ["property", "list", length, kind, name] => {
-                    add(&mut elements, name, kind, Some(length)).map_err(wrong)?
+                    add_property(&mut elements, name, kind, Some(length)).map_err(wrong)?
                 }
-                ["property", kind, name] => add(&mut elements, name, kind, None).map_err(wrong)?,
+                ["property", kind, name] => add_property(&mut elements, name, kind, None).map_err(wrong)?,
                 ["end_header"] => {
                     let encoding = encoding.ok_or_else(|| wrong("the header has no line `format`".into()))?;
                     // an element without properties takes no place, however many there are
@@ -228,22 +228,22 @@ impl Header {
                 }
             }
         }
-        Err(refused(&format!("line {MOST_LINES}"), "the header has no end"))
+        Err(ply_error(&format!("line {MAX_LINES}"), "the header has no end"))
     }
 
     /// The error of a file whose elements hold no triangle, such as a cloud of points.
-    fn without_triangles(&self) -> MeshError {
+    fn no_triangles_error(&self) -> MeshError {
         let names: Vec<String> = self.elements.iter().take(10).map(|e| format!("{} {}", e.count, e.name)).collect();
-        refused(
+        ply_error(
             "the file has no triangles",
             &format!("wanted elements `face` or `tristrips`; there are: {}", names.join(", ")),
         )
     }
 }
 
-fn add(elements: &mut [Element], name: &str, kind: &str, length: Option<&str>) -> Result<(), String> {
+fn add_property(elements: &mut [Element], name: &str, kind: &str, length: Option<&str>) -> Result<(), String> {
     let number = |word: &str| {
-        Number::named(word).ok_or_else(|| {
+        ScalarType::from_name(word).ok_or_else(|| {
             format!("`{word}` is no kind of number; wanted char, uchar, short, ushort, int, uint, float or double")
         })
     };
@@ -264,12 +264,12 @@ fn first_line(bytes: &[u8]) -> Option<(&str, &[u8])> {
 }
 
 /// The numbers after the header.
-struct Values<'a> {
+struct ValueReader<'a> {
     encoding: Encoding,
     rest: &'a [u8],
 }
 
-impl Values<'_> {
+impl ValueReader<'_> {
     /// Reads a property, and gives `each` the numbers of it that are no length.
     fn property(&mut self, property: &Property, mut each: impl FnMut(f64)) -> Result<(), String> {
         let Some(length) = property.length else {
@@ -286,11 +286,11 @@ impl Values<'_> {
         Ok(())
     }
 
-    fn next(&mut self, number: Number) -> Result<f64, String> {
+    fn next(&mut self, number: ScalarType) -> Result<f64, String> {
         if self.encoding == Encoding::Ascii { self.next_word() } else { self.next_bytes(number) }
     }
 
-    fn next_bytes(&mut self, number: Number) -> Result<f64, String> {
+    fn next_bytes(&mut self, number: ScalarType) -> Result<f64, String> {
         let (own, rest) = self.rest.split_at_checked(number.bytes()).ok_or("the file ends before it")?;
         self.rest = rest;
         let mut bytes = [0; 8];
@@ -311,7 +311,7 @@ impl Values<'_> {
     }
 }
 
-fn read_vertex(element: &Element, at: [usize; 3], values: &mut Values<'_>) -> Result<Vec3, String> {
+fn read_vertex(element: &Element, at: [usize; 3], values: &mut ValueReader<'_>) -> Result<Vec3, String> {
     let mut vertex = Vec3::zeros();
     for (n, property) in element.properties.iter().enumerate() {
         let axis = at.iter().position(|k| *k == n);
@@ -321,7 +321,7 @@ fn read_vertex(element: &Element, at: [usize; 3], values: &mut Values<'_>) -> Re
 }
 
 /// Corners as numbers from 1.
-fn read_face(element: &Element, at: usize, values: &mut Values<'_>) -> Result<Vec<i64>, String> {
+fn read_face(element: &Element, at: usize, values: &mut ValueReader<'_>) -> Result<Vec<i64>, String> {
     let mut corners = read_indices(element, at, values)?;
     if corners.len() < 3 {
         return Err(format!("{} corners, but it needs at least 3", corners.len()));
@@ -331,7 +331,7 @@ fn read_face(element: &Element, at: usize, values: &mut Values<'_>) -> Result<Ve
 }
 
 /// The list at place `at` of an element's properties: numbers of vertices, from 0 as in the file.
-fn read_indices(element: &Element, at: usize, values: &mut Values<'_>) -> Result<Vec<i64>, String> {
+fn read_indices(element: &Element, at: usize, values: &mut ValueReader<'_>) -> Result<Vec<i64>, String> {
     let mut indices = Vec::new();
     let mut odd = None;
     for (n, property) in element.properties.iter().enumerate() {

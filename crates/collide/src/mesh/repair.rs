@@ -13,7 +13,7 @@ use crate::{MeshError, Vec3};
 /// What [`TriMesh::repair`] may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RepairSettings {
-    /// Vertices at most this far apart become one, metres; 0 (the default) for those at the same place, else 1e-12 to
+    /// Vertices at most this far apart become one, meters; 0 (the default) for those at the same place, else 1e-12 to
     /// 0.01 of the diagonal.
     pub weld: f64,
     /// A hole of more edges than this is an error, 3 to 5000 (default 2000).
@@ -38,7 +38,7 @@ pub struct RepairReport {
     pub degenerate_faces: usize,
     /// Faces removed because the same face was there before.
     pub duplicate_faces: usize,
-    /// Faces reversed to agree with their neighbours.
+    /// Faces reversed to agree with their neighbors.
     pub flipped_faces: usize,
     /// Pieces that hung from an edge where others go on, dropped.
     pub dangling_pieces: usize,
@@ -73,7 +73,7 @@ impl RepairReport {
         );
         say(self.degenerate_faces, format!("{} faces of zero area were dropped", self.degenerate_faces));
         say(self.duplicate_faces, format!("{} faces that were there twice were dropped", self.duplicate_faces));
-        say(self.flipped_faces, format!("{} faces were reversed to agree with their neighbours", self.flipped_faces));
+        say(self.flipped_faces, format!("{} faces were reversed to agree with their neighbors", self.flipped_faces));
         say(
             self.dangling_pieces,
             format!("{} dangling piece(s) of {} face(s) were dropped", self.dangling_pieces, self.dangling_faces),
@@ -129,7 +129,7 @@ impl TriMesh {
             }
             Err(refused) => refused,
         };
-        match mesh.closed_up(settings, &mut report) {
+        match mesh.close_surface(settings, &mut report) {
             Ok(()) => {
                 *self = mesh;
                 Ok(report)
@@ -142,7 +142,7 @@ impl TriMesh {
         }
     }
 
-    fn closed_up(&mut self, settings: &RepairSettings, report: &mut RepairReport) -> Result<(), String> {
+    fn close_surface(&mut self, settings: &RepairSettings, report: &mut RepairReport) -> Result<(), String> {
         let (mut mesh, welded) = self.with_shared_vertices();
         report.welded_vertices += welded;
         let mut face_of: Vec<usize> = (0..mesh.triangles.len()).collect();
@@ -172,11 +172,11 @@ impl TriMesh {
             return;
         };
         let limit = debris * self.diagonal();
-        let open = pairing.open();
+        let open = pairing.has_boundary();
         let mut keep = vec![true; self.triangles.len()];
         for piece in (0..pairing.pieces).filter(|&p| open[p] && p != largest) {
             let bounds = crate::Aabb::around(faces[piece].iter().flat_map(|&f| self.corners(f)));
-            if pairing.dangles[piece] {
+            if pairing.dangling[piece] {
                 report.dangling_pieces += 1;
                 report.dangling_faces += faces[piece].len();
             } else if (bounds.max - bounds.min).norm() <= limit {
@@ -198,7 +198,7 @@ impl TriMesh {
 
     fn fill_holes(&mut self, most_edges: usize, report: &mut RepairReport) -> Result<(), String> {
         let pairing = Pairing::of(self);
-        if pairing.dangles.contains(&true) {
+        if pairing.dangling.contains(&true) {
             return Err("faces meet at an edge without a way to tell which go on over it".into());
         }
         let loops = pairing.loops();
@@ -210,16 +210,16 @@ impl TriMesh {
             let [a, b, c] = self.corners(t);
             (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
         };
-        let by_weight = holes::longest_by_weight(loops.iter().map(Vec::len).sum());
+        let max_dp_edges = holes::max_dp_edges_for(loops.iter().map(Vec::len).sum());
         let mut added = Vec::new();
-        for rim in &loops {
+        for boundary in &loops {
             // the filling goes against the faces around: from the end of each use to its start
             let end = |u: u32| self.triangles[u as usize / 3][(u as usize % 3 + 1) % 3];
-            let vertices: Vec<u32> = rim.iter().map(|&u| end(u)).collect();
+            let vertices: Vec<u32> = boundary.iter().map(|&u| end(u)).collect();
             let points: Vec<Vec3> = vertices.iter().map(|&v| self.vertices[v as usize]).collect();
-            let normals: Vec<Vec3> = rim.iter().map(|&u| unit(u as usize / 3)).collect();
-            if rim.len() >= 3 {
-                added.extend(holes::fill(&points, &normals, by_weight).iter().map(|t| t.map(|k| vertices[k])));
+            let normals: Vec<Vec3> = boundary.iter().map(|&u| unit(u as usize / 3)).collect();
+            if boundary.len() >= 3 {
+                added.extend(holes::fill(&points, &normals, max_dp_edges).iter().map(|t| t.map(|k| vertices[k])));
             }
         }
         report.filled_holes = loops.len();
@@ -265,7 +265,7 @@ impl RepairSettings {
             return refuse(
                 "the welding distance of a repair",
                 self.weld,
-                "0, or 1e-12 to 0.01 of the mesh's diagonal, metres",
+                "0, or 1e-12 to 0.01 of the mesh's diagonal, meters",
             );
         }
         if !(3..=5000).contains(&self.hole_edges) {

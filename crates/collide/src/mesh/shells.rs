@@ -46,7 +46,7 @@ pub(crate) fn shells(mesh: &TriMesh, groups: &EdgeGroups) -> (Vec<u32>, usize) {
 
 impl TriMesh {
     /// Turns shells that are inside out one by one; returns how many were.
-    pub(super) fn turn_shells(&mut self, shell: &[u32], count: usize) -> usize {
+    pub(super) fn orient_shells(&mut self, shell: &[u32], count: usize) -> usize {
         let mut members: Vec<Vec<usize>> = vec![Vec::new(); count];
         shell.iter().enumerate().for_each(|(face, &s)| members[s as usize].push(face));
         let negative: Vec<bool> = members.iter().map(|faces| self.volume_of(faces) < 0.0).collect();
@@ -58,26 +58,26 @@ impl TriMesh {
             samples(faces).any(|face| {
                 let p = self.centroid(face);
                 let own: f64 = faces.iter().filter(|&&f| f != face).map(|&f| solid_angle(&p, &self.corners(f))).sum();
-                (all.without(&p, &[face as u32]) - own / (4.0 * PI)).abs() < 0.5
+                (all.excluding(&p, &[face as u32]) - own / (4.0 * PI)).abs() < 0.5
             })
         };
-        let mut turned: Vec<bool> =
+        let mut inverted: Vec<bool> =
             members.iter().zip(&negative).map(|(faces, negative)| *negative && outside(faces)).collect();
-        let those: Vec<[u32; 3]> =
-            (0..shell.len()).filter(|&f| turned[shell[f] as usize]).map(|f| self.triangles[f]).collect();
-        if those.is_empty() {
+        let inverted_faces: Vec<[u32; 3]> =
+            (0..shell.len()).filter(|&f| inverted[shell[f] as usize]).map(|f| self.triangles[f]).collect();
+        if inverted_faces.is_empty() {
             return 0;
         }
-        let around = WindingNumber::new(&TriMesh { vertices: self.vertices.clone(), triangles: those });
+        let around = WindingNumber::new(&TriMesh { vertices: self.vertices.clone(), triangles: inverted_faces });
         for (s, faces) in members.iter().enumerate().filter(|(s, _)| !negative[*s]) {
-            turned[s] = samples(faces).all(|face| around.at(&self.centroid(face)) < -0.5);
+            inverted[s] = samples(faces).all(|face| around.at(&self.centroid(face)) < -0.5);
         }
         for (face, triangle) in self.triangles.iter_mut().enumerate() {
-            if turned[shell[face] as usize] {
+            if inverted[shell[face] as usize] {
                 triangle.swap(1, 2);
             }
         }
-        turned.iter().filter(|t| **t).count()
+        inverted.iter().filter(|t| **t).count()
     }
 
     fn centroid(&self, face: usize) -> Vec3 {

@@ -1,7 +1,7 @@
 //! STL, text and binary. The format has no shared vertices, so equal positions are welded (exact comparison).
 
 use super::TriMesh;
-use super::text::numbered;
+use super::text::numbered_lines;
 use crate::{MeshError, Vec3};
 
 /// 80 bytes of title, then the count.
@@ -57,7 +57,7 @@ fn read_binary(bytes: &[u8]) -> Vec<Vec3> {
 fn read_text(text: &str) -> Result<Vec<Vec3>, MeshError> {
     let mut soup = Vec::new();
     let mut last = 1;
-    for (line, words) in numbered(text) {
+    for (line, words) in numbered_lines(text) {
         let mut words = words.split_whitespace();
         match words.next() {
             Some(word) if word.eq_ignore_ascii_case("vertex") => soup.push(text_vertex(words, line)?),

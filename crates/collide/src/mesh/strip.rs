@@ -14,7 +14,7 @@ pub(super) fn strip_triangles(indices: &[i64], count: usize) -> Result<Vec<[u32;
         if !strip.is_empty() && strip.len() < 3 {
             return Err(format!("a strip of {} vertices, but it needs at least 3", strip.len()));
         }
-        let strip: Vec<u32> = strip.iter().map(|&index| checked(index, count)).collect::<Result<_, _>>()?;
+        let strip: Vec<u32> = strip.iter().map(|&index| check_index(index, count)).collect::<Result<_, _>>()?;
         let turned = |(k, v): (usize, &[u32])| if k % 2 == 0 { [v[0], v[1], v[2]] } else { [v[1], v[0], v[2]] };
         let proper = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
         triangles.extend(strip.windows(3).enumerate().map(turned).filter(proper));
@@ -22,7 +22,7 @@ pub(super) fn strip_triangles(indices: &[i64], count: usize) -> Result<Vec<[u32;
     Ok(triangles)
 }
 
-fn checked(index: i64, count: usize) -> Result<u32, String> {
+fn check_index(index: i64, count: usize) -> Result<u32, String> {
     let within = u32::try_from(index).ok().filter(|&v| (v as usize) < count);
     within
         .ok_or_else(|| format!("it points at vertex {index} (from 0), but there are {count} vertices; -1 ends a strip"))

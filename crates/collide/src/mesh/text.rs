@@ -6,7 +6,7 @@ use std::borrow::Cow;
 ///
 /// # Errors
 /// Where a byte is 0: that is no text. The error is the offset of the first, from 0.
-pub fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, usize> {
+pub fn decode_text(bytes: &[u8]) -> Result<Cow<'_, str>, usize> {
     if let Some(zero) = bytes.iter().position(|b| *b == 0) {
         return Err(zero);
     }
@@ -17,7 +17,7 @@ pub fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, usize> {
 }
 
 /// Lines with their numbers from 1, without the mark at the beginning of the text.
-pub(super) fn numbered(text: &str) -> impl Iterator<Item = (usize, &str)> {
+pub(super) fn numbered_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     // a `\r` before a `\n` is white space, which nobody minds; one alone ends a line
     let alone = !text.contains('\n');
@@ -26,7 +26,7 @@ pub(super) fn numbered(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// The same, where a line that ends in `\` goes on in the next one; it has the number of its first line.
 pub fn obj_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
-    let mut lines = numbered(text);
+    let mut lines = numbered_lines(text);
     std::iter::from_fn(move || {
         let (number, first) = lines.next()?;
         let Some(mut begun) = first.trim_end().strip_suffix('\\').map(str::to_owned) else {

@@ -1,7 +1,7 @@
 //! The boundary of the solid that a closed surface goes around at least once.
 //!
 //! Where shells overlap, or a surface crosses itself, some of it is buried. Faces that cross others are cut along the
-//! planes of those others, so that each piece lies on one side of every other face. A piece's centre `c` then tells
+//! planes of those others, so that each piece lies on one side of every other face. A piece's center `c` then tells
 //! for the whole of it: with the faces through `c` left out,
 //!
 //! ```text
@@ -23,16 +23,16 @@ use super::winding::WindingNumber;
 use crate::Vec3;
 
 /// Faces with more others across them than this are not cut.
-const MOST_PARTNERS: usize = 64;
+const MAX_PARTNERS: usize = 64;
 /// Pieces of one face.
-const MOST_PIECES: usize = 512;
+const MAX_PIECES: usize = 512;
 /// Pieces per face of the mesh, on average, and a floor for small meshes; further faces are not cut.
-const MOST_CUT: usize = 4;
-const FEWEST_CUT: usize = 200_000;
+const MAX_CUT: usize = 4;
+const MIN_CUT: usize = 200_000;
 /// Faces closer than this part of the diagonal lie on each other.
 const SAME_PLACE: f64 = 1e-10;
 /// A winding number farther than this from an integer is not believed.
-const DOUBT: f64 = 0.2;
+const MAX_ROUNDING: f64 = 0.2;
 
 /// A triangle of the boundary.
 #[derive(Clone, Debug)]
@@ -73,14 +73,14 @@ pub(super) struct Boundary {
 impl Boundary {
     /// Of a closed mesh (see [`TriMesh::check_closed`]).
     pub fn of(mesh: &TriMesh) -> (Boundary, Option<WindingNumber>) {
-        Boundary::by(mesh, &Crossings::of(mesh))
+        Boundary::from_crossings(mesh, &Crossings::of(mesh))
     }
 
     /// The same of a mesh whose crossing faces are known.
-    pub fn by(mesh: &TriMesh, crossings: &Crossings) -> (Boundary, Option<WindingNumber>) {
+    pub fn from_crossings(mesh: &TriMesh, crossings: &Crossings) -> (Boundary, Option<WindingNumber>) {
         let groups = edge_groups(mesh);
         let patches = patches(mesh, &groups, crossings);
-        let split = pinched(mesh, &groups);
+        let split = pinched_vertices(mesh, &groups);
         let simple = crossings.pairs.is_empty() && !crossings.capped && patches.count == 1;
         let winding = (!simple || split.contains(&true)).then(|| WindingNumber::new(mesh));
         let mut boundary = Boundary {
@@ -91,12 +91,14 @@ impl Boundary {
             doubtful_area: 0.0,
         };
         match &winding {
-            Some(winding) if !simple => boundary.cut(mesh, crossings, &patches, winding),
-            _ => (0..mesh.triangles.len()).for_each(|t| boundary.keep(t, mesh.corners(t), Told::Bounds(1.0))),
+            Some(winding) if !simple => boundary.split(mesh, crossings, &patches, winding),
+            _ => {
+                (0..mesh.triangles.len()).for_each(|t| boundary.add_piece(t, mesh.corners(t), PieceClass::Bounds(1.0)))
+            }
         }
         if boundary.pieces.is_empty() {
             // a surface around nothing: there is a distance, and no inside
-            (0..mesh.triangles.len()).for_each(|t| boundary.keep(t, mesh.corners(t), Told::Doubtful));
+            (0..mesh.triangles.len()).for_each(|t| boundary.add_piece(t, mesh.corners(t), PieceClass::Doubtful));
         }
         boundary.trust(mesh, split);
         (boundary, winding)
@@ -107,49 +109,49 @@ impl Boundary {
         Moments::of(self.pieces.iter().map(|p| (p.corners, p.weight)), origin)
     }
 
-    fn cut(&mut self, mesh: &TriMesh, crossings: &Crossings, patches: &Patches, winding: &WindingNumber) {
+    fn split(&mut self, mesh: &TriMesh, crossings: &Crossings, patches: &Patches, winding: &WindingNumber) {
         let mut partners = vec![Vec::new(); mesh.triangles.len()];
         for &(a, b) in &crossings.pairs {
             partners[a as usize].push(b);
             partners[b as usize].push(a);
         }
         let tolerance = SAME_PLACE * mesh.diagonal();
-        let most = (MOST_CUT * mesh.triangles.len()).max(FEWEST_CUT);
-        let mut cut = 0;
-        let mut outcome: Vec<Option<Told>> = vec![None; patches.count];
+        let most = (MAX_CUT * mesh.triangles.len()).max(MIN_CUT);
+        let mut split = 0;
+        let mut outcome: Vec<Option<PieceClass>> = vec![None; patches.count];
         for face in 0..mesh.triangles.len() {
             let others = &partners[face];
             if crossings.capped {
-                self.keep(face, mesh.corners(face), Told::Doubtful);
+                self.add_piece(face, mesh.corners(face), PieceClass::Doubtful);
             } else if others.is_empty() {
-                let told = *outcome[patches.of[face] as usize].get_or_insert_with(|| {
+                let class = *outcome[patches.of[face] as usize].get_or_insert_with(|| {
                     let largest = patches.largest[patches.of[face] as usize];
-                    tell(mesh, winding, largest, &mesh.corners(largest), &[], tolerance)
+                    classify(mesh, winding, largest, &mesh.corners(largest), &[], tolerance)
                 });
-                self.keep(face, mesh.corners(face), told);
-            } else if let Some(parts) = parts(mesh, face, others).filter(|_| cut <= most) {
-                cut += parts.len();
+                self.add_piece(face, mesh.corners(face), class);
+            } else if let Some(parts) = split_face(mesh, face, others).filter(|_| split <= most) {
+                split += parts.len();
                 for part in parts {
-                    self.keep(face, part, tell(mesh, winding, face, &part, others, tolerance));
+                    self.add_piece(face, part, classify(mesh, winding, face, &part, others, tolerance));
                 }
             } else {
-                self.keep(face, mesh.corners(face), Told::Doubtful);
+                self.add_piece(face, mesh.corners(face), PieceClass::Doubtful);
             }
         }
     }
 
-    fn keep(&mut self, face: usize, corners: [Vec3; 3], told: Told) {
-        let weight = match told {
-            Told::Buried => 0.0,
-            Told::Bounds(share) => share.abs(),
-            Told::Doubtful => {
+    fn add_piece(&mut self, face: usize, corners: [Vec3; 3], class: PieceClass) {
+        let weight = match class {
+            PieceClass::Buried => 0.0,
+            PieceClass::Bounds(fraction) => fraction.abs(),
+            PieceClass::Doubtful => {
                 self.doubtful_area += 0.5 * area_vector(&corners).norm();
                 1.0
             }
         };
         self.differs |= weight != 1.0;
         if weight != 0.0 {
-            let faces_out = matches!(told, Told::Bounds(share) if share > 0.0);
+            let faces_out = matches!(class, PieceClass::Bounds(fraction) if fraction > 0.0);
             let trust = if faces_out { Trust::Face } else { Trust::None };
             self.pieces.push(Piece { corners, face: face as u32, weight, trust });
         }
@@ -174,7 +176,7 @@ impl Boundary {
 
 /// What a piece is to the solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Told {
+enum PieceClass {
     /// Solid, or none, on both sides.
     Buried,
     /// Its boundary, of which it is such a share; negative where the solid is in front of it.
@@ -183,14 +185,14 @@ enum Told {
     Doubtful,
 }
 
-fn tell(
+fn classify(
     mesh: &TriMesh,
     winding: &WindingNumber,
     face: usize,
     part: &[Vec3; 3],
     others: &[u32],
     tolerance: f64,
-) -> Told {
+) -> PieceClass {
     let center = part.iter().sum::<Vec3>() / 3.0;
     let normal = area_vector(&mesh.corners(face));
     let mut through = vec![face as u32];
@@ -204,19 +206,19 @@ fn tell(
             jump += normal.dot(&facing).signum();
         }
     }
-    let middle = winding.without(&center, &through);
+    let middle = winding.excluding(&center, &through);
     let (front, back) = (middle - 0.5 * jump, middle + 0.5 * jump);
-    if (front - front.round()).abs() > DOUBT || normal.norm() == 0.0 {
-        return Told::Doubtful;
+    if (front - front.round()).abs() > MAX_ROUNDING || normal.norm() == 0.0 {
+        return PieceClass::Doubtful;
     }
-    if (front > 0.5) == (back > 0.5) { Told::Buried } else { Told::Bounds(1.0 / jump) }
+    if (front > 0.5) == (back > 0.5) { PieceClass::Buried } else { PieceClass::Bounds(1.0 / jump) }
 }
 
 /// A face cut along the planes of others, and of the edges of those that lie in its own plane; `None` if they are
 /// too many.
-fn parts(mesh: &TriMesh, face: usize, others: &[u32]) -> Option<Vec<[Vec3; 3]>> {
+fn split_face(mesh: &TriMesh, face: usize, others: &[u32]) -> Option<Vec<[Vec3; 3]>> {
     let corners = mesh.corners(face);
-    if others.len() > MOST_PARTNERS {
+    if others.len() > MAX_PARTNERS {
         return None;
     }
     let normal = area_vector(&corners);
@@ -227,12 +229,12 @@ fn parts(mesh: &TriMesh, face: usize, others: &[u32]) -> Option<Vec<[Vec3; 3]>> 
         if normal.cross(&facing).norm() <= 1e-9 * normal.norm() * facing.norm() {
             for k in 0..3 {
                 let (from, to) = (across[k], across[(k + 1) % 3]);
-                pieces = cut(pieces, &across, &from, &normal.cross(&(to - from)));
+                pieces = split(pieces, &across, &from, &normal.cross(&(to - from)));
             }
         } else {
-            pieces = cut(pieces, &across, &across[0], &facing);
+            pieces = split(pieces, &across, &across[0], &facing);
         }
-        if pieces.len() > MOST_PIECES {
+        if pieces.len() > MAX_PIECES {
             return None;
         }
     }
@@ -240,7 +242,7 @@ fn parts(mesh: &TriMesh, face: usize, others: &[u32]) -> Option<Vec<[Vec3; 3]>> 
 }
 
 /// Cuts those convex pieces that could meet the triangle `across` by the plane through `at` along `normal`.
-fn cut(pieces: Vec<Vec<Vec3>>, across: &[Vec3; 3], at: &Vec3, normal: &Vec3) -> Vec<Vec<Vec3>> {
+fn split(pieces: Vec<Vec<Vec3>>, across: &[Vec3; 3], at: &Vec3, normal: &Vec3) -> Vec<Vec<Vec3>> {
     let bounds = crate::Aabb::around(*across);
     let mut after = Vec::with_capacity(pieces.len() + 1);
     for piece in pieces {
@@ -251,13 +253,13 @@ fn cut(pieces: Vec<Vec<Vec3>>, across: &[Vec3; 3], at: &Vec3, normal: &Vec3) -> 
             after.push(piece);
             continue;
         }
-        after.extend([1.0, -1.0].map(|sign| half(&piece, &heights, sign)).into_iter().filter(|p| p.len() >= 3));
+        after.extend([1.0, -1.0].map(|sign| clip_half(&piece, &heights, sign)).into_iter().filter(|p| p.len() >= 3));
     }
     after
 }
 
 /// What of a convex piece lies where `sign · height ≥ 0`.
-fn half(piece: &[Vec3], heights: &[f64], sign: f64) -> Vec<Vec3> {
+fn clip_half(piece: &[Vec3], heights: &[f64], sign: f64) -> Vec<Vec3> {
     let mut kept = Vec::with_capacity(piece.len() + 1);
     for n in 0..piece.len() {
         let m = (n + 1) % piece.len();
@@ -268,8 +270,8 @@ fn half(piece: &[Vec3], heights: &[f64], sign: f64) -> Vec<Vec3> {
         if h * g < 0.0 {
             // from the same end for both halves, so that they share the very point
             let (low, high) = if heights[n] < heights[m] { (n, m) } else { (m, n) };
-            let share = heights[low] / (heights[low] - heights[high]);
-            kept.push(piece[low] + (piece[high] - piece[low]) * share);
+            let fraction = heights[low] / (heights[low] - heights[high]);
+            kept.push(piece[low] + (piece[high] - piece[low]) * fraction);
         }
     }
     kept
@@ -294,10 +296,10 @@ fn patches(mesh: &TriMesh, groups: &EdgeGroups, crossings: &Crossings) -> Patche
     for &(a, b) in &crossings.pairs {
         (crosses[a as usize], crosses[b as usize]) = (true, true);
     }
-    let mut neighbours = vec![Vec::new(); mesh.triangles.len()];
+    let mut neighbors = vec![Vec::new(); mesh.triangles.len()];
     for group in groups.iter().filter(|g| g.len() == 2 && !crosses[g[0].face] && !crosses[g[1].face]) {
-        neighbours[group[0].face].push(group[1].face);
-        neighbours[group[1].face].push(group[0].face);
+        neighbors[group[0].face].push(group[1].face);
+        neighbors[group[1].face].push(group[0].face);
     }
     let mut patches = Patches { of: vec![u32::MAX; mesh.triangles.len()], largest: Vec::new(), count: 0 };
     let area = |t: usize| area_vector(&mesh.corners(t)).norm_squared();
@@ -313,7 +315,7 @@ fn patches(mesh: &TriMesh, groups: &EdgeGroups, crossings: &Crossings) -> Patche
             if area(face) > area(largest) {
                 largest = face;
             }
-            for &next in &neighbours[face] {
+            for &next in &neighbors[face] {
                 if patches.of[next] == u32::MAX {
                     patches.of[next] = patch;
                     open.push(next);
@@ -326,7 +328,7 @@ fn patches(mesh: &TriMesh, groups: &EdgeGroups, crossings: &Crossings) -> Patche
 }
 
 /// Which vertices have more than one fan of faces around them, an edge of more than two, or a face without area.
-fn pinched(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<bool> {
+fn pinched_vertices(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<bool> {
     let mut pinched = vec![false; mesh.vertices.len()];
     for (_, triangle) in
         mesh.triangles.iter().enumerate().filter(|(t, _)| area_vector(&mesh.corners(*t)) == Vec3::zeros())

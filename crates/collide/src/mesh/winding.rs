@@ -19,17 +19,17 @@
 //! numbers for soups and clouds* (2018), of which the first two terms are taken.
 
 use super::TriMesh;
-use super::boxes::BoxTree;
+use super::aabb_tree::AabbTree;
 use crate::{Mat3, Vec3};
 use nalgebra::RealField;
 use std::f64::consts::PI;
 
-/// A group whose triangles all lie within `R` of its middle is far at `FAR·R`.
-const FAR: f64 = 2.0;
+/// A group whose triangles all lie within `R` of its middle is far at `FAR_FACTOR·R`.
+const FAR_FACTOR: f64 = 2.0;
 /// A sum farther than this from an integer is taken again, exactly.
-const DOUBT: f64 = 0.2;
+const MAX_ROUNDING: f64 = 0.2;
 /// A point lies in a triangle's plane where the box that its three corners span, seen from there, is smaller than this part of the product of its edges.
-const WITHIN: f64 = 1e-14;
+const COPLANAR: f64 = 1e-14;
 
 /// How a triangle is seen from a point.
 type Angle = fn(&Vec3, &[Vec3; 3]) -> f64;
@@ -37,7 +37,7 @@ type Angle = fn(&Vec3, &[Vec3; 3]) -> f64;
 /// A mesh made ready for winding numbers.
 #[derive(Clone, Debug)]
 pub struct WindingNumber {
-    tree: BoxTree,
+    tree: AabbTree,
     /// In the order of the leaves.
     corners: Vec<[Vec3; 3]>,
     groups: Vec<Group>,
@@ -47,7 +47,7 @@ pub struct WindingNumber {
 #[derive(Clone, Copy, Debug)]
 struct Group {
     middle: Vec3,
-    /// `(FAR·R)²`
+    /// `(FAR_FACTOR·R)²`
     far: f64,
     area: Vec3,
     moment: Mat3,
@@ -57,7 +57,7 @@ impl WindingNumber {
     /// Prepares a mesh, open or closed, of at least one triangle.
     pub fn new(mesh: &TriMesh) -> WindingNumber {
         let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
-        let tree = BoxTree::new(&corners);
+        let tree = AabbTree::new(&corners);
         let corners: Vec<[Vec3; 3]> = tree.ids.iter().map(|&t| corners[t as usize]).collect();
         let mut groups = Vec::with_capacity(tree.nodes.len());
         let ends = ends(&tree);
@@ -67,10 +67,10 @@ impl WindingNumber {
         WindingNumber { tree, corners, groups }
     }
 
-    /// The winding number at `p`, metres. Groups of triangles that are far are taken together, which errs by some
+    /// The winding number at `p`, meters. Groups of triangles that are far are taken together, which errs by some
     /// thousandths; where the sum is not close to an integer, every triangle is taken.
     pub fn at(&self, p: &Vec3) -> f64 {
-        self.without(p, &[])
+        self.excluding(p, &[])
     }
 
     /// The same by the sum of all solid angles, for any mesh; time linear in the mesh.
@@ -80,25 +80,25 @@ impl WindingNumber {
 
     /// Whether `p` is inside the solid around which the surface goes at least once.
     pub fn contains(&self, p: &Vec3) -> bool {
-        self.sum_in_doubt(p, &[], seen_from_within) > 0.5
+        self.checked_sum(p, &[], solid_angle_off_plane) > 0.5
     }
 
     /// Without some triangles, through which `p` passes.
-    pub(super) fn without(&self, p: &Vec3, skipped: &[u32]) -> f64 {
-        self.sum_in_doubt(p, skipped, solid_angle)
+    pub(super) fn excluding(&self, p: &Vec3, skipped: &[u32]) -> f64 {
+        self.checked_sum(p, skipped, solid_angle)
     }
 
-    fn sum_in_doubt(&self, p: &Vec3, skipped: &[u32], angle: Angle) -> f64 {
+    fn checked_sum(&self, p: &Vec3, skipped: &[u32], angle: Angle) -> f64 {
         let near = self.sum(p, skipped, 1.0, angle);
         // what is skipped may stand for halves
-        if (2.0 * near - (2.0 * near).round()).abs() <= DOUBT {
+        if (2.0 * near - (2.0 * near).round()).abs() <= MAX_ROUNDING {
             near
         } else {
             self.sum(p, skipped, f64::INFINITY, angle)
         }
     }
 
-    fn sum(&self, p: &Vec3, skipped: &[u32], caution: f64, angle: Angle) -> f64 {
+    fn sum(&self, p: &Vec3, skipped: &[u32], far_scale: f64, angle: Angle) -> f64 {
         let mut sum = 0.0;
         let mut open = [0_u32; 64];
         let mut depth = 1;
@@ -108,7 +108,7 @@ impl WindingNumber {
             let (node, group) = (&self.tree.nodes[n], &self.groups[n]);
             let r = group.middle - p;
             let square = r.norm_squared();
-            if square > group.far * caution {
+            if square > group.far * far_scale {
                 sum += group.angle(&r, square);
             } else if node.count > 0 {
                 let kept = node.range().filter(|&k| !skipped.contains(&self.tree.ids[k]));
@@ -135,7 +135,7 @@ impl Group {
         let middle = if total > 0.0 { first / total } else { triangles[0][0] };
         let moment = triangles.iter().map(weighed).map(|(n, c)| (c - middle) * n.transpose()).sum();
         let square = triangles.iter().flatten().map(|p| (p - middle).norm_squared()).fold(0.0, f64::max);
-        Group { middle, far: FAR * FAR * square, area, moment }
+        Group { middle, far: FAR_FACTOR * FAR_FACTOR * square, area, moment }
     }
 
     fn angle(&self, r: &Vec3, square: f64) -> f64 {
@@ -145,7 +145,7 @@ impl Group {
 }
 
 /// Past the last triangle of each node.
-fn ends(tree: &BoxTree) -> Vec<usize> {
+fn ends(tree: &AabbTree) -> Vec<usize> {
     let mut ends = vec![0; tree.nodes.len()];
     for n in (0..tree.nodes.len()).rev() {
         let node = &tree.nodes[n];
@@ -156,9 +156,9 @@ fn ends(tree: &BoxTree) -> Vec<usize> {
 
 /// [`solid_angle`], and 0 from a point within the triangle: the middle of what is seen from its two sides, so that faces that lie on each other back to back
 /// count as none.
-fn seen_from_within(p: &Vec3, corners: &[Vec3; 3]) -> f64 {
+fn solid_angle_off_plane(p: &Vec3, corners: &[Vec3; 3]) -> f64 {
     let [a, b, c] = corners.map(|x| x - p);
-    let flat = a.dot(&b.cross(&c)).abs() <= WITHIN * a.norm() * b.norm() * c.norm();
+    let flat = a.dot(&b.cross(&c)).abs() <= COPLANAR * a.norm() * b.norm() * c.norm();
     if flat { 0.0 } else { solid_angle(p, corners) }
 }
 

@@ -5,7 +5,7 @@
 //! | symbol | meaning |
 //! |---|---|
 //! | `R` | B's axes as columns, in A's frame |
-//! | `t` | B's centre in A's frame |
+//! | `t` | B's center in A's frame |
 //! | `a`, `b` | half extents |
 //! | separation on axis `n` | `|t·n| − Σ aᵢ|eᵢ·n| − Σ bⱼ|Rⱼ·n|`, a lower bound of the signed distance |
 //!
@@ -17,7 +17,7 @@ use super::{box_closest, reduce};
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 
 /// The two boxes in A's frame.
-pub(super) struct Frames {
+pub(super) struct BoxPair {
     pub a: Vec3,
     pub b: Vec3,
     pub r: Mat3,
@@ -46,21 +46,21 @@ pub(super) fn box_box(a: &Vec3, pose_a: &Pose, b: &Vec3, pose_b: &Pose, margin: 
         return;
     }
     let rotation_b = pose_b.rotation.to_rotation_matrix();
-    let frames = Frames {
+    let boxes = BoxPair {
         a: *a,
         b: *b,
         r: rotation_a.matrix().tr_mul(rotation_b.matrix()),
         t: rotation_a.matrix().tr_mul(&offset),
     };
     let start = out.len();
-    in_frame_of_a(&frames, margin, out);
+    in_frame_of_a(&boxes, margin, out);
     for contact in &mut out[start..] {
         contact.point = rotation_a * contact.point + pose_a.translation.vector;
         contact.normal = rotation_a * contact.normal;
     }
 }
 
-fn in_frame_of_a(f: &Frames, margin: f64, out: &mut Vec<Contact>) {
+fn in_frame_of_a(f: &BoxPair, margin: f64, out: &mut Vec<Contact>) {
     let smallest = f.a.min().min(f.b.min());
     let Some(face) = best_face(f, margin, 1e-4 * smallest) else { return };
     let Some(edge) = best_edge(f, margin) else { return };
@@ -86,26 +86,26 @@ fn in_frame_of_a(f: &Frames, margin: f64, out: &mut Vec<Contact>) {
 
 /// The face axis of greatest separation (A's unless B's is greater by `bias`); `None` if some axis separates by more
 /// than `margin`.
-fn best_face(f: &Frames, margin: f64, bias: f64) -> Option<FaceAxis> {
+fn best_face(f: &BoxPair, margin: f64, bias: f64) -> Option<FaceAxis> {
     let across_a = f.t.abs() - f.a - f.r.abs() * f.b;
     let across_b = f.r.tr_mul(&f.t).abs() - f.b - f.r.abs().tr_mul(&f.a);
     if across_a.max() > margin || across_b.max() > margin {
         return None;
     }
-    let (ka, kb) = (first_greatest(&across_a, bias), first_greatest(&across_b, bias));
+    let (ka, kb) = (greatest_axis(&across_a, bias), greatest_axis(&across_b, bias));
     let of_b = across_b[kb] > across_a[ka] + bias;
     let (k, separation) = if of_b { (kb, across_b[kb]) } else { (ka, across_a[ka]) };
     Some(FaceAxis { of_b, k, separation })
 }
 
 /// Index of the greatest entry, where a later one must be greater by `bias`.
-fn first_greatest(v: &Vec3, bias: f64) -> usize {
+fn greatest_axis(v: &Vec3, bias: f64) -> usize {
     (1..3).fold(0, |best, k| if v[k] > v[best] + bias { k } else { best })
 }
 
 /// The pair of edges of greatest separation, if any is not parallel; outer `None` if one separates by more than
 /// `margin`.
-fn best_edge(f: &Frames, margin: f64) -> Option<Option<EdgeAxis>> {
+fn best_edge(f: &BoxPair, margin: f64) -> Option<Option<EdgeAxis>> {
     let mut best: Option<EdgeAxis> = None;
     for i in 0..3 {
         for j in 0..3 {
@@ -129,7 +129,7 @@ fn best_edge(f: &Frames, margin: f64) -> Option<Option<EdgeAxis>> {
 }
 
 /// One contact midway between the two edges that support the axis.
-fn edge_contact(f: &Frames, edge: &EdgeAxis) -> Contact {
+fn edge_contact(f: &BoxPair, edge: &EdgeAxis) -> Contact {
     let EdgeAxis { normal, i, j, separation } = edge;
     let local_b = f.r.tr_mul(normal);
     // A's edge lies furthest against the normal, B's furthest along it
@@ -159,7 +159,7 @@ fn sign_bits(v: &Vec3) -> u64 {
 }
 
 /// A face manifold that is never empty: if rounding clips all away, the supporting corner stands for it.
-fn face_or_support(f: &Frames, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) {
+fn face_or_support(f: &BoxPair, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) {
     let start = out.len();
     face_manifold(f, face, margin, out);
     if out.len() == start {
@@ -173,7 +173,7 @@ fn face_or_support(f: &Frames, face: &FaceAxis, margin: f64, out: &mut Vec<Conta
 
 /// Clips the incident face by the reference face's prism; appends up to 4 points with gap ≤ `margin`, returns the
 /// least gap.
-fn face_manifold(f: &Frames, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) -> f64 {
+fn face_manifold(f: &BoxPair, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) -> f64 {
     let view = FaceView::new(f, face);
     let slop = 1e-3 * view.half.min().min(view.other_half.min());
     let mut polygon = Polygon::quad(view.incident_face());
@@ -190,17 +190,17 @@ fn face_manifold(f: &Frames, face: &FaceAxis, margin: f64, out: &mut Vec<Contact
             out.push(contact);
         }
     }
-    reduce::to_four(out, start);
+    reduce::reduce_to_four(out, start);
     least
 }
 
 /// The reference box's frame, and the other box seen from it.
 struct FaceView<'a> {
-    frames: &'a Frames,
+    boxes: &'a BoxPair,
     face: &'a FaceAxis,
     half: Vec3,
     other_half: Vec3,
-    /// The other box's axes and centre in the reference frame.
+    /// The other box's axes and center in the reference frame.
     axes: Mat3,
     center: Vec3,
     /// Which side of the reference axis faces the other box.
@@ -208,11 +208,11 @@ struct FaceView<'a> {
 }
 
 impl<'a> FaceView<'a> {
-    fn new(f: &'a Frames, face: &'a FaceAxis) -> FaceView<'a> {
+    fn new(f: &'a BoxPair, face: &'a FaceAxis) -> FaceView<'a> {
         let (half, other_half, axes, center) =
             if face.of_b { (f.b, f.a, f.r.transpose(), -f.r.tr_mul(&f.t)) } else { (f.a, f.b, f.r, f.t) };
         let sign = if center[face.k] < 0.0 { -1.0 } else { 1.0 };
-        FaceView { frames: f, face, half, other_half, axes, center, sign }
+        FaceView { boxes: f, face, half, other_half, axes, center, sign }
     }
 
     /// Axis and side of the other box's face that is turned most against the reference normal.
@@ -240,7 +240,7 @@ impl<'a> FaceView<'a> {
         let faces = 6 * (2 * k + usize::from(self.sign > 0.0)) + 2 * j + usize::from(side > 0.0);
         let feature = (u64::from(self.face.of_b) << 16) | (faces as u64) << 6 | name;
         let (point, normal, normal_from) = if self.face.of_b {
-            (self.frames.t + self.frames.r * middle, self.frames.r * outward, NormalFrom::FaceOfB)
+            (self.boxes.t + self.boxes.r * middle, self.boxes.r * outward, NormalFrom::FaceOfB)
         } else {
             (middle, -outward, NormalFrom::FaceOfA)
         };

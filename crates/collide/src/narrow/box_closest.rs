@@ -3,13 +3,13 @@
 //! The closest pair then has an edge or corner of B in it (a corner of A over a face of B belongs to the face case),
 //! so the least of the twelve exact distances from B's edges to A is the answer.
 
-use super::box_box::Frames;
+use super::box_box::BoxPair;
 use super::segment::segment_box;
 use super::sphere::{clamp, region};
 use crate::{Contact, NormalFrom, Vec3};
 
 /// In A's frame; `None` if the boxes touch or overlap.
-pub(super) fn closest(f: &Frames) -> Option<Contact> {
+pub(super) fn closest(f: &BoxPair) -> Option<Contact> {
     let mut best: Option<Contact> = None;
     for axis in 0..3 {
         for corner in 0..4_u64 {
@@ -23,7 +23,7 @@ pub(super) fn closest(f: &Frames) -> Option<Contact> {
 }
 
 /// B's edge along `axis`; the bits of `corner` are its signs on the other two axes.
-fn edge_to_box(f: &Frames, axis: usize, corner: u64) -> Option<Contact> {
+fn edge_to_box(f: &BoxPair, axis: usize, corner: u64) -> Option<Contact> {
     let (k1, k2) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut middle = Vec3::zeros();
     middle[k1] = if corner & 1 == 1 { f.b[k1] } else { -f.b[k1] };

@@ -9,9 +9,9 @@ use crate::shape::axis;
 use crate::{Contact, NormalFrom, Pose, Vec3};
 
 /// Sine of the angle under which two capsules count as lying along each other.
-const ALONG: f64 = 0.05;
+const PARALLEL_SINE: f64 = 0.05;
 /// Cosine of the angle between the closest direction and a face normal under which the face carries the capsule.
-const ON_FACE: f64 = 0.99;
+const FACE_COSINE: f64 = 0.99;
 
 pub(super) fn capsule_capsule(
     (ra, la): (f64, f64),
@@ -30,21 +30,21 @@ pub(super) fn capsule_capsule(
         return;
     }
     let across = ea.cross(&eb).norm();
-    if across < ALONG && push_overlap_ends((ca, ua, ra), (cb, ub, rb), closest.gap, margin, out) {
+    if across < PARALLEL_SINE && push_overlap_ends((ca, ua, ra), (cb, ub, rb), closest.gap, margin, out) {
         return;
     }
     let interior = s.abs() < 1.0 && t.abs() < 1.0;
-    if interior && across >= ALONG {
+    if interior && across >= PARALLEL_SINE {
         closest.normal_from = NormalFrom::Edges;
     }
     if closest.gap + ra + rb < 1e-9 * (ra + rb) {
-        push_crossing_axes(&mut closest, &ea, &eb, rb);
+        separate_crossing_axes(&mut closest, &ea, &eb, rb);
     }
     out.push(closest);
 }
 
 /// Where the axes meet, the way out is across both.
-fn push_crossing_axes(contact: &mut Contact, ea: &Vec3, eb: &Vec3, rb: f64) {
+fn separate_crossing_axes(contact: &mut Contact, ea: &Vec3, eb: &Vec3, rb: f64) {
     let cross = ea.cross(eb);
     let normal = if cross.norm() > 1e-9 { cross.normalize() } else { any_perpendicular(ea) };
     contact.point += (normal - contact.normal) * (rb + 0.5 * contact.gap);
@@ -86,13 +86,13 @@ fn push_overlap_ends(
 }
 
 /// A capsule's segment `c + s·u`, `s ∈ [−1, 1]`, in the frame of the box that it meets.
-struct Core {
+struct CoreSegment {
     c: Vec3,
     u: Vec3,
     radius: f64,
 }
 
-impl Core {
+impl CoreSegment {
     fn at(&self, s: f64) -> Vec3 {
         self.c + self.u * s
     }
@@ -108,7 +108,7 @@ pub(super) fn capsule_box(
     out: &mut Vec<Contact>,
 ) {
     let local = pose_b.inv_mul(pose_a);
-    let core = Core { c: local.translation.vector, u: axis(&local) * half_length, radius };
+    let core = CoreSegment { c: local.translation.vector, u: axis(&local) * half_length, radius };
     let s = segment_box(&core.c, &core.u, half);
     let distance = (core.at(s) - clamp(&core.at(s), half)).norm();
     if distance > radius + margin {
@@ -127,14 +127,14 @@ pub(super) fn capsule_box(
 }
 
 /// The core segment is outside the box; `s` is its closest point.
-fn separated_cores(core: &Core, s: f64, half: &Vec3, margin: f64, out: &mut Vec<Contact>) {
+fn separated_cores(core: &CoreSegment, s: f64, half: &Vec3, margin: f64, out: &mut Vec<Contact>) {
     let (p, radius) = (core.at(s), core.radius);
     let offset = p - clamp(&p, half);
     let distance = offset.norm();
     let normal = offset / distance;
     let k = normal.iamax();
     let mut least = f64::INFINITY;
-    if normal[k].abs() > ON_FACE {
+    if normal[k].abs() > FACE_COSINE {
         least = push_on_face(core, half, (k, normal[k].signum()), margin, out);
     }
     let gap = distance - radius;
@@ -164,7 +164,7 @@ fn end_code(s: f64) -> u64 {
 
 /// Contacts at both ends of the part of the segment that is over the face across axis `k` on side `sign`; returns the
 /// least gap.
-fn push_on_face(core: &Core, half: &Vec3, (k, sign): (usize, f64), margin: f64, out: &mut Vec<Contact>) -> f64 {
+fn push_on_face(core: &CoreSegment, half: &Vec3, (k, sign): (usize, f64), margin: f64, out: &mut Vec<Contact>) -> f64 {
     let (slop, radius) = (1e-3 * half.min(), core.radius);
     let Some((low, high)) = clip_to_prism(&core.c, &core.u, &half.add_scalar(slop), k) else { return f64::INFINITY };
     let ends = if (high - low) * core.u.norm() < 1e-3 * radius { &[low][..] } else { &[low, high][..] };
@@ -192,8 +192,8 @@ fn push_on_face(core: &Core, half: &Vec3, (k, sign): (usize, f64), margin: f64, 
 }
 
 /// The core segment passes through the box: least separation over the faces and the edges' cross products.
-fn crossing_cores(core: &Core, half: &Vec3, margin: f64, out: &mut Vec<Contact>) {
-    let Core { c, u, radius } = core;
+fn crossing_cores(core: &CoreSegment, half: &Vec3, margin: f64, out: &mut Vec<Contact>) {
+    let CoreSegment { c, u, radius } = core;
     let face = c.abs() - u.abs() - half;
     let k = face.imax();
     let edge =

@@ -9,11 +9,11 @@ use crate::{Contact, NormalFrom, Pose, Vec3};
 
 /// Sine of the tilt below which the lowest rim point is not told apart from the fixed ones (it lies lower by 0.3 of
 /// this, in radii).
-const LEVEL: f64 = 1e-4;
+const LEVEL_TILT: f64 = 1e-4;
 /// Sine of the tilt above which a face stands on one point.
-const STEEP: f64 = 0.2;
+const STEEP_TILT: f64 = 0.2;
 /// Sine of the tilt above which the cylinder lies.
-const LYING: f64 = 0.99;
+const SIDE_TILT: f64 = 0.99;
 
 pub(super) fn half_space(
     (radius, half_length): (f64, f64),
@@ -27,7 +27,7 @@ pub(super) fn half_space(
     // the way down in the flat faces
     let down = up * up.dot(&normal) - normal;
     let tilt = down.norm();
-    let core_a = if tilt > LYING { radius } else { 0.0 };
+    let core_a = if tilt > SIDE_TILT { radius } else { 0.0 };
     for (face, side) in [-1.0, 1.0].into_iter().enumerate() {
         let middle = pose_a.translation.vector + up * (side * half_length);
         let mut push = |direction: Vec3, n: usize| {
@@ -46,10 +46,10 @@ pub(super) fn half_space(
                 });
             }
         };
-        if tilt > LEVEL {
+        if tilt > LEVEL_TILT {
             push(down / tilt, 0);
         }
-        if tilt < STEEP {
+        if tilt < STEEP_TILT {
             let (x, y) = (pose_a.rotation * Vec3::x(), pose_a.rotation * Vec3::y());
             [x, y, -x, -y].into_iter().enumerate().for_each(|(n, direction)| push(direction, n + 1));
         }

@@ -3,7 +3,7 @@
 use crate::shape::axis;
 use crate::{Contact, NormalFrom, Pose, Vec3};
 
-/// Emits the contact of a ball about `core` (radius 0: a vertex) with the plane, if within `margin`.
+/// Emits the contact of a sphere about `core` (radius 0: a vertex) with the plane, if within `margin`.
 #[inline]
 fn push(core: Vec3, radius: f64, normal: &Vec3, origin: &Vec3, feature: u64, margin: f64, out: &mut Vec<Contact>) {
     let gap = normal.dot(&(core - origin)) - radius;

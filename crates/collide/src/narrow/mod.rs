@@ -8,29 +8,29 @@ mod cylinder;
 mod half_space;
 mod parts;
 mod reduce;
+mod sdf_contact;
 mod segment;
 mod sphere;
-mod surface;
 mod tree;
 
-use crate::surface::Field;
-use crate::surface::primitive::{BoxField, CylinderField, HalfSpaceField, RoundField};
+use crate::sdf::DistanceField;
+use crate::sdf::primitive::{BoxField, CylinderField, HalfSpaceField, RoundField};
 use crate::{Contact, ContactMode, Pose, Shape};
-use surface::{Body, Source};
+use sdf_contact::{Body, BodyElements};
 
-/// [`contacts_in`] the default mode, `surface`.
+/// [`contacts_in_mode`] the default mode, `surface`.
 pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
-    contacts_in(ContactMode::Surface, a, pose_a, b, pose_b, margin, out);
+    contacts_in_mode(ContactMode::Surface, a, pose_a, b, pose_b, margin, out);
 }
 
-/// Appends to `out` all contacts between `a` and `b` whose gap is at most `margin` metres (`margin ≥ 0`).
+/// Appends to `out` all contacts between `a` and `b` whose gap is at most `margin` meters (`margin ≥ 0`).
 ///
 /// Normals point from B towards A. Exact among half-space, sphere, box and capsule, and for a cylinder on a
 /// half-space. Where a mesh or another cylinder takes part, the mode decides: see [`ContactMode`]. Manifolds are
 /// reduced to the few points that matter. Does not allocate beyond the growth of `out`. A pose that is not finite
 /// touches nothing.
 #[allow(clippy::too_many_arguments)]
-pub fn contacts_in(
+pub fn contacts_in_mode(
     mode: ContactMode,
     a: &Shape,
     pose_a: &Pose,
@@ -44,9 +44,9 @@ pub fn contacts_in(
     }
     let start = out.len();
     if rank(a) <= rank(b) {
-        ordered(mode, a, pose_a, b, pose_b, margin, out);
+        dispatch(mode, a, pose_a, b, pose_b, margin, out);
     } else {
-        ordered(mode, b, pose_b, a, pose_a, margin, out);
+        dispatch(mode, b, pose_b, a, pose_a, margin, out);
         out[start..].iter_mut().for_each(|c| *c = c.flipped());
     }
 }
@@ -67,7 +67,15 @@ fn rank(shape: &Shape) -> u8 {
     }
 }
 
-fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+fn dispatch(
+    mode: ContactMode,
+    a: &Shape,
+    pose_a: &Pose,
+    b: &Shape,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     use Shape::{Box, Capsule, Cylinder, HalfSpace, Sphere};
     match (a, b) {
         (Sphere { radius: ra }, Sphere { radius: rb }) => sphere::sphere_sphere(*ra, pose_a, *rb, pose_b, margin, out),
@@ -91,11 +99,11 @@ fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose
         (Box { half_extents }, HalfSpace) => half_space::cuboid(half_extents, pose_a, pose_b, margin, out),
         (HalfSpace, HalfSpace) => {}
         (Cylinder(c), HalfSpace) => cylinder::half_space((c.radius(), c.half_length()), pose_a, pose_b, margin, out),
-        _ if mode == ContactMode::Surface && parts_of(a) == 1 && parts_of(b) == 1 => {
-            with_body(a, 0, &mut |a| with_body(b, 0, &mut |b| surface::surface(a, pose_a, b, pose_b, margin, out)))
+        _ if mode == ContactMode::Surface && part_count(a) == 1 && part_count(b) == 1 => {
+            with_body(a, 0, &mut |a| with_body(b, 0, &mut |b| sdf_contact::contacts(a, pose_a, b, pose_b, margin, out)))
         }
-        _ if mode == ContactMode::Surface && parts_of(a) > 0 && parts_of(b) > 0 => {
-            parts::parts(a, pose_a, b, pose_b, margin, out)
+        _ if mode == ContactMode::Surface && part_count(a) > 0 && part_count(b) > 0 => {
+            parts::contacts_of_parts(a, pose_a, b, pose_b, margin, out)
         }
         _ => match (a.tree(), b.tree()) {
             (Some(tree_a), Some(tree_b)) => tree::tree_tree(tree_a, pose_a, tree_b, pose_b, margin, out),
@@ -107,32 +115,34 @@ fn ordered(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose
 }
 
 /// How many surfaces a shape has: several where shells of a mesh overlap, none for meshes that cross themselves in another way.
-fn parts_of(shape: &Shape) -> usize {
+fn part_count(shape: &Shape) -> usize {
     if let Shape::Mesh(mesh) = shape { mesh.surfaces().len() } else { 1 }
 }
 
 /// What the `surface` mode knows of a shape, or of that part of it.
-fn with_body(shape: &Shape, part: usize, then: &mut dyn FnMut(&Body)) {
+fn with_body(shape: &Shape, part: usize, visit: &mut dyn FnMut(&Body)) {
     let radius = shape.bounding_radius();
-    let mut go = |source: Source, field: &dyn Field| then(&Body { source, field, mesh: None, radius });
+    let mut call =
+        |elements: BodyElements, field: &dyn DistanceField| visit(&Body { elements, field, mesh: None, radius });
     match shape {
-        Shape::HalfSpace => go(Source::Nothing, &HalfSpaceField),
-        Shape::Sphere { radius } => {
-            go(Source::Round { radius: *radius, half_length: 0.0 }, &RoundField { radius: *radius, half_length: 0.0 })
-        }
+        Shape::HalfSpace => call(BodyElements::Empty, &HalfSpaceField),
+        Shape::Sphere { radius } => call(
+            BodyElements::Round { radius: *radius, half_length: 0.0 },
+            &RoundField { radius: *radius, half_length: 0.0 },
+        ),
         Shape::Capsule { radius, half_length } => {
             let (radius, half_length) = (*radius, *half_length);
-            go(Source::Round { radius, half_length }, &RoundField { radius, half_length })
+            call(BodyElements::Round { radius, half_length }, &RoundField { radius, half_length })
         }
-        Shape::Box { half_extents } => go(Source::Box(*half_extents), &BoxField { half: *half_extents }),
+        Shape::Box { half_extents } => call(BodyElements::Box(*half_extents), &BoxField { half: *half_extents }),
         Shape::Cylinder(c) => {
             let (radius, half_length) = (c.radius(), c.half_length());
-            go(Source::Cylinder { radius, half_length }, &CylinderField { radius, half_length })
+            call(BodyElements::Cylinder { radius, half_length }, &CylinderField { radius, half_length })
         }
         Shape::Mesh(mesh) => {
             let Some(surface) = mesh.surfaces().get(part) else { return };
-            let source = Source::Mesh(&surface.elements);
-            then(&Body { source, field: &surface.field, mesh: Some(&surface.field), radius })
+            let elements = BodyElements::Mesh(&surface.elements);
+            visit(&Body { elements, field: &surface.field, mesh: Some(&surface.field), radius })
         }
     }
 }

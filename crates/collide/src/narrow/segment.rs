@@ -1,6 +1,6 @@
 //! Closest points of segments. A segment is `c + s·u`, `s ∈ [−1, 1]` (`u` half its length).
 //!
-//! Segment–segment: Ericson, *Real-Time Collision Detection* (2005), §5.1.9, in centred form.
+//! Segment–segment: Ericson, *Real-Time Collision Detection* (2005), §5.1.9, in centered form.
 //! Segment–box: `f(s) = |p(s) − clamp(p(s))|²` is convex and quadratic between the at most six values of `s` where a
 //! coordinate crosses a face plane, so `f'` is linear there and its root is found exactly.
 

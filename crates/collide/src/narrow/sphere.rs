@@ -77,7 +77,7 @@ fn edge(region: u64) -> Option<usize> {
 
 /// What a box says of a point, in the box's frame.
 pub(super) struct PointBox {
-    /// Signed distance from the surface, metres.
+    /// Signed distance from the surface, meters.
     pub distance: f64,
     /// Outward unit normal at the closest surface point.
     pub normal: Vec3,

@@ -1,8 +1,8 @@
 //! Sphere trees against each other and against primitives: the thesis's mode, where point and normal come from leaf
-//! balls.
+//! spheres.
 //!
-//! Source: thesis §IV.B.3.a–b. Two trees are walked together, the larger ball opened first. A primitive is asked for
-//! its signed distance at a ball's centre; it changes by at most 1 m per metre, so a ball that is further than
+//! Source: thesis §IV.B.3.a–b. Two trees are walked together, the larger sphere opened first. A primitive is asked for
+//! its signed distance at a sphere's center; it changes by at most 1 m per meter, so a sphere that is further than
 //! `margin` hides no leaf within it. The feature of a contact is the pair of leaf indices.
 
 use super::reduce::Collector;
@@ -12,7 +12,7 @@ use crate::{Contact, NormalFrom, Pose, Shape, SphereTree, Vec3};
 use nalgebra::Point3;
 
 /// Both trees, seen from B's frame.
-struct Pair<'a> {
+struct TreePair<'a> {
     a: &'a SphereTree,
     b: &'a SphereTree,
     a_in_b: Pose,
@@ -26,23 +26,23 @@ pub(super) fn tree_tree(
     margin: f64,
     out: &mut Vec<Contact>,
 ) {
-    let pair = Pair { a, b, a_in_b: pose_b.inv_mul(pose_a) };
+    let pair = TreePair { a, b, a_in_b: pose_b.inv_mul(pose_a) };
     let smaller = a.nodes()[0].radius.min(b.nodes()[0].radius);
     let mut found = Collector::new(margin, smaller, out);
-    pair.visit(0, &pair.place(0), 0, &mut found);
+    pair.visit(0, &pair.center_in_b(0), 0, &mut found);
     found.finish(pose_b);
 }
 
-impl Pair<'_> {
-    /// The place of a ball of A as B sees it.
-    fn place(&self, na: usize) -> Vec3 {
+impl TreePair<'_> {
+    /// The place of a sphere of A as B sees it.
+    fn center_in_b(&self, na: usize) -> Vec3 {
         (self.a_in_b * Point3::from(self.a.nodes()[na].center)).coords
     }
 
-    /// A pair of balls, A's at `center_a`. It is placed once for all of B's balls that it is held against.
+    /// A pair of spheres, A's at `center_a`. It is placed once for all of B's spheres that it is held against.
     fn visit(&self, na: usize, center_a: &Vec3, nb: usize, found: &mut Collector) {
         let (a, b) = (&self.a.nodes()[na], &self.b.nodes()[nb]);
-        // a deep limit leaves nothing of balls that are too small to reach it
+        // a deep limit leaves nothing of spheres that are too small to reach it
         let reach = (a.radius + b.radius + found.limit()).max(0.0);
         if (center_a - b.center).norm_squared() > reach * reach {
             return;
@@ -51,7 +51,7 @@ impl Pair<'_> {
             let feature = (na as u64) << 32 | nb as u64;
             found.push(Contact::between_cores((*center_a, a.radius), (b.center, b.radius), feature));
         } else if b.is_leaf() || (!a.is_leaf() && a.radius >= b.radius) {
-            a.child_range().for_each(|child| self.visit(child, &self.place(child), nb, found));
+            a.child_range().for_each(|child| self.visit(child, &self.center_in_b(child), nb, found));
         } else {
             b.child_range().for_each(|child| self.visit(na, center_a, child, found));
         }
@@ -59,7 +59,7 @@ impl Pair<'_> {
 }
 
 /// What a primitive says of a point in its own frame.
-struct Field {
+struct PrimitiveSample {
     distance: f64,
     normal: Vec3,
     core: f64,
@@ -82,38 +82,38 @@ pub(super) fn tree_primitive(
 }
 
 fn visit(tree: &SphereTree, pose: &Pose, primitive: &Shape, node: usize, found: &mut Collector) {
-    let ball = &tree.nodes()[node];
-    let center = (pose * Point3::from(ball.center)).coords;
-    let Some(field) = field(primitive, &center) else { return };
-    let gap = field.distance - ball.radius;
+    let sphere = &tree.nodes()[node];
+    let center = (pose * Point3::from(sphere.center)).coords;
+    let Some(sample) = sample_primitive(primitive, &center) else { return };
+    let gap = sample.distance - sphere.radius;
     if gap > found.limit() {
         return;
     }
-    if !ball.is_leaf() {
-        ball.child_range().for_each(|child| visit(tree, pose, primitive, child, found));
+    if !sphere.is_leaf() {
+        sphere.child_range().for_each(|child| visit(tree, pose, primitive, child, found));
         return;
     }
     found.push(Contact {
-        point: center - field.normal * (ball.radius + 0.5 * gap),
-        normal: field.normal,
+        point: center - sample.normal * (sphere.radius + 0.5 * gap),
+        normal: sample.normal,
         gap,
         feature: (node as u64) << 32,
-        core_a: ball.radius,
-        core_b: field.core,
-        normal_from: if field.face { NormalFrom::FaceOfB } else { NormalFrom::CorePoints },
+        core_a: sphere.radius,
+        core_b: sample.core,
+        normal_from: if sample.face { NormalFrom::FaceOfB } else { NormalFrom::CorePoints },
     });
 }
 
 /// Signed distance and outward normal of a primitive at `p`; `None` for shapes that have no such formula here.
-fn field(primitive: &Shape, p: &Vec3) -> Option<Field> {
+fn sample_primitive(primitive: &Shape, p: &Vec3) -> Option<PrimitiveSample> {
     match primitive {
-        Shape::HalfSpace => Some(Field { distance: p.z, normal: Vec3::z(), core: 0.0, face: true }),
-        Shape::Sphere { radius } => Some(round_field(p, *radius)),
+        Shape::HalfSpace => Some(PrimitiveSample { distance: p.z, normal: Vec3::z(), core: 0.0, face: true }),
+        Shape::Sphere { radius } => Some(sample_round(p, *radius)),
         Shape::Capsule { radius, half_length } => {
             let u = Vec3::z() * *half_length;
-            Some(round_field(&(p - u * closest_on_segment(p, &u)), *radius))
+            Some(sample_round(&(p - u * closest_on_segment(p, &u)), *radius))
         }
-        Shape::Box { half_extents } => point_box(p, half_extents).map(|f| Field {
+        Shape::Box { half_extents } => point_box(p, half_extents).map(|f| PrimitiveSample {
             distance: f.distance,
             normal: f.normal,
             core: 0.0,
@@ -123,9 +123,9 @@ fn field(primitive: &Shape, p: &Vec3) -> Option<Field> {
     }
 }
 
-/// A ball about the core point that `offset` starts at; on it, x.
-fn round_field(offset: &Vec3, radius: f64) -> Field {
+/// A sphere about the core point that `offset` starts at; on it, x.
+fn sample_round(offset: &Vec3, radius: f64) -> PrimitiveSample {
     let length = offset.norm();
     let normal = if length > 1e-300 { offset / length } else { Vec3::x() };
-    Field { distance: length - radius, normal, core: radius, face: false }
+    PrimitiveSample { distance: length - radius, normal, core: radius, face: false }
 }

@@ -5,7 +5,7 @@
 
 use super::{MeshShape, Tree};
 use crate::bytes::{Reader, Write};
-use crate::surface::Surface;
+use crate::sdf::Surface;
 use crate::{ClosedReport, MassProperties, Mat3, SphereTree, TriMesh};
 use std::sync::OnceLock;
 
@@ -51,9 +51,9 @@ fn write_report(report: &ClosedReport, to: &mut Vec<u8>) {
 
 fn counts(report: &ClosedReport) -> impl Iterator<Item = usize> {
     let ClosedReport { welded_vertices, degenerate_faces, duplicate_faces, flipped_faces, .. } = *report;
-    let ClosedReport { nonmanifold_edges, shells, turned_shells, crossing_faces, .. } = *report;
+    let ClosedReport { nonmanifold_edges, shells, inverted_shells, crossing_faces, .. } = *report;
     let first = [welded_vertices, degenerate_faces, duplicate_faces, flipped_faces];
-    first.into_iter().chain([nonmanifold_edges, shells, turned_shells, crossing_faces])
+    first.into_iter().chain([nonmanifold_edges, shells, inverted_shells, crossing_faces])
 }
 
 fn read_report(from: &mut Reader) -> Option<ClosedReport> {
@@ -64,7 +64,7 @@ fn read_report(from: &mut Reader) -> Option<ClosedReport> {
         flipped_faces: from.size()?,
         nonmanifold_edges: from.size()?,
         shells: from.size()?,
-        turned_shells: from.size()?,
+        inverted_shells: from.size()?,
         crossing_faces: from.size()?,
         turned: from.flag()?,
         crossing_capped: from.flag()?,

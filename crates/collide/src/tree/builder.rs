@@ -1,7 +1,7 @@
 //! What every builder does: a job in, nested cells and an account of the stages out.
 
 use super::TreeSettings;
-use super::ball::Ball;
+use super::sphere::Sphere;
 use crate::{MeshDistance, MeshError, TriMesh};
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ pub(super) struct Job<'a> {
 
 /// A method of building: one file (or folder) each.
 pub(super) trait TreeBuilder {
-    /// Nested cells whose balls cover the surface; the balls of inner cells are made later, around their children.
+    /// Nested cells whose spheres cover the surface; the spheres of inner cells are made later, around their children.
     fn build(&self, job: &Job) -> Result<Built, MeshError>;
 }
 
@@ -26,16 +26,16 @@ pub(super) struct Built {
     pub stages: Vec<StageCount>,
 }
 
-/// Nested cells, whose leaves have their balls.
+/// Nested cells, whose leaves have their spheres.
 pub(super) enum Cell {
-    Leaf(Ball),
+    Leaf(Sphere),
     Inner(Vec<Cell>),
 }
 
 /// Hears how far a build is, and can end it; called from any thread that works on the build.
 pub trait Progress: Sync {
     /// `share` of the work is done, 0 to 1; does not fall.
-    fn at(&self, share: f64);
+    fn report(&self, share: f64);
 
     /// Whether the build shall end early, with [`MeshError::Stopped`]. Asked in every long loop; a build that runs to its end does not
     /// depend on it.
@@ -45,20 +45,20 @@ pub trait Progress: Sync {
 }
 
 /// [`MeshError::Stopped`] where the build shall end early.
-pub(super) fn go_on(progress: &dyn Progress) -> Result<(), MeshError> {
+pub(super) fn check_stopped(progress: &dyn Progress) -> Result<(), MeshError> {
     if progress.stopped() { Err(MeshError::Stopped) } else { Ok(()) }
 }
 
 /// Nobody listens.
 impl Progress for () {
-    fn at(&self, _share: f64) {}
+    fn report(&self, _share: f64) {}
 }
 
 /// How often a stage of a builder did its work at one level.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageCount {
-    /// Level of the balls that were made, the root being 0.
+    /// Level of the spheres that were made, the root being 0.
     pub level: u32,
     /// The stage, in the words of the builder's file.
     pub stage: String,

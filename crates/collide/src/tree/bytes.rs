@@ -4,7 +4,7 @@ use super::{SphereNode, SphereTree};
 use crate::bytes::{Reader, Write};
 
 /// Levels of a tree that is read, at most.
-const MOST_LEVELS: u32 = 64;
+const MAX_LEVELS: u32 = 64;
 
 impl SphereTree {
     pub(crate) fn write(&self, to: &mut Vec<u8>) {
@@ -16,7 +16,7 @@ impl SphereTree {
         });
     }
 
-    /// `None` where it is no tree of nested balls.
+    /// `None` where it is no tree of nested spheres.
     pub(crate) fn read(from: &mut Reader) -> Option<SphereTree> {
         let mut nodes = from.list(read_node)?;
         // breadth first: the children of each follow those of the one before
@@ -25,7 +25,7 @@ impl SphereTree {
             let first = if nodes[n].children == 0 { 0 } else { next as u32 };
             let level = nodes[n].level + 1;
             let end = next + nodes[n].children as usize;
-            if (nodes[n].children > 0 && next <= n) || level > MOST_LEVELS {
+            if (nodes[n].children > 0 && next <= n) || level > MAX_LEVELS {
                 return None;
             }
             nodes[n].first_child = first;

@@ -23,14 +23,14 @@ impl SphereTree {
     /// # Errors
     /// Those of the build; none of the cache.
     pub fn build_cached(mesh: &TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<CachedTree, MeshError> {
-        SphereTree::build_cached_watched(mesh, settings, cache, &())
+        SphereTree::build_cached_with_progress(mesh, settings, cache, &())
     }
 
     /// The same, told how far it is.
     ///
     /// # Errors
     /// As [`SphereTree::build_cached`].
-    pub fn build_cached_watched(
+    pub fn build_cached_with_progress(
         mesh: &TriMesh,
         settings: &TreeSettings,
         cache: &TreeCache,
@@ -42,16 +42,16 @@ impl SphereTree {
         let mut note = None;
         match entry.as_ref().map(|entry| read(entry, &id, settings)) {
             Some(Ok(Some(file))) => {
-                progress.at(1.0);
+                progress.report(1.0);
                 return Ok(CachedTree { tree: file.tree, stages: file.stages, found: true, note });
             }
             Some(Err(why)) => note = Some(why),
             None | Some(Ok(None)) => {}
         }
-        let (tree, stages) = SphereTree::build_watched(mesh, settings, progress)?;
+        let (tree, stages) = SphereTree::build_with_progress(mesh, settings, progress)?;
         let mut built = CachedTree { tree, stages, found: false, note };
         if let Some(entry) = entry
-            && let Err(why) = entry.write(text_of(&built, id, settings).as_bytes())
+            && let Err(why) = entry.write(json_of(&built, id, settings).as_bytes())
         {
             built.note.get_or_insert(why);
         }
@@ -69,7 +69,7 @@ fn read(entry: &Entry, mesh: &MeshId, settings: &TreeSettings) -> Result<Option<
     Ok(Some(found))
 }
 
-fn text_of(built: &CachedTree, mesh: MeshId, settings: &TreeSettings) -> String {
+fn json_of(built: &CachedTree, mesh: MeshId, settings: &TreeSettings) -> String {
     let (name, quality) = (String::new(), Vec::new());
     let (stages, tree) = (built.stages.clone(), built.tree.clone());
     TreeFile { name, mesh, settings: *settings, stages, quality, tree }.to_json()

@@ -1,127 +1,128 @@
-//! Balls around a surface, one more at a time.
+//! Spheres around a surface, one more at a time.
 //!
-//! The surface is split into small pieces of triangles. Each piece belongs to one ball, which holds it: a piece lies in a ball iff its corners do. So the balls
-//! cover the surface at all times, whatever is done to them. What a ball about `c` with the pieces `P` needs to reach outside the solid is at most
+//! The surface is split into small pieces of triangles. Each piece belongs to one sphere, which holds it: a piece lies in a sphere iff its corners do. So the spheres
+//! cover the surface at all times, whatever is done to them. What a sphere about `c` with the pieces `P` needs to reach outside the solid is at most
 //!
 //! ```text
 //! need(c, P) = max over the corners p of P of |p − c| + s(c)
 //! ```
 //!
-//! `s` the signed distance of the centre, negative inside. [`Covering::refine`] divides the ball of the greatest need into two: at the middle of its pieces, across
-//! their principal and some other axes, and the two balls of the way that comes out best choose their pieces anew and are fitted again. Either half has no greater need than the whole,
-//! as the old ball would do for both. So the greatest need never rises with the number of balls. [`Covering::suggest`] takes centres from elsewhere, such as a
+//! `s` the signed distance of the center, negative inside. [`Covering::refine`] divides the sphere of the greatest need into two: at the middle of its pieces, across
+//! their principal and some other axes, and the two spheres of the way that comes out best choose their pieces anew and are fitted again. Either half has no greater need than the whole,
+//! as the old sphere would do for both. So the greatest need never rises with the number of spheres. [`Covering::suggest`] takes centers from elsewhere, such as a
 //! tree's, where they do better.
 
-use super::ball::{Ball, around_points};
-use super::close::halved;
-use super::simplex::simplex;
+use super::grow_to_cover::halves_of;
+use super::nelder_mead::nelder_mead;
+use super::sphere::{Sphere, around_points};
 use crate::{Mat3, MeshDistance, TriMesh, Vec3};
 use nalgebra::SymmetricEigen;
 use rayon::prelude::*;
 
 /// Pieces that the surface is split into at first.
-const FIRST: usize = 4000;
+const INITIAL_PIECES: usize = 4000;
 /// Pieces in all.
-const MOST: usize = 4_000_000;
-/// A ball of fewer pieces has them halved before it is divided; all together have as many times the balls before centres from elsewhere are looked at.
-const FEWEST: usize = 100;
-/// Pieces of a ball that is to be divided are halved until none is longer than this part of its radius, or they are so many.
-const FINE: f64 = 0.2;
-const MOST_OF_ONE: usize = 2000;
-/// Ways of dividing whose balls are fitted, the most promising by boxes.
-const FITTED: usize = 2;
+const MAX_PIECES: usize = 4_000_000;
+/// A sphere of fewer pieces has them halved before it is divided; all together have as many times the spheres before centers from elsewhere are looked at.
+const MIN_SPHERE_PIECES: usize = 100;
+/// Pieces of a sphere that is to be divided are halved until none is longer than this part of its radius, or they are so many.
+const PIECE_SIZE: f64 = 0.2;
+const MAX_SPHERE_PIECES: usize = 2000;
+/// Ways of dividing whose spheres are fitted, the most promising by boxes.
+const FITTED_SPLITS: usize = 2;
 /// Pieces smaller than this part of the diagonal are not halved.
-const SMALL: f64 = 1e-9;
+const MIN_PIECE: f64 = 1e-9;
 /// Rounds of fitting anew.
-const ROUNDS: usize = 6;
-/// Pairs of a piece and a ball that may be looked at in a round.
-const MOST_CHOICES: usize = 100_000_000;
-/// Evaluations of the search for a centre.
+const MAX_REFITS: usize = 6;
+/// Pairs of a piece and a sphere that may be looked at in a round.
+const MAX_CHOICES: usize = 100_000_000;
+/// Evaluations of the search for a center.
 const EVALUATIONS: usize = 60;
-/// Balls are larger by this share, so that they hold what they should in floating point.
+/// Spheres are larger by this share, so that they hold what they should in floating point.
 const ROUNDING: f64 = 1e-12;
 
-/// Balls that cover a surface.
+/// Spheres that cover a surface.
 #[derive(Clone, Debug)]
 pub struct Covering {
     distance: MeshDistance,
     pieces: Vec<[Vec3; 3]>,
-    balls: Vec<Own>,
+    spheres: Vec<PieceSphere>,
     small: f64,
 }
 
-/// A ball with its pieces.
+/// A sphere with its pieces.
 #[derive(Clone, Debug)]
-struct Own {
-    ball: Ball,
-    /// Metres; at least 0.
+struct PieceSphere {
+    sphere: Sphere,
+    /// Meters; at least 0.
     outward: f64,
     pieces: Vec<u32>,
     /// It cannot be divided.
-    whole: bool,
+    indivisible: bool,
 }
 
 impl Covering {
-    /// One ball around the surface `given`, which need not be closed; how far balls reach outside is measured from `solid`: closed, outward-wound. Both of at
+    /// One sphere around the surface `given`, which need not be closed; how far spheres reach outside is measured from `solid`: closed, outward-wound. Both of at
     /// least one triangle.
     pub fn new(given: &TriMesh, solid: &TriMesh) -> Covering {
-        let (distance, pieces) = (MeshDistance::new(solid), split(given));
-        let mut covering = Covering { distance, balls: Vec::new(), small: SMALL * given.diagonal(), pieces };
-        covering.balls = vec![covering.own((0..covering.pieces.len() as u32).collect(), &[])];
+        let (distance, pieces) = (MeshDistance::new(solid), initial_pieces(given));
+        let mut covering = Covering { distance, spheres: Vec::new(), small: MIN_PIECE * given.diagonal(), pieces };
+        covering.spheres = vec![covering.fit_sphere((0..covering.pieces.len() as u32).collect(), &[])];
         covering
     }
 
-    /// Number of balls.
+    /// Number of spheres.
     pub fn count(&self) -> usize {
-        self.balls.len()
+        self.spheres.len()
     }
 
-    /// Centre and radius of each, metres, and how far it reaches outside the solid at most.
-    pub fn balls(&self) -> impl Iterator<Item = (Vec3, f64, f64)> {
-        self.balls.iter().map(|own| (own.ball.center, own.ball.radius, own.outward))
+    /// Center and radius of each, meters, and how far it reaches outside the solid at most.
+    pub fn spheres(&self) -> impl Iterator<Item = (Vec3, f64, f64)> {
+        self.spheres.iter().map(|entry| (entry.sphere.center, entry.sphere.radius, entry.outward))
     }
 
-    /// The most that a ball reaches outside, metres.
+    /// The most that a sphere reaches outside, meters.
     pub fn worst(&self) -> f64 {
-        worst(&self.balls)
+        worst(&self.spheres)
     }
 
-    /// Divides the ball that reaches furthest outside into two; `false` where none can be divided.
+    /// Divides the sphere that reaches furthest outside into two; `false` where none can be divided.
     pub fn refine(&mut self) -> bool {
         loop {
-            let candidates = (0..self.balls.len()).filter(|k| !self.balls[*k].whole);
+            let candidates = (0..self.spheres.len()).filter(|k| !self.spheres[*k].indivisible);
             let Some(worst) =
-                candidates.max_by(|a, b| self.balls[*a].outward.total_cmp(&self.balls[*b].outward).then(b.cmp(a)))
+                candidates.max_by(|a, b| self.spheres[*a].outward.total_cmp(&self.spheres[*b].outward).then(b.cmp(a)))
             else {
                 return false;
             };
-            match self.divided(worst) {
+            match self.split_sphere(worst) {
                 Some([one, other]) => {
-                    self.balls[worst] = one;
-                    self.balls.push(other);
+                    self.spheres[worst] = one;
+                    self.spheres.push(other);
                     return true;
                 }
-                None => self.balls[worst].whole = true,
+                None => self.spheres[worst].indivisible = true,
             }
         }
     }
 
-    /// Takes balls about these centres, fitted to the pieces that they get, if they reach out less and are no more than `most`. Whether they were taken.
+    /// Takes spheres about these centers, fitted to the pieces that they get, if they reach out less and are no more than `most`. Whether they were taken.
     pub fn suggest(&mut self, centers: &[Vec3], most: usize) -> bool {
         if centers.is_empty() {
             return false;
         }
-        while self.pieces.len() < FEWEST * centers.len() {
+        while self.pieces.len() < MIN_SPHERE_PIECES * centers.len() {
             let before = self.pieces.len();
-            (0..self.balls.len()).for_each(|k| _ = self.halve_pieces(k, FINE * self.balls[k].ball.radius / 4.0));
+            (0..self.spheres.len())
+                .for_each(|k| _ = self.halve_pieces(k, PIECE_SIZE * self.spheres[k].sphere.radius / 4.0));
             if self.pieces.len() == before {
                 break;
             }
         }
         let all: Vec<u32> = (0..self.pieces.len() as u32).collect();
         let mut best = self.fitted(&all, centers);
-        for _ in 1..ROUNDS {
-            let centers: Vec<Vec3> = best.iter().map(|own| own.ball.center).collect();
+        for _ in 1..MAX_REFITS {
+            let centers: Vec<Vec3> = best.iter().map(|entry| entry.sphere.center).collect();
             let next = self.fitted(&all, &centers);
             if worst(&next) >= worst(&best) {
                 break;
@@ -130,31 +131,31 @@ impl Covering {
         }
         let better = best.len() <= most && worst(&best) < self.worst();
         if better {
-            self.balls = best;
+            self.spheres = best;
         }
         better
     }
 
-    /// [`Covering::suggest`] with the centres there are: pieces may change their balls. Nothing is done where they are too many.
+    /// [`Covering::suggest`] with the centers there are: pieces may change their spheres. Nothing is done where they are too many.
     pub fn settle(&mut self) -> bool {
-        if self.pieces.len() * self.balls.len() > MOST_CHOICES {
+        if self.pieces.len() * self.spheres.len() > MAX_CHOICES {
             return false;
         }
-        let centers: Vec<Vec3> = self.balls.iter().map(|own| own.ball.center).collect();
+        let centers: Vec<Vec3> = self.spheres.iter().map(|entry| entry.sphere.center).collect();
         self.suggest(&centers, centers.len())
     }
 
-    /// The ball of a set of pieces: around the smallest ball's centre or one of `tried`, moved to where its need is less.
-    fn own(&self, pieces: Vec<u32>, tried: &[Vec3]) -> Own {
+    /// The sphere of a set of pieces: around the smallest sphere's center or one of `tried`, moved to where its need is less.
+    fn fit_sphere(&self, pieces: Vec<u32>, tried: &[Vec3]) -> PieceSphere {
         let points: Vec<Vec3> = pieces.iter().flat_map(|n| self.pieces[*n as usize]).collect();
         let start = around_points(&points);
         let mut best = (f64::INFINITY, start);
         let mut judge = |c: &Vec3| {
-            let mut ball = Ball::holding(*c, &points);
-            ball.radius *= 1.0 + ROUNDING;
-            let need = ball.radius + self.distance.closest(c).signed_distance;
+            let mut sphere = Sphere::about(*c, &points);
+            sphere.radius *= 1.0 + ROUNDING;
+            let need = sphere.radius + self.distance.closest(c).signed_distance;
             if need < best.0 {
-                best = (need, ball);
+                best = (need, sphere);
             }
             need
         };
@@ -163,12 +164,12 @@ impl Covering {
             .chain([&start.center])
             .map(|c| (judge(c), *c))
             .fold((f64::INFINITY, start.center), |a, b| if b.0 < a.0 { b } else { a });
-        simplex(first.1, 0.4 * start.radius, EVALUATIONS, &mut judge);
-        Own { outward: best.0.max(0.0), ball: best.1, pieces, whole: false }
+        nelder_mead(first.1, 0.4 * start.radius, EVALUATIONS, &mut judge);
+        PieceSphere { outward: best.0.max(0.0), sphere: best.1, pieces, indivisible: false }
     }
 
-    /// The pieces, each with the centre of which it needs least, and balls fitted to what each gets. Centres that get none are left out.
-    fn fitted(&self, pieces: &[u32], centers: &[Vec3]) -> Vec<Own> {
+    /// The pieces, each with the center of which it needs least, and spheres fitted to what each gets. Centers that get none are left out.
+    fn fitted(&self, pieces: &[u32], centers: &[Vec3]) -> Vec<PieceSphere> {
         let depths: Vec<f64> = centers.iter().map(|c| self.distance.closest(c).signed_distance).collect();
         let chosen: Vec<usize> = pieces
             .par_iter()
@@ -191,18 +192,18 @@ impl Covering {
             .into_par_iter()
             .zip(centers)
             .filter(|(part, _)| !part.is_empty())
-            .map(|(part, center)| self.own(part, &[*center]))
+            .map(|(part, center)| self.fit_sphere(part, &[*center]))
             .collect()
     }
 
-    fn divided(&mut self, worst: usize) -> Option<[Own; 2]> {
-        while self.balls[worst].pieces.len() < FEWEST {
+    fn split_sphere(&mut self, worst: usize) -> Option<[PieceSphere; 2]> {
+        while self.spheres[worst].pieces.len() < MIN_SPHERE_PIECES {
             self.halve_pieces(worst, self.small)?;
         }
         // long ones would be held by both halves
-        let fine = FINE * self.balls[worst].ball.radius;
-        while self.balls[worst].pieces.len() < MOST_OF_ONE && self.halve_pieces(worst, fine).is_some() {}
-        let (pieces, old) = (&self.balls[worst].pieces, self.balls[worst].ball.center);
+        let fine = PIECE_SIZE * self.spheres[worst].sphere.radius;
+        while self.spheres[worst].pieces.len() < MAX_SPHERE_PIECES && self.halve_pieces(worst, fine).is_some() {}
+        let (pieces, old) = (&self.spheres[worst].pieces, self.spheres[worst].sphere.center);
         let middles: Vec<Vec3> = pieces.iter().map(|n| self.pieces[*n as usize].iter().sum::<Vec3>() / 3.0).collect();
         let mean = middles.iter().sum::<Vec3>() / middles.len() as f64;
         let covariance: Mat3 = middles.iter().map(|m| (m - mean) * (m - mean).transpose()).sum();
@@ -211,22 +212,24 @@ impl Covering {
                 pieces.iter().zip(&middles).partition(|(_, m)| (*m - mean).dot(axis) < 0.0);
             [one, other].map(|half| half.into_iter().map(|(n, _)| *n).collect::<Vec<u32>>())
         };
-        let ways: Vec<[Vec<u32>; 2]> = directions(&covariance)
+        let partitions: Vec<[Vec<u32>; 2]> = directions(&covariance)
             .iter()
             .map(across)
             .filter(|[one, other]| !one.is_empty() && !other.is_empty())
             .collect();
-        let mut ranked: Vec<(f64, [Vec<u32>; 2])> =
-            ways.into_iter().map(|halves| (self.rough(&halves[0]).max(self.rough(&halves[1])), halves)).collect();
+        let mut ranked: Vec<(f64, [Vec<u32>; 2])> = partitions
+            .into_iter()
+            .map(|halves| (self.box_estimate(&halves[0]).max(self.box_estimate(&halves[1])), halves))
+            .collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        ranked.truncate(FITTED);
-        // the old ball does for either half, so that neither needs more
-        let fit = |(_, halves): (f64, [Vec<u32>; 2])| self.refitted(halves.map(|half| self.own(half, &[old])));
+        ranked.truncate(FITTED_SPLITS);
+        // the old sphere does for either half, so that neither needs more
+        let fit = |(_, halves): (f64, [Vec<u32>; 2])| self.refitted(halves.map(|half| self.fit_sphere(half, &[old])));
         ranked.into_par_iter().map(fit).collect::<Vec<_>>().into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
     }
 
-    /// What the ball about the middle of the box around pieces needs, metres.
-    fn rough(&self, pieces: &[u32]) -> f64 {
+    /// What the sphere about the middle of the box around pieces needs, meters.
+    fn box_estimate(&self, pieces: &[u32]) -> f64 {
         let points = || pieces.iter().flat_map(|n| self.pieces[*n as usize]);
         let bounds = crate::Aabb::around(points());
         let middle = 0.5 * (bounds.min + bounds.max);
@@ -235,11 +238,11 @@ impl Covering {
     }
 
     /// The two choose their pieces anew, while that helps.
-    fn refitted(&self, mut pair: [Own; 2]) -> [Own; 2] {
-        for _ in 0..ROUNDS {
-            let all: Vec<u32> = pair.iter().flat_map(|own| own.pieces.iter().copied()).collect();
-            let next = self.fitted(&all, &[pair[0].ball.center, pair[1].ball.center]);
-            match <[Own; 2]>::try_from(next) {
+    fn refitted(&self, mut pair: [PieceSphere; 2]) -> [PieceSphere; 2] {
+        for _ in 0..MAX_REFITS {
+            let all: Vec<u32> = pair.iter().flat_map(|entry| entry.pieces.iter().copied()).collect();
+            let next = self.fitted(&all, &[pair[0].sphere.center, pair[1].sphere.center]);
+            match <[PieceSphere; 2]>::try_from(next) {
                 Ok(next) if worst(&next) <= worst(&pair) && cost(&next) < cost(&pair) => pair = next,
                 _ => break,
             }
@@ -247,14 +250,14 @@ impl Covering {
         pair
     }
 
-    /// Halves the pieces of a ball that are larger; `None` where none is, or they are as many as they may be.
-    fn halve_pieces(&mut self, ball: usize, larger: f64) -> Option<()> {
-        if self.pieces.len() + self.balls[ball].pieces.len() > MOST {
+    /// Halves the pieces of a sphere that are larger; `None` where none is, or they are as many as they may be.
+    fn halve_pieces(&mut self, sphere: usize, larger: f64) -> Option<()> {
+        if self.pieces.len() + self.spheres[sphere].pieces.len() > MAX_PIECES {
             return None;
         }
         let mut new = Vec::new();
-        for n in &self.balls[ball].pieces {
-            let (size, [one, other]) = halved(&self.pieces[*n as usize]);
+        for n in &self.spheres[sphere].pieces {
+            let (size, [one, other]) = halves_of(&self.pieces[*n as usize]);
             if size > larger.max(self.small) {
                 self.pieces[*n as usize] = one;
                 new.push(self.pieces.len() as u32);
@@ -262,7 +265,7 @@ impl Covering {
             }
         }
         let some = !new.is_empty();
-        self.balls[ball].pieces.extend(new);
+        self.spheres[sphere].pieces.extend(new);
         some.then_some(())
     }
 }
@@ -274,25 +277,25 @@ fn directions(covariance: &Mat3) -> Vec<Vec3> {
     vec![u, v, w, u + v, u - v, v + w, v - w, w + u, w - u, Vec3::x(), Vec3::y(), Vec3::z()]
 }
 
-fn worst(balls: &[Own]) -> f64 {
-    balls.iter().map(|own| own.outward).fold(0.0, f64::max)
+fn worst(spheres: &[PieceSphere]) -> f64 {
+    spheres.iter().map(|entry| entry.outward).fold(0.0, f64::max)
 }
 
 /// The worst first, and a little of the other.
-fn cost(pair: &[Own; 2]) -> f64 {
+fn cost(pair: &[PieceSphere; 2]) -> f64 {
     worst(pair) + 1e-3 * (pair[0].outward + pair[1].outward)
 }
 
 /// The triangles, the longest halved first, until there are as many pieces as there shall be at first.
-fn split(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
+fn initial_pieces(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
     let mut pieces: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
-    while pieces.len() < FIRST {
-        let sizes: Vec<f64> = pieces.iter().map(|p| halved(p).0).collect();
+    while pieces.len() < INITIAL_PIECES {
+        let sizes: Vec<f64> = pieces.iter().map(|p| halves_of(p).0).collect();
         // all within a factor of the longest at once
         let bar = 0.7 * sizes.iter().copied().fold(0.0, f64::max);
         for n in 0..sizes.len() {
             if sizes[n] >= bar {
-                let [one, other] = halved(&pieces[n]).1;
+                let [one, other] = halves_of(&pieces[n]).1;
                 pieces[n] = one;
                 pieces.push(other);
             }

@@ -1,6 +1,6 @@
-//! The smallest ball around balls, exactly.
+//! The smallest sphere around spheres, exactly.
 //!
-//! The smallest ball is that of at most four of the balls, its basis, which touch it from within: `|c − cᵢ| = R − rᵢ`.
+//! The smallest sphere is that of at most four of the spheres, its basis, which touch it from within: `|c − cᵢ| = R − rᵢ`.
 //! With `x = c − c₁` and `dᵢ = cᵢ − c₁`, taking the first equation from the others leaves
 //!
 //! ```text
@@ -8,66 +8,70 @@
 //! (v·v − 1) R² + 2 (u·v + r₁) R + u·u − r₁² = 0
 //! ```
 //!
-//! The basis is found as in a simplex method: while a ball sticks out, the farthest joins the basis, and of the subsets of
-//! those five the smallest ball that holds all five is the next. Its radius grows each time, so that no basis comes
-//! back. Source for balls in place of points: Fischer and Gärtner, *The smallest enclosing ball of balls:
+//! The basis is found as in a simplex method: while a sphere sticks out, the farthest joins the basis, and of the subsets of
+//! those five the smallest sphere that holds all five is the next. Its radius grows each time, so that no basis comes
+//! back. Source for spheres in place of points: Fischer and Gärtner, *The smallest enclosing ball of balls:
 //! combinatorial structure and algorithms* (2003).
 
-use super::ball::Ball;
+use super::sphere::Sphere;
 use crate::Vec3;
 
 /// Bounds the changes of basis; a dozen are usual.
-const CHANGES: usize = 200;
-/// A ball sticks out if by more than this part of the radius.
-const OUT: f64 = 1e-12;
+const MAX_CHANGES: usize = 200;
+/// A sphere sticks out if by more than this part of the radius.
+const TOLERANCE: f64 = 1e-12;
 
-/// The smallest ball around the balls; of radius zero for none.
-pub(super) fn smallest_around(balls: &[Ball]) -> Ball {
-    let Some(&first) = balls.iter().max_by(|a, b| a.radius.total_cmp(&b.radius)) else {
-        return Ball { center: Vec3::zeros(), radius: 0.0 };
+/// The smallest sphere around the spheres; of radius zero for none.
+pub(super) fn smallest_around(spheres: &[Sphere]) -> Sphere {
+    let Some(&first) = spheres.iter().max_by(|a, b| a.radius.total_cmp(&b.radius)) else {
+        return Sphere { center: Vec3::zeros(), radius: 0.0 };
     };
-    let (mut ball, mut basis) = (first, vec![first]);
-    for _ in 0..CHANGES {
-        let farthest = balls.iter().max_by(|a, b| reach(&ball.center, a).total_cmp(&reach(&ball.center, b)));
-        let Some(far) = farthest.filter(|far| reach(&ball.center, far) > ball.radius * (1.0 + OUT)) else { break };
+    let (mut sphere, mut basis) = (first, vec![first]);
+    for _ in 0..MAX_CHANGES {
+        let farthest = spheres.iter().max_by(|a, b| reach(&sphere.center, a).total_cmp(&reach(&sphere.center, b)));
+        let Some(far) = farthest.filter(|far| reach(&sphere.center, far) > sphere.radius * (1.0 + TOLERANCE)) else {
+            break;
+        };
         basis.push(*far);
-        let Some((next, its_basis)) = of_few(&basis).filter(|(next, _)| next.radius > ball.radius) else { break };
-        (ball, basis) = (next, its_basis);
+        let Some((next, its_basis)) = enclosing_subset(&basis).filter(|(next, _)| next.radius > sphere.radius) else {
+            break;
+        };
+        (sphere, basis) = (next, its_basis);
     }
     // what rounding left, and a rounding's worth more
-    let radius = balls.iter().map(|b| reach(&ball.center, b)).fold(0.0, f64::max) * (1.0 + 1e-12);
-    Ball { radius, ..ball }
+    let radius = spheres.iter().map(|b| reach(&sphere.center, b)).fold(0.0, f64::max) * (1.0 + 1e-12);
+    Sphere { radius, ..sphere }
 }
 
-/// How far a ball reaches from a point.
-fn reach(c: &Vec3, ball: &Ball) -> f64 {
-    (ball.center - c).norm() + ball.radius
+/// How far a sphere reaches from a point.
+fn reach(c: &Vec3, sphere: &Sphere) -> f64 {
+    (sphere.center - c).norm() + sphere.radius
 }
 
-/// The smallest ball around at most five balls, and those that it touches.
-fn of_few(balls: &[Ball]) -> Option<(Ball, Vec<Ball>)> {
-    let mut best: Option<(Ball, Vec<Ball>)> = None;
-    for set in 1..1_u32 << balls.len() {
+/// The smallest sphere around at most five spheres, and those that it touches.
+fn enclosing_subset(spheres: &[Sphere]) -> Option<(Sphere, Vec<Sphere>)> {
+    let mut best: Option<(Sphere, Vec<Sphere>)> = None;
+    for set in 1..1_u32 << spheres.len() {
         if set.count_ones() > 4 {
             continue;
         }
-        let touched: Vec<Ball> = (0..balls.len()).filter(|n| set >> n & 1 == 1).map(|n| balls[n]).collect();
-        let Some(ball) = touching(&touched) else { continue };
-        let holds = balls.iter().all(|b| reach(&ball.center, b) <= ball.radius * (1.0 + 1e-9));
-        if holds && best.as_ref().is_none_or(|b| ball.radius < b.0.radius) {
-            best = Some((ball, touched));
+        let touched: Vec<Sphere> = (0..spheres.len()).filter(|n| set >> n & 1 == 1).map(|n| spheres[n]).collect();
+        let Some(sphere) = tangent_sphere(&touched) else { continue };
+        let holds = spheres.iter().all(|b| reach(&sphere.center, b) <= sphere.radius * (1.0 + 1e-9));
+        if holds && best.as_ref().is_none_or(|b| sphere.radius < b.0.radius) {
+            best = Some((sphere, touched));
         }
     }
     best
 }
 
-/// The smallest ball that all of one to four balls touch from within, its centre in the span of theirs.
-fn touching(balls: &[Ball]) -> Option<Ball> {
-    let first = balls[0];
+/// The smallest sphere that all of one to four spheres touch from within, its center in the span of theirs.
+fn tangent_sphere(spheres: &[Sphere]) -> Option<Sphere> {
+    let first = spheres[0];
     // orthonormal axes of the span, and along them u and v
     let mut axes: Vec<Vec3> = Vec::new();
     let (mut u, mut v) = (Vec3::zeros(), Vec3::zeros());
-    for b in &balls[1..] {
+    for b in &spheres[1..] {
         let d = b.center - first.center;
         let across = axes.iter().fold(d, |d, e| d - e * e.dot(&d));
         let length = across.norm();
@@ -80,10 +84,10 @@ fn touching(balls: &[Ball]) -> Option<Ball> {
         v += e * ((b.radius - first.radius - d.dot(&v)) / length);
         axes.push(e);
     }
-    let least = balls.iter().map(|b| b.radius).fold(0.0, f64::max);
+    let least = spheres.iter().map(|b| b.radius).fold(0.0, f64::max);
     let (a, half_b, c) = (v.dot(&v) - 1.0, u.dot(&v) + first.radius, u.dot(&u) - first.radius * first.radius);
     let radius = roots(a, half_b, c).into_iter().filter(|r| *r >= least * (1.0 - 1e-9)).fold(f64::INFINITY, f64::min);
-    radius.is_finite().then(|| Ball { center: first.center + u + v * radius, radius })
+    radius.is_finite().then(|| Sphere { center: first.center + u + v * radius, radius })
 }
 
 /// Of `a x² + 2 h x + c = 0`; not numbers where there are none.
@@ -109,51 +113,51 @@ mod tests {
         }
     }
 
-    /// The radius is a convex function of the centre, so that it is least where no direction lowers it: on any way,
-    /// some ball that is touched gets farther (or, to a rounding, no nearer).
-    fn no_way_out(ball: &Ball, balls: &[Ball], next: &mut impl FnMut() -> f64) -> bool {
-        let touched: Vec<Vec3> = balls
+    /// The radius is a convex function of the center, so that it is least where no direction lowers it: on any way,
+    /// some sphere that is touched gets farther (or, to a rounding, no nearer).
+    fn is_minimal(sphere: &Sphere, spheres: &[Sphere], next: &mut impl FnMut() -> f64) -> bool {
+        let touched: Vec<Vec3> = spheres
             .iter()
-            .filter(|b| reach(&ball.center, b) > ball.radius * (1.0 - 1e-9))
-            .map(|b| (b.center - ball.center).try_normalize(1e-9).unwrap_or_default())
+            .filter(|b| reach(&sphere.center, b) > sphere.radius * (1.0 - 1e-9))
+            .map(|b| (b.center - sphere.center).try_normalize(1e-9).unwrap_or_default())
             .collect();
         (0..500).all(|_| {
-            let way = Vec3::from_fn(|_, _| 2.0 * next() - 1.0).normalize();
-            touched.iter().any(|to| to.dot(&way) <= 1e-6)
+            let direction = Vec3::from_fn(|_, _| 2.0 * next() - 1.0).normalize();
+            touched.iter().any(|to| to.dot(&direction) <= 1e-6)
         })
     }
 
     #[test]
-    fn no_smaller_ball_holds_the_balls() {
+    fn no_smaller_sphere_holds_the_spheres() {
         for seed in 1..60 {
             let mut next = numbers(seed);
             let count = 1 + (seed as usize % 12);
             let flat = seed % 5 == 0;
-            let balls: Vec<Ball> = (0..count)
+            let spheres: Vec<Sphere> = (0..count)
                 .map(|_| {
                     let center = Vec3::new(next(), next(), if flat { 0.5 } else { next() });
-                    Ball { center, radius: 0.5 * next() * next() }
+                    Sphere { center, radius: 0.5 * next() * next() }
                 })
                 .collect();
-            let ball = smallest_around(&balls);
-            assert!(balls.iter().all(|b| reach(&ball.center, b) <= ball.radius), "{seed}");
-            assert!(no_way_out(&ball, &balls, &mut next), "{seed}");
-            // nor do a thousand centres tried anywhere
+            let sphere = smallest_around(&spheres);
+            assert!(spheres.iter().all(|b| reach(&sphere.center, b) <= sphere.radius), "{seed}");
+            assert!(is_minimal(&sphere, &spheres, &mut next), "{seed}");
+            // nor do a thousand centers tried anywhere
             let any = (0..1000).map(|_| {
                 let c = Vec3::from_fn(|_, _| next());
-                balls.iter().map(|b| reach(&c, b)).fold(0.0, f64::max)
+                spheres.iter().map(|b| reach(&c, b)).fold(0.0, f64::max)
             });
-            assert!(any.fold(f64::INFINITY, f64::min) >= ball.radius * (1.0 - 1e-9), "{seed}");
+            assert!(any.fold(f64::INFINITY, f64::min) >= sphere.radius * (1.0 - 1e-9), "{seed}");
         }
     }
 
     #[test]
-    fn equal_balls_and_balls_within_balls_are_one() {
-        let ball = |x: f64, radius: f64| Ball { center: Vec3::new(x, 0.0, 0.0), radius };
-        let within = smallest_around(&[ball(0.0, 2.0), ball(0.5, 1.0), ball(0.0, 2.0), ball(-1.0, 1.0)]);
+    fn equal_spheres_and_spheres_within_spheres_are_one() {
+        let sphere = |x: f64, radius: f64| Sphere { center: Vec3::new(x, 0.0, 0.0), radius };
+        let within = smallest_around(&[sphere(0.0, 2.0), sphere(0.5, 1.0), sphere(0.0, 2.0), sphere(-1.0, 1.0)]);
         assert!(within.center.norm() < 1e-12 && (within.radius - 2.0).abs() < 1e-9, "{within:?}");
         // two of radius 1, three apart: from -1 to 4
-        let two = smallest_around(&[ball(0.0, 1.0), ball(3.0, 1.0), ball(0.0, 1.0), ball(1.5, 0.5)]);
+        let two = smallest_around(&[sphere(0.0, 1.0), sphere(3.0, 1.0), sphere(0.0, 1.0), sphere(1.5, 0.5)]);
         assert!((two.center.x - 1.5).abs() < 1e-9 && (two.radius - 2.5).abs() < 1e-9, "{two:?}");
     }
 }

@@ -12,7 +12,7 @@
 //! ```
 //!
 //! Every level stands for the solid by itself: a leaf above the last level is repeated in each level below, as the only child of itself.
-//! `format`, `version` and `levels` must be there, and of a ball `c`, `r` and, but for the root, `parent`. Without `out` a ball reaches `2 r` outside, the most that one that meets
+//! `format`, `version` and `levels` must be there, and of a sphere `c`, `r` and, but for the root, `parent`. Without `out` a sphere reaches `2 r` outside, the most that one that meets
 //! the solid can; without `mesh` lengths are over the diagonal of the box around the leaves; without `settings` those of the usual method stand.
 //!
 //! Numbers are written with as many digits as give the same bits back. What is read is checked as if it came from an enemy: sizes are
@@ -25,14 +25,14 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use thiserror::Error;
 
-/// Most balls of a tree that is read.
-const MOST_BALLS: usize = 1 << 23;
+/// Most spheres of a tree that is read.
+const MAX_SPHERES: usize = 1 << 23;
 /// Most levels of a tree that is read.
-const MOST_LEVELS: usize = 64;
-/// Centres up to this from the origin and radii up to this are read, metres.
-const FARTHEST: f64 = 1e10;
-/// A ball sticks out of its parent if by more than this part of the parent's radius, as in [`SphereTree::check_nesting`].
-const STICKS_OUT: f64 = 1e-12;
+const MAX_LEVELS: usize = 64;
+/// Centers up to this from the origin and radii up to this are read, meters.
+const MAX_COORDINATE: f64 = 1e10;
+/// A sphere sticks out of its parent if by more than this part of the parent's radius, as in [`SphereTree::check_nesting`].
+const NESTING_TOLERANCE: f64 = 1e-12;
 const FORMAT: &str = "tumble sphere tree";
 /// The version of the format that is written and read.
 const VERSION: u32 = 1;
@@ -62,7 +62,7 @@ pub struct MeshId {
     pub blake3: String,
     /// How many triangles it has.
     pub triangles: usize,
-    /// Diagonal of its bounding box, metres.
+    /// Diagonal of its bounding box, meters.
     pub diagonal: f64,
 }
 
@@ -83,7 +83,7 @@ pub enum TreeFileError {
         /// As it says.
         version: u32,
     },
-    /// Units other than metres.
+    /// Units other than meters.
     #[error("units are \"{0}\"; a sphere tree is in \"m\"")]
     Units(String),
     /// Too many or too few.
@@ -96,13 +96,13 @@ pub enum TreeFileError {
         /// What would be right.
         wanted: String,
     },
-    /// A ball that cannot be.
-    #[error("ball {ball} of level {level}: {what}")]
-    Ball {
+    /// A sphere that cannot be.
+    #[error("sphere {sphere} of level {level}: {what}")]
+    Sphere {
         /// From 0.
         level: usize,
         /// From 0.
-        ball: usize,
+        sphere: usize,
         /// What is wrong with it, and what would be right.
         what: String,
     },
@@ -113,12 +113,12 @@ pub enum TreeFileError {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Text {
+struct JsonTree {
     format: String,
     version: u32,
     #[serde(default)]
     name: String,
-    #[serde(default = "metres")]
+    #[serde(default = "meters")]
     units: String,
     mesh: Option<MeshId>,
     #[serde(default)]
@@ -127,12 +127,12 @@ struct Text {
     stages: Vec<StageCount>,
     #[serde(default)]
     quality: Vec<LevelQuality>,
-    levels: Vec<Vec<TextBall>>,
+    levels: Vec<Vec<JsonSphere>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct TextBall {
+struct JsonSphere {
     c: [f64; 3],
     r: f64,
     out: Option<f64>,
@@ -140,14 +140,14 @@ struct TextBall {
     parent: i64,
 }
 
-impl TextBall {
-    /// A ball that meets the solid reaches no further out of it than it is wide.
+impl JsonSphere {
+    /// A sphere that meets the solid reaches no further out of it than it is wide.
     fn out(&self) -> f64 {
         self.out.unwrap_or(2.0 * self.r)
     }
 }
 
-fn metres() -> String {
+fn meters() -> String {
     "m".into()
 }
 
@@ -174,7 +174,7 @@ impl MeshId {
 }
 
 impl TreeFile {
-    /// The text: the head in some lines, then one ball per line.
+    /// The text: the head in some lines, then one sphere per line.
     pub fn to_json(&self) -> String {
         let mut text = String::from("{\n");
         let mut key = |name: &str, value: String| _ = writeln!(text, "\"{name}\": {value},");
@@ -213,7 +213,7 @@ impl TreeFile {
         if text.len() > MOST_BYTES {
             return Err(TreeFileError::TooLong(text.len()));
         }
-        let text: Text = serde_json::from_str(text).map_err(|e| TreeFileError::Json(e.to_string()))?;
+        let text: JsonTree = serde_json::from_str(text).map_err(|e| TreeFileError::Json(e.to_string()))?;
         if (text.format.as_str(), text.version) != (FORMAT, VERSION) {
             return Err(TreeFileError::Format { format: text.format, version: text.version });
         }
@@ -235,9 +235,9 @@ impl TreeFile {
             triangles: 0,
             diagonal: (tree.bounds().max - tree.bounds().min).norm(),
         });
-        if !(mesh.diagonal > 0.0 && mesh.diagonal <= FARTHEST) {
+        if !(mesh.diagonal > 0.0 && mesh.diagonal <= MAX_COORDINATE) {
             return Err(TreeFileError::Tree(format!(
-                "`diagonal` of `mesh` is {}; wanted above 0, at most {FARTHEST:e} m",
+                "`diagonal` of `mesh` is {}; wanted above 0, at most {MAX_COORDINATE:e} m",
                 mesh.diagonal
             )));
         }
@@ -261,27 +261,27 @@ fn lines(items: impl Iterator<Item = String>) -> String {
     format!("[\n{}\n]", items.collect::<Vec<_>>().join(",\n"))
 }
 
-fn read_levels(levels: &[Vec<TextBall>]) -> Result<SphereTree, TreeFileError> {
+fn read_levels(levels: &[Vec<JsonSphere>]) -> Result<SphereTree, TreeFileError> {
     let count = |what: &str, count, wanted: String| Err(TreeFileError::Count { what: what.into(), count, wanted });
-    if levels.is_empty() || levels.len() > MOST_LEVELS {
-        return count("levels", levels.len(), format!("1 to {MOST_LEVELS}"));
+    if levels.is_empty() || levels.len() > MAX_LEVELS {
+        return count("levels", levels.len(), format!("1 to {MAX_LEVELS}"));
     }
     if levels[0].len() != 1 {
-        return count("balls in level 0", levels[0].len(), "1, the root".into());
+        return count("spheres in level 0", levels[0].len(), "1, the root".into());
     }
     if let Some(empty) = levels.iter().position(Vec::is_empty) {
         return count(
-            &format!("balls in level {empty}"),
+            &format!("spheres in level {empty}"),
             0,
             "at least 1: each level stands for the whole solid".into(),
         );
     }
-    let balls = levels.iter().map(Vec::len).sum();
-    if balls > MOST_BALLS {
-        return count("balls", balls, format!("at most {MOST_BALLS}"));
+    let spheres = levels.iter().map(Vec::len).sum();
+    if spheres > MAX_SPHERES {
+        return count("spheres", spheres, format!("at most {MAX_SPHERES}"));
     }
-    let mut nodes: Vec<SphereNode> = Vec::with_capacity(balls);
-    // for every ball of the level above its node, and whether it was carried down to there
+    let mut nodes: Vec<SphereNode> = Vec::with_capacity(spheres);
+    // for every sphere of the level above its node, and whether it was carried down to there
     let mut above: Vec<(usize, bool)> = Vec::new();
     for (number, level) in levels.iter().enumerate() {
         above = read_level(number, level, &above, &mut nodes)?;
@@ -291,14 +291,14 @@ fn read_levels(levels: &[Vec<TextBall>]) -> Result<SphereTree, TreeFileError> {
 
 fn read_level(
     number: usize,
-    level: &[TextBall],
+    level: &[JsonSphere],
     above: &[(usize, bool)],
     nodes: &mut Vec<SphereNode>,
 ) -> Result<Vec<(usize, bool)>, TreeFileError> {
     let mut placed = Vec::with_capacity(level.len());
-    for (n, ball) in level.iter().enumerate() {
-        let wrong = |what: String| TreeFileError::Ball { level: number, ball: n, what };
-        let node = read_ball(number, ball).map_err(wrong)?;
+    for (n, sphere) in level.iter().enumerate() {
+        let wrong = |what: String| TreeFileError::Sphere { level: number, sphere: n, what };
+        let node = read_sphere(number, sphere).map_err(wrong)?;
         let parent = read_parent(number, n, level, above.len()).map_err(wrong)?;
         let Some((number_above, (parent, carried))) = parent.map(|p| (p, above[p])) else {
             placed.push((nodes.len(), false));
@@ -308,18 +308,18 @@ fn read_level(
         let alone = [n.checked_sub(1), Some(n + 1)]
             .iter()
             .flatten()
-            .all(|m| level.get(*m).is_none_or(|other| other.parent != ball.parent));
+            .all(|m| level.get(*m).is_none_or(|other| other.parent != sphere.parent));
         let of = &nodes[parent];
         let same = alone && (node.center, node.radius, node.outward) == (of.center, of.radius, of.outward);
         if same {
             placed.push((parent, true));
         } else if carried {
-            return Err(wrong("its parent repeats the ball above it, as only a leaf is".into()));
+            return Err(wrong("its parent repeats the sphere above it, as only a leaf is".into()));
         } else {
             let excess = (node.center - of.center).norm() + node.radius - of.radius;
-            if excess > STICKS_OUT * of.radius {
+            if excess > NESTING_TOLERANCE * of.radius {
                 return Err(wrong(format!(
-                    "it sticks out of its parent, ball {number_above} of level {}, by {excess:e} m",
+                    "it sticks out of its parent, sphere {number_above} of level {}, by {excess:e} m",
                     number - 1
                 )));
             }
@@ -335,28 +335,28 @@ fn read_level(
     Ok(placed)
 }
 
-fn read_ball(number: usize, ball: &TextBall) -> Result<SphereNode, String> {
-    let [x, y, z] = ball.c;
-    if let Some(bad) = ball.c.iter().find(|x| x.is_nan() || x.abs() > FARTHEST) {
-        return Err(format!("its centre has the coordinate {bad}; wanted at most {FARTHEST:e} m"));
+fn read_sphere(number: usize, sphere: &JsonSphere) -> Result<SphereNode, String> {
+    let [x, y, z] = sphere.c;
+    if let Some(bad) = sphere.c.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
+        return Err(format!("its center has the coordinate {bad}; wanted at most {MAX_COORDINATE:e} m"));
     }
-    for (what, value) in [("radius `r`", ball.r), ("outward error `out`", ball.out())] {
-        if !(0.0..=FARTHEST).contains(&value) {
-            return Err(format!("its {what} is {value}; wanted 0 to {FARTHEST:e} m"));
+    for (what, value) in [("radius `r`", sphere.r), ("outward error `out`", sphere.out())] {
+        if !(0.0..=MAX_COORDINATE).contains(&value) {
+            return Err(format!("its {what} is {value}; wanted 0 to {MAX_COORDINATE:e} m"));
         }
     }
     Ok(SphereNode {
         center: Vec3::new(x, y, z),
-        radius: ball.r,
-        outward: ball.out(),
+        radius: sphere.r,
+        outward: sphere.out(),
         first_child: 0,
         children: 0,
         level: number as u32,
     })
 }
 
-/// The parent's index in the level above; `None` for the root. Parents must not fall along a level, so that siblings are neighbours.
-fn read_parent(number: usize, n: usize, level: &[TextBall], above: usize) -> Result<Option<usize>, String> {
+/// The parent's index in the level above; `None` for the root. Parents must not fall along a level, so that siblings are neighbors.
+fn read_parent(number: usize, n: usize, level: &[JsonSphere], above: usize) -> Result<Option<usize>, String> {
     let parent = level[n].parent;
     if number == 0 {
         return if parent == -1 { Ok(None) } else { Err(format!("its parent is {parent}; the root has none")) };
@@ -365,7 +365,7 @@ fn read_parent(number: usize, n: usize, level: &[TextBall], above: usize) -> Res
     let index = index.ok_or_else(|| format!("its parent is {parent}; wanted 0 to {}", above - 1))?;
     if n > 0 && level[n - 1].parent > parent {
         return Err(format!(
-            "its parent {parent} comes after {}; balls stand in the order of their parents",
+            "its parent {parent} comes after {}; spheres stand in the order of their parents",
             level[n - 1].parent
         ));
     }

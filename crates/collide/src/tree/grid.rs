@@ -1,32 +1,32 @@
-//! The grid builder: a region is parted by a grid of cubes, and each cube's points get a ball.
+//! The grid builder: a region is parted by a grid of cubes, and each cube's points get a sphere.
 //!
 //! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), which has an
-//! oriented, optimised grid of spheres among its simpler methods. Of grids in several orientations, offsets and
-//! spacings, those that need no more cubes than there may be balls are ranked by the largest box of a cube's
-//! points; the balls of the best few are fitted, and the grid whose worst ball reaches out least is taken. Balls are fitted
+//! oriented, optimized grid of spheres among its simpler methods. Of grids in several orientations, offsets and
+//! spacings, those that need no more cubes than there may be spheres are ranked by the largest box of a cube's
+//! points; the spheres of the best few are fitted, and the grid whose worst sphere reaches out least is taken. Spheres are fitted
 //! to the cube's points, not drawn around cubes, so that they are far smaller where the surface cuts a corner.
 
 use super::builder::{Built, Job, TreeBuilder};
-use super::regions::{Part, build, cover_of, refitted, worst};
+use super::regions::{Part, build, cover_points, refitted, worst};
 use crate::{Mat3, MeshError, Vec3};
 use nalgebra::{Rotation3, SymmetricEigen, Unit};
 
 /// Points of a region that grids are ranked by.
-const LOOKED_AT: usize = 500;
+const MAX_SAMPLES: usize = 500;
 /// Spacings tried: from the longest side of the region's box down by this factor each.
 const SPACINGS: usize = 24;
-const FINER: f64 = 0.9;
-/// Grids whose balls are fitted.
-const FITTED: usize = 6;
+const SPACING_FACTOR: f64 = 0.9;
+/// Grids whose spheres are fitted.
+const FITTED_GRIDS: usize = 6;
 
 /// The builder.
 pub(super) struct Grid;
 
 impl TreeBuilder for Grid {
     fn build(&self, job: &Job) -> Result<Built, MeshError> {
-        let cover = cover_of(job);
+        let cover = cover_points(job);
         let most = job.settings.branch as usize;
-        Ok(build(job, &cover, &|region| divided(region, &cover.points, most, job)))
+        Ok(build(job, &cover, &|region| best_partition(region, &cover.points, most, job)))
     }
 }
 
@@ -73,9 +73,9 @@ impl Cubes {
 }
 
 /// The region parted by the best grid found; nothing if no grid parts it.
-fn divided(region: &[u32], points: &[Vec3], most: usize, job: &Job) -> Vec<Part> {
-    let looked_at: Vec<u32> = region.iter().copied().step_by(region.len().div_ceil(LOOKED_AT)).collect();
-    let some: Vec<Vec3> = looked_at.iter().map(|&i| points[i as usize]).collect();
+fn best_partition(region: &[u32], points: &[Vec3], most: usize, job: &Job) -> Vec<Part> {
+    let sampled: Vec<u32> = region.iter().copied().step_by(region.len().div_ceil(MAX_SAMPLES)).collect();
+    let some: Vec<Vec3> = sampled.iter().map(|&i| points[i as usize]).collect();
     let mut ranked: Vec<(f64, Cubes)> =
         grids(&some).into_iter().filter_map(|cubes| Some((cubes.rank(&some, most)?, cubes))).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -85,7 +85,7 @@ fn divided(region: &[u32], points: &[Vec3], most: usize, job: &Job) -> Vec<Part>
         .map(|(_, cubes)| cubes.parts(region, points))
         // points that were not looked at may lie in more cubes
         .filter(|parts| (2..=most).contains(&parts.len()))
-        .take(FITTED)
+        .take(FITTED_GRIDS)
         .map(|parts| parts.into_iter().map(|own| Part::of(own, None, points, job.distance)).collect::<Vec<Part>>())
         .min_by(|a, b| worst(a).total_cmp(&worst(b)))
         .unwrap_or_default();
@@ -108,7 +108,7 @@ fn grids(points: &[Vec3]) -> Vec<Cubes> {
             continue;
         }
         for n in 0..SPACINGS {
-            let spacing = side * 1.001 * FINER.powi(n as i32);
+            let spacing = side * 1.001 * SPACING_FACTOR.powi(n as i32);
             // with its cubes even about the middle, or a cube in the middle, along each axis by itself
             for offset in 0..8_u32 {
                 let shift = |k: u32| if offset >> k & 1 == 0 { 0.0 } else { 0.5 * spacing };

@@ -1,83 +1,85 @@
-//! Hubbard's builder: medial balls of a fixed set of samples, merged until few are left.
+//! Hubbard's builder: medial spheres of a fixed set of samples, merged until few are left.
 //!
 //! Source: Hubbard, *Approximating polyhedra with spheres for time-critical collision detection* (1996). Samples of the
-//! surface give Voronoi balls whose centres are inside the solid (and others where those leave samples bare), once for the
-//! whole solid. For each region, its points choose among the balls that hold them; then, of all pairs of neighbours,
-//! the pair is merged whose ball reaches out of the solid least, until as many are left as there may be children.
+//! surface give Voronoi spheres whose centers are inside the solid (and others where those leave samples bare), once for the
+//! whole solid. For each region, its points choose among the spheres that hold them; then, of all pairs of neighbors,
+//! the pair is merged whose sphere reaches out of the solid least, until as many are left as there may be children.
 //!
-//! Neighbours are groups some of whose points lie in one ball; groups that hang together with no other get the nearest for
-//! a neighbour. A merged ball is about either old centre or the point half-way between, whichever reaches out less.
+//! Neighbors are groups some of whose points lie in one sphere; groups that hang together with no other get the nearest for
+//! a neighbor. A merged sphere is about either old center or the point half-way between, whichever reaches out less.
 //!
-//! Departs from the paper: where a ball reaches out far, over a hole between samples, a sample is added; and the parts that are left are refitted
-//! (points choose balls, balls are fitted anew), which brought spot's 64 balls from 0.034 to 0.023–0.031 of the diagonal.
+//! Departs from the paper: where a sphere reaches out far, over a hole between samples, a sample is added; and the parts that are left are refitted
+//! (points choose spheres, spheres are fitted anew), which brought spot's 64 spheres from 0.034 to 0.023–0.031 of the diagonal.
 
 use super::builder::{Built, Job, Progress, StageCount, TreeBuilder};
 use super::medial::CoverPoints;
-use super::medial::adaptive::Axis;
-use super::medial::{MedialBall, Want};
-use super::regions::{Part, build, cover_of, refitted};
+use super::medial::adaptive::MedialAxis;
+use super::medial::{MedialSphere, RefineGoal};
+use super::regions::{Part, build, cover_points, refitted};
 use crate::{MeshDistance, MeshError, Vec3};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-/// Samples that the balls are made of; about three balls each.
+/// Samples that the spheres are made of; about three spheres each.
 const SAMPLES: usize = 2000;
 
-/// A ball that reaches further out, in diagonals, is over a hole between samples, and gets one more.
-const HOLE: f64 = 0.01;
+/// A sphere that reaches further out, in diagonals, is over a hole between samples, and gets one more.
+const MAX_OUTWARD: f64 = 0.01;
 
 /// Points of a component that others are sought from.
-const LINKED_BY: usize = 32;
+const LINK_SAMPLES: usize = 32;
 
 /// Points of a group by which costs are bounded.
-const BOUNDED_BY: usize = 4;
-/// Balls that hold a point which are kept, those that reach out least.
-const HOLDERS: usize = 32;
+const BOUND_SAMPLES: usize = 4;
+/// Spheres that hold a point which are kept, those that reach out least.
+const MAX_HOLDERS: usize = 32;
 
 /// The builder.
 pub(super) struct Hubbard;
 
 impl TreeBuilder for Hubbard {
     fn build(&self, job: &Job) -> Result<Built, MeshError> {
-        let cover = cover_of(job);
+        let cover = cover_points(job);
         let all: Vec<u32> = (0..cover.points.len() as u32).collect();
-        let mut axis = Axis::new(&cover, &all, job.distance, SAMPLES, job.progress);
-        axis.refine(&Want { target: HOLE * job.mesh.diagonal(), least: 0, most: SAMPLES });
-        let all = axis.balls();
+        let mut axis = MedialAxis::new(&cover, &all, job.distance, SAMPLES, job.progress);
+        axis.refine(&RefineGoal { target: MAX_OUTWARD * job.mesh.diagonal(), least: 0, most: SAMPLES });
+        let all = axis.spheres();
         let mut holders = axis.holders();
         for of in &mut holders {
             let outward = |b: u32| all[b as usize].outward;
             of.sort_unstable_by(|&a, &b| outward(a).total_cmp(&outward(b)).then(a.cmp(&b)));
-            of.truncate(HOLDERS);
+            of.truncate(MAX_HOLDERS);
         }
-        let balls = Balls { all, holders, cover: &cover, distance: job.distance, progress: job.progress };
+        let spheres = MedialSpheres { all, holders, cover: &cover, distance: job.distance, progress: job.progress };
         let most = job.settings.branch as usize;
-        let mut built = build(job, &cover, &|region| balls.divide(region, most));
-        built.stages.insert(0, StageCount { level: 0, stage: "medial balls".into(), count: balls.all.len() as u64 });
+        let mut built = build(job, &cover, &|region| spheres.divide(region, most));
+        built
+            .stages
+            .insert(0, StageCount { level: 0, stage: "medial spheres".into(), count: spheres.all.len() as u64 });
         Ok(built)
     }
 }
 
-struct Balls<'a> {
-    all: Vec<MedialBall>,
-    /// Per cover point, balls that hold it, the one that reaches out least first.
+struct MedialSpheres<'a> {
+    all: Vec<MedialSphere>,
+    /// Per cover point, spheres that hold it, the one that reaches out least first.
     holders: Vec<Vec<u32>>,
     cover: &'a CoverPoints,
     distance: &'a MeshDistance,
     progress: &'a dyn Progress,
 }
 
-/// A ball that some were merged into.
+/// A sphere that some were merged into.
 struct Group {
     center: Vec3,
-    /// Signed distance of the centre.
+    /// Signed distance of the center.
     signed: f64,
     points: Vec<u32>,
     neighbors: BTreeSet<u32>,
-    alive: bool,
+    active: bool,
 }
 
-impl Balls<'_> {
+impl MedialSpheres<'_> {
     fn divide(&self, region: &[u32], most: usize) -> Vec<Part> {
         let mut groups = self.groups(region);
         let mut merging = Merging {
@@ -92,29 +94,29 @@ impl Balls<'_> {
         if self.progress.stopped() {
             return Vec::new();
         }
-        let parts = groups.into_iter().filter(|g| g.alive);
+        let parts = groups.into_iter().filter(|g| g.active);
         let parts: Vec<Part> =
             parts.map(|g| Part::of(g.points, Some(g.center), &self.cover.points, self.distance)).collect();
         if parts.len() < 2 { Vec::new() } else { refitted(parts, &self.cover.points, self.distance, self.progress) }
     }
 
-    /// Each point with the ball that reaches out least, among those that hold it.
+    /// Each point with the sphere that reaches out least, among those that hold it.
     fn groups(&self, region: &[u32]) -> Vec<Group> {
         let chosen = |i: u32| self.holders[i as usize].first().copied().unwrap_or(0);
         let mut number: BTreeMap<u32, u32> = BTreeMap::new();
         let mut groups: Vec<Group> = Vec::new();
         for &i in region {
-            let ball = chosen(i);
-            let g = *number.entry(ball).or_insert(groups.len() as u32) as usize;
+            let sphere = chosen(i);
+            let g = *number.entry(sphere).or_insert(groups.len() as u32) as usize;
             if g == groups.len() {
-                let b = &self.all[ball as usize];
-                let signed = self.distance.closest(&b.ball.center).signed_distance;
+                let b = &self.all[sphere as usize];
+                let signed = self.distance.closest(&b.sphere.center).signed_distance;
                 let (points, neighbors) = (Vec::new(), BTreeSet::new());
-                groups.push(Group { center: b.ball.center, signed, points, neighbors, alive: true });
+                groups.push(Group { center: b.sphere.center, signed, points, neighbors, active: true });
             }
             groups[g].points.push(i);
         }
-        // in the order of a ball's points, each group with the next that the ball holds some of
+        // in the order of a sphere's points, each group with the next that the sphere holds some of
         let mut last: BTreeMap<u32, u32> = BTreeMap::new();
         for &i in region {
             let own = number[&chosen(i)];
@@ -131,7 +133,7 @@ impl Balls<'_> {
 }
 
 /// Cost (ordered bits), whether it is known or a lower bound, and the pair of groups.
-type Offer = Reverse<(u64, bool, u32, u32)>;
+type QueuedMerge = Reverse<(u64, bool, u32, u32)>;
 
 struct Merging<'a> {
     points: &'a [Vec3],
@@ -145,38 +147,38 @@ impl Merging<'_> {
     fn run(&mut self, most: usize) {
         let mut queue = BinaryHeap::new();
         for a in 0..self.groups.len() as u32 {
-            self.offer(a, &mut queue, |a, b| a < b);
+            self.queue_merges(a, &mut queue, |a, b| a < b);
         }
         while self.left > most && !self.progress.stopped() {
             let Some(Reverse((_, known, a, b))) = queue.pop() else { return };
-            if !(self.groups[a as usize].alive && self.groups[b as usize].alive) {
+            if !(self.groups[a as usize].active && self.groups[b as usize].active) {
                 continue;
             }
             if known {
                 let merged = self.merge(a, b);
-                self.offer(merged, &mut queue, |_, _| true);
+                self.queue_merges(merged, &mut queue, |_, _| true);
             } else {
-                queue.push(Reverse((self.merged(a, b).0.to_bits(), true, a, b)));
+                queue.push(Reverse((self.merge_cost(a, b).0.to_bits(), true, a, b)));
             }
         }
     }
 
-    /// Queues the pairs of a group with its neighbours by what they cost at least; what they cost is found when they come up.
-    fn offer(&self, a: u32, queue: &mut BinaryHeap<Offer>, which: impl Fn(u32, u32) -> bool) {
-        if self.groups[a as usize].alive {
+    /// Queues the pairs of a group with its neighbors by what they cost at least; what they cost is found when they come up.
+    fn queue_merges(&self, a: u32, queue: &mut BinaryHeap<QueuedMerge>, which: impl Fn(u32, u32) -> bool) {
+        if self.groups[a as usize].active {
             for &b in self.groups[a as usize].neighbors.iter().filter(|b| which(a, **b)) {
-                queue.push(Reverse((self.at_least(a, b).to_bits(), false, a, b)));
+                queue.push(Reverse((self.merge_cost_bound(a, b).to_bits(), false, a, b)));
             }
         }
     }
 
-    /// A lower bound of [`Merging::merged`], by some of the points, and since signed distances differ by no more than centres do.
-    fn at_least(&self, a: u32, b: u32) -> f64 {
+    /// A lower bound of [`Merging::merge_cost`], by some of the points, and since signed distances differ by no more than centers do.
+    fn merge_cost_bound(&self, a: u32, b: u32) -> f64 {
         let [a, b] = [a, b].map(|g| &self.groups[g as usize]);
         let half = 0.5 * (a.center - b.center).norm();
         let centers =
             [(a.center, a.signed), (b.center, b.signed), (0.5 * (a.center + b.center), a.signed.max(b.signed) - half)];
-        let some = |g: &'_ Group| g.points.len().div_ceil(BOUNDED_BY);
+        let some = |g: &'_ Group| g.points.len().div_ceil(BOUND_SAMPLES);
         let reaches = centers.map(|(center, signed)| {
             let square = |i: &u32| (self.points[*i as usize] - center).norm_squared();
             let [one, other] = [a, b].map(|g| g.points.iter().step_by(some(g)).map(square).fold(0.0, f64::max));
@@ -186,8 +188,8 @@ impl Merging<'_> {
         (reaches.into_iter().fold(f64::INFINITY, f64::min) * (1.0 - 1e-9)).max(0.0)
     }
 
-    /// How far the ball of two groups reaches out, at least 0, its centre and that one's signed distance.
-    fn merged(&self, a: u32, b: u32) -> (f64, Vec3, f64) {
+    /// How far the sphere of two groups reaches out, at least 0, its center and that one's signed distance.
+    fn merge_cost(&self, a: u32, b: u32) -> (f64, Vec3, f64) {
         let [a, b] = [a, b].map(|g| &self.groups[g as usize]);
         let middle = 0.5 * (a.center + b.center);
         let centers =
@@ -201,12 +203,12 @@ impl Merging<'_> {
     }
 
     fn merge(&mut self, a: u32, b: u32) -> u32 {
-        let (_, center, signed) = self.merged(a, b);
+        let (_, center, signed) = self.merge_cost(a, b);
         let new = self.groups.len() as u32;
-        let mut group = Group { center, signed, points: Vec::new(), neighbors: BTreeSet::new(), alive: true };
+        let mut group = Group { center, signed, points: Vec::new(), neighbors: BTreeSet::new(), active: true };
         for old in [a, b] {
             let old = &mut self.groups[old as usize];
-            old.alive = false;
+            old.active = false;
             group.points.append(&mut old.points);
             group.neighbors.append(&mut old.neighbors);
         }
@@ -223,7 +225,7 @@ impl Merging<'_> {
     }
 }
 
-/// Makes neighbours until all groups hang together: each component but the largest gets the group of the point closest to some of its own.
+/// Makes neighbors until all groups hang together: each component but the largest gets the group of the point closest to some of its own.
 fn connect(groups: &mut [Group], region: &[u32], points: &[Vec3]) {
     let mut group_of: BTreeMap<u32, u32> = BTreeMap::new();
     for (g, group) in groups.iter().enumerate() {
@@ -240,7 +242,7 @@ fn connect(groups: &mut [Group], region: &[u32], points: &[Vec3]) {
         }
         for (c, inside) in own.iter().filter(|(c, _)| **c != largest) {
             let mut best = (f64::INFINITY, 0, 0);
-            for i in inside.iter().step_by(inside.len().div_ceil(LINKED_BY)) {
+            for i in inside.iter().step_by(inside.len().div_ceil(LINK_SAMPLES)) {
                 for j in region.iter().filter(|j| component[group_of[j] as usize] != *c) {
                     let square = (points[*i as usize] - points[*j as usize]).norm_squared();
                     if square < best.0 {

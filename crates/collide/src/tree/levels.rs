@@ -3,12 +3,12 @@
 use super::SphereTree;
 use crate::Vec3;
 
-/// One ball of a level. A leaf above the level is carried down: it is its own parent, once per level.
+/// One sphere of a level. A leaf above the level is carried down: it is its own parent, once per level.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LevelBall {
-    /// Mesh frame, metres.
+pub struct LevelSphere {
+    /// Mesh frame, meters.
     pub center: Vec3,
-    /// Metres.
+    /// Meters.
     pub radius: f64,
     /// Index into the level above; `None` in the first level.
     pub parent: Option<usize>,
@@ -16,24 +16,24 @@ pub struct LevelBall {
     pub node: usize,
 }
 
-impl LevelBall {
-    /// A ball without a parent and of no tree.
-    pub fn new(center: Vec3, radius: f64) -> LevelBall {
-        LevelBall { center, radius, parent: None, node: 0 }
+impl LevelSphere {
+    /// A sphere without a parent and of no tree.
+    pub fn new(center: Vec3, radius: f64) -> LevelSphere {
+        LevelSphere { center, radius, parent: None, node: 0 }
     }
 }
 
 impl SphereTree {
-    /// The balls of [`SphereTree::at_level`] for every level from the root's on, with their parents. Balls stand in the order of their
-    /// parents, so that the children of one ball are neighbours.
-    pub fn level_lists(&self) -> Vec<Vec<LevelBall>> {
-        let ball = |node: usize, parent| LevelBall {
+    /// The spheres of [`SphereTree::at_level`] for every level from the root's on, with their parents. Spheres stand in the order of their
+    /// parents, so that the children of one sphere are neighbors.
+    pub fn level_lists(&self) -> Vec<Vec<LevelSphere>> {
+        let sphere = |node: usize, parent| LevelSphere {
             center: self.nodes[node].center,
             radius: self.nodes[node].radius,
             parent,
             node,
         };
-        let mut lists = vec![vec![ball(0, None)]];
+        let mut lists = vec![vec![sphere(0, None)]];
         for _ in 1..self.levels() {
             let above = &lists[lists.len() - 1];
             let below = above.iter().enumerate().flat_map(|(parent, b)| {
@@ -41,7 +41,7 @@ impl SphereTree {
                 let nodes = if leaf { b.node..b.node + 1 } else { self.nodes[b.node].child_range() };
                 nodes.map(move |node| (node, parent))
             });
-            let below = below.map(|(node, parent)| ball(node, Some(parent))).collect();
+            let below = below.map(|(node, parent)| sphere(node, Some(parent))).collect();
             lists.push(below);
         }
         lists

@@ -1,61 +1,61 @@
-//! Sphere trees: a closed surface inside nested balls.
+//! Sphere trees: a closed surface inside nested spheres.
 //!
-//! Two promises are checked on every build and are an error if broken: every ball contains the balls of its children,
-//! and the leaves cover the surface. A third number is stated: how far the balls reach beyond the solid.
+//! Two promises are checked on every build and are an error if broken: every sphere contains the spheres of its children,
+//! and the leaves cover the surface. A third number is stated: how far the spheres reach beyond the solid.
 //!
-//! **Outward error.** A ball `(c, r)` whose centre lies `d` below the surface reaches at most `r − d` beyond it: on
-//! the way from `c` to any outside point of the ball the surface is crossed, at `d` or later (`d` is negative for a
-//! centre outside).
+//! **Outward error.** A sphere `(c, r)` whose center lies `d` below the surface reaches at most `r − d` beyond it: on
+//! the way from `c` to any outside point of the sphere the surface is crossed, at `d` or later (`d` is negative for a
+//! center outside).
 //!
-//! Two trees whose balls are `g` apart have solids that are between `g` and `g + e₁ + e₂` apart, `e` their outward
+//! Two trees whose spheres are `g` apart have solids that are between `g` and `g + e₁ + e₂` apart, `e` their outward
 //! errors: no contact is missed, and none is invented beyond `e₁ + e₂`.
 
-mod ball;
 mod builder;
 mod bytes;
 mod cache;
-mod close;
 mod covering;
-mod cut;
 mod enclose;
 mod file;
 mod grid;
+mod grow_to_cover;
 mod hubbard;
 mod levels;
 mod medial;
+mod nelder_mead;
 mod octree;
 mod quality;
 mod regions;
+mod select;
 mod settings;
-mod simplex;
+mod sphere;
 mod table;
 mod verify;
 
 pub use builder::{Progress, StageCount};
 pub use cache::CachedTree;
 pub use covering::Covering;
-pub use cut::grow_to_cover;
 pub use file::{MeshId, TreeFile, TreeFileError};
-pub use levels::LevelBall;
+pub use levels::LevelSphere;
 pub use quality::{LevelQuality, QualitySettings};
+pub use select::grow_to_cover;
 pub use settings::{Builder, TreeSettings};
 pub use table::align_columns;
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
-use ball::Ball;
-pub(crate) use ball::around_points;
-use builder::{Cell, Job, TreeBuilder, go_on};
+use builder::{Cell, Job, TreeBuilder, check_stopped};
+use sphere::Sphere;
+pub(crate) use sphere::around_points;
 
-/// One ball of a tree, in the mesh's frame.
+/// One sphere of a tree, in the mesh's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereNode {
-    /// Metres.
+    /// Meters.
     pub center: Vec3,
-    /// Metres.
+    /// Meters.
     pub radius: f64,
-    /// Upper bound of how far the ball reaches outside the solid, metres.
+    /// Upper bound of how far the sphere reaches outside the solid, meters.
     pub outward: f64,
-    /// Index of the first child; children are neighbours.
+    /// Index of the first child; children are neighbors.
     pub first_child: u32,
     /// Number of children; 0 for a leaf.
     pub children: u32,
@@ -64,7 +64,7 @@ pub struct SphereNode {
 }
 
 impl SphereNode {
-    /// Whether the ball has no children.
+    /// Whether the sphere has no children.
     pub fn is_leaf(&self) -> bool {
         self.children == 0
     }
@@ -75,7 +75,7 @@ impl SphereNode {
     }
 }
 
-/// A tree of balls around a closed surface; flat, breadth first, the root first.
+/// A tree of spheres around a closed surface; flat, breadth first, the root first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereTree {
     nodes: Vec<SphereNode>,
@@ -85,11 +85,11 @@ pub struct SphereTree {
 impl SphereTree {
     /// Builds and verifies a tree around a closed, outward-wound mesh (see [`TriMesh::check_closed`]).
     pub fn build(mesh: &TriMesh, settings: &TreeSettings) -> Result<SphereTree, MeshError> {
-        Ok(SphereTree::build_watched(mesh, settings, &())?.0)
+        Ok(SphereTree::build_with_progress(mesh, settings, &())?.0)
     }
 
     /// The same, told how far it is, and with what each stage did.
-    pub fn build_watched(
+    pub fn build_with_progress(
         mesh: &TriMesh,
         settings: &TreeSettings,
         progress: &dyn Progress,
@@ -113,31 +113,32 @@ impl SphereTree {
             Builder::Hubbard => &hubbard::Hubbard,
             Builder::Grid => &grid::Grid,
         };
-        go_on(progress)?;
+        check_stopped(progress)?;
         let built = builder.build(&Job { mesh, distance, settings, progress })?;
-        go_on(progress)?;
+        check_stopped(progress)?;
         let tree = SphereTree::flatten(&built.root, distance, settings.builder != Builder::Octree, progress);
-        go_on(progress)?;
+        check_stopped(progress)?;
         tree.check_nesting()?;
         tree.check_coverage_watched(mesh, progress)?;
-        progress.at(1.0);
+        progress.report(1.0);
         Ok((tree, built.stages))
     }
 
-    /// One ball around all vertices of a mesh whose data is right.
-    pub(crate) fn ball(mesh: &TriMesh) -> SphereTree {
-        let ball = around_points(&mesh.vertices);
-        // no point of the ball is further from the surface than its other end
-        let node = SphereNode { center: ball.center, radius: ball.radius, outward: 2.0 * ball.radius, ..empty_node(0) };
+    /// One sphere around all vertices of a mesh whose data is right.
+    pub(crate) fn bounding_sphere(mesh: &TriMesh) -> SphereTree {
+        let sphere = around_points(&mesh.vertices);
+        // no point of the sphere is further from the surface than its other end
+        let node =
+            SphereNode { center: sphere.center, radius: sphere.radius, outward: 2.0 * sphere.radius, ..empty_node(0) };
         SphereTree::of_nodes(vec![node])
     }
 
-    /// All balls, breadth first; the root is the first.
+    /// All spheres, breadth first; the root is the first.
     pub fn nodes(&self) -> &[SphereNode] {
         &self.nodes
     }
 
-    /// The balls that have no children.
+    /// The spheres that have no children.
     pub fn leaves(&self) -> impl Iterator<Item = &SphereNode> {
         self.nodes.iter().filter(|n| n.is_leaf())
     }
@@ -147,12 +148,12 @@ impl SphereTree {
         self.nodes.last().map_or(0, |n| n.level + 1)
     }
 
-    /// The balls that stand for the solid when looked at to `level`: those of that level and the leaves above it.
+    /// The spheres that stand for the solid when looked at to `level`: those of that level and the leaves above it.
     pub fn at_level(&self, level: u32) -> impl Iterator<Item = &SphereNode> {
         self.nodes.iter().filter(move |n| n.level == level || (n.level < level && n.is_leaf()))
     }
 
-    /// Upper bound of how far the leaves reach outside the solid, metres.
+    /// Upper bound of how far the leaves reach outside the solid, meters.
     pub fn outward_error(&self) -> f64 {
         self.leaves().map(|n| n.outward).fold(0.0, f64::max)
     }
@@ -167,7 +168,7 @@ impl SphereTree {
         &self.bounds
     }
 
-    /// Breadth first, so that children are neighbours; a cell with one child is replaced by it.
+    /// Breadth first, so that children are neighbors; a cell with one child is replaced by it.
     fn flatten(root: &Cell, distance: &MeshDistance, deep: bool, progress: &dyn Progress) -> SphereTree {
         let mut nodes = vec![empty_node(0)];
         let mut cells = vec![skip_single(root)];
@@ -183,24 +184,28 @@ impl SphereTree {
             next += 1;
         }
         for n in (0..nodes.len()).rev().take_while(|_| !progress.stopped()) {
-            let ball = match cells[n] {
-                Cell::Leaf(ball) => *ball,
+            let sphere = match cells[n] {
+                Cell::Leaf(sphere) => *sphere,
                 Cell::Inner(_) => {
-                    let children: Vec<Ball> = nodes[nodes[n].child_range()]
+                    let children: Vec<Sphere> = nodes[nodes[n].child_range()]
                         .iter()
-                        .map(|c| Ball { center: c.center, radius: c.radius })
+                        .map(|c| Sphere { center: c.center, radius: c.radius })
                         .collect();
-                    if deep { ball::deep_around(&children, distance) } else { enclose::smallest_around(&children) }
+                    if deep {
+                        sphere::min_outward_enclosing(&children, distance)
+                    } else {
+                        enclose::smallest_around(&children)
+                    }
                 }
             };
-            nodes[n].center = ball.center;
-            nodes[n].radius = ball.radius;
-            nodes[n].outward = ball.outward(distance);
+            nodes[n].center = sphere.center;
+            nodes[n].radius = sphere.radius;
+            nodes[n].outward = sphere.outward(distance);
         }
         SphereTree::of_nodes(nodes)
     }
 
-    /// Of nodes that are already a tree: breadth first, children neighbours.
+    /// Of nodes that are already a tree: breadth first, children neighbors.
     fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()

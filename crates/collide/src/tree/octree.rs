@@ -1,25 +1,25 @@
-//! The octree builder: the surface is cut by the planes of an octree, and each cell's piece gets a tight ball.
+//! The octree builder: the surface is cut by the planes of an octree, and each cell's piece gets a tight sphere.
 //!
-//! A piece's ball starts at the small enclosing ball of its corners and is moved inwards along the mean normal,
-//! growing so that it still holds the piece: a larger ball with its centre deeper in the solid bulges less (`δ²/2R`
-//! for a flat piece of radius `δ`). Of a few such balls the one with the least outward error is kept. A cell whose
-//! ball is good enough is a leaf; others are divided.
+//! A piece's sphere starts at the small enclosing sphere of its corners and is moved inwards along the mean normal,
+//! growing so that it still holds the piece: a larger sphere with its center deeper in the solid bulges less (`δ²/2R`
+//! for a flat piece of radius `δ`). Of a few such spheres the one with the least outward error is kept. A cell whose
+//! sphere is good enough is a leaf; others are divided.
 //!
 //! With `even`, each leaf is then grown until it reaches `target` outwards, no more and no less: the leaves' outer
-//! points lie on one offset surface, and a flat face stays flat. A tree of one ball is left as it is.
+//! points lie on one offset surface, and a flat face stays flat. A tree of one sphere is left as it is.
 //!
-//! Departs from the classic octree tree (balls around cells) in all of that; it keeps its robustness: any triangles
+//! Departs from the classic octree tree (spheres around cells) in all of that; it keeps its robustness: any triangles
 //! will do.
 
-use super::ball::{Ball, around_points};
 use super::builder::{Built, Cell, Job, Progress, StageCount, TreeBuilder};
+use super::sphere::{Sphere, around_points};
 use crate::{MeshDistance, MeshError, Vec3};
 
 /// No tree gets more leaves than this.
-const MOST_LEAVES: usize = 400_000;
-/// How far the ball's centre is moved inwards, in radii of the starting ball.
+const MAX_LEAVES: usize = 400_000;
+/// How far the sphere's center is moved inwards, in radii of the starting sphere.
 const SHIFTS: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.2, 3.2, 4.5, 6.5];
-/// Leaves are grown by this part of the starting radius, so that neighbours overlap by more than rounding.
+/// Leaves are grown by this part of the starting radius, so that neighbors overlap by more than rounding.
 const OVERLAP: f64 = 0.01;
 
 /// A convex piece of one triangle.
@@ -27,7 +27,7 @@ type Piece = Vec<Vec3>;
 
 struct Context<'a> {
     distance: &'a MeshDistance,
-    /// Good enough: outward error in metres.
+    /// Good enough: outward error in meters.
     target: f64,
     depth: u32,
     even: bool,
@@ -53,7 +53,7 @@ impl TreeBuilder for Octree {
             progress: job.progress,
         };
         let root = context.cell(pieces, 0.5 * (bounds.min + bounds.max), 0.5 * side, 0);
-        if context.leaves > MOST_LEAVES {
+        if context.leaves > MAX_LEAVES {
             let (what, allowed) =
                 ("the number of leaves of a sphere tree", "at most 400000: lower the depth or raise the error");
             return Err(MeshError::Settings { what, value: context.leaves as f64, allowed });
@@ -65,15 +65,15 @@ impl TreeBuilder for Octree {
 
 impl Context<'_> {
     fn cell(&mut self, pieces: Vec<Piece>, center: Vec3, half: f64, depth: u32) -> Cell {
-        let (mut ball, outward) = self.tight_ball(&pieces);
+        let (mut sphere, outward) = self.tight_sphere(&pieces);
         let fine = outward <= self.target || depth == self.depth;
-        if fine || self.leaves > MOST_LEAVES || self.progress.stopped() {
+        if fine || self.leaves > MAX_LEAVES || self.progress.stopped() {
             self.leaves += 1;
-            // a root that is the only leaf has no neighbours to be even with
+            // a root that is the only leaf has no neighbors to be even with
             if self.even && depth > 0 {
-                ball.radius += (self.target - outward).max(0.0);
+                sphere.radius += (self.target - outward).max(0.0);
             }
-            return Cell::Leaf(ball);
+            return Cell::Leaf(sphere);
         }
         let mut parts = vec![pieces];
         for k in 0..3 {
@@ -87,18 +87,18 @@ impl Context<'_> {
         Cell::Inner(children.collect())
     }
 
-    /// The ball of least outward error among those tried, and that error.
-    fn tight_ball(&self, pieces: &[Piece]) -> (Ball, f64) {
+    /// The sphere of least outward error among those tried, and that error.
+    fn tight_sphere(&self, pieces: &[Piece]) -> (Sphere, f64) {
         let points: Vec<Vec3> = pieces.iter().flatten().copied().collect();
         let start = around_points(&points);
         let inward = -area_vector(pieces).try_normalize(0.0).unwrap_or_default();
-        let mut best: Option<(Ball, f64)> = None;
+        let mut best: Option<(Sphere, f64)> = None;
         for shift in SHIFTS {
-            let mut ball = Ball::holding(start.center + inward * (shift * start.radius), &points);
-            ball.radius += OVERLAP * start.radius;
-            let outward = ball.outward(self.distance);
+            let mut sphere = Sphere::about(start.center + inward * (shift * start.radius), &points);
+            sphere.radius += OVERLAP * start.radius;
+            let outward = sphere.outward(self.distance);
             if best.is_none_or(|(_, least)| outward < least) {
-                best = Some((ball, outward));
+                best = Some((sphere, outward));
             }
         }
         best.unwrap_or((start, f64::INFINITY))

@@ -1,6 +1,6 @@
-//! How good a tree of balls is: the figures of each level against the solid, measured on samples.
+//! How good a tree of spheres is: the figures of each level against the solid, measured on samples.
 //!
-//! The measure knows nothing of how the tree was built, and takes any balls. `L` is the union of a level's balls, `M` the solid inside the
+//! The measure knows nothing of how the tree was built, and takes any spheres. `L` is the union of a level's spheres, `M` the solid inside the
 //! mesh, `D` the diagonal of its bounding box, `d_M` the signed distance to `M` (above 0 outside), `d_L(p) = minᵢ |p − cᵢ| − rᵢ`:
 //!
 //! | figure | meaning |
@@ -8,26 +8,26 @@
 //! | coverage | share of surface samples with `d_L ≤ tolerance` |
 //! | gap | `max(0, d_L)` over surface samples, over `D`: how far what is bare is from `L` |
 //! | protrusion | `max(0, d_M)` over the exposed boundary of `L`, weighted by area, over `D` |
-//! | sphere error | per ball the largest `d_M` of any of its points, exposed or not, over `D` (the measure of Bradshaw and O'Sullivan) |
+//! | sphere error | per sphere the largest `d_M` of any of its points, exposed or not, over `D` (the measure of Bradshaw and O'Sullivan) |
 //! | volume ratio | `vol L / vol M`; outside is `vol(L ∖ M) / vol M`, missing `vol(M ∖ L) / vol M` |
-//! | nesting | balls that stick out of their parent by more than the tolerance (or have none), and by how much, over `D` |
+//! | nesting | spheres that stick out of their parent by more than the tolerance (or have none), and by how much, over `D` |
 //!
 //! Samples are deterministic and evenly spread; results are the same bits on any number of threads. Being samples, they tell a little less
 //! than the worst: [`SphereTree::outward_error_at`] is the bound above it, [`SphereTree::check_coverage`] the proof of coverage.
 
 mod samples;
-mod union;
+mod sphere_union;
 
 use super::SphereTree;
-use super::levels::LevelBall;
+use super::levels::LevelSphere;
 use crate::{Aabb, MeshDistance, TriMesh, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use union::BallUnion;
+use sphere_union::SphereUnion;
 
 /// Most samples of one kind.
-const MOST_SAMPLES: usize = 1 << 26;
-/// A point this part of `D` below the surface of another ball is not exposed.
+const MAX_SAMPLES: usize = 1 << 26;
+/// A point this part of `D` below the surface of another sphere is not exposed.
 const EXPOSED: f64 = 1e-9;
 
 /// How many samples are taken. Counts above 67 million count as that.
@@ -35,23 +35,23 @@ const EXPOSED: f64 = 1e-9;
 pub struct QualitySettings {
     /// On the surface of the mesh.
     pub surface_samples: usize,
-    /// On all balls of a level together, in proportion to their areas.
+    /// On all spheres of a level together, in proportion to their areas.
     pub sphere_samples: usize,
-    /// On each ball at least.
-    pub least_on_a_sphere: usize,
-    /// In the box around mesh and balls.
+    /// On each sphere at least.
+    pub min_samples_per_sphere: usize,
+    /// In the box around mesh and spheres.
     pub volume_samples: usize,
     /// What counts as covered and as nested, as a part of the diagonal.
     pub tolerance: f64,
 }
 
 impl Default for QualitySettings {
-    /// 20,000 on the surface, 60,000 (48 at least) on the balls, 131,072 in the volume; tolerance 1e-6.
+    /// 20,000 on the surface, 60,000 (48 at least) on the spheres, 131,072 in the volume; tolerance 1e-6.
     fn default() -> QualitySettings {
         QualitySettings {
             surface_samples: 20_000,
             sphere_samples: 60_000,
-            least_on_a_sphere: 48,
+            min_samples_per_sphere: 48,
             volume_samples: 1 << 17,
             tolerance: 1e-6,
         }
@@ -64,29 +64,29 @@ impl Default for QualitySettings {
 pub struct LevelQuality {
     /// 0 for the root.
     pub level: u32,
-    /// Balls that stand for the solid at this level.
+    /// Spheres that stand for the solid at this level.
     pub spheres: usize,
-    /// Share of the surface inside the balls, 0 to 1.
+    /// Share of the surface inside the spheres, 0 to 1.
     pub coverage: f64,
-    /// Mean over the surface of how far bare points are from the balls.
+    /// Mean over the surface of how far bare points are from the spheres.
     pub gap_mean: f64,
     /// The 95th percentile of the same.
     pub gap_p95: f64,
     /// The most.
     pub gap_max: f64,
-    /// Share of vertices inside the balls.
+    /// Share of vertices inside the spheres.
     pub vertex_coverage: f64,
-    /// The most that a vertex is from the balls.
+    /// The most that a vertex is from the spheres.
     pub vertex_gap_max: f64,
-    /// The most that the exposed boundary of the balls is outside the solid.
+    /// The most that the exposed boundary of the spheres is outside the solid.
     pub protrusion_max: f64,
     /// The 95th percentile by area.
     pub protrusion_p95: f64,
     /// The mean by area.
     pub protrusion_mean: f64,
-    /// The most that any ball reaches outside.
+    /// The most that any sphere reaches outside.
     pub sphere_worst: f64,
-    /// The mean over balls of the most that each reaches outside.
+    /// The mean over spheres of the most that each reaches outside.
     pub sphere_mean: f64,
     /// Volume of the union over that of the solid.
     pub volume_ratio: f64,
@@ -94,7 +94,7 @@ pub struct LevelQuality {
     pub outside: f64,
     /// Volume of the solid outside the union, over that of the solid.
     pub missing: f64,
-    /// Balls outside their parents.
+    /// Spheres outside their parents.
     pub nesting_broken: usize,
     /// The most that one is.
     pub nesting_max: f64,
@@ -108,9 +108,9 @@ impl SphereTree {
 }
 
 impl LevelQuality {
-    /// Measures any balls, level by level; `node` is not looked at. A level without balls has no figures; a parent that is not there
+    /// Measures any spheres, level by level; `node` is not looked at. A level without spheres has no figures; a parent that is not there
     /// (below the first level) counts as broken nesting.
-    pub fn of_levels(levels: &[Vec<LevelBall>], mesh: &TriMesh, settings: &QualitySettings) -> Vec<LevelQuality> {
+    pub fn of_levels(levels: &[Vec<LevelSphere>], mesh: &TriMesh, settings: &QualitySettings) -> Vec<LevelQuality> {
         let solid = Solid::new(mesh, settings);
         let above = std::iter::once(None).chain(levels.iter().map(Some));
         levels
@@ -132,9 +132,9 @@ struct Solid<'a> {
     settings: QualitySettings,
 }
 
-/// A point on a ball: which ball, the area it stands for, how far it is outside the solid, whether no other ball hides it.
+/// A point on a sphere: which sphere, the area it stands for, how far it is outside the solid, whether no other sphere hides it.
 struct BoundaryPoint {
-    ball: usize,
+    sphere: usize,
     area: f64,
     outside: f64,
     exposed: bool,
@@ -142,11 +142,11 @@ struct BoundaryPoint {
 
 impl<'a> Solid<'a> {
     fn new(mesh: &'a TriMesh, settings: &QualitySettings) -> Solid<'a> {
-        let count = |n: usize| n.clamp(1, MOST_SAMPLES);
+        let count = |n: usize| n.clamp(1, MAX_SAMPLES);
         let settings = QualitySettings {
             surface_samples: count(settings.surface_samples),
             sphere_samples: count(settings.sphere_samples),
-            least_on_a_sphere: count(settings.least_on_a_sphere).min(1 << 16),
+            min_samples_per_sphere: count(settings.min_samples_per_sphere).min(1 << 16),
             volume_samples: count(settings.volume_samples),
             ..*settings
         };
@@ -160,12 +160,12 @@ impl<'a> Solid<'a> {
         }
     }
 
-    fn measure(&self, number: usize, level: &[LevelBall], above: Option<&[LevelBall]>) -> LevelQuality {
+    fn measure(&self, number: usize, level: &[LevelSphere], above: Option<&[LevelSphere]>) -> LevelQuality {
         let mut row = LevelQuality { level: number as u32, spheres: level.len(), ..LevelQuality::default() };
         if level.is_empty() {
             return row;
         }
-        let union = BallUnion::new(level.iter().map(|b| (b.center, b.radius)).collect());
+        let union = SphereUnion::new(level.iter().map(|b| (b.center, b.radius)).collect());
         self.measure_gaps(&union, &mut row);
         self.measure_protrusion(level, &union, &mut row);
         self.measure_volumes(level, &union, &mut row);
@@ -173,7 +173,7 @@ impl<'a> Solid<'a> {
         row
     }
 
-    fn measure_gaps(&self, union: &BallUnion, row: &mut LevelQuality) {
+    fn measure_gaps(&self, union: &SphereUnion, row: &mut LevelQuality) {
         let (share, gaps) = self.gaps(union, &self.surface);
         (row.coverage, row.gap_max) = (share, largest(&gaps));
         row.gap_mean = gaps.iter().sum::<f64>() / gaps.len() as f64;
@@ -183,16 +183,16 @@ impl<'a> Solid<'a> {
     }
 
     /// Share of the points within the tolerance, and the gaps of all.
-    fn gaps(&self, union: &BallUnion, points: &[Vec3]) -> (f64, Vec<f64>) {
+    fn gaps(&self, union: &SphereUnion, points: &[Vec3]) -> (f64, Vec<f64>) {
         let gaps: Vec<f64> = points.par_iter().map(|p| union.distance(p).max(0.0) / self.diagonal).collect();
         let covered = gaps.iter().filter(|g| **g <= self.settings.tolerance).count();
         (covered as f64 / gaps.len() as f64, gaps)
     }
 
-    fn measure_protrusion(&self, level: &[LevelBall], union: &BallUnion, row: &mut LevelQuality) {
+    fn measure_protrusion(&self, level: &[LevelSphere], union: &SphereUnion, row: &mut LevelQuality) {
         let points = self.boundary(level, union);
         let mut worst = vec![0.0_f64; level.len()];
-        points.iter().for_each(|p| worst[p.ball] = worst[p.ball].max(p.outside));
+        points.iter().for_each(|p| worst[p.sphere] = worst[p.sphere].max(p.outside));
         (row.sphere_worst, row.sphere_mean) = (largest(&worst), worst.iter().sum::<f64>() / worst.len() as f64);
         let exposed: Vec<(f64, f64)> = points.iter().filter(|p| p.exposed).map(|p| (p.outside, p.area)).collect();
         let area: f64 = exposed.iter().map(|p| p.1).sum();
@@ -203,29 +203,29 @@ impl<'a> Solid<'a> {
         row.protrusion_p95 = percentile_95(exposed);
     }
 
-    /// Points on all balls, in the balls' order.
-    fn boundary(&self, level: &[LevelBall], union: &BallUnion) -> Vec<BoundaryPoint> {
+    /// Points on all spheres, in the spheres' order.
+    fn boundary(&self, level: &[LevelSphere], union: &SphereUnion) -> Vec<BoundaryPoint> {
         let square: f64 = level.iter().map(|b| b.radius * b.radius).sum::<f64>().max(f64::MIN_POSITIVE);
-        let of_ball = |(ball, b): (usize, &LevelBall)| {
+        let of_sphere = |(sphere, b): (usize, &LevelSphere)| {
             let share = self.settings.sphere_samples as f64 * (b.radius * b.radius / square);
-            let count = (share as usize).max(self.settings.least_on_a_sphere);
+            let count = (share as usize).max(self.settings.min_samples_per_sphere);
             let area = b.radius * b.radius / count as f64;
             let point = |u: Vec3| {
                 let p = b.center + u * b.radius;
                 let outside = self.distance.closest(&p).signed_distance.max(0.0) / self.diagonal;
-                BoundaryPoint { ball, area, outside, exposed: !union.holds(&p, EXPOSED * self.diagonal) }
+                BoundaryPoint { sphere, area, outside, exposed: !union.contains(&p, EXPOSED * self.diagonal) }
             };
             samples::fibonacci(count).into_par_iter().map(point).collect::<Vec<_>>()
         };
-        level.par_iter().enumerate().flat_map_iter(of_ball).collect()
+        level.par_iter().enumerate().flat_map_iter(of_sphere).collect()
     }
 
-    fn measure_volumes(&self, level: &[LevelBall], union: &BallUnion, row: &mut LevelQuality) {
+    fn measure_volumes(&self, level: &[LevelSphere], union: &SphereUnion, row: &mut LevelQuality) {
         let corners = level.iter().flat_map(|b| [b.center.add_scalar(-b.radius), b.center.add_scalar(b.radius)]);
         let bounds = Aabb::around(corners.chain(self.mesh.vertices.iter().copied()));
         let points = samples::in_box(&bounds, self.settings.volume_samples);
         let in_mesh = samples::inside(&self.distance, &points, &bounds);
-        let in_union: Vec<bool> = points.par_iter().map(|p| union.holds(p, 0.0)).collect();
+        let in_union: Vec<bool> = points.par_iter().map(|p| union.contains(p, 0.0)).collect();
         let one = (bounds.max - bounds.min).product() / points.len() as f64 / self.volume;
         let count = |wanted: fn(bool, bool) -> bool| {
             in_union.iter().zip(&in_mesh).filter(|(l, m)| wanted(**l, **m)).count() as f64 * one
@@ -235,7 +235,7 @@ impl<'a> Solid<'a> {
         row.missing = count(|l, m| m && !l);
     }
 
-    fn measure_nesting(&self, level: &[LevelBall], above: Option<&[LevelBall]>, row: &mut LevelQuality) {
+    fn measure_nesting(&self, level: &[LevelSphere], above: Option<&[LevelSphere]>, row: &mut LevelQuality) {
         let Some(above) = above else { return };
         for b in level {
             let Some(parent) = b.parent.and_then(|p| above.get(p)) else {

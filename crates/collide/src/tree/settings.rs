@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 pub struct TreeSettings {
     /// Which method.
     pub builder: Builder,
-    /// Greatest number of children of a ball, 2 to 64. The octree has 8 at most and takes no notice.
+    /// Greatest number of children of a sphere, 2 to 64. The octree has 8 at most and takes no notice.
     pub branch: u32,
     /// Greatest number of subdivisions, 1 to 9.
     pub depth: u32,
-    /// A cell is not divided further once its ball reaches at most this far outwards, as a part of the mesh's
+    /// A cell is not divided further once its sphere reaches at most this far outwards, as a part of the mesh's
     /// diagonal; 1e-4 to 1.
     pub error: f64,
     /// Grow every leaf to the same stand-off, `error`: flat faces stay flat, so that what stands on them stands
@@ -30,14 +30,14 @@ pub enum Builder {
     /// Adaptive medial axis. The tightest.
     #[default]
     Medial,
-    /// Hubbard's medial axis: balls of a fixed set of samples, merged. Faster than the adaptive one and coarser.
+    /// Hubbard's medial axis: spheres of a fixed set of samples, merged. Faster than the adaptive one and coarser.
     Hubbard,
-    /// Balls of an oriented grid's cubes. Faster still.
+    /// Spheres of an oriented grid's cubes. Faster still.
     Grid,
 }
 
 impl Default for TreeSettings {
-    /// The tightest tree of at most 8, 64 and 512 balls.
+    /// The tightest tree of at most 8, 64 and 512 spheres.
     fn default() -> TreeSettings {
         TreeSettings { builder: Builder::Medial, branch: 8, depth: 3, error: 1e-4, even: false }
     }

@@ -1,12 +1,12 @@
 //! The promises of a sphere tree, checked by code that shares nothing with the builders.
 
-use super::builder::go_on;
+use super::builder::check_stopped;
 use super::{Progress, SphereNode, SphereTree};
 use crate::{MeshError, TriMesh, Vec3};
 
-/// A piece of surface smaller than this part of the mesh's diagonal that lies across balls is covered if its corners
+/// A piece of surface smaller than this part of the mesh's diagonal that lies across spheres is covered if its corners
 /// are.
-const TINY: f64 = 1e-5;
+const MIN_PIECE: f64 = 1e-5;
 
 impl SphereTree {
     /// Every parent contains its children: `|c − c'| + r' ≤ r`, to rounding.
@@ -17,7 +17,7 @@ impl SphereTree {
                 let excess = (c.center - parent.center).norm() + c.radius - parent.radius;
                 if excess > 1e-12 * parent.radius {
                     return Err(MeshError::Tree {
-                        what: format!("ball {child} sticks out of its parent {n} by {excess:e} m"),
+                        what: format!("sphere {child} sticks out of its parent {n} by {excess:e} m"),
                     });
                 }
             }
@@ -25,18 +25,18 @@ impl SphereTree {
         Ok(())
     }
 
-    /// The leaves cover the surface of `mesh`. A triangle lies in a ball iff its corners do, so each is halved
-    /// until every piece lies in one ball, or is tiny (1e-5 of the diagonal) and each of its corners lies in some
-    /// ball.
+    /// The leaves cover the surface of `mesh`. A triangle lies in a sphere iff its corners do, so each is halved
+    /// until every piece lies in one sphere, or is tiny (1e-5 of the diagonal) and each of its corners lies in some
+    /// sphere.
     pub fn check_coverage(&self, mesh: &TriMesh) -> Result<(), MeshError> {
         self.check_coverage_watched(mesh, &())
     }
 
     /// The same; `progress` can end it.
     pub(super) fn check_coverage_watched(&self, mesh: &TriMesh, progress: &dyn Progress) -> Result<(), MeshError> {
-        let tiny = TINY * mesh.diagonal();
+        let tiny = MIN_PIECE * mesh.diagonal();
         for t in 0..mesh.triangles.len() {
-            go_on(progress)?;
+            check_stopped(progress)?;
             if let Err(point) = self.cover(&mesh.corners(t), tiny, 80) {
                 let what = format!("triangle {} is not covered near ({}, {}, {})", t + 1, point.x, point.y, point.z);
                 return Err(MeshError::Tree { what });
@@ -64,7 +64,7 @@ impl SphereTree {
         [[a, middle, c], [middle, b, c]].iter().try_for_each(|t| self.cover(t, tiny, splits - 1))
     }
 
-    /// Whether one leaf below `node` holds all the points. Balls nest, so a node that does not hold them has no such
+    /// Whether one leaf below `node` holds all the points. Spheres nest, so a node that does not hold them has no such
     /// leaf.
     fn leaf_holding(&self, node: usize, points: &[Vec3]) -> bool {
         let here = &self.nodes[node];
@@ -73,6 +73,6 @@ impl SphereTree {
     }
 }
 
-fn holds(ball: &SphereNode, p: &Vec3) -> bool {
-    (p - ball.center).norm_squared() <= ball.radius * ball.radius * (1.0 + 1e-12)
+fn holds(sphere: &SphereNode, p: &Vec3) -> bool {
+    (p - sphere.center).norm_squared() <= sphere.radius * sphere.radius * (1.0 + 1e-12)
 }

@@ -77,7 +77,7 @@ fn deepest(found: &[Contact]) -> Option<&Contact> {
 }
 
 /// Signed distance and normal (towards A) by parry: GJK where separate, EPA where not; for a half-space the support
-/// point (its `contact` of a ball with a half-space is wrong once the centre is inside).
+/// point (its `contact` of a sphere with a half-space is wrong once the center is inside).
 fn reference(a: &Both, pa: &Pose, b: &Both, pb: &Pose) -> (f64, Option<Vec3>) {
     if matches!(a.ours, Shape::HalfSpace) {
         let (distance, normal) = reference(b, pb, a, pa);
@@ -201,7 +201,7 @@ fn points_are_midway_between_the_surfaces() {
             // (the end of the part of a tilted capsule that is over a face is neither)
             let exact = if (ka, kb) == (1, 2) || (ka, kb) == (2, 1) { 2e-3 } else { 1e-6 };
             assert!(off_a.min(off_b) < exact, "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}");
-            // a capsule's upper end is a ball within the tube, so only the deepest contact must lie on both surfaces
+            // a capsule's upper end is a sphere within the tube, so only the deepest contact must lie on both surfaces
             assert!(
                 c.gap > least || off_a.max(off_b) < 2e-3 + 0.2 * c.gap.abs(),
                 "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}"
@@ -238,7 +238,7 @@ fn features_of_a_pair_are_distinct_and_last() {
         names.sort_unstable();
         names.dedup();
         assert_eq!(names.len(), before.len(), "kinds {ka} {kb}, case {case}: {before:?}");
-        // what a step of rest does to a body: a millionth of a metre and of a radian
+        // what a step of rest does to a body: a millionth of a meter and of a radian
         let nudge = Quat::from_scaled_axis(rng.vec(1e-6));
         let nudged = Pose::from_parts((pa.translation.vector + rng.vec(1e-6)).into(), nudge * pa.rotation);
         let after = ask(&a.ours, &nudged, &b.ours, &pb);

@@ -38,14 +38,14 @@ fn box_without_two_sides_is_closed_flat() {
     assert_eq!(report.notes(), ["2 hole(s) were filled with 4 faces; the longest has 4 edges"]);
 }
 
-/// A hole in a fine ball is closed by what is close to a flat cap: the volume lacks that of the cap, `πh²(3r − h)/3`, at
-/// most, and the filling lies within the ball.
+/// A hole in a fine sphere is closed by what is close to a flat cap: the volume lacks that of the cap, `πh²(3r − h)/3`, at
+/// most, and the filling lies within the sphere.
 #[test]
-fn hole_in_a_ball_is_closed_within_the_cap() {
+fn hole_in_a_sphere_is_closed_within_the_cap() {
     for (height, edges) in [(0.995, 20), (0.8, 40), (-0.2, 40)] {
-        let ball = TriMesh::icosphere(1.0, 5);
-        let full = ball.signed_volume();
-        let (mesh, report) = repaired(without(ball, |c| c.iter().any(|p| p.z > height)));
+        let sphere = TriMesh::icosphere(1.0, 5);
+        let full = sphere.signed_volume();
+        let (mesh, report) = repaired(without(sphere, |c| c.iter().any(|p| p.z > height)));
         let h = 1.0 - height + 0.05;
         let cap = std::f64::consts::PI * h * h * (3.0 - h) / 3.0;
         assert!(report.longest_hole > edges, "{report:?}");
@@ -115,19 +115,19 @@ fn fins_walls_and_debris_go() {
 
 #[test]
 fn cracks_close_within_the_tolerance_given() {
-    // each face of the ball for itself, its corners off by up to 1e-5
-    let ball = TriMesh::icosphere(1.0, 3);
+    // each face of the sphere for itself, its corners off by up to 1e-5
+    let sphere = TriMesh::icosphere(1.0, 3);
     let mut rng = Rng::new(3);
     let vertices: Vec<Vec3> =
-        (0..ball.triangles.len()).flat_map(|t| ball.corners(t)).map(|p| p + rng.vec(5e-6)).collect();
+        (0..sphere.triangles.len()).flat_map(|t| sphere.corners(t)).map(|p| p + rng.vec(5e-6)).collect();
     let soup = TriMesh {
         triangles: (0..vertices.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
         vertices,
     };
     let mut mesh = soup.clone();
     let report = mesh.repair(&RepairSettings { weld: 1e-4, ..RepairSettings::default() }).unwrap();
-    assert_eq!((report.welded_vertices, report.filled_holes), (soup.vertices.len() - ball.vertices.len(), 0));
-    near(report.closed.volume, ball.signed_volume(), 1e-4, "volume");
+    assert_eq!((report.welded_vertices, report.filled_holes), (soup.vertices.len() - sphere.vertices.len(), 0));
+    near(report.closed.volume, sphere.signed_volume(), 1e-4, "volume");
     for weld in [-1.0, f64::NAN, 1e-20, 1.0] {
         let error = soup.clone().repair(&RepairSettings { weld, ..RepairSettings::default() }).unwrap_err();
         assert!(matches!(error, MeshError::Settings { .. }), "{error}");

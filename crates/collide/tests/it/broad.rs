@@ -158,7 +158,7 @@ fn boxes_that_touch_are_a_pair_and_what_does_not_move_is_not() {
     for x in 0..100 {
         both.insert(block(Vec3::new(f64::from(x), 0.0, 0.0), Vec3::repeat(0.5)), x % 3 == 0);
     }
-    // 99 neighbours touch; of them those between x = 1 and 2, 4 and 5 and so on do not move: 33
+    // 99 neighbors touch; of them those between x = 1 and 2, 4 and 5 and so on do not move: 33
     assert_eq!(both.check("a row"), 99 - 33);
 }
 

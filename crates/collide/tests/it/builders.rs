@@ -11,7 +11,7 @@ fn settings(builder: Builder, depth: u32) -> TreeSettings {
     TreeSettings { builder, branch: 8, depth, error: 1e-3, even: false }
 }
 
-/// Surface samples lie in leaves; balls have at most `branch` children and lie in their parents.
+/// Surface samples lie in leaves; spheres have at most `branch` children and lie in their parents.
 fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings) {
     let nodes = tree.nodes();
     assert!(tree.levels() <= settings.depth + 1, "{name}");
@@ -66,7 +66,7 @@ fn public_meshes_are_covered_and_nested() {
     }
 }
 
-/// The reference's own trees of spot, by the same methods and of as many balls, reach out .0725 (grid) and .0408 (Hubbard) of the
+/// The reference's own trees of spot, by the same methods and of as many spheres, reach out .0725 (grid) and .0408 (Hubbard) of the
 /// diagonal at level 2, though they neither nest nor cover all.
 #[test]
 fn spot_is_tighter_than_the_references_trees() {
@@ -81,14 +81,14 @@ fn spot_is_tighter_than_the_references_trees() {
 }
 
 #[test]
-fn generated_solids_get_trees_whose_balls_reach_out_as_stated() {
+fn generated_solids_get_trees_whose_spheres_reach_out_as_stated() {
     let meshes = [
         ("box", TriMesh::box_(Vec3::new(0.5, 1.0, 0.1))),
         ("sheet", TriMesh::box_(Vec3::new(0.5, 1.0, 1e-3))),
         ("needle", TriMesh::box_(Vec3::new(1e-3, 1.0, 1e-3))),
         ("cube", TriMesh::box_(Vec3::repeat(1.0))),
         ("cylinder", TriMesh::cylinder(0.5, 0.5, 32)),
-        ("ball", TriMesh::icosphere(1.0, 2)),
+        ("sphere", TriMesh::icosphere(1.0, 2)),
         ("torus", TriMesh::torus(1.0, 0.3, 24, 12)),
     ];
     for (name, mesh) in meshes {
@@ -107,16 +107,16 @@ fn generated_solids_get_trees_whose_balls_reach_out_as_stated() {
     }
 }
 
-/// A ball is itself: one ball is enough, and it is the right one. The sphere through the vertices of the icosphere has radius 1.
+/// A sphere is itself: one sphere is enough, and it is the right one. The sphere through the vertices of the icosphere has radius 1.
 #[test]
-fn a_ball_needs_one_ball() {
+fn a_sphere_needs_one_sphere() {
     let mesh = TriMesh::icosphere(1.0, 2);
     for builder in BUILDERS {
         let settings = TreeSettings { builder, branch: 8, depth: 3, error: 0.01, even: false };
         let tree = SphereTree::build(&mesh, &settings).unwrap();
         assert_eq!(tree.nodes().len(), 1, "{builder:?}");
-        let ball = &tree.nodes()[0];
-        assert!(ball.center.norm() < 5e-3 && (ball.radius - 1.0).abs() < 5e-3, "{ball:?}");
+        let sphere = &tree.nodes()[0];
+        assert!(sphere.center.norm() < 5e-3 && (sphere.radius - 1.0).abs() < 5e-3, "{sphere:?}");
     }
 }
 
@@ -148,9 +148,9 @@ fn branching_of_two_and_of_many() {
     }
 }
 
-/// The ball around a unit cube has the radius √3/2 and reaches `(√3/2 − 1/2)/√3 = 21.13 %` of the diagonal outside.
+/// The sphere around a unit cube has the radius √3/2 and reaches `(√3/2 − 1/2)/√3 = 21.13 %` of the diagonal outside.
 #[test]
-fn a_ball_that_is_good_enough_is_neither_divided_nor_grown() {
+fn a_sphere_that_is_good_enough_is_neither_divided_nor_grown() {
     let cube = TriMesh::box_(Vec3::repeat(0.5));
     let bound = 0.5 - 0.5 / 3.0_f64.sqrt();
     for builder in [Builder::Octree, Builder::Medial, Builder::Hubbard, Builder::Grid] {
@@ -165,7 +165,7 @@ fn a_ball_that_is_good_enough_is_neither_divided_nor_grown() {
 }
 
 #[test]
-fn no_ball_is_a_point() {
+fn no_sphere_is_a_point() {
     for builder in BUILDERS {
         for mesh in [TriMesh::box_(Vec3::new(0.5, 0.4, 0.3)), TriMesh::torus(1.0, 0.3, 24, 12)] {
             let tree = SphereTree::build(&mesh, &TreeSettings { builder, ..TreeSettings::default() }).unwrap();
@@ -176,11 +176,11 @@ fn no_ball_is_a_point() {
 }
 
 #[test]
-fn a_covering_covers_and_never_reaches_further_with_more_balls() {
+fn a_covering_covers_and_never_reaches_further_with_more_spheres() {
     let bowl = {
-        let mut ball = TriMesh::uv_sphere(0.2, 16, 12);
-        ball.triangles.retain(|t| t.iter().all(|&v| ball.vertices[v as usize].z < 1e-9));
-        ball
+        let mut sphere = TriMesh::uv_sphere(0.2, 16, 12);
+        sphere.triangles.retain(|t| t.iter().all(|&v| sphere.vertices[v as usize].z < 1e-9));
+        sphere
     };
     let hull = bowl.convex_hull().unwrap();
     let plate = TriMesh::box_(Vec3::new(0.5, 0.5, 0.05));
@@ -192,9 +192,9 @@ fn a_covering_covers_and_never_reaches_further_with_more_balls() {
             assert!(covering.worst() <= last, "{count}: {} after {last}", covering.worst());
             last = covering.worst();
             // by the other proof: nothing has to grow but by rounding
-            let mut balls: Vec<(Vec3, f64)> = covering.balls().map(|(c, r, _)| (c, r * (1.0 + 1e-9))).collect();
+            let mut spheres: Vec<(Vec3, f64)> = covering.spheres().map(|(c, r, _)| (c, r * (1.0 + 1e-9))).collect();
             if count == 13 {
-                let grown = grow_to_cover(&mut balls, given);
+                let grown = grow_to_cover(&mut spheres, given);
                 assert!(grown <= 2e-5 * given.diagonal(), "{count}: {grown}");
             }
             assert!(covering.refine());

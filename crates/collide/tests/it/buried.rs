@@ -1,9 +1,9 @@
 //! Meshes of shells that overlap: what is buried in another shell does not count.
 
 use crate::rng::Rng;
-use tumble_collide::{Contact, ContactMode, MeshDistance, Pose, Shape, TreeSettings, TriMesh, Vec3, contacts_in};
+use tumble_collide::{Contact, ContactMode, MeshDistance, Pose, Shape, TreeSettings, TriMesh, Vec3, contacts_in_mode};
 
-/// Boxes by half extents and centre, as one mesh.
+/// Boxes by half extents and center, as one mesh.
 fn boxes(all: &[(Vec3, Vec3)]) -> TriMesh {
     let mut mesh = TriMesh { vertices: Vec::new(), triangles: Vec::new() };
     for (half, center) in all {
@@ -25,7 +25,7 @@ fn shape(mesh: &TriMesh) -> (Shape, Pose) {
 
 fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
     let mut out = Vec::new();
-    contacts_in(ContactMode::Surface, a, pa, b, pb, margin, &mut out);
+    contacts_in_mode(ContactMode::Surface, a, pa, b, pb, margin, &mut out);
     out
 }
 
@@ -52,13 +52,13 @@ fn buried_corners_do_not_touch_a_plane() {
 }
 
 #[test]
-fn a_ball_in_the_seam_touches_both_blocks() {
+fn a_sphere_in_the_seam_touches_both_blocks() {
     let (shape, pose) = shape(&step());
     let (r, deep) = (0.05, 1e-4);
-    let ball = Shape::sphere(r).unwrap();
+    let sphere = Shape::sphere(r).unwrap();
     // the taller one's side is x = 0.5, the lower one's top z = 0.1
     let at = Pose::translation(0.5 + r - deep, 0.03, 0.1 + r - 2.0 * deep);
-    let mut found = ask(&ball, &at, &shape, &pose, 1e-3);
+    let mut found = ask(&sphere, &at, &shape, &pose, 1e-3);
     found.sort_by(|a, b| a.gap.total_cmp(&b.gap));
     let told: Vec<(f64, Vec3)> = found.iter().map(|c| (c.gap, c.normal)).collect();
     assert_eq!(told.len(), 2, "{found:?}");
@@ -82,14 +82,14 @@ fn gaps_are_those_of_the_union() {
     for mesh in &meshes {
         let (shape, pose) = shape(mesh);
         let union = MeshDistance::new(mesh);
-        let (ball, mut near) = (Shape::sphere(0.03).unwrap(), 0);
+        let (sphere, mut near) = (Shape::sphere(0.03).unwrap(), 0);
         for _ in 0..8000 {
             let p = rng.vec(1.0);
             let truth = union.closest(&p).signed_distance - 0.03;
-            // apart, and overlapping with the ball's centre outside
+            // apart, and overlapping with the sphere's center outside
             if (-0.03..0.05).contains(&truth) {
                 near += 1;
-                let found = ask(&ball, &Pose::from_parts(p.into(), Default::default()), &shape, &pose, 0.05);
+                let found = ask(&sphere, &Pose::from_parts(p.into(), Default::default()), &shape, &pose, 0.05);
                 let gap = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
                 assert!((gap - truth).abs() < 1e-9, "at {p:?}: {gap} but {truth}");
             }

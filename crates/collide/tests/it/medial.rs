@@ -28,7 +28,7 @@ fn crooked(half: Vec3, seed: u64) -> TriMesh {
     mesh
 }
 
-/// Checked here by points alone: each point of the surface lies in a ball of each level, each ball in its parent, and no point
+/// Checked here by points alone: each point of the surface lies in a sphere of each level, each sphere in its parent, and no point
 /// is told an error larger than the stated one.
 fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings) {
     let mut rng = Rng::new(5);
@@ -40,7 +40,7 @@ fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings)
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         let p = a + (b - a) * u + (c - a) * v;
         for (n, level) in levels.iter().enumerate() {
-            let held = level.iter().any(|ball| (p - ball.center).norm() <= ball.radius * (1.0 + 1e-9));
+            let held = level.iter().any(|sphere| (p - sphere.center).norm() <= sphere.radius * (1.0 + 1e-9));
             assert!(held, "{name}: {p} is bare on level {n}");
         }
     }
@@ -55,13 +55,19 @@ fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings)
 
 #[test]
 fn covers_and_nests_thin_and_scattered_solids() {
-    let ball = TriMesh::icosphere(0.3, 2);
+    let sphere = TriMesh::icosphere(0.3, 2);
     let cases = [
         ("sheet", crooked(Vec3::new(1.0, 0.8, 1e-3), 1)),
         ("needle", crooked(Vec3::new(1.0, 1e-3, 2e-3), 2)),
         ("crooked box", crooked(Vec3::new(1.0, 0.5, 0.3), 3)),
-        ("two parts", both(crooked(Vec3::new(0.5, 0.2, 0.3), 4), &ball.clone().translated(&Vec3::new(2.0, 0.5, 0.0)))),
-        ("parts that overlap", both(crooked(Vec3::new(0.5, 0.2, 0.3), 5), &ball.translated(&Vec3::new(0.5, 0.0, 0.0)))),
+        (
+            "two parts",
+            both(crooked(Vec3::new(0.5, 0.2, 0.3), 4), &sphere.clone().translated(&Vec3::new(2.0, 0.5, 0.0))),
+        ),
+        (
+            "parts that overlap",
+            both(crooked(Vec3::new(0.5, 0.2, 0.3), 5), &sphere.translated(&Vec3::new(0.5, 0.0, 0.0))),
+        ),
         ("ring", TriMesh::torus(1.0, 0.25, 24, 12)),
     ];
     for (name, mesh) in cases {
@@ -73,10 +79,10 @@ fn covers_and_nests_thin_and_scattered_solids() {
     }
 }
 
-/// One ball about the middle of a polyhedron that is inscribed in a sphere reaches out by the sagitta of its faces. Eight that
+/// One sphere about the middle of a polyhedron that is inscribed in a sphere reaches out by the sagitta of its faces. Eight that
 /// share its points find that, but for what closing them over the surface between the points grows.
 #[test]
-fn a_ball_is_covered_by_balls_as_large() {
+fn a_sphere_is_covered_by_spheres_as_large() {
     let mesh = TriMesh::icosphere(1.0, 3);
     let depth = |t: usize| {
         let [a, b, c] = mesh.corners(t);
@@ -100,7 +106,7 @@ fn what_is_good_enough_is_not_divided() {
 struct Told(Mutex<Vec<f64>>);
 
 impl Progress for Told {
-    fn at(&self, share: f64) {
+    fn report(&self, share: f64) {
         self.0.lock().unwrap().push(share);
     }
 }
@@ -109,7 +115,7 @@ impl Progress for Told {
 fn tells_how_far_it_is_and_what_each_stage_did() {
     let told = Told(Mutex::new(Vec::new()));
     let mesh = TriMesh::torus(1.0, 0.25, 24, 12);
-    let (tree, stages) = SphereTree::build_watched(&mesh, &settings(2), &told).unwrap();
+    let (tree, stages) = SphereTree::build_with_progress(&mesh, &settings(2), &told).unwrap();
     let shares = told.0.into_inner().unwrap();
     assert!(shares.len() > 5 && shares.windows(2).all(|w| w[0] <= w[1]) && shares.last() == Some(&1.0), "{shares:?}");
     let count = |level, stage: &str| {
@@ -119,7 +125,7 @@ fn tells_how_far_it_is_and_what_each_stage_did() {
         let regions = 8_u64.pow(level - 1);
         let ways = ["expand won", "merge won", "burst won"].map(|way| count(level, way)).iter().sum::<u64>();
         assert_eq!(ways, regions, "level {level}");
-        assert!(count(level, "internal balls") >= 500, "level {level}");
+        assert!(count(level, "internal spheres") >= 500, "level {level}");
     }
     assert!(count(2, "gaps filled") > 0);
     assert!(tree.at_level(2).count() as u64 <= 64);

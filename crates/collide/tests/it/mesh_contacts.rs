@@ -6,13 +6,15 @@ use crate::rng::Rng;
 use crate::shared_meshes::text;
 use parry3d_f64::query;
 use parry3d_f64::shape::{Ball, Capsule, Cuboid, Shape as ParryShape, TriMesh as ParryMesh};
-use tumble_collide::{Contact, ContactMode, NormalFrom, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in};
+use tumble_collide::{
+    Contact, ContactMode, NormalFrom, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in_mode,
+};
 
 struct Both {
     name: &'static str,
     ours: Shape,
     theirs: Box<dyn ParryShape>,
-    /// Outward error of the tree, metres; 0 for primitives.
+    /// Outward error of the tree, meters; 0 for primitives.
     error: f64,
     size: f64,
 }
@@ -44,7 +46,7 @@ fn bodies() -> Vec<Both> {
         solid("box mesh", TriMesh::box_(Vec3::new(0.2, 0.3, 0.1))),
         solid("ring", TriMesh::torus(1.0, 0.3, 48, 24)),
         Both { name: "cylinder", ours: cylinder, theirs: Box::new(theirs), error, size },
-        primitive("ball", Shape::sphere(0.3).unwrap(), Box::new(Ball::new(0.3))),
+        primitive("sphere", Shape::sphere(0.3).unwrap(), Box::new(Ball::new(0.3))),
         primitive(
             "box",
             Shape::cuboid(Vec3::new(0.3, 0.2, 0.4)).unwrap(),
@@ -62,7 +64,7 @@ fn bodies() -> Vec<Both> {
 
 fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
     let mut out = Vec::new();
-    contacts_in(ContactMode::Spheres, a, pa, b, pb, margin, &mut out);
+    contacts_in_mode(ContactMode::Spheres, a, pa, b, pb, margin, &mut out);
     for c in &out {
         assert!(
             (c.normal.norm() - 1.0).abs() < 1e-9 && c.gap <= margin && c.point.iter().all(|x| x.is_finite()),
@@ -84,7 +86,7 @@ fn tree_contacts_agree_with_the_distance_to_the_mesh() {
             // parry takes milliseconds for a pair of fine meshes
             let cases = if a.error > 0.0 && b.error > 0.0 { 12 } else { 200 };
             for case in 0..cases {
-                // centres at about the distance where the two begin to touch
+                // centers at about the distance where the two begin to touch
                 let away = rng.direction() * (a.size + b.size) * rng.between(0.3, 1.0);
                 let (pa, pb) = (rng.pose(0.5), rng.pose(0.5));
                 let pa = Pose::from_parts((pb.translation.vector + away).into(), pa.rotation);
@@ -174,16 +176,16 @@ fn a_pin_stands_upright_on_its_base() {
 }
 
 #[test]
-fn a_ball_lies_in_a_cup() {
+fn a_sphere_lies_in_a_cup() {
     let cup = TriMesh::lathe(&[(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.5, 2.0), (1.5, 0.5), (0.0, 0.5)], 64).unwrap();
     let expected = std::f64::consts::PI * (4.0 * 2.0 - 2.25 * 1.5);
     assert!((cup.signed_volume() / expected - 1.0).abs() < 2e-3);
     let cup = Shape::mesh(cup, &TreeSettings::octree()).unwrap();
     let error = cup.tree().unwrap().outward_error();
-    let ball = Shape::sphere(0.4).unwrap();
+    let sphere = Shape::sphere(0.4).unwrap();
     let at_height = |above: f64| {
         ask(
-            &ball,
+            &sphere,
             &Pose::translation(0.3, 0.2, 0.5 + 0.4 + above - cup.center_of_mass().z),
             &cup,
             &Pose::identity(),
@@ -207,7 +209,7 @@ fn poses_that_are_not_numbers_do_no_harm() {
         for a in &all {
             for b in &all {
                 out.clear();
-                contacts_in(
+                contacts_in_mode(
                     mode,
                     &a.ours,
                     &Pose::translation(bad, 0.0, 0.0),
@@ -216,7 +218,7 @@ fn poses_that_are_not_numbers_do_no_harm() {
                     0.1,
                     &mut out,
                 );
-                contacts_in(
+                contacts_in_mode(
                     mode,
                     &b.ours,
                     &Pose::identity(),
@@ -225,7 +227,7 @@ fn poses_that_are_not_numbers_do_no_harm() {
                     0.1,
                     &mut out,
                 );
-                contacts_in(
+                contacts_in_mode(
                     mode,
                     &a.ours,
                     &Pose::translation(bad, 0.0, 0.0),
@@ -267,7 +269,7 @@ fn cylinder_on_a_half_space_is_exact() {
 }
 
 #[test]
-fn boxes_around_shapes_hold_their_balls_and_vertices() {
+fn boxes_around_shapes_hold_their_spheres_and_vertices() {
     let mut rng = Rng::new(11);
     for body in bodies() {
         for _ in 0..20 {
@@ -275,7 +277,7 @@ fn boxes_around_shapes_hold_their_balls_and_vertices() {
             let bounds = body.ours.aabb(&pose);
             let theirs = body.theirs.compute_aabb(&to_parry(&pose));
             for k in 0..3 {
-                // no wider than the ball around all; exact for a primitive (parry's box of a turned mesh is loose)
+                // no wider than the sphere around all; exact for a primitive (parry's box of a turned mesh is loose)
                 let width = bounds.max[k] - bounds.min[k];
                 assert!(width <= 2.0 * (body.size + 2.0 * body.error) + 1e-9, "{}", body.name);
                 let off = (bounds.min[k] - theirs.mins[k]).abs().max((bounds.max[k] - theirs.maxs[k]).abs());
@@ -322,7 +324,7 @@ fn same_input_gives_the_same_bits() {
 }
 
 #[test]
-fn mesh_shape_is_moved_to_its_centre_of_mass() {
+fn mesh_shape_is_moved_to_its_center_of_mass() {
     let mesh = TriMesh::box_(Vec3::new(0.1, 0.2, 0.3)).translated(&Vec3::new(5.0, 6.0, 7.0));
     let shape = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
     assert!((shape.center_of_mass() - Vec3::new(5.0, 6.0, 7.0)).norm() < 1e-12);

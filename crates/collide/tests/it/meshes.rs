@@ -4,7 +4,8 @@ use crate::rng::Rng;
 use crate::shared_meshes::text;
 use std::f64::consts::PI;
 use tumble_collide::{
-    ClosedReport, Mat3, MeshDistance, MeshError, Pose, Quat, Shape, SphereTree, TreeSettings, TriMesh, Vec3, text_of,
+    ClosedReport, Mat3, MeshDistance, MeshError, Pose, Quat, Shape, SphereTree, TreeSettings, TriMesh, Vec3,
+    decode_text,
 };
 
 fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
@@ -35,16 +36,16 @@ fn box_mesh_has_the_mass_of_a_box_wherever_it_is() {
 }
 
 #[test]
-fn fine_torus_and_ball_tend_to_their_closed_forms() {
+fn fine_torus_and_sphere_tend_to_their_closed_forms() {
     let (big, small, n) = (1.0, 0.3, 400);
     let torus = TriMesh::torus(big, small, n, n).mass_properties(1.0);
     assert_near(torus.mass, 2.0 * PI * PI * big * small * small, 2e-4, "torus");
     // Izz = m (R² + 3/4 r²), Ixx = m (R²/2 + 5/8 r²)
     assert_near(torus.inertia[(2, 2)], torus.mass * (big * big + 0.75 * small * small), 2e-4, "torus Izz");
     assert_near(torus.inertia[(0, 0)], torus.mass * (0.5 * big * big + 0.625 * small * small), 2e-4, "torus Ixx");
-    let ball = TriMesh::icosphere(2.0, 6).mass_properties(1.0);
-    assert_near(ball.mass, 32.0 / 3.0 * PI, 1e-3, "ball");
-    assert_near(ball.inertia[(1, 1)], 0.4 * ball.mass * 4.0, 1e-3, "ball I");
+    let sphere = TriMesh::icosphere(2.0, 6).mass_properties(1.0);
+    assert_near(sphere.mass, 32.0 / 3.0 * PI, 1e-3, "sphere");
+    assert_near(sphere.inertia[(1, 1)], 0.4 * sphere.mass * 4.0, 1e-3, "sphere I");
 }
 
 #[test]
@@ -218,13 +219,13 @@ fn good_meshes_are_closed_with_the_volume_that_trimesh_finds() {
 }
 
 #[test]
-fn signed_distance_of_a_fine_ball_is_that_of_a_ball() {
-    let ball = MeshDistance::new(&TriMesh::icosphere(1.0, 5));
+fn signed_distance_of_a_fine_sphere_is_that_of_a_sphere() {
+    let sphere = MeshDistance::new(&TriMesh::icosphere(1.0, 5));
     let box_mesh = MeshDistance::new(&TriMesh::box_(Vec3::repeat(1.0)));
     for n in 0..500 {
         let p = Pose::rotation(Vec3::new(0.1, 0.2, 0.3) * f64::from(n))
             * nalgebra::Point3::new(0.005 * f64::from(n), 0.3, 0.1);
-        assert!((ball.closest(&p.coords).signed_distance - (p.coords.norm() - 1.0)).abs() < 2e-3);
+        assert!((sphere.closest(&p.coords).signed_distance - (p.coords.norm() - 1.0)).abs() < 2e-3);
         let q = p.coords.abs().add_scalar(-1.0);
         let expected = q.map(|x| x.max(0.0)).norm() + q.max().min(0.0);
         assert!((box_mesh.closest(&p.coords).signed_distance - expected).abs() < 1e-12);
@@ -234,10 +235,10 @@ fn signed_distance_of_a_fine_ball_is_that_of_a_ball() {
 /// Damage to any byte gives a mesh or an error, never a panic, and a mesh that passes the check has a volume.
 #[test]
 fn damaged_files_are_read_or_refused() {
-    let ball = TriMesh::icosphere(1.0, 1);
-    let mut obj: String = ball.vertices.iter().map(|v| format!("v {:.3} {:.3} {:.3}\n", v.x, v.y, v.z)).collect();
-    obj.extend(ball.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1)));
-    let (obj, stl) = (obj.into_bytes(), binary_stl(&ball));
+    let sphere = TriMesh::icosphere(1.0, 1);
+    let mut obj: String = sphere.vertices.iter().map(|v| format!("v {:.3} {:.3} {:.3}\n", v.x, v.y, v.z)).collect();
+    obj.extend(sphere.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1)));
+    let (obj, stl) = (obj.into_bytes(), binary_stl(&sphere));
     let mut rng = Rng::new(9);
     let (mut read, mut refused) = (0, 0);
     for case in 0..6000 {
@@ -392,13 +393,13 @@ fn a_sheet_over_a_notch_does_not_break_the_bound_of_a_tree() {
     }
     for depth in 1..4 {
         let tree = SphereTree::build(&mesh, &TreeSettings { depth, ..TreeSettings::octree() }).unwrap();
-        for ball in tree.nodes() {
-            let farthest = TriMesh::icosphere(ball.radius, 2)
+        for sphere in tree.nodes() {
+            let farthest = TriMesh::icosphere(sphere.radius, 2)
                 .vertices
                 .iter()
-                .map(|d| outside(&(ball.center + d)))
+                .map(|d| outside(&(sphere.center + d)))
                 .fold(0.0, f64::max);
-            assert!(farthest <= ball.outward + 1e-12, "{ball:?} reaches {farthest}");
+            assert!(farthest <= sphere.outward + 1e-12, "{sphere:?} reaches {farthest}");
         }
     }
 }
@@ -407,7 +408,7 @@ fn a_sheet_over_a_notch_does_not_break_the_bound_of_a_tree() {
 fn obj_files_come_in_several_spellings() {
     let plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
     let wanted = TriMesh::from_obj(plain).unwrap();
-    let read = |bytes: &[u8]| TriMesh::from_obj(&text_of(bytes).unwrap()).unwrap();
+    let read = |bytes: &[u8]| TriMesh::from_obj(&decode_text(bytes).unwrap()).unwrap();
     assert_eq!(read(format!("\u{feff}{plain}").as_bytes()), wanted);
     assert_eq!(read(plain.replace('\n', "\r").as_bytes()), wanted);
     assert_eq!(read(plain.replace('\n', "\r\n").as_bytes()), wanted);
@@ -417,7 +418,7 @@ fn obj_files_come_in_several_spellings() {
     // lines are those of the file, and of a line that goes on the first
     let (_, lines) = TriMesh::from_obj_with_lines(&plain.replace("1 3 2", "1 \\\n3 2")).unwrap();
     assert_eq!(lines, [5, 7, 8, 9]);
-    assert_eq!(text_of(b"v 0\0"), Err(3));
+    assert_eq!(decode_text(b"v 0\0"), Err(3));
 }
 
 #[test]

@@ -149,7 +149,7 @@ fn coincident_bodies_have_a_way_out() {
     for (name, shape) in [
         ("cube", cube()),
         ("cylinder", Shape::cylinder(0.5, 0.5).unwrap()),
-        ("ball", mesh(TriMesh::icosphere(0.5, 2))),
+        ("sphere", mesh(TriMesh::icosphere(0.5, 2))),
         ("ring", mesh(TriMesh::torus(0.4, 0.12, 32, 16))),
     ] {
         for pose in [Pose::identity(), Pose::from_parts(Vec3::zeros().into(), turned)] {

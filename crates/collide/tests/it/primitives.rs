@@ -97,7 +97,7 @@ fn capsules_lying_down_rest_on_two_points() {
 }
 
 #[test]
-fn coincident_centres_give_a_finite_normal() {
+fn coincident_centers_give_a_finite_normal() {
     let shapes = [
         Shape::sphere(0.5).unwrap(),
         Shape::cuboid(Vec3::new(0.5, 0.5, 0.5)).unwrap(),
@@ -121,8 +121,8 @@ fn coincident_centres_give_a_finite_normal() {
 }
 
 #[test]
-fn mass_of_a_capsule_is_a_tube_and_a_ball() {
-    // r = 1, l = 1, ρ = 3/π: tube 6, ball 4; Izz = 6/2 + 8/5; Ixx = 6(1/4 + 1/3) + 4(2/5 + 1 + 3/4)
+fn mass_of_a_capsule_is_a_tube_and_a_sphere() {
+    // r = 1, l = 1, ρ = 3/π: tube 6, sphere 4; Izz = 6/2 + 8/5; Ixx = 6(1/4 + 1/3) + 4(2/5 + 1 + 3/4)
     let mass = Shape::capsule(1.0, 1.0).unwrap().mass_properties(3.0 / std::f64::consts::PI).unwrap();
     assert!((mass.mass - 10.0).abs() < 1e-12);
     assert!((mass.inertia[(2, 2)] - 4.6).abs() < 1e-12);

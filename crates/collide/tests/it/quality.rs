@@ -2,12 +2,12 @@
 
 use std::f64::consts::PI;
 use tumble_collide::{
-    LevelBall, LevelQuality, QualitySettings, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover,
+    LevelQuality, LevelSphere, QualitySettings, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover,
 };
 
-/// The figures of balls `(x, r)` with their centres on the x axis.
-fn on_axis(balls: &[(f64, f64)], mesh: &TriMesh) -> LevelQuality {
-    let level = balls.iter().map(|&(x, r)| LevelBall::new(Vec3::x() * x, r)).collect();
+/// The figures of spheres `(x, r)` with their centers on the x axis.
+fn on_axis(spheres: &[(f64, f64)], mesh: &TriMesh) -> LevelQuality {
+    let level = spheres.iter().map(|&(x, r)| LevelSphere::new(Vec3::x() * x, r)).collect();
     LevelQuality::of_levels(&[level], mesh, &QualitySettings::default()).remove(0)
 }
 
@@ -32,14 +32,14 @@ fn mean_distance_to_cube(r: f64) -> f64 {
 }
 
 #[test]
-fn a_ball_around_a_cube() {
+fn a_sphere_around_a_cube() {
     let (r, d) = (3.0_f64.sqrt(), 12.0_f64.sqrt());
     // grown by more than the rounding of the corners
     let q = on_axis(&[(0.0, r * (1.0 + 1e-12))], &TriMesh::box_(Vec3::repeat(1.0)));
     assert_eq!((q.spheres, q.coverage, q.vertex_coverage, q.gap_max, q.vertex_gap_max), (1, 1.0, 1.0, 0.0, 0.0));
     near("greatest protrusion", q.protrusion_max, (r - 1.0) / d, 2e-5);
     near("mean protrusion", q.protrusion_mean, mean_distance_to_cube(r) / d, 2e-5);
-    near("error of the ball", q.sphere_worst, (r - 1.0) / d, 2e-5);
+    near("error of the sphere", q.sphere_worst, (r - 1.0) / d, 2e-5);
     let ratio = 4.0 / 3.0 * PI * r.powi(3) / 8.0;
     near("volume ratio", q.volume_ratio, ratio, 1e-3 * ratio);
     // half the standard deviation of as many random points
@@ -48,7 +48,7 @@ fn a_ball_around_a_cube() {
 }
 
 #[test]
-fn a_ball_in_a_cube() {
+fn a_sphere_in_a_cube() {
     let d = 12.0_f64.sqrt();
     let q = on_axis(&[(0.0, 1.0)], &TriMesh::box_(Vec3::repeat(1.0)));
     assert_eq!(
@@ -64,13 +64,13 @@ fn a_ball_in_a_cube() {
 }
 
 #[test]
-fn the_share_of_a_sheet_that_a_ball_covers() {
-    // faces of 2 × 2 at z = ±0.1; the ball of radius 0.5 cuts a disc from each and reaches no rim
+fn the_share_of_a_sheet_that_a_sphere_covers() {
+    // faces of 2 × 2 at z = ±0.1; the sphere of radius 0.5 cuts a disc from each and reaches no rim
     let mesh = TriMesh::box_(Vec3::new(1.0, 1.0, 0.1));
     let q = on_axis(&[(0.0, 0.5)], &mesh);
     let area = 2.0 * 4.0 + 4.0 * 2.0 * 0.2;
     near("coverage", q.coverage, 2.0 * PI * (0.25 - 0.01) / area, 5e-4);
-    near("error of the ball", q.sphere_worst, 0.4 / mesh.diagonal(), 1e-5);
+    near("error of the sphere", q.sphere_worst, 0.4 / mesh.diagonal(), 1e-5);
     // 95 % of the sphere is where |z| is at most 0.95 of the radius: the outside is 0.5·0.95 − 0.1
     near("95th percentile", q.protrusion_p95, 0.375 / mesh.diagonal(), 1e-5);
     // |z| is uniform on [0, 0.5]: the mean of max(0, |z| − 0.1) is 0.4²/2 / 0.5
@@ -78,7 +78,7 @@ fn the_share_of_a_sheet_that_a_ball_covers() {
 }
 
 #[test]
-fn two_balls_that_overlap_count_their_lens_once() {
+fn two_spheres_that_overlap_count_their_lens_once() {
     let (apart, mesh) = (0.8_f64, TriMesh::box_(Vec3::repeat(2.0)));
     let q = on_axis(&[(-0.5 * apart, 1.0), (0.5 * apart, 1.0)], &mesh);
     let lens = PI * (4.0 + apart) * (2.0 - apart).powi(2) / 12.0;
@@ -88,23 +88,23 @@ fn two_balls_that_overlap_count_their_lens_once() {
 }
 
 #[test]
-fn a_ball_beside_a_ball() {
-    // the solid is a ball to 0.1 %, the tree the same ball moved by 0.7: what they share is the lens
+fn a_sphere_beside_a_sphere() {
+    // the solid is a sphere to 0.1 %, the tree the same sphere moved by 0.7: what they share is the lens
     let apart = 0.7_f64;
     let q = on_axis(&[(apart, 1.0)], &TriMesh::icosphere(1.0, 5));
     let (whole, lens) = (4.0 / 3.0 * PI, PI * (4.0 + apart) * (2.0 - apart).powi(2) / 12.0);
     near("outside", q.outside, 1.0 - lens / whole, 2e-3);
     near("missing", q.missing, 1.0 - lens / whole, 2e-3);
     near("error", q.sphere_worst * 12.0_f64.sqrt(), apart, 2e-3);
-    // of the surface of the solid the cap beyond x = apart / 2 is covered; the mesh lies 0.07 % within its ball, which moves that by 5e-4
+    // of the surface of the solid the cap beyond x = apart / 2 is covered; the mesh lies 0.07 % within its sphere, which moves that by 5e-4
     near("coverage", q.coverage, (1.0 - 0.5 * apart) / 2.0, 2e-3);
 }
 
 #[test]
-fn a_hidden_ball_protrudes_from_nothing_but_has_its_own_error() {
+fn a_hidden_sphere_protrudes_from_nothing_but_has_its_own_error() {
     let mesh = TriMesh::box_(Vec3::repeat(1.0));
     let d = mesh.diagonal();
-    // the small ball is outside the cube, and within the large one
+    // the small sphere is outside the cube, and within the large one
     let q = on_axis(&[(0.0, 2.0), (1.4, 0.3)], &mesh);
     let alone = on_axis(&[(0.0, 2.0)], &mesh);
     near("mean protrusion", q.protrusion_mean, alone.protrusion_mean, 1e-5);
@@ -114,7 +114,7 @@ fn a_hidden_ball_protrudes_from_nothing_but_has_its_own_error() {
 #[test]
 fn broken_nesting_is_counted() {
     let mesh = TriMesh::box_(Vec3::repeat(1.0));
-    let child = |x: f64, r: f64, parent| LevelBall { parent, ..LevelBall::new(Vec3::x() * x, r) };
+    let child = |x: f64, r: f64, parent| LevelSphere { parent, ..LevelSphere::new(Vec3::x() * x, r) };
     let levels = [
         vec![child(0.0, 2.0, None)],
         vec![child(1.0, 1.0, Some(0)), child(1.0, 1.25, Some(0)), child(0.0, 0.1, None), child(0.0, 0.1, Some(1))],
@@ -161,20 +161,20 @@ fn a_cut_of_any_size_covers() {
     let tree = SphereTree::build(&mesh, &TreeSettings { depth: 4, ..TreeSettings::octree() }).unwrap();
     let few = QualitySettings { sphere_samples: 2000, volume_samples: 2000, ..QualitySettings::default() };
     for most in [1, 2, 9, 30, 200, 100_000] {
-        let cut = tree.cut(most, 0.0);
+        let cut = tree.select(most, 0.0);
         assert!(!cut.is_empty() && cut.len() <= most);
-        let level = cut.iter().map(|&n| LevelBall::new(tree.nodes()[n].center, tree.nodes()[n].radius)).collect();
+        let level = cut.iter().map(|&n| LevelSphere::new(tree.nodes()[n].center, tree.nodes()[n].radius)).collect();
         assert_eq!(LevelQuality::of_levels(&[level], &mesh, &few)[0].coverage, 1.0, "{most}");
     }
-    assert_eq!(tree.cut(1, 0.0), [0]);
-    assert_eq!(tree.cut(100_000, 0.0).len(), tree.leaves().count());
+    assert_eq!(tree.select(1, 0.0), [0]);
+    assert_eq!(tree.select(100_000, 0.0).len(), tree.leaves().count());
 }
 
 #[test]
-fn balls_grow_by_as_much_as_covering_needs() {
-    // one ball about a cube must reach the corners; balls that cover do not grow
+fn spheres_grow_by_as_much_as_covering_needs() {
+    // one sphere about a cube must reach the corners; spheres that cover do not grow
     let mesh = TriMesh::box_(Vec3::repeat(1.0));
-    let mut balls = [(Vec3::zeros(), 0.5)];
-    near("growth", grow_to_cover(&mut balls, &mesh), 3.0_f64.sqrt() - 0.5, 1e-12);
-    assert_eq!(grow_to_cover(&mut balls, &mesh), 0.0);
+    let mut spheres = [(Vec3::zeros(), 0.5)];
+    near("growth", grow_to_cover(&mut spheres, &mesh), 3.0_f64.sqrt() - 0.5, 1e-12);
+    assert_eq!(grow_to_cover(&mut spheres, &mesh), 0.0);
 }

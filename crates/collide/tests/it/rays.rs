@@ -10,15 +10,15 @@ use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
 fn a_ray_enters_where_geometry_says() {
     let at = Pose::translation(0.0, 0.0, 2.0);
     let down = Vec3::new(0.0, 0.0, -3.0);
-    let ball = Shape::sphere(0.5).unwrap();
+    let sphere = Shape::sphere(0.5).unwrap();
     assert_eq!(
-        ball.ray(&at, &Vec3::new(0.0, 0.0, 10.0), &down),
+        sphere.ray(&at, &Vec3::new(0.0, 0.0, 10.0), &down),
         Some(7.5),
         "10 - 2 - 0.5, whatever the length of the direction"
     );
-    assert_eq!(ball.ray(&at, &Vec3::new(0.0, 0.0, 2.1), &down), None, "from inside");
-    assert_eq!(ball.ray(&at, &Vec3::new(0.0, 0.0, 1.0), &down), None, "behind");
-    assert_eq!(ball.ray(&at, &Vec3::new(0.6, 0.0, 10.0), &down), None, "beside");
+    assert_eq!(sphere.ray(&at, &Vec3::new(0.0, 0.0, 2.1), &down), None, "from inside");
+    assert_eq!(sphere.ray(&at, &Vec3::new(0.0, 0.0, 1.0), &down), None, "behind");
+    assert_eq!(sphere.ray(&at, &Vec3::new(0.6, 0.0, 10.0), &down), None, "beside");
     let floor = Shape::half_space();
     let slanted = Vec3::new(3.0, 0.0, -4.0);
     assert!(

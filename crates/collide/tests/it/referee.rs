@@ -109,7 +109,7 @@ fn the_referee_knows_cubes() {
     let cube = TriMesh::box_(Vec3::repeat(0.5));
     let distance = MeshDistance::new(&cube);
     let ask = |pose: &Pose| closest(&cube, pose, &cube, &Pose::identity(), &distance, 0.0)[0];
-    // an edge across an edge: each is √½ from its centre
+    // an edge across an edge: each is √½ from its center
     let turn = |axis: Vec3, angle: f64| tumble_collide::Quat::from_scaled_axis(axis * angle);
     let way = Vec3::new(0.0, 0.5_f64.sqrt(), 0.5_f64.sqrt());
     // the upper cube's lowest edge, across the lower one's edge along x

@@ -16,7 +16,7 @@ fn cached(mesh: TriMesh, cache: &TreeCache) -> (Shape, Option<String>) {
     Shape::mesh_cached(mesh, &TreeSettings::octree(), cache).unwrap()
 }
 
-/// All that two of a shape say of each other in many places, deep, close and apart, and of a ball, a block and a cylinder; as text that tells all bits apart.
+/// All that two of a shape say of each other in many places, deep, close and apart, and of a sphere, a block and a cylinder; as text that tells all bits apart.
 fn said(shape: &Shape) -> String {
     let cylinder = Shape::cylinder(0.3, 0.6).unwrap();
     let others =
@@ -59,10 +59,10 @@ fn a_shape_from_the_cache_has_the_bits_of_a_fresh_one() {
 fn contacts_do_not_depend_on_who_asked_first() {
     let expected = said(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap());
     let shape = Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap();
-    let ball = Shape::sphere(0.2).unwrap();
+    let sphere = Shape::sphere(0.2).unwrap();
     for n in (0..40).rev() {
         let pose = Pose::translation(1.3 - 0.06 * f64::from(n), 0.3, 0.1);
-        contacts(&shape, &Pose::identity(), &ball, &pose, 0.3, &mut Vec::new());
+        contacts(&shape, &Pose::identity(), &sphere, &pose, 0.3, &mut Vec::new());
     }
     std::thread::scope(|scope| {
         let each = [(); 4].map(|()| scope.spawn(|| said(&shape)));

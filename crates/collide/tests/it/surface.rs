@@ -180,13 +180,13 @@ fn a_cylinder_on_a_block_touches_as_on_a_plane() {
 }
 
 #[test]
-fn a_ball_in_a_groove_touches_both_sides() {
-    // two blocks turned by 45° make a groove; here one concave mesh would do as well: a ring's hole and a ball in it
+fn a_sphere_in_a_groove_touches_both_sides() {
+    // two blocks turned by 45° make a groove; here one concave mesh would do as well: a ring's hole and a sphere in it
     let ring = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree()).unwrap();
-    let ball = Shape::sphere(0.9).unwrap();
-    // the ball sits on the hole: its centre is (0.9 + 0.25) from the tube's middle circle
+    let sphere = Shape::sphere(0.9).unwrap();
+    // the sphere sits on the hole: its center is (0.9 + 0.25) from the tube's middle circle
     let height = (1.15_f64.powi(2) - 1.0).sqrt();
-    let found = ask(&ball, &Pose::translation(0.0, 0.0, height), &ring, &Pose::identity(), 0.01);
+    let found = ask(&sphere, &Pose::translation(0.0, 0.0, height), &ring, &Pose::identity(), 0.01);
     assert!(found.len() >= 3, "{found:?}");
     let sum: Vec3 = found.iter().map(|c| c.normal).sum();
     assert!(found.iter().all(|c| c.gap.abs() < 0.01 && c.normal.z > 0.3), "{found:?}");
@@ -234,7 +234,7 @@ fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
     triangles.extend((0..5_u32).flat_map(|n| [[n, (n + 1) % 5, n + 5], [(n + 1) % 5, (n + 1) % 5 + 5, n + 5]]));
     let trough = Shape::mesh(TriMesh { vertices, triangles }, &TreeSettings::octree()).unwrap();
     let cylinder = Shape::cylinder(r, 0.15).unwrap();
-    // the mesh's frame is its centre of mass
+    // the mesh's frame is its center of mass
     let Shape::Mesh(shape) = &trough else { panic!("no mesh") };
     let bottom = shape.mesh().vertices[1] - Vec3::new(0.0, -0.4, 0.0);
     for turn in [0.0, 0.016, 0.3] {
@@ -293,7 +293,7 @@ fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
     }
 }
 
-/// A cube of edge 2 about its centre of mass, less a pyramid of 0.01 in one side, which moves that by 6e-5 (the deepest places are beside it in z).
+/// A cube of edge 2 about its center of mass, less a pyramid of 0.01 in one side, which moves that by 6e-5 (the deepest places are beside it in z).
 fn dented_block() -> Shape {
     let mut mesh = TriMesh::box_(Vec3::repeat(1.0));
     let at = |mesh: &TriMesh, v: u32| mesh.vertices[v as usize];

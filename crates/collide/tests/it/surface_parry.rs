@@ -64,7 +64,7 @@ fn primitives() -> Vec<Body> {
     let prism = ConvexPolyhedron::from_convex_hull(&prism.vertices.iter().map(vector).collect::<Vec<_>>()).unwrap();
     let half = Vec3::new(0.15, 0.1, 0.2);
     vec![
-        body("ball", Shape::sphere(0.15).unwrap(), Box::new(Ball::new(0.15))),
+        body("sphere", Shape::sphere(0.15).unwrap(), Box::new(Ball::new(0.15))),
         body("capsule", Shape::capsule(0.05, 0.2).unwrap(), Box::new(Capsule::new_z(0.2, 0.05))),
         body("block", Shape::cuboid(half).unwrap(), Box::new(Cuboid::new(vector(&half)))),
         body("cylinder", Shape::cylinder(0.1, 0.15).unwrap(), Box::new(prism)),
@@ -324,16 +324,16 @@ fn is_slow() -> bool {
 
 #[test]
 fn surface_contacts_agree_with_parry() {
-    for name in ["ball", "capsule", "block", "cylinder"] {
+    for name in ["sphere", "capsule", "block", "cylinder"] {
         on_primitive(name, 300, 3);
     }
     on_meshes(400, 1);
 }
 
 #[test]
-fn meshes_on_balls_and_capsules_agree_with_parry_full_length() {
+fn meshes_on_spheres_and_capsules_agree_with_parry_full_length() {
     if is_slow() {
-        on_primitive("ball", 10_000, 100);
+        on_primitive("sphere", 10_000, 100);
         on_primitive("capsule", 10_000, 100);
     }
 }

@@ -48,7 +48,7 @@ fn cached(mesh: &TriMesh, cache: &TreeCache) -> CachedTree {
 #[test]
 fn a_tree_from_the_cache_has_the_bits_of_a_fresh_one() {
     let folder = Folder::new();
-    let (fresh, stages) = SphereTree::build_watched(&ring(), &settings(), &()).unwrap();
+    let (fresh, stages) = SphereTree::build_with_progress(&ring(), &settings(), &()).unwrap();
     for found in [false, true, true] {
         let cached = cached(&ring(), &folder.cache());
         assert_eq!(cached, CachedTree { tree: fresh.clone(), stages: stages.clone(), found, note: None });
@@ -102,7 +102,7 @@ fn a_file_that_was_cut_anywhere_is_built_anew() {
     cached(&ring(), &folder.cache());
     let file = folder.files().remove(0);
     let good = fs::read(&file).unwrap();
-    // every byte of the head, then steps that hit all of a ball's fields
+    // every byte of the head, then steps that hit all of a sphere's fields
     let cuts = (0..300).chain((300..good.len()).step_by(7)).chain([good.len() - 1]);
     for cut in cuts {
         is_built_anew(&folder, &file, &good[..cut], &format!("cut at {cut} of {}", good.len()));

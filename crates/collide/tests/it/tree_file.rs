@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tumble_collide::{
-    LevelBall, LevelQuality, MeshId, QualitySettings, SphereTree, TreeFile, TreeFileError, TreeSettings, TriMesh, Vec3,
+    LevelQuality, LevelSphere, MeshId, QualitySettings, SphereTree, TreeFile, TreeFileError, TreeSettings, TriMesh,
+    Vec3,
 };
 
 fn file(mesh: &TriMesh, depth: u32) -> TreeFile {
     // an error at which some leaves are above the last level
     let settings = TreeSettings { depth, error: 0.03, ..TreeSettings::octree() };
-    let (tree, stages) = SphereTree::build_watched(mesh, &settings, &()).unwrap();
+    let (tree, stages) = SphereTree::build_with_progress(mesh, &settings, &()).unwrap();
     let few = QualitySettings {
         surface_samples: 500,
         sphere_samples: 500,
@@ -40,7 +41,7 @@ fn a_tree_comes_back_with_the_same_bits() {
         assert_eq!(back, file);
         assert_eq!(back.to_json(), text);
         eprintln!(
-            "{} balls, leaves at levels {:?} to {:?}",
+            "{} spheres, leaves at levels {:?} to {:?}",
             file.tree.nodes().len(),
             leaf_levels.iter().min(),
             leaf_levels.iter().max()
@@ -69,7 +70,7 @@ const GOOD: &str = r#"{"format":"tumble sphere tree","version":1,"name":"","unit
 [{"c":[1,0,0],"r":2,"out":1,"parent":0},{"c":[-2,0,0],"r":2,"out":1,"parent":1},{"c":[0,0,0],"r":2,"out":1,"parent":1}]]}"#;
 
 #[test]
-fn a_leaf_that_is_carried_down_is_one_ball() {
+fn a_leaf_that_is_carried_down_is_one_sphere() {
     let tree = TreeFile::from_json(GOOD).unwrap().tree;
     let said: Vec<(f64, u32, u32, u32)> =
         tree.nodes().iter().map(|n| (n.center.x, n.level, n.first_child, n.children)).collect();
@@ -84,37 +85,37 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
         ("\"units\":\"m\"", "\"units\":\"mm\"", "units are \"mm\"; a sphere tree is in \"m\""),
         ("\"name\":\"\"", "\"nam\":\"\"", "unknown field `nam`"),
         ("\"octree\"", "\"oct\"", "unknown variant `oct`"),
-        ("\"r\":4", "\"r\":-4", "ball 0 of level 0: its radius `r` is -4; wanted 0 to 1e10 m"),
+        ("\"r\":4", "\"r\":-4", "sphere 0 of level 0: its radius `r` is -4; wanted 0 to 1e10 m"),
         ("\"r\":4", "\"r\":1e400", "number out of range"),
         ("\"r\":4", "\"r\":null", "invalid type: null"),
         (
             "[-2,0,0]",
             "[-2e11,0,0]",
-            "ball 1 of level 2: its centre has the coordinate -200000000000; wanted at most 1e10 m",
+            "sphere 1 of level 2: its center has the coordinate -200000000000; wanted at most 1e10 m",
         ),
         ("[-2,0,0]", "[-2,0]", "invalid length 2"),
-        ("[-2,0,0]", "[-5,0,0]", "ball 1 of level 2: it sticks out of its parent, ball 1 of level 1, by 3e0 m"),
+        ("[-2,0,0]", "[-5,0,0]", "sphere 1 of level 2: it sticks out of its parent, sphere 1 of level 1, by 3e0 m"),
         ("\"r\":4,\"out\":1", "\"r\":4,\"out\":-1", "outward error `out` is -1"),
-        ("\"parent\":-1", "\"parent\":0", "ball 0 of level 0: its parent is 0; the root has none"),
+        ("\"parent\":-1", "\"parent\":0", "sphere 0 of level 0: its parent is 0; the root has none"),
         (
             "\"r\":3,\"out\":1,\"parent\":0",
             "\"r\":3,\"out\":1,\"parent\":1",
-            "ball 1 of level 1: its parent is 1; wanted 0 to 0",
+            "sphere 1 of level 1: its parent is 1; wanted 0 to 0",
         ),
-        ("\"r\":3,\"out\":1,\"parent\":0", "\"r\":3,\"out\":1", "ball 1 of level 1: its parent is -1; wanted 0 to 0"),
+        ("\"r\":3,\"out\":1,\"parent\":0", "\"r\":3,\"out\":1", "sphere 1 of level 1: its parent is -1; wanted 0 to 0"),
         (
             "[0,0,0],\"r\":2,\"out\":1,\"parent\":1",
             "[0,0,0],\"r\":2,\"out\":1,\"parent\":0",
-            "its parent 0 comes after 1; balls stand in the order of their parents",
+            "its parent 0 comes after 1; spheres stand in the order of their parents",
         ),
         ("\"levels\":[[", "\"levels\":[],\"other\":[[", "unknown field"),
-        ("\"levels\":[[{", "\"levels\":[[],[{", "there are 0 balls in level 0; wanted 1, the root"),
+        ("\"levels\":[[{", "\"levels\":[[],[{", "there are 0 spheres in level 0; wanted 1, the root"),
         (
             "],\n[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2",
             "],[],[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2",
-            "there are 0 balls in level 2; wanted at least 1",
+            "there are 0 spheres in level 2; wanted at least 1",
         ),
-        ("]]}", "],[]]}", "there are 0 balls in level 3; wanted at least 1"),
+        ("]]}", "],[]]}", "there are 0 spheres in level 3; wanted at least 1"),
         (
             "\"quality\":[]",
             "\"quality\":[QUALITY]",
@@ -132,16 +133,16 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
     let error = TreeFile::from_json(&repeated).unwrap_err();
     assert_eq!(
         error,
-        TreeFileError::Ball {
+        TreeFileError::Sphere {
             level: 3,
-            ball: 0,
-            what: "its parent repeats the ball above it, as only a leaf is".into()
+            sphere: 0,
+            what: "its parent repeats the sphere above it, as only a leaf is".into()
         }
     );
 }
 
 #[test]
-fn a_tree_by_hand_needs_its_balls_alone() {
+fn a_tree_by_hand_needs_its_spheres_alone() {
     let text = r#"{"format":"tumble sphere tree","version":1,"levels":[[{"c":[0,0,0],"r":2}],[{"c":[0,0,1],"r":1,"parent":0},{"c":[0,0,-1],"r":1,"out":0.5,"parent":0}]]}"#;
     let file = TreeFile::from_json(text).unwrap();
     assert_eq!(file.tree.nodes().iter().map(|n| n.outward).collect::<Vec<_>>(), [4.0, 2.0, 0.5]);
@@ -172,25 +173,28 @@ fn a_cut_or_damaged_text_never_panics() {
     }
 }
 
-/// A ring and balls about it by formula; the last ones leave a part of it bare and stick out of their parents.
-fn ring() -> (TriMesh, Vec<Vec<LevelBall>>) {
-    let balls = |count: usize, radius: f64, parents: Option<usize>| -> Vec<LevelBall> {
+/// A ring and spheres about it by formula; the last ones leave a part of it bare and stick out of their parents.
+fn ring() -> (TriMesh, Vec<Vec<LevelSphere>>) {
+    let spheres = |count: usize, radius: f64, parents: Option<usize>| -> Vec<LevelSphere> {
         let at = |n: usize| {
             let (sin, cos) = (std::f64::consts::TAU * n as f64 / count as f64).sin_cos();
-            LevelBall {
+            LevelSphere {
                 parent: parents.map(|p| n * p / count),
-                ..LevelBall::new(Vec3::new(cos, sin, 0.0) * parents.map_or(0.0, |_| 1.0), radius)
+                ..LevelSphere::new(Vec3::new(cos, sin, 0.0) * parents.map_or(0.0, |_| 1.0), radius)
             }
         };
         (0..count).map(at).collect()
     };
-    (TriMesh::torus(1.0, 0.3, 24, 12), vec![balls(1, 1.4, None), balls(8, 0.6, Some(1)), balls(16, 0.32, Some(8))])
+    (
+        TriMesh::torus(1.0, 0.3, 24, 12),
+        vec![spheres(1, 1.4, None), spheres(8, 0.6, Some(1)), spheres(16, 0.32, Some(8))],
+    )
 }
 
 /// The text of levels, for the measure in Python.
-fn levels_text(levels: &[Vec<LevelBall>]) -> String {
-    let ball = |b: &LevelBall| serde_json::json!({"c": [b.center.x, b.center.y, b.center.z], "r": b.radius, "parent": b.parent.map_or(-1, |p| p as i64)});
-    let levels: Vec<Vec<_>> = levels.iter().map(|level| level.iter().map(ball).collect()).collect();
+fn levels_text(levels: &[Vec<LevelSphere>]) -> String {
+    let sphere = |b: &LevelSphere| serde_json::json!({"c": [b.center.x, b.center.y, b.center.z], "r": b.radius, "parent": b.parent.map_or(-1, |p| p as i64)});
+    let levels: Vec<Vec<_>> = levels.iter().map(|level| level.iter().map(sphere).collect()).collect();
     serde_json::json!({"levels": levels}).to_string()
 }
 
@@ -239,7 +243,7 @@ fn obj(mesh: &TriMesh) -> String {
     vertices.chain(faces).collect()
 }
 
-/// A level as the outside program tells it: the keys of its answer, and how far ours may be from it. Both look at the same points of the balls, at
+/// A level as the outside program tells it: the keys of its answer, and how far ours may be from it. Both look at the same points of the spheres, at
 /// others of the surface and of space.
 const KEYS: [Key; 12] = [
     ("coverage", |q| q.coverage, 0.005),

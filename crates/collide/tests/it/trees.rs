@@ -10,7 +10,7 @@ fn solid(name: &str) -> Option<TriMesh> {
     Some(mesh)
 }
 
-/// Points of the leaf balls must not be further outside than stated; surface samples must lie in a leaf.
+/// Points of the leaf spheres must not be further outside than stated; surface samples must lie in a leaf.
 fn sample(name: &str, mesh: &TriMesh, tree: &SphereTree) {
     let distance = MeshDistance::new(mesh);
     let mut rng = Rng::new(7);
@@ -37,7 +37,7 @@ fn public_meshes_get_tight_trees() {
         let tree = SphereTree::build(&mesh, &TreeSettings::octree()).unwrap();
         let relative: Vec<f64> = (0..tree.levels()).map(|l| tree.outward_error_at(l) / mesh.diagonal()).collect();
         let count = tree.leaves().count();
-        eprintln!("{name}: {count} leaves, {} balls, error per level {relative:.4?}", tree.nodes().len());
+        eprintln!("{name}: {count} leaves, {} spheres, error per level {relative:.4?}", tree.nodes().len());
         assert!(tree.outward_error() < 0.02 * mesh.diagonal(), "{name}");
         assert!(count < 6000, "{name}: {count}");
         // the cow crosses itself, and the distance that the samples are judged by takes some of its inside for
@@ -90,7 +90,7 @@ fn settings_out_of_range_are_refused() {
 
 #[test]
 fn hard_meshes_and_fine_settings_still_cover() {
-    // a needle, a sheet, a box far from the origin, and a ball at a tenth of the default error
+    // a needle, a sheet, a box far from the origin, and a sphere at a tenth of the default error
     let far = TriMesh::box_(Vec3::repeat(0.5)).translated(&Vec3::new(1e5, -1e5, 1e5));
     let meshes = [
         TriMesh::cylinder(1e-3, 1.0, 8),

@@ -106,8 +106,8 @@ fn overlapping_boxes_are_their_union_in_mass_and_distance() {
     near(report.volume, 16.0 - overlap, 1e-9, "volume");
     assert!(report.crossing_faces > 0 && report.doubtful == 0.0 && report.shells == 2, "{report:?}");
     let mass = mesh.union_mass_properties(1.0);
-    // by symmetry the centre is in the middle of the two
-    near((mass.center_of_mass - turn * (0.5 * shift)).norm(), 0.0, 1e-9, "centre");
+    // by symmetry the center is in the middle of the two
+    near((mass.center_of_mass - turn * (0.5 * shift)).norm(), 0.0, 1e-9, "center");
     let block = |half: Vec3, at: Vec3| {
         let mass = 8.0 * half.product();
         let own = Mat3::from_diagonal(&Vec3::new(
@@ -230,7 +230,7 @@ fn folded_face_counts_what_it_bounds() {
     }
 }
 
-/// A ball within a ball: a cavity if it is wound inwards, nothing if outwards.
+/// A sphere within a sphere: a cavity if it is wound inwards, nothing if outwards.
 #[test]
 fn shell_in_a_shell_is_a_cavity_or_buried_by_its_winding() {
     let (outer, inner) = (TriMesh::icosphere(1.0, 3), TriMesh::icosphere(0.5, 3).translated(&Vec3::new(0.2, 0.0, 0.0)));
@@ -238,12 +238,12 @@ fn shell_in_a_shell_is_a_cavity_or_buried_by_its_winding() {
     let mut hollow = both(&outer, &inside_out(inner.clone()));
     let report = hollow.check_closed().unwrap();
     near(report.volume, big.mass - small.mass, 1e-12, "hollow");
-    assert_eq!((report.turned, report.turned_shells, report.shells, report.crossing_faces), (false, 0, 2, 0));
+    assert_eq!((report.turned, report.inverted_shells, report.shells, report.crossing_faces), (false, 0, 2, 0));
     let distance = MeshDistance::new(&hollow);
     let shape = Shape::mesh(hollow, &TreeSettings { depth: 3, ..TreeSettings::octree() }).unwrap();
     let mass = shape.mass_properties(1.0).unwrap();
     near(mass.mass, big.mass - small.mass, 1e-12, "mass");
-    // parallel axes about the common centre
+    // parallel axes about the common center
     let at = -small.mass * 0.2 / mass.mass;
     let about = |m: &tumble_collide::MassProperties| m.inertia_about(&Vec3::new(at, 0.0, 0.0));
     near((mass.inertia - (about(&big) - about(&small))).norm(), 0.0, 1e-12, "inertia");
@@ -275,7 +275,7 @@ fn shells_are_turned_by_where_they_lie() {
     ];
     for (name, mut mesh, volume, told) in cases {
         let report = mesh.check_closed().unwrap();
-        assert_eq!((report.turned, report.turned_shells), told, "{name}");
+        assert_eq!((report.turned, report.inverted_shells), told, "{name}");
         if volume.is_finite() {
             near(report.volume, volume, 1e-12, name);
         }

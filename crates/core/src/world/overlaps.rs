@@ -4,7 +4,7 @@ use crate::detect::meet;
 use crate::view::{Entry, Mode, ObjectId};
 use crate::world::World;
 use std::collections::BTreeMap;
-use tumble_collide::{Aabb, BroadPhase, Contact, Pose, Shape, SweepAndPrune, contacts_in};
+use tumble_collide::{Aabb, BroadPhase, Contact, Pose, Shape, SweepAndPrune, contacts_in_mode};
 
 /// Two objects that overlap, or one twice whose own parts do; the one added first stands first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,7 @@ impl World {
         let (of_a, of_b) = (a.entry.object.collidable()?, b.entry.object.collidable()?);
         let mode = of_a.contact_mode(a.part).of_pair(of_b.contact_mode(b.part));
         let mut found: Vec<Contact> = Vec::new();
-        contacts_in(mode, a.shape, &a.pose, b.shape, &b.pose, 0.0, &mut found);
+        contacts_in_mode(mode, a.shape, &a.pose, b.shape, &b.pose, 0.0, &mut found);
         found.iter().map(|contact| -contact.gap).max_by(f64::total_cmp)
     }
 }

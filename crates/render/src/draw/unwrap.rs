@@ -4,7 +4,7 @@
 //! laid on by position.
 
 use std::path::Path;
-use tumble_collide::{FaceCutter, Vec3, obj_lines, text_of};
+use tumble_collide::{PolygonTriangulator, Vec3, decode_text, obj_lines};
 
 /// A larger file is not read.
 const MOST_BYTES: u64 = 256 << 20;
@@ -22,7 +22,7 @@ impl Unwrapped {
         {
             return None;
         }
-        Unwrapped::parse(&text_of(&std::fs::read(path).ok()?).ok()?)
+        Unwrapped::parse(&decode_text(&std::fs::read(path).ok()?).ok()?)
     }
 
     /// Polygons are cut as in [`tumble_collide::TriMesh::from_obj`].
@@ -48,11 +48,12 @@ impl Unwrapped {
                 _ => {}
             }
         }
-        let (mut out, mut cutter) = (Unwrapped { triangles: Vec::new(), places: Vec::new() }, FaceCutter::default());
+        let (mut out, mut triangulator) =
+            (Unwrapped { triangles: Vec::new(), places: Vec::new() }, PolygonTriangulator::default());
         for corners in faces {
             let points: Vec<Vec3> =
                 corners.iter().map(|c| vertices.get(c.0 as usize).copied()).collect::<Option<_>>()?;
-            for triangle in cutter.cut(&points).ok()? {
+            for triangle in triangulator.triangulate(&points).ok()? {
                 out.triangles.push(triangle.map(|k| corners[k].0));
                 out.places.push(triangle.map(|k| corners[k].1));
             }

@@ -119,9 +119,11 @@ impl<'s> Share<'s> {
                 let reach = reach(*radius, *length, *count);
                 (0..*count).map(|n| (Vec3::z() * at(n), reach, reach - radius)).collect()
             }
-            Share::Mesh(mesh) => {
-                mesh.covering.balls().map(|(center, radius, outward)| (center, radius, outward + mesh.slack)).collect()
-            }
+            Share::Mesh(mesh) => mesh
+                .covering
+                .spheres()
+                .map(|(center, radius, outward)| (center, radius, outward + mesh.slack))
+                .collect(),
         }
     }
 }
@@ -158,7 +160,7 @@ impl MeshShare<'_> {
                 .map_err(|e| e.to_string())
         };
         let enough = options.error * self.solid.diagonal();
-        let cut = |tree: &SphereTree| tree.cut(count, enough).iter().map(|&n| tree.nodes()[n].center).collect();
+        let cut = |tree: &SphereTree| tree.select(count, enough).iter().map(|&n| tree.nodes()[n].center).collect();
         if options.tree.builder != Builder::Octree {
             let settings = TreeSettings { branch: count as u32, depth: 1, ..options.tree };
             return if count <= MOST_BRANCHES { Ok(vec![cut(&build(settings)?)]) } else { Ok(Vec::new()) };

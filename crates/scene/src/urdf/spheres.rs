@@ -126,7 +126,7 @@ pub fn spherize(
                 .map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
             links.push(written(name, &parts, &shares, &text, &mut edits).map_err(wrong)?);
         }
-        progress.at((n + 1) as f64 / elements.len() as f64);
+        progress.report((n + 1) as f64 / elements.len() as f64);
     }
     let notes = robot.notes.into_iter().chain(context.notes.take()).collect();
     Ok(SphereRobot { name: robot.name, text: edited(&text, edits), links, notes })

@@ -43,7 +43,7 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     let mesh = read(path, options)?;
     let settings = settings(options);
     let (clock, progress) = (Instant::now(), WorkProgress::new("building", options.quiet));
-    let built = SphereTree::build_cached_watched(&mesh, &settings, &cache(options), &progress);
+    let built = SphereTree::build_cached_with_progress(&mesh, &settings, &cache(options), &progress);
     progress.done();
     let built = built.map_err(|e| wrong(e.to_string()))?;
     let seconds = clock.elapsed().as_secs_f64();

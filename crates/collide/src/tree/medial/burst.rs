@@ -1,4 +1,4 @@
-//! Burst: a ball is taken away and its points go to the others, again and again, the ball that is missed least first.
+//! Burst: a sphere is taken away and its points go to the others, again and again, the sphere that is missed least first.
 //!
 //! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), §5. What
 //! a burst costs is how much the sum of the sixth powers of all errors grows.
@@ -11,11 +11,11 @@ use crate::Vec3;
 pub(super) fn burst(points: &[Vec3], mut fit: Fit, most: usize) -> Vec<Site> {
     while fit.sites.len() > most.max(1) {
         let costs = (0..fit.sites.len()).map(|k| (cost(points, &fit, k), k));
-        let Some((_, gone)) = costs.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
-        let orphans = fit.parts.swap_remove(gone);
-        fit.sites.swap_remove(gone);
-        fit.errors.swap_remove(gone);
-        fit.take(points, &orphans);
+        let Some((_, removed)) = costs.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        let orphans = fit.parts.swap_remove(removed);
+        fit.sites.swap_remove(removed);
+        fit.errors.swap_remove(removed);
+        fit.add_points(points, &orphans);
     }
     fit.sites
 }

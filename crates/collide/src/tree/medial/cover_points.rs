@@ -1,10 +1,10 @@
-//! The points of the surface that the balls are made to cover: vertices, and points inside triangles by area.
+//! The points of the surface that the spheres are made to cover: vertices, and points inside triangles by area.
 //!
 //! Along the triangles in their order, each `A/n` of area gets a point (`A` the whole area, `n` the number asked
 //! for); within its triangle it lies at the next member of the R₂ sequence, which spreads evenly (Roberts, *The
 //! unreasonable effectiveness of quasirandom sequences*, 2018).
 
-use super::spheres::CoverPoints;
+use super::types::CoverPoints;
 use crate::{TriMesh, Vec3};
 
 /// Steps of the R₂ sequence: `1/g` and `1/g²`, `g` the real root of `g³ = g + 1`.

@@ -1,5 +1,5 @@
 //! Expand and select: every candidate is grown to a stand-off `e` beyond the surface, a greedy set cover of the points
-//! is drawn from them, and the smallest `e` that gives at most `most` balls is searched by halving.
+//! is drawn from them, and the smallest `e` that gives at most `most` spheres is searched by halving.
 //!
 //! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), §5.
 //! A candidate grown to `e` holds `p` iff `need(c, p) ≤ e`, so that all needs are computed once.

@@ -1,57 +1,57 @@
-//! Groups: which balls of a level lie in which ball of the level above.
+//! Groups: which spheres of a level lie in which sphere of the level above.
 //!
-//! Where the surface is hard the worst balls want help from regions where it is easy, but a ball has room for `branch`
+//! Where the surface is hard the worst spheres want help from regions where it is easy, but a sphere has room for `branch`
 //! children only. So an exchange across groups comes with a chain of hand-overs: the group that has one too many
-//! hands one of its balls to a neighbour, and so on, to a group with room; the chain is the one of least cost (Bellman
-//! and Ford). It is done only if the balls around all groups that change reach out no further than a budget.
+//! hands one of its spheres to a neighbor, and so on, to a group with room; the chain is the one of least cost (Bellman
+//! and Ford). It is done only if the spheres around all groups that change reach out no further than a budget.
 
 use super::refit::keep;
 use super::site::Site;
 use crate::MeshDistance;
 use crate::tree::TreeSettings;
-use crate::tree::ball::{Ball, deep_around};
+use crate::tree::sphere::{Sphere, min_outward_enclosing};
 
-/// With more groups than this, balls are exchanged within groups only.
-const MOST_GROUPS: usize = 128;
-/// How far the balls above the leaves may reach out, as a multiple of what the worst of their level does before any
+/// With more groups than this, spheres are exchanged within groups only.
+const MAX_GROUPS: usize = 128;
+/// How far the spheres above the leaves may reach out, as a multiple of what the worst of their level does before any
 /// exchange, all levels' parts together.
 const SLACK: f64 = 0.2;
-/// The same for balls two and more levels above those that are exchanged.
+/// The same for spheres two and more levels above those that are exchanged.
 const SLACK_ABOVE: f64 = 0.05;
 
 /// The groups of a level.
 #[derive(Clone, Debug)]
 pub(super) struct Groups {
-    /// Balls that a group has room for.
+    /// Spheres that a group has room for.
     pub room: usize,
-    /// How far the ball around a group may reach out of the solid, metres.
+    /// How far the sphere around a group may reach out of the solid, meters.
     pub budget: f64,
-    /// Group of each ball.
+    /// Group of each sphere.
     pub of: Vec<usize>,
-    pub balls: Vec<Ball>,
-    /// Centre of the ball around each group.
+    pub spheres: Vec<Sphere>,
+    /// Center of the sphere around each group.
     sites: Vec<Site>,
-    /// The balls around the groups.
-    around: Vec<Ball>,
+    /// The spheres around the groups.
+    around: Vec<Sphere>,
     /// How those are grouped in turn.
     above: Option<Box<Groups>>,
 }
 
-/// An exchange among balls, as the groups see it.
+/// An exchange among spheres, as the groups see it.
 pub(super) struct Change {
-    /// Balls that are other balls now.
-    pub balls: Vec<(usize, Ball)>,
-    /// The new ball, maybe in the place of a burst one.
-    pub new: (usize, Ball),
-    /// The ball that was split, in whose group the new one starts.
+    /// Spheres that are other spheres now.
+    pub spheres: Vec<(usize, Sphere)>,
+    /// The new sphere, maybe in the place of a burst one.
+    pub new: (usize, Sphere),
+    /// The sphere that was split, in whose group the new one starts.
     pub split: usize,
 }
 
 impl Groups {
-    /// Groups of balls, `of` saying which is whose, below those of the level above. Their budget is a little more than
+    /// Groups of spheres, `of` saying which is whose, below those of the level above. Their budget is a little more than
     /// the worst of them needs.
     pub fn new(
-        balls: Vec<Ball>,
+        spheres: Vec<Sphere>,
         of: Vec<usize>,
         settings: &TreeSettings,
         above: Option<Groups>,
@@ -60,11 +60,11 @@ impl Groups {
         let levels = f64::from(settings.depth.max(2) - 1);
         let room = settings.branch as usize;
         let count = of.iter().max().map_or(0, |g| g + 1);
-        let nowhere = Site { center: crate::Vec3::zeros(), depth: 0.0, fence: None };
+        let nowhere = Site { center: crate::Vec3::zeros(), depth: 0.0, parent_bound: None };
         let sites = vec![nowhere; count];
-        let around = vec![Ball { center: nowhere.center, radius: 0.0 }; count];
+        let around = vec![Sphere { center: nowhere.center, radius: 0.0 }; count];
         let above = above.map(Box::new);
-        let mut groups = Groups { room, budget: f64::INFINITY, of, balls, sites, around, above };
+        let mut groups = Groups { room, budget: f64::INFINITY, of, spheres, sites, around, above };
         groups.refit(distance);
         groups.set_budget(1.0 + SLACK / levels);
         groups
@@ -77,51 +77,51 @@ impl Groups {
         }
     }
 
-    /// Fits all balls around groups anew, on all levels.
+    /// Fits all spheres around groups anew, on all levels.
     pub fn refit(&mut self, distance: &MeshDistance) {
         (0..self.sites.len()).for_each(|g| self.fit(g, distance));
         if let Some(above) = &mut self.above {
-            above.balls.clone_from(&self.around);
+            above.spheres.clone_from(&self.around);
             above.refit(distance);
         }
     }
 
-    /// How far the balls around the groups reach out at most.
+    /// How far the spheres around the groups reach out at most.
     fn worst(&self) -> f64 {
         self.around.iter().zip(&self.sites).map(|(b, s)| b.radius - s.depth).fold(0.0, f64::max)
     }
 
-    /// Drops the balls that are not marked; the groups of the others.
+    /// Drops the spheres that are not marked; the groups of the others.
     pub fn keep(&mut self, kept: &[bool]) -> Vec<usize> {
         keep(&mut self.of, kept);
-        keep(&mut self.balls, kept);
+        keep(&mut self.spheres, kept);
         self.of.clone()
     }
 
-    /// Within what a ball has to stay.
-    pub fn fence(&self, k: usize) -> Option<Ball> {
+    /// Within what a sphere has to stay.
+    pub fn parent_bound(&self, k: usize) -> Option<Sphere> {
         let site = &self.sites[self.of[k]];
-        Some(Ball { center: site.center, radius: site.depth + self.budget })
+        Some(Sphere { center: site.center, radius: site.depth + self.budget })
     }
 
-    /// Fits the ball around a group.
+    /// Fits the sphere around a group.
     fn fit(&mut self, g: usize, distance: &MeshDistance) {
-        let own: Vec<Ball> = self.of.iter().zip(&self.balls).filter(|(of, _)| **of == g).map(|(_, b)| *b).collect();
+        let own: Vec<Sphere> = self.of.iter().zip(&self.spheres).filter(|(of, _)| **of == g).map(|(_, b)| *b).collect();
         if !own.is_empty() {
-            self.around[g] = deep_around(&own, distance);
+            self.around[g] = min_outward_enclosing(&own, distance);
             self.sites[g] = Site::at(self.around[g].center, distance);
         }
     }
 
-    /// Makes the groups hold their balls; whether they and all above stay within their budgets. A group is fitted
-    /// anew only where its present centre does not do.
-    fn hold(&mut self, mut stale: Vec<usize>, distance: &MeshDistance) -> bool {
+    /// Makes the groups hold their spheres; whether they and all above stay within their budgets. A group is fitted
+    /// anew only where its present center does not do.
+    fn fit_groups(&mut self, mut stale: Vec<usize>, distance: &MeshDistance) -> bool {
         stale.sort_unstable();
         stale.dedup();
         for &g in &stale {
-            let own = self.of.iter().zip(&self.balls).filter(|(of, _)| **of == g);
+            let own = self.of.iter().zip(&self.spheres).filter(|(of, _)| **of == g);
             let reach = own.map(|(_, b)| (b.center - self.sites[g].center).norm() + b.radius).fold(0.0, f64::max);
-            self.around[g] = Ball { center: self.sites[g].center, radius: reach };
+            self.around[g] = Sphere { center: self.sites[g].center, radius: reach };
             if reach - self.sites[g].depth > self.budget {
                 self.fit(g, distance);
             }
@@ -139,65 +139,65 @@ impl Groups {
             }
             let fits = above(self);
             if let Some(a) = &mut self.above {
-                a.balls[g] = self.around[g];
+                a.spheres[g] = self.around[g];
             }
             !fits
         });
         let Some(above) = &mut self.above else { return true };
-        above.hold(stale.into_iter().map(|g| above.of[g]).collect(), distance)
+        above.fit_groups(stale.into_iter().map(|g| above.of[g]).collect(), distance)
     }
 
-    /// Whether `ball` in the place of ball `k` would lie within what its group may hold about its present centre.
-    fn would_fit(&self, k: usize, ball: &Ball) -> bool {
-        need(&self.sites[self.of[k]], ball) <= self.budget
+    /// Whether `sphere` in the place of sphere `k` would lie within what its group may hold about its present center.
+    fn would_fit(&self, k: usize, sphere: &Sphere) -> bool {
+        need(&self.sites[self.of[k]], sphere) <= self.budget
     }
 
     /// The groups after a change, if it can be had within the budget.
-    pub fn after(&self, change: &Change, distance: &MeshDistance) -> Option<Groups> {
+    pub fn with_change(&self, change: &Change, distance: &MeshDistance) -> Option<Groups> {
         let mut next = self.clone();
-        for &(k, ball) in &change.balls {
-            next.balls[k] = ball;
+        for &(k, sphere) in &change.spheres {
+            next.spheres[k] = sphere;
         }
         let home = next.of[change.split];
-        let (new, ball) = change.new;
+        let (new, sphere) = change.new;
         if new == next.of.len() {
             next.of.push(home);
-            next.balls.push(ball);
+            next.spheres.push(sphere);
         } else {
             next.of[new] = home;
-            next.balls[new] = ball;
+            next.spheres[new] = sphere;
         }
         let mut size = vec![0; next.sites.len()];
         next.of.iter().for_each(|&g| size[g] += 1);
         let mut stale: Vec<usize> = change
-            .balls
+            .spheres
             .iter()
             .map(|(k, _)| *k)
-            .filter(|&k| !next.would_fit(k, &next.balls[k]))
+            .filter(|&k| !next.would_fit(k, &next.spheres[k]))
             .map(|k| next.of[k])
             .collect();
         stale.push(home);
         if size[home] > next.room {
-            for (ball, to) in next.chain(&size, home)? {
-                next.of[ball] = to;
+            for (sphere, to) in next.chain(&size, home)? {
+                next.of[sphere] = to;
                 stale.push(to);
             }
         }
-        next.hold(stale, distance).then_some(next)
+        next.fit_groups(stale, distance).then_some(next)
     }
 
-    /// Hand-overs `(ball, to)` from `full` to a group with room, of least total cost.
+    /// Hand-overs `(sphere, to)` from `full` to a group with room, of least total cost.
     fn chain(&self, size: &[usize], full: usize) -> Option<Vec<(usize, usize)>> {
         let groups = size.len();
-        if groups > MOST_GROUPS {
+        if groups > MAX_GROUPS {
             return None;
         }
         let mut hand = vec![vec![(f64::INFINITY, 0); groups]; groups];
-        for (k, (ball, &from)) in self.balls.iter().zip(&self.of).enumerate() {
-            let here = self.cost(&self.sites[from], ball).min(1.0);
+        for (k, (sphere, &from)) in self.spheres.iter().zip(&self.of).enumerate() {
+            let here = self.cost(&self.sites[from], sphere).min(1.0);
             for (to, site) in self.sites.iter().enumerate() {
                 // a group is refitted after a hand-over, which makes some room
-                let extra = (self.cost(site, ball) - here).max(1e-6);
+                let extra = (self.cost(site, sphere) - here).max(1e-6);
                 if to != from && extra < 3.0 && extra < hand[from][to].0 {
                     hand[from][to] = (extra, k);
                 }
@@ -231,13 +231,13 @@ impl Groups {
         (to == full).then_some(chain)
     }
 
-    /// What it costs a group to hold a ball: 1 at the budget.
-    fn cost(&self, site: &Site, ball: &Ball) -> f64 {
-        (need(site, ball) / self.budget).max(0.0).powi(4)
+    /// What it costs a group to hold a sphere: 1 at the budget.
+    fn cost(&self, site: &Site, sphere: &Sphere) -> f64 {
+        (need(site, sphere) / self.budget).max(0.0).powi(4)
     }
 }
 
-/// How far the ball about the site must reach out of the solid to hold `ball`, metres.
-fn need(site: &Site, ball: &Ball) -> f64 {
-    (ball.center - site.center).norm() + ball.radius - site.depth
+/// How far the sphere about the site must reach out of the solid to hold `sphere`, meters.
+fn need(site: &Site, sphere: &Sphere) -> f64 {
+    (sphere.center - site.center).norm() + sphere.radius - site.depth
 }

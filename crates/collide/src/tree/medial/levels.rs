@@ -1,50 +1,50 @@
 //! The levels of the tree, from the root down.
 
-use super::adaptive::Axis;
+use super::adaptive::MedialAxis;
 use super::candidates::touching;
-use super::gaps::add_gaps;
 use super::group::Groups;
-use super::optimise::Exchange;
-use super::reduce::{WAYS, reduce};
-use super::refit::{Fit, own};
+use super::optimize::Exchange;
+use super::reduce::{METHODS, reduce};
+use super::refit::{Fit, points_of};
 use super::site::Site;
-use super::spheres::{CoverPoints, Want};
-use crate::tree::ball::{Ball, around_points};
+use super::types::{CoverPoints, RefineGoal};
+use super::uncovered::add_uncovered;
 use crate::tree::builder::{Cell, Job, StageCount};
-use crate::tree::close::closed;
+use crate::tree::grow_to_cover::grown_to_cover;
+use crate::tree::sphere::{Sphere, around_points};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
-/// Candidates per region: medial balls, and balls that touch it.
+/// Candidates per region: medial spheres, and spheres that touch it.
 const MEDIAL: usize = 200;
 const TOUCHING: usize = 100;
-/// Sites that the medial balls begin with.
+/// Sites that the medial spheres begin with.
 const FIRST_SITES: usize = 100;
-/// Medial balls for each region that is to be divided, and bounds of their number.
-const BALLS_EACH: f64 = 120.0;
-const LEAST_BALLS: f64 = 1000.0;
-const MOST_BALLS: f64 = 8000.0;
+/// Medial spheres for each region that is to be divided, and bounds of their number.
+const SPHERES_PER_REGION: f64 = 120.0;
+const MIN_SPHERES: f64 = 1000.0;
+const MAX_SPHERES: f64 = 8000.0;
 /// Points of a region that the reducers look at; the last refit looks at all.
-const LOOKED_AT: usize = 1200;
-/// Exchanges tried per ball, and in one run.
-const TRIES: usize = 3;
-const MOST_TRIES: usize = 2000;
+const MAX_SAMPLES: usize = 1200;
+/// Exchanges tried per sphere, and in one run.
+const TRIES_PER_SPHERE: usize = 3;
+const MAX_TRIES: usize = 2000;
 /// Cover points: at least, at most while there are 40 for each leaf, at most while there are ten.
 const POINTS: (f64, f64, f64) = (6000.0, 20_000.0, 60_000.0);
-/// The balls that a ball is divided into stay within what it would be if it reached out so much farther than the worst
+/// The spheres that a sphere is divided into stay within what it would be if it reached out so much farther than the worst
 /// of its level.
-const FENCE: f64 = 1.15;
+const PARENT_BOUND_FACTOR: f64 = 1.15;
 /// Shares of the work: dividing, exchanging, filling gaps.
-const SHARES: [f64; 3] = [0.4, 0.3, 0.25];
+const PROGRESS_SHARES: [f64; 3] = [0.4, 0.3, 0.25];
 /// Sizes of the gaps that are filled, one after the other; parts of the mesh's diagonal.
-const GAPS: [f64; 4] = [8e-3, 4e-3, 2e-3, 1e-3];
+const GAP_SIZES: [f64; 4] = [8e-3, 4e-3, 2e-3, 1e-3];
 
 pub(super) struct Levels<'a> {
     job: &'a Job<'a>,
     cover: CoverPoints,
-    /// Per cover point, the ball that touches there.
+    /// Per cover point, the sphere that touches there.
     candidates: Vec<Site>,
-    /// Adaptive medial balls, and per cover point those that hold it.
+    /// Adaptive medial spheres, and per cover point those that hold it.
     medial: Vec<Site>,
     holders: Vec<Vec<u32>>,
     scale: f64,
@@ -52,19 +52,19 @@ pub(super) struct Levels<'a> {
     pub stages: Vec<StageCount>,
 }
 
-/// A part covered by few balls.
+/// A part covered by few spheres.
 struct Divided {
     fit: Fit,
     /// The way of reducing that won.
-    way: Option<usize>,
+    method: Option<usize>,
     exchanges: u64,
 }
 
 impl<'a> Levels<'a> {
     pub fn new(job: &'a Job<'a>) -> Levels<'a> {
         let scale = job.mesh.diagonal();
-        let balls = (f64::from(job.settings.branch)).powi(job.settings.depth as i32);
-        let points = (balls * 40.0).clamp(POINTS.0, POINTS.1).max((balls * 10.0).min(POINTS.2));
+        let spheres = (f64::from(job.settings.branch)).powi(job.settings.depth as i32);
+        let points = (spheres * 40.0).clamp(POINTS.0, POINTS.1).max((spheres * 10.0).min(POINTS.2));
         let cover = CoverPoints::on(job.mesh, points as usize);
         let mut levels = Levels {
             job,
@@ -76,15 +76,15 @@ impl<'a> Levels<'a> {
             done: Mutex::new(0.0),
             stages: Vec::new(),
         };
-        levels.touch();
+        levels.add_candidates();
         levels
     }
 
     /// Candidates for the cover points that have none yet.
-    fn touch(&mut self) {
+    fn add_candidates(&mut self) {
         let new = self.candidates.len() as u32..self.cover.points.len() as u32;
         let touching = |i| match self.job.progress.stopped() {
-            true => Site { center: self.cover.points[i as usize], depth: 0.0, fence: None },
+            true => Site { center: self.cover.points[i as usize], depth: 0.0, parent_bound: None },
             false => touching(&self.cover, i, self.job.distance, 0.5 * self.scale),
         };
         let more: Vec<Site> = new.into_par_iter().map(touching).collect();
@@ -94,38 +94,38 @@ impl<'a> Levels<'a> {
     /// The whole of it.
     pub fn cells(&mut self) -> Cell {
         let (fit, parents) = self.leaves();
-        let balls = closed(self.job.mesh, self.balls(&fit), self.job.progress);
-        nested(&balls, &parents)
+        let spheres = grown_to_cover(self.job.mesh, self.spheres(&fit), self.job.progress);
+        nested(&spheres, &parents)
     }
 
-    fn balls(&self, fit: &Fit) -> Vec<Ball> {
-        fit.sites.iter().zip(&fit.parts).map(|(s, part)| s.ball(&own(&self.cover.points, part))).collect()
+    fn spheres(&self, fit: &Fit) -> Vec<Sphere> {
+        fit.sites.iter().zip(&fit.parts).map(|(s, part)| s.sphere(&points_of(&self.cover.points, part))).collect()
     }
 
-    /// The leaves, and of each level the balls' parents.
+    /// The leaves, and of each level the spheres' parents.
     fn leaves(&mut self) -> (Fit, Vec<Vec<usize>>) {
         let all: Vec<u32> = (0..self.cover.points.len() as u32).collect();
-        let alone = self.alone(&all);
-        if alone.worst() <= self.enough() {
+        let alone = self.single_sphere(&all);
+        if alone.worst() <= self.target_error() {
             return (alone, Vec::new());
         }
-        let mut axis = Axis::new(&self.cover, &all, self.job.distance, FIRST_SITES, self.job.progress);
+        let mut axis = MedialAxis::new(&self.cover, &all, self.job.distance, FIRST_SITES, self.job.progress);
         let site = Site::at(self.cover.points[0], self.job.distance);
         let mut fit = Fit { sites: vec![site], parts: vec![all], errors: vec![self.scale] };
         let (mut parents, mut groups) = (Vec::new(), None);
         for level in 1..=self.job.settings.depth {
-            if fit.worst() <= self.enough() || self.job.progress.stopped() {
+            if fit.worst() <= self.target_error() || self.job.progress.stopped() {
                 break;
             }
             let room = fit.sites.len() * self.job.settings.branch as usize;
-            self.adapt(&mut axis, &fit, level);
+            self.refine_medial(&mut axis, &fit, level);
             let (next, of) = self.next_level(&fit, level);
             let mut next_groups = self.grouped(&next, &of, groups.take());
-            fit = self.exchanged(next, level, room, next_groups.as_mut());
-            if level == self.job.settings.depth || fit.worst() <= self.enough() {
-                fit = self.filled(fit, level, room, next_groups.as_mut());
+            fit = self.with_exchanges(next, level, room, next_groups.as_mut());
+            if level == self.job.settings.depth || fit.worst() <= self.target_error() {
+                fit = self.with_gaps_filled(fit, level, room, next_groups.as_mut());
             }
-            fit.sites.iter_mut().for_each(|s| s.fence = None);
+            fit.sites.iter_mut().for_each(|s| s.parent_bound = None);
             let kept = fit.drop_empty();
             parents.push(match &mut next_groups {
                 Some(groups) => groups.keep(&kept),
@@ -136,79 +136,79 @@ impl<'a> Levels<'a> {
         (fit, parents)
     }
 
-    /// One ball for all points.
-    fn alone(&self, all: &[u32]) -> Fit {
+    /// One sphere for all points.
+    fn single_sphere(&self, all: &[u32]) -> Fit {
         let center = around_points(&self.cover.points).center;
         let mut fit = Fit::of(vec![Site::at(center, self.job.distance)], &self.cover.points, all);
         fit.refit(4, &self.cover.points, all, self.job.distance);
         fit
     }
 
-    /// An outward error that needs no dividing, metres.
-    fn enough(&self) -> f64 {
+    /// An outward error that needs no dividing, meters.
+    fn target_error(&self) -> f64 {
         self.job.settings.error * self.scale
     }
 
-    /// The balls of a level in those of the level above, from the second on.
+    /// The spheres of a level in those of the level above, from the second on.
     fn grouped(&self, fit: &Fit, of: &[usize], above: Option<Groups>) -> Option<Groups> {
-        // the first level's balls lie in the root and nowhere else
+        // the first level's spheres lie in the root and nowhere else
         let root = of.iter().all(|g| *g == 0);
-        (!root).then(|| Groups::new(self.balls(fit), of.to_vec(), self.job.settings, above, self.job.distance))
+        (!root).then(|| Groups::new(self.spheres(fit), of.to_vec(), self.job.settings, above, self.job.distance))
     }
 
     /// The leaves once more, with cover points where the surface between the others was left bare.
-    fn filled(&mut self, mut fit: Fit, level: u32, room: usize, mut groups: Option<&mut Groups>) -> Fit {
-        for (n, gap) in GAPS.into_iter().enumerate().take_while(|_| !self.job.progress.stopped()) {
-            let balls = self.balls(&fit);
-            let added = add_gaps(&mut self.cover, self.job.mesh, &balls, gap * self.scale, self.job.progress);
-            self.count(level, "gaps filled", added as u64);
-            self.touch();
+    fn with_gaps_filled(&mut self, mut fit: Fit, level: u32, room: usize, mut groups: Option<&mut Groups>) -> Fit {
+        for (n, gap) in GAP_SIZES.into_iter().enumerate().take_while(|_| !self.job.progress.stopped()) {
+            let spheres = self.spheres(&fit);
+            let added = add_uncovered(&mut self.cover, self.job.mesh, &spheres, gap * self.scale, self.job.progress);
+            self.count_stage(level, "gaps filled", added as u64);
+            self.add_candidates();
             fit.refit_all(2, &self.cover.points, self.job);
             if n == 1 {
-                fit = self.exchanged(fit, level, room, groups.as_deref_mut());
+                fit = self.with_exchanges(fit, level, room, groups.as_deref_mut());
             }
-            self.report(SHARES[2] / GAPS.len() as f64);
+            self.report(PROGRESS_SHARES[2] / GAP_SIZES.len() as f64);
         }
         fit
     }
 
-    /// Refines the medial balls for the division of a level's balls.
-    fn adapt(&mut self, axis: &mut Axis, fit: &Fit, level: u32) {
+    /// Refines the medial spheres for the division of a level's spheres.
+    fn refine_medial(&mut self, axis: &mut MedialAxis, fit: &Fit, level: u32) {
         let parts = fit.errors.len() as f64;
-        let least = (parts * BALLS_EACH).clamp(LEAST_BALLS, MOST_BALLS) as usize;
+        let least = (parts * SPHERES_PER_REGION).clamp(MIN_SPHERES, MAX_SPHERES) as usize;
         // half the mean error of the level
         let target = 0.5 * fit.errors.iter().sum::<f64>() / parts;
-        axis.refine(&Want { target, least, most: least / 2 });
-        let balls = axis.balls();
-        self.medial = balls.iter().map(|b| Site::about(b.ball.center, self.job.distance)).collect();
+        axis.refine(&RefineGoal { target, least, most: least / 2 });
+        let spheres = axis.spheres();
+        self.medial = spheres.iter().map(|b| Site::approximate(b.sphere.center, self.job.distance)).collect();
         self.holders = axis.holders();
         self.stages.extend(axis.counts().stages(level));
     }
 
-    /// Candidates for a region: medial balls that hold points of it, and balls that touch it.
-    fn candidates_of(&self, part: &[u32], fence: Option<Ball>) -> Vec<Site> {
+    /// Candidates for a region: medial spheres that hold points of it, and spheres that touch it.
+    fn candidates_of(&self, part: &[u32], parent_bound: Option<Sphere>) -> Vec<Site> {
         let mut holders: Vec<u32> =
-            every(part, LOOKED_AT).iter().flat_map(|&i| self.holders[i as usize].iter().copied()).collect();
+            sample_evenly(part, MAX_SAMPLES).iter().flat_map(|&i| self.holders[i as usize].iter().copied()).collect();
         holders.sort_unstable();
         holders.dedup();
-        let medial = every(&holders, MEDIAL).into_iter().map(|k| self.medial[k as usize]);
-        let touching = every(part, TOUCHING).into_iter().map(|i| self.candidates[i as usize]);
-        medial.chain(touching).map(|site| Site { fence, ..site }).collect()
+        let medial = sample_evenly(&holders, MEDIAL).into_iter().map(|k| self.medial[k as usize]);
+        let touching = sample_evenly(part, TOUCHING).into_iter().map(|i| self.candidates[i as usize]);
+        medial.chain(touching).map(|site| Site { parent_bound, ..site }).collect()
     }
 
-    /// Balls exchanged among all regions of a level, as far as its groups allow, and refitted together.
-    fn exchanged(&mut self, mut fit: Fit, level: u32, room: usize, groups: Option<&mut Groups>) -> Fit {
+    /// Spheres exchanged among all regions of a level, as far as its groups allow, and refitted together.
+    fn with_exchanges(&mut self, mut fit: Fit, level: u32, room: usize, groups: Option<&mut Groups>) -> Fit {
         let mut groups = groups;
         if let Some(groups) = groups.as_deref_mut() {
-            groups.balls = self.balls(&fit);
+            groups.spheres = self.spheres(&fit);
             groups.refit(self.job.distance);
-            (0..fit.sites.len()).for_each(|k| fit.sites[k].fence = groups.fence(k));
+            (0..fit.sites.len()).for_each(|k| fit.sites[k].parent_bound = groups.parent_bound(k));
         }
         let exchange = self.exchange(room.max(fit.sites.len()));
         let (mut fit, exchanges) = exchange.run(fit, groups);
         fit.refit_all(3, &self.cover.points, self.job);
-        self.count(level, "exchanges across regions", exchanges);
-        self.report(SHARES[1] / f64::from(self.job.settings.depth));
+        self.count_stage(level, "exchanges across regions", exchanges);
+        self.report(PROGRESS_SHARES[1] / f64::from(self.job.settings.depth));
         fit
     }
 
@@ -218,13 +218,13 @@ impl<'a> Levels<'a> {
             candidates: &self.candidates,
             distance: self.job.distance,
             most,
-            enough: self.enough(),
-            tries: (TRIES * most).min(MOST_TRIES),
+            enough: self.target_error(),
+            tries: (TRIES_PER_SPHERE * most).min(MAX_TRIES),
             progress: self.job.progress,
         }
     }
 
-    /// Divides the balls of the deepest level.
+    /// Divides the spheres of the deepest level.
     fn next_level(&mut self, fit: &Fit, level: u32) -> (Fit, Vec<usize>) {
         let divided: Vec<Divided> = fit
             .parts
@@ -232,21 +232,21 @@ impl<'a> Levels<'a> {
             .zip(&fit.sites)
             .zip(&fit.errors)
             .map(|((part, site), error)| {
-                if *error <= self.enough() || self.job.progress.stopped() {
+                if *error <= self.target_error() || self.job.progress.stopped() {
                     let fit = Fit { sites: vec![*site], parts: vec![part.clone()], errors: vec![*error] };
-                    Divided { fit, way: None, exchanges: 0 }
+                    Divided { fit, method: None, exchanges: 0 }
                 } else {
                     // children stay within what the worst of the level reaches
-                    let reach = site.depth + FENCE * fit.worst();
-                    let fence = (level > 1).then_some(Ball { center: site.center, radius: reach });
-                    self.divided(part, fence)
+                    let reach = site.depth + PARENT_BOUND_FACTOR * fit.worst();
+                    let parent_bound = (level > 1).then_some(Sphere { center: site.center, radius: reach });
+                    self.divide_region(part, parent_bound)
                 }
             })
             .collect();
-        for (n, way) in WAYS.iter().enumerate() {
-            self.count(level, way, divided.iter().filter(|d| d.way == Some(n)).count() as u64);
+        for (n, method) in METHODS.iter().enumerate() {
+            self.count_stage(level, method, divided.iter().filter(|d| d.method == Some(n)).count() as u64);
         }
-        self.count(level, "exchanges", divided.iter().map(|d| d.exchanges).sum());
+        self.count_stage(level, "exchanges", divided.iter().map(|d| d.exchanges).sum());
         let mut next = Fit::default();
         let mut of = Vec::new();
         for (parent, Divided { fit, .. }) in divided.into_iter().enumerate() {
@@ -255,27 +255,27 @@ impl<'a> Levels<'a> {
             next.parts.extend(fit.parts);
             next.errors.extend(fit.errors);
         }
-        self.count(level, "balls", next.sites.len() as u64);
+        self.count_stage(level, "spheres", next.sites.len() as u64);
         (next, of)
     }
 
-    /// The points of a part covered by at most `branch` balls.
-    fn divided(&self, part: &[u32], fence: Option<Ball>) -> Divided {
+    /// The points of a part covered by at most `branch` spheres.
+    fn divide_region(&self, part: &[u32], parent_bound: Option<Sphere>) -> Divided {
         let most = self.job.settings.branch as usize;
         let points = &self.cover.points;
-        let some = every(part, LOOKED_AT);
-        let candidates = self.candidates_of(part, fence);
-        let (mut fit, way) = reduce(&candidates, points, &some, most, self.job.distance);
+        let some = sample_evenly(part, MAX_SAMPLES);
+        let candidates = self.candidates_of(part, parent_bound);
+        let (mut fit, method) = reduce(&candidates, points, &some, most, self.job.distance);
         fit.refit(2, points, &some, self.job.distance);
         let (mut fit, exchanges) = self.exchange(most).run(fit, None);
         fit.assign(points, part);
         fit.refit(2, points, part, self.job.distance);
         fit.drop_empty();
-        self.report(SHARES[0] * part.len() as f64 / (points.len() * self.job.settings.depth as usize) as f64);
-        Divided { fit, way: Some(way), exchanges }
+        self.report(PROGRESS_SHARES[0] * part.len() as f64 / (points.len() * self.job.settings.depth as usize) as f64);
+        Divided { fit, method: Some(method), exchanges }
     }
 
-    fn count(&mut self, level: u32, stage: &str, count: u64) {
+    fn count_stage(&mut self, level: u32, stage: &str, count: u64) {
         self.stages.push(StageCount { level, stage: stage.into(), count });
     }
 
@@ -283,27 +283,27 @@ impl<'a> Levels<'a> {
     fn report(&self, share: f64) {
         if let Ok(mut done) = self.done.lock() {
             *done = (*done + share).min(1.0);
-            self.job.progress.at(*done);
+            self.job.progress.report(*done);
         }
     }
 }
 
-/// Nested cells over the leaves' balls; `parents` of each level, the deepest last.
-fn nested(balls: &[Ball], parents: &[Vec<usize>]) -> Cell {
-    let mut below: Vec<Option<Cell>> = balls.iter().map(|ball| Some(Cell::Leaf(*ball))).collect();
+/// Nested cells over the leaves' spheres; `parents` of each level, the deepest last.
+fn nested(spheres: &[Sphere], parents: &[Vec<usize>]) -> Cell {
+    let mut below: Vec<Option<Cell>> = spheres.iter().map(|sphere| Some(Cell::Leaf(*sphere))).collect();
     for of in parents.iter().rev() {
         let mut inside: Vec<Vec<Cell>> = Vec::new();
         inside.resize_with(of.iter().max().map_or(0, |p| p + 1), Vec::new);
         for (parent, cell) in of.iter().zip(below) {
             inside[*parent].extend(cell);
         }
-        // a ball all of whose points went to others has no cells
+        // a sphere all of whose points went to others has no cells
         below = inside.into_iter().map(|cells| (!cells.is_empty()).then_some(Cell::Inner(cells))).collect();
     }
     below.into_iter().flatten().next().unwrap_or(Cell::Inner(Vec::new()))
 }
 
 /// At most `most` of the items, evenly.
-fn every(items: &[u32], most: usize) -> Vec<u32> {
+fn sample_evenly(items: &[u32], most: usize) -> Vec<u32> {
     items.iter().copied().step_by(items.len().div_ceil(most).max(1)).collect()
 }

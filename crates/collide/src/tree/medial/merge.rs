@@ -1,8 +1,8 @@
-//! Merge: two balls become one, again and again, those whose ball needs least first.
+//! Merge: two spheres become one, again and again, those whose sphere needs least first.
 //!
 //! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), §5. The
-//! ball of a merged pair is about the candidate that the points of both need least of, where the paper tries the two
-//! old centres and the ball around both. With `N(c, A)` the need of a part `A` of candidate `c`,
+//! sphere of a merged pair is about the candidate that the points of both need least of, where the paper tries the two
+//! old centers and the sphere around both. With `N(c, A)` the need of a part `A` of candidate `c`,
 //!
 //! ```text
 //! N(c, A ∪ B) = max(N(c, A), N(c, B))    cost(A, B) = min over c of N(c, A ∪ B)

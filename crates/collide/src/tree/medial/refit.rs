@@ -1,12 +1,12 @@
-//! Refit: points choose their balls, balls move to where their points need least.
+//! Refit: points choose their spheres, spheres move to where their points need least.
 //!
 //! One pass assigns each point to the site of least need (an additively weighted Voronoi partition) and then moves
 //! each site by Nelder and Mead's simplex (*A simplex method for function minimization*, 1965) to lower
 //! `max |p − c| + s(c)` over its own points. Neither half can raise the worst need.
 
-use super::site::{LOOKED_AT, Site};
+use super::site::{SEARCH_TRIANGLES, Site};
 use crate::tree::builder::Job;
-use crate::tree::simplex::simplex;
+use crate::tree::nelder_mead::nelder_mead;
 use crate::{MeshDistance, Vec3};
 use rayon::prelude::*;
 
@@ -19,7 +19,7 @@ pub(super) struct Fit {
     pub sites: Vec<Site>,
     /// Points of each site.
     pub parts: Vec<Vec<u32>>,
-    /// The worst need of each part, metres; at least 0.
+    /// The worst need of each part, meters; at least 0.
     pub errors: Vec<f64>,
 }
 
@@ -36,11 +36,11 @@ impl Fit {
         self.parts.resize(self.sites.len(), Vec::new());
         self.parts.iter_mut().for_each(Vec::clear);
         self.errors = vec![0.0; self.sites.len()];
-        self.take(points, region);
+        self.add_points(points, region);
     }
 
     /// Gives further points to the sites.
-    pub fn take(&mut self, points: &[Vec3], region: &[u32]) {
+    pub fn add_points(&mut self, points: &[Vec3], region: &[u32]) {
         for &i in region {
             let (need, k) = least(&self.sites, &points[i as usize]);
             self.parts[k].push(i);
@@ -78,7 +78,7 @@ impl Fit {
             }
             settled.clone_from(&self.parts);
             for k in changed {
-                self.sites[k] = moved(self.sites[k], &own(points, &self.parts[k]), distance);
+                self.sites[k] = optimized(self.sites[k], &points_of(points, &self.parts[k]), distance);
             }
             self.assign(points, region);
         }
@@ -90,7 +90,7 @@ impl Fit {
             self.assign_all(points, job);
             let moved_to = |(site, part): (&Site, &Vec<u32>)| match job.progress.stopped() {
                 true => *site,
-                false => moved(*site, &own(points, part), job.distance),
+                false => optimized(*site, &points_of(points, part), job.distance),
             };
             self.sites = self.sites.par_iter().zip(&self.parts).map(moved_to).collect();
         }
@@ -117,7 +117,7 @@ pub(super) fn keep<T>(items: &mut Vec<T>, kept: &[bool]) {
 }
 
 /// The points of a part.
-pub(super) fn own(points: &[Vec3], part: &[u32]) -> Vec<Vec3> {
+pub(super) fn points_of(points: &[Vec3], part: &[u32]) -> Vec<Vec3> {
     part.iter().map(|&i| points[i as usize]).collect()
 }
 
@@ -130,7 +130,7 @@ fn least(sites: &[Site], p: &Vec3) -> (f64, usize) {
 }
 
 /// The site moved to where its points need less.
-pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
+pub(super) fn optimized(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
     if own.is_empty() {
         return site;
     }
@@ -141,17 +141,17 @@ pub(super) fn moved(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
     }
     let step = (start * 2.0).min(0.3 * radius).max(1e-3 * radius);
     let mut depth = site.depth;
-    let before = start + site.beyond(&site.center, radius);
+    let before = start + site.bound_penalty(&site.center, radius);
     let mut best = (site.center, before);
-    simplex(site.center, step, EVALUATIONS, |c| {
+    nelder_mead(site.center, step, EVALUATIONS, |c| {
         let reach = own.iter().map(|p| (p - c).norm_squared()).fold(0.0, f64::max).sqrt();
-        // depths differ by no more than the centres do
+        // depths differ by no more than the centers do
         let bound = reach - site.depth - (c - site.center).norm();
         if bound >= 2.0 * start {
             return bound;
         }
-        let here = -distance.closest_of(c, LOOKED_AT).signed_distance;
-        let cost = reach - here + site.beyond(c, reach);
+        let here = -distance.closest_approximate(c, SEARCH_TRIANGLES).signed_distance;
+        let cost = reach - here + site.bound_penalty(c, reach);
         if cost < best.1 {
             best = (*c, cost);
             depth = here;

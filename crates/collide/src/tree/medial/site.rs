@@ -1,59 +1,63 @@
-//! A centre and its depth, which is all that a ball needs to be judged by.
+//! A center and its depth, which is all that a sphere needs to be judged by.
 //!
-//! A ball about `c` that holds the points `P` has the radius `max |p − c|` and reaches at most
+//! A sphere about `c` that holds the points `P` has the radius `max |p − c|` and reaches at most
 //!
 //! ```text
 //! need(c, P) = max over p in P of |p − c| + s(c)
 //! ```
 //!
-//! out of the solid, `s` the signed distance of the centre (negative inside). Each point has its own need, so that
-//! points choose among centres by it: that choice lowers the worst need, as does moving each centre to where the need
+//! out of the solid, `s` the signed distance of the center (negative inside). Each point has its own need, so that
+//! points choose among centers by it: that choice lowers the worst need, as does moving each center to where the need
 //! of its own points is least. The two in turn are the whole of fitting.
 
-use crate::tree::ball::Ball;
+use crate::tree::sphere::Sphere;
 use crate::{MeshDistance, Vec3};
 
-/// A centre.
+/// A center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Site {
-    /// Metres.
+    /// Meters.
     pub center: Vec3,
-    /// How far below the surface it lies, metres; negative outside.
+    /// How far below the surface it lies, meters; negative outside.
     pub depth: f64,
-    /// The ball of the level above in which it is to stay.
-    pub fence: Option<Ball>,
+    /// The sphere of the level above in which it is to stay.
+    pub parent_bound: Option<Sphere>,
 }
 
-/// Triangles that a search for a centre looks at for each distance; what the search comes to is measured exactly.
-pub(in crate::tree) const LOOKED_AT: usize = 400;
-/// What a metre beyond the fence costs, in metres of need.
-const BEYOND: f64 = 4.0;
+/// Triangles that a search for a center looks at for each distance; what the search comes to is measured exactly.
+pub(in crate::tree) const SEARCH_TRIANGLES: usize = 400;
+/// What a meter beyond the fence costs, in meters of need.
+const BOUND_PENALTY: f64 = 4.0;
 
 impl Site {
     pub fn at(center: Vec3, distance: &MeshDistance) -> Site {
-        Site { center, depth: -distance.closest(&center).signed_distance, fence: None }
+        Site { center, depth: -distance.closest(&center).signed_distance, parent_bound: None }
     }
 
     /// The same, found faster and maybe a little too deep.
-    pub fn about(center: Vec3, distance: &MeshDistance) -> Site {
-        Site { center, depth: -distance.closest_of(&center, LOOKED_AT).signed_distance, fence: None }
+    pub fn approximate(center: Vec3, distance: &MeshDistance) -> Site {
+        Site {
+            center,
+            depth: -distance.closest_approximate(&center, SEARCH_TRIANGLES).signed_distance,
+            parent_bound: None,
+        }
     }
 
-    /// The same centre measured exactly.
+    /// The same center measured exactly.
     pub fn exact(self, distance: &MeshDistance) -> Site {
-        Site { fence: self.fence, ..Site::at(self.center, distance) }
+        Site { parent_bound: self.parent_bound, ..Site::at(self.center, distance) }
     }
 
-    /// The penalty of a ball about `c` of radius `r` that leaves the fence, metres.
+    /// The penalty of a sphere about `c` of radius `r` that leaves the fence, meters.
     #[inline]
-    pub fn beyond(&self, c: &Vec3, r: f64) -> f64 {
-        self.fence.map_or(0.0, |f| BEYOND * ((c - f.center).norm() + r - f.radius).max(0.0))
+    pub fn bound_penalty(&self, c: &Vec3, r: f64) -> f64 {
+        self.parent_bound.map_or(0.0, |f| BOUND_PENALTY * ((c - f.center).norm() + r - f.radius).max(0.0))
     }
 
-    /// How far out of the solid the ball about this centre must reach to hold `p`, metres.
+    /// How far out of the solid the sphere about this center must reach to hold `p`, meters.
     #[inline]
     pub fn need(&self, p: &Vec3) -> f64 {
-        (p - self.center).norm() - self.depth + self.beyond(p, 0.0)
+        (p - self.center).norm() - self.depth + self.bound_penalty(p, 0.0)
     }
 
     /// The need of `p` if it is below `bar`; most are refused without a root.
@@ -72,8 +76,8 @@ impl Site {
         square.sqrt() - self.depth
     }
 
-    /// The ball about this centre that just holds the points.
-    pub fn ball(&self, points: &[Vec3]) -> Ball {
-        Ball::holding(self.center, points)
+    /// The sphere about this center that just holds the points.
+    pub fn sphere(&self, points: &[Vec3]) -> Sphere {
+        Sphere::about(self.center, points)
     }
 }

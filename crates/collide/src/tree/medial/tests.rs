@@ -2,15 +2,15 @@
 
 use super::burst::burst;
 use super::expand::expand;
-use super::gaps::add_gaps;
 use super::group::{Change, Groups};
 use super::merge::merge;
 use super::refit::Fit;
 use super::site::Site;
-use super::spheres::CoverPoints;
+use super::types::CoverPoints;
+use super::uncovered::add_uncovered;
 use crate::tree::TreeSettings;
-use crate::tree::ball::Ball;
-use crate::tree::close::closed;
+use crate::tree::grow_to_cover::grown_to_cover;
+use crate::tree::sphere::Sphere;
 use crate::{MeshDistance, TriMesh, Vec3};
 
 /// A bar along x, from -4 to 4.
@@ -39,13 +39,13 @@ fn cover_points_lie_on_their_triangles_by_area() {
         let [a, _, _] = mesh.corners(*t as usize);
         assert!((p - a).dot(n).abs() < 1e-12 && p.amax() <= 4.0 && p.y.abs() <= 0.5 && p.z.abs() <= 0.5);
     }
-    // the two ends are 2 of 34 square metres
+    // the two ends are 2 of 34 square meters
     let ends = cover.points[8..].iter().filter(|p| p.x.abs() == 4.0).count();
     assert!((198..=202).contains(&ends), "{ends}");
 }
 
 #[test]
-fn every_point_has_one_ball_which_it_needs_least_of() {
+fn every_point_has_one_sphere_which_it_needs_least_of() {
     let (mesh, distance) = (bar(), MeshDistance::new(&bar()));
     let cover = CoverPoints::on(&mesh, 500);
     let region = all(&cover.points);
@@ -62,7 +62,7 @@ fn every_point_has_one_ball_which_it_needs_least_of() {
     assert!(seen.iter().all(|n| *n == 1));
     fit.refit(4, &cover.points, &region, &distance);
     assert!(fit.worst() < before, "{} of {before}", fit.worst());
-    // what the balls are said to need is what they need
+    // what the spheres are said to need is what they need
     for (site, (part, error)) in fit.sites.iter().zip(fit.parts.iter().zip(&fit.errors)) {
         let radius = part.iter().map(|&i| (cover.points[i as usize] - site.center).norm()).fold(0.0, f64::max);
         assert!((radius + distance.closest(&site.center).signed_distance - error).abs() < 1e-12);
@@ -86,7 +86,7 @@ fn expand_finds_the_least_stand_off() {
 }
 
 #[test]
-fn merge_and_burst_give_up_the_ball_that_another_stands_for() {
+fn merge_and_burst_give_up_the_sphere_that_another_stands_for() {
     let distance = MeshDistance::new(&bar());
     let points: Vec<Vec3> = (-8..=8).map(|n| Vec3::new(0.5 * f64::from(n), 0.5, 0.1)).collect();
     // the first two are all but one
@@ -99,42 +99,42 @@ fn merge_and_burst_give_up_the_ball_that_another_stands_for() {
     assert_eq!((burst(&points, fit.clone(), 1).len(), merge(&few, &points, &fit, 1)), (1, vec![few[2]]));
 }
 
-/// Three groups along the bar, the first two full. A ball that comes into the first is made room for by a chain.
+/// Three groups along the bar, the first two full. A sphere that comes into the first is made room for by a chain.
 #[test]
 fn full_groups_hand_on_what_they_can_not_hold() {
     let distance = MeshDistance::new(&bar());
-    let ball = |x: f64| Ball { center: along_x(x), radius: 0.8 };
-    let balls = [-3.0, -2.0, -1.0, 0.5, 2.5].map(ball).to_vec();
+    let sphere = |x: f64| Sphere { center: along_x(x), radius: 0.8 };
+    let spheres = [-3.0, -2.0, -1.0, 0.5, 2.5].map(sphere).to_vec();
     let settings = TreeSettings { branch: 2, depth: 2, ..TreeSettings::default() };
-    let mut groups = Groups::new(balls, vec![0, 0, 1, 1, 2], &settings, None, &distance);
-    let change = Change { balls: vec![(0, ball(-3.2))], new: (5, ball(-2.8)), split: 0 };
-    // the second group must take ball 1 and let ball 3 go; within what it needs now it can not
+    let mut groups = Groups::new(spheres, vec![0, 0, 1, 1, 2], &settings, None, &distance);
+    let change = Change { spheres: vec![(0, sphere(-3.2))], new: (5, sphere(-2.8)), split: 0 };
+    // the second group must take sphere 1 and let sphere 3 go; within what it needs now it can not
     groups.budget = 10.0;
-    let after = groups.after(&change, &distance).expect("there is room in the third group");
+    let after = groups.with_change(&change, &distance).expect("there is room in the third group");
     assert_eq!(after.of, [0, 1, 1, 2, 2, 0]);
     groups.budget = 0.5;
-    assert!(groups.after(&change, &distance).is_none());
+    assert!(groups.with_change(&change, &distance).is_none());
 }
 
 #[test]
 fn a_leaf_is_grown_by_what_it_lacks_and_no_more() {
     let mesh = TriMesh::box_(Vec3::new(1.0, 2.0, 2.0));
-    let balls = closed(&mesh, vec![Ball { center: Vec3::zeros(), radius: 0.1 }], &());
-    assert!((balls[0].radius - 3.0).abs() < 1e-9, "{}", balls[0].radius);
-    let enough = vec![Ball { center: Vec3::zeros(), radius: 3.5 }];
-    assert!((closed(&mesh, enough, &())[0].radius - 3.5).abs() < 1e-9);
+    let spheres = grown_to_cover(&mesh, vec![Sphere { center: Vec3::zeros(), radius: 0.1 }], &());
+    assert!((spheres[0].radius - 3.0).abs() < 1e-9, "{}", spheres[0].radius);
+    let enough = vec![Sphere { center: Vec3::zeros(), radius: 3.5 }];
+    assert!((grown_to_cover(&mesh, enough, &())[0].radius - 3.5).abs() < 1e-9);
 }
 
 #[test]
-fn gaps_are_where_no_ball_is() {
+fn gaps_are_where_no_sphere_is() {
     let mesh = TriMesh { vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::y()], triangles: vec![[0, 1, 2]] };
-    let corners = mesh.vertices.iter().map(|v| Ball { center: *v, radius: 0.45 });
+    let corners = mesh.vertices.iter().map(|v| Sphere { center: *v, radius: 0.45 });
     let mut cover = CoverPoints::default();
-    let added = add_gaps(&mut cover, &mesh, &corners.clone().collect::<Vec<_>>(), 0.05, &());
+    let added = add_uncovered(&mut cover, &mesh, &corners.clone().collect::<Vec<_>>(), 0.05, &());
     assert!(added > 0 && added == cover.points.len());
-    // each sticks out of some ball, next to where none is
+    // each sticks out of some sphere, next to where none is
     let depth = |p: &Vec3| mesh.vertices.iter().map(|v| (p - v).norm() - 0.45).fold(f64::INFINITY, f64::min);
     assert!(cover.points.iter().all(|p| depth(p) > -0.05) && cover.points.iter().any(|p| depth(p) > 0.04));
-    let whole = [Ball { center: Vec3::zeros(), radius: 1.0 + 1e-9 }];
-    assert_eq!(add_gaps(&mut cover, &mesh, &whole, 0.05, &()), 0);
+    let whole = [Sphere { center: Vec3::zeros(), radius: 1.0 + 1e-9 }];
+    assert_eq!(add_uncovered(&mut cover, &mesh, &whole, 0.05, &()), 0);
 }

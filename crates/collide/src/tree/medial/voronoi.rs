@@ -1,4 +1,4 @@
-//! Voronoi vertices as balls: the sphere through the corners of each Delaunay cell, and how it lies to the solid.
+//! Voronoi vertices as spheres: the sphere through the corners of each Delaunay cell, and how it lies to the solid.
 //!
 //! ```text
 //! u = b − a, v = c − a, w = d − a
@@ -7,37 +7,37 @@
 //!
 //! `u·(v×w)` is taken from the exact predicate, since it is what goes wrong in slivers. Eight corners of a large box
 //! around the points are sites too: the cells of all others then end, so that each point of the surface lies in some
-//! ball (see [`super::adaptive`]).
+//! sphere (see [`super::adaptive`]).
 
 use super::delaunay::{Delaunay, orient};
-use crate::tree::ball::Ball;
+use crate::tree::sphere::Sphere;
 use crate::{Aabb, MeshDistance, Vec3};
 
 /// Half the side of the box around, in diagonals of what is inside.
 const BOX: f64 = 1.5;
-/// A sphere whose corners are not at one distance to this part of the radius has no centre in floating point.
+/// A sphere whose corners are not at one distance to this part of the radius has no center in floating point.
 const ROUND: f64 = 1e-4;
 
 /// What is known of a Voronoi vertex.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::tree) struct VoronoiBall {
-    /// Holds its four forming points (metres).
-    pub ball: Ball,
-    /// Of the centre, metres, negative inside the solid; positive infinity for centres well outside of the points' box,
+pub(in crate::tree) struct VoronoiSphere {
+    /// Holds its four forming points (meters).
+    pub sphere: Sphere,
+    /// Of the center, meters, negative inside the solid; positive infinity for centers well outside of the points' box,
     /// which are not looked up.
     pub signed_distance: f64,
-    /// Whether the centre is inside the solid.
+    /// Whether the center is inside the solid.
     pub internal: bool,
 }
 
-/// A tetrahedralisation of sites within a large box, and the ball of each cell.
+/// A tetrahedralization of sites within a large box, and the sphere of each cell.
 pub(in crate::tree) struct Voronoi<'a> {
     pub delaunay: Delaunay,
     distance: &'a MeshDistance,
     /// Around what can be inside the solid.
     bounds: Aabb,
     /// By cell; `None` for ghosts, dead cells and slivers beyond floating point.
-    balls: Vec<Option<VoronoiBall>>,
+    spheres: Vec<Option<VoronoiSphere>>,
 }
 
 /// Number of corners of the box, which are the first vertices.
@@ -58,41 +58,45 @@ impl<'a> Voronoi<'a> {
         };
         let points: Vec<Vec3> = (0..CORNERS).map(corner).chain(sites.iter().copied()).collect();
         let delaunay = Delaunay::new(&points)?;
-        let mut made =
-            Voronoi { balls: vec![None; delaunay.cell_count()], delaunay, distance, bounds: solid.grown(1e-3 * half) };
-        for c in 0..made.delaunay.cell_count() as u32 {
-            made.refresh(c);
+        let mut created = Voronoi {
+            spheres: vec![None; delaunay.cell_count()],
+            delaunay,
+            distance,
+            bounds: solid.grown(1e-3 * half),
+        };
+        for c in 0..created.delaunay.cell_count() as u32 {
+            created.refresh(c);
         }
-        Some(made)
+        Some(created)
     }
 
-    /// The ball of a cell.
-    pub fn ball(&self, cell: u32) -> Option<&VoronoiBall> {
-        self.balls.get(cell as usize)?.as_ref()
+    /// The sphere of a cell.
+    pub fn sphere(&self, cell: u32) -> Option<&VoronoiSphere> {
+        self.spheres.get(cell as usize)?.as_ref()
     }
 
-    /// Inserts a site, walking from `hint`; whether it was new. The changes are the tetrahedralisation's `made` and
-    /// `gone`.
+    /// Inserts a site, walking from `hint`; whether it was new. The changes are the tetrahedralization's `created` and
+    /// `removed`.
     pub fn insert(&mut self, p: Vec3, hint: u32) -> bool {
         if self.delaunay.insert(p, hint).is_none() {
             return false;
         }
-        self.balls.resize(self.delaunay.cell_count(), None);
-        for n in 0..self.delaunay.gone().len() {
-            self.balls[self.delaunay.gone()[n] as usize] = None;
+        self.spheres.resize(self.delaunay.cell_count(), None);
+        for n in 0..self.delaunay.removed().len() {
+            self.spheres[self.delaunay.removed()[n] as usize] = None;
         }
-        for n in 0..self.delaunay.made().len() {
-            self.refresh(self.delaunay.made()[n]);
+        for n in 0..self.delaunay.created().len() {
+            self.refresh(self.delaunay.created()[n]);
         }
         true
     }
 
-    /// The signed distance of a cell's centre, looked up if it was not yet.
+    /// The signed distance of a cell's center, looked up if it was not yet.
     pub fn signed_distance(&mut self, cell: u32) -> f64 {
         let distance = self.distance;
-        self.balls.get_mut(cell as usize).and_then(Option::as_mut).map_or(f64::INFINITY, |b| {
+        self.spheres.get_mut(cell as usize).and_then(Option::as_mut).map_or(f64::INFINITY, |b| {
             if b.signed_distance == f64::INFINITY {
-                b.signed_distance = distance.closest(&b.ball.center).signed_distance;
+                b.signed_distance = distance.closest(&b.sphere.center).signed_distance;
             }
             b.signed_distance
         })
@@ -102,19 +106,19 @@ impl<'a> Voronoi<'a> {
         if !self.delaunay.is_finite(cell) {
             return;
         }
-        self.balls[cell as usize] = circumscribed(&self.delaunay.corners(cell)).map(|ball| {
+        self.spheres[cell as usize] = circumscribed(&self.delaunay.corners(cell)).map(|sphere| {
             let may_be_inside =
-                (0..3).all(|k| ball.center[k] >= self.bounds.min[k] && ball.center[k] <= self.bounds.max[k]);
+                (0..3).all(|k| sphere.center[k] >= self.bounds.min[k] && sphere.center[k] <= self.bounds.max[k]);
             let signed_distance =
-                if may_be_inside { self.distance.closest(&ball.center).signed_distance } else { f64::INFINITY };
-            VoronoiBall { ball, signed_distance, internal: signed_distance < 0.0 }
+                if may_be_inside { self.distance.closest(&sphere.center).signed_distance } else { f64::INFINITY };
+            VoronoiSphere { sphere, signed_distance, internal: signed_distance < 0.0 }
         });
     }
 }
 
-/// The ball about the centre of the sphere through four points, grown to hold them all; `None` where floating point
+/// The sphere about the center of the sphere through four points, grown to hold them all; `None` where floating point
 /// does not give it.
-pub(in crate::tree) fn circumscribed(corners: &[Vec3; 4]) -> Option<Ball> {
+pub(in crate::tree) fn circumscribed(corners: &[Vec3; 4]) -> Option<Sphere> {
     let [a, b, c, d] = corners;
     let (u, v, w) = (b - a, c - a, d - a);
     let scaled = v.cross(&w) * u.norm_squared() + w.cross(&u) * v.norm_squared() + u.cross(&v) * w.norm_squared();
@@ -125,7 +129,7 @@ pub(in crate::tree) fn circumscribed(corners: &[Vec3; 4]) -> Option<Ball> {
     let squares = corners.map(|p| (p - center).norm_squared());
     let least = squares.iter().copied().fold(f64::INFINITY, f64::min).sqrt();
     let radius = squares.iter().copied().fold(0.0, f64::max).sqrt() * (1.0 + 1e-12);
-    (radius.is_finite() && radius - least <= ROUND * radius).then_some(Ball { center, radius })
+    (radius.is_finite() && radius - least <= ROUND * radius).then_some(Sphere { center, radius })
 }
 
 #[cfg(test)]
@@ -137,24 +141,24 @@ mod tests {
     fn the_sphere_through_four_points_of_a_known_one() {
         let center = Vec3::new(1.0, -2.0, 3.0);
         let on = |x: f64, y: f64, z: f64| center + Vec3::new(x, y, z).normalize() * 0.7;
-        let ball =
+        let sphere =
             circumscribed(&[on(1.0, 0.0, 0.2), on(0.0, 1.0, 0.1), on(-1.0, 0.3, 0.0), on(0.1, 0.2, 1.0)]).unwrap();
-        assert!((ball.center - center).norm() < 1e-14 && (ball.radius - 0.7).abs() < 1e-11);
+        assert!((sphere.center - center).norm() < 1e-14 && (sphere.radius - 0.7).abs() < 1e-11);
         let flat = [Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::new(1.0, 2.0, 0.0)];
         assert_eq!(circumscribed(&flat), None);
     }
 
     #[test]
-    fn inner_balls_of_a_sphere_are_the_sphere() {
+    fn inner_spheres_of_a_sphere_are_the_sphere() {
         let mesh = TriMesh::icosphere(1.0, 2);
         let distance = MeshDistance::new(&mesh);
         let voronoi = Voronoi::new(&mesh.vertices, &mesh.aabb(), &distance).unwrap();
         let inner: Vec<_> =
-            voronoi.delaunay.finite_cells().filter_map(|c| voronoi.ball(c)).filter(|b| b.internal).collect();
+            voronoi.delaunay.finite_cells().filter_map(|c| voronoi.sphere(c)).filter(|b| b.internal).collect();
         assert!(!inner.is_empty());
         for b in inner {
             // vertices are on the unit sphere to rounding, which slivers magnify
-            assert!((b.ball.radius - 1.0).abs() < 1e-3 && b.ball.center.norm() < 1e-3, "{b:?}");
+            assert!((b.sphere.radius - 1.0).abs() < 1e-3 && b.sphere.center.norm() < 1e-3, "{b:?}");
         }
     }
 }

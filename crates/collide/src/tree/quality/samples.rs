@@ -1,7 +1,7 @@
-//! Deterministic, evenly spread points on a surface, on a ball and in a box.
+//! Deterministic, evenly spread points on a surface, on a sphere and in a box.
 //!
 //! Additive recurrences `xₙ = frac(½ + n·α)` with the powers of `1/φ_d`, `φ_d` the root of `x^(d+1) = x + 1`: Roberts, *The unreasonable
-//! effectiveness of quasirandom sequences* (2018). On a ball the Fibonacci lattice: `z = 1 − 2(n + ½)/N`, longitude by the golden angle.
+//! effectiveness of quasirandom sequences* (2018). On a sphere the Fibonacci lattice: `z = 1 − 2(n + ½)/N`, longitude by the golden angle.
 
 use crate::{Aabb, MeshDistance, TriMesh, Vec3};
 use nalgebra::ComplexField;
@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 const PLASTIC: f64 = 1.324_717_957_244_746;
 const PHI_3: f64 = 1.220_744_084_605_759_6;
 /// Points of one cell that are asked for one by one.
-const FEW: usize = 4;
+const MAX_CELL_POINTS: usize = 4;
 
 /// `count` points, uniform by area: even steps along the summed areas, an additive recurrence within the triangles.
 pub(super) fn on_surface(mesh: &TriMesh, count: usize) -> Vec<Vec3> {
@@ -58,7 +58,7 @@ fn step(n: usize, alpha: f64) -> f64 {
     (0.5 + n as f64 * alpha).fract()
 }
 
-/// Which of the points lie inside the solid. Cells whose centre is further from the surface than their corners hold points of one kind;
+/// Which of the points lie inside the solid. Cells whose center is further from the surface than their corners hold points of one kind;
 /// others are halved three times, until few points are left.
 pub(super) fn inside(distance: &MeshDistance, points: &[Vec3], bounds: &Aabb) -> Vec<bool> {
     let mut answer = vec![false; points.len()];
@@ -68,7 +68,7 @@ pub(super) fn inside(distance: &MeshDistance, points: &[Vec3], bounds: &Aabb) ->
 }
 
 fn classify(distance: &MeshDistance, points: &[Vec3], order: &mut [u32], cell: Aabb, answer: &mut [bool]) {
-    if order.len() <= FEW {
+    if order.len() <= MAX_CELL_POINTS {
         order.iter().for_each(|&n| answer[n as usize] = distance.closest(&points[n as usize]).signed_distance < 0.0);
         return;
     }
@@ -82,12 +82,12 @@ fn classify(distance: &MeshDistance, points: &[Vec3], order: &mut [u32], cell: A
     // splits the slice at the cell's middle along one axis after the other
     let mut parts = vec![(order, cell)];
     for k in 0..3 {
-        parts = parts.into_iter().flat_map(|(part, cell)| halves(points, part, cell, k, center[k])).collect();
+        parts = parts.into_iter().flat_map(|(part, cell)| split_points(points, part, cell, k, center[k])).collect();
     }
     parts.into_iter().for_each(|(part, cell)| classify(distance, points, part, cell, answer));
 }
 
-fn halves<'a>(points: &[Vec3], part: &'a mut [u32], cell: Aabb, k: usize, at: f64) -> [(&'a mut [u32], Aabb); 2] {
+fn split_points<'a>(points: &[Vec3], part: &'a mut [u32], cell: Aabb, k: usize, at: f64) -> [(&'a mut [u32], Aabb); 2] {
     part.sort_unstable_by_key(|&n| (points[n as usize][k] >= at, n));
     let below = part.partition_point(|&n| points[n as usize][k] < at);
     let (low, high) = part.split_at_mut(below);

@@ -1,39 +1,39 @@
-//! Adaptive medial balls: Voronoi balls of few sites, refined where they are worst.
+//! Adaptive medial spheres: Voronoi spheres of few sites, refined where they are worst.
 //!
 //! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), §4.
 //!
-//! - A ball is INTERNAL if its centre is inside the solid.
-//! - A cover point that no INTERNAL ball holds has the best of the other balls that hold it flagged COVER. The balls
+//! - A sphere is INTERNAL if its center is inside the solid.
+//! - A cover point that no INTERNAL sphere holds has the best of the other spheres that hold it flagged COVER. The spheres
 //!   that hold a point are those of the cells that would go were it inserted, a connected set around the cell that it
 //!   lies in. It is never empty: the Voronoi cell of the nearest site is bounded and holds the point, so that some vertex
 //!   `v` of it is at least as far along from the site `s` as the point `p` is, `(v − s)·(p − s) ≥ |p − s|²`, hence
 //!   `|v − p| ≤ |v − s|`.
-//! - The error of a ball is at most `r + s(c)`, `s` the signed distance of its centre.
-//! - Refinement takes the worst flagged ball and makes its closest surface point a site, which is inside the ball
+//! - The error of a sphere is at most `r + s(c)`, `s` the signed distance of its center.
+//! - Refinement takes the worst flagged sphere and makes its closest surface point a site, which is inside the sphere
 //!   and so ends it.
 //!
-//! Each cover point keeps one flagged ball as its *witness*. When a cell goes, the points that it was witness of are
-//! judged anew, and no others; a COVER ball is judged anew before it is refined, and at the end, since an INTERNAL one
+//! Each cover point keeps one flagged sphere as its *witness*. When a cell goes, the points that it was witness of are
+//! judged anew, and no others; a COVER sphere is judged anew before it is refined, and at the end, since an INTERNAL one
 //! may have come to hold its points.
 //!
-//! Departs from the paper: best is least error, not the largest radius less distance; and it is sought among all balls that
+//! Departs from the paper: best is least error, not the largest radius less distance; and it is sought among all spheres that
 //! hold the point, not only those of the nearest site.
 
 #[cfg(test)]
 mod tests;
 mod witness;
 
-use super::spheres::{CoverPoints, MedialBall, Want};
+use super::types::{CoverPoints, MedialSphere, RefineGoal};
 use super::voronoi::Voronoi;
 use crate::tree::Progress;
-use crate::tree::ball::Ball;
 use crate::tree::builder::StageCount;
+use crate::tree::sphere::Sphere;
 use crate::{Aabb, MeshDistance, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 const NONE: u32 = u32::MAX;
-/// A ball is told to hold a point up to this part of its radius, and is grown by it.
+/// A sphere is told to hold a point up to this part of its radius, and is grown by it.
 const SLACK: f64 = 1e-9;
 
 /// What a refinement did.
@@ -42,7 +42,7 @@ pub(in crate::tree) struct Counts {
     pub inserted: u64,
     pub internal: u64,
     pub cover: u64,
-    /// Cover points that only a ball of no size holds, since floating point gives no other.
+    /// Cover points that only a sphere of no size holds, since floating point gives no other.
     pub alone: u64,
     /// Sites that were there already.
     pub duplicates: u64,
@@ -53,8 +53,8 @@ impl Counts {
     pub fn stages(&self, level: u32) -> Vec<StageCount> {
         [
             ("sites inserted", self.inserted),
-            ("internal balls", self.internal),
-            ("cover balls", self.cover),
+            ("internal spheres", self.internal),
+            ("cover spheres", self.cover),
             ("points alone", self.alone),
             ("duplicate sites", self.duplicates),
         ]
@@ -63,8 +63,8 @@ impl Counts {
     }
 }
 
-/// Voronoi balls with their flags. Cover points are numbered by their place in the region.
-pub(in crate::tree) struct Axis<'a> {
+/// Voronoi spheres with their flags. Cover points are numbered by their place in the region.
+pub(in crate::tree) struct MedialAxis<'a> {
     points: Vec<Vec3>,
     /// Whether the points are of a part of the surface.
     partial: bool,
@@ -72,15 +72,15 @@ pub(in crate::tree) struct Axis<'a> {
     progress: &'a dyn Progress,
     /// `None` for a region of no extent.
     voronoi: Option<Voronoi<'a>>,
-    /// Per cover point, the cell whose ball is its witness.
+    /// Per cover point, the cell whose sphere is its witness.
     witness: Vec<u32>,
     /// Per cell, its points, as a chain: the first, and per point the next.
     first: Vec<u32>,
     next: Vec<u32>,
-    /// Per cell, whether its ball is INTERNAL.
+    /// Per cell, whether its sphere is INTERNAL.
     inner: Vec<bool>,
     /// Per cell, how often it went: entries of the queue of earlier lives are void.
-    lives: Vec<u32>,
+    generations: Vec<u32>,
     /// Per cell, the life in which it was queued last.
     queued: Vec<u32>,
     /// Error (as ordered bits), cell, life.
@@ -92,7 +92,7 @@ pub(in crate::tree) struct Axis<'a> {
     inserted: usize,
 }
 
-impl<'a> Axis<'a> {
+impl<'a> MedialAxis<'a> {
     /// Begins with `sites` of the region's points (at least 8), taken evenly.
     pub fn new(
         cover: &CoverPoints,
@@ -100,12 +100,12 @@ impl<'a> Axis<'a> {
         distance: &'a MeshDistance,
         sites: usize,
         progress: &'a dyn Progress,
-    ) -> Axis<'a> {
+    ) -> MedialAxis<'a> {
         let points: Vec<Vec3> = region.iter().map(|&i| cover.points[i as usize]).collect();
         let stride = (points.len() / sites.max(8)).max(1);
         let first: Vec<Vec3> = points.iter().copied().step_by(stride).collect();
         let solid = Aabb::around(cover.points.iter().copied());
-        let mut axis = Axis {
+        let mut axis = MedialAxis {
             witness: vec![NONE; points.len()],
             next: vec![NONE; points.len()],
             partial: points.len() < cover.points.len(),
@@ -115,7 +115,7 @@ impl<'a> Axis<'a> {
             voronoi: Voronoi::new(&first, &solid, distance),
             first: Vec::new(),
             inner: Vec::new(),
-            lives: Vec::new(),
+            generations: Vec::new(),
             queued: Vec::new(),
             queue: BinaryHeap::new(),
             seen: Vec::new(),
@@ -125,22 +125,22 @@ impl<'a> Axis<'a> {
             inserted: 0,
         };
         axis.grow_tables();
-        for c in 0..axis.lives.len() as u32 {
-            axis.welcome(c);
+        for c in 0..axis.generations.len() as u32 {
+            axis.register_cell(c);
         }
         let mut hint = 0;
         for i in (0..axis.points.len() as u32).take_while(|_| !progress.stopped()) {
-            hint = axis.judge(i, hint);
+            hint = axis.assign_witness(i, hint);
         }
         axis
     }
 
-    /// Refines until the worst error is below the target and there are enough balls, or no more may be inserted.
-    pub fn refine(&mut self, want: &Want) {
-        let most = self.inserted + want.most;
+    /// Refines until the worst error is below the target and there are enough spheres, or no more may be inserted.
+    pub fn refine(&mut self, goal: &RefineGoal) {
+        let most = self.inserted + goal.most;
         while self.inserted < most && !self.progress.stopped() {
             let Some((error, cell)) = self.worst() else { return };
-            let enough = error < want.target && self.internal + self.covering >= want.least;
+            let enough = error < goal.target && self.internal + self.covering >= goal.least;
             if enough {
                 self.queued[cell as usize] = NONE;
                 self.enqueue(cell);
@@ -150,26 +150,26 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// The flagged balls, of points that have none a ball of no size.
-    pub fn balls(&mut self) -> Vec<MedialBall> {
+    /// The flagged spheres, of points that have none a sphere of no size.
+    pub fn spheres(&mut self) -> Vec<MedialSphere> {
         let progress = self.progress;
         for c in (0..self.first.len() as u32).take_while(|_| !progress.stopped()) {
-            self.judge_again(c);
+            self.reassign_witnesses(c);
         }
-        let mut balls = Vec::with_capacity(self.internal + self.covering);
+        let mut spheres = Vec::with_capacity(self.internal + self.covering);
         for c in self.listed() {
             let outward = self.error(c);
-            if let Some(b) = self.voronoi.as_ref().and_then(|v| v.ball(c)) {
-                let ball = Ball { center: b.ball.center, radius: b.ball.radius * (1.0 + SLACK) };
-                balls.push(MedialBall { ball, outward });
+            if let Some(b) = self.voronoi.as_ref().and_then(|v| v.sphere(c)) {
+                let sphere = Sphere { center: b.sphere.center, radius: b.sphere.radius * (1.0 + SLACK) };
+                spheres.push(MedialSphere { sphere, outward });
             }
         }
         let alone = (0..self.points.len()).filter(|&i| self.witness[i] == NONE).map(|i| self.points[i]);
-        balls.extend(alone.map(|center| MedialBall { ball: Ball { center, radius: 0.0 }, outward: 0.0 }));
-        balls
+        spheres.extend(alone.map(|center| MedialSphere { sphere: Sphere { center, radius: 0.0 }, outward: 0.0 }));
+        spheres
     }
 
-    /// Per point, the balls of the list that [`Axis::balls`] just gave which hold it: all that do, up to rounding; that
+    /// Per point, the spheres of the list that [`MedialAxis::spheres`] just gave which hold it: all that do, up to rounding; that
     /// is at least one.
     pub fn holders(&mut self) -> Vec<Vec<u32>> {
         let mut place = vec![NONE; self.first.len()];
@@ -183,7 +183,7 @@ impl<'a> Axis<'a> {
                 all.push(holders);
                 continue;
             }
-            hint = self.each_holder(i, hint, |c, _| {
+            hint = self.for_each_holder(i, hint, |c, _| {
                 if place[c as usize] != NONE {
                     holders.push(place[c as usize]);
                 }
@@ -203,7 +203,7 @@ impl<'a> Axis<'a> {
 
     /// The flagged cells that matter.
     fn listed(&self) -> Vec<u32> {
-        (0..self.first.len() as u32).filter(|&c| self.is_flagged(c) && self.matters(c)).collect()
+        (0..self.first.len() as u32).filter(|&c| self.is_flagged(c) && self.is_in_region(c)).collect()
     }
 
     /// What was done so far.
@@ -217,14 +217,14 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// The worst flagged ball, taken from the queue.
+    /// The worst flagged sphere, taken from the queue.
     fn worst(&mut self) -> Option<(f64, u32)> {
-        while let Some((bits, cell, life)) = self.queue.pop() {
-            if self.lives[cell.0 as usize] != life {
+        while let Some((bits, cell, generation)) = self.queue.pop() {
+            if self.generations[cell.0 as usize] != generation {
                 continue;
             }
-            self.judge_again(cell.0);
-            if self.is_flagged(cell.0) && self.matters(cell.0) {
+            self.reassign_witnesses(cell.0);
+            if self.is_flagged(cell.0) && self.is_in_region(cell.0) {
                 return Some((f64::from_bits(bits), cell.0));
             }
             self.queued[cell.0 as usize] = NONE;
@@ -232,34 +232,34 @@ impl<'a> Axis<'a> {
         None
     }
 
-    /// Makes the closest surface point of a ball a site. A ball whose closest surface point is a site already is as good as it gets.
+    /// Makes the closest surface point of a sphere a site. A sphere whose closest surface point is a site already is as good as it gets.
     fn split(&mut self, cell: u32) {
         let Some(voronoi) = self.voronoi.as_mut() else { return };
-        let Some(ball) = voronoi.ball(cell).map(|b| b.ball) else { return };
-        let site = self.distance.closest(&ball.center).point;
-        if (site - ball.center).norm() >= ball.radius * (1.0 - SLACK) || !voronoi.insert(site, cell) {
+        let Some(sphere) = voronoi.sphere(cell).map(|b| b.sphere) else { return };
+        let site = self.distance.closest(&sphere.center).point;
+        if (site - sphere.center).norm() >= sphere.radius * (1.0 - SLACK) || !voronoi.insert(site, cell) {
             return;
         }
         self.inserted += 1;
-        let orphans = self.dismiss();
+        let orphans = self.remove_cells();
         self.grow_tables();
-        let made = self.made();
-        for &c in &made {
-            self.welcome(c);
+        let created = self.created();
+        for &c in &created {
+            self.register_cell(c);
         }
         for i in orphans {
-            match made.iter().find(|&&c| self.inner[c as usize] && self.holds(c, i)) {
-                Some(&c) => self.entrust(i, c),
-                None => _ = self.judge(i, made[0]),
+            match created.iter().find(|&&c| self.inner[c as usize] && self.contains(c, i)) {
+                Some(&c) => self.set_witness(i, c),
+                None => _ = self.assign_witness(i, created[0]),
             }
         }
     }
 
     /// Forgets the cells that are gone; the points that they were witness of.
-    fn dismiss(&mut self) -> Vec<u32> {
+    fn remove_cells(&mut self) -> Vec<u32> {
         let Some(voronoi) = self.voronoi.as_ref() else { return Vec::new() };
         let mut orphans = Vec::new();
-        for &c in voronoi.delaunay.gone() {
+        for &c in voronoi.delaunay.removed() {
             let c = c as usize;
             let before = orphans.len();
             witness::chain(self.first[c], &self.next, &mut orphans);
@@ -270,7 +270,7 @@ impl<'a> Axis<'a> {
             }
             self.inner[c] = false;
             self.first[c] = NONE;
-            self.lives[c] += 1;
+            self.generations[c] += 1;
         }
         for &i in &orphans {
             self.witness[i as usize] = NONE;

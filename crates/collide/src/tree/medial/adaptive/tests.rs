@@ -3,55 +3,60 @@
 use super::*;
 use crate::TriMesh;
 
-/// The whole of it: the balls of a region and what was done.
-fn adaptive(cover: &CoverPoints, region: &[u32], distance: &MeshDistance, want: &Want) -> (Vec<MedialBall>, Counts) {
-    let mut axis = Axis::new(cover, region, distance, want.least / 12, &());
-    axis.refine(want);
-    (axis.balls(), axis.counts())
+/// The whole of it: the spheres of a region and what was done.
+fn adaptive(
+    cover: &CoverPoints,
+    region: &[u32],
+    distance: &MeshDistance,
+    goal: &RefineGoal,
+) -> (Vec<MedialSphere>, Counts) {
+    let mut axis = MedialAxis::new(cover, region, distance, goal.least / 12, &());
+    axis.refine(goal);
+    (axis.spheres(), axis.counts())
 }
 
-fn check(mesh: &TriMesh, want: &Want) -> (Vec<MedialBall>, Counts) {
+fn check(mesh: &TriMesh, goal: &RefineGoal) -> (Vec<MedialSphere>, Counts) {
     let cover = CoverPoints::on(mesh, 2000);
     let distance = MeshDistance::new(mesh);
     let region: Vec<u32> = (0..cover.points.len() as u32).collect();
-    let (balls, counts) = adaptive(&cover, &region, &distance, want);
+    let (spheres, counts) = adaptive(&cover, &region, &distance, goal);
     let slack = 1e-6 * mesh.diagonal();
-    let far = |b: &MedialBall, p: &Vec3| (b.ball.center - p).norm() - b.ball.radius;
+    let far = |b: &MedialSphere, p: &Vec3| (b.sphere.center - p).norm() - b.sphere.radius;
     for p in &cover.points {
-        assert!(balls.iter().any(|b| far(b, p) <= 0.0), "{p} is bare");
+        assert!(spheres.iter().any(|b| far(b, p) <= 0.0), "{p} is bare");
     }
-    for b in &balls {
-        let s = distance.closest(&b.ball.center).signed_distance;
-        assert!((b.outward - (b.ball.radius + s).max(0.0)).abs() <= 1e-7 * b.ball.radius);
+    for b in &spheres {
+        let s = distance.closest(&b.sphere.center).signed_distance;
+        assert!((b.outward - (b.sphere.radius + s).max(0.0)).abs() <= 1e-7 * b.sphere.radius);
     }
-    assert_eq!(balls.len() as u64, counts.internal + counts.cover + counts.alone);
-    let mut axis = Axis::new(&cover, &region, &distance, want.least / 12, &());
-    axis.refine(want);
-    assert_eq!(axis.balls(), balls);
+    assert_eq!(spheres.len() as u64, counts.internal + counts.cover + counts.alone);
+    let mut axis = MedialAxis::new(&cover, &region, &distance, goal.least / 12, &());
+    axis.refine(goal);
+    assert_eq!(axis.spheres(), spheres);
     for (p, holders) in cover.points.iter().zip(axis.holders()) {
-        let strictly: Vec<u32> = (0..balls.len() as u32).filter(|&k| far(&balls[k as usize], p) < -slack).collect();
+        let strictly: Vec<u32> = (0..spheres.len() as u32).filter(|&k| far(&spheres[k as usize], p) < -slack).collect();
         assert!(strictly.iter().all(|k| holders.contains(k)), "{p}");
-        assert!(!holders.is_empty() && holders.iter().all(|&k| far(&balls[k as usize], p) <= 0.0));
+        assert!(!holders.is_empty() && holders.iter().all(|&k| far(&spheres[k as usize], p) <= 0.0));
     }
-    assert_eq!((balls.clone(), counts), adaptive(&cover, &region, &distance, want));
-    (balls, counts)
+    assert_eq!((spheres.clone(), counts), adaptive(&cover, &region, &distance, goal));
+    (spheres, counts)
 }
 
 #[test]
 fn a_box_is_refined_to_what_is_asked() {
     let mesh = TriMesh::box_(Vec3::new(0.5, 1.0, 0.2));
-    let (balls, counts) = check(&mesh, &Want { target: 0.05, least: 100, most: 2000 });
-    assert!(counts.inserted < 2000 && balls.len() >= 100, "{counts:?}");
-    let worst = balls.iter().map(|b| b.outward).fold(0.0, f64::max);
+    let (spheres, counts) = check(&mesh, &RefineGoal { target: 0.05, least: 100, most: 2000 });
+    assert!(counts.inserted < 2000 && spheres.len() >= 100, "{counts:?}");
+    let worst = spheres.iter().map(|b| b.outward).fold(0.0, f64::max);
     assert!(worst < 0.05, "{worst} {counts:?}");
-    // no inner ball of the box is larger than half its least side
-    assert!(balls.iter().all(|b| b.ball.radius - b.outward <= 0.2 + 1e-9));
+    // no inner sphere of the box is larger than half its least side
+    assert!(spheres.iter().all(|b| b.sphere.radius - b.outward <= 0.2 + 1e-9));
 }
 
 #[test]
 fn more_insertions_than_allowed_are_not_made() {
     let mesh = TriMesh::torus(1.0, 0.3, 48, 24);
-    let (_, counts) = check(&mesh, &Want { target: 0.0, least: 0, most: 100 });
+    let (_, counts) = check(&mesh, &RefineGoal { target: 0.0, least: 0, most: 100 });
     assert_eq!(counts.inserted, 100);
     assert_eq!(counts.alone, 0);
 }
@@ -62,19 +67,19 @@ fn a_region_of_coplanar_points() {
     let cover = CoverPoints::on(&mesh, 600);
     let region: Vec<u32> = (0..cover.points.len() as u32).filter(|&i| cover.points[i as usize].z == 0.5).collect();
     let distance = MeshDistance::new(&mesh);
-    let (balls, _) = adaptive(&cover, &region, &distance, &Want { target: 0.02, least: 50, most: 500 });
+    let (spheres, _) = adaptive(&cover, &region, &distance, &RefineGoal { target: 0.02, least: 50, most: 500 });
     for &i in &region {
         let p = cover.points[i as usize];
-        assert!(balls.iter().any(|b| (b.ball.center - p).norm() <= b.ball.radius), "{p} is bare");
+        assert!(spheres.iter().any(|b| (b.sphere.center - p).norm() <= b.sphere.radius), "{p} is bare");
     }
-    let worst = balls.iter().map(|b| b.outward).fold(0.0, f64::max);
+    let worst = spheres.iter().map(|b| b.outward).fold(0.0, f64::max);
     assert!(worst < 0.02, "{worst}");
 }
 
 #[test]
 fn points_of_thin_sheets_and_needles_are_held() {
     for half in [Vec3::new(1.0, 1.0, 1e-3), Vec3::new(1.0, 1e-4, 1e-4)] {
-        let (_, counts) = check(&TriMesh::box_(half), &Want { target: 0.02, least: 100, most: 1000 });
+        let (_, counts) = check(&TriMesh::box_(half), &RefineGoal { target: 0.02, least: 100, most: 1000 });
         assert_eq!(counts.alone, 0, "{half}");
     }
 }

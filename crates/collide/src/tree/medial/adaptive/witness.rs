@@ -1,28 +1,28 @@
-//! Flags and witnesses of the balls: who holds which point.
+//! Flags and witnesses of the spheres: who holds which point.
 
-use super::{Axis, NONE, SLACK};
+use super::{MedialAxis, NONE, SLACK};
 use crate::Vec3;
-use crate::tree::ball::Ball;
+use crate::tree::sphere::Sphere;
 use std::cmp::Reverse;
 
-impl Axis<'_> {
+impl MedialAxis<'_> {
     /// The tetrahedra that the last insertion made.
-    pub(super) fn made(&self) -> Vec<u32> {
+    pub(super) fn created(&self) -> Vec<u32> {
         let Some(voronoi) = self.voronoi.as_ref() else { return Vec::new() };
-        voronoi.delaunay.made().iter().copied().filter(|&c| voronoi.delaunay.is_finite(c)).collect()
+        voronoi.delaunay.created().iter().copied().filter(|&c| voronoi.delaunay.is_finite(c)).collect()
     }
 
     /// Flags a new cell, if it is INTERNAL.
-    pub(super) fn welcome(&mut self, cell: u32) {
-        if self.voronoi.as_ref().and_then(|v| v.ball(cell)).is_some_and(|b| b.internal) {
+    pub(super) fn register_cell(&mut self, cell: u32) {
+        if self.voronoi.as_ref().and_then(|v| v.sphere(cell)).is_some_and(|b| b.internal) {
             self.inner[cell as usize] = true;
             self.internal += 1;
             self.enqueue(cell);
         }
     }
 
-    /// Judges anew the points of a COVER ball.
-    pub(super) fn judge_again(&mut self, cell: u32) {
+    /// Judges anew the points of a COVER sphere.
+    pub(super) fn reassign_witnesses(&mut self, cell: u32) {
         if self.inner[cell as usize] || self.first[cell as usize] == NONE {
             return;
         }
@@ -32,15 +32,15 @@ impl Axis<'_> {
         self.covering -= 1;
         for i in points {
             self.witness[i as usize] = NONE;
-            self.judge(i, cell);
+            self.assign_witness(i, cell);
         }
     }
 
-    /// Finds a point its witness: the first INTERNAL ball met that holds it, or else the one of least error. The cell it
+    /// Finds a point its witness: the first INTERNAL sphere met that holds it, or else the one of least error. The cell it
     /// lies in, walking from `hint`.
-    pub(super) fn judge(&mut self, i: u32, hint: u32) -> u32 {
+    pub(super) fn assign_witness(&mut self, i: u32, hint: u32) -> u32 {
         let mut best = (f64::INFINITY, NONE);
-        let home = self.each_holder(i, hint, |c, axis| {
+        let home = self.for_each_holder(i, hint, |c, axis| {
             if axis.inner[c as usize] {
                 best.1 = c;
                 return false;
@@ -52,13 +52,13 @@ impl Axis<'_> {
             true
         });
         if best.1 != NONE {
-            self.entrust(i, best.1);
+            self.set_witness(i, best.1);
         }
         home
     }
 
-    /// Calls `visit` for all cells whose balls hold point `i`, until it says no. The cell it lies in, walking from `hint`.
-    pub(super) fn each_holder(&mut self, i: u32, hint: u32, mut visit: impl FnMut(u32, &mut Self) -> bool) -> u32 {
+    /// Calls `visit` for all cells whose spheres hold point `i`, until it says no. The cell it lies in, walking from `hint`.
+    pub(super) fn for_each_holder(&mut self, i: u32, hint: u32, mut visit: impl FnMut(u32, &mut Self) -> bool) -> u32 {
         let Some(voronoi) = self.voronoi.as_ref() else { return NONE };
         let p = self.points[i as usize];
         let home = voronoi.delaunay.locate(&p, hint);
@@ -66,13 +66,13 @@ impl Axis<'_> {
         self.seen[home as usize] = self.search;
         let mut stack = vec![home];
         while let Some(c) = stack.pop() {
-            if self.holds(c, i) && !visit(c, self) {
+            if self.contains(c, i) && !visit(c, self) {
                 break;
             }
             let Some(voronoi) = self.voronoi.as_ref() else { break };
             for n in voronoi.delaunay.across(c) {
-                // on through slivers that have no ball
-                let on = voronoi.delaunay.is_finite(n) && voronoi.ball(n).is_none_or(|b| holds(&b.ball, &p));
+                // on through slivers that have no sphere
+                let on = voronoi.delaunay.is_finite(n) && voronoi.sphere(n).is_none_or(|b| contains(&b.sphere, &p));
                 if on && self.seen[n as usize] != self.search {
                     self.seen[n as usize] = self.search;
                     stack.push(n);
@@ -82,8 +82,8 @@ impl Axis<'_> {
         home
     }
 
-    /// Makes a ball the witness of a point.
-    pub(super) fn entrust(&mut self, i: u32, cell: u32) {
+    /// Makes a sphere the witness of a point.
+    pub(super) fn set_witness(&mut self, i: u32, cell: u32) {
         let c = cell as usize;
         if self.first[c] == NONE && !self.inner[c] {
             self.covering += 1;
@@ -94,13 +94,13 @@ impl Axis<'_> {
         self.first[c] = i;
     }
 
-    /// Queues a flagged ball, once.
+    /// Queues a flagged sphere, once.
     pub(super) fn enqueue(&mut self, cell: u32) {
-        let life = self.lives[cell as usize];
-        if self.queued[cell as usize] != life {
-            self.queued[cell as usize] = life;
+        let generation = self.generations[cell as usize];
+        if self.queued[cell as usize] != generation {
+            self.queued[cell as usize] = generation;
             let error = self.error(cell);
-            self.queue.push((error.to_bits(), Reverse(cell), life));
+            self.queue.push((error.to_bits(), Reverse(cell), generation));
         }
     }
 
@@ -108,34 +108,39 @@ impl Axis<'_> {
         self.inner[cell as usize] || self.first[cell as usize] != NONE
     }
 
-    /// Whether a flagged ball is of the region: it holds some point of it.
-    pub(super) fn matters(&self, cell: u32) -> bool {
-        !self.partial || self.first[cell as usize] != NONE || (0..self.points.len() as u32).any(|i| self.holds(cell, i))
+    /// Whether a flagged sphere is of the region: it holds some point of it.
+    pub(super) fn is_in_region(&self, cell: u32) -> bool {
+        !self.partial
+            || self.first[cell as usize] != NONE
+            || (0..self.points.len() as u32).any(|i| self.contains(cell, i))
     }
 
-    /// Upper bound of how far the ball reaches out of the solid, metres.
+    /// Upper bound of how far the sphere reaches out of the solid, meters.
     pub(super) fn error(&mut self, cell: u32) -> f64 {
         let Some(voronoi) = self.voronoi.as_mut() else { return 0.0 };
         let signed = voronoi.signed_distance(cell);
-        voronoi.ball(cell).map_or(0.0, |b| (b.ball.radius + signed).max(0.0))
+        voronoi.sphere(cell).map_or(0.0, |b| (b.sphere.radius + signed).max(0.0))
     }
 
-    pub(super) fn holds(&self, cell: u32, i: u32) -> bool {
-        self.voronoi.as_ref().and_then(|v| v.ball(cell)).is_some_and(|b| holds(&b.ball, &self.points[i as usize]))
+    pub(super) fn contains(&self, cell: u32, i: u32) -> bool {
+        self.voronoi
+            .as_ref()
+            .and_then(|v| v.sphere(cell))
+            .is_some_and(|b| contains(&b.sphere, &self.points[i as usize]))
     }
 
     pub(super) fn grow_tables(&mut self) {
         let count = self.voronoi.as_ref().map_or(0, |v| v.delaunay.cell_count());
         self.first.resize(count, NONE);
         self.inner.resize(count, false);
-        self.lives.resize(count, 0);
+        self.generations.resize(count, 0);
         self.queued.resize(count, NONE);
         self.seen.resize(count, 0);
     }
 }
 
-fn holds(ball: &Ball, p: &Vec3) -> bool {
-    (p - ball.center).norm_squared() <= ball.radius * ball.radius * (1.0 + SLACK)
+fn contains(sphere: &Sphere, p: &Vec3) -> bool {
+    (p - sphere.center).norm_squared() <= sphere.radius * sphere.radius * (1.0 + SLACK)
 }
 
 /// Appends a chain of points to `all`.

@@ -21,33 +21,33 @@ impl Delaunay {
     /// Inserts vertex `v`, whose point is there, walking from `hint`; whether it was: a duplicate is not.
     pub(super) fn insert_vertex(&mut self, v: u32, hint: u32) -> bool {
         let p = self.points[v as usize];
-        self.gone.clear();
-        self.made.clear();
+        self.removed.clear();
+        self.created.clear();
         let start = self.locate(&p, hint);
         let corners = self.cells[start as usize].vertices;
         if corners.iter().any(|&c| c != GHOST && self.points[c as usize] == p) {
             return false;
         }
-        self.dig(start, v);
-        self.fill(v);
-        self.glue();
-        for &c in &self.gone {
+        self.find_cavity(start, v);
+        self.fill_cavity(v);
+        self.link_created();
+        for &c in &self.removed {
             self.cells[c as usize].vertices = [GHOST; 4];
             self.free.push(c);
         }
         true
     }
 
-    /// Collects the cells that go (`gone`) and the facets around the hole (`rim`).
-    fn dig(&mut self, start: u32, v: u32) {
+    /// Collects the cells that go (`removed`) and the facets around the hole (`cavity_boundary`).
+    fn find_cavity(&mut self, start: u32, v: u32) {
         let p = self.points[v as usize];
         self.stamp += 2;
         let (goes, stays) = (self.stamp, self.stamp + 1);
         self.stamps[start as usize] = goes;
-        self.rim.clear();
-        self.gone.push(start);
+        self.cavity_boundary.clear();
+        self.removed.push(start);
         let mut next = 0;
-        while let Some(&c) = self.gone.get(next) {
+        while let Some(&c) = self.removed.get(next) {
             next += 1;
             for k in 0..4 {
                 let n = self.cells[c as usize].across[k];
@@ -55,11 +55,11 @@ impl Delaunay {
                     let conflict = self.in_conflict(n, &p);
                     self.stamps[n as usize] = if conflict { goes } else { stays };
                     if conflict {
-                        self.gone.push(n);
+                        self.removed.push(n);
                     }
                 }
                 if self.stamps[n as usize] == stays {
-                    self.rim.push((c, k));
+                    self.cavity_boundary.push((c, k));
                 }
             }
         }
@@ -75,9 +75,9 @@ impl Delaunay {
     }
 
     /// One new cell on each facet of the rim, with corner `k` put at the new vertex.
-    fn fill(&mut self, v: u32) {
-        for r in 0..self.rim.len() {
-            let (c, k) = self.rim[r];
+    fn fill_cavity(&mut self, v: u32) {
+        for r in 0..self.cavity_boundary.len() {
+            let (c, k) = self.cavity_boundary[r];
             let old = self.cells[c as usize];
             let mut cell = Cell { vertices: old.vertices, across: [NONE; 4] };
             cell.vertices[k] = v;
@@ -86,15 +86,15 @@ impl Delaunay {
             let outside = &mut self.cells[old.across[k] as usize].across;
             outside.iter_mut().filter(|n| **n == c).for_each(|n| *n = id);
             self.cells[c as usize].across[k] = NEW | id;
-            self.made.push(id);
+            self.created.push(id);
         }
     }
 
     /// Joins the new cells to one another: around each edge of the rim, through the cells that go, to the rim's other
     /// facet at that edge.
-    fn glue(&mut self) {
-        for r in 0..self.rim.len() {
-            let ((c, k), id) = (self.rim[r], self.made[r]);
+    fn link_created(&mut self) {
+        for r in 0..self.cavity_boundary.len() {
+            let ((c, k), id) = (self.cavity_boundary[r], self.created[r]);
             for j in (0..4).filter(|&j| j != k) {
                 if self.cells[id as usize].across[j] != NONE {
                     continue;

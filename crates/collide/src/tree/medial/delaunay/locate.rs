@@ -8,7 +8,7 @@ impl Delaunay {
     /// The finite cell that holds `p` (or one of them), or a ghost whose hull facet `p` is strictly beyond. Walks from
     /// `hint`, a cell of any kind, or dead.
     ///
-    /// The walk crosses any facet that has `p` strictly beyond it; in a Delaunay tetrahedralisation that comes to an
+    /// The walk crosses any facet that has `p` strictly beyond it; in a Delaunay tetrahedralization that comes to an
     /// end (Devillers, Pion and Teillaud, *Walking in a triangulation*, 2002). It is bounded all the same.
     pub fn locate(&self, p: &Vec3, hint: u32) -> u32 {
         let mut at = self.finite_near(hint);
@@ -32,17 +32,17 @@ impl Delaunay {
             Some(k) => self.side(c, k, p) > 0.0,
             None => (0..4).all(|k| self.side(c, k, p) >= 0.0),
         };
-        (0..self.cells.len() as u32).find(|&c| self.is_alive(c) && holds(c)).unwrap_or(self.finite_near(NONE))
+        (0..self.cells.len() as u32).find(|&c| self.is_in_use(c) && holds(c)).unwrap_or(self.finite_near(NONE))
     }
 
-    /// `hint`, the finite neighbour of a ghost, or any finite cell.
+    /// `hint`, the finite neighbor of a ghost, or any finite cell.
     fn finite_near(&self, hint: u32) -> u32 {
         let finite = |c: &u32| (*c as usize) < self.cells.len() && self.is_finite(*c);
         if finite(&hint) {
             return hint;
         }
         if (hint as usize) < self.cells.len()
-            && self.is_alive(hint)
+            && self.is_in_use(hint)
             && let Some(k) = self.ghost_corner(hint)
         {
             return self.cells[hint as usize].across[k];

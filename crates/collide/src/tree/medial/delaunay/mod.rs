@@ -1,4 +1,4 @@
-//! Delaunay tetrahedralisation: no sphere through the corners of a cell holds another point strictly inside.
+//! Delaunay tetrahedralization: no sphere through the corners of a cell holds another point strictly inside.
 //!
 //! Built point by point ([`insert`]), with exact predicates ([`predicates`]), in a spatial order ([`order`]). The
 //! outside of the convex hull is filled with *ghost* cells: one on each facet of the hull, with a corner at infinity,
@@ -34,7 +34,7 @@ struct Cell {
     across: [u32; 4],
 }
 
-/// A tetrahedralisation that points can be added to.
+/// A tetrahedralization that points can be added to.
 #[derive(Clone, Debug)]
 pub(in crate::tree) struct Delaunay {
     points: Vec<Vec3>,
@@ -42,11 +42,11 @@ pub(in crate::tree) struct Delaunay {
     /// Dead cells, to be used again.
     free: Vec<u32>,
     /// What the last insertion made.
-    made: Vec<u32>,
+    created: Vec<u32>,
     /// What the last insertion took away; the ids may be given anew by the next.
-    gone: Vec<u32>,
+    removed: Vec<u32>,
     /// Facets around the hole, as (cell that goes, facet).
-    rim: Vec<(u32, usize)>,
+    cavity_boundary: Vec<(u32, usize)>,
     /// Per cell, the last insertion that looked at it, and how it was judged.
     stamps: Vec<u32>,
     stamp: u32,
@@ -54,38 +54,38 @@ pub(in crate::tree) struct Delaunay {
 }
 
 impl Delaunay {
-    /// The tetrahedralisation of `points`, which keep their numbers as vertices; `None` if they all lie in one plane.
+    /// The tetrahedralization of `points`, which keep their numbers as vertices; `None` if they all lie in one plane.
     /// Of points that are the same bits the first is used.
     pub fn new(points: &[Vec3]) -> Option<Delaunay> {
         let order = order::order(points);
         let first = independent(points, &order)?;
-        let mut made = Delaunay {
+        let mut created = Delaunay {
             points: points.to_vec(),
             cells: Vec::with_capacity(8 * points.len()),
             free: Vec::new(),
-            made: Vec::new(),
-            gone: Vec::new(),
-            rim: Vec::new(),
+            created: Vec::new(),
+            removed: Vec::new(),
+            cavity_boundary: Vec::new(),
             stamps: Vec::new(),
             stamp: 0,
             duplicates: 0,
         };
-        made.begin(first);
+        created.initialize(first);
         let mut hint = 0;
         for v in order {
             if first.contains(&v) {
                 continue;
             }
-            if made.insert_vertex(v, hint) {
-                hint = made.made[0];
+            if created.insert_vertex(v, hint) {
+                hint = created.created[0];
             } else {
-                made.duplicates += 1;
+                created.duplicates += 1;
             }
         }
-        Some(made)
+        Some(created)
     }
 
-    /// Adds a point; its vertex, or `None` for a duplicate. [`Delaunay::made`] and [`Delaunay::gone`] say what
+    /// Adds a point; its vertex, or `None` for a duplicate. [`Delaunay::created`] and [`Delaunay::removed`] say what
     /// changed. `hint`: a cell to walk from.
     pub fn insert(&mut self, p: Vec3, hint: u32) -> Option<u32> {
         let v = self.points.len() as u32;
@@ -104,13 +104,13 @@ impl Delaunay {
     }
 
     /// Cells made by the last insertion, ghosts too.
-    pub fn made(&self) -> &[u32] {
-        &self.made
+    pub fn created(&self) -> &[u32] {
+        &self.created
     }
 
     /// Cells taken away by the last insertion, ghosts too.
-    pub fn gone(&self) -> &[u32] {
-        &self.gone
+    pub fn removed(&self) -> &[u32] {
+        &self.removed
     }
 
     /// Points that were skipped since they were there.
@@ -144,7 +144,7 @@ impl Delaunay {
         (0..self.cells.len() as u32).filter(|&c| self.is_finite(c))
     }
 
-    fn is_alive(&self, cell: u32) -> bool {
+    fn is_in_use(&self, cell: u32) -> bool {
         self.vertices(cell) != [GHOST; 4]
     }
 
@@ -153,7 +153,7 @@ impl Delaunay {
     }
 
     /// One tetrahedron and its four ghosts.
-    fn begin(&mut self, [a, b, c, d]: [u32; 4]) {
+    fn initialize(&mut self, [a, b, c, d]: [u32; 4]) {
         let at = |v: u32| &self.points[v as usize];
         let vertices = if orient(at(a), at(b), at(c), at(d)) > 0.0 { [a, b, c, d] } else { [b, a, c, d] };
         self.add(Cell { vertices, across: [1, 2, 3, 4] });

@@ -1,16 +1,16 @@
 //! The order in which points are inserted: rounds that double, each along a space-filling curve.
 //!
 //! Source: Amenta, Choi and Rote, *Incremental constructions con BRIO* (2003). Rounds keep the expected work of the
-//! randomised construction, the curve keeps each point close to the one before. The dice are a hash of the index, so
+//! randomized construction, the curve keeps each point close to the one before. The dice are a hash of the index, so
 //! that the order is a function of the points alone.
 
 use crate::Vec3;
-use crate::mesh::along_curve;
+use crate::mesh::morton_codes;
 
 /// All indices of `points`, in the order in which to insert them.
 pub(super) fn order(points: &[Vec3]) -> Vec<u32> {
     let mut keys: Vec<(u32, u64, u32)> =
-        along_curve(points).into_iter().zip(0..).map(|(place, n)| (round(u64::from(n)), place, n)).collect();
+        morton_codes(points).into_iter().zip(0..).map(|(place, n)| (round(u64::from(n)), place, n)).collect();
     keys.sort_unstable();
     keys.into_iter().map(|k| k.2).collect()
 }
@@ -20,7 +20,7 @@ fn round(n: u64) -> u32 {
     64 - hash(n).trailing_zeros()
 }
 
-/// The finaliser of splitmix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014).
+/// The finalizer of splitmix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014).
 fn hash(n: u64) -> u64 {
     let x = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,4 +1,4 @@
-//! The exact signs that the tetrahedralisation is made by.
+//! The exact signs that the tetrahedralization is made by.
 //!
 //! Source: Shewchuk, *Adaptive precision floating-point arithmetic and fast robust geometric predicates* (1997), by
 //! the crate `robust`, which filters first and is exact where the filter cannot tell.

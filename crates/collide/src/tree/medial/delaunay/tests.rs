@@ -1,4 +1,4 @@
-//! Against brute force: empty spheres, the hull's volume by divergence, the counts of a ball.
+//! Against brute force: empty spheres, the hull's volume by divergence, the counts of a sphere.
 
 use super::predicates::{in_sphere, orient};
 use super::{Delaunay, GHOST};
@@ -43,7 +43,7 @@ fn on_surface(mesh: &TriMesh, each: usize) -> Vec<Vec3> {
 
 /// Each cell right way round, each link mutual and over the same facet.
 fn check_links(d: &Delaunay) {
-    for c in (0..d.cell_count() as u32).filter(|&c| d.is_alive(c)) {
+    for c in (0..d.cell_count() as u32).filter(|&c| d.is_in_use(c)) {
         if d.is_finite(c) {
             let [p, q, r, s] = d.corners(c);
             assert!(orient(&p, &q, &r, &s) > 0.0, "cell {c} is flat or turned");
@@ -75,7 +75,7 @@ fn check_empty(d: &Delaunay, points: &[Vec3]) {
 fn check_hull(d: &Delaunay, points: &[Vec3]) {
     let filled: f64 = d.finite_cells().map(|c| d.corners(c)).map(|[p, q, r, s]| orient(&p, &q, &r, &s) / 6.0).sum();
     let mut enclosed = 0.0;
-    for c in (0..d.cell_count() as u32).filter(|&c| d.is_alive(c)) {
+    for c in (0..d.cell_count() as u32).filter(|&c| d.is_in_use(c)) {
         let Some(k) = d.ghost_corner(c) else { continue };
         for p in points {
             assert!(d.side(c, k, p) <= 0.0, "{p} is beyond a facet of the hull");
@@ -88,7 +88,7 @@ fn check_hull(d: &Delaunay, points: &[Vec3]) {
 /// With infinity the cells make a three-sphere: `V − E + F − C = 0`, and each cell has four facets, each facet two
 /// cells.
 fn check_euler(d: &Delaunay) {
-    let cells: Vec<u32> = (0..d.cell_count() as u32).filter(|&c| d.is_alive(c)).collect();
+    let cells: Vec<u32> = (0..d.cell_count() as u32).filter(|&c| d.is_in_use(c)).collect();
     let mut vertices: Vec<u32> = cells.iter().flat_map(|&c| d.vertices(c)).collect();
     let mut edges: Vec<[u32; 2]> = Vec::new();
     for &c in &cells {
@@ -182,15 +182,15 @@ fn points_added_later_keep_all_spheres_empty_and_tell_what_changed() {
             _ => Vec3::new(0.0, 0.025 * f64::from(n / 4), 0.1),
         };
         let before: Vec<Option<[u32; 4]>> =
-            (0..d.cell_count() as u32).map(|c| d.is_alive(c).then(|| d.vertices(c))).collect();
+            (0..d.cell_count() as u32).map(|c| d.is_in_use(c).then(|| d.vertices(c))).collect();
         if d.insert(p, 0).is_none() {
             assert!(points.contains(&p));
             continue;
         }
         points.push(p);
         for (c, old) in before.iter().enumerate() {
-            let same = *old == d.is_alive(c as u32).then(|| d.vertices(c as u32));
-            assert!(same || d.gone().contains(&(c as u32)) || d.made().contains(&(c as u32)));
+            let same = *old == d.is_in_use(c as u32).then(|| d.vertices(c as u32));
+            assert!(same || d.removed().contains(&(c as u32)) || d.created().contains(&(c as u32)));
         }
     }
     check_links(&d);
@@ -207,7 +207,7 @@ fn ten_thousand_points_twice_the_same() {
     check_euler(&d);
     let again = Delaunay::new(&points).unwrap();
     assert_eq!(d.cells, again.cells);
-    // spheres against a sample of the points; their corners' neighbours are held against all by the links' law
+    // spheres against a sample of the points; their corners' neighbors are held against all by the links' law
     for c in d.finite_cells().step_by(97) {
         let corners = d.corners(c);
         assert!(points.iter().all(|p| in_sphere(corners.each_ref(), p) <= 0.0));

@@ -1,0 +1,431 @@
+//! A straight element (an edge, an axis) against a field: the least distance along it, and where it leaves a face that it lies on.
+//!
+//! **Search along an edge.** Against a convex body `d_B` is convex along a line, so two tangents meet below the minimum
+//! (Kelley 1960, *The cutting-plane method*): where that is above the margin, the search ends; else their meeting point
+//! is the next place to look. On flat faces a few looks are exact. Other bodies: the edge is first halved into short pieces, and those
+//! that are too far to reach the margin are dropped (`d_B` changes by at most 1 m per meter). Within a piece that is kept the function
+//! is treated as convex until a look lies below the tangent of another one: there is a valley of B between them, and perhaps a second minimum,
+//! so that part is halved a few times.
+//! Where an edge or a corner of B is closest, the distance from it alone has its least place in closed form ([`Hyperbola`]): that is looked at next, and where
+//! the same edge or corner is closest there, it is the minimum.
+//! What comes out:
+//!
+//! - a kink, two slopes: an edge of B (or the ridge between two faces, inside) is crossed. The normal is the combination of the two that is
+//!   perpendicular to the edge;
+//! - a face that the edge lies on, or slopes gently over. Its two ends are contacts, the corners of the area of contact, unless they are the
+//!   edge's own ends, which are points and speak for themselves.
+
+use super::super::reduce::Collector;
+use super::hyperbola::Hyperbola;
+use super::query::{Normals, Query, SLOPE_ROUNDING};
+use crate::sdf::elements::Edge;
+use crate::sdf::{Feature, Hit, TOUCHING, facing};
+use crate::{NormalFrom, Vec3};
+
+/// Pieces that an edge is halved into against a body that is not convex, in radii of the smaller body.
+pub(super) const MAX_PIECE: f64 = 0.03;
+/// The same where both faces of the edge belong to a smooth surface: its ends say enough.
+const MAX_SMOOTH_PIECE: f64 = 0.06;
+/// Slopes that differ by this are the same.
+pub(super) const LEVEL_SLOPE: f64 = 1e-7;
+/// An edge that slopes less than this over a face lies on it.
+pub(super) const FLAT_SLOPE: f64 = 0.15;
+/// Looks for the end of a flat bottom at most.
+const MAX_END_SAMPLES: usize = 20;
+/// Looks for the minimum at most: a third of them halve what is left.
+const MAX_SAMPLES: usize = 90;
+/// Halvings of a part over a valley, at most.
+const MAX_SPLITS: u32 = 5;
+/// A foot so near a look is no news, as a part of what is left.
+const MIN_FOOT_OFFSET: f64 = 1e-6;
+/// How far below a tangent is no rounding, as a part of the smaller body's radius.
+const CONVEXITY_TOLERANCE: f64 = 1e-9;
+
+/// A straight element in the frame of the field.
+struct Line<'a> {
+    start: Vec3,
+    along: Vec3,
+    length: f64,
+    radius: f64,
+    normals: &'a [Vec3],
+    index: u32,
+    /// The edge of a mesh that it is.
+    edge: Option<&'a Edge>,
+}
+
+/// A look at a place on a line.
+#[derive(Clone, Copy)]
+struct Sample {
+    s: f64,
+    slope: f64,
+    hit: Hit,
+}
+
+impl Sample {
+    /// Whether the line lies here on a face, or along a straight round side.
+    fn is_flat(&self) -> bool {
+        match self.hit.feature {
+            Feature::Face => self.hit.facing && self.slope.abs() < FLAT_SLOPE,
+            _ => self.slope.abs() <= LEVEL_SLOPE,
+        }
+    }
+
+    /// The tangent at another place.
+    fn height(&self, s: f64) -> f64 {
+        self.hit.distance + self.slope * (s - self.s)
+    }
+
+    /// The distance from the edge or corner that is closest here.
+    fn hyperbola(&self, line: &Line) -> Option<Hyperbola> {
+        Hyperbola::new(&self.hit, self.s, self.slope, &line.along)
+    }
+}
+
+impl Query<'_> {
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn edge(
+        &self,
+        ends: &[Vec3; 2],
+        radius: f64,
+        normals: &[Vec3],
+        index: u32,
+        edge: Option<&Edge>,
+        found: &mut Collector,
+    ) {
+        let [start, end] = ends.map(|p| self.to_field(&p));
+        let (middle, length) = (0.5 * (start + end), (end - start).norm());
+        if length <= 0.0 || self.field.bound(&middle) - 0.5 * length - radius > found.limit() {
+            return;
+        }
+        let normals: Normals = normals.iter().map(|n| self.rotation * n).collect();
+        let line = Line { start, along: (end - start) / length, length, radius, normals: &normals, index, edge };
+        if self.field.is_convex() {
+            let start = self.sample(&line, 0.0);
+            if start.slope < FLAT_SLOPE {
+                self.search(&line, start, self.sample(&line, length), found);
+            }
+        } else {
+            self.halve(&line, (0.0, None), (length, None), found);
+        }
+    }
+
+    /// A piece that may be in reach, between two places that may have been looked at. Returns what was seen at them.
+    fn halve(
+        &self,
+        line: &Line,
+        low: (f64, Option<Sample>),
+        high: (f64, Option<Sample>),
+        found: &mut Collector,
+    ) -> [Option<Sample>; 2] {
+        let (from, to) = (low.0, high.0);
+        let smooth = line.edge.is_some_and(|edge| edge.end_tolerance > 0.0);
+        if !self.is_one_piece(to - from, smooth) && to - from > 1e-3 * line.length {
+            let middle = 0.5 * (from + to);
+            let reaches = |from: f64, to: f64, found: &Collector| {
+                self.field.bound(&line.at(0.5 * (from + to))) - 0.5 * (to - from) - line.radius <= found.limit()
+            };
+            let [mut first, mut between, mut last] = [low.1, None, high.1];
+            if reaches(from, middle, found) {
+                [first, between] = self.halve(line, low, (middle, None), found);
+            }
+            if reaches(middle, to, found) {
+                [_, last] = self.halve(line, (middle, between), high, found);
+            }
+            return [first, last];
+        }
+        // one that rises steeply into the piece, from either end, has its least place there
+        let start = low.1.unwrap_or_else(|| self.sample(line, low.0));
+        if start.slope >= FLAT_SLOPE && high.1.is_none() {
+            return [Some(start), None];
+        }
+        let end = high.1.unwrap_or_else(|| self.sample(line, high.0));
+        self.search(line, start, end, found);
+        [Some(start), Some(end)]
+    }
+
+    /// Whether the distance along so much of an edge is treated as convex.
+    pub(super) fn is_one_piece(&self, length: f64, smooth: bool) -> bool {
+        self.field.is_convex() || length <= if smooth { MAX_SMOOTH_PIECE } else { MAX_PIECE } * self.size
+    }
+
+    fn sample(&self, line: &Line, s: f64) -> Sample {
+        let end = if s == 0.0 {
+            Some(0)
+        } else if s == line.length {
+            Some(1)
+        } else {
+            None
+        };
+        let name = end.and_then(|end: usize| line.edge.map(|edge| edge.points[end]));
+        let at = line.at(s);
+        let hit = self.hit_at(&at, name, line.normals, TOUCHING);
+        let slope = hit.normal.dot(&line.along);
+        // the surface around an axis is its radius away across it alone
+        self.record(&hit, if slope.abs() <= SLOPE_ROUNDING { line.radius } else { 0.0 });
+        Sample { s, slope, hit }
+    }
+
+    /// The minimum between two looks, if it is not at one of them, and where the line leaves a face that it lies on.
+    fn search(&self, line: &Line, low: Sample, high: Sample, found: &mut Collector) {
+        let nonconvex = !self.field.is_convex() && self.is_nonconvex(&low, &high);
+        if !nonconvex && (high.slope - low.slope <= LEVEL_SLOPE || ends_suffice(line, &low, &high)) {
+            return;
+        }
+        match (low.is_flat(), high.is_flat()) {
+            (true, false) => self.end_of_face(line, &low, high, found),
+            (false, true) => self.end_of_face(line, &high, low, found),
+            _ => {}
+        }
+        self.minima(line, low, high, low.is_flat() != high.is_flat(), MAX_SPLITS, found);
+    }
+
+    /// The minima between two looks; a part beyond a ridge is halved so often at most. `on_face`: the face that the line lies on is known.
+    fn minima(&self, line: &Line, low: Sample, high: Sample, on_face: bool, halvings: u32, found: &mut Collector) {
+        match (low.slope < -LEVEL_SLOPE, high.slope > LEVEL_SLOPE) {
+            (true, true) => {
+                let Some([to, from]) = self.descend(line, low, high, on_face, found) else { return };
+                self.search_nonconvex(line, [low, to], false, halvings, found);
+                self.search_nonconvex(line, [from, high], true, halvings, found);
+            }
+            (false, false) => {}
+            (_, rises) => self.search_nonconvex(line, [low, high], rises, halvings, found),
+        }
+    }
+
+    /// A part that rises from a minimum, or falls to one, at both ends: further minima where a look lies below the tangent of another.
+    fn search_nonconvex(
+        &self,
+        line: &Line,
+        [low, high]: [Sample; 2],
+        rises: bool,
+        halvings: u32,
+        found: &mut Collector,
+    ) {
+        let length = high.s - low.s;
+        // the distance changes by at most 1 m per meter
+        let least = 0.5 * (low.hit.distance + high.hit.distance - length) - line.radius;
+        if halvings == 0 || self.field.is_convex() || least > found.limit() || !self.is_nonconvex(&low, &high) {
+            return;
+        }
+        // two faces that meet in a valley are as high as both tangents where those meet
+        let (s, _) = tangent_intersection(&low, &high);
+        let s = if halvings == MAX_SPLITS && s > low.s + 0.01 * length && s < high.s - 0.01 * length {
+            s
+        } else {
+            0.5 * (low.s + high.s)
+        };
+        let middle = self.sample(line, s);
+        match rises {
+            true if middle.slope < -LEVEL_SLOPE => self.minima(line, middle, high, false, halvings - 1, found),
+            false if middle.slope > LEVEL_SLOPE => self.minima(line, low, middle, false, halvings - 1, found),
+            _ => {
+                self.search_nonconvex(line, [low, middle], rises, halvings - 1, found);
+                self.search_nonconvex(line, [middle, high], rises, halvings - 1, found);
+            }
+        }
+    }
+
+    /// Whether one of two looks lies below the tangent of the other: not convex between them.
+    fn is_nonconvex(&self, low: &Sample, high: &Sample) -> bool {
+        let slack = CONVEXITY_TOLERANCE * self.size;
+        low.hit.distance < high.height(low.s) - slack || high.hit.distance < low.height(high.s) - slack
+    }
+
+    /// The minimum that tangents lead to between two slopes, a contact if it is in reach, and the looks next to it; `None` where it is out of reach.
+    fn descend(
+        &self,
+        line: &Line,
+        mut low: Sample,
+        mut high: Sample,
+        mut on_face: bool,
+        found: &mut Collector,
+    ) -> Option<[Sample; 2]> {
+        let tolerance = 1e-9 * self.size;
+        let limit = found.limit() + line.radius;
+        for n in 0..MAX_SAMPLES {
+            let (s, level) = tangent_intersection(&low, &high);
+            let least = low.hit.distance.min(high.hit.distance);
+            // tangents that meet above what was seen are no bound: not convex here
+            let convex = level <= least + tolerance;
+            if convex && level > limit {
+                return None;
+            }
+            if (convex && least - level < tolerance) || high.s - low.s < tolerance {
+                break;
+            }
+            let foot = if n % 3 < 2 { self.foot_between(line, &low, &high) } else { None };
+            let s = match n % 3 {
+                _ if let Some(foot) = foot => foot,
+                0 if convex => s.clamp(low.s, high.s),
+                1 => low.s - low.slope * (high.s - low.s) / (high.slope - low.slope),
+                _ => 0.5 * (low.s + high.s),
+            };
+            let sample = self.sample(line, s);
+            let level = sample.slope.abs() <= LEVEL_SLOPE;
+            if sample.is_flat() && !on_face {
+                on_face = true;
+                self.face(line, &sample, low, high, found);
+            } else if level {
+                self.bottom(line, sample.s, sample.hit, found);
+            }
+            if level {
+                return Some([sample; 2]);
+            }
+            if sample.slope < 0.0 {
+                low = sample;
+            } else {
+                high = sample;
+            }
+        }
+        self.kink(line, &low, &high, found);
+        Some([low, high])
+    }
+
+    /// The foot on the feature that is closest at the lower of two looks, or else at the other, where it lies between them.
+    fn foot_between(&self, line: &Line, low: &Sample, high: &Sample) -> Option<f64> {
+        if self.field.is_round() {
+            return None;
+        }
+        let margin = MIN_FOOT_OFFSET * (high.s - low.s);
+        let samples = if low.hit.distance < high.hit.distance { [low, high] } else { [high, low] };
+        samples
+            .iter()
+            .filter_map(|sample| Some(sample.hyperbola(line)?.foot))
+            .find(|s| *s > low.s + margin && *s < high.s - margin)
+    }
+
+    /// A minimum between two slopes.
+    fn kink(&self, line: &Line, low: &Sample, high: &Sample, found: &mut Collector) {
+        let (s, level) = tangent_intersection(low, high);
+        let (a, b) = (high.slope, -low.slope);
+        let sum = low.hit.normal * a + high.hit.normal * b;
+        let length = sum.norm();
+        if length.is_nan() || length <= 1e-9 * (a + b) {
+            return;
+        }
+        let nearest = if low.hit.distance < high.hit.distance { low } else { high };
+        // two faces at depth `level` meet in an edge further up
+        let distance = level * (a + b) / length;
+        self.bottom(line, s, Hit { distance, normal: sum / length, ..nearest.hit }, found);
+    }
+
+    fn bottom(&self, line: &Line, s: f64, hit: Hit, found: &mut Collector) {
+        let fits = facing(line.normals, &hit.normal) && line.is_closest(&hit.normal);
+        if self.second.is_some()
+            && matches!(hit.feature, Feature::Edge(_))
+            && self.is_duplicate(&line.at(s), line.radius, &hit, found)
+        {
+            return; // that edge has found it
+        }
+        self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);
+    }
+
+    /// A part that lies on a face: its two ends.
+    fn face(&self, line: &Line, sample: &Sample, low: Sample, high: Sample, found: &mut Collector) {
+        let from = self.exit_place(line, sample, low);
+        let to = self.exit_place(line, sample, high);
+        if to - from < 1e-3 * self.size {
+            self.push_on_face(line, sample, sample.s, 1, found);
+        } else {
+            self.push_on_face(line, sample, from, 1, found);
+            self.push_on_face(line, sample, to, 2, found);
+        }
+    }
+
+    /// The end of a part that lies on a face and begins at `sample`, on the side of `outer`.
+    fn end_of_face(&self, line: &Line, sample: &Sample, outer: Sample, found: &mut Collector) {
+        if sample.hit.distance.min(sample.height(outer.s)) - line.radius > found.limit() {
+            return;
+        }
+        let s = self.exit_place(line, sample, outer);
+        // at the very start it is the element's own end, or another piece's
+        if (s - sample.s).abs() > 1e-6 * self.size {
+            self.push_on_face(line, sample, s, if outer.s > sample.s { 2 } else { 1 }, found);
+        }
+    }
+
+    /// Where the line leaves the face that is under `sample`, towards `outer`: in closed form where the edge that bounds the face is closest at `outer`,
+    /// else where the tangents of the two meet.
+    fn exit_place(&self, line: &Line, sample: &Sample, mut outer: Sample) -> f64 {
+        let tolerance = 1e-9 * self.size;
+        for _ in 0..MAX_END_SAMPLES {
+            let turn = outer.slope - sample.slope;
+            let rise = outer.hit.distance - sample.height(outer.s);
+            if rise < tolerance || turn.abs() <= LEVEL_SLOPE {
+                return outer.s;
+            }
+            // the edge may end before that place: the look there tells
+            let s = self.exit_in_closed_form(line, sample, &outer, tolerance).unwrap_or(outer.s - rise / turn);
+            if (s - sample.s) * (outer.s - sample.s) <= 0.0 || (s - outer.s) * (sample.s - outer.s) <= 0.0 {
+                return sample.s;
+            }
+            outer = self.sample(line, s);
+        }
+        outer.s
+    }
+
+    /// The same where the feature that is closest at `outer` bounds that face: its distance touches the face's plane there.
+    fn exit_in_closed_form(&self, line: &Line, sample: &Sample, outer: &Sample, tolerance: f64) -> Option<f64> {
+        if self.field.is_round() {
+            return None;
+        }
+        let hyperbola = outer.hyperbola(line)?;
+        let s = hyperbola.at_slope(sample.slope)?;
+        let between = (s - sample.s) * (outer.s - sample.s) > 0.0 && (s - outer.s) * (sample.s - outer.s) > 0.0;
+        (between && (hyperbola.height(s) - sample.height(s)).abs() < tolerance).then_some(s)
+    }
+
+    fn push_on_face(&self, line: &Line, sample: &Sample, s: f64, part: u64, found: &mut Collector) {
+        let hit = Hit { distance: sample.height(s), ..sample.hit };
+        if line.radius > 0.0 && sample.slope.abs() > SLOPE_ROUNDING {
+            return; // the surface of a cylinder is its radius away across the axis alone
+        }
+        if hit.facing && (hit.feature == Feature::Face || line.is_closest(&hit.normal)) {
+            self.push(&line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(part), found);
+        }
+    }
+}
+
+impl Line<'_> {
+    fn at(&self, s: f64) -> Vec3 {
+        self.start + self.along * s
+    }
+
+    /// Whether going from the edge into either of its faces leads no closer.
+    fn is_closest(&self, normal: &Vec3) -> bool {
+        let [n1, n2] = self.normals else { return true };
+        let cos = n1.dot(n2);
+        // into the first face is −(n₂ − n₁ cos)
+        [n2 - n1 * cos, n1 - n2 * cos].iter().all(|out| normal.dot(out) <= SLOPE_ROUNDING)
+    }
+
+    fn feature(&self, part: u64) -> u64 {
+        1 << 58 | u64::from(self.index) << 2 | part
+    }
+}
+
+/// Where the tangents of two looks meet: place and height.
+fn tangent_intersection(low: &Sample, high: &Sample) -> (f64, f64) {
+    let fall = high.hit.distance - low.hit.distance + low.slope * low.s - high.slope * high.s;
+    let s = fall / (low.slope - high.slope);
+    (s, low.hit.distance + low.slope * (s - low.s))
+}
+
+/// Whether an edge of a smooth surface is no deeper than one of its ends, which counts, by more than the stated error.
+fn ends_suffice(line: &Line, low: &Sample, high: &Sample) -> bool {
+    let Some(edge) = line.edge else { return false };
+    let end = if low.hit.distance < high.hit.distance { low } else { high };
+    let whole = low.s == 0.0 && high.s == line.length;
+    let turns = low.slope < 0.0 && high.slope > 0.0;
+    let least = if turns { tangent_intersection(low, high).1 } else { end.hit.distance };
+    whole && end.hit.feature == Feature::Face && end.hit.facing && end.hit.distance - least < edge.end_tolerance
+}
+
+/// What the normal of a line's contact turns with.
+fn line_normal(line: &Line, hit: &Hit) -> NormalFrom {
+    match hit.feature {
+        Feature::Face => NormalFrom::FaceOfB,
+        Feature::Line(_) | Feature::Edge(_) => NormalFrom::Edges,
+        Feature::Point => NormalFrom::LineOfA(line.along),
+    }
+}

@@ -1,0 +1,92 @@
+//! The `surface` mode: elements of each body against the signed distance of the other.
+//!
+//! ```text
+//! point x        d_B(x) where it is
+//! edge x(s)      min over s of d_B(x(s))      slope g(s) = n(x(s))·u,  u the edge's direction, n the field's normal
+//! core           the same for the points and axes of rounded bodies, less their radius
+//! ```
+//!
+//! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
+//! search of a face we need in deep overlaps alone ([`mesh_convex_depth`], [`mesh_mesh_depth`]), since edges and vertices of both bodies are exact.
+
+mod hyperbola;
+mod line;
+mod mesh_convex_depth;
+mod mesh_mesh_depth;
+mod min_translation;
+mod query;
+mod rim;
+mod smooth;
+
+use super::reduce::Collector;
+use crate::sdf::DistanceField;
+use crate::sdf::elements::Elements;
+use crate::sdf::field::MeshField;
+use crate::{Contact, Pose, Vec3};
+use mesh_convex_depth::DEEP_OVERLAP;
+use min_translation::SampledDistance;
+use query::{NearestCache, Query};
+
+/// A body as the pass sees it that takes its elements.
+pub(in crate::narrow) enum BodyElements<'a> {
+    /// A mesh.
+    Mesh(&'a Elements),
+    /// A block's corners and edges.
+    Box(Vec3),
+    /// All within a radius of the segment `±half_length` on z; a sphere if that is 0.
+    Round { radius: f64, half_length: f64 },
+    /// Rims and axis.
+    Cylinder { radius: f64, half_length: f64 },
+    /// A half-space has no elements.
+    Empty,
+}
+
+/// A body in the `surface` mode.
+pub(in crate::narrow) struct Body<'a> {
+    pub elements: BodyElements<'a>,
+    pub field: &'a dyn DistanceField,
+    /// The field again, where it is a mesh's.
+    pub mesh: Option<&'a MeshField>,
+    pub radius: f64,
+}
+
+/// All contacts of `a` and `b`.
+pub(in crate::narrow) fn contacts(
+    a: &Body,
+    pose_a: &Pose,
+    b: &Body,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
+    let a_in_b = pose_b.inv_mul(pose_a);
+    let size = a.radius.min(b.radius);
+    let mut found = Collector::new(margin, size, out);
+    let sampled = elements(a, b, &a_in_b, size, &mut found);
+    min_translation::separate(a, b, &a_in_b, size, &sampled, &mut found);
+    found.finish(pose_b);
+}
+
+/// The contacts of the elements of both, in B's frame; of deep overlaps that of their faces too.
+fn elements(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector) -> SampledDistance {
+    let b_in_a = a_in_b.inverse();
+    let cache_first = NearestCache::new();
+    let cache_second = NearestCache::new();
+    let first = Query::new([a, b], a_in_b, size, None, &cache_first);
+    let second = Query::new([b, a], &b_in_a, size, Some(a_in_b), &cache_second);
+    first.run(&a.elements, found);
+    second.run(&b.elements, found);
+    if found.penetration() > DEEP_OVERLAP * size {
+        faces([&first, &second], [a, b], found);
+    }
+    SampledDistance { min: first.min_distance().min(second.min_distance()) }
+}
+
+/// The deepest place of the faces of each mesh in the other body.
+fn faces(queries: [&Query; 2], bodies: [&Body; 2], found: &mut Collector) {
+    for (query, body) in queries.into_iter().zip(bodies) {
+        if let Some(mesh) = body.mesh {
+            query.faces(mesh, found);
+        }
+    }
+}

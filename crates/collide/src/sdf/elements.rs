@@ -1,0 +1,450 @@
+//! What of a mesh is held against the other's field: points and edges, held by the spheres of its sphere tree.
+//!
+//! A point is held by one leaf that covers it, an edge by one of its ends. What a leaf holds is halved into groups of a few points. Around all
+//! that a sphere or a group holds there is a sphere of its own, and of each point it is known how long its edges are: one look at the field passes
+//! over all that is further than the margin.
+//!
+//! **Which edges.** An edge of length `L` that turns by `θ` (the angle between its faces' normals) is left out where
+//! `θ·L/4 ≤ ε`. Where two edges cross at distance `g`, the ends of the first have at least one at distance
+//! `g + L₁·θ₂/4` or less from the other body (its slopes to the two sides differ by at most `θ₂`), and the other way round.
+//! If both edges were left out, the least of these is at most `√(θ₁L₁·θ₂L₂)/4 ≤ ε`: a finely triangulated smooth surface
+//! needs only its vertices, and the gap is overestimated by `ε` at most (to first order in θ).
+//!
+//! That supposes flat faces on both sides. A cylinder of radius `R` falls away from the middle of an edge by `L²/8R`, however little the edge
+//! turns: the edges left out ([`Edge::fine`]) are searched against cylinders alone, where a search is cheap.
+//!
+//! A short edge that turns little is [`Edge::end_tolerance`]: it makes no contact of its own where one of its ends is on a face and at most `ε`
+//! further from the other body. The least gap is then known to the same `ε`.
+
+use crate::bytes::{Reader, Write};
+use crate::mesh::{EdgeGroups, face_normals};
+use crate::tree::around_points;
+use crate::{Aabb, SphereTree, TriMesh, Vec3};
+use nalgebra::ComplexField;
+
+/// `ε`: how much too large the gap of two crossing edges may be, as a part of the diagonal.
+pub(crate) const EDGE_ERROR: f64 = 2e-4;
+/// An edge is a smooth surface's if it turns by less, radians, and is shorter than this part of the diagonal.
+const SMOOTH_ANGLE: f64 = 0.5;
+const SMOOTH_LENGTH: f64 = 0.03;
+/// Normals of one vertex that are within this cosine of another one are left out.
+const SAME_NORMAL_COSINE: f64 = 0.98;
+/// Normals kept per vertex at most.
+const MAX_NORMALS: usize = 12;
+
+/// A point of the surface, with the normals around it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Point {
+    pub at: Vec3,
+    /// Names it.
+    pub index: u32,
+    /// Range of its outward normals in [`Elements::normals`].
+    pub first: u32,
+    pub count: u32,
+    /// Range of the directions of the searched edges that start here, in [`Elements::edge_directions`].
+    pub first_direction: u32,
+    pub edge_directions: u32,
+    /// Where the edges that it holds begin in [`Elements::edges`], how many are searched always, how many are fine.
+    pub first_edge: u32,
+    pub edges: [u32; 2],
+    /// Lengths of the longest of those searched always and of all, meters.
+    pub longest: [f64; 2],
+}
+
+/// A straight edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Edge {
+    pub ends: [Vec3; 2],
+    /// Meters.
+    pub length: f64,
+    /// Names of the points at its ends.
+    pub points: [u32; 2],
+    /// Its own contact may be left out if an end is no further by this, meters: `ε` on a smooth surface, else 0.
+    pub end_tolerance: f64,
+    /// Whether it turns so little that only cylinders are held against it.
+    pub fine: bool,
+    /// Outward normals of its faces.
+    pub normals: [Vec3; 2],
+    /// Names it.
+    pub index: u32,
+}
+
+/// All of a mesh, grouped by the tree's spheres.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Elements {
+    pub points: Vec<Point>,
+    pub edges: Vec<Edge>,
+    pub normals: Vec<Vec3>,
+    pub edge_directions: Vec<Vec3>,
+    /// Spheres and groups; the first holds all, the parts of each are side by side.
+    pub groups: Vec<Group>,
+}
+
+/// What a sphere of the tree, or a part of a leaf, holds. Thirty-two bytes: with poses that change most of the time goes by waiting for them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(32))]
+pub(crate) struct Group {
+    center: [f32; 3],
+    /// How far what it and its parts hold reaches from the center, without the fine edges and with them, meters; rounded up.
+    reach: [f32; 2],
+    /// Where its parts begin in [`Elements::groups`], or what it holds in [`Elements::points`].
+    first: u32,
+    count: u32,
+    /// Whether it has parts.
+    has_children: bool,
+}
+
+impl Group {
+    pub fn center(&self) -> Vec3 {
+        Vec3::from(self.center.map(f64::from))
+    }
+
+    pub fn center_single(&self) -> &[f32; 3] {
+        &self.center
+    }
+
+    /// From the center, with the fine edges or without, meters.
+    pub fn reach(&self, fine: bool) -> f64 {
+        f64::from(self.reach[usize::from(fine)])
+    }
+
+    pub fn write(&self, to: &mut Vec<u8>) {
+        self.center.iter().chain(&self.reach).for_each(|x| to.single(*x));
+        to.u32(self.first);
+        to.u32(self.count);
+        to.flag(self.has_children);
+    }
+
+    pub fn read(from: &mut Reader) -> Option<Group> {
+        let center = [from.single()?, from.single()?, from.single()?];
+        let reach = [from.single()?, from.single()?];
+        Some(Group { center, reach, first: from.u32()?, count: from.u32()?, has_children: from.flag()? })
+    }
+}
+
+/// A group on the way to [`Group`]: each before its parts, all that it holds up to `end`.
+struct GroupDraft {
+    group: Group,
+    end: usize,
+}
+
+/// Points of a group that is not halved.
+const MAX_GROUP_POINTS: usize = 4;
+/// Parts of a group: as many as are looked at side by side, unless a sphere of the tree has more children.
+pub(crate) const MAX_CHILDREN: usize = 8;
+/// Groups that are read are nested no deeper.
+const MAX_GROUP_DEPTH: u32 = 100;
+/// Rounds up to single precision.
+const ROUND_UP: f64 = 1.0 + 1e-6;
+
+impl Elements {
+    /// The points in the order of the mesh's vertices, and the edges; no groups yet. Also returns, per triangle, which of its edges (k to k+1) are among the
+    /// elements.
+    fn without_groups(mesh: &TriMesh, groups: &EdgeGroups) -> (Elements, Vec<[bool; 3]>) {
+        let face = face_normals(mesh);
+        let mut all = Elements::default();
+        let (mut edges, searched) = gather_edges(mesh, groups, &face);
+        all.gather_points(mesh, &face, &searched);
+        edges.sort_by_key(|e| (e.points[0], e.fine, e.index));
+        for point in &mut all.points {
+            let of = |fine: bool| {
+                (
+                    edges.partition_point(|e| (e.points[0], e.fine) < (point.index, fine)),
+                    edges.partition_point(|e| (e.points[0], e.fine) <= (point.index, fine)),
+                )
+            };
+            let ((a, b), (_, c)) = (of(false), of(true));
+            let longest = |end: usize| edges[a..end].iter().map(|e| e.length).fold(0.0, f64::max);
+            (point.first_edge, point.edges, point.longest) =
+                (a as u32, [(b - a) as u32, (c - b) as u32], [longest(b), longest(c)]);
+        }
+        all.edges = edges;
+        (all, searched)
+    }
+
+    /// Also returns, per triangle, which of its edges (k to k+1) are among the elements. `groups`: the edges of the mesh.
+    pub fn new(mesh: &TriMesh, groups: &EdgeGroups, tree: &SphereTree) -> (Elements, Vec<[bool; 3]>) {
+        let (mut all, searched) = Elements::without_groups(mesh, groups);
+        let mut points: Vec<(u32, Point)> =
+            std::mem::take(&mut all.points).into_iter().map(|p| (holding_node(tree, &p.at), p)).collect();
+        points.sort_by_key(|p| (p.0, p.1.index));
+        let held: Vec<[usize; 2]> = (0..tree.nodes().len() as u32)
+            .map(|node| [node, node + 1].map(|n| points.partition_point(|p| p.0 < n)))
+            .collect();
+        let mut points: Vec<Point> = points.into_iter().map(|p| p.1).collect();
+        let mut drafts = Vec::new();
+        all.gather(tree, 0, &held, &mut points, &mut drafts);
+        all.points = points;
+        if let Some(first) = drafts.first() {
+            all.groups.push(first.group);
+            all.store_children(&drafts, 0, 0);
+        }
+        (all, searched)
+    }
+
+    /// The same with groups that were made before of the same mesh and tree; `order` names the points in theirs. `None` where they do not fit the mesh.
+    pub fn from_groups(
+        mesh: &TriMesh,
+        edges: &EdgeGroups,
+        order: &[u32],
+        groups: Vec<Group>,
+    ) -> Option<(Elements, Vec<[bool; 3]>)> {
+        let (mut all, searched) = Elements::without_groups(mesh, edges);
+        let mut left: Vec<Option<Point>> = vec![None; mesh.vertices.len()];
+        let count = all.points.len();
+        all.points.drain(..).for_each(|p| left[p.index as usize] = Some(p));
+        all.points = order.iter().map(|&v| left.get_mut(v as usize)?.take()).collect::<Option<_>>()?;
+        all.groups = groups;
+        (all.points.len() == count && all.has_valid_groups()).then_some((all, searched))
+    }
+
+    /// Whether each group but the first is a part of one before it, each point is held by one group, and nothing is nested too deep.
+    fn has_valid_groups(&self) -> bool {
+        let mut depth = vec![None; self.groups.len()];
+        let mut held = vec![false; self.points.len()];
+        if let Some(first) = depth.first_mut() {
+            *first = Some(0);
+        }
+        for (n, group) in self.groups.iter().enumerate() {
+            let Some(own) = depth[n].filter(|own| *own < MAX_GROUP_DEPTH) else { return false };
+            let range = group.first as usize..group.first as usize + group.count as usize;
+            let taken = match group.has_children {
+                true => depth
+                    .get_mut(range)
+                    .is_some_and(|children| children.iter_mut().all(|child| child.replace(own + 1).is_none())),
+                false => held
+                    .get_mut(range)
+                    .is_some_and(|points| points.iter_mut().all(|point| !std::mem::replace(point, true))),
+            };
+            if !taken {
+                return false;
+            }
+        }
+        held.iter().all(|held| *held)
+    }
+
+    /// The points that a group holds itself; none where it has parts.
+    pub fn points_of(&self, group: &Group) -> &[Point] {
+        if group.has_children { &[] } else { &self.points[group.first as usize..][..group.count as usize] }
+    }
+
+    pub fn children_of(&self, group: &Group) -> &[Group] {
+        if group.has_children { &self.groups[group.first as usize..][..group.count as usize] } else { &[] }
+    }
+
+    /// The edges that a point holds, with the fine ones or without.
+    pub fn edges_of(&self, point: &Point, fine: bool) -> &[Edge] {
+        let count = point.edges[0] + if fine { point.edges[1] } else { 0 };
+        &self.edges[point.first_edge as usize..(point.first_edge + count) as usize]
+    }
+
+    pub fn normals_of(&self, point: &Point) -> &[Vec3] {
+        &self.normals[point.first as usize..(point.first + point.count) as usize]
+    }
+
+    pub fn edge_directions_of(&self, point: &Point) -> &[Vec3] {
+        &self.edge_directions[point.first_direction as usize..(point.first_direction + point.edge_directions) as usize]
+    }
+
+    /// The group of a sphere of the tree and of its children; nothing where they hold nothing. `held`: ranges in `points`, per sphere.
+    fn gather(
+        &mut self,
+        tree: &SphereTree,
+        node: usize,
+        held: &[[usize; 2]],
+        points: &mut [Point],
+        out: &mut Vec<GroupDraft>,
+    ) {
+        let mut below = Vec::new();
+        let mut stack = vec![node];
+        while let Some(n) = stack.pop() {
+            below.push(held[n]);
+            stack.extend(tree.nodes()[n].child_range());
+        }
+        let [first, last] = held[node];
+        if below.iter().all(|[a, b]| a == b) {
+            return;
+        }
+        if tree.nodes()[node].is_leaf() {
+            return self.halve(points, first, last, out);
+        }
+        let group = self.group(points, &below, out);
+        if first < last {
+            self.halve(points, first, last, out);
+        }
+        for child in tree.nodes()[node].child_range() {
+            self.gather(tree, child, held, points, out);
+        }
+        out[group].end = out.len();
+    }
+
+    /// The groups of a range of points, which are put into another order.
+    fn halve(&mut self, points: &mut [Point], first: usize, last: usize, out: &mut Vec<GroupDraft>) {
+        let group = self.group(points, &[[first, last]], out);
+        if last - first <= MAX_GROUP_POINTS {
+            let held = &mut out[group].group;
+            (held.first, held.count, held.has_children) = (first as u32, (last - first) as u32, false);
+        } else {
+            let range = &mut points[first..last];
+            let bounds = Aabb::around(range.iter().map(|p| p.at));
+            let axis = (bounds.max - bounds.min).imax();
+            let half = range.len() / 2;
+            range.select_nth_unstable_by(half, |a, b| a.at[axis].total_cmp(&b.at[axis]).then(a.index.cmp(&b.index)));
+            self.halve(points, first, first + half, out);
+            self.halve(points, first + half, last, out);
+        }
+        out[group].end = out.len();
+    }
+
+    /// A group around ranges of points; returns its number.
+    fn group(&mut self, points: &[Point], ranges: &[[usize; 2]], out: &mut Vec<GroupDraft>) -> usize {
+        let all = &*self;
+        let held = || ranges.iter().flat_map(|[a, b]| &points[*a..*b]);
+        let ends = |fine: bool| held().flat_map(move |p| all.edges_of(p, fine).iter().map(|e| e.ends[1]).chain([p.at]));
+        let middle = around_points(&ends(false).collect::<Vec<_>>()).center;
+        let center: [f32; 3] = std::array::from_fn(|k| middle[k] as f32);
+        let from = Vec3::from(center.map(f64::from));
+        let reach =
+            [false, true].map(|fine| (ends(fine).map(|p| (p - from).norm()).fold(0.0, f64::max) * ROUND_UP) as f32);
+        out.push(GroupDraft { group: Group { center, reach, first: 0, count: 0, has_children: true }, end: 0 });
+        out.len() - 1
+    }
+
+    /// Files the parts of a group side by side, then theirs; those of a few parts are taken for its own.
+    fn store_children(&mut self, drafts: &[GroupDraft], from: usize, to: usize) {
+        if !drafts[from].group.has_children {
+            return;
+        }
+        let children = children_of(drafts, from);
+        let first = self.groups.len();
+        (self.groups[to].first, self.groups[to].count) = (first as u32, children.len() as u32);
+        self.groups.extend(children.iter().map(|&n| drafts[n].group));
+        for (n, &child) in children.iter().enumerate() {
+            self.store_children(drafts, child, first + n);
+        }
+    }
+
+    /// The vertices.
+    fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], searched: &[[bool; 3]]) {
+        let mut edge_directions: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for k in (0..3).filter(|&k| searched[t][k]) {
+                let (from, to) = (triangle[k] as usize, triangle[(k + 1) % 3] as usize);
+                // the neighbor's triangle has the same edge the other way
+                edge_directions[from].push((mesh.vertices[to] - mesh.vertices[from]).normalize());
+            }
+        }
+        let mut around: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for &v in triangle {
+                let normals = &mut around[v as usize];
+                if normals.len() < MAX_NORMALS && normals.iter().all(|n| n.dot(&face[t]) < SAME_NORMAL_COSINE) {
+                    normals.push(face[t]);
+                }
+            }
+        }
+        for (v, normals) in around.iter().enumerate() {
+            if normals.is_empty() {
+                continue;
+            }
+            let at = mesh.vertices[v];
+            let point = Point {
+                at,
+                index: v as u32,
+                first: self.normals.len() as u32,
+                count: normals.len() as u32,
+                first_direction: self.edge_directions.len() as u32,
+                edge_directions: edge_directions[v].len() as u32,
+                first_edge: 0,
+                edges: [0; 2],
+                longest: [0.0; 2],
+            };
+            self.normals.extend(normals);
+            self.edge_directions.extend(&edge_directions[v]);
+            self.points.push(point);
+        }
+    }
+}
+
+/// The parts of a group, or in the place of one its own, the widest first, as long as there are few.
+fn children_of(drafts: &[GroupDraft], group: usize) -> Vec<usize> {
+    let direct = |group: usize| -> Vec<usize> {
+        std::iter::successors(Some(group + 1), |n| Some(drafts[*n].end).filter(|n| *n < drafts[group].end)).collect()
+    };
+    let mut children = direct(group);
+    loop {
+        let wider = |n: &usize| {
+            children
+                .iter()
+                .filter(|m| drafts[**m].group.has_children)
+                .all(|m| drafts[*m].group.reach[0] <= drafts[children[*n]].group.reach[0])
+        };
+        let Some(widest) = (0..children.len()).filter(|n| drafts[children[*n]].group.has_children).find(wider) else {
+            return children;
+        };
+        let own = direct(children[widest]);
+        if children.len() + own.len() - 1 > MAX_CHILDREN {
+            return children;
+        }
+        children.splice(widest..=widest, own);
+    }
+}
+
+/// The edges that turn outwards.
+fn gather_edges(mesh: &TriMesh, groups: &EdgeGroups, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
+    let mut searched = vec![[false; 3]; mesh.triangles.len()];
+    let mut edges = Vec::new();
+    let diagonal = mesh.diagonal();
+    let error = EDGE_ERROR * diagonal;
+    for (index, group) in groups.iter().enumerate() {
+        let ends = [group[0].low, group[0].high].map(|v| mesh.vertices[v as usize]);
+        let normals = [face[group[0].face], face[group[group.len() - 1].face]];
+        let apart = mesh.corners(group[group.len() - 1].face);
+        // more than two faces, or a convex edge: the other face is below the first one's plane
+        let reach = apart.iter().map(|c| normals[0].dot(&(c - ends[0]))).fold(0.0, f64::min);
+        let turn = ComplexField::acos(normals[0].dot(&normals[1]).clamp(-1.0, 1.0));
+        let length = (ends[1] - ends[0]).norm();
+        let convex = reach < -1e-9 * length;
+        if group.len() == 2 && !convex {
+            continue;
+        }
+        let fine = group.len() == 2 && 0.25 * turn * length <= error;
+        let smooth = group.len() == 2 && turn < SMOOTH_ANGLE && length < SMOOTH_LENGTH * diagonal;
+        let end_tolerance = if smooth { error } else { 0.0 };
+        for u in group.iter().filter(|_| !fine) {
+            let t = mesh.triangles[u.face];
+            let from = if u.forward { u.low } else { u.high };
+            if let Some(k) = (0..3).find(|&k| t[k] == from && t[(k + 1) % 3] == u.low + u.high - from) {
+                searched[u.face][k] = true;
+            }
+        }
+        edges.push(Edge {
+            ends,
+            length,
+            points: [group[0].low, group[0].high],
+            end_tolerance,
+            fine,
+            normals,
+            index: index as u32,
+        });
+    }
+    (edges, searched)
+}
+
+/// The smallest sphere found, going down, that holds `p`; the root where rounding leaves none.
+fn holding_node(tree: &SphereTree, p: &Vec3) -> u32 {
+    let nodes = tree.nodes();
+    let holds = |n: usize| (p - nodes[n].center).norm() <= nodes[n].radius * (1.0 + 1e-9);
+    let (mut best, mut stack) = (0, vec![0]);
+    while let Some(n) = stack.pop() {
+        if n > 0 && !holds(n) {
+            continue;
+        }
+        let better = n > 0 && (nodes[n].level, -nodes[n].radius) > (nodes[best].level, -nodes[best].radius);
+        if better {
+            best = n;
+        }
+        stack.extend(nodes[n].child_range());
+    }
+    best as u32
+}
