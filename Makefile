@@ -10,7 +10,7 @@ help:
 	@echo "make cave-trial a cave of five processes: frames, kills, freezes, a recording shown again and cut; minutes (scripts/cave_trial.py --long: all of it)"
 	@echo "make goldens    draws the kept pictures of crates/render/tests/goldens anew; look at them before committing"
 	@echo "make references installs Pinocchio, MuJoCo and real robots into target/python; tests that compare with them then run"
-	@echo "make lint       clippy; warnings are errors"
+	@echo "make lint       format, clippy, rustdoc, ruff and mypy; warnings are errors"
 	@echo "make bench      step times beside Rapier (benches/peers, a workspace of its own)"
 	@echo "make clean      remove everything built"
 

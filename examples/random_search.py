@@ -11,7 +11,7 @@ world = tumble.World.parse(f'world = {{ dt_s = 0.05 }}\n[[articulated]]\nname = 
 cart = world.articulation("cart")
 
 rng, mean, spread = np.random.default_rng(1), np.zeros(10), 25 * np.eye(10)
-for turn in range(40):  # the cross-entropy method: draw, keep the best tenth, draw as they are spread
+for _ in range(40):  # the cross-entropy method: draw, keep the best tenth, draw as they are spread
     pushes = rng.multivariate_normal(mean, spread, 500)
     ends = world.rollout(np.repeat(pushes, 2, axis=1)[..., None], every=20)[:, -1]  # controls (forks, steps, joints); states (forks, 2)
     cost = (pushes**2).mean(axis=1) + 1e4 * ((ends - (1, 0)) ** 2).sum(axis=1)

@@ -34,7 +34,7 @@ world.add_force("wind", Wind(speed=5.0, drag=0.05))
 while world["stone"].position[2] > 0.06:
     world.step()
 print(f"after {world.time:.2f} s the stone is down")
-for name, mass in masses.items():
+for name in masses:
     x, _, z = world[name].position
     print(f"{name:<12} has drifted {x:6.3f} m and is {z:6.3f} m up, falling at {-world[name].velocity[2]:.3f} m/s")
 

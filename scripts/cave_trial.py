@@ -345,7 +345,7 @@ def records(data):
 def frames_by_chunk(data):
     """Where each chunk ends, and how many frames it holds: by the index behind it, which is not packed."""
     chunks, states = [], None
-    for begin, stop, opcode in records(data):
+    for begin, _, opcode in records(data):
         if opcode == 0x04:  # a channel, of those that the summary repeats
             number, _, length = struct.unpack_from("<HHI", data, begin + 9)
             if data[begin + 17:begin + 17 + length] == b"/tumble/state":

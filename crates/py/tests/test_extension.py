@@ -107,7 +107,7 @@ def test_what_is_only_shown_cannot_be_written_and_the_view_ends_with_the_call():
     world.add_force("keep", Keep())
     world.step()
     with pytest.raises(tumble.RemovedError, match="has returned"):
-        kept["view"].position
+        _ = kept["view"].position
     before = world.state.copy()
     kept["force"][:] = 1e9  # a dead copy
     world.step()
@@ -187,7 +187,7 @@ def test_a_callback_that_uses_its_world_gets_an_error_and_no_deadlock():
 
 def test_another_thread_gets_an_error_while_a_callback_runs():
     world, _ = one_ball()
-    inside, leave, said = threading.Event(), threading.Event(), []
+    inside, leave = threading.Event(), threading.Event()
 
     class Waits(tumble.Force):
         def apply(self, view):

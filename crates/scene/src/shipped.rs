@@ -20,7 +20,7 @@ pub struct Shipped {
 
 macro_rules! shipped_file {
     ($name:literal, $file:literal) => {
-        include_str!(concat!("../../../scenes/", $name, "/", $file))
+        include_str!(concat!("../scenes/", $name, "/", $file))
     };
 }
 

@@ -175,12 +175,11 @@ def data_folder():
 
 def dump(model):
     """The tree of a robot as lines `link`: joint axes and placements and all inertias, fixed links folded in by Pinocchio."""
-    data = model.createData()
     for j in range(1, model.njoints):
         joint = model.joints[j]
         made = joint.createData()
         joint.calc(made, pin.neutral(model))
-        s, name = np.array(made.S.matrix() if hasattr(made.S, "matrix") else made.S).reshape(6, -1), joint.shortname()
+        s = np.array(made.S.matrix() if hasattr(made.S, "matrix") else made.S).reshape(6, -1)
         kind = {3: "spherical", 6: "floating"}.get(joint.nv) or ("revolute" if np.linalg.norm(s[3:]) > 0.5 else "prismatic")
         axis = s[3:, 0] if kind == "revolute" else s[:3, 0] if kind == "prismatic" else np.zeros(3)
         placement, inertia = model.jointPlacements[j], model.inertias[j]

@@ -17,7 +17,7 @@ pub struct ShippedCave {
 
 macro_rules! shipped_caves {
     ($($name:literal),* $(,)?) => {
-        &[$(ShippedCave { name: $name, text: include_str!(concat!("../../../../caves/", $name, ".toml")) }),*]
+        &[$(ShippedCave { name: $name, text: include_str!(concat!("../../caves/", $name, ".toml")) }),*]
     };
 }
 
