@@ -34,6 +34,7 @@ mod sdf;
 mod shape;
 mod solid;
 mod tree;
+mod union_find;
 
 #[doc(hidden)]
 pub use archive::shared;
@@ -54,3 +55,4 @@ pub use tree::{
     Builder, CachedTree, Covering, LevelQuality, LevelSphere, MeshId, Progress, QualitySettings, SphereNode,
     SphereTree, StageCount, TreeFile, TreeFileError, TreeSettings, align_columns, grow_to_cover,
 };
+pub use union_find::UnionFind;

@@ -4,9 +4,10 @@
 //! each is a non-manifold edge with a well-defined volume, which is accepted and told.
 
 use super::TriMesh;
+use super::edges::{EdgeGroups, HalfEdge, edge_groups, unbalanced};
 use super::shells::shells;
 use super::union::Boundary;
-use crate::{MeshError, Vec3};
+use crate::{MeshError, UnionFind, Vec3};
 
 /// What [`TriMesh::check_closed`] found and did.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -252,43 +253,6 @@ impl TriMesh {
     }
 }
 
-/// One face's use of an edge.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct HalfEdge {
-    pub low: u32,
-    pub high: u32,
-    pub face: usize,
-    /// Whether the face goes from `low` to `high`.
-    pub forward: bool,
-}
-
-/// The uses of all edges, in ascending order of the undirected edges.
-pub(crate) struct EdgeGroups(Vec<HalfEdge>);
-
-impl EdgeGroups {
-    /// The uses of each undirected edge.
-    pub fn iter(&self) -> impl Iterator<Item = &[HalfEdge]> {
-        self.0.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
-    }
-}
-
-/// The uses of each undirected edge, edges in ascending order.
-pub(crate) fn edge_groups(mesh: &TriMesh) -> EdgeGroups {
-    let mut half_edges: Vec<HalfEdge> = Vec::with_capacity(3 * mesh.triangles.len());
-    for (face, t) in mesh.triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (u, v) = (t[k], t[(k + 1) % 3]);
-            half_edges.push(HalfEdge { low: u.min(v), high: u.max(v), face, forward: u < v });
-        }
-    }
-    half_edges.sort_unstable();
-    EdgeGroups(half_edges)
-}
-
-pub(super) fn unbalanced(groups: &EdgeGroups) -> impl Iterator<Item = &[HalfEdge]> {
-    groups.iter().filter(|g| 2 * g.iter().filter(|u| u.forward).count() != g.len())
-}
-
 /// `face_of` gives the numbers that faces have for the user.
 fn check_balanced(groups: &EdgeGroups, face_of: &[usize]) -> Result<(), MeshError> {
     let bad: Vec<&[HalfEdge]> = unbalanced(groups).collect();
@@ -330,14 +294,13 @@ fn connected_groups(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec
     if count > 2000 {
         return vec![0; count];
     }
-    let mut group: Vec<usize> = (0..count).collect();
+    let mut sets = UnionFind::new(count);
     for a in 0..count {
         for b in 0..a {
-            let (ga, gb) = (group[a], group[b]);
-            if ga != gb && related(a, b) {
-                group.iter_mut().filter(|g| **g == ga.max(gb)).for_each(|g| *g = ga.min(gb));
+            if related(a, b) {
+                sets.union(a as u32, b as u32);
             }
         }
     }
-    group
+    (0..count).map(|n| sets.find(n as u32) as usize).collect()
 }

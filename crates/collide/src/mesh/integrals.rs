@@ -8,7 +8,6 @@
 //! of a 3D solid body* (2004).
 
 use super::TriMesh;
-use super::union::Boundary;
 use crate::{MassProperties, Mat3, Vec3};
 
 impl TriMesh {
@@ -22,12 +21,6 @@ impl TriMesh {
     /// wound outwards. What the surface goes around twice counts twice; see [`TriMesh::union_mass_properties`].
     pub fn mass_properties(&self, density: f64) -> MassProperties {
         self.moments().mass_properties(&self.middle(), density)
-    }
-
-    /// The same where the surface crosses itself or shells overlap: of all that it goes around at least once, each
-    /// place counted once. Exact up to rounding, but for faces that cross more than 64 others, which count whole.
-    pub fn union_mass_properties(&self, density: f64) -> MassProperties {
-        Boundary::of(self).0.moments(&self.middle()).mass_properties(&self.middle(), density)
     }
 
     pub(super) fn middle(&self) -> Vec3 {
@@ -63,7 +56,7 @@ impl Moments {
         Moments { volume, first, second }
     }
 
-    fn mass_properties(&self, origin: &Vec3, density: f64) -> MassProperties {
+    pub fn mass_properties(&self, origin: &Vec3, density: f64) -> MassProperties {
         let center = self.first / self.volume;
         let about_center = self.second - center * center.transpose() * self.volume;
         MassProperties {

@@ -7,7 +7,8 @@
 //! to loops without choice.
 
 use super::TriMesh;
-use super::check::{HalfEdge, edge_groups};
+use super::edges::{HalfEdge, edge_groups};
+use crate::UnionFind;
 
 /// No partner.
 pub(super) const BOUNDARY: u32 = u32::MAX;
@@ -128,28 +129,7 @@ fn pair_group(group: &[HalfEdge], sheet: &[u32], area: &[f64], join: &mut impl F
 
 /// Numbers the connected sets of `0..count` by their first members.
 fn components(count: usize, edges: impl Iterator<Item = (usize, usize)>) -> (Vec<u32>, usize) {
-    let mut parent: Vec<usize> = (0..count).collect();
-    fn root(parent: &mut [usize], mut f: usize) -> usize {
-        while parent[f] != f {
-            parent[f] = parent[parent[f]];
-            f = parent[f];
-        }
-        f
-    }
-    for (a, b) in edges {
-        let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-        parent[a.max(b)] = a.min(b);
-    }
-    let mut number = vec![0; count];
-    let mut found = 0;
-    for f in 0..count {
-        let r = root(&mut parent, f);
-        number[f] = if r == f {
-            found += 1;
-            found - 1
-        } else {
-            number[r]
-        };
-    }
-    (number, found as usize)
+    let mut sets = UnionFind::new(count);
+    edges.for_each(|(a, b)| sets.union(a as u32, b as u32));
+    sets.numbered()
 }

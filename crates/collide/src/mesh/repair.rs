@@ -5,7 +5,8 @@
 //! What comes out has passed [`TriMesh::check_closed`].
 
 use super::TriMesh;
-use super::check::{ClosedReport, edge_groups, unbalanced};
+use super::check::ClosedReport;
+use super::edges::{edge_groups, unbalanced};
 use super::holes;
 use super::pairing::Pairing;
 use crate::{MeshError, Vec3};

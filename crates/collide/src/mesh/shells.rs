@@ -4,9 +4,9 @@
 //! inside out. It is turned, and with it the shells that lie wholly within it, which were wound to suit it.
 
 use super::TriMesh;
-use super::check::EdgeGroups;
+use super::edges::EdgeGroups;
 use super::winding::{WindingNumber, solid_angle};
-use crate::Vec3;
+use crate::{UnionFind, Vec3};
 use std::f64::consts::PI;
 
 /// Faces of a shell at which it is asked where the shell lies.
@@ -15,33 +15,11 @@ const SAMPLES: usize = 32;
 /// The shell of each face, counted from 0 in the order of their first faces, and how many there are. Faces are
 /// connected over edges.
 pub(crate) fn shells(mesh: &TriMesh, groups: &EdgeGroups) -> (Vec<u32>, usize) {
-    let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
-    fn root(parent: &mut [usize], mut f: usize) -> usize {
-        while parent[f] != f {
-            parent[f] = parent[parent[f]];
-            f = parent[f];
-        }
-        f
+    let mut sets = UnionFind::new(mesh.triangles.len());
+    for pair in groups.iter().flat_map(|group| group.windows(2)) {
+        sets.union(pair[0].face as u32, pair[1].face as u32);
     }
-    for group in groups.iter() {
-        for pair in group.windows(2) {
-            let (a, b) = (root(&mut parent, pair[0].face), root(&mut parent, pair[1].face));
-            parent[a.max(b)] = a.min(b);
-        }
-    }
-    let mut count = 0;
-    let mut shell = vec![0; parent.len()];
-    for f in 0..parent.len() {
-        // a root comes before the others of its set
-        let r = root(&mut parent, f);
-        shell[f] = if r == f {
-            count += 1;
-            count - 1
-        } else {
-            shell[r]
-        };
-    }
-    (shell, count as usize)
+    sets.numbered()
 }
 
 impl TriMesh {

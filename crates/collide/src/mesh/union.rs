@@ -15,12 +15,12 @@
 //! Integrals over the boundary's pieces are exact for the union, whatever the number of times it is gone around.
 
 use super::TriMesh;
-use super::check::{EdgeGroups, edge_groups};
-use super::closest_on_triangle;
 use super::crossing::Crossings;
+use super::edges::{EdgeGroups, edge_groups};
 use super::integrals::Moments;
+use super::triangle::closest_on_triangle;
 use super::winding::WindingNumber;
-use crate::Vec3;
+use crate::{MassProperties, UnionFind, Vec3};
 
 /// Faces with more others across them than this are not cut.
 const MAX_PARTNERS: usize = 64;
@@ -68,6 +68,14 @@ pub(super) struct Boundary {
     pub differs: bool,
     /// Area of what was kept without being sure, m².
     pub doubtful_area: f64,
+}
+
+impl TriMesh {
+    /// The same where the surface crosses itself or shells overlap: of all that it goes around at least once, each
+    /// place counted once. Exact up to rounding, but for faces that cross more than 64 others, which count whole.
+    pub fn union_mass_properties(&self, density: f64) -> MassProperties {
+        Boundary::of(self).0.moments(&self.middle()).mass_properties(&self.middle(), density)
+    }
 }
 
 impl Boundary {
@@ -336,14 +344,7 @@ fn pinched_vertices(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<bool> {
         triangle.iter().for_each(|&v| pinched[v as usize] = true);
     }
     // corners of faces, joined over the edges that meet there: one set per fan
-    let mut parent: Vec<u32> = (0..3 * mesh.triangles.len() as u32).collect();
-    fn root(parent: &mut [u32], mut n: u32) -> u32 {
-        while parent[n as usize] != n {
-            parent[n as usize] = parent[parent[n as usize] as usize];
-            n = parent[n as usize];
-        }
-        n
-    }
+    let mut sets = UnionFind::new(3 * mesh.triangles.len());
     let corner =
         |face: usize, v: u32| (3 * face + mesh.triangles[face].iter().position(|&w| w == v).unwrap_or(0)) as u32;
     for group in groups.iter() {
@@ -352,14 +353,13 @@ fn pinched_vertices(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<bool> {
                 pinched[v as usize] = true;
                 continue;
             }
-            let [a, b] = [corner(group[0].face, v), corner(group[1].face, v)].map(|c| root(&mut parent, c));
-            parent[a.max(b) as usize] = a.min(b);
+            sets.union(corner(group[0].face, v), corner(group[1].face, v));
         }
     }
     let mut fan = vec![u32::MAX; mesh.vertices.len()];
-    for n in 0..parent.len() as u32 {
+    for n in 0..3 * mesh.triangles.len() as u32 {
         let v = mesh.triangles[n as usize / 3][n as usize % 3] as usize;
-        if root(&mut parent, n) == n {
+        if sets.find(n) == n {
             pinched[v] |= fan[v] != u32::MAX;
             fan[v] = n;
         }

@@ -12,17 +12,10 @@
 //! A face is preferred over a pair of edges by a small bias, because it gives a manifold; where the boxes are apart
 //! and no face manifold reaches the least separation, the exact closest points are used (`box_closest.rs`).
 
+use super::box_pair::BoxPair;
 use super::clip::Polygon;
 use super::{box_closest, reduce};
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
-
-/// The two boxes in A's frame.
-pub(super) struct BoxPair {
-    pub a: Vec3,
-    pub b: Vec3,
-    pub r: Mat3,
-    pub t: Vec3,
-}
 
 /// A face axis: which box, which axis, its separation.
 struct FaceAxis {

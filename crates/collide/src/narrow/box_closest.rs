@@ -3,7 +3,7 @@
 //! The closest pair then has an edge or corner of B in it (a corner of A over a face of B belongs to the face case),
 //! so the least of the twelve exact distances from B's edges to A is the answer.
 
-use super::box_box::BoxPair;
+use super::box_pair::BoxPair;
 use super::segment::segment_box;
 use super::sphere::{clamp, region};
 use crate::{Contact, NormalFrom, Vec3};

@@ -2,6 +2,7 @@
 
 mod box_box;
 mod box_closest;
+mod box_pair;
 mod capsule;
 mod clip;
 mod cylinder;

@@ -5,10 +5,11 @@
 //! encloses exactly.
 
 use super::enclose::smallest_around;
-use super::medial::SEARCH_TRIANGLES;
 use super::nelder_mead::nelder_mead;
 use crate::{MeshDistance, Vec3};
 
+/// Triangles that a search for a center looks at for each distance; what the search comes to is measured exactly.
+pub(super) const SEARCH_TRIANGLES: usize = 400;
 const STEPS: usize = 100;
 /// Evaluations of each of the two searches for the center of a sphere that lies deep.
 const EVALUATIONS: usize = 40;

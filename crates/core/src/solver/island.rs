@@ -1,13 +1,14 @@
 //! Islands: sets of blocks that share no moving object, found by union-find. Statics do not merge.
 
 use crate::rows::Rows;
+use tumble_collide::UnionFind;
 
 /// The blocks of a solve, grouped. Islands are ordered by their first block, blocks within one as they were added.
 #[derive(Clone, Debug, Default)]
 pub struct Islands {
     blocks: Vec<u32>,
     starts: Vec<u32>,
-    parent: Vec<u32>,
+    sets: UnionFind,
     island_of_root: Vec<u32>,
     count: Vec<u32>,
 }
@@ -17,12 +18,10 @@ const NONE: u32 = u32::MAX;
 impl Islands {
     /// Groups the blocks of `rows` for which `keep` holds; a block without sides is left out.
     pub fn build(&mut self, rows: &Rows, keep: impl Fn(usize) -> bool) {
-        self.parent.clear();
-        self.parent.extend(0..rows.dof as u32);
+        self.sets.reset(rows.dof);
         for (b, block) in rows.blocks.iter().enumerate() {
             if let ([first, second], true) = (block.sides(), keep(b)) {
-                let (a, b) = (self.root(first.u), self.root(second.u));
-                self.parent[a.max(b) as usize] = a.min(b);
+                self.sets.union(first.u, second.u);
             }
         }
         self.number(rows, &keep);
@@ -49,14 +48,6 @@ impl Islands {
         (0..self.len()).map(|i| self.get(i))
     }
 
-    fn root(&mut self, mut i: u32) -> u32 {
-        while self.parent[i as usize] != i {
-            self.parent[i as usize] = self.parent[self.parent[i as usize] as usize];
-            i = self.parent[i as usize];
-        }
-        i
-    }
-
     /// Numbers the islands by first block and counts their blocks.
     fn number(&mut self, rows: &Rows, keep: &impl Fn(usize) -> bool) {
         self.island_of_root.clear();
@@ -64,7 +55,7 @@ impl Islands {
         self.count.clear();
         for (b, block) in rows.blocks.iter().enumerate() {
             let Some(side) = block.sides().first().filter(|_| keep(b)) else { continue };
-            let root = self.root(side.u) as usize;
+            let root = self.sets.find(side.u) as usize;
             if self.island_of_root[root] == NONE {
                 self.island_of_root[root] = self.count.len() as u32;
                 self.count.push(0);
@@ -86,7 +77,7 @@ impl Islands {
         self.blocks.resize(*self.starts.last().unwrap_or(&0) as usize, 0);
         for (b, block) in rows.blocks.iter().enumerate() {
             let Some(side) = block.sides().first().filter(|_| keep(b)) else { continue };
-            let root = self.root(side.u) as usize;
+            let root = self.sets.find(side.u) as usize;
             let island = self.island_of_root[root] as usize;
             self.blocks[next[island] as usize] = b as u32;
             next[island] += 1;

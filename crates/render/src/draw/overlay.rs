@@ -5,7 +5,7 @@ use crate::{DebugStyle, DrawList};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
-use tumble_core::collide::{Pose, Shape, Vec3};
+use tumble_core::collide::{Pose, Shape, UnionFind, Vec3};
 use tumble_core::{ArticulatedBody, Closure, ClosureKind, ContactPoint, Joint, Mode, ObjectId, World};
 
 /// Which overlays to draw.
@@ -195,7 +195,7 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
     }
 }
 
-/// A colour for each moving object: the same where contacts or closures join them, directly or through others that move. Objects that nothing joins are grey.
+/// Returns a color for each dynamic object: the same for all objects of an island. Objects without contact and joint are gray.
 pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moves = |id: ObjectId| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic);
     let closures = world.ids().iter().filter_map(|&id| world.get::<Closure>(id)).filter_map(|c| {
@@ -203,32 +203,23 @@ pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
         Some((a.part?.0, b.part?.0))
     });
     let contacts = world.contacts().iter().filter(|c| c.depth >= -1e-3 || c.force.norm() > 0.0).map(|c| (c.a, c.b));
-    let pairs: Vec<(ObjectId, ObjectId)> =
-        contacts.chain(closures).filter(|(a, b)| moves(*a) && moves(*b) && a != b).collect();
-    let mut root: BTreeMap<ObjectId, ObjectId> =
-        world.ids().iter().filter(|id| moves(**id)).map(|&id| (id, id)).collect();
-    fn find(root: &BTreeMap<ObjectId, ObjectId>, mut id: ObjectId) -> ObjectId {
-        while root[&id] != id {
-            id = root[&id];
+    // in the order of the world, so that colors stay while islands do
+    let moving: Vec<ObjectId> = world.ids().iter().copied().filter(|&id| moves(id)).collect();
+    let index: BTreeMap<ObjectId, u32> = moving.iter().copied().zip(0..).collect();
+    let mut sets = UnionFind::new(moving.len());
+    for (a, b) in contacts.chain(closures) {
+        if let (Some(&a), Some(&b)) = (index.get(&a), index.get(&b)) {
+            sets.union(a, b);
         }
-        id
     }
-    for (a, b) in pairs {
-        let (a, b) = (find(&root, a), find(&root, b));
-        root.insert(a.max(b), a.min(b));
-    }
-    let mut members: BTreeMap<ObjectId, Vec<ObjectId>> = BTreeMap::new();
-    // in the order of the world, so that colours stay while islands do
-    let order: Vec<ObjectId> = world.ids().iter().copied().filter(|id| root.contains_key(id)).collect();
-    order.iter().for_each(|&id| members.entry(find(&root, id)).or_default().push(id));
-    let mut colors = SHELL_COLORS.iter().cycle();
-    let mut out = BTreeMap::new();
-    for first in order.iter().filter(|id| members.contains_key(id)) {
-        let group = &members[first];
-        let color = if group.len() == 1 { [0.55, 0.56, 0.58] } else { *colors.next().unwrap_or(&SHELL_COLORS[0]) };
-        out.extend(group.iter().map(|&id| (id, color)));
-    }
-    out
+    let (island, count) = sets.numbered();
+    let mut size = vec![0; count];
+    island.iter().for_each(|&n| size[n as usize] += 1);
+    let mut palette = SHELL_COLORS.iter().cycle();
+    let mut color =
+        |size: &i32| if *size == 1 { [0.55, 0.56, 0.58] } else { *palette.next().unwrap_or(&SHELL_COLORS[0]) };
+    let colors: Vec<[f32; 3]> = size.iter().map(&mut color).collect();
+    moving.into_iter().zip(island).map(|(id, n)| (id, colors[n as usize])).collect()
 }
 
 /// An object stands still below this speed of each of its parts, m/s and rad/s.

@@ -17,19 +17,14 @@
 
 use super::super::reduce::Collector;
 use super::hyperbola::Hyperbola;
-use super::query::{Normals, Query, SLOPE_ROUNDING};
+use super::query::{Normals, Query};
+use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, MAX_PIECE, SLOPE_ROUNDING};
 use crate::sdf::elements::Edge;
 use crate::sdf::{Feature, Hit, TOUCHING, facing};
 use crate::{NormalFrom, Vec3};
 
-/// Pieces that an edge is halved into against a body that is not convex, in radii of the smaller body.
-pub(super) const MAX_PIECE: f64 = 0.03;
 /// The same where both faces of the edge belong to a smooth surface: its ends say enough.
 const MAX_SMOOTH_PIECE: f64 = 0.06;
-/// Slopes that differ by this are the same.
-pub(super) const LEVEL_SLOPE: f64 = 1e-7;
-/// An edge that slopes less than this over a face lies on it.
-pub(super) const FLAT_SLOPE: f64 = 0.15;
 /// Looks for the end of a flat bottom at most.
 const MAX_END_SAMPLES: usize = 20;
 /// Looks for the minimum at most: a third of them halve what is left.

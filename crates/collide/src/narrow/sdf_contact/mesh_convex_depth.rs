@@ -14,8 +14,6 @@ use crate::Vec3;
 use crate::sdf::TOUCHING;
 use crate::sdf::field::MeshField;
 
-/// An overlap is deep if it is more than this, in radii of the smaller body.
-pub(super) const DEEP_OVERLAP: f64 = 0.03;
 /// What a deeper place must gain to count, in the same.
 const MIN_GAIN: f64 = 1e-4;
 /// Steps of a search: they leave 5e-7 of a side.

@@ -17,8 +17,8 @@
 //! in the other.
 
 use super::super::reduce::Collector;
-use super::mesh_convex_depth::DEEP_OVERLAP;
 use super::query::{NearestCache, Query};
+use super::tolerances::DEEP_OVERLAP;
 use super::{Body, BodyElements, elements, faces};
 use crate::sdf::TOUCHING;
 use crate::sdf::elements::Elements;

@@ -17,15 +17,16 @@ mod min_translation;
 mod query;
 mod rim;
 mod smooth;
+mod tolerances;
 
 use super::reduce::Collector;
 use crate::sdf::DistanceField;
 use crate::sdf::elements::Elements;
 use crate::sdf::field::MeshField;
 use crate::{Contact, Pose, Vec3};
-use mesh_convex_depth::DEEP_OVERLAP;
 use min_translation::SampledDistance;
 use query::{NearestCache, Query};
+use tolerances::DEEP_OVERLAP;
 
 /// A body as the pass sees it that takes its elements.
 pub(in crate::narrow) enum BodyElements<'a> {

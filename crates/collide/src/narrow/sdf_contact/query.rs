@@ -1,7 +1,7 @@
 //! The elements of one body against the field of the other: which are in reach, and what becomes of those that are.
 
 use super::super::reduce::Collector;
-use super::line::{FLAT_SLOPE, LEVEL_SLOPE};
+use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, SLOPE_ROUNDING};
 use super::{Body, BodyElements};
 use crate::sdf::elements::{Edge, Elements, Group, MAX_CHILDREN, Point};
 use crate::sdf::field::{FrameMap, MeshField};
@@ -20,9 +20,6 @@ struct PointBound {
     /// The normal, where every element meets the same.
     up: Option<Vec3>,
 }
-
-/// Slopes across an edge down to this are rounding's.
-pub(super) const SLOPE_ROUNDING: f64 = 1e-6;
 
 /// Contacts of two edges that differ by less are one, found from either side; as parts of the smaller body's radius.
 const SAME_DEPTH: f64 = 1e-6;

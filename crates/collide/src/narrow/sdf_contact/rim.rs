@@ -17,8 +17,8 @@
 //! A rim that hardly tilts over a face rests on four fixed points instead.
 
 use super::super::reduce::Collector;
-use super::line::{LEVEL_SLOPE, MAX_PIECE};
 use super::query::{Query, point_normal};
+use super::tolerances::{LEVEL_SLOPE, MAX_PIECE};
 use crate::Vec3;
 use crate::sdf::{Feature, Hit, OVERHANG, facing};
 

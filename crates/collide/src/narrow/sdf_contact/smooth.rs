@@ -9,8 +9,8 @@
 //! ```
 
 use super::super::reduce::Collector;
-use super::line::LEVEL_SLOPE;
 use super::query::{Normals, Query};
+use super::tolerances::LEVEL_SLOPE;
 use crate::sdf::elements::Edge;
 use crate::sdf::{Feature, TOUCHING};
 

@@ -6,8 +6,9 @@
 //! smaller one through `p` and `q`: `r ← |p − q|² / 2 n·(p − q)`. The centers lie on the medial axis, next to the
 //! Voronoi centers that sampling gives, and none is missed for want of samples.
 
-use super::site::{SEARCH_TRIANGLES, Site};
+use super::site::Site;
 use super::types::CoverPoints;
+use crate::tree::sphere::SEARCH_TRIANGLES;
 use crate::{MeshDistance, Vec3};
 
 /// Bounds the shrinking; five steps are usual.

@@ -53,7 +53,6 @@ mod types;
 mod uncovered;
 pub(in crate::tree) mod voronoi;
 
-pub(super) use site::SEARCH_TRIANGLES;
 pub(super) use types::{CoverPoints, MedialSphere, RefineGoal};
 
 use super::builder::{Built, Job, TreeBuilder};

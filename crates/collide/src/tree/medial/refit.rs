@@ -4,9 +4,10 @@
 //! each site by Nelder and Mead's simplex (*A simplex method for function minimization*, 1965) to lower
 //! `max |p − c| + s(c)` over its own points. Neither half can raise the worst need.
 
-use super::site::{SEARCH_TRIANGLES, Site};
+use super::site::Site;
 use crate::tree::builder::Job;
 use crate::tree::nelder_mead::nelder_mead;
+use crate::tree::sphere::SEARCH_TRIANGLES;
 use crate::{MeshDistance, Vec3};
 use rayon::prelude::*;
 

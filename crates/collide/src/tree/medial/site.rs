@@ -10,7 +10,7 @@
 //! points choose among centers by it: that choice lowers the worst need, as does moving each center to where the need
 //! of its own points is least. The two in turn are the whole of fitting.
 
-use crate::tree::sphere::Sphere;
+use crate::tree::sphere::{SEARCH_TRIANGLES, Sphere};
 use crate::{MeshDistance, Vec3};
 
 /// A center.
@@ -24,8 +24,6 @@ pub(super) struct Site {
     pub parent_bound: Option<Sphere>,
 }
 
-/// Triangles that a search for a center looks at for each distance; what the search comes to is measured exactly.
-pub(in crate::tree) const SEARCH_TRIANGLES: usize = 400;
 /// What a meter beyond the fence costs, in meters of need.
 const BOUND_PENALTY: f64 = 4.0;
 
