@@ -16,10 +16,10 @@ impl Tumble {
     pub fn new(scene: &Scene) -> Tumble {
         let mut world = World::new(Settings { dt: DT, ..Settings::default() }).expect("the default settings are valid");
         for (i, plane) in scene.planes.iter().enumerate() {
-            let fixture = RigidBody::fixture(format!("plane{i}"), Shape::half_space())
+            let fixed = RigidBody::fixed(format!("plane{i}"), Shape::half_space())
                 .surface(RESTITUTION, FRICTION)
                 .at(pose(plane));
-            world.add_static(fixture).expect("a fixture is valid");
+            world.add_static(fixed).expect("a fixture is valid");
         }
         let shape = match scene.body {
             Body::Sphere => Shape::sphere(RADIUS),
@@ -43,7 +43,7 @@ impl Engine for Tumble {
     }
 
     fn center(&self, i: usize) -> [f64; 3] {
-        self.world.site(self.ids[i], 0).expect("the body is there").position().into()
+        self.world.part_state(self.ids[i], 0).expect("the body is there").position().into()
     }
 
     fn residual(&self) -> Option<f64> {

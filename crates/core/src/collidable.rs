@@ -1,17 +1,17 @@
 //! What collides: shapes, materials, who meets whom, and the test impulse (thesis §IV.A.3).
 
 use crate::object::Integratable;
-use crate::site::Site;
+use crate::part_state::PartState;
 use tumble_collide::{ContactMode, Shape, Vec3};
 
 /// A kind of collidable object, 0 to 63 (thesis `CollisionObjectType`): pairs are filtered by it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-pub struct CollisionKind(u8);
+pub struct CollisionGroup(u8);
 
-impl CollisionKind {
+impl CollisionGroup {
     /// Kind number `n`; `None` above 63.
-    pub const fn new(n: u8) -> Option<CollisionKind> {
-        if n < 64 { Some(CollisionKind(n)) } else { None }
+    pub const fn new(n: u8) -> Option<CollisionGroup> {
+        if n < 64 { Some(CollisionGroup(n)) } else { None }
     }
 
     /// The kind as one bit of a mask.
@@ -113,9 +113,9 @@ pub trait Collidable {
     /// Surface of a part.
     fn material(&self, part: usize) -> Material;
     /// Kind of a part.
-    fn kind(&self, part: usize) -> CollisionKind;
+    fn collision_group(&self, part: usize) -> CollisionGroup;
     /// Whether a part meets parts of that kind. Two parts meet when both say so.
-    fn collides_with(&self, part: usize, other: CollisionKind) -> bool;
+    fn collides_with(&self, part: usize, other: CollisionGroup) -> bool;
     /// How a part's mesh or cylinder collides; a pair goes by spheres if either side says so.
     fn contact_mode(&self, part: usize) -> ContactMode {
         let _ = part;
@@ -127,18 +127,25 @@ pub trait Collidable {
         true
     }
     /// Whether two parts of this same object meet.
-    fn parts_meet(&self, part_a: usize, part_b: usize) -> bool {
+    fn parts_collide(&self, part_a: usize, part_b: usize) -> bool {
         let _ = (part_a, part_b);
         false
     }
     /// "What would unit impulses along these axes at this point do?" (thesis `ApplyTestImpulse`). Adds `sign · L⁻ᵀJᵀ` to `y`: one
     /// row of `dof` numbers per axis.
-    fn test_impulse(&self, part: usize, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]);
+    fn test_impulse(&self, part: usize, part_state: &PartState, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]);
 }
 
 /// The test impulse of a single rigid part whose coordinates are `[ω; v]` at the site's origin.
-pub fn rigid_test_impulse(body: &dyn Integratable, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
-    let r = point - site.position();
+pub fn rigid_test_impulse(
+    body: &dyn Integratable,
+    part_state: &PartState,
+    point: &Vec3,
+    axes: &[Vec3],
+    sign: f64,
+    y: &mut [f64],
+) {
+    let r = point - part_state.position();
     for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
         let moment = r.cross(axis);
         let jacobian = [moment.x, moment.y, moment.z, axis.x, axis.y, axis.z];

@@ -1,11 +1,11 @@
 //! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
 
 use crate::collidable::{ContactFrame, Material};
-use crate::pair::{Pair, Reach, Recalled, Travel};
+use crate::pair::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::pair_material::PairMaterials;
+use crate::part_state::PartState;
 use crate::settings::Settings;
-use crate::site::Site;
-use crate::step::meet_at;
+use crate::step::shift_to_impact;
 use crate::view::{Entry, Mode, ObjectId, Table};
 use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
 
@@ -19,7 +19,7 @@ pub(crate) struct Owner {
 
 /// Names a contact across steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Key {
+pub(crate) struct ContactKey {
     /// Serial and part of either side, A first.
     pub pair: [u32; 4],
     pub feature: u64,
@@ -27,7 +27,7 @@ pub(crate) struct Key {
 
 /// A contact between two sites, with the constants of the pair.
 #[derive(Clone, Debug)]
-pub(crate) struct Touch {
+pub(crate) struct ContactConstraint {
     pub a: u32,
     pub b: u32,
     pub contact: Contact,
@@ -36,13 +36,13 @@ pub(crate) struct Touch {
     pub frame: ContactFrame,
     pub friction: f64,
     pub restitution: f64,
-    pub key: Key,
+    pub key: ContactKey,
 }
 
 /// Last step's impulse (or force) per contact, world axes, on A.
 #[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct WarmStarts {
-    entries: Vec<(Key, [f64; 3])>,
+    entries: Vec<(ContactKey, [f64; 3])>,
 }
 
 impl Clone for WarmStarts {
@@ -58,21 +58,21 @@ impl Clone for WarmStarts {
 
 impl WarmStarts {
     /// Takes out what is filed under the keys that `which` picks.
-    pub fn take(&mut self, which: impl Fn(&Key) -> bool) -> Vec<(Key, [f64; 3])> {
+    pub fn take(&mut self, which: impl Fn(&ContactKey) -> bool) -> Vec<(ContactKey, [f64; 3])> {
         let (taken, kept) = std::mem::take(&mut self.entries).into_iter().partition(|e| which(&e.0));
         self.entries = kept;
         taken
     }
 
     /// Files what was taken.
-    pub fn add(&mut self, entries: Vec<(Key, [f64; 3])>) {
+    pub fn add(&mut self, entries: Vec<(ContactKey, [f64; 3])>) {
         self.entries.extend(entries);
         self.entries.sort_by_key(|e| e.0);
         self.entries.dedup_by_key(|e| e.0);
     }
 
     /// Files anew; `entries` may come in any order.
-    pub fn replace(&mut self, entries: impl Iterator<Item = (Key, Vec3)>) {
+    pub fn replace(&mut self, entries: impl Iterator<Item = (ContactKey, Vec3)>) {
         self.entries.clear();
         self.entries.extend(entries.map(|(k, v)| (k, [v.x, v.y, v.z])));
         if !self.in_order() {
@@ -81,16 +81,16 @@ impl WarmStarts {
     }
 
     /// What was filed under `key`. `place` is where the last search ended: keys that come in order are found in a step or two.
-    pub fn get(&self, key: &Key, place: &mut usize) -> Option<Vec3> {
+    pub fn get(&self, key: &ContactKey, place: &mut usize) -> Option<Vec3> {
         let before = self.entries[..*place].last().is_some_and(|e| e.0 >= *key);
         let from = if before { 0 } else { *place };
-        *place = from + gallop(&self.entries[from..], key);
+        *place = from + exponential_search(&self.entries[from..], key);
         let found = self.entries.get(*place).filter(|e| e.0 == *key)?;
         Some(Vec3::from(found.1))
     }
 
     /// Whether any contact of the key's pair carried a force.
-    pub fn carries(&self, key: &Key) -> bool {
+    pub fn carries(&self, key: &ContactKey) -> bool {
         let first = self.entries.partition_point(|e| e.0.pair < key.pair);
         self.entries[first..].iter().take_while(|e| e.0.pair == key.pair).any(|e| e.1 != [0.0; 3])
     }
@@ -110,7 +110,7 @@ impl WarmStarts {
 }
 
 /// How many entries come before `key`, searched for at doubling distances from the start.
-fn gallop(entries: &[(Key, [f64; 3])], key: &Key) -> usize {
+fn exponential_search(entries: &[(ContactKey, [f64; 3])], key: &ContactKey) -> usize {
     let (mut low, mut step) = (0, 1);
     while entries.get(low + step - 1).is_some_and(|e| e.0 < *key) {
         low += step;
@@ -122,29 +122,29 @@ fn gallop(entries: &[(Key, [f64; 3])], key: &Key) -> usize {
 
 /// The detector's working memory.
 #[derive(Default)]
-pub(crate) struct Scratch {
+pub(crate) struct DetectorBuffers {
     proxies: Vec<u32>,
-    travel: Vec<Travel>,
-    recalled: Recalled,
+    motion_bounds: Vec<MotionBounds>,
+    narrow_phase_cache: NarrowPhaseCache,
     /// Who has which box of the broad phase: those of the last detection, and of this one. Ascending, as the site table is.
-    filed: Vec<Filed>,
-    gathered: Vec<Filed>,
+    registered: Vec<BroadPhaseProxy>,
+    gathered: Vec<BroadPhaseProxy>,
     /// Place in `proxies` of every handle.
     place: Vec<u32>,
     pairs: Vec<[u32; 2]>,
     found: Vec<Contact>,
 }
 
-impl Scratch {
+impl DetectorBuffers {
     /// Drops what was found: a frame knows nothing of the one before.
     pub fn forget(&mut self) {
-        self.recalled.forget();
+        self.narrow_phase_cache.forget();
     }
 }
 
 /// A part that has a box in the broad phase, under a handle.
 #[derive(Clone, Copy)]
-struct Filed {
+struct BroadPhaseProxy {
     /// Serial and part.
     who: [u32; 2],
     handle: u32,
@@ -154,28 +154,28 @@ struct Filed {
 pub(crate) struct Detector<'a> {
     pub table: &'a Table,
     pub owners: &'a [Owner],
-    pub sites: &'a [Site],
+    pub part_states: &'a [PartState],
     pub settings: &'a Settings,
     pub pair_materials: &'a PairMaterials,
     pub broad: &'a mut dyn BroadPhase,
-    pub scratch: &'a mut Scratch,
+    pub scratch: &'a mut DetectorBuffers,
     /// Serials of sleepers that something comes near.
-    pub stirred: &'a mut Vec<u32>,
+    pub wake_requests: &'a mut Vec<u32>,
 }
 
 impl Detector<'_> {
     /// All contacts whose gap is at most what the pair may close within `horizon` seconds, plus the drift tolerance.
-    pub fn detect(&mut self, horizon: f64, reach: Reach, out: &mut Vec<Touch>) {
+    pub fn detect(&mut self, horizon: f64, prediction: PredictionMode, out: &mut Vec<ContactConstraint>) {
         out.clear();
         self.gather(horizon);
         let mut pairs = std::mem::take(&mut self.scratch.pairs);
         self.broad.pairs(&mut pairs);
-        self.order_by_site(&mut pairs);
-        self.scratch.recalled.begin();
+        self.order_by_part(&mut pairs);
+        self.scratch.narrow_phase_cache.begin();
         for &[i, j] in &pairs {
-            self.narrow([i as usize, j as usize], (horizon, reach), out);
+            self.narrow([i as usize, j as usize], (horizon, prediction), out);
         }
-        self.scratch.recalled.end();
+        self.scratch.narrow_phase_cache.end();
         self.scratch.pairs = pairs;
     }
 
@@ -183,24 +183,24 @@ impl Detector<'_> {
     fn gather(&mut self, horizon: f64) {
         let s = &mut *self.scratch;
         s.proxies.clear();
-        s.travel.clear();
+        s.motion_bounds.clear();
         s.gathered.clear();
-        let mut filed = s.filed.iter().peekable();
-        for entry in self.table.iter().filter(|e| e.status.alive && e.status.collidable) {
+        let mut registered = s.registered.iter().peekable();
+        for entry in self.table.iter().filter(|e| e.status.enabled && e.status.collidable) {
             let Some(collidable) = entry.object.collidable() else { continue };
-            for (part, index) in entry.span.site.clone().enumerate() {
+            for (part, index) in entry.state_range.parts.clone().enumerate() {
                 let Some(shape) = collidable.shape(part) else { continue };
-                let site = &self.sites[index];
-                let tight = shape.aabb(&site.pose);
-                let around = (tight.max - site.position()).sup(&(site.position() - tight.min));
-                let travel = Travel::new(site, shape.bounding_radius(), around, horizon);
-                let bounds = travel.swept(&tight, self.settings.drift_tolerance);
+                let part_state = &self.part_states[index];
+                let tight = shape.aabb(&part_state.pose);
+                let around = (tight.max - part_state.position()).sup(&(part_state.position() - tight.min));
+                let motion_bounds = MotionBounds::new(part_state, shape.bounding_radius(), around, horizon);
+                let bounds = motion_bounds.swept(&tight, self.settings.drift_tolerance);
                 let moving = entry.status.mode != Mode::Static && !entry.asleep;
                 let who = [entry.serial, part as u32];
-                while let Some(gone) = filed.next_if(|f| f.who < who) {
+                while let Some(gone) = registered.next_if(|f| f.who < who) {
                     self.broad.remove(gone.handle);
                 }
-                let handle = match filed.next_if(|f| f.who == who) {
+                let handle = match registered.next_if(|f| f.who == who) {
                     Some(known) => {
                         self.broad.set(known.handle, &bounds, moving);
                         known.handle
@@ -208,21 +208,21 @@ impl Detector<'_> {
                     None => self.broad.insert(&bounds, moving),
                 };
                 s.proxies.push(index as u32);
-                s.travel.push(travel);
-                s.gathered.push(Filed { who, handle });
+                s.motion_bounds.push(motion_bounds);
+                s.gathered.push(BroadPhaseProxy { who, handle });
             }
         }
-        filed.for_each(|gone| self.broad.remove(gone.handle));
-        std::mem::swap(&mut s.filed, &mut s.gathered);
+        registered.for_each(|gone| self.broad.remove(gone.handle));
+        std::mem::swap(&mut s.registered, &mut s.gathered);
     }
 
     /// Pairs of handles as pairs of places in `proxies`, ascending: what the broad phase remembers does not show. Already in order, as a rule.
-    fn order_by_site(&mut self, pairs: &mut [[u32; 2]]) {
+    fn order_by_part(&mut self, pairs: &mut [[u32; 2]]) {
         let s = &mut *self.scratch;
-        let handles = s.filed.iter().map(|f| f.handle as usize + 1).max().unwrap_or(0);
+        let handles = s.registered.iter().map(|f| f.handle as usize + 1).max().unwrap_or(0);
         s.place.resize(handles.max(s.place.len()), 0);
-        for (place, filed) in s.filed.iter().enumerate() {
-            s.place[filed.handle as usize] = place as u32;
+        for (place, registered) in s.registered.iter().enumerate() {
+            s.place[registered.handle as usize] = place as u32;
         }
         for pair in pairs.iter_mut() {
             let [i, j] = pair.map(|handle| s.place[handle as usize]);
@@ -232,36 +232,41 @@ impl Detector<'_> {
     }
 
     /// The contacts of one pair.
-    fn narrow(&mut self, [i, j]: [usize; 2], (horizon, reach): (f64, Reach), out: &mut Vec<Touch>) {
+    fn narrow(
+        &mut self,
+        [i, j]: [usize; 2],
+        (horizon, prediction): (f64, PredictionMode),
+        out: &mut Vec<ContactConstraint>,
+    ) {
         let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
         let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
         let (entry_a, entry_b) = (&self.table.slots[owner_a.id], &self.table.slots[owner_b.id]);
-        if !meet(entry_a, owner_a.part as usize, entry_b, owner_b.part as usize, self.sites) {
+        if !may_collide(entry_a, owner_a.part as usize, entry_b, owner_b.part as usize, self.part_states) {
             return;
         }
         let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
-        let (site_a, site_b) = (&self.sites[a as usize], &self.sites[b as usize]);
+        let (state_a, state_b) = (&self.part_states[a as usize], &self.part_states[b as usize]);
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
         let near = 2.0 * self.settings.drift_tolerance;
-        let pair = Pair {
+        let pair = PairQuery {
             mode,
             shapes: [shape_a, shape_b],
-            sites: [site_a, site_b],
-            travel: [self.scratch.travel[i], self.scratch.travel[j]],
+            part_states: [state_a, state_b],
+            motion_bounds: [self.scratch.motion_bounds[i], self.scratch.motion_bounds[j]],
             near,
-            reach,
+            prediction,
         };
-        if pair.is_dear() && pair.stays_apart() {
+        if pair.is_expensive() && pair.is_separated() {
             return;
         }
         let found = &mut self.scratch.found;
-        let moment = pair.contacts([a, b], horizon, &mut self.scratch.recalled, found);
+        let moment = pair.contacts([a, b], horizon, &mut self.scratch.narrow_phase_cache, found);
         let first = out.len();
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
             // the frame will be done again with it awake
-            self.stirred.extend((!found.is_empty()).then_some(sleeper.serial));
+            self.wake_requests.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
         let surface_a = (owner_a.id, part_a, body_a.material(part_a));
@@ -275,7 +280,7 @@ impl Detector<'_> {
             }
             ContactFrame { point: contact.point, ..frame }
         };
-        out.extend(found.iter().map(|contact| Touch {
+        out.extend(found.iter().map(|contact| ContactConstraint {
             a,
             b,
             contact: *contact,
@@ -283,10 +288,12 @@ impl Detector<'_> {
             frame: frame_of(contact),
             friction,
             restitution,
-            key: Key { pair, feature: contact.feature },
+            key: ContactKey { pair, feature: contact.feature },
         }));
         if moment > 0.0 {
-            out[first..].iter_mut().for_each(|touch| meet_at(touch, &touch.contact.clone(), site_a, site_b, moment));
+            out[first..].iter_mut().for_each(|constraint| {
+                shift_to_impact(constraint, &constraint.contact.clone(), state_a, state_b, moment)
+            });
         }
     }
 }
@@ -303,26 +310,26 @@ fn across(v: Vec3, along: &Vec3) -> Vec3 {
 }
 
 /// Whether two parts are to be tested: one of them moves (or is led towards a sleeper), and both kinds say yes.
-pub(crate) fn meet(a: &Entry, part_a: usize, b: &Entry, part_b: usize, sites: &[Site]) -> bool {
+pub(crate) fn may_collide(a: &Entry, part_a: usize, b: &Entry, part_b: usize, part_states: &[PartState]) -> bool {
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
-    let stirs = a.asleep && b.comes(sites) || b.asleep && a.comes(sites);
+    let stirs = a.asleep && b.approaches(part_states) || b.asleep && a.approaches(part_states);
     if !(stirs || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
         return false;
     }
-    if a.serial == b.serial && !ca.parts_meet(part_a, part_b) {
+    if a.serial == b.serial && !ca.parts_collide(part_a, part_b) {
         return false;
     }
-    ca.collides_with(part_a, cb.kind(part_b)) && cb.collides_with(part_b, ca.kind(part_a))
+    ca.collides_with(part_a, cb.collision_group(part_b)) && cb.collides_with(part_b, ca.collision_group(part_a))
 }
 
-impl Touch {
+impl ContactConstraint {
     /// The contact point as B has it, metres.
     pub fn point_b(&self) -> Vec3 {
         self.contact.point + self.offset
     }
 
     /// Relative velocity of A against B at the contact, m/s; negative along the normal where they approach.
-    pub fn velocity(&self, a: &Site, b: &Site) -> Vec3 {
+    pub fn velocity(&self, a: &PartState, b: &PartState) -> Vec3 {
         a.velocity_at(&self.contact.point) - b.velocity_at(&self.point_b())
     }
 
@@ -335,7 +342,7 @@ impl Touch {
     /// ```text
     /// s = v_A(p) − v_B(p)        ds/dt = [a + α×r + ω×(ṗ − v)]_A − [ … ]_B        d²gap/dt² = n·ds/dt + ṅ·s
     /// ```
-    pub fn acceleration(&self, a: &Site, b: &Site) -> Vec3 {
+    pub fn acceleration(&self, a: &PartState, b: &PartState) -> Vec3 {
         let (c, n) = (&self.contact, &self.contact.normal);
         let (core_a, core_b) = (c.point + n * (0.5 * c.gap + c.core_a), c.point - n * (0.5 * c.gap + c.core_b));
         let (va, vb) = (a.velocity_at(&core_a), b.velocity_at(&core_b));

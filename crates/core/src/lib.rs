@@ -9,33 +9,33 @@
 //! ```
 //! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};
 //! let mut world = World::new(Settings::default())?;
-//! world.add_static(RigidBody::fixture("ground", Shape::half_space()))?;
+//! world.add_static(RigidBody::fixed("ground", Shape::half_space()))?;
 //! let ball = world.add(RigidBody::with_mass("ball", Shape::sphere(0.1)?, 2.0)?.at(Pose::translation(0.0, 0.0, 1.0)))?;
 //! for _ in 0..240 {
 //!     world.step()?;
 //! }
-//! assert!((world.site(ball, 0).unwrap().position().z - 0.1).abs() < 1e-6);
+//! assert!((world.part_state(ball, 0).unwrap().position().z - 0.1).abs() < 1e-6);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod apart;
 pub mod archive;
 pub mod articulated;
-mod closure;
 mod collidable;
 mod detect;
 mod integrators;
+mod loop_joint;
 mod motion;
 mod mounts;
+mod obb_separation;
 mod object;
 mod pair;
 mod pair_material;
+mod part_state;
 mod rigid;
 mod rotation;
 mod row_builder;
 pub mod rows;
 mod settings;
-mod site;
 mod sleep;
 pub mod solver;
 pub mod spatial;
@@ -47,26 +47,27 @@ mod world;
 
 pub use archive::ArchiveError;
 pub use articulated::{
-    ArticulatedBody, ArticulatedError, Collider, Coupling, Drive, Freedom, Joint, LinkMass, Model, ModelBuilder,
+    ArticulatedBody, ArticulatedError, Collider, Coupling, DofSettings, Drive, Joint, LinkMass, Model, ModelBuilder,
     ModelError, Playback, Spring,
 };
-pub use closure::{Anchor, Closure, ClosureError, ClosureKind, Misfit};
-pub use collidable::{Collidable, CollisionKind, Combine, ContactFrame, Material, rigid_test_impulse};
+pub use collidable::{Collidable, CollisionGroup, Combine, ContactFrame, Material, rigid_test_impulse};
+pub use loop_joint::{Anchor, LoopJoint, LoopJointError, LoopJointKind, PositionError};
 pub use mounts::{CameraCarrier, CameraMount, Detail, LightCarrier, LightMount, Spread};
 pub use object::{
-    Constraint, Energy, ForceGenerator, Integratable, Level, Look, Momentum, NetSync, Object, Renderable, RowTarget,
-    SyncError,
+    Appearance, Constraint, Energy, ForceGenerator, Integratable, Level, Momentum, NetSync, Object, Renderable,
+    RowTarget, SyncError,
 };
 pub use pair_material::{PairMaterial, PairSide};
+pub use part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
 pub use rigid::{BodyError, RigidBody};
 pub use row_builder::RowBuilder;
-pub use settings::{Integrator, OutOfReach, Settings, SettingsError, StepReport};
-pub use site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
+pub use settings::{Integrator, Settings, SettingsError, StepReport, UnreachableJoint};
 pub use sleep::Sleep;
-pub use step::{Backtracking, Frame, STEPPERS, Stepper, TimeStepping, stepper_by_name};
+pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
 pub use view::{Mode, ObjectId, Status, WorldView};
 pub use visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use world::{
-    Checkpoint, ContactPoint, MirrorError, Overlap, Pull, SnapshotError, StateHold, StepError, World, WorldError,
+    Checkpoint, ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World,
+    WorldError,
 };

@@ -9,17 +9,17 @@
 //! | RK4 | classical on `p`; on `x` the commutator-free method of Celledoni, Marthinsen and Owren (2003), two exponentials in the last stage |
 
 use crate::integrators::Adaptive;
+use crate::part_state::{Forces, PartState, Wrench};
 use crate::settings::Integrator;
-use crate::site::{Forces, Site, Wrench};
 use crate::view::{Entry, Mode, ObjectId, Table, WorldView};
 use crate::world::StepError;
 use tumble_collide::Vec3;
 
 /// What the integrators work on, borrowed from the world.
-pub(crate) struct Motion<'a> {
+pub(crate) struct IntegrationContext<'a> {
     pub table: &'a mut Table,
     pub x: &'a mut [f64],
-    pub sites: &'a mut [Site],
+    pub part_states: &'a mut [PartState],
     pub forces: &'a mut Forces,
     pub gravity: Vec3,
     /// See [`WorldView::implicit`].
@@ -34,18 +34,18 @@ pub(crate) struct Motion<'a> {
     pub held_wrenches: &'a [Wrench],
     /// See [`Core::pin`](crate::world::Core).
     pub pinned: &'a [f64],
-    pub pinned_sites: &'a mut [Site],
+    pub pinned_part_states: &'a mut [PartState],
 }
 
-impl Motion<'_> {
+impl IntegrationContext<'_> {
     /// Writes sites and caches from the state. What is static or not alive is at rest, whatever momentum it keeps.
     pub fn refresh(&mut self) {
-        let (x, sites) = (&self.x[..], &mut *self.sites);
-        let (pinned, pinned_sites) = (self.pinned, &mut *self.pinned_sites);
+        let (x, part_states) = (&self.x[..], &mut *self.part_states);
+        let (pinned, pinned_part_states) = (self.pinned, &mut *self.pinned_part_states);
         self.table.for_each_mut(|e| {
-            refresh(e, x, sites);
+            refresh(e, x, part_states);
             if !pinned.is_empty() && e.moves() {
-                refresh(e, pinned, pinned_sites);
+                refresh(e, pinned, pinned_part_states);
             }
         });
     }
@@ -53,7 +53,7 @@ impl Motion<'_> {
     /// The same for one object.
     pub fn refresh_one(&mut self, id: ObjectId) {
         if let Some(entry) = self.table.slots.get_mut(id) {
-            refresh(entry, self.x, self.sites);
+            refresh(entry, self.x, self.part_states);
         }
     }
 
@@ -75,28 +75,29 @@ impl Motion<'_> {
             gravity: self.gravity,
             implicit: self.implicit,
             x: self.x,
-            sites: self.sites,
+            part_states: self.part_states,
             table: self.table,
         };
-        for entry in self.table.iter().filter(|e| e.status.alive) {
+        for entry in self.table.iter().filter(|e| e.status.enabled) {
             if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {
-                body.accumulate_forces(&entry.span, &view, self.forces);
+                body.accumulate_forces(&entry.state_range, &view, self.forces);
             }
             if let Some(force) = entry.object.force() {
-                force.apply(&entry.span, &view, self.forces);
+                force.apply(&entry.state_range, &view, self.forces);
             }
         }
         dp.fill(0.0);
         for entry in self.table.iter() {
             let Some(body) = entry.object.integratable() else { continue };
-            let (span, sites) = (&entry.span, &mut self.sites[entry.span.site.clone()]);
+            let (state_range, part_states) =
+                (&entry.state_range, &mut self.part_states[entry.state_range.parts.clone()]);
             if entry.moves() {
-                let dp = &mut dp[span.v.clone()];
-                body.derivative(&self.x[span.x.clone()], &self.forces.slice(span), dp);
-                body.accelerations(&self.x[span.x.clone()], dp, sites);
+                let dp = &mut dp[state_range.v.clone()];
+                body.derivative(&self.x[state_range.x.clone()], &self.forces.slice(state_range), dp);
+                body.accelerations(&self.x[state_range.x.clone()], dp, part_states);
             } else {
                 // what is led keeps its generalized velocity: a link that turns about another still has its centripetal acceleration
-                sites.iter_mut().for_each(|s| {
+                part_states.iter_mut().for_each(|s| {
                     (s.acceleration, s.angular_acceleration) = (s.bias_acceleration, s.bias_angular_acceleration)
                 });
             }
@@ -104,27 +105,27 @@ impl Motion<'_> {
     }
 
     /// Every object that moves goes on freely for `h`; what is led follows its velocity.
-    pub fn coast(&mut self, h: f64) {
+    pub fn free_motion(&mut self, h: f64) {
         for entry in self.table.iter() {
-            coast(entry, &mut self.x[entry.span.x.clone()], h);
+            free_motion(entry, &mut self.x[entry.state_range.x.clone()], h);
         }
     }
 
     /// Leaves of the rates what the coasts of a splitting do not do by themselves.
-    pub fn take_off_coasting(&self, dp: &mut [f64]) {
-        let mut coasting = Vec::new();
+    pub fn subtract_free_motion(&self, dp: &mut [f64]) {
+        let mut rate = Vec::new();
         for entry in self.table.iter().filter(|e| e.moves()) {
             let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
-            coasting.resize(entry.span.v.len(), 0.0);
-            body.coasting_rate(&self.x[entry.span.x.clone()], &mut coasting);
-            dp[entry.span.v.clone()].iter_mut().zip(&coasting).for_each(|(dp, c)| *dp -= c);
+            rate.resize(entry.state_range.v.len(), 0.0);
+            body.free_motion_rate(&self.x[entry.state_range.x.clone()], &mut rate);
+            dp[entry.state_range.v.clone()].iter_mut().zip(&rate).for_each(|(dp, c)| *dp -= c);
         }
     }
 
     fn kick(&mut self, dp: &[f64], h: f64) {
         for entry in self.table.iter().filter(|e| e.moves()) {
             if let Some(body) = entry.object.integratable() {
-                body.kick(&mut self.x[entry.span.x.clone()], &dp[entry.span.v.clone()], h);
+                body.kick(&mut self.x[entry.state_range.x.clone()], &dp[entry.state_range.v.clone()], h);
             }
         }
     }
@@ -132,18 +133,18 @@ impl Motion<'_> {
     /// Generalized velocities of everything that moves or is led; zero elsewhere.
     pub fn velocities(&self, v: &mut [f64]) {
         v.fill(0.0);
-        for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode != Mode::Static) {
+        for entry in self.table.iter().filter(|e| e.status.enabled && e.status.mode != Mode::Static) {
             if let Some(body) = entry.object.integratable() {
-                body.velocity(&self.x[entry.span.x.clone()], &mut v[entry.span.v.clone()]);
+                body.velocity(&self.x[entry.state_range.x.clone()], &mut v[entry.state_range.v.clone()]);
             }
         }
     }
 
-    fn drift(&mut self, v: &[f64], h: f64) {
-        for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode != Mode::Static && !e.asleep) {
-            let (x, v) = (&mut self.x[entry.span.x.clone()], &v[entry.span.v.clone()]);
+    fn integrate_positions(&mut self, v: &[f64], h: f64) {
+        for entry in self.table.iter().filter(|e| e.status.enabled && e.status.mode != Mode::Static && !e.asleep) {
+            let (x, v) = (&mut self.x[entry.state_range.x.clone()], &v[entry.state_range.v.clone()]);
             if let Some(body) = entry.object.integratable() {
-                body.drift(x, v, h);
+                body.integrate_positions(x, v, h);
             }
         }
     }
@@ -161,30 +162,30 @@ impl Motion<'_> {
         let start = self.x.to_vec();
         match integrator {
             Integrator::Verlet => {
-                self.coast(0.5 * h);
+                self.free_motion(0.5 * h);
                 self.evaluate(t + 0.5 * h, dp);
-                self.take_off_coasting(dp);
+                self.subtract_free_motion(dp);
                 self.kick(dp, h);
-                self.coast(0.5 * h);
+                self.free_motion(0.5 * h);
             }
             Integrator::SymplecticEuler => {
                 self.evaluate(t, dp);
                 self.kick(dp, h);
                 let mut v = vec![0.0; dp.len()];
                 self.velocities(&mut v);
-                self.drift(&v, h);
+                self.integrate_positions(&v, h);
             }
             Integrator::ExplicitEuler => {
                 self.evaluate(t, dp);
                 let mut v = vec![0.0; dp.len()];
                 self.velocities(&mut v);
                 self.kick(dp, h);
-                self.drift(&v, h);
+                self.integrate_positions(&v, h);
             }
             Integrator::Rk4 => self.rk4(t, h, dp),
             Integrator::DormandPrince => return adaptive.integrate(self, t, h, dp, true),
         }
-        self.restore_led_velocities(&start);
+        self.restore_kinematic_velocities(&start);
         self.refresh();
         Ok(h)
     }
@@ -194,31 +195,31 @@ impl Motion<'_> {
         let start = self.x.to_vec();
         let (mut v, mut f) = (vec![vec![0.0; n]; 4], vec![vec![0.0; n]; 4]);
         self.stage(t, &mut v[0], &mut f[0]);
-        let led = v[0].clone();
+        let kinematic = v[0].clone();
         // stages 2 and 3 start from x0 with half a step
         self.kick(&f[0], 0.5 * h);
-        self.drift(&v[0], 0.5 * h);
+        self.integrate_positions(&v[0], 0.5 * h);
         let second = self.x.to_vec();
         self.stage(t + 0.5 * h, &mut v[1], &mut f[1]);
-        self.keep_led(&led, &mut v[1]);
+        self.keep_kinematic_velocities(&kinematic, &mut v[1]);
         self.x.copy_from_slice(&start);
         self.kick(&f[1], 0.5 * h);
-        self.drift(&v[1], 0.5 * h);
+        self.integrate_positions(&v[1], 0.5 * h);
         self.stage(t + 0.5 * h, &mut v[2], &mut f[2]);
-        self.keep_led(&led, &mut v[2]);
+        self.keep_kinematic_velocities(&kinematic, &mut v[2]);
         // stage 4: positions from stage 2 by v3 − v1/2, momenta p0 + h·f3
         self.x.copy_from_slice(&second);
         self.kick(&combine(&f, [-0.5, 0.0, 1.0, 0.0]), h);
-        self.drift(&combine(&v, [-0.5, 0.0, 1.0, 0.0]), h);
+        self.integrate_positions(&combine(&v, [-0.5, 0.0, 1.0, 0.0]), h);
         self.stage(t + h, &mut v[3], &mut f[3]);
-        self.keep_led(&led, &mut v[3]);
+        self.keep_kinematic_velocities(&kinematic, &mut v[3]);
         // the step
         self.x.copy_from_slice(&start);
         let sixth = 1.0 / 6.0;
         dp.copy_from_slice(&combine(&f, [sixth, 2.0 * sixth, 2.0 * sixth, sixth]));
         self.kick(dp, h);
-        self.drift(&combine(&v, [3.0 / 12.0, 2.0 / 12.0, 2.0 / 12.0, -1.0 / 12.0]), h);
-        self.drift(&combine(&v, [-1.0 / 12.0, 2.0 / 12.0, 2.0 / 12.0, 3.0 / 12.0]), h);
+        self.integrate_positions(&combine(&v, [3.0 / 12.0, 2.0 / 12.0, 2.0 / 12.0, -1.0 / 12.0]), h);
+        self.integrate_positions(&combine(&v, [-1.0 / 12.0, 2.0 / 12.0, 2.0 / 12.0, 3.0 / 12.0]), h);
     }
 
     fn stage(&mut self, t: f64, v: &mut [f64], f: &mut [f64]) {
@@ -227,41 +228,41 @@ impl Motion<'_> {
     }
 
     /// What is led has one velocity over the whole step.
-    fn keep_led(&self, led: &[f64], v: &mut [f64]) {
+    fn keep_kinematic_velocities(&self, kinematic: &[f64], v: &mut [f64]) {
         for entry in self.table.iter().filter(|e| e.status.mode == Mode::Kinematic) {
-            v[entry.span.v.clone()].copy_from_slice(&led[entry.span.v.clone()]);
+            v[entry.state_range.v.clone()].copy_from_slice(&kinematic[entry.state_range.v.clone()]);
         }
     }
 
     /// What is led keeps the velocity it started with, whatever the stages made of it.
-    fn restore_led_velocities(&mut self, start: &[f64]) {
-        for entry in self.table.iter().filter(|e| e.status.alive && e.status.mode == Mode::Kinematic) {
+    fn restore_kinematic_velocities(&mut self, start: &[f64]) {
+        for entry in self.table.iter().filter(|e| e.status.enabled && e.status.mode == Mode::Kinematic) {
             let Some(body) = entry.object.integratable() else { continue };
-            let mut v = vec![0.0; entry.span.v.len()];
-            body.velocity(&start[entry.span.x.clone()], &mut v);
-            body.write_velocity(&mut self.x[entry.span.x.clone()], &v);
+            let mut v = vec![0.0; entry.state_range.v.len()];
+            body.velocity(&start[entry.state_range.x.clone()], &mut v);
+            body.write_velocity(&mut self.x[entry.state_range.x.clone()], &v);
         }
     }
 }
 
-fn refresh(entry: &mut Entry, x: &[f64], sites: &mut [Site]) {
-    let sites = &mut sites[entry.span.site.clone()];
-    entry.object.refresh(&x[entry.span.x.clone()], sites);
-    if entry.status.mode == Mode::Static || !entry.status.alive {
-        sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
+fn refresh(entry: &mut Entry, x: &[f64], part_states: &mut [PartState]) {
+    let part_states = &mut part_states[entry.state_range.parts.clone()];
+    entry.object.refresh(&x[entry.state_range.x.clone()], part_states);
+    if entry.status.mode == Mode::Static || !entry.status.enabled {
+        part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
     }
 }
 
 /// One object goes on for `h`: freely where it moves, with its given velocity where it is led, not at all where it is static.
-pub(crate) fn coast(entry: &Entry, x: &mut [f64], h: f64) {
-    let Some(body) = entry.object.integratable().filter(|_| entry.status.alive && !entry.asleep) else { return };
+pub(crate) fn free_motion(entry: &Entry, x: &mut [f64], h: f64) {
+    let Some(body) = entry.object.integratable().filter(|_| entry.status.enabled && !entry.asleep) else { return };
     match entry.status.mode {
         Mode::Static => {}
-        Mode::Dynamic => body.coast(x, h),
+        Mode::Dynamic => body.free_motion(x, h),
         Mode::Kinematic => {
-            let mut v = vec![0.0; entry.span.v.len()];
+            let mut v = vec![0.0; entry.state_range.v.len()];
             body.velocity(x, &mut v);
-            body.drift(x, &v, h);
+            body.integrate_positions(x, &v, h);
             body.write_velocity(x, &v);
         }
     }

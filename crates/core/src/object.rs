@@ -6,9 +6,9 @@
 
 use crate::collidable::Collidable;
 use crate::mounts::{CameraCarrier, Detail, LightCarrier};
+use crate::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes};
 use crate::row_builder::RowBuilder;
 use crate::rows::RowSet;
-use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::view::{ObjectId, WorldView};
 use crate::visual::Visual;
 use std::any::Any;
@@ -25,8 +25,8 @@ pub trait Object: Any + Send + Sync {
     fn fork(&self) -> Box<dyn Object>;
     /// Writes the poses and velocities of its sites from its slice of the state, and its caches, which must be pure functions of `x`
     /// (thesis `UpdateState`). Accelerations are left to [`Integratable::accelerations`].
-    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
-        let _ = (x, sites);
+    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
+        let _ = (x, part_states);
     }
     /// Whether it has a state that the integrator advances.
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -68,7 +68,7 @@ pub trait Object: Any + Send + Sync {
 /// and whitened velocity `u = L·v` where the mass matrix is `M = LᵀL`. The four whitening maps hold at the state last refreshed.
 pub trait Integratable {
     /// How many numbers it needs.
-    fn dims(&self) -> Dims;
+    fn state_sizes(&self) -> StateSizes;
     /// Writes its state at time 0.
     fn write_initial(&self, x: &mut [f64]);
     /// Whether these numbers, as many as its state has, are a state of it: finite, orientations of unit length.
@@ -76,7 +76,7 @@ pub trait Integratable {
         x.iter().all(|x| x.is_finite())
     }
     /// Adds the forces that it feels of itself (gravity, damping) to its own rows of the force table.
-    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces);
+    fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces);
     /// Generalized velocity at `x`.
     fn velocity(&self, x: &[f64], v: &mut [f64]);
     /// Changes the momentum in `x` so that the generalized velocity there is `v`: the inverse of [`velocity`](Self::velocity).
@@ -85,11 +85,11 @@ pub trait Integratable {
     /// whose state holds velocities; `dp` names it either way.
     fn derivative(&self, x: &[f64], f: &ForceSlice, dp: &mut [f64]);
     /// Why the state at the last refresh has no motion (a singular mass matrix), if so. The step then ends with this as its error.
-    fn trouble(&self) -> Option<String> {
+    fn singularity(&self) -> Option<String> {
         None
     }
     /// Writes the accelerations of its sites for a rate of momentum `dp`.
-    fn accelerations(&self, x: &[f64], dp: &[f64], sites: &mut [Site]);
+    fn accelerations(&self, x: &[f64], dp: &[f64], part_states: &mut [PartState]);
     /// Writes `dp − M·v̇`: what of the rate of momentum changes the velocity's direction in the body and not its size (`ω × L` of a rigid
     /// body, Coriolis terms). Rows at the acceleration level need `v̇`. Zero where the mass matrix is constant.
     fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
@@ -99,17 +99,17 @@ pub trait Integratable {
     /// Momentum (or velocity, as [`derivative`](Self::derivative) says) changes by `h·dp`; positions stay.
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64);
     /// Free motion for `h` seconds with the momentum held: exact or symmetric of second order at least.
-    fn coast(&self, x: &mut [f64], h: f64);
+    fn free_motion(&self, x: &mut [f64], h: f64);
     /// Positions move with generalized velocity `v` for `h` seconds; exact on rotations. Momentum stays.
-    fn drift(&self, x: &mut [f64], v: &[f64], h: f64);
-    /// Positions move by `h·v`, a displacement and no motion: kinetic energy stays, and linear momentum to second order at least. [`drift`](Self::drift)
+    fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64);
+    /// Positions move by `h·v`, a displacement and no motion: kinetic energy stays, and linear momentum to second order at least. [`integrate_positions`](Self::integrate_positions)
     /// where the mass matrix is constant; a rigid body that is turned scales its angular momentum, and an object whose state holds velocities carries them
     /// along parallel to themselves.
     fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
-        self.drift(x, v, h);
+        self.integrate_positions(x, v, h);
     }
     /// Turns a velocity `v` at the displacement `displacement` from some state into the rate of that displacement: the inverse of the
-    /// differential of [`drift`](Self::drift)'s exponential map. Coordinates that simply add up leave `v` as it is, the default.
+    /// differential of [`integrate_positions`](Self::integrate_positions)'s exponential map. Coordinates that simply add up leave `v` as it is, the default.
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
         let _ = (displacement, v);
     }
@@ -126,9 +126,9 @@ pub trait Integratable {
     fn holds_velocity(&self) -> bool {
         false
     }
-    /// What of [`derivative`](Self::derivative) is already in [`coast`](Self::coast): zero where coasting leaves the state's momentum alone;
+    /// What of [`derivative`](Self::derivative) is already in [`free_motion`](Self::free_motion): zero where coasting leaves the state's momentum alone;
     /// the acceleration without any force of an object whose state holds velocities.
-    fn coasting_rate(&self, x: &[f64], out: &mut [f64]) {
+    fn free_motion_rate(&self, x: &[f64], out: &mut [f64]) {
         let _ = x;
         out.fill(0.0);
     }
@@ -188,7 +188,7 @@ impl Default for Momentum {
 /// Acts on others without a state of its own: wind, springs, a flock (thesis §IV.A.2).
 pub trait ForceGenerator {
     /// Adds forces, at the view's state and time.
-    fn apply(&self, me: &Span, view: &WorldView, out: &mut Forces);
+    fn apply(&self, me: &StateRange, view: &WorldView, out: &mut Forces);
 }
 
 /// At which level rows are asked for: the thesis's two `Evaluate…Constraints` (§IV.A.4).
@@ -208,11 +208,11 @@ pub trait Constraint {
     /// Adds its rows. See [`RowBuilder`] for how a row is made. The view shows the state that free motion makes by the middle of the step to
     /// come: directions are right there to second order. Errors are those of that state too; the stepper takes them back to the present. Where there
     /// are rigid equality rows they are asked for several times in a step, at its start, middle and end: rows are a function of the view alone.
-    fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder);
+    fn rows(&self, me: &StateRange, view: &WorldView, level: Level, out: &mut RowBuilder);
     /// Appends the errors of its one-sided rows ([`RowSet::HalfLine`]) at the view's state, one per row and in the order of the rows. What is told
     /// here `backtracking` locates in time as it does contacts: the step ends where the limit is reached, and the limit acts from there on. Of a
     /// constraint that tells nothing the limits act over the whole of the step in which they are reached.
-    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+    fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
         let _ = (me, view, out);
     }
     /// Appends all objects that its rows can take hold of; `false` where it does not say, and then nothing in the world falls asleep.
@@ -256,7 +256,7 @@ impl RowTarget {
 /// sizes, time) is not the object's business.
 pub trait NetSync {
     /// Appends what the other side needs to show this object as it is in the view.
-    fn get_data(&self, me: &Span, view: &WorldView, out: &mut Vec<u8>);
+    fn get_data(&self, me: &StateRange, view: &WorldView, out: &mut Vec<u8>);
     /// Applies such a message to the object's slice of a state. `data` comes from outside and is not trusted: on an error `x` is unchanged.
     fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError>;
 }
@@ -285,7 +285,7 @@ pub trait Renderable {
 
 /// How a surface looks: a shader by name and its properties, as the thesis's shader attributes.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Look {
+pub struct Appearance {
     /// Base colour, sRGB, each 0 to 1.
     pub color: [f32; 3],
     /// 0 is a mirror, 1 is chalk.
@@ -303,9 +303,9 @@ pub struct Look {
     pub detail: Detail,
 }
 
-impl Default for Look {
-    fn default() -> Look {
-        Look {
+impl Default for Appearance {
+    fn default() -> Appearance {
+        Appearance {
             color: [0.7, 0.7, 0.72],
             roughness: 0.5,
             metallic: 0.0,

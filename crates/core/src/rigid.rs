@@ -14,11 +14,11 @@
 //! keeps the frame of its file, and the center of mass stands at [`RigidBody::center_of_mass`] in it. State, velocities and sites know the center of
 //! mass alone; [`World::pose`](crate::World::pose), [`World::set_pose`](crate::World::set_pose) and [`RigidBody::at`] convert.
 
-use crate::collidable::{Collidable, CollisionKind, Material};
+use crate::collidable::{Collidable, CollisionGroup, Material};
 use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
+use crate::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes};
 use crate::rotation;
-use crate::site::{Dims, ForceSlice, Forces, Site, Span};
 use crate::sync;
 use crate::view::WorldView;
 use crate::visual::Visual;
@@ -86,16 +86,16 @@ pub struct RigidBody {
     /// How its mesh or cylinder collides.
     pub contact_mode: ContactMode,
     /// Its kind, for filtering.
-    pub kind: CollisionKind,
+    pub group: CollisionGroup,
     /// Kinds it meets, one bit each.
-    pub meets: u64,
+    pub mask: u64,
     /// Pose of its frame at time 0.
     pub initial_pose: Pose,
     /// Velocity of the centre of mass at time 0, m/s.
     pub initial_velocity: Vec3,
     /// Angular velocity at time 0, rad/s, world axes.
     pub initial_angular_velocity: Vec3,
-    fixture: bool,
+    fixed: bool,
     /// The center of mass in the body's frame, metres.
     center: Vec3,
     visuals: Vec<Visual>,
@@ -145,12 +145,12 @@ impl RigidBody {
             contact_mode: ContactMode::default(),
             linear_damping: 0.0,
             angular_damping: 0.0,
-            kind: CollisionKind::default(),
-            meets: u64::MAX,
+            group: CollisionGroup::default(),
+            mask: u64::MAX,
             initial_pose: Pose::identity(),
             initial_velocity: Vec3::zeros(),
             initial_angular_velocity: Vec3::zeros(),
-            fixture: false,
+            fixed: false,
             visuals,
             cameras: Vec::new(),
             lights: Vec::new(),
@@ -179,16 +179,16 @@ impl RigidBody {
     }
 
     /// Geometry that is meant to stay static or kinematic: mass and inertia are 1 and never felt, so it may be unbounded.
-    pub fn fixture(name: impl Into<String>, shape: Shape) -> RigidBody {
+    pub fn fixed(name: impl Into<String>, shape: Shape) -> RigidBody {
         match RigidBody::new(name, shape, 1.0, Mat3::identity()) {
-            Ok(body) => RigidBody { fixture: true, ..body },
+            Ok(body) => RigidBody { fixed: true, ..body },
             Err(_) => unreachable!("unit mass and inertia are valid"),
         }
     }
 
     /// Whether it was made as a fixture, with a mass that means nothing.
-    pub fn is_fixture(&self) -> bool {
-        self.fixture
+    pub fn is_fixed(&self) -> bool {
+        self.fixed
     }
 
     /// Sets the pose of its frame at time 0.
@@ -264,12 +264,12 @@ impl RigidBody {
     }
 
     /// Pose of the body's frame, for one of its center of mass (the site's).
-    pub fn frame_of(&self, site: &Pose) -> Pose {
-        site * Translation3::from(-self.center)
+    pub fn frame_of(&self, part_state: &Pose) -> Pose {
+        part_state * Translation3::from(-self.center)
     }
 
     /// Pose of the center of mass (the site), for one of the body's frame.
-    pub fn site_of(&self, frame: &Pose) -> Pose {
+    pub fn center_pose_of(&self, frame: &Pose) -> Pose {
         frame * Translation3::from(self.center)
     }
 
@@ -381,15 +381,15 @@ impl Object for RigidBody {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
+    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
         let q = orientation(x);
         let r = q.to_rotation_matrix().into_inner();
         self.cache.respond = self.inertia.inverse_root * r.transpose();
         self.cache.recover = r * self.inertia.root;
-        let site = &mut sites[0];
-        site.pose = Pose::from_parts(Translation3::from(vec3(x)), q);
-        site.velocity = vec3(&x[7..]) / self.mass;
-        site.angular_velocity = self.cache.respond.tr_mul(&(self.cache.respond * vec3(&x[10..])));
+        let part_state = &mut part_states[0];
+        part_state.pose = Pose::from_parts(Translation3::from(vec3(x)), q);
+        part_state.velocity = vec3(&x[7..]) / self.mass;
+        part_state.angular_velocity = self.cache.respond.tr_mul(&(self.cache.respond * vec3(&x[10..])));
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -419,7 +419,7 @@ impl Object for RigidBody {
 
 /// The whole state, 13 little-endian `f64`: exact, for replicas. What only draws can do with less.
 impl NetSync for RigidBody {
-    fn get_data(&self, me: &Span, view: &WorldView, out: &mut Vec<u8>) {
+    fn get_data(&self, me: &StateRange, view: &WorldView, out: &mut Vec<u8>) {
         sync::write_state(&view.x[me.x.clone()], out);
     }
 
@@ -429,12 +429,13 @@ impl NetSync for RigidBody {
 }
 
 impl Integratable for RigidBody {
-    fn dims(&self) -> Dims {
-        Dims { x: 13, dof: 6, sites: 1 }
+    fn state_sizes(&self) -> StateSizes {
+        StateSizes { x: 13, dof: 6, parts: 1 }
     }
 
     fn write_initial(&self, x: &mut [f64]) {
-        let (q, at) = (Unit::new_normalize(self.initial_pose.rotation.into_inner()), self.site_of(&self.initial_pose));
+        let (q, at) =
+            (Unit::new_normalize(self.initial_pose.rotation.into_inner()), self.center_pose_of(&self.initial_pose));
         let l = q * (self.inertia.tensor * q.inverse_transform_vector(&self.initial_angular_velocity));
         x[..3].copy_from_slice(at.translation.vector.as_slice());
         write_orientation(x, &q);
@@ -447,9 +448,9 @@ impl Integratable for RigidBody {
         x.iter().all(|x| x.is_finite()) && (norm - 1.0).abs() < 1e-9
     }
 
-    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
+    fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces) {
         let x = &view.x[me.x.clone()];
-        let wrench = &mut out.wrenches[me.site.start];
+        let wrench = &mut out.wrenches[me.parts.start];
         wrench.force += self.mass * view.gravity - self.linear_damping * vec3(&x[7..]);
         wrench.torque -= self.angular_damping * vec3(&x[10..]);
     }
@@ -470,11 +471,11 @@ impl Integratable for RigidBody {
         dp.iter_mut().zip(f.generalized).for_each(|(dp, f)| *dp += f);
     }
 
-    fn accelerations(&self, x: &[f64], dp: &[f64], sites: &mut [Site]) {
-        let (q, l, site) = (orientation(x), vec3(&x[10..]), &mut sites[0]);
-        site.acceleration = vec3(&dp[3..]) / self.mass;
+    fn accelerations(&self, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
+        let (q, l, part_state) = (orientation(x), vec3(&x[10..]), &mut part_states[0]);
+        part_state.acceleration = vec3(&dp[3..]) / self.mass;
         // α = I⁻¹(τ − ω × L)
-        site.angular_acceleration = self.omega(&q, &(vec3(dp) - site.angular_velocity.cross(&l)));
+        part_state.angular_acceleration = self.omega(&q, &(vec3(dp) - part_state.angular_velocity.cross(&l)));
     }
 
     fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
@@ -487,17 +488,18 @@ impl Integratable for RigidBody {
         add(&mut x[7..10], &vec3(&dp[3..]), h);
     }
 
-    fn coast(&self, x: &mut [f64], h: f64) {
+    fn free_motion(&self, x: &mut [f64], h: f64) {
         let (p, l) = (vec3(&x[7..]), vec3(&x[10..]));
         add(&mut x[..3], &p, h / self.mass);
         if l != Vec3::zeros() {
             let principal = orientation(x) * self.inertia.principal;
-            let turned = rotation::coast(&principal, &l, &self.inertia.moments, h) * self.inertia.principal.inverse();
+            let turned =
+                rotation::free_motion(&principal, &l, &self.inertia.moments, h) * self.inertia.principal.inverse();
             write_orientation(x, &turned);
         }
     }
 
-    fn drift(&self, x: &mut [f64], v: &[f64], h: f64) {
+    fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         add(&mut x[..3], &vec3(&v[3..]), h);
         let turned = rotation::turn(&orientation(x), &vec3(v), h);
         write_orientation(x, &turned);
@@ -505,7 +507,7 @@ impl Integratable for RigidBody {
 
     fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
         let before = self.spinning(x);
-        self.drift(x, v, h);
+        self.integrate_positions(x, v, h);
         let after = self.spinning(x);
         if before != after && after > 0.0 {
             // turned under the momentum that it has, the body has another energy
@@ -563,20 +565,28 @@ impl Collidable for RigidBody {
         self.material
     }
 
-    fn kind(&self, _part: usize) -> CollisionKind {
-        self.kind
+    fn collision_group(&self, _part: usize) -> CollisionGroup {
+        self.group
     }
 
     fn contact_mode(&self, _part: usize) -> ContactMode {
         self.contact_mode
     }
 
-    fn collides_with(&self, _part: usize, other: CollisionKind) -> bool {
-        self.meets & other.bit() != 0
+    fn collides_with(&self, _part: usize, other: CollisionGroup) -> bool {
+        self.mask & other.bit() != 0
     }
 
-    fn test_impulse(&self, _part: usize, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
-        let r = point - site.position();
+    fn test_impulse(
+        &self,
+        _part: usize,
+        part_state: &PartState,
+        point: &Vec3,
+        axes: &[Vec3],
+        sign: f64,
+        y: &mut [f64],
+    ) {
+        let r = point - part_state.position();
         let linear = sign / self.root_mass;
         for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
             let angular = self.cache.respond * r.cross(axis);

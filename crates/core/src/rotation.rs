@@ -27,7 +27,7 @@ const CORRECTIONS: usize = 4;
 const FARTHEST: f64 = 0.3;
 
 /// Rotates `q` for `h` seconds with world angular momentum `l` held; `moments` are the principal moments. Angular momentum and energy stay to rounding.
-pub fn coast(q: &Quat, l: &Vec3, moments: &Vec3, h: f64) -> Quat {
+pub fn free_motion(q: &Quat, l: &Vec3, moments: &Vec3, h: f64) -> Quat {
     let inverse = moments.map(|i| 1.0 / i);
     let (low, high) = (moments.imin(), moments.imax());
     if moments[high] - moments[low] <= 1e-12 * moments[high] {

@@ -2,8 +2,8 @@
 
 use crate::collidable::ContactFrame;
 use crate::object::{Constraint, Integratable, RowTarget};
+use crate::part_state::PartState;
 use crate::rows::{RowSet, Rows};
-use crate::site::Site;
 use crate::view::{Entry, Mode, ObjectId, Table};
 use tumble_collide::Vec3;
 
@@ -34,7 +34,7 @@ pub struct RowBuilder<'a> {
     pub(crate) kinds: &'a mut Vec<RowKind>,
     pub(crate) table: &'a Table,
     pub(crate) x: &'a [f64],
-    pub(crate) sites: &'a [Site],
+    pub(crate) part_states: &'a [PartState],
     pub(crate) problem: &'a mut Option<String>,
     /// Whose rows are being made.
     pub(crate) owner: ObjectId,
@@ -85,7 +85,7 @@ impl RowBuilder<'_> {
         self.is_of(RowKind::Rotation);
         let [_, b, c] = ContactFrame::new(Vec3::zeros(), *axis).axes;
         self.on_part(table.slots.get(id), part, |row, entry| {
-            let p = row.sites[entry.span.site.start + part].position();
+            let p = row.part_states[entry.state_range.parts.start + part].position();
             row.point_side(entry, part, &(p + b), &[c], sign) && row.point_side(entry, part, &p, &[c], -sign)
         });
         self
@@ -98,7 +98,7 @@ impl RowBuilder<'_> {
     /// Lets `add` put its side of the row; refuses the row where the object is gone, has no such part, or is a third.
     fn on_part(&mut self, entry: Option<&Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
         let Some(entry) = entry else { return self.refuse("a row names an object that is not in the world".into()) };
-        if part >= entry.span.site.len() || !add(self, entry) {
+        if part >= entry.state_range.parts.len() || !add(self, entry) {
             self.refuse(format!(
                 "'{}' has no part {part} that answers impulses, or the row names a third object",
                 entry.object.name()
@@ -117,13 +117,13 @@ impl RowBuilder<'_> {
             self.refuse("a row names an object that is not in the world".into());
             return self;
         };
-        let done = entry.object.integratable().filter(|i| i.dims().dof == jacobian.len()).is_some_and(|i| {
+        let done = entry.object.integratable().filter(|i| i.state_sizes().dof == jacobian.len()).is_some_and(|i| {
             if !entry.moves() {
-                return self.led_coordinates(entry, i, jacobian);
+                return self.kinematic_coordinates(entry, i, jacobian);
             }
             let mut y = vec![0.0; jacobian.len()];
             i.respond(jacobian, &mut y);
-            let side = self.rows.side(entry.span.v.start, y.len());
+            let side = self.rows.side(entry.state_range.v.start, y.len());
             side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()
         });
         if !done {
@@ -146,25 +146,25 @@ impl RowBuilder<'_> {
     }
 
     /// The velocity of something led along a row written in its coordinates.
-    fn led_coordinates(&mut self, entry: &Entry, body: &dyn Integratable, jacobian: &[f64]) -> bool {
-        if entry.status.mode == Mode::Kinematic && entry.status.alive {
+    fn kinematic_coordinates(&mut self, entry: &Entry, body: &dyn Integratable, jacobian: &[f64]) -> bool {
+        if entry.status.mode == Mode::Kinematic && entry.status.enabled {
             let mut v = vec![0.0; jacobian.len()];
-            body.velocity(&self.x[entry.span.x.clone()], &mut v);
-            let led: f64 = v.iter().zip(jacobian).map(|(v, j)| v * j).sum();
-            self.bias.last_mut().into_iter().for_each(|bias| *bias += led);
+            body.velocity(&self.x[entry.state_range.x.clone()], &mut v);
+            let kinematic: f64 = v.iter().zip(jacobian).map(|(v, j)| v * j).sum();
+            self.bias.last_mut().into_iter().for_each(|bias| *bias += kinematic);
         }
         true
     }
 
     /// One side of the last block: a test impulse where it moves, its velocity where it is led.
     pub(crate) fn point_side(&mut self, entry: &Entry, part: usize, p: &Vec3, axes: &[Vec3], sign: f64) -> bool {
-        let site = &self.sites[entry.span.site.start + part];
+        let part_state = &self.part_states[entry.state_range.parts.start + part];
         let Some(collidable) = entry.object.collidable() else { return false };
         if entry.moves() {
-            let Some(y) = self.rows.side(entry.span.v.start, entry.span.v.len()) else { return false };
-            collidable.test_impulse(part, site, p, axes, sign, y);
+            let Some(y) = self.rows.side(entry.state_range.v.start, entry.state_range.v.len()) else { return false };
+            collidable.test_impulse(part, part_state, p, axes, sign, y);
         } else {
-            let velocity = site.velocity_at(p);
+            let velocity = part_state.velocity_at(p);
             let first = self.bias.len() - axes.len();
             for (bias, axis) in self.bias[first..].iter_mut().zip(axes) {
                 *bias += sign * velocity.dot(axis);
@@ -182,6 +182,6 @@ impl RowBuilder<'_> {
 pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (ObjectId, &Entry, &dyn Constraint)> {
     let entries = table.order.iter().map(|&id| (id, &table.slots[id]));
     entries
-        .filter(|(_, e)| e.status.alive)
+        .filter(|(_, e)| e.status.enabled)
         .filter_map(|(id, e)| Some((id, e, e.object.constraint().filter(|c| e.moves() || !c.on_itself())?)))
 }

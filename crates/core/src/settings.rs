@@ -2,7 +2,7 @@
 
 use crate::collidable::Combine;
 use crate::sleep::Sleep;
-use crate::solver::Accuracy;
+use crate::solver::SolverSettings;
 use crate::view::ObjectId;
 use tumble_collide::Vec3;
 
@@ -37,8 +37,8 @@ pub struct Settings {
     /// the coordinate's displacement or velocity is above 1; 1e-14 to 0.1.
     pub integrator_tolerance: f64,
     /// Effort of the iterative solvers.
-    pub accuracy: Accuracy,
-    /// Sweeps at most of the position projection; of groups with joints as many as [`Settings::accuracy`] grants a solve, if that is more.
+    pub solver_settings: SolverSettings,
+    /// Sweeps at most of the position projection; of groups with joints as many as [`Settings::solver_settings`] grants a solve, if that is more.
     pub projection_sweeps: u32,
     /// Whether the equality rows of constraints (joints) are held in place too, and not in velocity alone: off, they drift.
     pub stabilize_positions: bool,
@@ -65,7 +65,7 @@ impl Default for Settings {
             substeps: 1,
             integrator: Integrator::default(),
             integrator_tolerance: 1e-6,
-            accuracy: Accuracy { sweeps: 200, relaxations: 20_000, tolerance: 1e-9 },
+            solver_settings: SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 },
             projection_sweeps: 15,
             stabilize_positions: true,
             contact_tolerance: 1e-7,
@@ -101,8 +101,13 @@ impl Settings {
         check("substeps", self.substeps as f64, (1..=1000).contains(&self.substeps), "1 to 1000")?;
         let tolerance = self.integrator_tolerance;
         check("integrator tolerance", tolerance, (1e-14..=0.1).contains(&tolerance), "1e-14 to 0.1")?;
-        check("sweeps", self.accuracy.sweeps as f64, (1..=1_000_000).contains(&self.accuracy.sweeps), "1 to 1000000")?;
-        check("solver tolerance", self.accuracy.tolerance, self.accuracy.tolerance >= 0.0, "at least 0")?;
+        check(
+            "sweeps",
+            self.solver_settings.max_sweeps as f64,
+            (1..=1_000_000).contains(&self.solver_settings.max_sweeps),
+            "1 to 1000000",
+        )?;
+        check("solver tolerance", self.solver_settings.tolerance, self.solver_settings.tolerance >= 0.0, "at least 0")?;
         check("contact tolerance", self.contact_tolerance, self.contact_tolerance > 0.0, "above 0 m")?;
         check(
             "drift tolerance",
@@ -120,9 +125,9 @@ impl Settings {
 
 /// A joint that could not be closed where it was led.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OutOfReach {
+pub struct UnreachableJoint {
     /// The constraint.
-    pub closure: ObjectId,
+    pub loop_joint: ObjectId,
     /// How far it is open, metres; 0 where only its angle is.
     pub distance: f64,
     /// The same of its angle, rad, where its distance is not what is furthest off.
@@ -158,11 +163,11 @@ pub struct StepReport {
     pub max_penetration: f64,
     /// The joint that was furthest open where it cannot be closed; `None` where all could.
     #[serde(skip)]
-    pub out_of_reach: Option<OutOfReach>,
+    pub unreachable_joint: Option<UnreachableJoint>,
 }
 
 impl StepReport {
-    pub(crate) fn solved(&mut self, outcome: crate::solver::Outcome, residual: f64) {
+    pub(crate) fn solved(&mut self, outcome: crate::solver::SolveReport, residual: f64) {
         self.residual = self.residual.max(residual);
         self.unconverged += !outcome.converged as u32;
         self.rays += outcome.ray as u32;

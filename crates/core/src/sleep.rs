@@ -18,10 +18,10 @@
 //! ([`Integratable::may_sleep`](crate::Integratable::may_sleep)); beside a constraint that does not name its objects
 //! ([`Constraint::partners`](crate::Constraint::partners)) nothing does.
 
-use crate::detect::Key;
+use crate::detect::ContactKey;
 use crate::object::Constraint;
+use crate::part_state::{PartState, Wrench};
 use crate::row_builder::constraints;
-use crate::site::{Site, Wrench};
 use crate::view::{Entry, Mode, ObjectId};
 use crate::world::Core;
 use serde::{Deserialize, Serialize};
@@ -45,28 +45,28 @@ impl Default for Sleep {
 
 /// Since when an object has been still, and where its parts were then: position and quaternion `x, y, z, w`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Still {
+pub(crate) struct RestTimer {
     pub since: f64,
     pub from: Vec<[f64; 7]>,
 }
 
 /// Objects that fell asleep together. Serials, ascending.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Group {
+pub(crate) struct SleepGroup {
     pub members: Vec<u32>,
     /// What they lie on or hang from that does not move, and where it was.
     pub watched: Vec<(u32, Vec<[f64; 7]>)>,
     /// Forces and torques on the members' parts and freedoms by others than themselves; `None` until the first frame asleep.
     pub load: Option<Vec<f64>>,
     /// Contact forces they fell asleep with.
-    pub warm: Vec<(Key, [f64; 3])>,
+    pub warm: Vec<(ContactKey, [f64; 3])>,
 }
 
 /// The groups, and what was stirred during the frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sleepers {
-    pub groups: Vec<Group>,
-    pub stirred: Vec<u32>,
+    pub groups: Vec<SleepGroup>,
+    pub wake_requests: Vec<u32>,
 }
 
 fn numbers(pose: &Pose) -> [f64; 7] {
@@ -74,12 +74,12 @@ fn numbers(pose: &Pose) -> [f64; 7] {
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 }
 
-fn poses(sites: &[Site]) -> Vec<[f64; 7]> {
-    sites.iter().map(|s| numbers(&s.pose)).collect()
+fn poses(part_states: &[PartState]) -> Vec<[f64; 7]> {
+    part_states.iter().map(|s| numbers(&s.pose)).collect()
 }
 
-fn at_rest(sites: &[Site]) -> bool {
-    sites.iter().all(|s| s.velocity.norm_squared() + s.angular_velocity.norm_squared() == 0.0)
+fn at_rest(part_states: &[PartState]) -> bool {
+    part_states.iter().all(|s| s.velocity.norm_squared() + s.angular_velocity.norm_squared() == 0.0)
 }
 
 /// How far the furthest point of a body of this bounding radius has come at most, metres: the way of its middle, and the chord of its turn.
@@ -90,7 +90,7 @@ fn moved(from: &[f64; 7], to: &[f64; 7], radius: f64) -> f64 {
     way + 2.0 * chord(1.0).min(chord(-1.0)) * radius
 }
 
-impl Group {
+impl SleepGroup {
     /// Whether a snapshot may hold it.
     pub fn sound(&self) -> bool {
         let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
@@ -119,14 +119,15 @@ impl Core {
         self.wake_groups(|_| true);
     }
 
-    fn wake_groups(&mut self, mut which: impl FnMut(&Group) -> bool) {
+    fn wake_groups(&mut self, mut which: impl FnMut(&SleepGroup) -> bool) {
         let (gone, kept) = std::mem::take(&mut self.sleepers.groups).into_iter().partition::<Vec<_>, _>(|g| which(g));
         self.sleepers.groups = kept;
         for group in gone {
             for id in group.members.iter().filter_map(|&s| self.by_serial(s)).collect::<Vec<_>>() {
                 let entry = &mut self.table.slots[id];
                 entry.asleep = false;
-                entry.still = Still { since: self.time, from: poses(&self.sites[entry.span.site.clone()]) };
+                entry.rest_timer =
+                    RestTimer { since: self.time, from: poses(&self.part_states[entry.state_range.parts.clone()]) };
             }
             self.warm.add(group.warm);
         }
@@ -134,7 +135,7 @@ impl Core {
 
     /// Before a frame: wakes those that are pushed, and those whose bed has moved, moves, or is gone.
     pub(crate) fn wake_disturbed(&mut self) {
-        self.sleepers.stirred.clear();
+        self.sleepers.wake_requests.clear();
         if self.sleepers.groups.is_empty() {
             return;
         }
@@ -143,41 +144,41 @@ impl Core {
         self.wake_groups(|_| disturbed.next().unwrap_or(false));
     }
 
-    fn disturbed(&self, group: &Group) -> bool {
+    fn disturbed(&self, group: &SleepGroup) -> bool {
         let pushed = |e: &Entry| self.pushed(e);
-        let bed = |(serial, from): &(u32, Vec<[f64; 7]>)| {
+        let support = |(serial, from): &(u32, Vec<[f64; 7]>)| {
             let Some(e) = self.by_serial(*serial).map(|id| &self.table.slots[id]) else { return true };
-            let sites = &self.sites[e.span.site.clone()];
-            e.moves() || !e.status.alive || !at_rest(sites) || poses(sites) != *from
+            let part_states = &self.part_states[e.state_range.parts.clone()];
+            e.moves() || !e.status.enabled || !at_rest(part_states) || poses(part_states) != *from
         };
         group.members.iter().filter_map(|&s| self.by_serial(s)).any(|id| pushed(&self.table.slots[id]))
-            || group.watched.iter().any(bed)
+            || group.watched.iter().any(support)
     }
 
     /// Whether a user pushes the object during this frame.
     fn pushed(&self, e: &Entry) -> bool {
-        let generalized = self.applied_generalized[e.span.v.clone()].iter().any(|f| *f != 0.0);
-        generalized || self.applied[e.span.site.clone()].iter().any(|w| *w != Wrench::default())
+        let generalized = self.applied_generalized[e.state_range.v.clone()].iter().any(|f| *f != 0.0);
+        generalized || self.applied[e.state_range.parts.clone()].iter().any(|w| *w != Wrench::default())
     }
 
     /// After a frame: whether it stirred a sleeper, so that it must be done again. Notes the loads of those who sleep their first frame.
-    pub(crate) fn stirred(&mut self) -> bool {
+    pub(crate) fn needs_wake(&mut self) -> bool {
         for i in 0..self.sleepers.groups.len() {
             let load = self.load(&self.sleepers.groups[i]);
             let group = &mut self.sleepers.groups[i];
             if group.load.get_or_insert_with(|| load.clone()) != &load {
-                self.sleepers.stirred.push(group.members[0]);
+                self.sleepers.wake_requests.push(group.members[0]);
             }
         }
-        !self.sleepers.stirred.is_empty()
+        !self.sleepers.wake_requests.is_empty()
     }
 
-    fn load(&self, group: &Group) -> Vec<f64> {
+    fn load(&self, group: &SleepGroup) -> Vec<f64> {
         let mut load = Vec::new();
         for id in group.members.iter().filter_map(|&s| self.by_serial(s)) {
-            let span = &self.table.slots[id].span;
-            load.extend(self.forces.generalized.get(span.v.clone()).unwrap_or_default());
-            let wrenches = self.forces.wrenches.get(span.site.clone()).unwrap_or_default();
+            let state_range = &self.table.slots[id].state_range;
+            load.extend(self.forces.generalized.get(state_range.v.clone()).unwrap_or_default());
+            let wrenches = self.forces.wrenches.get(state_range.parts.clone()).unwrap_or_default();
             load.extend(
                 wrenches.iter().flat_map(|w| w.torque.iter().chain(w.force.iter()).copied().collect::<Vec<_>>()),
             );
@@ -186,15 +187,15 @@ impl Core {
     }
 
     /// Wakes those whom the frame stirred; the state is that before it again.
-    pub(crate) fn wake_stirred(&mut self) {
-        let stirred = std::mem::take(&mut self.sleepers.stirred);
-        self.wake_groups(|g| stirred.iter().any(|s| g.members.binary_search(s).is_ok()));
+    pub(crate) fn wake_requested(&mut self) {
+        let wake_requests = std::mem::take(&mut self.sleepers.wake_requests);
+        self.wake_groups(|g| wake_requests.iter().any(|s| g.members.binary_search(s).is_ok()));
     }
 
     /// After a frame: the islands that have been still for long enough fall asleep.
     pub(crate) fn fall_asleep(&mut self) {
         let Some(sleep) = self.settings.sleep else { return };
-        let ready = self.still_for(&sleep);
+        let ready = self.at_rest_for(&sleep);
         if !ready.contains(&true) {
             return;
         }
@@ -204,7 +205,7 @@ impl Core {
         };
         let mut ready = ready;
         let mut parent: Vec<usize> = (0..ready.len()).collect();
-        let mut beds: Vec<(usize, ObjectId)> = Vec::new();
+        let mut supports: Vec<(usize, ObjectId)> = Vec::new();
         for [a, b] in bonds {
             let (Some(i), Some(j)) = (place(a), place(b)) else { continue };
             let (one, other) = (&self.table.slots[a], &self.table.slots[b]);
@@ -214,9 +215,9 @@ impl Core {
                     parent[i.max(j)] = i.min(j);
                 }
                 (true, false) | (false, true) => {
-                    let (mover, bed) = if one.moves() { (i, b) } else { (j, a) };
-                    ready[mover] &= at_rest(&self.sites[self.table.slots[bed].span.site.clone()]);
-                    beds.push((mover, bed));
+                    let (mover, support) = if one.moves() { (i, b) } else { (j, a) };
+                    ready[mover] &= at_rest(&self.part_states[self.table.slots[support].state_range.parts.clone()]);
+                    supports.push((mover, support));
                 }
                 (false, false) => {}
             }
@@ -228,14 +229,15 @@ impl Core {
         }
         for r in (0..parent.len()).filter(|&r| roots[r] == r && calm[r] && ready[r]) {
             let members: Vec<usize> = (r..parent.len()).filter(|&i| roots[i] == r).collect();
-            let watched = beds.iter().filter(|(mover, _)| roots[*mover] == r).map(|(_, bed)| *bed).collect();
-            self.lay_down(&members, watched);
+            let watched =
+                supports.iter().filter(|(mover, _)| roots[*mover] == r).map(|(_, support)| *support).collect();
+            self.put_to_sleep(&members, watched);
         }
-        self.motion().refresh();
+        self.integration().refresh();
     }
 
     /// Which objects, in their order, have been still for as long as `sleep` asks; begins anew for those that moved.
-    fn still_for(&mut self, sleep: &Sleep) -> Vec<bool> {
+    fn at_rest_for(&mut self, sleep: &Sleep) -> Vec<bool> {
         let mut ready = Vec::with_capacity(self.table.order.len());
         for &id in &self.table.order {
             let entry = &self.table.slots[id];
@@ -243,7 +245,7 @@ impl Core {
                 ready.push(false);
                 continue;
             }
-            let now = poses(&self.sites[entry.span.site.clone()]);
+            let now = poses(&self.part_states[entry.state_range.parts.clone()]);
             let radius = |part: usize| {
                 entry
                     .object
@@ -255,11 +257,11 @@ impl Core {
             };
             let far =
                 |(part, (from, to)): (usize, (&[f64; 7], &[f64; 7]))| moved(from, to, radius(part)) > sleep.within;
-            let from = &entry.still.from;
+            let from = &entry.rest_timer.from;
             let restless = from.len() != now.len() || self.pushed(entry) || from.iter().zip(&now).enumerate().any(far);
-            ready.push(!restless && self.time - entry.still.since >= sleep.after);
+            ready.push(!restless && self.time - entry.rest_timer.since >= sleep.after);
             if restless {
-                self.table.slots[id].still = Still { since: self.time, from: now };
+                self.table.slots[id].rest_timer = RestTimer { since: self.time, from: now };
             }
         }
         ready
@@ -281,22 +283,22 @@ impl Core {
         Some(bonds)
     }
 
-    fn lay_down(&mut self, members: &[usize], watched: Vec<ObjectId>) {
-        let mut group = Group::default();
+    fn put_to_sleep(&mut self, members: &[usize], watched: Vec<ObjectId>) {
+        let mut group = SleepGroup::default();
         for &i in members {
             let id = self.table.order[i];
             let entry = &mut self.table.slots[id];
             entry.asleep = true;
             group.members.push(entry.serial);
             if let Some(body) = entry.object.integratable() {
-                body.write_velocity(&mut self.x[entry.span.x.clone()], &vec![0.0; entry.span.v.len()]);
+                body.write_velocity(&mut self.x[entry.state_range.x.clone()], &vec![0.0; entry.state_range.v.len()]);
             }
         }
-        let bed = |id: &ObjectId| {
+        let support = |id: &ObjectId| {
             let e = &self.table.slots[*id];
-            (e.serial, poses(&self.sites[e.span.site.clone()]))
+            (e.serial, poses(&self.part_states[e.state_range.parts.clone()]))
         };
-        group.watched = watched.iter().map(bed).collect();
+        group.watched = watched.iter().map(support).collect();
         group.watched.sort_by_key(|w| w.0);
         group.watched.dedup_by_key(|w| w.0);
         let ours = |serial: &u32| group.members.binary_search(serial).is_ok();
@@ -314,8 +316,10 @@ fn root(parent: &[usize], mut i: usize) -> usize {
 
 impl Entry {
     /// Whether it comes towards others by itself: moved by forces, or led with a velocity.
-    pub fn comes(&self, sites: &[Site]) -> bool {
+    pub fn approaches(&self, part_states: &[PartState]) -> bool {
         self.moves()
-            || (self.status.alive && self.status.mode == Mode::Kinematic && !at_rest(&sites[self.span.site.clone()]))
+            || (self.status.enabled
+                && self.status.mode == Mode::Kinematic
+                && !at_rest(&part_states[self.state_range.parts.clone()]))
     }
 }

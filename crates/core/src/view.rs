@@ -1,8 +1,8 @@
 //! The table of objects and the read-only view of the world that objects are given.
 
 use crate::object::Object;
-use crate::site::{Site, Span};
-use crate::sleep::Still;
+use crate::part_state::{PartState, StateRange};
+use crate::sleep::RestTimer;
 use slotmap::{SlotMap, new_key_type};
 use tumble_collide::Vec3;
 
@@ -29,44 +29,44 @@ pub struct Status {
     /// How it takes part.
     pub mode: Mode,
     /// Not alive: neither moves, nor collides, nor acts, until it is alive again.
-    pub alive: bool,
+    pub enabled: bool,
     /// Whether its parts meet others.
     pub collidable: bool,
 }
 
 impl Default for Status {
     fn default() -> Status {
-        Status { mode: Mode::Dynamic, alive: true, collidable: true }
+        Status { mode: Mode::Dynamic, enabled: true, collidable: true }
     }
 }
 
 impl Status {
     /// Whether impulses move it.
     pub fn moves(&self) -> bool {
-        self.alive && self.mode == Mode::Dynamic
+        self.enabled && self.mode == Mode::Dynamic
     }
 }
 
 /// An object and its place.
 pub(crate) struct Entry {
     pub object: Box<dyn Object>,
-    pub span: Span,
+    pub state_range: StateRange,
     pub status: Status,
     /// Never used twice in a world: what warm starts are filed under.
     pub serial: u32,
     /// Left out of the steps until something stirs it.
     pub asleep: bool,
-    pub still: Still,
+    pub rest_timer: RestTimer,
 }
 
 impl Entry {
-    pub fn new(object: Box<dyn Object>, span: Span, status: Status, serial: u32) -> Entry {
-        Entry { object, span, status, serial, asleep: false, still: Still::default() }
+    pub fn new(object: Box<dyn Object>, state_range: StateRange, status: Status, serial: u32) -> Entry {
+        Entry { object, state_range, status, serial, asleep: false, rest_timer: RestTimer::default() }
     }
 
     /// Whether it takes part in dynamics: dynamic, alive, and with a state; awake or asleep.
     pub fn dynamic(&self) -> bool {
-        self.status.moves() && !self.span.v.is_empty()
+        self.status.moves() && !self.state_range.v.is_empty()
     }
 
     /// Whether forces and impulses move it: dynamic and awake.
@@ -77,8 +77,12 @@ impl Entry {
 
 impl Clone for Entry {
     fn clone(&self) -> Entry {
-        let (asleep, still) = (self.asleep, self.still.clone());
-        Entry { asleep, still, ..Entry::new(self.object.fork(), self.span.clone(), self.status, self.serial) }
+        let (asleep, rest_timer) = (self.asleep, self.rest_timer.clone());
+        Entry {
+            asleep,
+            rest_timer,
+            ..Entry::new(self.object.fork(), self.state_range.clone(), self.status, self.serial)
+        }
     }
 }
 
@@ -114,7 +118,7 @@ pub struct WorldView<'a> {
     /// The state `X` at this stage.
     pub x: &'a [f64],
     /// The site table at this stage.
-    pub sites: &'a [Site],
+    pub part_states: &'a [PartState],
     pub(crate) table: &'a Table,
 }
 
@@ -131,13 +135,13 @@ impl WorldView<'_> {
     }
 
     /// Where an object's numbers lie.
-    pub fn span(&self, id: ObjectId) -> Option<&Span> {
-        self.table.slots.get(id).map(|e| &e.span)
+    pub fn state_range(&self, id: ObjectId) -> Option<&StateRange> {
+        self.table.slots.get(id).map(|e| &e.state_range)
     }
 
     /// The site of one part.
-    pub fn site(&self, id: ObjectId, part: usize) -> Option<&Site> {
-        self.sites[self.span(id)?.site.clone()].get(part)
+    pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
+        self.part_states[self.state_range(id)?.parts.clone()].get(part)
     }
 
     /// An object's switches.

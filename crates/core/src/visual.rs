@@ -3,7 +3,7 @@
 //! A mesh that is only drawn is read when somebody draws it, and is never checked for being closed: a world that nobody looks at does not pay for its
 //! pictures. What cannot be read is not drawn, and [`VisualMesh::fault`] says why from then on.
 
-use crate::object::Look;
+use crate::object::Appearance;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 use tumble_collide::{MeshError, Pose, Shape, TriMesh, Vec3};
@@ -18,7 +18,7 @@ pub struct Visual {
     /// Geometry.
     pub geometry: VisualGeometry,
     /// Look.
-    pub look: Look,
+    pub appearance: Appearance,
     /// If not empty: drawn only where none of these can be read.
     pub stands_in_for: Vec<Arc<VisualMesh>>,
 }
@@ -43,13 +43,13 @@ pub enum Drawn<'v> {
 
 impl Visual {
     /// A shape at a pose in the part's frame.
-    pub fn shape(part: usize, pose: Pose, shape: Shape, look: Look) -> Visual {
-        Visual { part, pose, geometry: VisualGeometry::Shape(shape), look, stands_in_for: Vec::new() }
+    pub fn shape(part: usize, pose: Pose, shape: Shape, appearance: Appearance) -> Visual {
+        Visual { part, pose, geometry: VisualGeometry::Shape(shape), appearance, stands_in_for: Vec::new() }
     }
 
     /// A mesh at a pose in the part's frame.
-    pub fn mesh(part: usize, pose: Pose, mesh: Arc<VisualMesh>, look: Look) -> Visual {
-        Visual { part, pose, geometry: VisualGeometry::Mesh(mesh), look, stands_in_for: Vec::new() }
+    pub fn mesh(part: usize, pose: Pose, mesh: Arc<VisualMesh>, appearance: Appearance) -> Visual {
+        Visual { part, pose, geometry: VisualGeometry::Mesh(mesh), appearance, stands_in_for: Vec::new() }
     }
 
     /// What is to be drawn, its mesh read if nobody has before. `None` where it cannot be read, or stands in for what can.
@@ -156,7 +156,7 @@ mod tests {
             count.fetch_add(1, Relaxed);
             Ok(Arc::new(triangle()))
         }));
-        let visual = Visual::mesh(0, Pose::translation(0.0, 0.0, 2.0), mesh.clone(), Look::default());
+        let visual = Visual::mesh(0, Pose::translation(0.0, 0.0, 2.0), mesh.clone(), Appearance::default());
         assert!(!mesh.is_read() && mesh.fault().is_none() && reads.load(Relaxed) == 0);
         let copy = visual.clone();
         assert!(matches!(visual.drawn(), Some(Drawn::Mesh(read)) if **read == triangle()));
@@ -175,7 +175,7 @@ mod tests {
         let lost = Arc::new(VisualMesh::read_by("lost", move || Ok(Arc::new(bad.clone()))));
         let gone = Arc::new(VisualMesh::read_by("gone", || Err("there is none".into())));
         let there = Arc::new(VisualMesh::new("there", triangle()).unwrap());
-        let ball = Visual::shape(0, Pose::identity(), Shape::sphere(1.0).unwrap(), Look::default());
+        let ball = Visual::shape(0, Pose::identity(), Shape::sphere(1.0).unwrap(), Appearance::default());
         let instead = |meshes: &[&Arc<VisualMesh>]| Visual {
             stands_in_for: meshes.iter().map(|mesh| (*mesh).clone()).collect(),
             ..ball.clone()
@@ -183,7 +183,7 @@ mod tests {
         assert!(ball.drawn().is_some());
         assert!(instead(&[&lost, &gone]).drawn().is_some(), "neither can be read");
         assert!(instead(&[&lost, &there]).drawn().is_none(), "one can be read");
-        assert!(Visual::mesh(0, Pose::identity(), gone.clone(), Look::default()).drawn().is_none());
+        assert!(Visual::mesh(0, Pose::identity(), gone.clone(), Appearance::default()).drawn().is_none());
         assert_eq!(gone.fault(), Some("there is none"));
         assert_eq!(lost.fault(), Some("vertex 2 is (NaN, 0, 0), but coordinates must be finite"));
     }

@@ -25,12 +25,12 @@ pub fn names(world: &World) -> Vec<String> {
 
 fn name(world: &World, id: ObjectId, part: usize) -> String {
     let name = world.object(id).map_or("", |o| o.name());
-    let several = world.view().span(id).is_some_and(|span| span.site.len() > 1);
+    let several = world.view().state_range(id).is_some_and(|span| span.parts.len() > 1);
     if several { format!("{name}/{part}") } else { name.to_owned() }
 }
 
 fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {
-    let parts = |id: ObjectId| world.view().span(id).map_or(0, |span| span.site.len());
+    let parts = |id: ObjectId| world.view().state_range(id).map_or(0, |span| span.parts.len());
     world.ids().iter().flat_map(move |&id| (0..parts(id)).map(move |part| (id, part)))
 }
 
@@ -39,7 +39,7 @@ fn entity(world: &World, id: ObjectId, part: usize) -> Entity {
     let visuals = object.and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
     let center = world.get::<RigidBody>(id).map_or(Vec3::zeros(), RigidBody::center_of_mass);
     let parts = visuals.iter().filter(|v| v.part == part).filter_map(|v| {
-        let [r, g, b] = v.look.color;
+        let [r, g, b] = v.appearance.color;
         let color = [r, g, b, 1.0].map(f64::from).map(|c| c as _);
         let placed = Translation3::from(center) * v.pose;
         Some(VisualPart { shape: drawn(v.drawn()?), pose: pose(&placed), color })

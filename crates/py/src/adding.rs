@@ -36,7 +36,7 @@ pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>,
     match (mass, density) {
         (Some(mass), None) => Ok(Rigid::with_mass(name, solid, mass)?),
         (None, Some(density)) => Ok(Rigid::with_density(name, solid, density)?),
-        (None, None) if led => Ok(Rigid::fixture(name, solid)),
+        (None, None) if led => Ok(Rigid::fixed(name, solid)),
         _ => Err(Error::value(format!("body '{name}': wanted a mass or a density, and one of the two alone"))),
     }
 }

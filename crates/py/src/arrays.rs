@@ -7,7 +7,7 @@ use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Vec3;
-use tumble::dynamics::{Site, Wrench};
+use tumble::dynamics::{PartState, Wrench};
 
 /// Numbers of a row: position, quaternion, velocity, angular velocity, acceleration, angular acceleration.
 const WIDTHS: [usize; 6] = [3, 4, 3, 3, 3, 3];
@@ -47,7 +47,7 @@ impl Arrays {
     }
 
     /// Writes the sites, and zeros for what will act.
-    pub fn fill(&self, py: Python<'_>, sites: &[Site]) -> Result<()> {
+    pub fn fill(&self, py: Python<'_>, sites: &[PartState]) -> Result<()> {
         let [position, orientation, velocity, angular_velocity, acceleration, angular_acceleration] = &self.shown;
         copy(py, position, sites, |s| s.position().into())?;
         copy(py, orientation, sites, |s| s.pose.rotation.coords.into())?;
@@ -94,8 +94,8 @@ impl Arrays {
 fn copy<const N: usize>(
     py: Python<'_>,
     (array, _): &Column,
-    sites: &[Site],
-    get: impl Fn(&Site) -> [f64; N],
+    sites: &[PartState],
+    get: impl Fn(&PartState) -> [f64; N],
 ) -> Result<()> {
     let mut out = array.bind(py).try_readwrite().map_err(PyErr::from)?;
     let rows = out.as_slice_mut().map_err(PyErr::from)?.as_chunks_mut().0;

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::{ArticulatedBody, Freedom};
+use tumble::dynamics::{ArticulatedBody, DofSettings};
 use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A tree of links: a robot, a chain, a skeleton.
@@ -304,8 +304,8 @@ impl Articulation {
         let drive = drive(target, velocity, stiffness, damping, limit)?;
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
-            let freedom = Freedom { drive, ..body.freedoms()[index].clone() };
-            Ok(body.set_freedom(index, freedom)?)
+            let freedom = DofSettings { drive, ..body.dofs()[index].clone() };
+            Ok(body.set_dof(index, freedom)?)
         })
     }
 

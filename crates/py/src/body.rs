@@ -13,7 +13,7 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::{Mode, ObjectId, RigidBody as Rigid, Site, Status};
+use tumble::dynamics::{Mode, ObjectId, PartState, RigidBody as Rigid, Status};
 
 /// Where a handle points: a world, an object of it, and the name it had.
 #[derive(Clone)]
@@ -51,8 +51,8 @@ impl Place {
     }
 
     /// The site of one part.
-    pub fn site(&self, part: usize) -> Result<Site> {
-        self.read(|inner| inner.world.site(self.id, part).copied())
+    pub fn site(&self, part: usize) -> Result<PartState> {
+        self.read(|inner| inner.world.part_state(self.id, part).copied())
     }
 
     /// Pose of a rigid body's frame.
@@ -100,7 +100,7 @@ impl RigidBody {
     fn set_motion(&self, py: Python<'_>, velocity: Option<Vec3>, angular: Option<Vec3>) -> Result<()> {
         let place = &self.place;
         place.write(py, |inner| {
-            let site = *inner.world.site(place.id, 0).ok_or_else(|| place.removed())?;
+            let site = *inner.world.part_state(place.id, 0).ok_or_else(|| place.removed())?;
             Ok(inner.world.set_velocity(
                 place.id,
                 velocity.unwrap_or(site.velocity),
@@ -219,7 +219,7 @@ impl RigidBody {
     #[setter]
     fn set_mode(&self, py: Python<'_>, value: &str) -> Result<()> {
         let mode = meaning("mode", value, MODES)?;
-        if mode == Mode::Dynamic && self.constant(Rigid::is_fixture)? {
+        if mode == Mode::Dynamic && self.constant(Rigid::is_fixed)? {
             return Err(Error::value(format!(
                 "'{}' has no mass: it was added as static, and cannot be dynamic",
                 self.place.name
@@ -231,12 +231,12 @@ impl RigidBody {
     /// Whether it takes part in anything at all; its state stays while it does not.
     #[getter]
     fn alive(&self) -> Result<bool> {
-        Ok(self.place.status()?.alive)
+        Ok(self.place.status()?.enabled)
     }
 
     #[setter]
     fn set_alive(&self, py: Python<'_>, value: bool) -> Result<()> {
-        self.place.write(py, |inner| Ok(inner.world.set_alive(self.place.id, value)?))
+        self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
     }
 
     /// Whether it sleeps: left out of the steps until something touches it (``World(sleep_after=…)``). What is done to it wakes it.
@@ -321,8 +321,8 @@ impl RigidBody {
     fn apply_force(&self, py: Python<'_>, force: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<()> {
         let (force, point) = (vec3(force, "force")?, point.map(|p| vec3(p, "point")).transpose()?);
         self.place.write(py, |inner| {
-            let at =
-                point.unwrap_or(inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+            let at = point
+                .unwrap_or(inner.world.part_state(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
             Ok(inner.world.apply_force(self.place.id, 0, force, &at)?)
         })
     }
@@ -343,8 +343,8 @@ impl RigidBody {
     ) -> Result<()> {
         let (impulse, point) = (vec3(impulse, "impulse")?, point.map(|p| vec3(p, "point")).transpose()?);
         self.place.write(py, |inner| {
-            let at =
-                point.unwrap_or(inner.world.site(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+            let at = point
+                .unwrap_or(inner.world.part_state(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
             Ok(inner.world.apply_impulse(self.place.id, 0, impulse, &at)?)
         })
     }

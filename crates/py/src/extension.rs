@@ -13,7 +13,7 @@ use crate::view::View;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::{Arc, Mutex, MutexGuard};
-use tumble::dynamics::{Checkpoint, ForceGenerator, Forces, Mode, Object, ObjectId, Span, WorldView, Wrench};
+use tumble::dynamics::{Checkpoint, ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, WorldView, Wrench};
 
 /// A Python object that is called, which rows are whose, and what it raised.
 struct Code {
@@ -78,7 +78,7 @@ impl Code {
                 Some(arrays) => arrays,
                 None => Arc::new(Arrays::new(py, layout.len())?),
             };
-            arrays.fill(py, &layout.shown(world.sites))?;
+            arrays.fill(py, &layout.shown(world.part_states))?;
             let view = Bound::new(py, View::new(world, &layout, &arrays))?;
             let object = self.object.bind(py);
             let outcome = match rows {
@@ -94,7 +94,7 @@ impl Code {
                 )));
             }
             arrays.take(py, &layout, &self.name, |row, wrench| {
-                let (site, wrench) = layout.at_site(row, world.sites, wrench);
+                let (site, wrench) = layout.at_site(row, world.part_states, wrench);
                 each(site, wrench);
             })?;
             *lock(&self.arrays) = Some(arrays);
@@ -123,7 +123,7 @@ impl Object for PythonForce {
 }
 
 impl ForceGenerator for PythonForce {
-    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
         // after an error the rest of the frame is of no use
         if lock(&self.code.raised).is_some() {
             return;
@@ -196,13 +196,13 @@ impl Inner {
     pub fn extended_frame(&mut self) -> Result<()> {
         // what could not be forked
         self.take_raised()?;
-        self.world.mark(&mut self.extension.before);
+        self.world.checkpoint(&mut self.extension.before);
         let outcome = self.behave().and_then(|()| {
             let outcome = self.frame();
             self.take_raised().map(|()| outcome)
         });
         outcome.unwrap_or_else(|raised| {
-            self.world.go_back(&self.extension.before);
+            self.world.roll_back(&self.extension.before);
             Err(raised)
         })
     }
@@ -218,13 +218,13 @@ impl Inner {
             }
             let mut wrenches = Vec::new();
             code.call(&view, "act", Some(&rows), |site, wrench| wrenches.push((site, wrench)))?;
-            let mut owners = vec![None; view.sites.len()];
-            for (id, span) in view.ids().iter().filter_map(|&id| Some((id, view.span(id)?))) {
-                span.site.clone().enumerate().for_each(|(part, site)| owners[site] = Some((id, part)));
+            let mut owners = vec![None; view.part_states.len()];
+            for (id, span) in view.ids().iter().filter_map(|&id| Some((id, view.state_range(id)?))) {
+                span.parts.clone().enumerate().for_each(|(part, site)| owners[site] = Some((id, part)));
             }
             for (site, wrench) in wrenches.into_iter().filter(|(_, wrench)| *wrench != Wrench::default()) {
                 let Some((id, part)) = owners[site] else { continue };
-                let Some(point) = self.world.site(id, part).map(|site| site.position()) else { continue };
+                let Some(point) = self.world.part_state(id, part).map(|site| site.position()) else { continue };
                 self.world.apply_force(id, part, wrench.force, &point)?;
                 self.world.apply_torque(id, part, wrench.torque)?;
             }

@@ -109,7 +109,8 @@ impl Inner {
         let mut write = |from: &[f64]| -> Result<()> {
             let ids = self.world.ids().to_vec();
             for id in ids {
-                let Some(span) = self.world.view().span(id).map(|span| span.x.clone()).filter(|x| !x.is_empty()) else {
+                let Some(span) = self.world.view().state_range(id).map(|span| span.x.clone()).filter(|x| !x.is_empty())
+                else {
                     continue;
                 };
                 self.world.write_state_of(id, &from[span])?;

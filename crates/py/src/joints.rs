@@ -69,7 +69,7 @@ impl Articulation {
         let point = point.map(|p| vec3(p, "point")).transpose()?;
         let frame = self.robot.frame(link)?.pose;
         place.write(py, |inner| {
-            let site = inner.world.site(place.id, part).ok_or_else(|| place.removed())?;
+            let site = inner.world.part_state(place.id, part).ok_or_else(|| place.removed())?;
             let at = point.unwrap_or((site.pose * frame).translation.vector);
             apply(inner, place, part, at)
         })

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use tumble::collide::Vec3;
-use tumble::dynamics::{ArticulatedBody, ObjectId, RigidBody as Rigid, Site, WorldView, Wrench};
+use tumble::dynamics::{ArticulatedBody, ObjectId, PartState, RigidBody as Rigid, WorldView, Wrench};
 
 /// Which rows belong to whom: made once and kept until objects come or go.
 pub struct Layout {
@@ -33,12 +33,12 @@ pub struct Row {
 
 impl Row {
     /// From the site to the centre of mass, world axes, m.
-    fn arm(&self, sites: &[Site]) -> Vec3 {
+    fn arm(&self, sites: &[PartState]) -> Vec3 {
         sites[self.site].pose.rotation * self.center
     }
 
     /// The centre of mass as a site.
-    fn shown(&self, sites: &[Site]) -> Site {
+    fn shown(&self, sites: &[PartState]) -> PartState {
         let (mut site, arm) = (sites[self.site], self.arm(sites));
         let spin = site.angular_velocity;
         site.acceleration += site.angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
@@ -56,12 +56,12 @@ impl Layout {
             objects: Vec::new(),
             links: Vec::new(),
             rows: Vec::new(),
-            sites: view.sites.len(),
+            sites: view.part_states.len(),
             plain: true,
         };
         for &id in view.ids() {
-            let (Some(span), Some(object)) = (view.span(id), view.object(id)) else { continue };
-            if span.site.is_empty() {
+            let (Some(span), Some(object)) = (view.state_range(id), view.object(id)) else { continue };
+            if span.parts.is_empty() {
                 continue;
             }
             let first = layout.rows.len();
@@ -71,7 +71,7 @@ impl Layout {
                     let moving = links.iter().enumerate().map(|(i, link)| (i, link.mass.center, link.mass.mass, true));
                     let rows = moving.chain([(links.len(), Vec3::zeros(), 0.0, false)]);
                     layout.rows.extend(rows.map(|(part, center, mass, may_move)| Row {
-                        site: span.site.start + part,
+                        site: span.parts.start + part,
                         center,
                         mass,
                         may_move,
@@ -85,8 +85,8 @@ impl Layout {
                     layout.plain = false;
                 }
                 None => {
-                    let mass = view.get::<Rigid>(id).filter(|body| !body.is_fixture()).map_or(0.0, |body| body.mass());
-                    layout.rows.extend(span.site.clone().map(|site| Row {
+                    let mass = view.get::<Rigid>(id).filter(|body| !body.is_fixed()).map_or(0.0, |body| body.mass());
+                    layout.rows.extend(span.parts.clone().map(|site| Row {
                         site,
                         center: Vec3::zeros(),
                         mass,
@@ -101,7 +101,7 @@ impl Layout {
 
     /// Whether it still holds.
     pub fn fits(&self, view: &WorldView) -> bool {
-        self.ids == view.ids() && self.sites == view.sites.len()
+        self.ids == view.ids() && self.sites == view.part_states.len()
     }
 
     /// Number of rows.
@@ -110,12 +110,12 @@ impl Layout {
     }
 
     /// The rows as sites.
-    pub fn shown<'a>(&self, sites: &'a [Site]) -> Cow<'a, [Site]> {
+    pub fn shown<'a>(&self, sites: &'a [PartState]) -> Cow<'a, [PartState]> {
         if self.plain { Cow::Borrowed(sites) } else { self.rows.iter().map(|row| row.shown(sites)).collect() }
     }
 
     /// The site that a row belongs to, and what a wrench at the row is there.
-    pub fn at_site(&self, row: usize, sites: &[Site], mut wrench: Wrench) -> (usize, Wrench) {
+    pub fn at_site(&self, row: usize, sites: &[PartState], mut wrench: Wrench) -> (usize, Wrench) {
         let row = &self.rows[row];
         if !self.plain {
             wrench.torque += row.arm(sites).cross(&wrench.force);

@@ -1,7 +1,7 @@
 //! What bodies look like that are made in a program and not by a scene.
 
 use tumble::collide::Shape;
-use tumble::dynamics::{Look, Renderable, RigidBody as Rigid};
+use tumble::dynamics::{Appearance, Renderable, RigidBody as Rigid};
 
 /// Colours that new bodies take in turn, sRGB.
 const PALETTE: [[f32; 3]; 7] = [
@@ -17,38 +17,38 @@ const PALETTE: [[f32; 3]; 7] = [
 /// A body as it looks unless told otherwise: the `count`th colour; planes are a grey checkerboard of half a metre, other static geometry is grey.
 pub fn usual(body: Rigid, count: usize) -> Rigid {
     let plane = matches!(body.shape(), Shape::HalfSpace);
-    let look = match (plane, body.is_fixture()) {
-        (true, _) => Look {
+    let appearance = match (plane, body.is_fixed()) {
+        (true, _) => Appearance {
             color: [0.62, 0.64, 0.66],
             roughness: 0.8,
             shader: "checker".into(),
             properties: [("second_r", 0.50), ("second_g", 0.52), ("second_b", 0.54), ("scale_m", 0.5)]
                 .map(|(key, value)| (key.into(), value))
                 .to_vec(),
-            ..Look::default()
+            ..Appearance::default()
         },
         (_, true) => return body,
-        _ => Look { color: PALETTE[count % PALETTE.len()], ..Look::default() },
+        _ => Appearance { color: PALETTE[count % PALETTE.len()], ..Appearance::default() },
     };
-    looking(body, look)
+    looking(body, appearance)
 }
 
 /// The body in a plain colour, sRGB, each 0 to 1.
 pub fn colored(body: Rigid, color: [f64; 3]) -> Rigid {
-    looking(body, Look { color: color.map(|c| c as f32), ..Look::default() })
+    looking(body, Appearance { color: color.map(|c| c as f32), ..Appearance::default() })
 }
 
-fn looking(body: Rigid, look: Look) -> Rigid {
+fn looking(body: Rigid, appearance: Appearance) -> Rigid {
     let visuals = body
         .visuals()
         .iter()
         .cloned()
-        .map(|visual| tumble::dynamics::Visual { look: look.clone(), ..visual })
+        .map(|visual| tumble::dynamics::Visual { appearance: appearance.clone(), ..visual })
         .collect();
     body.drawn_as(visuals)
 }
 
 /// The colour of what is first drawn of it.
 pub fn color(body: &Rigid) -> [f64; 3] {
-    body.visuals().first().map_or([0.0; 3], |visual| visual.look.color.map(f64::from))
+    body.visuals().first().map_or([0.0; 3], |visual| visual.appearance.color.map(f64::from))
 }

@@ -51,10 +51,10 @@ impl StepReport {
             rays,
             iterations,
             max_penetration,
-            out_of_reach,
+            unreachable_joint: out_of_reach,
             asleep,
         } = *world.report();
-        let name = out_of_reach.and_then(|o| Some(world.object(o.closure)?.name().to_string()));
+        let name = out_of_reach.and_then(|o| Some(world.object(o.loop_joint)?.name().to_string()));
         StepReport {
             substeps,
             tries,

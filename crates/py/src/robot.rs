@@ -9,7 +9,7 @@ use crate::pool;
 use rayon::prelude::*;
 use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::articulated::{
-    BatchDynamics, Dynamics, Frame, InverseDynamics, Kinematics, Lanes, MassMatrix, Model, center_of_mass,
+    BatchDynamics, Dynamics, InverseDynamics, Kinematics, Lanes, LinkFrame, MassMatrix, Model, center_of_mass,
     forward_dynamics, inverse_dynamics, link_jacobian, normalize,
 };
 
@@ -156,7 +156,7 @@ impl Robot {
     }
 
     /// A named frame, or the error that says which there are.
-    pub fn frame(&self, link: &str) -> Result<&Frame> {
+    pub fn frame(&self, link: &str) -> Result<&LinkFrame> {
         self.model.frame(link).ok_or_else(|| {
             let names: Vec<&str> = self.model.frames().iter().map(|f| f.name.as_str()).take(12).collect();
             Error::Name(format!("there is no link named '{link}'; there are {}", names.join(", ")))
@@ -220,7 +220,7 @@ impl Robot {
     }
 
     /// Angular, then linear velocity of a frame's origin per unit of each velocity, world axes: 6 rows.
-    pub fn jacobian(&self, frame: &Frame, rows: &mut Rows) -> Result<Vec<f64>> {
+    pub fn jacobian(&self, frame: &LinkFrame, rows: &mut Rows) -> Result<Vec<f64>> {
         let dof = self.dof();
         self.at_positions(rows, 6 * dof, |kin, _, out| {
             let Some(link) = frame.link else { return };

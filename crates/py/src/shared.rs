@@ -112,9 +112,9 @@ fn apart<T>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(Python<'_>, &mu
     if inner.extension.is_empty() || !inner.shown.alive(py) {
         return call(py, inner);
     }
-    inner.world.set_state_aside();
+    inner.world.freeze_state_memory();
     let outcome = call(py, inner);
-    inner.world.show_state();
+    inner.world.thaw_state_memory();
     outcome
 }
 

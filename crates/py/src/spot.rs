@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard};
 use tumble::collide::Vec3;
-use tumble::dynamics::{ArticulatedBody, Freedom};
+use tumble::dynamics::{ArticulatedBody, DofSettings};
 use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A description by itself, or one in a world.
@@ -23,7 +23,7 @@ pub enum Spot {
 pub struct Source {
     pub file: PathBuf,
     pub options: UrdfOptions,
-    pub freedoms: Vec<Freedom>,
+    pub freedoms: Vec<DofSettings>,
 }
 
 /// The numbers of a description.
@@ -140,11 +140,11 @@ impl Spot {
     }
 
     /// Limits and drives of its freedoms.
-    pub fn freedoms(&self) -> Result<Vec<Freedom>> {
+    pub fn freedoms(&self) -> Result<Vec<DofSettings>> {
         match self {
             Spot::Free { source, .. } => Ok(source.freedoms.clone()),
             Spot::Placed(place) => {
-                place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.freedoms().to_vec()))
+                place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.dofs().to_vec()))
             }
         }
     }
@@ -159,7 +159,7 @@ pub fn locked(now: &Mutex<Now>) -> MutexGuard<'_, Now> {
 pub fn start(body: &ArticulatedBody) -> Vec<f64> {
     use tumble::dynamics::Object;
     let Some(own) = body.integratable() else { return Vec::new() };
-    let mut x = vec![0.0; own.dims().x];
+    let mut x = vec![0.0; own.state_sizes().x];
     own.write_initial(&mut x);
     x
 }

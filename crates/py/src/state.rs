@@ -1,6 +1,6 @@
 //! The state as numpy sees it: the world's own memory, not a copy. The only `unsafe` of the package is here.
 //!
-//! An array looks straight into the memory that the world steps in ([`World::hold_state`]); making one, and stepping under it, copies nothing. When a body
+//! An array looks straight into the memory that the world steps in ([`World::hold_state_memory`]); making one, and stepping under it, copies nothing. When a body
 //! comes or goes the world moves to new memory once, and old arrays keep the old. Why this is sound:
 //!
 //! - *The memory stays.* The world writes it in place and never gives it back while a hold lives; each array keeps a [`Memory`] alive, which has one.
@@ -19,12 +19,12 @@ use numpy::ndarray::ArrayView1;
 use pyo3::prelude::*;
 use pyo3::types::{PyWeakrefMethods, PyWeakrefReference};
 use std::sync::Arc;
-use tumble::dynamics::{StateHold, World};
+use tumble::dynamics::{StateMemoryHold, World};
 
 /// Keeps alive what an array looks into.
 #[pyclass(frozen, module = "tumble", name = "_Memory")]
 struct Memory {
-    _hold: Arc<StateHold>,
+    _hold: Arc<StateMemoryHold>,
 }
 
 /// The array that views look at, while anybody holds one, and where it looks.
@@ -60,7 +60,7 @@ impl Shown {
 
 /// An array over the memory of a world's state.
 fn over<'py>(py: Python<'py>, world: &mut World) -> PyResult<Bound<'py, PyAny>> {
-    let keeper = Bound::new(py, Memory { _hold: world.hold_state() })?.into_any();
+    let keeper = Bound::new(py, Memory { _hold: world.hold_state_memory() })?.into_any();
     let (start, len) = world.state_address();
     // SAFETY: `start` is the start of `len` initialized numbers that stay there while `keeper` lives; when they are written is told above. No
     // reference to them is made: the view is taken apart into pointer, length and stride.

@@ -256,13 +256,13 @@ impl World {
     /// Name of the stepper.
     #[getter]
     fn stepper(&self) -> Result<&'static str> {
-        self.shared.read(|inner| Ok(inner.world.methods().0))
+        self.shared.read(|inner| Ok(inner.world.stepper_name()))
     }
 
     /// Name of the solver of contacts.
     #[getter]
     fn solver(&self) -> Result<&'static str> {
-        self.shared.read(|inner| Ok(inner.world.methods().1))
+        self.shared.read(|inner| Ok(inner.world.solver_name()))
     }
 
     /// Name of the integrator.
@@ -468,7 +468,7 @@ impl World {
         contacts: &str,
     ) -> Result<RigidBody> {
         let pose = pose(position, orientation)? * shape.placement;
-        let body = Rigid::fixture(name, shape.solid.clone())
+        let body = Rigid::fixed(name, shape.solid.clone())
             .at(pose)
             .surface(restitution, friction)
             .colliding_by(meaning("contacts", contacts, ContactMode::NAMES)?);
@@ -597,7 +597,7 @@ impl World {
 
     fn __repr__(&self) -> Result<String> {
         self.shared.read(|inner| {
-            let (stepper, solver) = inner.world.methods();
+            let (stepper, solver) = (inner.world.stepper_name(), inner.world.solver_name());
             Ok(format!(
                 "<tumble.World {} bodies, t = {} s, {stepper}, {solver}>",
                 bodies::body_ids(&inner.world).len(),

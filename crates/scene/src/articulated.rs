@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use tumble_core::Joint;
-use tumble_core::articulated::MOST_LINKS;
+use tumble_core::articulated::MAX_LINKS;
 use tumble_core::collide::Pose;
 
 use crate::body::{Library, read_name};
@@ -15,7 +15,7 @@ use crate::link::{Inherited, LinkRow, LinkSpec, Surface};
 use crate::rotation;
 use crate::urdf::{CollisionMeshes, MissingMeshes, UrdfOptions};
 
-/// Most pairs in `keep_apart`.
+/// Most pairs in `exclude_collisions`.
 const MOST_PAIRS: usize = 100_000;
 
 /// One articulated body at the start, all references resolved.
@@ -30,7 +30,7 @@ pub struct ArticulatedSpec {
     /// Whether links that are not joined to each other meet. Default true.
     pub self_collision: bool,
     /// Pairs of links that never meet.
-    pub keep_apart: Vec<[usize; 2]>,
+    pub exclude_collisions: Vec<[usize; 2]>,
     /// Whether links that overlap at the start never meet: true of a URDF.
     pub part_overlaps: bool,
     /// Takes part in anything at all. Default true.
@@ -52,13 +52,13 @@ impl ArticulatedSpec {
 
     /// One of these links, its base at the origin.
     pub(crate) fn of(name: String, links: Vec<LinkSpec>) -> ArticulatedSpec {
-        let (base, keep_apart, notes) = (Pose::identity(), Vec::new(), Vec::new());
+        let (base, exclude_collisions, notes) = (Pose::identity(), Vec::new(), Vec::new());
         ArticulatedSpec {
             name,
             base,
             links,
             self_collision: true,
-            keep_apart,
+            exclude_collisions,
             part_overlaps: false,
             alive: true,
             notes,
@@ -78,7 +78,7 @@ impl ArticulatedSpec {
             library,
             surface: &surface,
             floating,
-            room: MOST_LINKS,
+            room: MAX_LINKS,
             collides: f.flag_or("collides", true),
             visible: f.flag_or("visible", true),
         };
@@ -96,7 +96,7 @@ impl ArticulatedSpec {
     }
 
     fn read_links(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>) {
-        let tables = f.tables("link", MOST_LINKS);
+        let tables = f.tables("link", MAX_LINKS);
         if tables.is_empty() && f.value("link").is_none() {
             f.missing("link", "links, each under a line [[articulated.link]], or `urdf`");
         }
@@ -104,7 +104,7 @@ impl ArticulatedSpec {
         let mut lines: BTreeMap<String, usize> = BTreeMap::new();
         for mut table in tables {
             let names: Vec<&str> = self.links.iter().map(|link| link.name.as_str()).collect();
-            let room = MOST_LINKS.saturating_sub(self.links.len());
+            let room = MAX_LINKS.saturating_sub(self.links.len());
             let row = LinkRow::read(&mut table, &Inherited { room, ..*from }, &names);
             let place = table.value("name").map_or(table.span.clone(), Value::span);
             let first = self.links.len();
@@ -188,8 +188,8 @@ impl ArticulatedSpec {
 
     /// `[[articulated.joint]]`: what acts on joints that are there.
     fn read_joints(&mut self, f: &mut Fields<'_>) {
-        for mut table in f.tables("joint", MOST_LINKS) {
-            let named = table.texts("name", MOST_LINKS, "the name of a joint, or a list of them");
+        for mut table in f.tables("joint", MAX_LINKS) {
+            let named = table.texts("name", MAX_LINKS, "the name of a joint, or a list of them");
             let joints: Vec<usize> =
                 named.iter().filter_map(|(name, value)| self.named_joint(&table, "name", name, value)).collect();
             if let Some((name, _)) = named.first() {
@@ -259,7 +259,7 @@ impl ArticulatedSpec {
             };
             let pair: Vec<usize> = items.iter().filter_map(|item| self.named_link(f, item)).collect();
             if let [a, b] = pair[..] {
-                self.keep_apart.push([a, b]);
+                self.exclude_collisions.push([a, b]);
             }
         }
     }

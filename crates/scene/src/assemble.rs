@@ -1,11 +1,11 @@
 //! From links to what the dynamics knows: a model, and a body with colliders, pictures and motors.
 
 use tumble_core::articulated::{
-    ArticulatedBody, ArticulatedError, Collider, Coupling, Freedom, Kinematics, LinkMass, Model, ModelBuilder,
+    ArticulatedBody, ArticulatedError, Collider, Coupling, DofSettings, Kinematics, LinkMass, Model, ModelBuilder,
     ModelError,
 };
 use tumble_core::collide::{Pose, Shape, contacts};
-use tumble_core::{CameraMount, Joint, Look, Material, Object, Visual};
+use tumble_core::{Appearance, CameraMount, Joint, Material, Object, Visual};
 
 use crate::articulated::ArticulatedSpec;
 use crate::build::{look, material_id};
@@ -30,7 +30,7 @@ pub(crate) fn moving_joints(links: &[LinkSpec]) -> Vec<String> {
 }
 
 /// What acts on each degree of freedom, in the order of the velocities.
-pub(crate) fn freedoms(links: &[LinkSpec]) -> Vec<Freedom> {
+pub(crate) fn freedoms(links: &[LinkSpec]) -> Vec<DofSettings> {
     let of = |link: &LinkSpec| vec![link.joint.freedom.clone(); link.joint.kind.dof()];
     links.iter().filter(|link| moves(link)).flat_map(of).collect()
 }
@@ -82,16 +82,16 @@ fn furnished(
     for (number, link) in moving.iter().enumerate() {
         let first = body.model().links()[number].v;
         for index in first..first + link.joint.kind.dof() {
-            body.set_freedom(index, link.joint.freedom.clone())?;
+            body.set_dof(index, link.joint.freedom.clone())?;
         }
         if let Some(mimic) = link.joint.mimic
-            && let Some(of) = body.freedom_of(&spec.links[mimic.link].name)
+            && let Some(of) = body.dof_of(&spec.links[mimic.link].name)
         {
-            body.couple(Coupling { freedom: first, of, multiplier: mimic.multiplier, offset: mimic.offset })?;
+            body.couple(Coupling { dof: first, of, multiplier: mimic.multiplier, offset: mimic.offset })?;
         }
     }
-    for [a, b] in &spec.keep_apart {
-        body.keep_apart(&spec.links[*a].name, &spec.links[*b].name)?;
+    for [a, b] in &spec.exclude_collisions {
+        body.exclude_collisions(&spec.links[*a].name, &spec.links[*b].name)?;
     }
     keep_apart_across_stacks(spec, &mut body)?;
     if spec.part_overlaps && spec.self_collision && maker.purpose == Purpose::Stepped {
@@ -123,9 +123,9 @@ fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Resul
         )?;
     }
     if placed.visible {
-        let look: Look = look(&surface.look, &placed.center());
+        let look: Appearance = look(&surface.look, &placed.center());
         let (geometry, stands_in_for) = (placed.geometry.clone(), placed.stands_in_for.clone());
-        body.add_visual(link, Visual { part: 0, pose: placed.pose, geometry, look, stands_in_for })?;
+        body.add_visual(link, Visual { part: 0, pose: placed.pose, geometry, appearance: look, stands_in_for })?;
     }
     Ok(())
 }
@@ -139,7 +139,7 @@ fn keep_apart_across_stacks(spec: &ArticulatedSpec, body: &mut ArticulatedBody) 
             above = between.parent;
         }
         if let Some(above) = above.filter(|_| above != link.parent) {
-            body.keep_apart(&link.name, &spec.links[above].name)?;
+            body.exclude_collisions(&link.name, &spec.links[above].name)?;
         }
     }
     Ok(())
@@ -165,12 +165,13 @@ fn part_overlaps(
     let mut pairs = Vec::new();
     for (n, a) in solid.iter().enumerate() {
         for (m, b) in solid.iter().enumerate().skip(n + 1) {
-            let meet = |body: &ArticulatedBody| body.collidable().is_some_and(|c| c.parts_meet(first + n, first + m));
+            let meet =
+                |body: &ArticulatedBody| body.collidable().is_some_and(|c| c.parts_collide(first + n, first + m));
             if !meet(body) || !a.overlaps(b) {
                 continue;
             }
             let pair = format!("{} and {}", name(a.link), name(b.link));
-            body.keep_apart(name(a.link), name(b.link))?;
+            body.exclude_collisions(name(a.link), name(b.link))?;
             match meet(body) {
                 true => maker.notes.add(pair, "overlap at the start and meet all the same"),
                 false => pairs.push(pair),

@@ -7,7 +7,7 @@ use tumble_core::collide::ContactMode;
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
-use crate::look::Look;
+use crate::look::Appearance;
 use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, MaterialSpec, RESTITUTION};
 use crate::mount::Mounts;
 use crate::rotation;
@@ -67,7 +67,7 @@ pub struct BodySpec {
     /// Is drawn. Default true.
     pub visible: bool,
     /// The body's own look, on top of its material's.
-    pub look: Look,
+    pub look: Appearance,
     /// The camera and the light that it carries, in axes of the shape.
     pub mounts: Mounts,
 }
@@ -92,7 +92,7 @@ impl BodySpec {
         let base = material.map(|index| &library.materials[index]);
         let (friction, restitution) =
             base.map_or((DEFAULT_FRICTION, DEFAULT_RESTITUTION), |m| (m.friction, m.restitution));
-        let look = base.map_or_else(Look::default, |m| m.look.clone());
+        let look = base.map_or_else(Appearance::default, |m| m.look.clone());
         let [linear, angular] = read_velocities(f, mode);
         let body = BodySpec {
             name: name.unwrap_or_default(),
@@ -112,7 +112,7 @@ impl BodySpec {
             collides: f.flag_or("collides", true),
             alive: f.flag_or("alive", true),
             visible: f.flag_or("visible", true),
-            look: Look::read(f, &look),
+            look: Appearance::read(f, &look),
             mounts: Mounts::read(f),
         };
         let shape = shape?;

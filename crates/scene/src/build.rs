@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
 use tumble_collide::{Pose, RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3, decode_text};
-use tumble_core::solver::{self, Accuracy};
+use tumble_core::solver::{self, SolverSettings};
 use tumble_core::{
-    ArticulatedBody, Closure, Look as CoreLook, ObjectId, PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual,
-    World, WorldError, stepper_by_name,
+    Appearance as CoreAppearance, ArticulatedBody, LoopJoint, ObjectId, PairMaterial, PairSide, RigidBody, Settings,
+    Sleep, Visual, World, WorldError, stepper_by_name,
 };
 
 use crate::articulated::ArticulatedSpec;
@@ -18,7 +18,7 @@ use crate::closure::{ClosureKind, ClosureSpec, PartSpec};
 use crate::collada;
 use crate::file::SceneFile;
 use crate::link_shapes::{self, Purpose, ShapeMaker};
-use crate::look::Look;
+use crate::look::Appearance;
 use crate::mesh::{MeshSource, MeshSpec};
 use crate::pair::{PairSideSpec, PairSpec};
 use crate::slow::building_surface;
@@ -125,7 +125,7 @@ impl SceneFile {
             let body = self.body(spec, &meshes)?;
             let id = built.add_boxed(Box::new(body), spec.mode).map_err(|e| self.body_error(spec, e))?;
             built.set_collidable(id, spec.collides).map_err(world)?;
-            built.set_alive(id, spec.alive).map_err(world)?;
+            built.set_enabled(id, spec.alive).map_err(world)?;
         }
         let mut maker = ShapeMaker::new(&meshes, purpose);
         for spec in &self.articulated {
@@ -151,7 +151,7 @@ impl SceneFile {
         let wrong = |why: String| BuildError::Articulated { scene: self.file.clone(), body: spec.name.clone(), why };
         let body = assemble::body(spec, maker).map_err(wrong)?;
         let id = world.add(body).map_err(|e| wrong(e.to_string()))?;
-        world.set_alive(id, spec.alive).map_err(|e| wrong(e.to_string()))
+        world.set_enabled(id, spec.alive).map_err(|e| wrong(e.to_string()))
     }
 
     fn add_closure(&self, spec: &ClosureSpec, world: &mut World) -> Result<(), BuildError> {
@@ -159,10 +159,10 @@ impl SceneFile {
         let (a, b) = (self.part(world, &spec.a), spec.b.and_then(|b| self.part(world, &b)));
         let (point, axis, name) = (Vec3::from(spec.position_m), Vec3::from(spec.axis), spec.name.as_str());
         let closure = match spec.kind {
-            ClosureKind::Point => Closure::point_at(name, world, a, b, point),
-            ClosureKind::Hinge => Closure::hinge_at(name, world, a, b, point, axis),
-            ClosureKind::Weld => Closure::weld_at(name, world, a, b, point),
-            ClosureKind::Slider => Closure::slider_at(name, world, a, b, point, axis),
+            ClosureKind::Point => LoopJoint::spherical_at(name, world, a, b, point),
+            ClosureKind::Hinge => LoopJoint::revolute_at(name, world, a, b, point, axis),
+            ClosureKind::Weld => LoopJoint::fixed_at(name, world, a, b, point),
+            ClosureKind::Slider => LoopJoint::prismatic_at(name, world, a, b, point, axis),
         };
         world.add(closure.map_err(|e| wrong(e.to_string()))?).map(drop).map_err(|e| wrong(e.to_string()))
     }
@@ -213,7 +213,7 @@ impl SceneFile {
             substeps: w.substeps,
             integrator: w.integrator.into(),
             integrator_tolerance: w.integrator_tolerance,
-            accuracy: Accuracy { sweeps: w.iterations, ..base.accuracy },
+            solver_settings: SolverSettings { max_sweeps: w.iterations, ..base.solver_settings },
             contact_tolerance: w.contact_tolerance_m,
             drift_tolerance: base.drift_tolerance.max(w.contact_tolerance_m),
             sleep: w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }),
@@ -314,7 +314,7 @@ impl SceneFile {
         let body = match spec.mass {
             Some(MassSpec::Mass(mass)) => RigidBody::with_mass(&spec.name, shape.clone(), mass),
             Some(MassSpec::Density(density)) => RigidBody::with_density(&spec.name, shape.clone(), density),
-            None => Ok(RigidBody::fixture(&spec.name, shape.clone())),
+            None => Ok(RigidBody::fixed(&spec.name, shape.clone())),
         };
         let [x, y, z, w] = spec.orientation_xyzw;
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
@@ -403,7 +403,7 @@ fn visuals(spec: &BodySpec, shape: Shape) -> Vec<Visual> {
 }
 
 /// The look in body axes, whose origin is the centre of mass.
-pub(crate) fn look(look: &Look, center: &Vec3) -> CoreLook {
+pub(crate) fn look(look: &Appearance, center: &Vec3) -> CoreAppearance {
     let [r, g, b] = look.second_color;
     let named = [
         ("second_r", r),
@@ -413,7 +413,7 @@ pub(crate) fn look(look: &Look, center: &Vec3) -> CoreLook {
         ("offset_m", look.pattern_offset_m - center.z),
         ("clearcoat", look.clearcoat),
     ];
-    CoreLook {
+    CoreAppearance {
         color: look.color.map(|c| c as f32),
         roughness: look.roughness as f32,
         metallic: look.metallic as f32,

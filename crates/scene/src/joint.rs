@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tumble_core::Joint;
-use tumble_core::articulated::{Drive, Freedom, Playback, Spring};
+use tumble_core::articulated::{DofSettings, Drive, Playback, Spring};
 use tumble_core::collide::Vec3;
 
 use crate::bound::Bound;
@@ -21,7 +21,7 @@ pub struct JointSpec {
     /// How the link moves; the axis is of unit length.
     pub kind: Joint,
     /// What acts on each of its degrees of freedom.
-    pub freedom: Freedom,
+    pub freedom: DofSettings,
     /// The joint that this one follows.
     pub mimic: Option<MimicSpec>,
     /// Its position numbers at time 0, as [`Joint`] says.
@@ -129,7 +129,7 @@ impl JointSpec {
             position[k + 3] = 1.0;
         }
         let velocity = vec![0.0; kind.dof()];
-        let freedom = Freedom::default();
+        let freedom = DofSettings::default();
         JointSpec {
             name: name.into(),
             kind,

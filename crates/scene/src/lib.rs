@@ -100,7 +100,7 @@ pub use format::FileKind;
 pub use joint::{JointSpec, MimicSpec};
 pub use link::{Geometry, LinkMassSpec, LinkShape, LinkSpec, Surface};
 pub use link_shapes::read_mesh_bytes;
-pub use look::{Color, Look, Pattern};
+pub use look::{Appearance, Color, Pattern};
 pub use material::MaterialSpec;
 pub use mesh::{MeshSource, MeshSpec};
 pub use mount::Mounts;

@@ -11,7 +11,7 @@ use crate::body::{Library, MOST_NAME_BYTES, MassSpec, read_material, read_name};
 use crate::bound::Bound;
 use crate::fields::{Fields, Value};
 use crate::joint::JointSpec;
-use crate::look::{Color, Look, as_color};
+use crate::look::{Appearance, Color, as_color};
 use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, RESTITUTION};
 use crate::mount::Mounts;
 use crate::rotation;
@@ -119,7 +119,7 @@ pub struct Surface {
     /// How its meshes and cylinders collide.
     pub contacts: ContactMode,
     /// Look.
-    pub look: Look,
+    pub look: Appearance,
 }
 
 impl Default for Surface {
@@ -129,7 +129,7 @@ impl Default for Surface {
             friction: DEFAULT_FRICTION,
             restitution: DEFAULT_RESTITUTION,
             contacts: ContactMode::default(),
-            look: Look::default(),
+            look: Appearance::default(),
         }
     }
 }
@@ -146,7 +146,7 @@ impl Surface {
             friction: f.number_or("friction", FRICTION, friction),
             restitution: f.number_or("restitution", RESTITUTION, restitution),
             contacts: f.choice_or("contacts", CONTACTS, base.contacts),
-            look: Look::read(f, look),
+            look: Appearance::read(f, look),
         }
     }
 }

@@ -54,7 +54,7 @@ impl Pattern {
 
 /// The look of a surface.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Look {
+pub struct Appearance {
     /// Main colour. Default a light grey.
     pub color: Color,
     /// The other colour of a pattern. Default white.
@@ -78,9 +78,9 @@ pub struct Look {
     pub detail: Detail,
 }
 
-impl Default for Look {
+impl Default for Appearance {
     fn default() -> Self {
-        Look {
+        Appearance {
             color: [0.72, 0.72, 0.74],
             second_color: [1.0, 1.0, 1.0],
             pattern: Pattern::Plain,
@@ -95,10 +95,10 @@ impl Default for Look {
     }
 }
 
-impl Look {
+impl Appearance {
     /// The look whose keys stand in `f`; what is not there is as in `base`.
-    pub(crate) fn read(f: &mut Fields<'_>, base: &Look) -> Look {
-        Look {
+    pub(crate) fn read(f: &mut Fields<'_>, base: &Appearance) -> Appearance {
+        Appearance {
             color: read_color(f, "color", base.color),
             second_color: read_color(f, "second_color", base.second_color),
             pattern: f.choice_or("pattern", Pattern::NAMES, base.pattern),

@@ -2,7 +2,7 @@
 
 use crate::bound::Bound;
 use crate::fields::Fields;
-use crate::look::Look;
+use crate::look::Appearance;
 
 /// Friction of a body that says nothing.
 pub(crate) const DEFAULT_FRICTION: f64 = 0.5;
@@ -24,7 +24,7 @@ pub struct MaterialSpec {
     /// Newton's coefficient, 0 to 1; combined with the other body's. Default 0.
     pub restitution: f64,
     /// Look of bodies of this material.
-    pub look: Look,
+    pub look: Appearance,
 }
 
 impl MaterialSpec {
@@ -33,7 +33,7 @@ impl MaterialSpec {
             name: name.to_owned(),
             friction: f.number_or("friction", FRICTION, DEFAULT_FRICTION),
             restitution: f.number_or("restitution", RESTITUTION, DEFAULT_RESTITUTION),
-            look: Look::read(&mut f, &Look::default()),
+            look: Appearance::read(&mut f, &Appearance::default()),
         };
         f.finish();
         material

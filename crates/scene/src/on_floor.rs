@@ -13,7 +13,7 @@ use crate::error::SceneError;
 use crate::file::SceneFile;
 use crate::link::{Geometry, LinkShape, LinkSpec};
 use crate::link_shapes;
-use crate::look::Look;
+use crate::look::Appearance;
 use crate::mesh::{MeshSource, MeshSpec};
 use crate::shape::ShapeSpec;
 use crate::urdf::{self, UrdfError, UrdfOptions, Wanted};
@@ -88,7 +88,7 @@ pub(crate) fn mesh(path: &Path, repair: bool) -> Result<SceneFile, SceneError> {
         shape: ShapeSpec::Mesh { mesh: 0 },
         mass: Some(MassSpec::Density(DENSITY)),
         visible: true,
-        look: Look { color: COLOR, ..Look::default() },
+        look: Appearance { color: COLOR, ..Appearance::default() },
         ..scene.bodies[0].clone()
     };
     scene.bodies.push(body);

@@ -2,7 +2,7 @@
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
-use crate::look::{Color, Look, Pattern, read_color};
+use crate::look::{Appearance, Color, Pattern, read_color};
 
 /// A camera that stands still.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -216,21 +216,21 @@ pub struct GroundSpec {
     /// Height of the floor, m. Default 0.
     pub height_m: f64,
     /// Default a grey checker of 1 m.
-    pub look: Look,
+    pub look: Appearance,
 }
 
 impl GroundSpec {
     pub(crate) fn read(mut f: Fields<'_>) -> Self {
-        let base = Look {
+        let base = Appearance {
             color: [0.40, 0.41, 0.42],
             second_color: [0.46, 0.47, 0.48],
             pattern: Pattern::Checker,
             pattern_scale_m: 1.0,
             roughness: 0.9,
-            ..Look::default()
+            ..Appearance::default()
         };
         let height_m = f.number_or("height_m", Bound::ANY, 0.0);
-        let ground = GroundSpec { height_m, look: Look::read(&mut f, &base) };
+        let ground = GroundSpec { height_m, look: Appearance::read(&mut f, &base) };
         f.finish();
         ground
     }

@@ -114,7 +114,7 @@ fn neither(name: &str, error: &SceneError) -> Failure {
 fn degrees(world: &World) -> usize {
     let view = world.view();
     let moving = world.ids().iter().filter(|id| view.status(**id).is_some_and(|s| s.moves()));
-    moving.filter_map(|id| view.span(*id)).map(|span| span.v.len()).sum()
+    moving.filter_map(|id| view.state_range(*id)).map(|span| span.v.len()).sum()
 }
 
 fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {

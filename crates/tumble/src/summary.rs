@@ -1,7 +1,7 @@
 //! `--summary`: what a run took and how well it went, as JSON.
 
 use serde::Serialize;
-use tumble::dynamics::{Energy, OutOfReach, StepReport, World};
+use tumble::dynamics::{Energy, StepReport, UnreachableJoint, World};
 
 /// The whole summary. Units stand in the names; quaternions are `x, y, z, w`.
 #[derive(Serialize)]
@@ -61,7 +61,7 @@ pub struct Tally {
     unconverged: u64,
     rays: u64,
     penetration: f64,
-    out_of_reach: Option<OutOfReach>,
+    out_of_reach: Option<UnreachableJoint>,
     tries: u64,
     tries_max: u32,
     floor_hits: u64,
@@ -79,8 +79,8 @@ impl Tally {
         self.unconverged += report.unconverged as u64;
         self.rays += report.rays as u64;
         self.penetration = self.penetration.max(report.max_penetration);
-        let further = |o: &OutOfReach| self.out_of_reach.is_none_or(|worst| o.distance > worst.distance);
-        self.out_of_reach = report.out_of_reach.filter(further).or(self.out_of_reach);
+        let further = |o: &UnreachableJoint| self.out_of_reach.is_none_or(|worst| o.distance > worst.distance);
+        self.out_of_reach = report.unreachable_joint.filter(further).or(self.out_of_reach);
         self.tries += report.tries as u64;
         self.tries_max = self.tries_max.max(report.tries);
         self.floor_hits += report.floor_hits as u64;
@@ -100,7 +100,7 @@ impl Tally {
 
     /// The summary at the end of a run that took `wall_s` seconds of the clock.
     pub fn summary(&self, scene: &str, world: &World, start: State, simulated_s: f64, wall_s: f64) -> Summary {
-        let (stepper, solver) = world.methods();
+        let (stepper, solver) = (world.stepper_name(), world.solver_name());
         Summary {
             scene: scene.to_string(),
             stepper,
@@ -119,7 +119,7 @@ impl Tally {
             rays: self.rays,
             max_penetration_m: self.penetration,
             out_of_reach_max_m: self.out_of_reach.map_or(0.0, |o| o.distance),
-            out_of_reach: self.out_of_reach.and_then(|o| Some(world.object(o.closure)?.name().to_string())),
+            out_of_reach: self.out_of_reach.and_then(|o| Some(world.object(o.loop_joint)?.name().to_string())),
             tries_mean: self.per_step(self.tries),
             tries_max: self.tries_max,
             floor_hits: self.floor_hits,

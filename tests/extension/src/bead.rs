@@ -6,7 +6,7 @@
 //! ℓ(φ) = 4R·sin(φ/2)         σ = ℓ̇ = 2R·cos(φ/2)·φ̇      arc length from the lowest point, and speed along the wire
 //! ```
 //!
-//! Left alone the bead keeps `σ` while `p` changes with `M`: [`Bead::coast`](Integratable::coast) is exact. Under gravity
+//! Left alone the bead keeps `σ` while `p` changes with `M`: [`Bead::free_motion`](Integratable::free_motion) is exact. Under gravity
 //! `ℓ̈ = −(g/4R)·ℓ`: harmonic at *every* amplitude, with the period `4π√(R/g)` (Huygens, *Horologium Oscillatorium*, 1673).
 //!
 //! | symbol | meaning |
@@ -17,8 +17,8 @@
 
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    Collidable, CollisionKind, Constraint, Dims, Energy, ForceSlice, Forces, Integratable, Level, Material, Momentum,
-    Object, RowBuilder, RowTarget, Site, Span, WorldView, rows::RowSet,
+    Collidable, CollisionGroup, Constraint, Energy, ForceSlice, Forces, Integratable, Level, Material, Momentum,
+    Object, PartState, RowBuilder, RowTarget, StateRange, StateSizes, WorldView, rows::RowSet,
 };
 
 /// A bead on a cycloid in the x–z plane, lowest at the origin; its ends are at `|φ| = π`.
@@ -105,11 +105,11 @@ impl Object for Bead {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
+    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
         self.root = self.inertia(x[0]).sqrt();
         self.tangent = self.tangent(x[0]);
-        sites[0].pose = Pose::from_parts(self.position(x[0]).into(), tumble_core::collide::Quat::identity());
-        sites[0].velocity = self.tangent * (x[1] / self.root.powi(2));
+        part_states[0].pose = Pose::from_parts(self.position(x[0]).into(), tumble_core::collide::Quat::identity());
+        part_states[0].velocity = self.tangent * (x[1] / self.root.powi(2));
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -126,16 +126,16 @@ impl Object for Bead {
 }
 
 impl Integratable for Bead {
-    fn dims(&self) -> Dims {
-        Dims { x: 2, dof: 1, sites: 1 }
+    fn state_sizes(&self) -> StateSizes {
+        StateSizes { x: 2, dof: 1, parts: 1 }
     }
 
     fn write_initial(&self, x: &mut [f64]) {
         x.copy_from_slice(&[self.angle, self.mass * self.stretch(self.angle) * self.speed]);
     }
 
-    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
-        out.wrenches[me.site.start].force += self.mass * view.gravity;
+    fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces) {
+        out.wrenches[me.parts.start].force += self.mass * view.gravity;
     }
 
     fn velocity(&self, x: &[f64], v: &mut [f64]) {
@@ -152,13 +152,13 @@ impl Integratable for Bead {
     }
 
     /// `r̈ = r'·φ̈ + r''·φ̇²` with `φ̈ = (Q + ½·M'·φ̇² − M'·φ̇²)/M`.
-    fn accelerations(&self, x: &[f64], dp: &[f64], sites: &mut [Site]) {
+    fn accelerations(&self, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
         let (phi, m) = (x[0], self.inertia(x[0]));
         let rate = x[1] / m;
         let slope = -2.0 * self.mass * self.radius.powi(2) * phi.sin();
         let second = (dp[0] - 0.5 * slope * rate * rate) / m;
         let bend = self.radius * Vec3::new(-phi.sin(), 0.0, phi.cos());
-        sites[0].acceleration = self.tangent(phi) * second + bend * (rate * rate);
+        part_states[0].acceleration = self.tangent(phi) * second + bend * (rate * rate);
     }
 
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
@@ -166,14 +166,14 @@ impl Integratable for Bead {
     }
 
     /// Exact: the arc length grows by `σ·h`, and `p` follows `M`.
-    fn coast(&self, x: &mut [f64], h: f64) {
+    fn free_motion(&self, x: &mut [f64], h: f64) {
         let sigma = x[1] / (self.mass * self.stretch(x[0]));
         let arc = 4.0 * self.radius * (0.5 * x[0]).sin() + sigma * h;
         x[0] = 2.0 * (arc / (4.0 * self.radius)).clamp(-1.0, 1.0).asin();
         x[1] = self.mass * self.stretch(x[0]) * sigma;
     }
 
-    fn drift(&self, x: &mut [f64], v: &[f64], h: f64) {
+    fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         x[0] += h * v[0];
     }
 
@@ -219,16 +219,24 @@ impl Collidable for Bead {
         self.material
     }
 
-    fn kind(&self, _part: usize) -> CollisionKind {
-        CollisionKind::default()
+    fn collision_group(&self, _part: usize) -> CollisionGroup {
+        CollisionGroup::default()
     }
 
-    fn collides_with(&self, _part: usize, _other: CollisionKind) -> bool {
+    fn collides_with(&self, _part: usize, _other: CollisionGroup) -> bool {
         true
     }
 
     /// `J = axisᵀ·r'`.
-    fn test_impulse(&self, _part: usize, _site: &Site, _point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
+    fn test_impulse(
+        &self,
+        _part: usize,
+        _part_state: &PartState,
+        _point: &Vec3,
+        axes: &[Vec3],
+        sign: f64,
+        y: &mut [f64],
+    ) {
         for (axis, y) in axes.iter().zip(y) {
             *y += sign * axis.dot(&self.tangent) / self.root;
         }
@@ -237,7 +245,7 @@ impl Collidable for Bead {
 
 /// The stop: `0 ≤ (φ_stop − φ) ⟂ λ ≥ 0`.
 impl Constraint for Bead {
-    fn rows(&self, me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+    fn rows(&self, me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
         let Some(stop) = self.stop else { return };
         let x = &view.x[me.x.clone()];
         let (rate, slope) = (x[1] / self.inertia(x[0]), -2.0 * self.mass * self.radius.powi(2) * x[0].sin());
@@ -248,7 +256,7 @@ impl Constraint for Bead {
         out.row(target).on_coordinates(me, &[-1.0]);
     }
 
-    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+    fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
         out.extend(self.stop.map(|stop| stop - view.x[me.x.start]));
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::Particle;
 use tumble_core::collide::Pose;
-use tumble_core::{CameraCarrier, CameraMount, Integratable, LightCarrier, LightMount, Object, Site, Spread};
+use tumble_core::{CameraCarrier, CameraMount, Integratable, LightCarrier, LightMount, Object, PartState, Spread};
 
 /// A [`Particle`] with a camera that looks along the world's x axis and a white lamp.
 #[derive(Clone)]
@@ -37,8 +37,8 @@ impl Object for Lookout {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
-        self.particle.refresh(x, sites);
+    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
+        self.particle.refresh(x, part_states);
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {

@@ -8,8 +8,8 @@
 
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    Collidable, CollisionKind, Dims, Energy, ForceSlice, Forces, Integratable, Material, Momentum, Object, Site, Span,
-    WorldView,
+    Collidable, CollisionGroup, Energy, ForceSlice, Forces, Integratable, Material, Momentum, Object, PartState,
+    StateRange, StateSizes, WorldView,
 };
 
 /// A point mass that collides as a sphere and never turns.
@@ -69,9 +69,9 @@ impl Object for Particle {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
-        sites[0].pose = Pose::translation(x[0], x[1], x[2]);
-        sites[0].velocity = vec3(&x[3..]) / self.mass;
+    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
+        part_states[0].pose = Pose::translation(x[0], x[1], x[2]);
+        part_states[0].velocity = vec3(&x[3..]) / self.mass;
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -84,8 +84,8 @@ impl Object for Particle {
 }
 
 impl Integratable for Particle {
-    fn dims(&self) -> Dims {
-        Dims { x: 6, dof: 3, sites: 1 }
+    fn state_sizes(&self) -> StateSizes {
+        StateSizes { x: 6, dof: 3, parts: 1 }
     }
 
     fn write_initial(&self, x: &mut [f64]) {
@@ -93,8 +93,8 @@ impl Integratable for Particle {
         scaled(self.velocity.as_slice(), self.mass, &mut x[3..]);
     }
 
-    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
-        out.wrenches[me.site.start].force += self.mass * view.gravity;
+    fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces) {
+        out.wrenches[me.parts.start].force += self.mass * view.gravity;
     }
 
     fn velocity(&self, x: &[f64], v: &mut [f64]) {
@@ -109,19 +109,19 @@ impl Integratable for Particle {
         (0..3).for_each(|k| dp[k] = f.wrenches[0].force[k] + f.generalized[k]);
     }
 
-    fn accelerations(&self, _x: &[f64], dp: &[f64], sites: &mut [Site]) {
-        sites[0].acceleration = vec3(dp) / self.mass;
+    fn accelerations(&self, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
+        part_states[0].acceleration = vec3(dp) / self.mass;
     }
 
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
         (0..3).for_each(|k| x[3 + k] += h * dp[k]);
     }
 
-    fn coast(&self, x: &mut [f64], h: f64) {
+    fn free_motion(&self, x: &mut [f64], h: f64) {
         (0..3).for_each(|k| x[k] += h * x[3 + k] / self.mass);
     }
 
-    fn drift(&self, x: &mut [f64], v: &[f64], h: f64) {
+    fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         (0..3).for_each(|k| x[k] += h * v[k]);
     }
 
@@ -167,15 +167,23 @@ impl Collidable for Particle {
         self.material
     }
 
-    fn kind(&self, _part: usize) -> CollisionKind {
-        CollisionKind::default()
+    fn collision_group(&self, _part: usize) -> CollisionGroup {
+        CollisionGroup::default()
     }
 
-    fn collides_with(&self, _part: usize, _other: CollisionKind) -> bool {
+    fn collides_with(&self, _part: usize, _other: CollisionGroup) -> bool {
         true
     }
 
-    fn test_impulse(&self, _part: usize, _site: &Site, _point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
+    fn test_impulse(
+        &self,
+        _part: usize,
+        _part_state: &PartState,
+        _point: &Vec3,
+        axes: &[Vec3],
+        sign: f64,
+        y: &mut [f64],
+    ) {
         let scale = sign / self.mass.sqrt();
         for (axis, y) in axes.iter().zip(y.chunks_exact_mut(3)) {
             (0..3).for_each(|k| y[k] += scale * axis[k]);

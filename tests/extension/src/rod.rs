@@ -6,7 +6,7 @@
 //! ```
 
 use tumble_core::collide::Vec3;
-use tumble_core::{Constraint, Level, Object, ObjectId, RowBuilder, RowTarget, Span, WorldView, rows::RowSet};
+use tumble_core::{Constraint, Level, Object, ObjectId, RowBuilder, RowTarget, StateRange, WorldView, rows::RowSet};
 
 /// What an end is fixed to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,7 @@ impl Rod {
 fn motion(end: End, view: &WorldView) -> Option<(Vec3, Vec3)> {
     match end {
         End::Point(p) => Some((p, Vec3::zeros())),
-        End::Object(id) => view.site(id, 0).map(|site| (site.position(), site.velocity)),
+        End::Object(id) => view.part_state(id, 0).map(|part_state| (part_state.position(), part_state.velocity)),
     }
 }
 
@@ -61,7 +61,7 @@ impl Object for Rod {
 }
 
 impl Constraint for Rod {
-    fn rows(&self, _me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+    fn rows(&self, _me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
         let (Some((pa, va)), Some((pb, vb))) = (motion(self.ends[0], view), motion(self.ends[1], view)) else { return };
         let (d, v) = (pa - pb, va - vb);
         let distance = d.norm();
@@ -81,7 +81,7 @@ impl Constraint for Rod {
         }
     }
 
-    fn gaps(&self, _me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+    fn gaps(&self, _me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
         if let (true, Some((pa, _)), Some((pb, _))) =
             (self.rope, motion(self.ends[0], view), motion(self.ends[1], view))
         {

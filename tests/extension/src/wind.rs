@@ -1,7 +1,7 @@
 //! Wind: a force that follows what it blows on. Drag `F = −c·(v − w)` at the origin of every part of the objects it is told of.
 
 use tumble_core::collide::Vec3;
-use tumble_core::{ForceGenerator, Forces, Object, ObjectId, Span, WorldView};
+use tumble_core::{ForceGenerator, Forces, Object, ObjectId, StateRange, WorldView};
 
 /// Linear drag towards a velocity of the air.
 #[derive(Clone, Debug)]
@@ -37,10 +37,12 @@ impl Object for Wind {
 }
 
 impl ForceGenerator for Wind {
-    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
-        for index in self.on.iter().filter_map(|id| view.span(*id)).flat_map(|span| span.site.clone()) {
-            let site = &view.sites[index];
-            out.add_at(index, site, -self.drag * (site.velocity - self.velocity), &site.position());
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        for index in
+            self.on.iter().filter_map(|id| view.state_range(*id)).flat_map(|state_range| state_range.parts.clone())
+        {
+            let part_state = &view.part_states[index];
+            out.add_at(index, part_state, -self.drag * (part_state.velocity - self.velocity), &part_state.position());
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Rigid and articulated bodies as data. What their constructors compute (roots of inertias, whitening, caches) is computed anew.
 
-use super::records::{Known, Tables, VisualRecord, shape};
+use super::records::{LoadedTables, Tables, VisualRecord, shape};
 use super::{ArchiveError, damaged};
 use crate::articulated::{ArticulatedParts, Collider};
-use crate::collidable::{CollisionKind, Material};
+use crate::collidable::{CollisionGroup, Material};
 use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Object, Renderable};
-use crate::{ArticulatedBody, Coupling, Freedom, Model, RigidBody};
+use crate::{ArticulatedBody, Coupling, DofSettings, Model, RigidBody};
 use serde::{Deserialize, Serialize};
 use tumble_collide::{ContactMode, Mat3, Pose, Vec3};
 
@@ -21,8 +21,8 @@ pub(super) struct RigidRecord {
     linear_damping: f64,
     angular_damping: f64,
     contact_mode: ContactMode,
-    kind: CollisionKind,
-    meets: u64,
+    group: CollisionGroup,
+    mask: u64,
     initial_pose: Pose,
     initial_velocity: [Vec3; 2],
     visuals: Vec<VisualRecord>,
@@ -34,14 +34,14 @@ impl RigidRecord {
     pub fn of(body: &RigidBody, tables: &mut Tables) -> RigidRecord {
         RigidRecord {
             name: body.name().into(),
-            shape: tables.shapes.place(body.shape()),
-            mass: (!body.is_fixture()).then(|| (body.mass(), *body.inertia())),
+            shape: tables.shapes.index(body.shape()),
+            mass: (!body.is_fixed()).then(|| (body.mass(), *body.inertia())),
             material: body.material,
             linear_damping: body.linear_damping,
             angular_damping: body.angular_damping,
             contact_mode: body.contact_mode,
-            kind: body.kind,
-            meets: body.meets,
+            group: body.group,
+            mask: body.mask,
             initial_pose: body.initial_pose,
             initial_velocity: [body.initial_velocity, body.initial_angular_velocity],
             visuals: body.visuals().iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
@@ -50,17 +50,17 @@ impl RigidRecord {
         }
     }
 
-    pub fn body(self, known: &Known) -> Result<RigidBody, ArchiveError> {
-        let shape = shape(&known.shapes, self.shape)?;
+    pub fn body(self, tables: &LoadedTables) -> Result<RigidBody, ArchiveError> {
+        let shape = shape(&tables.shapes, self.shape)?;
         let mut body = match self.mass {
             Some((mass, inertia)) => RigidBody::new(self.name, shape, mass, inertia).map_err(damaged)?,
-            None => RigidBody::fixture(self.name, shape),
+            None => RigidBody::fixed(self.name, shape),
         };
         (body.material, body.contact_mode) = (self.material, self.contact_mode);
         (body.linear_damping, body.angular_damping) = (self.linear_damping, self.angular_damping);
-        (body.kind, body.meets) = (self.kind, self.meets);
+        (body.group, body.mask) = (self.group, self.mask);
         let [velocity, angular_velocity] = self.initial_velocity;
-        let visuals = self.visuals.into_iter().map(|v| v.visual(known)).collect::<Result<_, _>>()?;
+        let visuals = self.visuals.into_iter().map(|v| v.visual(tables)).collect::<Result<_, _>>()?;
         let body = body.at(self.initial_pose).moving(velocity, angular_velocity).drawn_as(visuals);
         Ok(body.carrying(self.cameras, self.lights))
     }
@@ -74,27 +74,27 @@ struct ColliderRecord {
     shape: u32,
     material: Material,
     contact_mode: ContactMode,
-    kind: CollisionKind,
-    meets: u64,
+    group: CollisionGroup,
+    mask: u64,
 }
 
 impl ColliderRecord {
     fn of(link: Option<usize>, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
-        let Collider { pose, shape, material, contact_mode, kind, meets } = collider;
+        let Collider { pose, shape, material, contact_mode, group, mask } = collider;
         ColliderRecord {
             link,
             pose: *pose,
-            shape: tables.shapes.place(shape),
+            shape: tables.shapes.index(shape),
             material: *material,
             contact_mode: *contact_mode,
-            kind: *kind,
-            meets: *meets,
+            group: *group,
+            mask: *mask,
         }
     }
 
-    fn collider(self, known: &Known) -> Result<(Option<usize>, Collider), ArchiveError> {
-        let ColliderRecord { link, pose, shape: place, material, contact_mode, kind, meets } = self;
-        Ok((link, Collider { pose, shape: shape(&known.shapes, place)?, material, contact_mode, kind, meets }))
+    fn collider(self, tables: &LoadedTables) -> Result<(Option<usize>, Collider), ArchiveError> {
+        let ColliderRecord { link, pose, shape: index, material, contact_mode, group, mask } = self;
+        Ok((link, Collider { pose, shape: shape(&tables.shapes, index)?, material, contact_mode, group, mask }))
     }
 }
 
@@ -108,10 +108,10 @@ pub(super) struct ArticulatedRecord {
     visuals: Vec<VisualRecord>,
     cameras: Vec<CameraMount>,
     lights: Vec<LightMount>,
-    freedoms: Vec<Freedom>,
+    dofs: Vec<DofSettings>,
     couplings: Vec<Coupling>,
     self_collision: bool,
-    apart: Vec<[Option<usize>; 2]>,
+    excluded_pairs: Vec<[Option<usize>; 2]>,
     start: Vec<f64>,
 }
 
@@ -126,30 +126,30 @@ impl ArticulatedRecord {
             visuals: parts.visuals.iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
             cameras: parts.cameras,
             lights: parts.lights,
-            freedoms: body.freedoms().to_vec(),
+            dofs: body.dofs().to_vec(),
             couplings: parts.couplings,
             self_collision: body.self_collision,
-            apart: parts.apart,
+            excluded_pairs: parts.excluded_pairs,
             start: parts.start,
         }
     }
 
-    pub fn body(self, known: &Known) -> Result<ArticulatedBody, ArchiveError> {
+    pub fn body(self, tables: &LoadedTables) -> Result<ArticulatedBody, ArchiveError> {
         if !self.model.is_sound() {
             return Err(damaged(format!("'{}' is no tree of links", self.name)));
         }
         let mut body = ArticulatedBody::new(self.name, self.model);
-        for (index, freedom) in self.freedoms.into_iter().enumerate() {
-            body.set_freedom(index, freedom).map_err(damaged)?;
+        for (index, dof) in self.dofs.into_iter().enumerate() {
+            body.set_dof(index, dof).map_err(damaged)?;
         }
         body.self_collision = self.self_collision;
         let parts = ArticulatedParts {
-            colliders: self.colliders.into_iter().map(|c| c.collider(known)).collect::<Result<_, _>>()?,
-            visuals: self.visuals.into_iter().map(|v| v.visual(known)).collect::<Result<_, _>>()?,
+            colliders: self.colliders.into_iter().map(|c| c.collider(tables)).collect::<Result<_, _>>()?,
+            visuals: self.visuals.into_iter().map(|v| v.visual(tables)).collect::<Result<_, _>>()?,
             cameras: self.cameras,
             lights: self.lights,
             couplings: self.couplings,
-            apart: self.apart,
+            excluded_pairs: self.excluded_pairs,
             start: self.start,
         };
         body.with_parts(self.base, parts).map_err(damaged)

@@ -17,9 +17,11 @@ use crate::solver::{self, RowSolver};
 use crate::step::{Stepper, stepper_by_name};
 use crate::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, World};
-use crate::{ArticulatedBody, Closure, Object, OutOfReach, RigidBody};
+use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint};
 use bodies::{ArticulatedRecord, RigidRecord};
-use records::{ClosureRecord, ContactRecord, Known, MeshRecord, PairRecord, Places, ReportRecord, Tables, meshes};
+use records::{
+    ContactRecord, LoadedTables, LoopJointRecord, MeshRecord, ObjectIndices, PairRecord, ReportRecord, Tables, meshes,
+};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Shape;
@@ -73,7 +75,7 @@ struct Archive {
 enum Record {
     Rigid(RigidRecord),
     Articulated(Box<ArticulatedRecord>),
-    Closure(ClosureRecord),
+    LoopJoint(LoopJointRecord),
     Foreign(String),
 }
 
@@ -84,13 +86,13 @@ impl World {
     /// # Errors
     /// [`ArchiveError::Foreign`]: an object of a kind of its own that is not among `foreign`.
     pub fn archive(&self, foreign: &[ObjectId]) -> Result<Vec<u8>, ArchiveError> {
-        let (mut tables, places) = (Tables::default(), Places::of(self.ids()));
-        let (stepper, solver) = self.methods();
+        let (mut tables, indices) = (Tables::default(), ObjectIndices::of(self.ids()));
+        let (stepper, solver) = (self.stepper_name(), self.solver_name());
         let objects = self
             .ids()
             .iter()
             .filter_map(|&id| self.object(id))
-            .map(|object| record(object, &mut tables, &places))
+            .map(|object| record(object, &mut tables, &indices))
             .collect::<Vec<Record>>();
         let unknown = self.ids().iter().zip(&objects).find_map(|(id, record)| match record {
             Record::Foreign(name) if !foreign.contains(id) => Some(name.clone()),
@@ -100,7 +102,7 @@ impl World {
             return Err(ArchiveError::Foreign(name));
         }
         let mut pairs: Vec<PairRecord> =
-            self.pair_materials().filter_map(|(sides, material)| PairRecord::of(sides, material, &places)).collect();
+            self.pair_materials().filter_map(|(sides, material)| PairRecord::of(sides, material, &indices)).collect();
         pairs.sort_unstable_by_key(|pair| pair.sides);
         let archive = Archive {
             settings: *self.settings(),
@@ -111,8 +113,8 @@ impl World {
             objects,
             pairs,
             snapshot: self.save(),
-            contacts: self.contacts().iter().map(|c| ContactRecord::of(c, &places)).collect(),
-            report: ReportRecord::of(self.report(), &places),
+            contacts: self.contacts().iter().map(|c| ContactRecord::of(c, &indices)).collect(),
+            report: ReportRecord::of(self.report(), &indices),
         };
         seal(HEAD, &archive)
     }
@@ -129,13 +131,13 @@ impl World {
         let mut world = World::new(archive.settings).map_err(damaged)?;
         world.set_stepper(stepper(&archive.stepper)?);
         world.set_solver(solver(&archive.solver)?);
-        let known = Known { shapes: archive.shapes, meshes: meshes(archive.meshes) };
+        let tables = LoadedTables { shapes: archive.shapes, meshes: meshes(archive.meshes) };
         let mut ids = Vec::with_capacity(archive.objects.len());
         for record in archive.objects {
             let object: Box<dyn Object> = match record {
-                Record::Rigid(rigid) => Box::new(rigid.body(&known)?),
-                Record::Articulated(articulated) => Box::new(articulated.body(&known)?),
-                Record::Closure(closure) => Box::new(closure.closure(&ids)?),
+                Record::Rigid(rigid) => Box::new(rigid.body(&tables)?),
+                Record::Articulated(articulated) => Box::new(articulated.body(&tables)?),
+                Record::LoopJoint(loop_joint) => Box::new(loop_joint.loop_joint(&ids)?),
                 Record::Foreign(name) => foreign(&name).ok_or(ArchiveError::Foreign(name))?,
             };
             ids.push(world.add_boxed(object, Mode::Dynamic).map_err(damaged)?);
@@ -189,14 +191,14 @@ fn solver(name: &str) -> Result<Box<dyn RowSolver>, ArchiveError> {
     solver::by_name(name).ok_or_else(|| damaged(format!("there is no solver '{name}'")))
 }
 
-fn record(object: &dyn Object, tables: &mut Tables, places: &Places) -> Record {
+fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> Record {
     let any: &dyn std::any::Any = object;
     if let Some(body) = any.downcast_ref::<RigidBody>() {
         Record::Rigid(RigidRecord::of(body, tables))
     } else if let Some(body) = any.downcast_ref::<ArticulatedBody>() {
         Record::Articulated(Box::new(ArticulatedRecord::of(body, tables)))
-    } else if let Some(closure) = any.downcast_ref::<Closure>() {
-        Record::Closure(ClosureRecord::of(closure, places))
+    } else if let Some(loop_joint) = any.downcast_ref::<LoopJoint>() {
+        Record::LoopJoint(LoopJointRecord::of(loop_joint, indices))
     } else {
         Record::Foreign(object.name().into())
     }

@@ -1,8 +1,8 @@
 //! The parts of an archive that name objects by their place, and shapes by their place in a table.
 
-use super::{ArchiveError, ContactPoint, OutOfReach, StepReport, damaged};
-use crate::closure::{Anchor, Closure, ClosureKind};
-use crate::object::{Look, Object};
+use super::{ArchiveError, ContactPoint, StepReport, UnreachableJoint, damaged};
+use crate::loop_joint::{Anchor, LoopJoint, LoopJointKind};
+use crate::object::{Appearance, Object};
 use crate::pair_material::{PairMaterial, PairSide};
 use crate::view::ObjectId;
 use crate::visual::{Visual, VisualGeometry, VisualMesh};
@@ -16,44 +16,44 @@ use tumble_collide::{Pose, Shape, TriMesh, Vec3};
 #[derive(Default)]
 pub(super) struct ShapeTable {
     pub list: Vec<Shape>,
-    known: BTreeMap<usize, u32>,
+    tables: BTreeMap<usize, u32>,
 }
 
 impl ShapeTable {
     /// The place of a shape.
-    pub fn place(&mut self, shape: &Shape) -> u32 {
+    pub fn index(&mut self, shape: &Shape) -> u32 {
         let next = self.list.len() as u32;
         let address = match shape {
             Shape::Mesh(mesh) => Some(Arc::as_ptr(mesh).addr()),
             Shape::Cylinder(cylinder) => Some(Arc::as_ptr(cylinder).addr()),
             _ => None,
         };
-        let place = address.map_or(next, |address| *self.known.entry(address).or_insert(next));
-        if place == next {
+        let index = address.map_or(next, |address| *self.tables.entry(address).or_insert(next));
+        if index == next {
             self.list.push(shape.clone());
         }
-        place
+        index
     }
 }
 
 /// The shape at a place.
-pub(super) fn shape(shapes: &[Shape], place: u32) -> Result<Shape, ArchiveError> {
-    shapes.get(place as usize).cloned().ok_or_else(|| damaged(format!("there is no shape {place}")))
+pub(super) fn shape(shapes: &[Shape], index: u32) -> Result<Shape, ArchiveError> {
+    shapes.get(index as usize).cloned().ok_or_else(|| damaged(format!("there is no shape {index}")))
 }
 
 /// Every visual mesh once. They are read now: the archive needs none of their files.
 #[derive(Default)]
 pub(super) struct MeshTable {
     pub list: Vec<MeshRecord>,
-    known: BTreeMap<usize, u32>,
+    tables: BTreeMap<usize, u32>,
 }
 
 /// The name of a visual mesh, and its triangles or why they cannot be read.
 pub(super) type MeshRecord = (String, Result<TriMesh, String>);
 
 impl MeshTable {
-    fn place(&mut self, mesh: &Arc<VisualMesh>) -> u32 {
-        *self.known.entry(Arc::as_ptr(mesh).addr()).or_insert_with(|| {
+    fn index(&mut self, mesh: &Arc<VisualMesh>) -> u32 {
+        *self.tables.entry(Arc::as_ptr(mesh).addr()).or_insert_with(|| {
             let triangles = mesh.triangles().map(|mesh| TriMesh::clone(mesh)).map_err(str::to_owned);
             self.list.push((mesh.name().to_owned(), triangles));
             self.list.len() as u32 - 1
@@ -71,11 +71,11 @@ pub(super) fn meshes(list: Vec<MeshRecord>) -> Vec<Arc<VisualMesh>> {
 }
 
 /// Places of objects in the order of adding.
-pub(super) struct Places(BTreeMap<ObjectId, u32>);
+pub(super) struct ObjectIndices(BTreeMap<ObjectId, u32>);
 
-impl Places {
-    pub fn of(ids: &[ObjectId]) -> Places {
-        Places(ids.iter().zip(0..).map(|(id, place)| (*id, place)).collect())
+impl ObjectIndices {
+    pub fn of(ids: &[ObjectId]) -> ObjectIndices {
+        ObjectIndices(ids.iter().zip(0..).map(|(id, index)| (*id, index)).collect())
     }
 
     /// `None` of an object that is gone.
@@ -85,8 +85,8 @@ impl Places {
 }
 
 /// The id at a place; one that names nothing where there is none.
-fn id(ids: &[ObjectId], place: Option<u32>) -> ObjectId {
-    place.and_then(|place| ids.get(place as usize)).copied().unwrap_or_default()
+fn id(ids: &[ObjectId], index: Option<u32>) -> ObjectId {
+    index.and_then(|index| ids.get(index as usize)).copied().unwrap_or_default()
 }
 
 /// One side of a closure: the place of its object, if that is still there, and the part; `None` for the world.
@@ -94,24 +94,24 @@ type Side = (Option<(Option<u32>, usize)>, Pose);
 
 /// A closure.
 #[derive(Serialize, Deserialize)]
-pub(super) struct ClosureRecord {
+pub(super) struct LoopJointRecord {
     name: String,
-    kind: ClosureKind,
+    kind: LoopJointKind,
     sides: [Side; 2],
 }
 
-impl ClosureRecord {
-    pub fn of(closure: &Closure, places: &Places) -> ClosureRecord {
-        let side = |a: Anchor| (a.part.map(|(id, part)| (places.of_id(id), part)), a.frame);
-        ClosureRecord { name: closure.name().into(), kind: closure.kind(), sides: closure.sides().map(side) }
+impl LoopJointRecord {
+    pub fn of(loop_joint: &LoopJoint, indices: &ObjectIndices) -> LoopJointRecord {
+        let side = |a: Anchor| (a.part.map(|(id, part)| (indices.of_id(id), part)), a.frame);
+        LoopJointRecord { name: loop_joint.name().into(), kind: loop_joint.kind(), sides: loop_joint.sides().map(side) }
     }
 
-    pub fn closure(self, ids: &[ObjectId]) -> Result<Closure, ArchiveError> {
+    pub fn loop_joint(self, ids: &[ObjectId]) -> Result<LoopJoint, ArchiveError> {
         let [a, b] = self.sides.map(|(part, frame)| {
-            let part = part.map(|(place, part)| (id(ids, place), part));
+            let part = part.map(|(index, part)| (id(ids, index), part));
             Anchor { part, frame }
         });
-        Closure::new(self.name, self.kind, a, b).map_err(damaged)
+        LoopJoint::new(self.name, self.kind, a, b).map_err(damaged)
     }
 }
 
@@ -125,9 +125,9 @@ pub(super) struct ContactRecord {
 }
 
 impl ContactRecord {
-    pub fn of(c: &ContactPoint, places: &Places) -> ContactRecord {
+    pub fn of(c: &ContactPoint, indices: &ObjectIndices) -> ContactRecord {
         ContactRecord {
-            sides: [(places.of_id(c.a), c.part_a), (places.of_id(c.b), c.part_b)],
+            sides: [(indices.of_id(c.a), c.part_a), (indices.of_id(c.b), c.part_b)],
             vectors: [c.point, c.normal, c.velocity, c.impulse, c.force],
             depth: c.depth,
         }
@@ -170,11 +170,11 @@ pub(super) struct PairRecord {
 
 impl PairRecord {
     /// `None` of a pair whose object is gone.
-    pub fn of(sides: &[PairSide; 2], material: &PairMaterial, places: &Places) -> Option<PairRecord> {
+    pub fn of(sides: &[PairSide; 2], material: &PairMaterial, indices: &ObjectIndices) -> Option<PairRecord> {
         let side = |side: PairSide| {
             Some(match side {
-                PairSide::Part(id, part) => PairSideRecord::Part(places.of_id(id)?, part),
-                PairSide::Object(id) => PairSideRecord::Object(places.of_id(id)?),
+                PairSide::Part(id, part) => PairSideRecord::Part(indices.of_id(id)?, part),
+                PairSide::Object(id) => PairSideRecord::Object(indices.of_id(id)?),
                 PairSide::Material(material) => PairSideRecord::Material(material),
             })
         };
@@ -187,8 +187,8 @@ impl PairRecord {
     /// Puts it into a world of these objects.
     pub fn put(self, world: &mut World, ids: &[ObjectId]) -> Result<(), WorldError> {
         let [a, b] = self.sides.map(|side| match side {
-            PairSideRecord::Part(place, part) => PairSide::Part(id(ids, Some(place)), part),
-            PairSideRecord::Object(place) => PairSide::Object(id(ids, Some(place))),
+            PairSideRecord::Part(index, part) => PairSide::Part(id(ids, Some(index)), part),
+            PairSideRecord::Object(index) => PairSide::Object(id(ids, Some(index))),
             PairSideRecord::Material(material) => PairSide::Material(material),
         });
         world.set_pair_material(a, b, PairMaterial { restitution: self.restitution, friction: self.friction })
@@ -199,18 +199,18 @@ impl PairRecord {
 #[derive(Serialize, Deserialize)]
 pub(super) struct ReportRecord {
     report: StepReport,
-    out_of_reach: Option<(Option<u32>, f64, f64)>,
+    unreachable_joint: Option<(Option<u32>, f64, f64)>,
 }
 
 impl ReportRecord {
-    pub fn of(report: &StepReport, places: &Places) -> ReportRecord {
-        let out_of_reach = report.out_of_reach.map(|o| (places.of_id(o.closure), o.distance, o.angle));
-        ReportRecord { report: *report, out_of_reach }
+    pub fn of(report: &StepReport, indices: &ObjectIndices) -> ReportRecord {
+        let unreachable_joint = report.unreachable_joint.map(|o| (indices.of_id(o.loop_joint), o.distance, o.angle));
+        ReportRecord { report: *report, unreachable_joint }
     }
 
     pub fn report(self, ids: &[ObjectId]) -> StepReport {
-        let joint = |(place, distance, angle)| OutOfReach { closure: id(ids, place), distance, angle };
-        StepReport { out_of_reach: self.out_of_reach.map(joint), ..self.report }
+        let joint = |(index, distance, angle)| UnreachableJoint { loop_joint: id(ids, index), distance, angle };
+        StepReport { unreachable_joint: self.unreachable_joint.map(joint), ..self.report }
     }
 }
 
@@ -220,7 +220,7 @@ pub(super) struct VisualRecord {
     part: usize,
     pose: Pose,
     geometry: GeometryRecord,
-    look: Look,
+    appearance: Appearance,
     stands_in_for: Vec<u32>,
 }
 
@@ -239,32 +239,32 @@ pub(super) struct Tables {
 }
 
 /// The same, as it is read.
-pub(super) struct Known {
+pub(super) struct LoadedTables {
     pub shapes: Vec<Shape>,
     pub meshes: Vec<Arc<VisualMesh>>,
 }
 
 impl VisualRecord {
     pub fn of(visual: &Visual, tables: &mut Tables) -> VisualRecord {
-        let Visual { part, pose, geometry, look, stands_in_for } = visual;
+        let Visual { part, pose, geometry, appearance, stands_in_for } = visual;
         let geometry = match geometry {
-            VisualGeometry::Shape(shape) => GeometryRecord::Shape(tables.shapes.place(shape)),
-            VisualGeometry::Mesh(mesh) => GeometryRecord::Mesh(tables.meshes.place(mesh)),
+            VisualGeometry::Shape(shape) => GeometryRecord::Shape(tables.shapes.index(shape)),
+            VisualGeometry::Mesh(mesh) => GeometryRecord::Mesh(tables.meshes.index(mesh)),
         };
-        let stands_in_for = stands_in_for.iter().map(|mesh| tables.meshes.place(mesh)).collect();
-        VisualRecord { part: *part, pose: *pose, geometry, look: look.clone(), stands_in_for }
+        let stands_in_for = stands_in_for.iter().map(|mesh| tables.meshes.index(mesh)).collect();
+        VisualRecord { part: *part, pose: *pose, geometry, appearance: appearance.clone(), stands_in_for }
     }
 
-    pub fn visual(self, known: &Known) -> Result<Visual, ArchiveError> {
-        let mesh = |place: u32| {
-            let mesh = known.meshes.get(place as usize).cloned();
-            mesh.ok_or_else(|| damaged(format!("there is no visual mesh {place}")))
+    pub fn visual(self, tables: &LoadedTables) -> Result<Visual, ArchiveError> {
+        let mesh = |index: u32| {
+            let mesh = tables.meshes.get(index as usize).cloned();
+            mesh.ok_or_else(|| damaged(format!("there is no visual mesh {index}")))
         };
         let geometry = match self.geometry {
-            GeometryRecord::Shape(place) => VisualGeometry::Shape(shape(&known.shapes, place)?),
-            GeometryRecord::Mesh(place) => VisualGeometry::Mesh(mesh(place)?),
+            GeometryRecord::Shape(index) => VisualGeometry::Shape(shape(&tables.shapes, index)?),
+            GeometryRecord::Mesh(index) => VisualGeometry::Mesh(mesh(index)?),
         };
         let stands_in_for = self.stands_in_for.into_iter().map(mesh).collect::<Result<_, _>>()?;
-        Ok(Visual { part: self.part, pose: self.pose, geometry, look: self.look, stands_in_for })
+        Ok(Visual { part: self.part, pose: self.pose, geometry, appearance: self.appearance, stands_in_for })
     }
 }

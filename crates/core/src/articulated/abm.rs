@@ -25,7 +25,7 @@
 //! Because `p` carries `α⁰` and `a⁰`, there is no velocity-product term `c` in the inward sweep, against [RBDA Table 7.1]: it is out of the chain
 //! of operations that wait for each other. The inward sweep sums over all children; the thesis's Algorithm 1 serves one.
 
-use super::compiled::{Body, Compiled, Kind};
+use super::compiled::{Compiled, CompiledLink, JointKind};
 use super::factor::{Factor, rows_times, rows_transposed_times};
 use crate::spatial::{ArticulatedInertia, Force, Inertia, Matrix, Motion, Scalar, Symmetric, Vector};
 use tumble_collide::Vec3;
@@ -36,7 +36,7 @@ pub(super) const SINGULAR: f64 = 1e-12;
 /// Where a sweep reads its state and forces. A trait and not closures, so that all of it is compiled for the instructions of the sweep.
 pub(super) trait Input<T> {
     /// Sine and cosine of the hinge of a link, whose angle is position number `q`.
-    fn turn(&self, link: usize, q: usize) -> (T, T);
+    fn joint_angle_sin_cos(&self, link: usize, q: usize) -> (T, T);
     /// A position number.
     fn q(&self, k: usize) -> T;
     /// A velocity number.
@@ -55,7 +55,7 @@ pub(super) struct Slot<T> {
     /// `ω`.
     pub angular: Vector<T>,
     /// `[α⁰; a⁰]`.
-    pub drift: Motion<T>,
+    pub bias_acceleration: Motion<T>,
     /// `p`.
     pub bias: Force<T>,
     /// `IA`.
@@ -80,7 +80,7 @@ pub(super) struct Slot<T> {
 ///
 /// A ball joint: `first` is of `J`, rows `w = l⁻¹ H`. A floating root: `first` is of `M`, `w = l⁻¹ Hᵀ`, and `second` is of `J − H M⁻¹ Hᵀ`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Block<T> {
+pub(super) struct JointFactor<T> {
     pub first: Factor<T>,
     pub w: [Vector<T>; 3],
     pub second: Factor<T>,
@@ -90,7 +90,7 @@ pub(super) struct Block<T> {
 #[derive(Clone, Debug)]
 pub(super) struct Sweep<T> {
     pub slots: Vec<Slot<T>>,
-    pub blocks: Vec<Block<T>>,
+    pub blocks: Vec<JointFactor<T>>,
 }
 
 impl<T: Scalar> Sweep<T> {
@@ -105,7 +105,7 @@ impl<T: Scalar> Sweep<T> {
             rotation: unit,
             arm: none,
             angular: none,
-            drift: still,
+            bias_acceleration: still,
             bias: no_force,
             inertia,
             column: no_force,
@@ -116,7 +116,7 @@ impl<T: Scalar> Sweep<T> {
             position: none,
             linear: none,
         };
-        let block = Block { first: Factor::zero(zero), w: [none; 3], second: Factor::zero(zero) };
+        let block = JointFactor { first: Factor::zero(zero), w: [none; 3], second: Factor::zero(zero) };
         Sweep { slots: vec![world; compiled.bodies.len() + 1], blocks: vec![block; compiled.blocks] }
     }
 
@@ -127,27 +127,27 @@ impl<T: Scalar> Sweep<T> {
             let parent = &self.slots[body.parent];
             let turned = parent.rotation.times_constant(&body.turned);
             let mut arm = parent.rotation.of_constant(&body.offset);
-            let (outer, outer_drift) = (parent.angular, parent.drift);
+            let (outer, outer_bias_acceleration) = (parent.angular, parent.bias_acceleration);
             let (parent_position, parent_linear) = (parent.position, parent.linear);
             let zero = outer.x.constant(0.0);
             let mut turn = Vector::splat(zero);
             let mut slide = turn;
             let rotation = match body.kind {
-                Kind::Revolute => {
+                JointKind::Revolute => {
                     turn = turned.z * state.v(body.v);
-                    turn_about_z(&turned, state.turn(i, body.q))
+                    turn_about_z(&turned, state.joint_angle_sin_cos(i, body.q))
                 }
-                Kind::Prismatic => {
+                JointKind::Prismatic => {
                     arm += turned.z * state.q(body.q);
                     slide = turned.z * state.v(body.v);
                     turned
                 }
-                Kind::Spherical(_) => {
+                JointKind::Spherical(_) => {
                     let rotation = turned * quaternion_matrix(four(state, body.q));
                     turn = rotation * three(|k| state.v(k), body.v);
                     rotation
                 }
-                Kind::Floating(_) => {
+                JointKind::Floating(_) => {
                     arm = three(|k| state.q(k), body.q);
                     turn = three(|k| state.v(k), body.v);
                     slide = three(|k| state.v(k), body.v + 3);
@@ -156,12 +156,15 @@ impl<T: Scalar> Sweep<T> {
             };
             let angular = outer + turn;
             let sweeping = outer.cross(arm);
-            let drift = Motion {
-                angular: outer_drift.angular + outer.cross(turn),
-                linear: outer_drift.linear + outer_drift.angular.cross(arm) + outer.cross(sweeping + (slide + slide)),
+            let bias_acceleration = Motion {
+                angular: outer_bias_acceleration.angular + outer.cross(turn),
+                linear: outer_bias_acceleration.linear
+                    + outer_bias_acceleration.angular.cross(arm)
+                    + outer.cross(sweeping + (slide + slide)),
             };
             let slot = &mut self.slots[i + 1];
-            (slot.rotation, slot.arm, slot.angular, slot.drift) = (rotation, arm, angular, drift);
+            (slot.rotation, slot.arm, slot.angular, slot.bias_acceleration) =
+                (rotation, arm, angular, bias_acceleration);
             if WHOLE {
                 slot.position = parent_position + arm;
                 slot.linear = parent_linear + sweeping + slide;
@@ -179,12 +182,12 @@ impl<T: Scalar> Sweep<T> {
     }
 
     #[inline(always)]
-    pub fn fold_link(&mut self, i: usize, body: &Body) {
+    pub fn fold_link(&mut self, i: usize, body: &CompiledLink) {
         let slot = &mut self.slots[i];
         let left = match body.kind {
-            Kind::Revolute => {
+            JointKind::Revolute => {
                 let s = slot.rotation.z;
-                slot.column = slot.inertia.times_turn(s);
+                slot.column = slot.inertia.times_angular(s);
                 slot.pivot = s.dot(slot.column.torque);
                 slot.inverse = slot.pivot.reciprocal_above(slot.inertia.rotational.trace() * SINGULAR);
                 if body.parent == 0 {
@@ -192,9 +195,9 @@ impl<T: Scalar> Sweep<T> {
                 }
                 slot.inertia.minus_square(slot.column, slot.inverse)
             }
-            Kind::Prismatic => {
+            JointKind::Prismatic => {
                 let s = slot.rotation.z;
-                slot.column = slot.inertia.times_slide(s);
+                slot.column = slot.inertia.times_linear(s);
                 slot.pivot = s.dot(slot.column.force);
                 slot.inverse = slot.pivot.reciprocal_above(slot.inertia.mass.trace() * SINGULAR);
                 if body.parent == 0 {
@@ -202,8 +205,8 @@ impl<T: Scalar> Sweep<T> {
                 }
                 slot.inertia.minus_square(slot.column, slot.inverse)
             }
-            Kind::Spherical(block) => ball_factor(&slot.inertia, &mut self.blocks[block]),
-            Kind::Floating(block) => return floating_factor(&slot.inertia, &mut self.blocks[block]),
+            JointKind::Spherical(block) => spherical_factor(&slot.inertia, &mut self.blocks[block]),
+            JointKind::Floating(block) => return floating_factor(&slot.inertia, &mut self.blocks[block]),
         };
         if body.parent != 0 {
             let shifted = left.from_arm(slot.arm);
@@ -214,7 +217,7 @@ impl<T: Scalar> Sweep<T> {
 
     /// The inward step of forces at one link: what is left in `bias` goes to the parent's.
     #[inline(always)]
-    pub fn push_link(&mut self, i: usize, body: &Body, state: &impl Input<T>) {
+    pub fn push_link(&mut self, i: usize, body: &CompiledLink, state: &impl Input<T>) {
         let slot = &mut self.slots[i];
         let mut effort = slot.effort;
         let passed = push(body, slot, &self.blocks, slot.bias, |k| state.tau(k), &mut effort);
@@ -254,33 +257,33 @@ impl<T: Scalar> Sweep<T> {
 /// [`spread`] needs.
 #[inline(always)]
 pub(super) fn push<T: Scalar>(
-    body: &Body,
+    body: &CompiledLink,
     slot: &Slot<T>,
-    blocks: &[Block<T>],
+    blocks: &[JointFactor<T>],
     p: Force<T>,
     tau: impl Fn(usize) -> T + Copy,
     effort: &mut Force<T>,
 ) -> Force<T> {
     let s = slot.rotation.z;
     match body.kind {
-        Kind::Revolute => {
+        JointKind::Revolute => {
             let rate = slot.inverse * (tau(body.v) - s.dot(p.torque));
             effort.torque.x = rate;
             p + slot.column * rate
         }
-        Kind::Prismatic => {
+        JointKind::Prismatic => {
             let rate = slot.inverse * (tau(body.v) - s.dot(p.force));
             effort.torque.x = rate;
             p + slot.column * rate
         }
-        Kind::Spherical(block) => {
-            let Block { first, w, .. } = &blocks[block];
+        JointKind::Spherical(block) => {
+            let JointFactor { first, w, .. } = &blocks[block];
             let wanted = slot.rotation * three(tau, body.v);
             let e = first.forward(wanted - p.torque);
             effort.torque = e;
             Force::new(wanted, p.force + rows_transposed_times(w, first.divide(e)))
         }
-        Kind::Floating(_) => {
+        JointKind::Floating(_) => {
             *effort = Force::new(three(tau, body.v), three(tau, body.v + 3)) - p;
             p
         }
@@ -290,32 +293,32 @@ pub(super) fn push<T: Scalar>(
 /// `Â` of a link from `Â' = X Âₚ`; writes its `q̈` to `out`.
 #[inline(always)]
 pub(super) fn spread<T: Scalar>(
-    body: &Body,
+    body: &CompiledLink,
     slot: &Slot<T>,
-    blocks: &[Block<T>],
+    blocks: &[JointFactor<T>],
     effort: &Force<T>,
     carried: Motion<T>,
     out: &mut impl FnMut(usize, T),
 ) -> Motion<T> {
     let s = slot.rotation.z;
     match body.kind {
-        Kind::Revolute => {
+        JointKind::Revolute => {
             let rate = effort.torque.x - slot.inverse * carried.power(slot.column);
             out(body.v, rate);
             Motion { angular: carried.angular + s * rate, linear: carried.linear }
         }
-        Kind::Prismatic => {
+        JointKind::Prismatic => {
             let rate = effort.torque.x - slot.inverse * carried.power(slot.column);
             out(body.v, rate);
             Motion { angular: carried.angular, linear: carried.linear + s * rate }
         }
-        Kind::Spherical(block) => {
-            let Block { first, w, .. } = &blocks[block];
+        JointKind::Spherical(block) => {
+            let JointFactor { first, w, .. } = &blocks[block];
             let angular = first.backward(first.divide(effort.torque - rows_times(w, carried.linear)));
             write_three(body.v, slot.rotation.transposed_times(angular - carried.angular), out);
             Motion { angular, linear: carried.linear }
         }
-        Kind::Floating(block) => {
+        JointKind::Floating(block) => {
             let a = solve_floating(&blocks[block], *effort);
             write_three(body.v, a.angular - carried.angular, out);
             write_three(body.v + 3, a.linear - carried.linear, out);
@@ -326,8 +329,8 @@ pub(super) fn spread<T: Scalar>(
 
 /// `Â = D⁻¹ e` of a floating root.
 #[inline(always)]
-pub(super) fn solve_floating<T: Scalar>(block: &Block<T>, e: Force<T>) -> Motion<T> {
-    let Block { first, w, second } = block;
+pub(super) fn solve_floating<T: Scalar>(block: &JointFactor<T>, e: Force<T>) -> Motion<T> {
+    let JointFactor { first, w, second } = block;
     let f = first.forward(e.force);
     let n = e.torque - rows_transposed_times(w, first.divide(f));
     let angular = second.backward(second.divide(second.forward(n)));
@@ -336,24 +339,24 @@ pub(super) fn solve_floating<T: Scalar>(block: &Block<T>, e: Force<T>) -> Motion
 
 /// The rigid inertia and the bias `p` of a link that is placed.
 #[inline(always)]
-fn load<T: Scalar>(body: &Body, slot: &mut Slot<T>) {
+fn load<T: Scalar>(body: &CompiledLink, slot: &mut Slot<T>) {
     let like = slot.angular.x;
     let (n, m) = (slot.rotation.of_constant(&body.pair[0]), slot.rotation.of_constant(&body.pair[1]));
     let h = slot.rotation.of_constant(&body.moment);
-    let (omega, drift) = (slot.angular, slot.drift);
+    let (omega, bias_acceleration) = (slot.angular, slot.bias_acceleration);
     let paired = Symmetric::of_pair(n, m);
     let sphere = like.constant(body.sphere);
     let mass = like.constant(body.mass);
     let rotational = Symmetric { xx: paired.xx + sphere, yy: paired.yy + sphere, zz: paired.zz + sphere, ..paired };
     slot.inertia = ArticulatedInertia::rigid(&Inertia { rotational, moment: h, mass });
     let spin = n * m.dot(omega) + m * n.dot(omega);
-    let torque = rotational * drift.angular + omega.cross(spin) + h.cross(drift.linear);
-    let force = drift.linear * mass + drift.angular.cross(h) + omega.cross(omega.cross(h));
+    let torque = rotational * bias_acceleration.angular + omega.cross(spin) + h.cross(bias_acceleration.linear);
+    let force = bias_acceleration.linear * mass + bias_acceleration.angular.cross(h) + omega.cross(omega.cross(h));
     slot.bias = Force { torque, force };
 }
 
 #[inline(always)]
-fn ball_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut Block<T>) -> ArticulatedInertia<T> {
+fn spherical_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut JointFactor<T>) -> ArticulatedInertia<T> {
     block.first = Factor::new(&inertia.rotational, inertia.rotational.trace() * SINGULAR);
     block.w = block.first.forward_rows(inertia.coupling);
     let zero = inertia.mass.xx.constant(0.0);
@@ -362,7 +365,7 @@ fn ball_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut Block<T>)
 }
 
 #[inline(always)]
-fn floating_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut Block<T>) {
+fn floating_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut JointFactor<T>) {
     let [x, y, z] = inertia.coupling;
     let columns = [Vector::new(x.x, y.x, z.x), Vector::new(x.y, y.y, z.y), Vector::new(x.z, y.z, z.z)];
     block.first = Factor::new(&inertia.mass, inertia.mass.trace() * SINGULAR);

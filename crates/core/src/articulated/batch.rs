@@ -16,12 +16,12 @@ use tumble_collide::Vec3;
 #[derive(Clone, Debug)]
 pub struct BatchDynamics<const N: usize> {
     compiled: Compiled,
-    way: Way,
+    width: SimdWidth,
 }
 
 /// The registers used, with the proof that the processor has them.
 #[derive(Clone, Debug)]
-enum Way {
+enum SimdWidth {
     One(Sweep<f64>),
     #[cfg(target_arch = "x86_64")]
     Four(pulp::x86::V3, Sweep<Four>),
@@ -33,13 +33,13 @@ impl<const N: usize> BatchDynamics<N> {
     /// Makes a model ready; all allocation happens here.
     pub fn new(model: &Model) -> BatchDynamics<N> {
         let compiled = Compiled::new(model);
-        BatchDynamics { way: Way::best(&compiled, N), compiled }
+        BatchDynamics { width: SimdWidth::best(&compiled, N), compiled }
     }
 
     /// The same one by one, as on a processor without SIMD: slower, the same bits.
     pub fn plain(model: &Model) -> BatchDynamics<N> {
         let compiled = Compiled::new(model);
-        BatchDynamics { way: Way::One(Sweep::new(&compiled, 0.0)), compiled }
+        BatchDynamics { width: SimdWidth::One(Sweep::new(&compiled, 0.0)), compiled }
     }
 
     /// `q̈` of every lane from its `q`, `v` and joint forces `tau` (lengths `positions` and `dof` of the model, one state per lane), in uniform gravity,
@@ -53,29 +53,29 @@ impl<const N: usize> BatchDynamics<N> {
         qdd: &mut [Lanes<N>],
     ) {
         let call = Call { compiled: &self.compiled, gravity, q, v, tau, qdd };
-        match &mut self.way {
-            Way::One(sweep) => call.run((), sweep),
+        match &mut self.width {
+            SimdWidth::One(sweep) => call.run((), sweep),
             #[cfg(target_arch = "x86_64")]
-            Way::Four(token, sweep) => token.vectorize(Within { call, token: *token, sweep }),
+            SimdWidth::Four(token, sweep) => token.vectorize(VectorizedCall { call, token: *token, sweep }),
             #[cfg(target_arch = "x86_64")]
-            Way::Eight(token, sweep) => token.vectorize(Within { call, token: *token, sweep }),
+            SimdWidth::Eight(token, sweep) => token.vectorize(VectorizedCall { call, token: *token, sweep }),
         }
     }
 }
 
-impl Way {
-    fn best(compiled: &Compiled, lanes: usize) -> Way {
+impl SimdWidth {
+    fn best(compiled: &Compiled, lanes: usize) -> SimdWidth {
         #[cfg(target_arch = "x86_64")]
         {
             if let (0, Some(token)) = (lanes % Eight::LANES, pulp::x86::V4::try_new()) {
-                return Way::Eight(token, Sweep::new(compiled, Eight::load(token, &[0.0; Eight::LANES])));
+                return SimdWidth::Eight(token, Sweep::new(compiled, Eight::load(token, &[0.0; Eight::LANES])));
             }
             if let (0, Some(token)) = (lanes % Four::LANES, pulp::x86::V3::try_new()) {
-                return Way::Four(token, Sweep::new(compiled, Four::load(token, &[0.0; Four::LANES])));
+                return SimdWidth::Four(token, Sweep::new(compiled, Four::load(token, &[0.0; Four::LANES])));
             }
         }
         let _ = lanes;
-        Way::One(Sweep::new(compiled, 0.0))
+        SimdWidth::One(Sweep::new(compiled, 0.0))
     }
 }
 
@@ -95,7 +95,7 @@ impl<const N: usize> Call<'_, N> {
     fn run<T: Register>(self, token: T::Token, sweep: &mut Sweep<T>) {
         let Call { compiled, gravity, q, v, tau, qdd } = self;
         for first in (0..N).step_by(T::LANES) {
-            sweep.run(compiled, gravity, &Rows::<T, N> { token, first, q, v, tau }, |k, x| {
+            sweep.run(compiled, gravity, &LaneInput::<T, N> { token, first, q, v, tau }, |k, x| {
                 x.store(&mut qdd[k].0[first..])
             });
         }
@@ -103,7 +103,7 @@ impl<const N: usize> Call<'_, N> {
 }
 
 /// States side by side, as a sweep reads them: a register of lanes from the first on.
-struct Rows<'a, T: Register, const N: usize> {
+struct LaneInput<'a, T: Register, const N: usize> {
     token: T::Token,
     first: usize,
     q: &'a [Lanes<N>],
@@ -111,9 +111,9 @@ struct Rows<'a, T: Register, const N: usize> {
     tau: &'a [Lanes<N>],
 }
 
-impl<T: Register, const N: usize> Input<T> for Rows<'_, T, N> {
+impl<T: Register, const N: usize> Input<T> for LaneInput<'_, T, N> {
     #[inline(always)]
-    fn turn(&self, _: usize, q: usize) -> (T, T) {
+    fn joint_angle_sin_cos(&self, _: usize, q: usize) -> (T, T) {
         self.q(q).sin_cos()
     }
     #[inline(always)]
@@ -132,14 +132,14 @@ impl<T: Register, const N: usize> Input<T> for Rows<'_, T, N> {
 
 /// A call that is compiled for the instructions of the one who makes it.
 #[cfg(target_arch = "x86_64")]
-struct Within<'a, T: Register, const N: usize> {
+struct VectorizedCall<'a, T: Register, const N: usize> {
     call: Call<'a, N>,
     token: T::Token,
     sweep: &'a mut Sweep<T>,
 }
 
 #[cfg(target_arch = "x86_64")]
-impl<T: Register, const N: usize> pulp::NullaryFnOnce for Within<'_, T, N> {
+impl<T: Register, const N: usize> pulp::NullaryFnOnce for VectorizedCall<'_, T, N> {
     type Output = ();
     #[inline(always)]
     fn call(self) {

@@ -5,11 +5,11 @@
 //! per collider, with its own frame.
 //! Generalized velocity is `v`; the mass matrix is whitened by the articulated inertias, `M = LᵀL`.
 
+use super::dof::{Coupling, DofSettings};
 use super::dynamics::{Dynamics, Scratch};
-use super::freedom::{Coupling, Freedom};
 use super::kinematics::Kinematics;
 use super::model::Model;
-use crate::collidable::{CollisionKind, Material};
+use crate::collidable::{CollisionGroup, Material};
 use crate::mounts::{CameraMount, LightMount};
 use crate::visual::Visual;
 use nalgebra::{Quaternion, Translation3};
@@ -43,17 +43,17 @@ pub enum ArticulatedError {
     },
     /// A coupling between freedoms that cannot be.
     #[error(
-        "articulated body '{body}': a coupling of freedom {freedom} to {of}; both must be different revolute or prismatic freedoms below {dof}, ratio and offset finite"
+        "articulated body '{body}': the coupling of degree of freedom {dof} to {of}: both must be different degrees of freedom of revolute or prismatic joints below {count}, ratio and offset finite"
     )]
     Coupling {
         /// Body.
         body: String,
         /// Freedom that follows.
-        freedom: usize,
+        dof: usize,
         /// Freedom that it follows.
         of: usize,
         /// Number of freedoms.
-        dof: usize,
+        count: usize,
     },
     /// Numbers that are no position or velocity of it.
     #[error("articulated body '{body}': {what} must be {wanted} finite numbers, quaternions of unit length")]
@@ -79,9 +79,9 @@ pub struct Collider {
     /// How its mesh or cylinder collides.
     pub contact_mode: ContactMode,
     /// Its kind, for filtering.
-    pub kind: CollisionKind,
+    pub group: CollisionGroup,
     /// Kinds it meets, one bit each.
-    pub meets: u64,
+    pub mask: u64,
 }
 
 impl Collider {
@@ -92,15 +92,15 @@ impl Collider {
             shape,
             material: Material::default(),
             contact_mode: ContactMode::default(),
-            kind: CollisionKind::default(),
-            meets: u64::MAX,
+            group: CollisionGroup::default(),
+            mask: u64::MAX,
         }
     }
 }
 
 /// A collider in its place.
 #[derive(Clone)]
-pub(super) struct Part {
+pub(super) struct LinkCollider {
     /// Moving link; `None` for one that is fixed to the base.
     pub link: Option<usize>,
     /// What it is, with its pose in the moving link's frame (or the base's).
@@ -110,7 +110,7 @@ pub(super) struct Part {
 /// A tree of links that moves as one object. See the module for its state.
 ///
 /// ```
-/// # use tumble_core::{ArticulatedBody, Collider, Freedom, Joint, LinkMass, ModelBuilder, Settings, World, collide::{Mat3, Pose, Shape, Vec3}};
+/// # use tumble_core::{ArticulatedBody, Collider, DofSettings, Joint, LinkMass, ModelBuilder, Settings, World, collide::{Mat3, Pose, Shape, Vec3}};
 /// # let mut world = World::new(Settings::default())?;
 /// # let rod = LinkMass { mass: 1.0, center: Vec3::new(0.0, 0.0, -0.5), inertia: Mat3::identity() };
 /// let mut builder = ModelBuilder::new();
@@ -118,7 +118,7 @@ pub(super) struct Part {
 /// builder.link("lower", Some(upper), Joint::revolute(Vec3::y()), Pose::translation(0.0, 0.0, -1.0), rod);
 /// let mut arm = ArticulatedBody::new("arm", builder.build()?).at(Pose::translation(0.0, 0.0, 2.0));
 /// arm.add_collider("lower", Collider::new(Shape::capsule(0.05, 0.4)?, Pose::translation(0.0, 0.0, -0.5)))?;
-/// arm.set_freedom(0, Freedom { limits: Some([-1.0, 1.0]), ..Freedom::default() })?;
+/// arm.set_dof(0, DofSettings { limits: Some([-1.0, 1.0]), ..DofSettings::default() })?;
 /// world.add(arm)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -126,17 +126,17 @@ pub struct ArticulatedBody {
     pub(super) name: String,
     pub(super) model: Model,
     pub(super) base: Pose,
-    pub(super) colliders: Vec<Part>,
+    pub(super) colliders: Vec<LinkCollider>,
     pub(super) visuals: Vec<Visual>,
     pub(super) cameras: Vec<CameraMount>,
     pub(super) lights: Vec<LightMount>,
     /// What acts on each degree of freedom, in the order of `v`. May be changed between steps.
-    freedoms: Vec<Freedom>,
+    dofs: Vec<DofSettings>,
     pub(super) couplings: Vec<Coupling>,
     /// Whether links meet other links of the same body; links joined to each other never do.
     pub self_collision: bool,
     /// Pairs that do not meet, smaller number first and the base (`None`) before all; sorted.
-    pub(super) apart: Vec<[Option<usize>; 2]>,
+    pub(super) excluded_pairs: Vec<[Option<usize>; 2]>,
     pub(super) start: Vec<f64>,
     pub(super) dynamics: Dynamics,
     pub(super) working: Mutex<Working>,
@@ -151,7 +151,7 @@ pub(super) struct Working {
     pub kinematics: Kinematics,
     /// No joint forces, no accelerations.
     pub zeros: Vec<f64>,
-    pub wrenches: Vec<crate::site::Wrench>,
+    pub wrenches: Vec<crate::part_state::Wrench>,
     pub accelerations: Vec<(Vec3, Vec3)>,
 }
 
@@ -174,10 +174,10 @@ impl Clone for ArticulatedBody {
             visuals: self.visuals.clone(),
             cameras: self.cameras.clone(),
             lights: self.lights.clone(),
-            freedoms: self.freedoms.clone(),
+            dofs: self.dofs.clone(),
             couplings: self.couplings.clone(),
             self_collision: self.self_collision,
-            apart: self.apart.clone(),
+            excluded_pairs: self.excluded_pairs.clone(),
             start: self.start.clone(),
             dynamics: self.dynamics.clone(),
             working: Mutex::new(self.working().clone()),
@@ -202,7 +202,7 @@ impl ArticulatedBody {
             wrenches: vec![Default::default(); model.links().len()],
             accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],
         };
-        let freedoms = vec![Freedom::default(); model.dof()];
+        let dofs = vec![DofSettings::default(); model.dof()];
         let mut body = ArticulatedBody {
             name: name.into(),
             model,
@@ -211,10 +211,10 @@ impl ArticulatedBody {
             visuals: Vec::new(),
             cameras: Vec::new(),
             lights: Vec::new(),
-            freedoms,
+            dofs,
             couplings: Vec::new(),
             self_collision: true,
-            apart: Vec::new(),
+            excluded_pairs: Vec::new(),
             start,
             dynamics,
             working: Mutex::new(working),
@@ -275,7 +275,7 @@ impl ArticulatedBody {
         let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
         let center = Translation3::from(collider.shape.center_of_mass());
         collider.pose = frame.pose * (collider.pose * center);
-        self.colliders.push(Part { link: frame.link, collider });
+        self.colliders.push(LinkCollider { link: frame.link, collider });
         Ok(())
     }
 
@@ -307,22 +307,22 @@ impl ArticulatedBody {
     }
 
     /// Keeps two links from meeting; what is folded into another link, or into the base, stands for all of that.
-    pub fn keep_apart(&mut self, a: &str, b: &str) -> Result<(), ArticulatedError> {
+    pub fn exclude_collisions(&mut self, a: &str, b: &str) -> Result<(), ArticulatedError> {
         let find = |link: &str| self.model.frame(link).map(|f| f.link).ok_or_else(|| self.no_link(link));
         let (a, b) = (find(a)?, find(b)?);
         let pair = [a.min(b), a.max(b)];
-        if let Err(place) = self.apart.binary_search(&pair) {
-            self.apart.insert(place, pair);
+        if let Err(place) = self.excluded_pairs.binary_search(&pair) {
+            self.excluded_pairs.insert(place, pair);
         }
         Ok(())
     }
 
     /// Sets what acts on one degree of freedom (its place in `v`).
-    pub fn set_freedom(&mut self, index: usize, freedom: Freedom) -> Result<(), ArticulatedError> {
+    pub fn set_dof(&mut self, index: usize, dof: DofSettings) -> Result<(), ArticulatedError> {
         let Some(link) = self.model.links().iter().find(|l| (l.v..l.v + l.joint.dof()).contains(&index)) else {
             return Err(self.no_link(&format!("of freedom {index}")));
         };
-        if let Some((what, value, wanted)) = freedom.fault(link.joint.dof() == 1) {
+        if let Some((what, value, wanted)) = dof.range_error(link.joint.dof() == 1) {
             return Err(ArticulatedError::Range {
                 body: self.name.clone(),
                 link: link.name.clone(),
@@ -331,19 +331,19 @@ impl ArticulatedBody {
                 wanted,
             });
         }
-        self.freedoms[index] = freedom;
+        self.dofs[index] = dof;
         Ok(())
     }
 
     /// Makes one freedom follow another.
     pub fn couple(&mut self, coupling: Coupling) -> Result<(), ArticulatedError> {
-        let Coupling { freedom, of, multiplier, offset } = coupling;
-        let fine = freedom != of
-            && [freedom, of].iter().all(|&i| self.position_of(i).is_some())
+        let Coupling { dof, of, multiplier, offset } = coupling;
+        let fine = dof != of
+            && [dof, of].iter().all(|&i| self.position_of(i).is_some())
             && multiplier.is_finite()
             && offset.is_finite();
         if !fine {
-            return Err(ArticulatedError::Coupling { body: self.name.clone(), freedom, of, dof: self.model.dof() });
+            return Err(ArticulatedError::Coupling { body: self.name.clone(), dof, of, count: self.model.dof() });
         }
         self.couplings.push(coupling);
         Ok(())
@@ -355,8 +355,8 @@ impl ArticulatedBody {
     }
 
     /// What acts on each degree of freedom.
-    pub fn freedoms(&self) -> &[Freedom] {
-        &self.freedoms
+    pub fn dofs(&self) -> &[DofSettings] {
+        &self.dofs
     }
 
     /// Where the base stands, in the world.
@@ -365,14 +365,14 @@ impl ArticulatedBody {
     }
 
     /// The velocity coordinate of the joint that moves a link, if that joint has just one.
-    pub fn freedom_of(&self, link: &str) -> Option<usize> {
+    pub fn dof_of(&self, link: &str) -> Option<usize> {
         let link = &self.model.links()[self.model.link(link)?];
         (link.joint.dof() == 1).then_some(link.v)
     }
 
     /// The place in `q` of the position of a revolute or prismatic freedom.
-    pub fn position_of(&self, freedom: usize) -> Option<usize> {
-        self.model.links().iter().find(|l| l.v == freedom && l.joint.dof() == 1).map(|l| l.q)
+    pub fn position_of(&self, dof: usize) -> Option<usize> {
+        self.model.links().iter().find(|l| l.v == dof && l.joint.dof() == 1).map(|l| l.q)
     }
 
     /// The moving link that carries a part; `None` for the base and what is fixed to it.
@@ -388,12 +388,12 @@ impl ArticulatedBody {
     }
 
     /// The collider that is this part, if it is one.
-    pub(super) fn collider(&self, part: usize) -> Option<&Part> {
+    pub(super) fn collider(&self, part: usize) -> Option<&LinkCollider> {
         self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)
     }
 
     /// What a link hangs on: its parent, beyond massless links of a stack. `None` is the base.
-    fn bearer(&self, link: usize) -> Option<usize> {
+    fn massive_ancestor(&self, link: usize) -> Option<usize> {
         let mut parent = self.model.links()[link].parent;
         while let Some(p) = parent.filter(|&p| self.model.links()[p].mass == super::LinkMass::none()) {
             parent = self.model.links()[p].parent;
@@ -402,11 +402,11 @@ impl ArticulatedBody {
     }
 
     /// Whether two different moving links (or the base, `None`) may meet.
-    pub(super) fn links_meet(&self, a: Option<usize>, b: Option<usize>) -> bool {
-        let parent = |link: Option<usize>| link.map(|l| self.bearer(l));
+    pub(super) fn links_collide(&self, a: Option<usize>, b: Option<usize>) -> bool {
+        let parent = |link: Option<usize>| link.map(|l| self.massive_ancestor(l));
         let grounded = |link: Option<usize>| link.is_none_or(|l| self.model.links()[l].joint != super::Joint::Floating);
         let joined = (parent(a) == Some(b) && grounded(a)) || (parent(b) == Some(a) && grounded(b));
-        let kept = self.apart.binary_search(&[a.min(b), a.max(b)]).is_ok();
+        let kept = self.excluded_pairs.binary_search(&[a.min(b), a.max(b)]).is_ok();
         self.self_collision && a != b && !joined && !kept
     }
 

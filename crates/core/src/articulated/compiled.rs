@@ -19,7 +19,7 @@ use tumble_collide::{Mat3, Vec3};
 
 /// What a sweep does at a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum JointKind {
     Revolute,
     Prismatic,
     /// Index of its block.
@@ -30,8 +30,8 @@ pub(super) enum Kind {
 
 /// One link. Lengths and axes are in inner frames: the parent's for the placement, its own for the mass.
 #[derive(Clone, Debug)]
-pub(super) struct Body {
-    pub kind: Kind,
+pub(super) struct CompiledLink {
+    pub kind: JointKind,
     /// Slot of the parent.
     pub parent: usize,
     /// First of its position numbers.
@@ -56,7 +56,7 @@ pub(super) struct Body {
 /// All links, and how many of them have a factor of three rows or more.
 #[derive(Clone, Debug)]
 pub(super) struct Compiled {
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<CompiledLink>,
     pub blocks: usize,
     pub positions: usize,
     pub dof: usize,
@@ -78,28 +78,28 @@ impl Compiled {
         compiled
     }
 
-    fn kind(&mut self, joint: &Joint) -> Kind {
+    fn kind(&mut self, joint: &Joint) -> JointKind {
         let block = self.blocks;
         match joint {
-            Joint::Prismatic { .. } => Kind::Prismatic,
+            Joint::Prismatic { .. } => JointKind::Prismatic,
             Joint::Spherical | Joint::Floating => {
                 self.blocks += 1;
-                if *joint == Joint::Floating { Kind::Floating(block) } else { Kind::Spherical(block) }
+                if *joint == Joint::Floating { JointKind::Floating(block) } else { JointKind::Spherical(block) }
             }
             // A model holds no fixed links: they are folded into their parents.
-            Joint::Revolute { .. } | Joint::Fixed => Kind::Revolute,
+            Joint::Revolute { .. } | Joint::Fixed => JointKind::Revolute,
         }
     }
 }
 
-fn body(link: &Link, kind: Kind, outer: &Mat3) -> Body {
+fn body(link: &Link, kind: JointKind, outer: &Mat3) -> CompiledLink {
     let own = match link.joint {
         Joint::Revolute { axis } | Joint::Prismatic { axis } => axes_with_z(&axis),
         _ => Mat3::identity(),
     };
     let placed = link.placement.rotation.to_rotation_matrix().into_inner();
     let (sphere, pair) = biaxial(&link.mass, &own);
-    Body {
+    CompiledLink {
         kind,
         parent: link.parent.map_or(0, |p| p + 1),
         q: link.q,

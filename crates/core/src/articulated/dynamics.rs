@@ -2,10 +2,10 @@
 //! refreshed.
 
 use super::abm::{Input, Slot, Sweep, push, spread, three, write_three};
-use super::compiled::{Body, Compiled, Kind};
+use super::compiled::{Compiled, CompiledLink, JointKind};
+use super::joint_sin_cos::JointSinCos;
 use super::model::Model;
-use super::sines::Sines;
-use crate::site::Wrench;
+use crate::part_state::Wrench;
 use crate::spatial::{Force, Motion, Vector};
 use nalgebra::{Rotation3, UnitQuaternion};
 use tumble_collide::{Mat3, Pose, Vec3};
@@ -35,7 +35,7 @@ use tumble_collide::{Mat3, Pose, Vec3};
 pub struct Dynamics {
     pub(super) compiled: Compiled,
     pub(super) sweep: Sweep<f64>,
-    sines: Sines,
+    joint_sin_cos: JointSinCos,
     /// `√D` and `1/√D` (or 0) of each hinge and slider, by slot.
     pub(super) roots: Vec<[f64; 2]>,
     singular: Option<usize>,
@@ -56,7 +56,7 @@ impl Dynamics {
         let sweep = Sweep::new(&compiled, 0.0);
         Dynamics {
             roots: vec![[0.0; 2]; compiled.bodies.len() + 1],
-            sines: Sines::new(&compiled),
+            joint_sin_cos: JointSinCos::new(&compiled),
             compiled,
             sweep,
             singular: None,
@@ -90,24 +90,24 @@ impl Dynamics {
 
     /// Takes a new state. Quaternions in `q` may have any length above 0.
     pub fn refresh(&mut self, q: &[f64], v: &[f64]) {
-        let turns = self.sines.take(q);
-        self.sweep.place::<true>(&self.compiled, &Alone { turns, q, v, tau: &[] });
+        let turns = self.joint_sin_cos.take(q);
+        self.sweep.place::<true>(&self.compiled, &SingleState { turns, q, v, tau: &[] });
         self.sweep.fold(&self.compiled);
         self.singular = None;
         for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
             let slot = &self.sweep.slots[i + 1];
             let positive = match body.kind {
-                Kind::Revolute | Kind::Prismatic => {
+                JointKind::Revolute | JointKind::Prismatic => {
                     let root = if slot.inverse > 0.0 { slot.pivot.sqrt() } else { 0.0 };
                     self.roots[i + 1] = [root, if root > 0.0 { 1.0 / root } else { 0.0 }];
                     root > 0.0
                 }
-                Kind::Spherical(block) => {
+                JointKind::Spherical(block) => {
                     let block = &mut self.sweep.blocks[block];
                     block.first = block.first.with_roots();
                     block.first.is_positive()
                 }
-                Kind::Floating(block) => {
+                JointKind::Floating(block) => {
                     let block = &mut self.sweep.blocks[block];
                     (block.first, block.second) = (block.first.with_roots(), block.second.with_roots());
                     block.first.is_positive() && block.second.is_positive()
@@ -177,13 +177,13 @@ impl Dynamics {
             out[i] = (a.angular.into(), a.linear.into());
         }
         for ((angular, linear), slot) in out.iter_mut().zip(&slots[1..]) {
-            *angular += Vec3::from(slot.drift.angular);
-            *linear += Vec3::from(slot.drift.linear);
+            *angular += Vec3::from(slot.bias_acceleration.angular);
+            *linear += Vec3::from(slot.bias_acceleration.linear);
         }
     }
 
     /// Motion of every link that joint rates `v` alone give, into `s.motions`.
-    pub(super) fn carry(&self, s: &mut Scratch, v: &[f64]) {
+    pub(super) fn propagate_velocities(&self, s: &mut Scratch, v: &[f64]) {
         s.motions[0] = Motion::default();
         for (i, body) in self.compiled.bodies.iter().enumerate() {
             s.motions[i + 1] = carried(body, &self.sweep.slots[i + 1], s.motions[body.parent], v);
@@ -193,13 +193,13 @@ impl Dynamics {
 
 /// `V = X Vₚ + S v` of a link.
 #[inline(always)]
-fn carried(body: &Body, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> Motion {
+fn carried(body: &CompiledLink, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> Motion {
     let mut motion = parent.at(slot.arm);
     match body.kind {
-        Kind::Revolute => motion.angular += slot.rotation.z * v[body.v],
-        Kind::Prismatic => motion.linear += slot.rotation.z * v[body.v],
-        Kind::Spherical(_) => motion.angular += slot.rotation * at(v, body.v),
-        Kind::Floating(_) => motion = Motion::new(at(v, body.v), at(v, body.v + 3)),
+        JointKind::Revolute => motion.angular += slot.rotation.z * v[body.v],
+        JointKind::Prismatic => motion.linear += slot.rotation.z * v[body.v],
+        JointKind::Spherical(_) => motion.angular += slot.rotation * load_vector(v, body.v),
+        JointKind::Floating(_) => motion = Motion::new(load_vector(v, body.v), load_vector(v, body.v + 3)),
     }
     motion
 }
@@ -207,22 +207,22 @@ fn carried(body: &Body, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> Motion {
 /// Forward dynamics in one go: `q̈` from `q`, `v` and joint forces `tau` in uniform gravity. Leaves `d` fit for another call of this alone: its maps need
 /// a [`Dynamics::refresh`] first.
 pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
-    let Dynamics { compiled, sweep, sines, .. } = d;
-    let turns = sines.take(q);
-    sweep.run(compiled, gravity, &Alone { turns, q, v, tau }, |k, x| qdd[k] = x);
+    let Dynamics { compiled, sweep, joint_sin_cos, .. } = d;
+    let turns = joint_sin_cos.take(q);
+    sweep.run(compiled, gravity, &SingleState { turns, q, v, tau }, |k, x| qdd[k] = x);
 }
 
 /// One state, as a sweep reads it.
-struct Alone<'a> {
+struct SingleState<'a> {
     turns: &'a [(f64, f64)],
     q: &'a [f64],
     v: &'a [f64],
     tau: &'a [f64],
 }
 
-impl Input<f64> for Alone<'_> {
+impl Input<f64> for SingleState<'_> {
     #[inline(always)]
-    fn turn(&self, link: usize, _: usize) -> (f64, f64) {
+    fn joint_angle_sin_cos(&self, link: usize, _: usize) -> (f64, f64) {
         self.turns[link]
     }
     #[inline(always)]
@@ -240,11 +240,11 @@ impl Input<f64> for Alone<'_> {
 }
 
 /// Three numbers of a slice from `k` on.
-pub(super) fn at(x: &[f64], k: usize) -> Vector {
+pub(super) fn load_vector(x: &[f64], k: usize) -> Vector {
     three(|k| x[k], k)
 }
 
 /// Writes three numbers of a slice from `k` on.
-pub(super) fn put(x: &mut [f64], k: usize, v: Vector) {
+pub(super) fn store_vector(x: &mut [f64], k: usize, v: Vector) {
     write_three(k, v, &mut |k, x_k| x[k] = x_k);
 }

@@ -20,7 +20,7 @@
 
 use super::coordinates::{read_rotation, read_vector};
 use super::joint::Joint;
-use super::model::{Frame, Link, Model};
+use super::model::{Link, LinkFrame, Model};
 use nalgebra::{ComplexField, Quaternion, Rotation3, Unit};
 use tumble_collide::{Mat3, Pose, Quat, Vec3};
 
@@ -125,7 +125,7 @@ impl Kinematics {
     }
 
     /// Pose in the world of a named frame of the model.
-    pub fn frame_pose(&self, frame: &Frame) -> Pose {
+    pub fn frame_pose(&self, frame: &LinkFrame) -> Pose {
         frame.link.map_or(frame.pose, |i| self.links[i].pose * frame.pose)
     }
 

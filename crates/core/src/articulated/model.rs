@@ -1,7 +1,7 @@
 //! A tree of links: what never changes of an articulated body [RBDA §4.1–4.4], thesis §III.B.1.
 //!
 //! Links are numbered so that a parent comes before its children. Fixed links are folded into their parents when the model is built and live on
-//! as [`Frame`]s. Coordinates are laid out link by link: `q` has [`Model::positions`] numbers and `v` has [`Model::dof`].
+//! as [`LinkFrame`]s. Coordinates are laid out link by link: `q` has [`Model::positions`] numbers and `v` has [`Model::dof`].
 
 use super::joint::Joint;
 use nalgebra::SymmetricEigen;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use tumble_collide::{Mat3, Pose, Vec3};
 
 /// Links at most in one model: a bound for what comes from files.
-pub const MOST_LINKS: usize = 10_000;
+pub const MAX_LINKS: usize = 10_000;
 
 /// What is wrong with a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -17,8 +17,8 @@ pub enum ModelError {
     /// Nothing in it.
     #[error("the model has no moving link")]
     Empty,
-    /// More links than [`MOST_LINKS`].
-    #[error("the model has more than {MOST_LINKS} links")]
+    /// More links than [`MAX_LINKS`].
+    #[error("the model has more than {MAX_LINKS} links")]
     TooMany,
     /// Names are unique within a model.
     #[error("two links are named '{0}'; names must be unique within a model")]
@@ -114,24 +114,25 @@ impl LinkMass {
     }
 
     fn validate(&self, link: &str) -> Result<(), ModelError> {
-        let fault = |what, value, wanted| Err(ModelError::Inertia { link: link.to_string(), what, value, wanted });
+        let range_error =
+            |what, value, wanted| Err(ModelError::Inertia { link: link.to_string(), what, value, wanted });
         if !(self.mass.is_finite() && self.mass >= 0.0) {
-            return fault("mass", self.mass, "finite and at least 0 kg");
+            return range_error("mass", self.mass, "finite and at least 0 kg");
         }
         if let Some(value) = self.center.iter().copied().find(|x| !x.is_finite()) {
-            return fault("a coordinate of the centre of mass", value, "finite");
+            return range_error("a coordinate of the centre of mass", value, "finite");
         }
         if let Some(value) = self.inertia.iter().copied().find(|x| !x.is_finite()) {
-            return fault("an entry of the inertia", value, "finite");
+            return range_error("an entry of the inertia", value, "finite");
         }
         let size = self.inertia.amax();
         let skew = (self.inertia - self.inertia.transpose()).amax();
         if skew > 1e-9 * size {
-            return fault("the asymmetry of the inertia", skew, "0");
+            return range_error("the asymmetry of the inertia", skew, "0");
         }
         let moments = SymmetricEigen::new(0.5 * (self.inertia + self.inertia.transpose())).eigenvalues;
         if moments.min() < -1e-12 * size {
-            return fault("the least principal moment of inertia", moments.min(), "at least 0 kg·m²");
+            return range_error("the least principal moment of inertia", moments.min(), "at least 0 kg·m²");
         }
         Ok(())
     }
@@ -158,7 +159,7 @@ pub struct Link {
 
 /// A named frame that moves with a link: every link, the folded ones too.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Frame {
+pub struct LinkFrame {
     /// Name of the link as it was added.
     pub name: String,
     /// Moving link that carries it; `None` for one fixed to the base.
@@ -171,7 +172,7 @@ pub struct Frame {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Model {
     links: Vec<Link>,
-    frames: Vec<Frame>,
+    frames: Vec<LinkFrame>,
     positions: usize,
     dof: usize,
 }
@@ -183,12 +184,12 @@ impl Model {
     }
 
     /// All named frames, in the order in which their links were added.
-    pub fn frames(&self) -> &[Frame] {
+    pub fn frames(&self) -> &[LinkFrame] {
         &self.frames
     }
 
     /// The frame of that name.
-    pub fn frame(&self, name: &str) -> Option<&Frame> {
+    pub fn frame(&self, name: &str) -> Option<&LinkFrame> {
         self.frames.iter().find(|f| f.name == name)
     }
 
@@ -278,7 +279,7 @@ impl ModelBuilder {
 
     /// Checks everything, folds fixed links into their parents and numbers the coordinates.
     pub fn build(self) -> Result<Model, ModelError> {
-        if self.added.len() > MOST_LINKS {
+        if self.added.len() > MAX_LINKS {
             return Err(ModelError::TooMany);
         }
         let mut model = Model { links: Vec::new(), frames: Vec::new(), positions: 0, dof: 0 };
@@ -320,11 +321,11 @@ impl Model {
                 let carried = &mut self.links[link].mass;
                 *carried = carried.with(&mass.seen_from(&placement));
             }
-            self.frames.push(Frame { name, link: carrier, pose: placement });
+            self.frames.push(LinkFrame { name, link: carrier, pose: placement });
             return Ok(());
         }
         let joint = unit_axis(joint, &name)?;
-        self.frames.push(Frame { name: name.clone(), link: Some(self.links.len()), pose: Pose::identity() });
+        self.frames.push(LinkFrame { name: name.clone(), link: Some(self.links.len()), pose: Pose::identity() });
         let (q, v) = (self.positions, self.dof);
         self.positions += joint.positions();
         self.dof += joint.dof();

@@ -1,16 +1,16 @@
 //! The articulated body behind the interfaces of the thesis: it integrates, collides, is drawn and kept in step like any other object.
 
-use super::body::{ArticulatedBody, Part};
-use super::coast;
+use super::body::{ArticulatedBody, LinkCollider};
 use super::coordinates::integrate;
 use super::energy::{energy, momentum};
+use super::free_motion;
 use super::joint::Joint;
-use crate::collidable::{Collidable, CollisionKind, Material};
+use crate::collidable::{Collidable, CollisionGroup, Material};
 use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
+use crate::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
 use crate::rigid::vec3;
 use crate::rotation;
-use crate::site::{Dims, ForceSlice, Forces, Site, Span, Wrench};
 use crate::sync;
 use crate::view::WorldView;
 use crate::visual::Visual;
@@ -25,27 +25,27 @@ impl Object for ArticulatedBody {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], sites: &mut [Site]) {
+    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
         self.refresh_dynamics(x);
         let links = self.model.links().len();
-        let (moving, rest) = sites.split_at_mut(links);
+        let (moving, rest) = part_states.split_at_mut(links);
         let working = self.working.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
         self.dynamics.link_accelerations(&working.zeros, &mut working.accelerations);
-        for (i, site) in moving.iter_mut().enumerate() {
+        for (i, part_state) in moving.iter_mut().enumerate() {
             let (angular_velocity, velocity) = self.dynamics.link_velocity(i);
-            (site.pose, site.angular_velocity, site.velocity) =
+            (part_state.pose, part_state.angular_velocity, part_state.velocity) =
                 (self.dynamics.link_pose(i), angular_velocity, velocity);
-            (site.bias_angular_acceleration, site.bias_acceleration) = working.accelerations[i];
+            (part_state.bias_angular_acceleration, part_state.bias_acceleration) = working.accelerations[i];
         }
-        rest[0] = Site { pose: *self.base(), ..Site::default() };
-        for (site, Part { link, collider }) in rest[1..].iter_mut().zip(&self.colliders) {
-            let carrier = link.map_or(Site { pose: *self.base(), ..Site::default() }, |l| moving[l]);
-            site.pose = carrier.pose * collider.pose;
-            let (point, spin) = (site.position(), carrier.angular_velocity);
+        rest[0] = PartState { pose: *self.base(), ..PartState::default() };
+        for (part_state, LinkCollider { link, collider }) in rest[1..].iter_mut().zip(&self.colliders) {
+            let carrier = link.map_or(PartState { pose: *self.base(), ..PartState::default() }, |l| moving[l]);
+            part_state.pose = carrier.pose * collider.pose;
+            let (point, spin) = (part_state.position(), carrier.angular_velocity);
             let arm = point - carrier.position();
-            (site.angular_velocity, site.velocity) = (spin, carrier.velocity_at(&point));
-            site.bias_angular_acceleration = carrier.bias_angular_acceleration;
-            site.bias_acceleration = carrier.bias_acceleration
+            (part_state.angular_velocity, part_state.velocity) = (spin, carrier.velocity_at(&point));
+            part_state.bias_angular_acceleration = carrier.bias_angular_acceleration;
+            part_state.bias_acceleration = carrier.bias_acceleration
                 + carrier.bias_angular_acceleration.cross(&arm)
                 + spin.cross(&spin.cross(&arm));
         }
@@ -85,7 +85,7 @@ impl ArticulatedBody {
     fn gather(&self, parts: &[Wrench], links: &mut [Wrench]) {
         let (moving, rest) = parts.split_at(links.len());
         links.copy_from_slice(moving);
-        for (wrench, Part { link, collider }) in rest[1..].iter().zip(&self.colliders) {
+        for (wrench, LinkCollider { link, collider }) in rest[1..].iter().zip(&self.colliders) {
             let Some(link) = *link else { continue };
             let arm = self.dynamics.link_pose(link).rotation * collider.pose.translation.vector;
             links[link].force += wrench.force;
@@ -95,11 +95,11 @@ impl ArticulatedBody {
 }
 
 impl Integratable for ArticulatedBody {
-    fn dims(&self) -> Dims {
-        Dims {
+    fn state_sizes(&self) -> StateSizes {
+        StateSizes {
             x: self.model.positions() + self.model.dof(),
             dof: self.model.dof(),
-            sites: self.model.links().len() + 1 + self.colliders.len(),
+            parts: self.model.links().len() + 1 + self.colliders.len(),
         }
     }
 
@@ -111,9 +111,9 @@ impl Integratable for ArticulatedBody {
         self.is_state(x)
     }
 
-    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
+    fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces) {
         for (i, link) in self.model.links().iter().enumerate().filter(|(_, l)| l.mass.mass > 0.0) {
-            let (weight, wrench) = (link.mass.mass * view.gravity, &mut out.wrenches[me.site.start + i]);
+            let (weight, wrench) = (link.mass.mass * view.gravity, &mut out.wrenches[me.parts.start + i]);
             wrench.force += weight;
             wrench.torque += (self.dynamics.link_pose(i).rotation * link.mass.center).cross(&weight);
         }
@@ -134,7 +134,7 @@ impl Integratable for ArticulatedBody {
         self.dynamics.accelerate(&mut working.scratch, f.generalized, &working.wrenches, dp);
     }
 
-    fn trouble(&self) -> Option<String> {
+    fn singularity(&self) -> Option<String> {
         let link = &self.model.links()[self.dynamics.singular()?];
         Some(format!(
             "nothing that hangs on the joint of link '{}' has inertia along it where it stands (gimbal lock of stacked joints, or a point mass on the axis): \
@@ -143,18 +143,18 @@ impl Integratable for ArticulatedBody {
         ))
     }
 
-    fn accelerations(&self, _x: &[f64], dp: &[f64], sites: &mut [Site]) {
+    fn accelerations(&self, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
         let working = &mut *self.working();
         self.dynamics.link_accelerations(dp, &mut working.accelerations);
-        let (moving, rest) = sites.split_at_mut(self.model.links().len());
-        for (site, (angular, linear)) in moving.iter_mut().zip(&working.accelerations) {
-            (site.angular_acceleration, site.acceleration) = (*angular, *linear);
+        let (moving, rest) = part_states.split_at_mut(self.model.links().len());
+        for (part_state, (angular, linear)) in moving.iter_mut().zip(&working.accelerations) {
+            (part_state.angular_acceleration, part_state.acceleration) = (*angular, *linear);
         }
-        for (site, Part { link, .. }) in rest[1..].iter_mut().zip(&self.colliders) {
-            let carrier = link.map_or(Site::default(), |l| moving[l]);
-            let point = site.position();
-            site.angular_acceleration = carrier.angular_acceleration;
-            site.acceleration = if link.is_some() {
+        for (part_state, LinkCollider { link, .. }) in rest[1..].iter_mut().zip(&self.colliders) {
+            let carrier = link.map_or(PartState::default(), |l| moving[l]);
+            let point = part_state.position();
+            part_state.angular_acceleration = carrier.angular_acceleration;
+            part_state.acceleration = if link.is_some() {
                 carrier.acceleration_following(&point, &carrier.velocity_at(&point))
             } else {
                 Vec3::zeros()
@@ -166,7 +166,7 @@ impl Integratable for ArticulatedBody {
         true
     }
 
-    fn coasting_rate(&self, _x: &[f64], out: &mut [f64]) {
+    fn free_motion_rate(&self, _x: &[f64], out: &mut [f64]) {
         let working = &mut *self.working();
         self.dynamics.accelerate(&mut working.scratch, &working.zeros, &[], out);
     }
@@ -175,16 +175,16 @@ impl Integratable for ArticulatedBody {
         x[self.model.positions()..].iter_mut().zip(dp).for_each(|(v, dp)| *v += h * dp);
     }
 
-    fn coast(&self, x: &mut [f64], h: f64) {
-        coast::coast(&self.model, &mut self.working(), x, h);
+    fn free_motion(&self, x: &mut [f64], h: f64) {
+        free_motion::free_motion(&self.model, &mut self.working(), x, h);
     }
 
-    fn drift(&self, x: &mut [f64], v: &[f64], h: f64) {
+    fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         integrate(&self.model, &mut x[..self.model.positions()], v, h);
     }
 
     fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
-        coast::transport(&self.model, &mut self.working(), x, v, h);
+        free_motion::transport(&self.model, &mut self.working(), x, v, h);
     }
 
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
@@ -251,30 +251,30 @@ impl Collidable for ArticulatedBody {
         self.collider(part).map_or(Material::default(), |p| p.collider.material)
     }
 
-    fn kind(&self, part: usize) -> CollisionKind {
-        self.collider(part).map_or(CollisionKind::default(), |p| p.collider.kind)
+    fn collision_group(&self, part: usize) -> CollisionGroup {
+        self.collider(part).map_or(CollisionGroup::default(), |p| p.collider.group)
     }
 
     fn contact_mode(&self, part: usize) -> ContactMode {
         self.collider(part).map_or(ContactMode::default(), |p| p.collider.contact_mode)
     }
 
-    fn collides_with(&self, part: usize, other: CollisionKind) -> bool {
-        self.collider(part).is_some_and(|p| p.collider.meets & other.bit() != 0)
+    fn collides_with(&self, part: usize, other: CollisionGroup) -> bool {
+        self.collider(part).is_some_and(|p| p.collider.mask & other.bit() != 0)
     }
 
     fn part_moves(&self, part: usize) -> bool {
         self.link_of(part).is_some()
     }
 
-    fn parts_meet(&self, part_a: usize, part_b: usize) -> bool {
-        self.links_meet(self.link_of(part_a), self.link_of(part_b))
+    fn parts_collide(&self, part_a: usize, part_b: usize) -> bool {
+        self.links_collide(self.link_of(part_a), self.link_of(part_b))
     }
 
-    fn test_impulse(&self, part: usize, site: &Site, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
+    fn test_impulse(&self, part: usize, part_state: &PartState, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
         let Some(link) = self.link_of(part) else { return };
         let carried = self.collider(part).map_or(Vec3::zeros(), |p| p.collider.pose.translation.vector);
-        let arm = point - site.position() + self.dynamics.link_pose(link).rotation * carried;
+        let arm = point - part_state.position() + self.dynamics.link_pose(link).rotation * carried;
         self.dynamics.point_response(link, &arm, axes, sign, y);
     }
 }
@@ -299,7 +299,7 @@ impl Renderable for ArticulatedBody {
 
 /// The whole state as little-endian `f64`: exact, for replicas.
 impl NetSync for ArticulatedBody {
-    fn get_data(&self, me: &Span, view: &WorldView, out: &mut Vec<u8>) {
+    fn get_data(&self, me: &StateRange, view: &WorldView, out: &mut Vec<u8>) {
         sync::write_state(&view.x[me.x.clone()], out);
     }
 

@@ -1,7 +1,7 @@
 //! What of an articulated body is neither its model nor its freedoms, for archives.
 
-use super::body::{ArticulatedBody, ArticulatedError, Collider, Part};
-use super::freedom::Coupling;
+use super::body::{ArticulatedBody, ArticulatedError, Collider, LinkCollider};
+use super::dof::Coupling;
 use crate::mounts::{CameraMount, LightMount};
 use crate::visual::Visual;
 use tumble_collide::Pose;
@@ -15,7 +15,7 @@ pub(crate) struct ArticulatedParts {
     pub lights: Vec<LightMount>,
     pub couplings: Vec<Coupling>,
     /// Pairs of links that do not collide, sorted.
-    pub apart: Vec<[Option<usize>; 2]>,
+    pub excluded_pairs: Vec<[Option<usize>; 2]>,
     pub start: Vec<f64>,
 }
 
@@ -27,7 +27,7 @@ impl ArticulatedBody {
             cameras: self.cameras.clone(),
             lights: self.lights.clone(),
             couplings: self.couplings.clone(),
-            apart: self.apart.clone(),
+            excluded_pairs: self.excluded_pairs.clone(),
             start: self.start.clone(),
         }
     }
@@ -37,10 +37,10 @@ impl ArticulatedBody {
         if !self.is_state(&parts.start) {
             return Err(ArticulatedError::Start { body: self.name, what: "positions", wanted: self.start.len() });
         }
-        let ArticulatedParts { colliders, visuals, cameras, lights, couplings, apart, start } = parts;
-        self.colliders = colliders.into_iter().map(|(link, collider)| Part { link, collider }).collect();
+        let ArticulatedParts { colliders, visuals, cameras, lights, couplings, excluded_pairs, start } = parts;
+        self.colliders = colliders.into_iter().map(|(link, collider)| LinkCollider { link, collider }).collect();
         (self.base, self.visuals, self.cameras, self.lights) = (base, visuals, cameras, lights);
-        (self.couplings, self.apart) = (couplings, apart);
+        (self.couplings, self.excluded_pairs) = (couplings, excluded_pairs);
         self.refresh_dynamics(&start);
         self.start = start;
         Ok(self)

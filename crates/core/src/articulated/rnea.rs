@@ -18,7 +18,7 @@
 
 use super::kinematics::{Kinematics, Rates};
 use super::model::Model;
-use crate::site::Wrench;
+use crate::part_state::Wrench;
 use tumble_collide::Vec3;
 
 /// Working memory of inverse dynamics.

@@ -18,9 +18,9 @@
 //! | ball | `R` own axes to world; `C` of `J` there | `[C; Wᵀ]`, `W = C⁻¹ H` |
 //! | floating root | block upper triangular: `C` of `M`, `W = C⁻¹ Hᵀ`, `C` of `J − Wᵀ W` | none: nothing before it moves |
 
-use super::abm::Block;
-use super::compiled::{Body, Kind};
-use super::dynamics::{Dynamics, Scratch, at, put};
+use super::abm::JointFactor;
+use super::compiled::{CompiledLink, JointKind};
+use super::dynamics::{Dynamics, Scratch, load_vector, store_vector};
 use super::factor::{rows_times, rows_transposed_times};
 use crate::spatial::{Force, Motion, Vector};
 use tumble_collide::Vec3;
@@ -31,20 +31,26 @@ const ROWS: usize = 3;
 impl Dynamics {
     /// `u = L v`: velocities where every mass is 1.
     pub fn whiten(&self, s: &mut Scratch, v: &[f64], u: &mut [f64]) {
-        self.carry(s, v);
+        self.propagate_velocities(s, v);
         for (i, body) in self.compiled.bodies.iter().enumerate() {
             let (slot, motion) = (&self.sweep.slots[i + 1], s.motions[i + 1]);
             match body.kind {
                 // Gᵀ V' + Cᵀ v = Gᵀ V, because Gᵀ S = Cᵀ.
-                Kind::Revolute | Kind::Prismatic => u[body.v] = self.roots[i + 1][1] * motion.power(slot.column),
-                Kind::Spherical(block) => {
-                    let Block { first, w, .. } = &self.sweep.blocks[block];
-                    put(u, body.v, first.upper_times(motion.angular) + first.divide_root(rows_times(w, motion.linear)));
+                JointKind::Revolute | JointKind::Prismatic => {
+                    u[body.v] = self.roots[i + 1][1] * motion.power(slot.column)
                 }
-                Kind::Floating(block) => {
-                    let Block { first, w, second } = &self.sweep.blocks[block];
-                    put(u, body.v, second.upper_times(motion.angular));
-                    put(
+                JointKind::Spherical(block) => {
+                    let JointFactor { first, w, .. } = &self.sweep.blocks[block];
+                    store_vector(
+                        u,
+                        body.v,
+                        first.upper_times(motion.angular) + first.divide_root(rows_times(w, motion.linear)),
+                    );
+                }
+                JointKind::Floating(block) => {
+                    let JointFactor { first, w, second } = &self.sweep.blocks[block];
+                    store_vector(u, body.v, second.upper_times(motion.angular));
+                    store_vector(
                         u,
                         body.v + 3,
                         first.upper_times(motion.linear) + first.divide_root(rows_times(w, motion.angular)),
@@ -61,25 +67,27 @@ impl Dynamics {
             let slot = &self.sweep.slots[i + 1];
             let mut motion = s.motions[body.parent].at(slot.arm);
             match body.kind {
-                Kind::Revolute | Kind::Prismatic => {
+                JointKind::Revolute | JointKind::Prismatic => {
                     let rate = self.roots[i + 1][1] * u[body.v] - slot.inverse * motion.power(slot.column);
                     v[body.v] = rate;
-                    let part = if body.kind == Kind::Revolute { &mut motion.angular } else { &mut motion.linear };
+                    let part = if body.kind == JointKind::Revolute { &mut motion.angular } else { &mut motion.linear };
                     *part += slot.rotation.z * rate;
                 }
-                Kind::Spherical(block) => {
-                    let Block { first, w, .. } = &self.sweep.blocks[block];
-                    let angular = first.upper_solve(at(u, body.v) - first.divide_root(rows_times(w, motion.linear)));
-                    put(v, body.v, slot.rotation.transposed_times(angular - motion.angular));
+                JointKind::Spherical(block) => {
+                    let JointFactor { first, w, .. } = &self.sweep.blocks[block];
+                    let angular =
+                        first.upper_solve(load_vector(u, body.v) - first.divide_root(rows_times(w, motion.linear)));
+                    store_vector(v, body.v, slot.rotation.transposed_times(angular - motion.angular));
                     motion.angular = angular;
                 }
-                Kind::Floating(block) => {
-                    let Block { first, w, second } = &self.sweep.blocks[block];
-                    let angular = second.upper_solve(at(u, body.v));
-                    let linear = first.upper_solve(at(u, body.v + 3) - first.divide_root(rows_times(w, angular)));
+                JointKind::Floating(block) => {
+                    let JointFactor { first, w, second } = &self.sweep.blocks[block];
+                    let angular = second.upper_solve(load_vector(u, body.v));
+                    let linear =
+                        first.upper_solve(load_vector(u, body.v + 3) - first.divide_root(rows_times(w, angular)));
                     motion = Motion::new(angular, linear);
-                    put(v, body.v, angular);
-                    put(v, body.v + 3, linear);
+                    store_vector(v, body.v, angular);
+                    store_vector(v, body.v + 3, linear);
                 }
             }
             s.motions[i + 1] = motion;
@@ -102,29 +110,29 @@ impl Dynamics {
             let (slot, mut p) = (&self.sweep.slots[i + 1], s.forces[i + 1]);
             let [root, inverse_root] = self.roots[i + 1];
             match body.kind {
-                Kind::Revolute => {
+                JointKind::Revolute => {
                     j[body.v] = root * u[body.v] + slot.rotation.z.dot(p.torque);
                     p += slot.column * (inverse_root * u[body.v]);
                 }
-                Kind::Prismatic => {
+                JointKind::Prismatic => {
                     j[body.v] = root * u[body.v] + slot.rotation.z.dot(p.force);
                     p += slot.column * (inverse_root * u[body.v]);
                 }
-                Kind::Spherical(block) => {
-                    let Block { first, w, .. } = &self.sweep.blocks[block];
-                    let own = at(u, body.v);
+                JointKind::Spherical(block) => {
+                    let JointFactor { first, w, .. } = &self.sweep.blocks[block];
+                    let own = load_vector(u, body.v);
                     p += Force::new(first.lower_times(own), rows_transposed_times(w, first.divide_root(own)));
-                    put(j, body.v, slot.rotation.transposed_times(p.torque));
+                    store_vector(j, body.v, slot.rotation.transposed_times(p.torque));
                 }
-                Kind::Floating(block) => {
-                    let Block { first, w, second } = &self.sweep.blocks[block];
-                    let (angular, linear) = (at(u, body.v), at(u, body.v + 3));
-                    put(
+                JointKind::Floating(block) => {
+                    let JointFactor { first, w, second } = &self.sweep.blocks[block];
+                    let (angular, linear) = (load_vector(u, body.v), load_vector(u, body.v + 3));
+                    store_vector(
                         j,
                         body.v,
                         second.lower_times(angular) + rows_transposed_times(w, first.divide_root(linear)) + p.torque,
                     );
-                    put(j, body.v + 3, first.lower_times(linear) + p.force);
+                    store_vector(j, body.v + 3, first.lower_times(linear) + p.force);
                 }
             }
             s.forces[body.parent] += p.from_arm(slot.arm);
@@ -167,30 +175,30 @@ impl Dynamics {
     fn respond_link(
         &self,
         i: usize,
-        body: &Body,
+        body: &CompiledLink,
         mut p: Force,
         j: impl Fn(usize) -> f64,
         mut out: impl FnMut(usize, f64),
     ) -> Force {
         let slot = &self.sweep.slots[i];
         match body.kind {
-            Kind::Revolute | Kind::Prismatic => {
-                let part = if body.kind == Kind::Revolute { p.torque } else { p.force };
+            JointKind::Revolute | JointKind::Prismatic => {
+                let part = if body.kind == JointKind::Revolute { p.torque } else { p.force };
                 let inverse_root = self.roots[i][1];
                 let y = inverse_root * (j(body.v) + slot.rotation.z.dot(part));
                 out(body.v, y);
                 p -= slot.column * (inverse_root * y);
             }
-            Kind::Spherical(block) => {
-                let Block { first, w, .. } = &self.sweep.blocks[block];
+            JointKind::Spherical(block) => {
+                let JointFactor { first, w, .. } = &self.sweep.blocks[block];
                 let own = slot.rotation * Vector::new(j(body.v), j(body.v + 1), j(body.v + 2));
                 let y = first.lower_solve(own + p.torque);
                 (0..3).for_each(|k| out(body.v + k, [y.x, y.y, y.z][k]));
                 // P − G y = [P − C y; …] and C y = own + P.
                 p = Force::new(-own, p.force - rows_transposed_times(w, first.divide_root(y)));
             }
-            Kind::Floating(block) => {
-                let Block { first, w, second } = &self.sweep.blocks[block];
+            JointKind::Floating(block) => {
+                let JointFactor { first, w, second } = &self.sweep.blocks[block];
                 let own = |k| Vector::new(j(k), j(k + 1), j(k + 2));
                 let linear = first.lower_solve(own(body.v + 3) + p.force);
                 let angular =

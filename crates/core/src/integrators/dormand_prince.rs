@@ -25,8 +25,8 @@
 //!
 //! What is led keeps the velocity that it has at the start of the whole call: `Θ = t·v`, without error.
 
-use super::trajectory::{Piece, Trajectory};
-use crate::motion::Motion;
+use super::trajectory::{InnerStep, Trajectory};
+use crate::motion::IntegrationContext;
 use crate::settings::Settings;
 use crate::view::{Entry, Mode};
 use crate::world::StepError;
@@ -49,9 +49,9 @@ const E: [f64; STAGES] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
 /// Inner steps in one frame at most, refused ones included.
-const MOST_STEPS: u32 = 100_000;
+const MAX_STEPS: u32 = 100_000;
 /// Least inner step, as a share of the frame.
-const FLOOR: f64 = 1e-12;
+const MIN_STEP_FRACTION: f64 = 1e-12;
 /// Least and greatest factor from one inner step to the next.
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
@@ -78,7 +78,7 @@ pub(crate) struct Adaptive {
 struct Work {
     start: Vec<f64>,
     /// Velocity of what is led.
-    led: Vec<f64>,
+    kinematic: Vec<f64>,
     k: [Vec<f64>; STAGES],
     y: Vec<f64>,
     /// Velocity at the end of the step, not pulled back.
@@ -106,7 +106,7 @@ impl Adaptive {
     /// early where no more of it can be. Returns how far it came, s; state, sites and forces are left there, the last rates in `dp`.
     pub fn integrate(
         &mut self,
-        motion: &mut Motion,
+        motion: &mut IntegrationContext,
         t: f64,
         h: f64,
         dp: &mut [f64],
@@ -115,35 +115,42 @@ impl Adaptive {
         let n = dp.len();
         self.begin(motion, t, n);
         if record {
-            self.path.begin(motion.x.len(), n, &self.work.led);
+            self.path.begin(motion.x.len(), n, &self.work.kinematic);
         }
-        self.step = if self.step > 0.0 { self.step.clamp(FLOOR * self.frame, self.frame) } else { self.frame };
+        self.step =
+            if self.step > 0.0 { self.step.clamp(MIN_STEP_FRACTION * self.frame, self.frame) } else { self.frame };
         let (mut done, mut grow) = (0.0, GROW);
         while done < h && !(record && self.path.full()) {
             // equal parts of what is left, so that no sliver remains for the last
             let parts = ((h - done) / self.step).ceil();
             let step = (h - done) / parts;
             self.steps += 1;
-            let worst = self.attempt(motion, t + done, step);
+            let worst = self.try_step(motion, t + done, step);
             let factor = (SAFETY * ComplexField::powf(worst.error, -0.2)).clamp(SHRINK, grow);
             if worst.error > 1.0 {
-                if step <= FLOOR * self.frame || self.steps >= MOST_STEPS {
-                    return Err(self.give_up(motion, t + done, step, worst));
+                if step <= MIN_STEP_FRACTION * self.frame || self.steps >= MAX_STEPS {
+                    return Err(self.tolerance_error(motion, t + done, step, worst));
                 }
                 (self.step, grow) = (step * factor, 1.0);
                 continue;
             }
             let end = if parts <= 1.0 { h } else { done + step };
             if record {
-                self.path.push(Piece { start: done, length: step }, end, &self.work.start, &self.work.k, &self.work.y);
+                self.path.push(
+                    InnerStep { start: done, length: step },
+                    end,
+                    &self.work.start,
+                    &self.work.k,
+                    &self.work.y,
+                );
             }
             done = end;
             let proposed = step * factor;
             self.step = if factor >= grow { self.step.max(proposed) } else { proposed }.min(self.frame);
             grow = GROW;
-            self.go_on(motion, n);
-            if self.steps >= MOST_STEPS && done < h {
-                return Err(self.give_up(motion, t + done, step, worst));
+            self.advance(motion, n);
+            if self.steps >= MAX_STEPS && done < h {
+                return Err(self.tolerance_error(motion, t + done, step, worst));
             }
         }
         dp.copy_from_slice(&self.work.k[0][n..]);
@@ -151,44 +158,44 @@ impl Adaptive {
     }
 
     /// The first stage of the first step.
-    fn begin(&mut self, motion: &mut Motion, t: f64, n: usize) {
+    fn begin(&mut self, motion: &mut IntegrationContext, t: f64, n: usize) {
         let w = &mut self.work;
         w.k.iter_mut().for_each(|k| k.resize(2 * n, 0.0));
         [&mut w.y, &mut w.error].into_iter().for_each(|v| v.resize(2 * n, 0.0));
-        [&mut w.led, &mut w.velocity].into_iter().for_each(|v| v.resize(n, 0.0));
+        [&mut w.kinematic, &mut w.velocity].into_iter().for_each(|v| v.resize(n, 0.0));
         motion.x.clone_into(&mut w.start);
         let (v, f) = w.k[0].split_at_mut(n);
         motion.evaluate(t, f);
         motion.velocities(v);
-        w.led.copy_from_slice(v);
+        w.kinematic.copy_from_slice(v);
     }
 
     /// Tries one inner step: the state is left at its end; the rates of all stages are in `k`, the step in `y`.
-    fn attempt(&mut self, motion: &mut Motion, t: f64, step: f64) -> Worst {
+    fn try_step(&mut self, motion: &mut IntegrationContext, t: f64, step: f64) -> Worst {
         let w = &mut self.work;
-        let n = w.led.len();
+        let n = w.kinematic.len();
         for i in 1..STAGES {
             let (before, after) = w.k.split_at_mut(i);
             combine(before, &A[i][..i], step, &mut w.y);
-            motion.displace(&w.start, &w.y, &w.led);
+            motion.displace(&w.start, &w.y, &w.kinematic);
             let (v, f) = after[0].split_at_mut(n);
             motion.evaluate(t + C[i] * step, f);
             motion.velocities(v);
             w.velocity.copy_from_slice(v);
-            motion.pull_back(&w.y[..n], v, &w.led);
+            motion.pull_back(&w.y[..n], v, &w.kinematic);
         }
         combine(&w.k, &E, step, &mut w.error);
         self.worst(motion)
     }
 
     /// The greatest error of all objects that move; what is not a number is infinite.
-    fn worst(&mut self, motion: &Motion) -> Worst {
+    fn worst(&mut self, motion: &IntegrationContext) -> Worst {
         let w = &mut self.work;
-        let n = w.led.len();
+        let n = w.kinematic.len();
         let mut worst = Worst { error: 0.0, object: 0 };
         for (object, entry) in motion.table.iter().enumerate().filter(|(_, e)| e.moves()) {
             let Some(body) = entry.object.integratable() else { continue };
-            let (x, v) = (entry.span.x.clone(), entry.span.v.clone());
+            let (x, v) = (entry.state_range.x.clone(), entry.state_range.v.clone());
             // e_v = M⁻¹·e_Π: the velocity that the error is, at the end of the step
             let momentum = &w.error[n + v.start..n + v.end];
             w.x.clear();
@@ -212,22 +219,22 @@ impl Adaptive {
     }
 
     /// Makes the end of the step the start of the next: its last stage is the next one's first.
-    fn go_on(&mut self, motion: &Motion, n: usize) {
+    fn advance(&mut self, motion: &IntegrationContext, n: usize) {
         let w = &mut self.work;
         w.start.copy_from_slice(motion.x);
         w.k.swap(0, STAGES - 1);
         w.k[0][..n].copy_from_slice(&w.velocity);
-        for entry in motion.table.iter().filter(|e| led(e)) {
-            w.k[0][entry.span.v.clone()].copy_from_slice(&w.led[entry.span.v.clone()]);
+        for entry in motion.table.iter().filter(|e| is_kinematic(e)) {
+            w.k[0][entry.state_range.v.clone()].copy_from_slice(&w.kinematic[entry.state_range.v.clone()]);
         }
     }
 
-    fn give_up(&self, motion: &Motion, time: f64, step: f64, worst: Worst) -> StepError {
+    fn tolerance_error(&self, motion: &IntegrationContext, time: f64, step: f64, worst: Worst) -> StepError {
         let Some(entry) = motion.table.iter().nth(worst.object) else {
             unreachable!("the object was found in this table")
         };
         let object = entry.object.name().to_string();
-        match entry.object.integratable().and_then(|body| body.trouble()) {
+        match entry.object.integratable().and_then(|body| body.singularity()) {
             Some(why) => StepError::Singular { object, why, time },
             None => StepError::Tolerance { object, time, step, steps: self.steps, tolerance: self.tolerance },
         }
@@ -243,36 +250,38 @@ fn combine(k: &[Vec<f64>], weight: &[f64], h: f64, out: &mut [f64]) {
     out.iter_mut().for_each(|out| *out *= h);
 }
 
-fn led(entry: &Entry) -> bool {
-    entry.status.alive && entry.status.mode == Mode::Kinematic
+fn is_kinematic(entry: &Entry) -> bool {
+    entry.status.enabled && entry.status.mode == Mode::Kinematic
 }
 
-impl Motion<'_> {
+impl IntegrationContext<'_> {
     /// Writes the state `(Θ, Π)` away from `start`. What is led has its one velocity there too.
-    pub(super) fn displace(&mut self, start: &[f64], y: &[f64], led_velocity: &[f64]) {
+    pub(super) fn displace(&mut self, start: &[f64], y: &[f64], kinematic_velocity: &[f64]) {
         self.x.copy_from_slice(start);
-        let (theta, pi) = y.split_at(led_velocity.len());
-        for entry in self.table.iter().filter(|e| e.moves() || led(e)) {
+        let (theta, pi) = y.split_at(kinematic_velocity.len());
+        for entry in self.table.iter().filter(|e| e.moves() || is_kinematic(e)) {
             let Some(body) = entry.object.integratable() else { continue };
-            let (x, v) = (&mut self.x[entry.span.x.clone()], entry.span.v.clone());
+            let (x, v) = (&mut self.x[entry.state_range.x.clone()], entry.state_range.v.clone());
             if entry.moves() {
                 body.kick(x, &pi[v.clone()], 1.0);
-                body.drift(x, &theta[v], 1.0);
+                body.integrate_positions(x, &theta[v], 1.0);
             } else {
-                body.drift(x, &theta[v.clone()], 1.0);
-                body.write_velocity(x, &led_velocity[v]);
+                body.integrate_positions(x, &theta[v.clone()], 1.0);
+                body.write_velocity(x, &kinematic_velocity[v]);
             }
         }
     }
 
     /// Turns velocities at the displacement `Θ` into rates of `Θ`.
-    fn pull_back(&self, theta: &[f64], v: &mut [f64], led_velocity: &[f64]) {
+    fn pull_back(&self, theta: &[f64], v: &mut [f64], kinematic_velocity: &[f64]) {
         for entry in self.table.iter() {
-            let (Some(body), span) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+            let (Some(body), state_range) = (entry.object.integratable(), entry.state_range.v.clone()) else {
+                continue;
+            };
             if entry.moves() {
-                body.pull_back(&theta[span.clone()], &mut v[span]);
-            } else if led(entry) {
-                v[span.clone()].copy_from_slice(&led_velocity[span]);
+                body.pull_back(&theta[state_range.clone()], &mut v[state_range]);
+            } else if is_kinematic(entry) {
+                v[state_range.clone()].copy_from_slice(&kinematic_velocity[state_range]);
             }
         }
     }

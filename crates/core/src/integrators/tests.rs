@@ -1,12 +1,12 @@
 //! The record of a call against integrations that end where it is read; the exponential map's differential against differences.
 
 use super::Adaptive;
-use crate::motion::Motion;
+use crate::motion::IntegrationContext;
 use crate::object::{ForceGenerator, Object};
+use crate::part_state::{Forces, PartState, StateRange, Wrench};
 use crate::rigid::RigidBody;
 use crate::rotation;
 use crate::settings::Settings;
-use crate::site::{Forces, Site, Span, Wrench};
 use crate::view::{Entry, Status, Table, WorldView};
 use tumble_collide::{Mat3, Quat, Shape, Vec3};
 
@@ -27,10 +27,11 @@ impl Object for Spring {
 }
 
 impl ForceGenerator for Spring {
-    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
-        let site = &view.sites[0];
-        out.wrenches[0].force -= 100.0 * site.position();
-        out.wrenches[0].torque += 3.0 * (site.pose.rotation * Vec3::x()) + Vec3::new((5.0 * view.time).cos(), 0.0, 0.0);
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        let part_state = &view.part_states[0];
+        out.wrenches[0].force -= 100.0 * part_state.position();
+        out.wrenches[0].torque +=
+            3.0 * (part_state.pose.rotation * Vec3::x()) + Vec3::new((5.0 * view.time).cos(), 0.0, 0.0);
     }
 }
 
@@ -38,7 +39,7 @@ impl ForceGenerator for Spring {
 struct Bench {
     table: Table,
     x: Vec<f64>,
-    sites: Vec<Site>,
+    part_states: Vec<PartState>,
     forces: Forces,
     applied: Vec<Wrench>,
     held: Vec<f64>,
@@ -53,27 +54,28 @@ impl Bench {
         let mut table = Table::default();
         let mut x = vec![0.0; 13];
         crate::object::Integratable::write_initial(&body, &mut x);
-        let spans = [Span { x: 0..13, v: 0..6, site: 0..1 }, Span { x: 13..13, v: 6..6, site: 1..1 }];
+        let state_ranges =
+            [StateRange { x: 0..13, v: 0..6, parts: 0..1 }, StateRange { x: 13..13, v: 6..6, parts: 1..1 }];
         let objects: [Box<dyn Object>; 2] = [Box::new(body), Box::new(Spring)];
-        for (serial, (object, span)) in (0..).zip(objects.into_iter().zip(spans)) {
-            let id = table.slots.insert(Entry::new(object, span, Status::default(), serial));
+        for (serial, (object, state_range)) in (0..).zip(objects.into_iter().zip(state_ranges)) {
+            let id = table.slots.insert(Entry::new(object, state_range, Status::default(), serial));
             table.order.push(id);
         }
         Bench {
             table,
             x,
-            sites: vec![Site::default()],
+            part_states: vec![PartState::default()],
             forces: Forces::default(),
             applied: vec![Wrench::default()],
             held: vec![0.0; 6],
         }
     }
 
-    fn motion(&mut self) -> Motion<'_> {
-        Motion {
+    fn integration(&mut self) -> IntegrationContext<'_> {
+        IntegrationContext {
             table: &mut self.table,
             x: &mut self.x,
-            sites: &mut self.sites,
+            part_states: &mut self.part_states,
             forces: &mut self.forces,
             gravity: Vec3::zeros(),
             implicit: false,
@@ -82,7 +84,7 @@ impl Bench {
             held: &self.held,
             held_wrenches: &[],
             pinned: &[],
-            pinned_sites: &mut [],
+            pinned_part_states: &mut [],
         }
     }
 }
@@ -91,7 +93,7 @@ impl Bench {
 fn integrate(bench: &mut Bench, tolerance: f64, h: f64) -> Adaptive {
     let mut adaptive = Adaptive::default();
     adaptive.set(&Settings { integrator_tolerance: tolerance, dt: 1.0, ..Settings::default() }, 0.0, 0);
-    let came = adaptive.integrate(&mut bench.motion(), 0.0, h, &mut [0.0; 6], true).unwrap();
+    let came = adaptive.integrate(&mut bench.integration(), 0.0, h, &mut [0.0; 6], true).unwrap();
     assert_eq!(came, h);
     adaptive
 }
@@ -108,7 +110,7 @@ fn dense_output_is_as_good_as_the_steps() {
         let (end, mut worst) = (bench.x.clone(), 0.0f64);
         for i in 1..=50 {
             let t = 0.01 * i as f64;
-            adaptive.path.write(&mut bench.motion(), t);
+            adaptive.path.write(&mut bench.integration(), t);
             let mut fine = Bench::new();
             integrate(&mut fine, 1e-13, t);
             worst = worst.max(apart(&bench.x, &fine.x));
@@ -148,7 +150,10 @@ fn a_full_record_ends_the_call_early() {
     let mut adaptive = Adaptive::default();
     // a state of 13 and 6 freedoms takes 61 numbers a step: 68,759 steps fit into 2²²
     adaptive.set(&Settings { integrator_tolerance: 1e-6, dt: 1e-3, ..Settings::default() }, 0.0, 0);
-    let came = adaptive.integrate(&mut bench.motion(), 0.0, 100.0, &mut [0.0; 6], true).unwrap();
+    let came = adaptive.integrate(&mut bench.integration(), 0.0, 100.0, &mut [0.0; 6], true).unwrap();
     assert_eq!(adaptive.steps, 68_759);
-    assert!((came - 68.759).abs() < 1e-3 && adaptive.path.reaches(came) && !adaptive.path.goes_beyond(came), "{came}");
+    assert!(
+        (came - 68.759).abs() < 1e-3 && adaptive.path.reaches(came) && !adaptive.path.extends_beyond(came),
+        "{came}"
+    );
 }

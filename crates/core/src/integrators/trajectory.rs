@@ -10,7 +10,7 @@
 //! It meets the step's ends with the right slopes, so the whole is once continuously differentiable.
 
 use super::dormand_prince::STAGES;
-use crate::motion::Motion;
+use crate::motion::IntegrationContext;
 
 const D: [f64; STAGES] = [
     -12715105075.0 / 11282082432.0,
@@ -22,11 +22,11 @@ const D: [f64; STAGES] = [
     69997945.0 / 29380423.0,
 ];
 /// Numbers kept at most (32 MiB), one inner step always.
-const MOST_NUMBERS: usize = 1 << 22;
+const MAX_NUMBERS: usize = 1 << 22;
 
 /// One inner step: when it starts, counted from the start of the call, and how long it is, s.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
+pub(super) struct InnerStep {
     pub start: f64,
     pub length: f64,
 }
@@ -34,7 +34,7 @@ pub(super) struct Piece {
 /// The inner steps of a call, one after the other.
 #[derive(Default)]
 pub(crate) struct Trajectory {
-    pieces: Vec<Piece>,
+    inner_steps: Vec<InnerStep>,
     /// Per piece: the state at its start, then `r₂ … r₅`.
     data: Vec<f64>,
     state: usize,
@@ -42,21 +42,21 @@ pub(crate) struct Trajectory {
     /// How far it goes, s.
     end: f64,
     /// Velocity of what is led.
-    led: Vec<f64>,
+    kinematic: Vec<f64>,
 }
 
 impl Trajectory {
     /// Forgets everything.
     pub fn clear(&mut self) {
-        self.pieces.clear();
+        self.inner_steps.clear();
         self.data.clear();
     }
 
-    pub(super) fn begin(&mut self, state: usize, dof: usize, led: &[f64]) {
+    pub(super) fn begin(&mut self, state: usize, dof: usize, kinematic: &[f64]) {
         self.clear();
         (self.state, self.dof) = (state, dof);
-        self.led.clear();
-        self.led.extend_from_slice(led);
+        self.kinematic.clear();
+        self.kinematic.extend_from_slice(kinematic);
     }
 
     fn stride(&self) -> usize {
@@ -65,14 +65,14 @@ impl Trajectory {
 
     /// Whether another piece would be too much.
     pub(super) fn full(&self) -> bool {
-        !self.pieces.is_empty() && self.data.len() + self.stride() > MOST_NUMBERS
+        !self.inner_steps.is_empty() && self.data.len() + self.stride() > MAX_NUMBERS
     }
 
     /// Adds an inner step that takes the path to `end`.
-    pub(super) fn push(&mut self, piece: Piece, end: f64, start: &[f64], k: &[Vec<f64>; STAGES], y: &[f64]) {
-        let h = piece.length;
+    pub(super) fn push(&mut self, inner_step: InnerStep, end: f64, start: &[f64], k: &[Vec<f64>; STAGES], y: &[f64]) {
+        let h = inner_step.length;
         self.end = end;
-        self.pieces.push(piece);
+        self.inner_steps.push(inner_step);
         self.data.extend_from_slice(start);
         self.data.extend_from_slice(y);
         self.data.extend(k[0].iter().zip(y).map(|(k, y)| h * k - y));
@@ -82,39 +82,39 @@ impl Trajectory {
 
     /// Whether the path goes from its start to `t` seconds after it.
     pub fn reaches(&self, t: f64) -> bool {
-        !self.pieces.is_empty() && t <= self.end
+        !self.inner_steps.is_empty() && t <= self.end
     }
 
     /// Whether it goes on after `t`.
-    pub fn goes_beyond(&self, t: f64) -> bool {
-        !self.pieces.is_empty() && t < self.end
+    pub fn extends_beyond(&self, t: f64) -> bool {
+        !self.inner_steps.is_empty() && t < self.end
     }
 
     /// The last start of an inner step before `t`, counted from the path's start, s, and the state there.
     pub fn before(&self, t: f64) -> (f64, &[f64]) {
         let i = self.index(t);
-        (self.pieces[i].start, &self.data[i * self.stride()..][..self.state])
+        (self.inner_steps[i].start, &self.data[i * self.stride()..][..self.state])
     }
 
     /// Length of the inner step that holds `t`, s.
     pub fn length(&self, t: f64) -> f64 {
-        self.pieces[self.index(t)].length
+        self.inner_steps[self.index(t)].length
     }
 
     /// The piece that holds `t`.
     fn index(&self, t: f64) -> usize {
-        self.pieces.partition_point(|p| p.start < t).saturating_sub(1)
+        self.inner_steps.partition_point(|p| p.start < t).saturating_sub(1)
     }
 
     /// Writes the state `t` seconds after the path's start, and refreshes what readers see; accelerations stay as they are.
-    pub fn write(&self, motion: &mut Motion, t: f64) {
+    pub fn write(&self, motion: &mut IntegrationContext, t: f64) {
         let (i, n) = (self.index(t), 2 * self.dof);
-        let piece = self.pieces[i];
+        let inner_step = self.inner_steps[i];
         let (start, r) = self.data[i * self.stride()..(i + 1) * self.stride()].split_at(self.state);
-        let s = (t - piece.start) / piece.length;
+        let s = (t - inner_step.start) / inner_step.length;
         let y = |i: usize| s * (r[i] + (1.0 - s) * (r[n + i] + s * (r[2 * n + i] + (1.0 - s) * r[3 * n + i])));
         let y: Vec<f64> = (0..n).map(y).collect();
-        motion.displace(start, &y, &self.led);
+        motion.displace(start, &y, &self.kinematic);
         motion.refresh();
     }
 }

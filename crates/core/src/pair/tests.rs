@@ -1,8 +1,8 @@
 //! What is not asked cannot matter: pairs that are told apart, followed along their motion.
 
-use super::{Pair, Reach, Recalled, Travel};
-use crate::site::Site;
-use crate::step::coasted;
+use super::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
+use crate::part_state::PartState;
+use crate::step::pose_after_free_motion;
 use tumble_collide::{ContactMode, Pose, Shape, Vec3, contacts};
 
 const H: f64 = 1.0 / 60.0;
@@ -17,16 +17,16 @@ fn vector(seed: &mut u64, size: f64) -> Vec3 {
     Vec3::from_fn(|_, _| size * random(seed))
 }
 
-fn travel(shape: &Shape, site: &Site) -> Travel {
-    let tight = shape.aabb(&site.pose);
-    let around = (tight.max - site.position()).sup(&(site.position() - tight.min));
-    Travel::new(site, shape.bounding_radius(), around, H)
+fn motion_bounds(shape: &Shape, part_state: &PartState) -> MotionBounds {
+    let tight = shape.aabb(&part_state.pose);
+    let around = (tight.max - part_state.position()).sup(&(part_state.position() - tight.min));
+    MotionBounds::new(part_state, shape.bounding_radius(), around, H)
 }
 
 /// Bodies that fly and spin: whatever is told apart at the start touches at no moment of the step, by the exact contacts of boxes, balls and half-spaces.
 #[test]
 fn what_is_told_apart_touches_at_no_moment_of_the_step() {
-    let (mut seed, mut told, mut touched) = (3, 0, 0);
+    let (mut seed, mut recorded, mut touched) = (3, 0, 0);
     let shapes = [
         Shape::cuboid(Vec3::new(0.5, 0.1, 0.2)).unwrap(),
         Shape::sphere(0.2).unwrap(),
@@ -35,73 +35,80 @@ fn what_is_told_apart_touches_at_no_moment_of_the_step() {
     ];
     for n in 0..4000 {
         let pair = [&shapes[n % 3], &shapes[(n / 3) % 4]];
-        let mut site = |size: f64| Site {
+        let mut part_state = |size: f64| PartState {
             pose: Pose::new(vector(&mut seed, size), vector(&mut seed, 3.0)),
             velocity: vector(&mut seed, 6.0),
             angular_velocity: vector(&mut seed, 10.0),
             acceleration: vector(&mut seed, 20.0),
-            ..Site::default()
+            ..PartState::default()
         };
-        let sites = [site(1.0), site(0.2)];
-        let sites = if n % 12 >= 9 {
-            [sites[0], Site { velocity: Vec3::zeros(), angular_velocity: Vec3::zeros(), ..sites[1] }]
+        let part_states = [part_state(1.0), part_state(0.2)];
+        let part_states = if n % 12 >= 9 {
+            [part_states[0], PartState { velocity: Vec3::zeros(), angular_velocity: Vec3::zeros(), ..part_states[1] }]
         } else {
-            sites
+            part_states
         };
-        let travel = [0, 1].map(|k| travel(pair[k], &sites[k]));
+        let motion_bounds = [0, 1].map(|k| motion_bounds(pair[k], &part_states[k]));
         let moments = (0..=40).map(|k| H * f64::from(k) / 40.0);
         let mut meets = moments.map(|t| {
             let mut found = Vec::new();
-            contacts(pair[0], &coasted(&sites[0], t), pair[1], &coasted(&sites[1], t), 0.0, &mut found);
+            contacts(
+                pair[0],
+                &pose_after_free_motion(&part_states[0], t),
+                pair[1],
+                &pose_after_free_motion(&part_states[1], t),
+                0.0,
+                &mut found,
+            );
             !found.is_empty()
         });
         let meets = meets.any(|m| m);
-        for reach in [Reach::Relative, Reach::Each] {
-            let asked = Pair {
+        for prediction in [PredictionMode::Relative, PredictionMode::Each] {
+            let queries = PairQuery {
                 mode: ContactMode::Surface,
                 shapes: pair,
-                sites: [&sites[0], &sites[1]],
-                travel,
+                part_states: [&part_states[0], &part_states[1]],
+                motion_bounds,
                 near: 1e-4,
-                reach,
+                prediction,
             };
-            let apart = asked.stays_apart();
-            assert!(!(apart && meets), "{n}, {reach:?}: told apart, and they meet");
-            told += usize::from(apart);
+            let are_separated = queries.is_separated();
+            assert!(!(are_separated && meets), "{n}, {prediction:?}: told apart, and they meet");
+            recorded += usize::from(are_separated);
         }
         touched += usize::from(meets);
     }
-    assert!(told > 1000 && touched > 200, "{told} told apart, {touched} met");
+    assert!(recorded > 1000 && touched > 200, "{recorded} told apart, {touched} met");
 }
 
 /// The second query at the same poses is not made, gives the same contacts, and a wider one is.
 #[test]
 fn what_has_not_moved_is_recalled() {
     let (cylinder, block) = (Shape::cylinder(0.1, 0.2).unwrap(), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
-    let at = |z: f64| Site { pose: Pose::translation(0.0, 0.0, z), ..Site::default() };
-    let sites = [at(0.7001), at(0.0)];
-    let pair = |near: f64| Pair {
+    let at = |z: f64| PartState { pose: Pose::translation(0.0, 0.0, z), ..PartState::default() };
+    let part_states = [at(0.7001), at(0.0)];
+    let pair = |near: f64| PairQuery {
         mode: ContactMode::Surface,
         shapes: [&cylinder, &block],
-        sites: [&sites[0], &sites[1]],
-        travel: [Travel::default(); 2],
+        part_states: [&part_states[0], &part_states[1]],
+        motion_bounds: [MotionBounds::default(); 2],
         near,
-        reach: Reach::Relative,
+        prediction: PredictionMode::Relative,
     };
-    let mut recalled = Recalled::default();
-    let ask = |near: f64, recalled: &mut Recalled| {
+    let mut narrow_phase_cache = NarrowPhaseCache::default();
+    let query = |near: f64, narrow_phase_cache: &mut NarrowPhaseCache| {
         let mut found = Vec::new();
-        recalled.begin();
-        pair(near).contacts([4, 7], H, recalled, &mut found);
-        recalled.end();
+        narrow_phase_cache.begin();
+        pair(near).contacts([4, 7], H, narrow_phase_cache, &mut found);
+        narrow_phase_cache.end();
         found
     };
-    let first = ask(1e-3, &mut recalled);
+    let first = query(1e-3, &mut narrow_phase_cache);
     assert!(first.len() >= 4 && first.iter().all(|c| (c.gap - 1e-4).abs() < 1e-9), "{first:?}");
     // what is kept is what is given
-    recalled.last.contacts.iter_mut().for_each(|c| c.core_b = 42.0);
-    let again = ask(1e-3, &mut recalled);
+    narrow_phase_cache.last.contacts.iter_mut().for_each(|c| c.core_b = 42.0);
+    let again = query(1e-3, &mut narrow_phase_cache);
     assert!(again.len() == first.len() && again.iter().all(|c| c.core_b == 42.0), "asked again: {again:?}");
-    assert!(ask(1e-5, &mut recalled).is_empty(), "further away than asked");
-    assert_eq!(ask(2e-3, &mut recalled), first, "a wider look is a new one");
+    assert!(query(1e-5, &mut narrow_phase_cache).is_empty(), "further away than asked");
+    assert_eq!(query(2e-3, &mut narrow_phase_cache), first, "a wider look is a new one");
 }

@@ -17,19 +17,19 @@
 //! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. With friction the problem is not convex and the
 //! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. What is slow even so (nearly redundant contacts, high mass ratios) is
 //! finished by Newton's method where an island is small (`newton.rs`); elsewhere the residual says how far. Plain sweeps can go in circles too; those that
-//! get nowhere go on by shorter steps (`pace.rs`).
+//! get nowhere go on by shorter steps (`relaxation.rs`).
 
-use super::linkage::{Linkages, Reach};
+use super::dof6::Dof6;
+use super::linkage::{Linkages, SideRange};
 use super::newton::Newton;
-use super::one_contact::{Contact, Symmetric};
-use super::pace::Pace;
-use super::six::Six;
-use super::{Accuracy, Outcome, RowSolver};
+use super::one_contact::{ContactBlock, Symmetric3};
+use super::relaxation::Relaxation;
+use super::{RowSolver, SolveReport, SolverSettings};
 use crate::rows::{Block, RowSet, Rows};
 use smallvec::SmallVec;
 
 /// Blocks of an island that is solved without memory from the heap: a ball on a floor, a box on it.
-const FEW: usize = 4;
+const INLINE_BLOCKS: usize = 4;
 /// Sweeps with extrapolation between them.
 const ACCELERATED: u32 = 200;
 
@@ -49,48 +49,48 @@ impl RowSolver for GaussSeidel {
         c: &[f64],
         lambda: &mut [f64],
         du: &mut [f64],
-        accuracy: Accuracy,
-    ) -> Outcome {
+        settings: SolverSettings,
+    ) -> SolveReport {
         let mut linkages = Linkages::new(rows, blocks);
-        let mut locals: SmallVec<[Local; FEW]> = SmallVec::with_capacity(blocks.len());
+        let mut locals: SmallVec<[Local; INLINE_BLOCKS]> = SmallVec::with_capacity(blocks.len());
         for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
-            if !linkages.hold(rows, block) {
+            if !linkages.contains_row(rows, block) {
                 locals.push(Local::new(rows, &mut linkages, block, c, lambda));
             }
         }
         apply(&locals, &linkages, rows, c, lambda, du);
-        let sweeps = accuracy.sweeps_of(locals.len());
-        let mut momentum = Momentum::new(&locals, &linkages, du);
-        let mut newton = linkages.is_empty().then(|| Newton::new(&momentum));
-        let mut outcome = Outcome { iterations: sweeps, converged: false, ray: false };
-        let mut pace = Pace::new(ACCELERATED);
+        let sweeps = settings.max_sweeps_for(locals.len());
+        let mut extrapolation = Extrapolation::new(&locals, &linkages, du);
+        let mut newton = linkages.is_empty().then(|| Newton::new(&extrapolation));
+        let mut outcome = SolveReport { iterations: sweeps, converged: false, ray: false };
+        let mut relaxation = Relaxation::new(ACCELERATED);
         for sweep in 1..=sweeps {
             let mut progress = Progress::default();
             for local in &mut locals {
-                local.relax(momentum.beta, pace.share, rows, &linkages, du, &mut progress);
+                local.relax(extrapolation.beta, relaxation.factor, rows, &linkages, du, &mut progress);
             }
-            if progress.change <= accuracy.tolerance {
-                outcome = Outcome { iterations: sweep, converged: true, ray: false };
+            if progress.change <= settings.tolerance {
+                outcome = SolveReport { iterations: sweep, converged: true, ray: false };
                 break;
             }
-            pace.note(sweep, progress.change);
+            relaxation.record(sweep, progress.change);
             if let Some(newton) = &mut newton
-                && newton.after(sweep..sweeps, progress.change, &mut locals, rows, &momentum, du)
+                && newton.try_step(sweep..sweeps, progress.change, &mut locals, rows, &extrapolation, du)
             {
-                momentum.renew(&locals, &linkages, rows, c, lambda, du);
+                extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
                 continue;
             }
             if sweep < sweeps {
-                let plain = sweep > ACCELERATED || sweep + SETTLE >= sweeps;
-                momentum.extrapolate(progress.against > 0.0 || plain, du);
+                let plain = sweep > ACCELERATED || sweep + FINAL_PLAIN_SWEEPS >= sweeps;
+                extrapolation.extrapolate(progress.against > 0.0 || plain, du);
             }
-            if sweep % RENEW == 0 {
-                momentum.renew(&locals, &linkages, rows, c, lambda, du);
+            if sweep % REBUILD_INTERVAL == 0 {
+                extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
             }
         }
         write_back(&locals, lambda);
         if !linkages.is_empty() {
-            momentum.clear(du);
+            extrapolation.clear(du);
             outcome.converged &= apply(&locals, &linkages, rows, c, lambda, du);
         }
         outcome
@@ -102,9 +102,9 @@ impl RowSolver for GaussSeidel {
 }
 
 /// The last sweeps are plain: an extrapolated iterate may overshoot far just before it turns, and a solve cut off there would be worse than none.
-const SETTLE: u32 = 5;
+const FINAL_PLAIN_SWEEPS: u32 = 5;
 /// Extrapolation carries the rounding errors of `du` on and on; after so many sweeps it is made anew from `λ`.
-const RENEW: u32 = 1000;
+const REBUILD_INTERVAL: u32 = 1000;
 
 fn write_back(locals: &[Local], lambda: &mut [f64]) {
     for local in locals {
@@ -117,12 +117,12 @@ fn write_back(locals: &[Local], lambda: &mut [f64]) {
 fn apply(locals: &[Local], linkages: &Linkages, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
     write_back(locals, lambda);
     for local in locals.iter().filter(|l| l.lambda != [0.0; 3]) {
-        match (local.six, &local.step) {
-            (Some(six), Step::Contact(_)) => six.push(rows, local.lambda, du),
+        match (local.dof6, &local.step) {
+            (Some(dof6), BlockSolver::Contact(_)) => dof6.push(rows, local.lambda, du),
             _ => rows.apply_block(local.block, lambda, du),
         }
     }
-    linkages.settle(rows, c, lambda, du)
+    linkages.solve_equalities(rows, c, lambda, du)
 }
 
 /// A block as the sweeps read it; of a scalar block only the first of each three numbers counts.
@@ -132,9 +132,9 @@ pub(super) struct Local<'a> {
     pub lambda: [f64; 3],
     /// `λ` of the sweep before.
     last: [f64; 3],
-    pub step: Step,
-    reach: Reach,
-    six: Option<Six>,
+    pub step: BlockSolver,
+    side_range: SideRange,
+    dof6: Option<Dof6>,
 }
 
 /// What a sweep did.
@@ -148,7 +148,7 @@ struct Progress {
 
 impl Progress {
     #[inline(always)]
-    fn note(&mut self, change: f64) {
+    fn record(&mut self, change: f64) {
         // Not `max`, which spends several instructions on NaN.
         if change > self.change {
             self.change = change;
@@ -157,19 +157,19 @@ impl Progress {
 }
 
 /// The extrapolation between sweeps, over the stretches of `du` that the island acts on. Multipliers follow when it is their turn to be relaxed.
-pub(super) struct Momentum {
+pub(super) struct Extrapolation {
     theta: f64,
     /// `β` of the sweep to come.
     beta: f64,
     /// First index and end of each stretch of `du`, one after the other; neighbours are joined.
-    stretches: SmallVec<[(u32, u32); 2 * FEW]>,
+    stretches: SmallVec<[(u32, u32); 2 * INLINE_BLOCKS]>,
     /// `du` of the sweep before, of all stretches.
     last: SmallVec<[f64; 32]>,
 }
 
-impl Momentum {
-    fn new(locals: &[Local], linkages: &Linkages, du: &[f64]) -> Momentum {
-        let mut stretches: SmallVec<[(u32, u32); 2 * FEW]> = linkages.stretches().collect();
+impl Extrapolation {
+    fn new(locals: &[Local], linkages: &Linkages, du: &[f64]) -> Extrapolation {
+        let mut stretches: SmallVec<[(u32, u32); 2 * INLINE_BLOCKS]> = linkages.stretches().collect();
         for (i, local) in locals.iter().enumerate() {
             // the contacts of a pair follow one another: one of them is enough
             let same =
@@ -187,7 +187,7 @@ impl Momentum {
             joins
         });
         let last = stretches.iter().flat_map(|&(start, end)| &du[start as usize..end as usize]).copied().collect();
-        Momentum { theta: 1.0, beta: 0.0, stretches, last }
+        Extrapolation { theta: 1.0, beta: 0.0, stretches, last }
     }
 
     /// How many freedoms the island has.
@@ -214,14 +214,17 @@ impl Momentum {
         let beta = self.beta;
         let mut rest = &mut self.last[..];
         for &(start, end) in &self.stretches {
-            let (last, after) = rest.split_at_mut((end - start) as usize);
-            du[start as usize..end as usize].iter_mut().zip(last).for_each(|(du, last)| go_on(du, last, beta));
-            rest = after;
+            let (last, try_step) = rest.split_at_mut((end - start) as usize);
+            du[start as usize..end as usize]
+                .iter_mut()
+                .zip(last)
+                .for_each(|(du, last)| extrapolate_value(du, last, beta));
+            rest = try_step;
         }
     }
 
     /// Makes `du` anew from the multipliers, which are not extrapolated yet, and starts from rest.
-    fn renew(
+    fn rebuild(
         &mut self,
         locals: &[Local],
         linkages: &Linkages,
@@ -243,21 +246,21 @@ impl Momentum {
 
 /// `x ← x + β(x − x_last)`, `x_last ← x`.
 #[inline(always)]
-fn go_on(x: &mut f64, last: &mut f64, beta: f64) {
+fn extrapolate_value(x: &mut f64, last: &mut f64, beta: f64) {
     let now = *x;
     *x += beta * (now - *last);
     *last = now;
 }
 
-pub(super) enum Step {
+pub(super) enum BlockSolver {
     /// No response: no impulse.
-    Dead,
-    Scalar(Scalar),
-    Contact(Contact),
+    Unresponsive,
+    Scalar(ScalarBlock),
+    Contact(ContactBlock),
 }
 
 /// A row by itself.
-pub(super) struct Scalar {
+pub(super) struct ScalarBlock {
     /// Its diagonal of `K + R`.
     pub k: f64,
     inverse: f64,
@@ -266,40 +269,47 @@ pub(super) struct Scalar {
     pub hi: f64,
 }
 
-impl Step {
-    fn new(rows: &Rows, linkages: &Linkages, block: &Block, reach: Reach) -> Step {
+impl BlockSolver {
+    fn new(rows: &Rows, linkages: &Linkages, block: &Block, side_range: SideRange) -> BlockSolver {
         let (lo, hi) = match block.set {
             RowSet::Cone { mu } => {
-                let k =
-                    if reach.is_own() { Symmetric::own(rows, block) } else { linkages.own_contact(rows, block, reach) };
-                return if k.m00 <= f64::MIN_POSITIVE { Step::Dead } else { Step::Contact(Contact::new(k, mu)) };
+                let k = if side_range.is_own() {
+                    Symmetric3::own(rows, block)
+                } else {
+                    linkages.own_contact(rows, block, side_range)
+                };
+                return if k.m00 <= f64::MIN_POSITIVE {
+                    BlockSolver::Unresponsive
+                } else {
+                    BlockSolver::Contact(ContactBlock::new(k, mu))
+                };
             }
             RowSet::Equality => (f64::NEG_INFINITY, f64::INFINITY),
             RowSet::HalfLine => (0.0, f64::INFINITY),
             RowSet::Interval { lo, hi } => (lo, hi),
         };
         let response = rows.own(block, 0, 0);
-        let moves = if reach.is_own() { response } else { linkages.own(rows, block, reach, 0, 0) };
+        let moves = if side_range.is_own() { response } else { linkages.own(rows, block, side_range, 0, 0) };
         let k = moves + block.compliance;
         if response <= f64::MIN_POSITIVE || k <= f64::MIN_POSITIVE {
-            return Step::Dead;
+            return BlockSolver::Unresponsive;
         }
-        Step::Scalar(Scalar { k, inverse: 1.0 / k, compliance: block.compliance, lo, hi })
+        BlockSolver::Scalar(ScalarBlock { k, inverse: 1.0 / k, compliance: block.compliance, lo, hi })
     }
 }
 
 impl<'a> Local<'a> {
     fn new(rows: &Rows, linkages: &mut Linkages, block: &'a Block, c: &[f64], lambda: &[f64]) -> Local<'a> {
-        let reach = linkages.lay(rows, block);
-        let step = Step::new(rows, linkages, block, reach);
-        let six = if reach.is_own() { Six::of(block) } else { None };
+        let side_range = linkages.extend_sides(rows, block);
+        let step = BlockSolver::new(rows, linkages, block, side_range);
+        let dof6 = if side_range.is_own() { Dof6::of(block) } else { None };
         let numbers = |from: &[f64]| {
             let mut three = [0.0; 3];
             three[..block.set.rows()].copy_from_slice(&from[block.range()]);
             three
         };
-        let start = if matches!(step, Step::Dead) { [0.0; 3] } else { numbers(lambda) };
-        Local { block, c: numbers(c), lambda: start, last: start, step, reach, six }
+        let start = if matches!(step, BlockSolver::Unresponsive) { [0.0; 3] } else { numbers(lambda) };
+        Local { block, c: numbers(c), lambda: start, last: start, step, side_range, dof6 }
     }
 
     /// Extrapolates the multipliers of this block, solves it with the others held, and goes this share of the way there.
@@ -307,36 +317,36 @@ impl<'a> Local<'a> {
     fn relax(
         &mut self,
         beta: f64,
-        share: f64,
+        factor: f64,
         rows: &Rows,
         linkages: &Linkages,
         du: &mut [f64],
         progress: &mut Progress,
     ) {
         match &self.step {
-            Step::Dead => {}
-            Step::Scalar(scalar) => {
-                go_on(&mut self.lambda[0], &mut self.last[0], beta);
-                let velocity = match self.six.and_then(|six| six.sides::<1>(rows, du)) {
+            BlockSolver::Unresponsive => {}
+            BlockSolver::Scalar(scalar) => {
+                extrapolate_value(&mut self.lambda[0], &mut self.last[0], beta);
+                let velocity = match self.dof6.and_then(|dof6| dof6.sides::<1>(rows, du)) {
                     Some(sides) => sides.velocity(0),
                     None => rows.row_velocity(self.block, 0, du),
                 };
                 let full = scalar.change(self.lambda[0], self.c[0], velocity);
                 if full != 0.0 {
-                    let delta = share * full;
+                    let delta = factor * full;
                     let next = clamp(self.lambda[0] + delta, scalar.lo, scalar.hi);
                     self.lambda[0] = next;
                     progress.against -= delta * (next - self.last[0]);
-                    progress.note((full * scalar.k).abs());
-                    match self.six {
-                        Some(six) => six.push(rows, [delta], du),
+                    progress.record((full * scalar.k).abs());
+                    match self.dof6 {
+                        Some(dof6) => dof6.push(rows, [delta], du),
                         None => self.push(rows, linkages, &[delta], du),
                     }
                 }
             }
-            Step::Contact(contact) => {
-                (0..3).for_each(|k| go_on(&mut self.lambda[k], &mut self.last[k], beta));
-                let w = match self.six.and_then(|six| six.sides::<3>(rows, du)) {
+            BlockSolver::Contact(contact) => {
+                (0..3).for_each(|k| extrapolate_value(&mut self.lambda[k], &mut self.last[k], beta));
+                let w = match self.dof6.and_then(|dof6| dof6.sides::<3>(rows, du)) {
                     Some(sides) => {
                         let normal = self.c[0] + sides.velocity(0);
                         if contact.stays_open(self.lambda, normal) {
@@ -348,11 +358,11 @@ impl<'a> Local<'a> {
                 };
                 let (mut next, mut delta) = contact.solve(self.lambda, w);
                 if delta != [0.0; 3] {
-                    progress.note((delta[0] * contact.k.m00).abs());
-                    progress.note((delta[1] * contact.k.m11).abs());
-                    progress.note((delta[2] * contact.k.m22).abs());
-                    if share < 1.0 {
-                        delta = delta.map(|x| share * x);
+                    progress.record((delta[0] * contact.k.m00).abs());
+                    progress.record((delta[1] * contact.k.m11).abs());
+                    progress.record((delta[2] * contact.k.m22).abs());
+                    if factor < 1.0 {
+                        delta = delta.map(|x| factor * x);
                         next = [0, 1, 2].map(|k| self.lambda[k] + delta[k]);
                     }
                     self.lambda = next;
@@ -360,8 +370,8 @@ impl<'a> Local<'a> {
                     progress.against -= delta[0] * (next[0] - last[0])
                         + delta[1] * (next[1] - last[1])
                         + delta[2] * (next[2] - last[2]);
-                    match self.six {
-                        Some(six) => six.push(rows, delta, du),
+                    match self.dof6 {
+                        Some(dof6) => dof6.push(rows, delta, du),
                         None => self.push(rows, linkages, &delta, du),
                     }
                 }
@@ -372,15 +382,15 @@ impl<'a> Local<'a> {
     /// Brings the multipliers back to what they may be.
     pub fn bound(&mut self) {
         match &self.step {
-            Step::Dead => self.lambda = [0.0; 3],
-            Step::Scalar(scalar) => self.lambda[0] = clamp(self.lambda[0], scalar.lo, scalar.hi),
-            Step::Contact(contact) => self.lambda = contact.bounded(self.lambda),
+            BlockSolver::Unresponsive => self.lambda = [0.0; 3],
+            BlockSolver::Scalar(scalar) => self.lambda[0] = clamp(self.lambda[0], scalar.lo, scalar.hi),
+            BlockSolver::Contact(contact) => self.lambda = contact.bounded(self.lambda),
         }
     }
 
     /// `u += Ỹ·δ`.
     fn push(&self, rows: &Rows, linkages: &Linkages, delta: &[f64], du: &mut [f64]) {
-        let (sides, y) = linkages.moved(rows, self.block, self.reach);
+        let (sides, y) = linkages.moved(rows, self.block, self.side_range);
         for side in sides {
             let (u, dof) = (side.u as usize, side.dof as usize);
             for (y, delta) in y[side.y as usize..].chunks_exact(dof).zip(delta) {
@@ -390,7 +400,7 @@ impl<'a> Local<'a> {
     }
 }
 
-impl Scalar {
+impl ScalarBlock {
     /// How the multiplier changes where it was `old` and the row velocity is `w = c + velocity + R·old`. Written so that what waits for
     /// the velocity is short: rows of one body wait for each other.
     #[inline(always)]

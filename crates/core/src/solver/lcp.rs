@@ -23,24 +23,24 @@
 //! first ([`Equalities`]); `K` has the compliance of soft rows on its diagonal. A row without response gets no multiplier, and a dead tangent no share in `d₁`.
 //!
 //! The warm start is not used, except that [`GaussSeidel`] takes over from it, with `converged` false, where there is no answer: on a
-//! secondary ray (`ray` true), where the pivots run out, and where there are more than [`UNKNOWNS`] unknowns (pivoting is O(n³)).
+//! secondary ray (`ray` true), where the pivots run out, and where there are more than [`MAX_UNKNOWNS`] unknowns (pivoting is O(n³)).
 //! Numbers that are not finite give zero multipliers and `converged` false.
 
 use super::equality::{Equalities, RANK};
 use super::lemke::{LcpResult, lemke};
-use super::{Accuracy, GaussSeidel, Outcome, RowSolver};
+use super::{GaussSeidel, RowSolver, SolveReport, SolverSettings};
 use crate::rows::{Block, RowSet, Rows};
 
 /// Most unknowns that are pivoted.
-pub const UNKNOWNS: usize = 3000;
+pub const MAX_UNKNOWNS: usize = 3000;
 /// Diagonal of `K` under which a tangent has no response, as a part of the block's largest.
-const DEAD: f64 = 1e-20;
+const RESPONSE_TOLERANCE: f64 = 1e-20;
 /// Sliding velocity that counts as none, as a part of the largest free value of the island.
-const STILL: f64 = 1e-13;
+const SLIDING_TOLERANCE: f64 = 1e-13;
 /// Free value that is rounding and counts as 0, as a part of the same: scaled up, it could make rows contradict each other.
 const ROUNDING: f64 = 1e-13;
 /// The least that "the largest free value" is taken for, m/s or m/s².
-const SLOWEST: f64 = 1e-3;
+const MIN_SCALE: f64 = 1e-3;
 /// Velocity error of the equality rows that still counts as solved, as a part of the same.
 const ACCEPT: f64 = 1e-9;
 
@@ -64,9 +64,9 @@ impl RowSolver for LcpPyramid {
         c: &[f64],
         lambda: &mut [f64],
         du: &mut [f64],
-        accuracy: Accuracy,
-    ) -> Outcome {
-        solve(Friction::Pyramid, rows, blocks, c, lambda, du, accuracy)
+        settings: SolverSettings,
+    ) -> SolveReport {
+        solve(Friction::Pyramid, rows, blocks, c, lambda, du, settings)
     }
 
     fn fork(&self) -> Box<dyn RowSolver> {
@@ -86,9 +86,9 @@ impl RowSolver for LcpSliding {
         c: &[f64],
         lambda: &mut [f64],
         du: &mut [f64],
-        accuracy: Accuracy,
-    ) -> Outcome {
-        solve(Friction::Sliding, rows, blocks, c, lambda, du, accuracy)
+        settings: SolverSettings,
+    ) -> SolveReport {
+        solve(Friction::Sliding, rows, blocks, c, lambda, du, settings)
     }
 
     fn fork(&self) -> Box<dyn RowSolver> {
@@ -109,18 +109,18 @@ fn solve(
     c: &[f64],
     lambda: &mut [f64],
     du: &mut [f64],
-    accuracy: Accuracy,
-) -> Outcome {
+    settings: SolverSettings,
+) -> SolveReport {
     let fall_back = |lambda: &mut [f64], du: &mut [f64], pivots: u32, ray: bool| {
-        let sweeps = GaussSeidel.solve(rows, blocks, c, lambda, du, accuracy).iterations;
-        Outcome { iterations: pivots + sweeps, converged: false, ray }
+        let sweeps = GaussSeidel.solve(rows, blocks, c, lambda, du, settings).iterations;
+        SolveReport { iterations: pivots + sweeps, converged: false, ray }
     };
-    if unknowns_at_most(friction, rows, blocks) > UNKNOWNS {
+    if unknowns_at_most(friction, rows, blocks) > MAX_UNKNOWNS {
         return fall_back(lambda, du, 0, false);
     }
     if !finite(rows, blocks, c) {
         blocks.iter().for_each(|&b| lambda[rows.blocks[b as usize].range()].fill(0.0));
-        return Outcome { iterations: 0, converged: false, ray: false };
+        return SolveReport { iterations: 0, converged: false, ray: false };
     }
     let problem = Problem::new(friction, rows, blocks, c);
     let (m, q) = problem.matrix();
@@ -141,7 +141,7 @@ fn solve(
         rows.apply_block(block, lambda, du);
         first += count;
     }
-    Outcome { iterations: pivots, converged, ray: false }
+    SolveReport { iterations: pivots, converged, ray: false }
 }
 
 /// Whether all that the island's problem is made of is a number; an interval may end at infinity.
@@ -190,7 +190,7 @@ struct Problem {
     k: Vec<f64>,
     /// Free values of the island's rows.
     c: Vec<f64>,
-    /// The largest of them, or [`SLOWEST`].
+    /// The largest of them, or [`MIN_SCALE`].
     scale: f64,
     /// Multipliers at `z = 0`: the lower ends of intervals.
     start: Vec<f64>,
@@ -206,7 +206,7 @@ impl Problem {
         let island = || blocks.iter().map(|&b| &rows.blocks[b as usize]);
         let k = rows.dense(blocks);
         let c: Vec<f64> = island().flat_map(|block| c[block.range()].iter().copied()).collect();
-        let scale = c.iter().fold(SLOWEST, |a: f64, c| a.max(c.abs()));
+        let scale = c.iter().fold(MIN_SCALE, |a: f64, c| a.max(c.abs()));
         let start = vec![0.0; c.len()];
         let equalities = Equalities::new(&[], 0, RANK);
         let mut problem =
@@ -277,7 +277,7 @@ impl Problem {
 
     /// `d₁` against the free sliding velocity and, where both tangents respond, `d₂` across it.
     fn directions(&self, row: usize) -> Option<([f64; 2], Option<[f64; 2]>)> {
-        let floor = DEAD * (0..3).map(|r| self.diagonal(row + r)).fold(0.0, f64::max);
+        let floor = RESPONSE_TOLERANCE * (0..3).map(|r| self.diagonal(row + r)).fold(0.0, f64::max);
         let live = [self.diagonal(row + 1) > floor, self.diagonal(row + 2) > floor];
         match live {
             [false, false] => None,
@@ -286,7 +286,7 @@ impl Problem {
             [true, true] => {
                 let (x, y) = (self.c[row + 1], self.c[row + 2]);
                 let speed = x.hypot(y);
-                let along = if speed > STILL * self.scale { [-x / speed, -y / speed] } else { [1.0, 0.0] };
+                let along = if speed > SLIDING_TOLERANCE * self.scale { [-x / speed, -y / speed] } else { [1.0, 0.0] };
                 Some((along, Some([-along[1], along[0]])))
             }
         }

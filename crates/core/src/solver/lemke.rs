@@ -167,7 +167,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Where a variable stands. Variables: `w_i` is `i`, `z_i` is `n + i`, `z₀` is `2n`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Place {
+enum VariablePlace {
     Row(usize),
     Column(usize),
 }
@@ -179,14 +179,14 @@ struct Dictionary {
     b: Vec<f64>,
     basic: Vec<usize>,
     nonbasic: Vec<usize>,
-    place: Vec<Place>,
+    place: Vec<VariablePlace>,
 }
 
 impl Dictionary {
     fn new(problem: &Scaled, cover: &[f64]) -> Dictionary {
         let n = problem.n;
         let a = (0..n).flat_map(|i| problem.row(i).iter().copied().chain([cover[i]])).collect();
-        let place = (0..n).map(Place::Row).chain((0..=n).map(Place::Column)).collect();
+        let place = (0..n).map(VariablePlace::Row).chain((0..=n).map(VariablePlace::Column)).collect();
         Dictionary { n, a, b: problem.q.clone(), basic: (0..n).collect(), nonbasic: (n..=2 * n).collect(), place }
     }
 
@@ -213,8 +213,8 @@ impl Dictionary {
         self.a[r * width..(r + 1) * width].copy_from_slice(&row);
         self.b[r] = constant;
         std::mem::swap(&mut self.basic[r], &mut self.nonbasic[s]);
-        self.place[self.basic[r]] = Place::Row(r);
-        self.place[self.nonbasic[s]] = Place::Column(s);
+        self.place[self.basic[r]] = VariablePlace::Row(r);
+        self.place[self.nonbasic[s]] = VariablePlace::Column(s);
     }
 
     /// Computes the dictionary of this basis anew from the problem, without what pivoting accumulated; `false` where the basis is singular.
@@ -225,7 +225,7 @@ impl Dictionary {
         let n = self.n;
         let entry = |i: usize, v: usize| if v == 2 * n { cover[i] } else { problem.row(i)[v - n] };
         let (tight, active) = self.basis();
-        let loose: Vec<usize> = (0..n).filter(|&i| matches!(self.place[i], Place::Row(_))).collect();
+        let loose: Vec<usize> = (0..n).filter(|&i| matches!(self.place[i], VariablePlace::Row(_))).collect();
         // Columns as in the dictionary, the constants last.
         let given = |i: usize, s: usize| match self.nonbasic.get(s) {
             None => problem.q[i],
@@ -244,7 +244,7 @@ impl Dictionary {
         (0..n + 2).for_each(|s| w.column_mut(s).gemv(1.0, &below, &z.column(s), 1.0));
         for (values, variables) in [(&z, &active), (&w, &loose)] {
             for (i, &v) in variables.iter().enumerate() {
-                let Place::Row(r) = self.place[v] else { return false };
+                let VariablePlace::Row(r) = self.place[v] else { return false };
                 (0..=n).for_each(|s| self.a[r * (n + 1) + s] = values[(i, s)]);
                 self.b[r] = values[(i, n + 1)];
             }
@@ -255,8 +255,8 @@ impl Dictionary {
     /// The rows whose `w` is nonbasic, and the basic `z`; as many of one as of the other.
     fn basis(&self) -> (Vec<usize>, Vec<usize>) {
         let n = self.n;
-        let active = (n..=2 * n).filter(|&v| matches!(self.place[v], Place::Row(_))).collect();
-        ((0..n).filter(|&i| matches!(self.place[i], Place::Column(_))).collect(), active)
+        let active = (n..=2 * n).filter(|&v| matches!(self.place[v], VariablePlace::Row(_))).collect();
+        ((0..n).filter(|&i| matches!(self.place[i], VariablePlace::Column(_))).collect(), active)
     }
 
     /// The row that leaves when the variable of column `s` grows; `None` if nothing bounds it.
@@ -289,8 +289,8 @@ impl Dictionary {
     /// What row `r` carries of `εʲ`.
     fn perturbation(&self, r: usize, j: usize) -> f64 {
         match self.place[j] {
-            Place::Column(s) => -self.at(r, s),
-            Place::Row(own) => f64::from(u8::from(own == r)),
+            VariablePlace::Column(s) => -self.at(r, s),
+            VariablePlace::Row(own) => f64::from(u8::from(own == r)),
         }
     }
 }
@@ -325,7 +325,7 @@ fn walk(dictionary: &mut Dictionary, problem: &Scaled, cover: &[f64], cap: u32) 
     dictionary.pivot(first, n);
     for pivots in 1..cap {
         let entering = if left < n { left + n } else { left - n };
-        let Place::Column(s) = dictionary.place[entering] else { return (End::Limit, pivots) };
+        let VariablePlace::Column(s) = dictionary.place[entering] else { return (End::Limit, pivots) };
         let mut choice = dictionary.leaving(s);
         let doubtful = choice.is_none_or(|r| -dictionary.at(r, s) < DOUBTFUL);
         if age >= fresh_for || (doubtful && age > 0) {
@@ -351,7 +351,7 @@ fn best_solution(problem: &Scaled, cover: &[f64], dictionary: &Dictionary) -> Op
     let n = problem.n;
     let mut own = vec![0.0; n];
     for i in 0..n {
-        if let Place::Row(r) = dictionary.place[n + i] {
+        if let VariablePlace::Row(r) = dictionary.place[n + i] {
             own[i] = dictionary.b[r].max(0.0);
         }
     }

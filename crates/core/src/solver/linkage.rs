@@ -18,7 +18,7 @@
 //!
 //! So a sweep reads a row's velocity from its own two objects, as ever, and writes to the linkages that they belong to. The equalities never
 //! come up in it: they hold in every iterate, and `λ_E` is found at the end. The cost is `e³/3` for the factor and `e²` for every other row that
-//! meets the linkage; where that is more than [`WORK`], or `e` more than [`DIRECT_ROWS`], the linkage's rows are relaxed one by one.
+//! meets the linkage; where that is more than [`MAX_WORK`], or `e` more than [`MAX_DIRECT_ROWS`], the linkage's rows are relaxed one by one.
 //!
 //! Rows that depend on others get no multiplier. [`RANK`] is coarser here than rounding alone asks: two pins of one joint that have drifted
 //! apart by a part `ε` of the size of their bodies leave `ε²` of a diagonal, and solved for they would lock the joint.
@@ -27,13 +27,13 @@
 //! is an active set: bordering the factor by one row (`e²`) when one joins, dropping it by the inverse of that, and a sweep in between.
 
 use super::equality::{Equalities, VANISHED};
-use super::one_contact::Symmetric;
+use super::one_contact::Symmetric3;
 use crate::rows::{Block, RowSet, Rows, Side, dot};
 
 /// Most equality rows of a linkage that are solved at once.
-pub const DIRECT_ROWS: usize = 200;
+pub const MAX_DIRECT_ROWS: usize = 200;
 /// Most multiplications spent on a linkage before the first sweep: some 20 ms.
-const WORK: usize = 40_000_000;
+const MAX_WORK: usize = 40_000_000;
 /// Rows whose pivot fell under this part of their own diagonal depend on the others: two pins of one joint, 0.1 mm in a metre apart.
 const RANK: f64 = 1e-8;
 /// What is left of a velocity along an equality row counts as none if it is less than this part of the largest that there was.
@@ -60,12 +60,12 @@ struct Linkage {
 
 /// What a block of other rows moves where it meets a linkage: sides of [`Linkages`].
 #[derive(Clone, Copy, Default)]
-pub(super) struct Reach {
+pub(super) struct SideRange {
     first: u32,
     end: u32,
 }
 
-impl Reach {
+impl SideRange {
     /// Whether the block meets no linkage: it moves its own sides alone.
     #[inline(always)]
     pub fn is_own(self) -> bool {
@@ -80,13 +80,13 @@ impl Linkages {
         let mut all = Linkages::default();
         for joined in groups(rows, &joints) {
             let objects = objects_of(rows, &joined);
-            let meets = |block: &&Block| block.sides().iter().any(|s| objects.binary_search(&(s.u, s.dof)).is_ok());
-            let met: usize = if joined.len() > DIRECT_ROWS {
+            let couples = |block: &&Block| block.sides().iter().any(|s| objects.binary_search(&(s.u, s.dof)).is_ok());
+            let met: usize = if joined.len() > MAX_DIRECT_ROWS {
                 0
             } else {
-                island(rows, blocks).filter(meets).map(|b| b.set.rows()).sum()
+                island(rows, blocks).filter(couples).map(|b| b.set.rows()).sum()
             };
-            if joined.len() <= DIRECT_ROWS && joined.len().pow(2) * met <= WORK {
+            if joined.len() <= MAX_DIRECT_ROWS && joined.len().pow(2) * met <= MAX_WORK {
                 all.objects.extend(objects.iter().map(|(u, _)| (*u, all.linkages.len())));
                 all.linkages.push(Linkage::new(rows, joined, objects));
             }
@@ -101,7 +101,7 @@ impl Linkages {
     }
 
     /// Whether the block is one of the rows solved here.
-    pub fn hold(&self, rows: &Rows, block: &Block) -> bool {
+    pub fn contains_row(&self, rows: &Rows, block: &Block) -> bool {
         !self.is_empty() && is_joint(rows, block) && block.sides().iter().any(|s| self.linkage_of(s).is_some())
     }
 
@@ -111,13 +111,13 @@ impl Linkages {
     }
 
     /// Lays out `Ỹ` of a block of other rows.
-    pub fn lay(&mut self, rows: &Rows, block: &Block) -> Reach {
+    pub fn extend_sides(&mut self, rows: &Rows, block: &Block) -> SideRange {
         if self.is_empty() {
-            return Reach::default();
+            return SideRange::default();
         }
         let met: Vec<Option<usize>> = block.sides().iter().map(|s| self.linkage_of(s)).collect();
         if met.iter().all(Option::is_none) {
-            return Reach::default();
+            return SideRange::default();
         }
         let (first, count) = (self.sides.len(), block.set.rows());
         for (side, _) in block.sides().iter().zip(&met).filter(|(_, met)| met.is_none()) {
@@ -129,23 +129,23 @@ impl Linkages {
                 let objects = std::mem::take(&mut self.linkages[linkage].objects);
                 objects.iter().for_each(|(u, dof)| self.push_side(*u, *dof, count));
                 self.linkages[linkage].objects = objects;
-                self.hold_joints(rows, block, linkage, first);
+                self.subtract_joint_responses(rows, block, linkage, first);
             }
         }
         for side in block.sides() {
             (0..count).for_each(|k| self.add(first, side, k, 1.0, rows.response(side, k)));
         }
-        let reach = Reach { first: first as u32, end: self.sides.len() as u32 };
+        let side_range = SideRange { first: first as u32, end: self.sides.len() as u32 };
         for k in 0..count {
-            if self.own(rows, block, reach, k, k) <= VANISHED * rows.own(block, k, k) {
-                self.clear(reach, k);
+            if self.own(rows, block, side_range, k, k) <= VANISHED * rows.own(block, k, k) {
+                self.clear(side_range, k);
             }
         }
-        reach
+        side_range
     }
 
     /// `Ỹ −= Y_E·A⁻¹·K_Ei` of one linkage, for every row of a block.
-    fn hold_joints(&mut self, rows: &Rows, block: &Block, linkage: usize, first: usize) {
+    fn subtract_joint_responses(&mut self, rows: &Rows, block: &Block, linkage: usize, first: usize) {
         for k in 0..block.set.rows() {
             let linkage = &self.linkages[linkage];
             let coupling: Vec<f64> =
@@ -179,8 +179,8 @@ impl Linkages {
         }
     }
 
-    fn clear(&mut self, reach: Reach, k: usize) {
-        for side in &self.sides[reach.first as usize..reach.end as usize] {
+    fn clear(&mut self, side_range: SideRange, k: usize) {
+        for side in &self.sides[side_range.first as usize..side_range.end as usize] {
             let (start, dof) = (side.y as usize + k * side.dof as usize, side.dof as usize);
             self.y[start..start + dof].fill(0.0);
         }
@@ -188,20 +188,20 @@ impl Linkages {
 
     /// The sides that a block moves, and the numbers that their responses are in.
     #[inline(always)]
-    pub fn moved<'a>(&'a self, rows: &'a Rows, block: &'a Block, reach: Reach) -> (&'a [Side], &'a [f64]) {
-        if reach.is_own() {
+    pub fn moved<'a>(&'a self, rows: &'a Rows, block: &'a Block, side_range: SideRange) -> (&'a [Side], &'a [f64]) {
+        if side_range.is_own() {
             (block.sides(), &rows.y)
         } else {
-            (&self.sides[reach.first as usize..reach.end as usize], &self.y)
+            (&self.sides[side_range.first as usize..side_range.end as usize], &self.y)
         }
     }
 
     /// `K̃_ij = Y_iᵀ·Ỹ_j` of a block's own rows.
-    pub fn own(&self, rows: &Rows, block: &Block, reach: Reach, i: usize, j: usize) -> f64 {
-        if reach.is_own() {
+    pub fn own(&self, rows: &Rows, block: &Block, side_range: SideRange, i: usize, j: usize) -> f64 {
+        if side_range.is_own() {
             return rows.own(block, i, j);
         }
-        let (sides, y) = self.moved(rows, block, reach);
+        let (sides, y) = self.moved(rows, block, side_range);
         let part = |side: &Side| {
             let to = sides.iter().find(|s| s.u == side.u)?;
             let start = to.y as usize + j * to.dof as usize;
@@ -211,14 +211,14 @@ impl Linkages {
     }
 
     /// The whole of a contact's own `K̃`.
-    pub fn own_contact(&self, rows: &Rows, block: &Block, reach: Reach) -> Symmetric {
-        let k = |i, j| self.own(rows, block, reach, i, j);
-        Symmetric { m00: k(0, 0), m10: k(1, 0), m20: k(2, 0), m11: k(1, 1), m21: k(2, 1), m22: k(2, 2) }
+    pub fn own_contact(&self, rows: &Rows, block: &Block, side_range: SideRange) -> Symmetric3 {
+        let k = |i, j| self.own(rows, block, side_range, i, j);
+        Symmetric3 { m00: k(0, 0), m10: k(1, 0), m20: k(2, 0), m11: k(1, 1), m21: k(2, 1), m22: k(2, 2) }
     }
 
     /// Finds all `λ_E` for the `du` that the other rows make, and adds what they do. Whether that leaves no velocity along any of the rows.
-    pub fn settle(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
-        self.linkages.iter().map(|l| l.settle(rows, c, lambda, du)).fold(true, |all, settled| all & settled)
+    pub fn solve_equalities(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
+        self.linkages.iter().map(|l| l.solve_equalities(rows, c, lambda, du)).fold(true, |all, settled| all & settled)
     }
 }
 
@@ -228,7 +228,7 @@ impl Linkage {
         Linkage { rows: joints, factor, objects }
     }
 
-    fn settle(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
+    fn solve_equalities(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
         island(rows, &self.rows).for_each(|joint| lambda[joint.row as usize] = 0.0);
         let velocities = |lambda: &[f64], du: &[f64]| -> Vec<f64> {
             let w = |joint: &Block| {

@@ -2,6 +2,7 @@
 //!
 //! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) answers each set as [`RowSet`](crate::rows::RowSet) says.
 
+mod dof6;
 mod equality;
 mod gauss_seidel;
 mod island;
@@ -10,48 +11,47 @@ mod lemke;
 mod linkage;
 mod newton;
 mod one_contact;
-mod pace;
+mod relaxation;
 mod residual;
-mod six;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use equality::smallest_pivot;
 pub use gauss_seidel::GaussSeidel;
 pub use island::Islands;
-pub use lcp::{LcpPyramid, LcpSliding, UNKNOWNS};
+pub use lcp::{LcpPyramid, LcpSliding, MAX_UNKNOWNS};
 pub use lemke::{LcpResult, lemke};
-pub use linkage::DIRECT_ROWS;
+pub use linkage::MAX_DIRECT_ROWS;
 pub use residual::residual;
 
 use crate::rows::Rows;
 
 /// How far an iterative solver goes. Pivoting solvers are exact and take no notice.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Accuracy {
+pub struct SolverSettings {
     /// Sweeps at most, at least 1.
-    pub sweeps: u32,
+    pub max_sweeps: u32,
     /// Relaxations of one block at most, all sweeps of an island together: large islands get fewer sweeps, so that the cost of a
-    /// step is bounded, but never fewer than [`FEWEST_SWEEPS`] (or `sweeps`, if that is less).
-    pub relaxations: u32,
+    /// step is bounded, but never fewer than [`MIN_SWEEPS`] (or `sweeps`, if that is less).
+    pub max_relaxations: u32,
     /// A sweep that changes no row velocity by more than this ends the solve (m/s; m/s² at the acceleration level).
     pub tolerance: f64,
 }
 
 /// What an island gets however large it is.
-pub const FEWEST_SWEEPS: u32 = 25;
+pub const MIN_SWEEPS: u32 = 25;
 
-impl Accuracy {
+impl SolverSettings {
     /// Sweeps for an island of that many blocks.
-    pub fn sweeps_of(&self, blocks: usize) -> u32 {
-        let share = self.relaxations / (blocks.max(1) as u32);
-        share.max(FEWEST_SWEEPS).min(self.sweeps).max(1)
+    pub fn max_sweeps_for(&self, blocks: usize) -> u32 {
+        let share = self.max_relaxations / (blocks.max(1) as u32);
+        share.max(MIN_SWEEPS).min(self.max_sweeps).max(1)
     }
 }
 
 /// How one island's solve ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
+pub struct SolveReport {
     /// Sweeps or pivots taken.
     pub iterations: u32,
     /// Whether the solver itself says that it reached its aim: the tolerance, or a complementary basis.
@@ -90,8 +90,8 @@ pub trait RowSolver: Send + Sync {
         c: &[f64],
         lambda: &mut [f64],
         du: &mut [f64],
-        accuracy: Accuracy,
-    ) -> Outcome;
+        settings: SolverSettings,
+    ) -> SolveReport;
     /// An independent copy.
     fn fork(&self) -> Box<dyn RowSolver>;
 }

@@ -27,8 +27,8 @@
 //! So after one that was none a *cut* jump follows: as far as the first multiplier comes to its bound, `λ + α δλ` with the greatest `α ≤ 1` for which no
 //! normal changes sign and none that sticks leaves its cone. With that one at its bound the next jump has other conditions.
 
-use super::gauss_seidel::{Local, Momentum, Step};
-use super::one_contact::Contact;
+use super::gauss_seidel::{BlockSolver, Extrapolation, Local};
+use super::one_contact::ContactBlock;
 use crate::rows::Rows;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -36,23 +36,23 @@ use std::ops::Range;
 /// `ε` as a share of the mean diagonal of `K`.
 const PROXIMAL: f64 = 1e-7;
 /// Islands of more freedoms than this are left to sweeps.
-const MOST_FREEDOMS: usize = 120;
+const MAX_DOFS: usize = 120;
 /// Sweeps before the first jump, besides half the number of freedoms.
-const FIRST: u32 = 10;
+const FIRST_WAIT: u32 = 10;
 /// Sweeps after a jump before it is judged.
-const TRIAL: u32 = 3;
+const TRIAL_SWEEPS: u32 = 3;
 /// The same after a cut jump, which turns friction by much.
-const LONG_TRIAL: u32 = 10;
+const LONG_TRIAL_SWEEPS: u32 = 10;
 /// How far friction of a contact that slides may turn in a cut jump, radians, about.
-const TURN: f64 = 0.5;
+const MAX_TURN: f64 = 0.5;
 /// A jump after which sweeps change more than this share of what they did before is not followed by another at once.
-const WORTH: f64 = 0.8;
+const WORTHWHILE: f64 = 0.8;
 /// A cut jump only moves on to other conditions: sweeps may change this many times as much after it.
-const LEEWAY: f64 = 10.0;
+const ALLOWED_GROWTH: f64 = 10.0;
 /// A contact is inside its cone by more than this share of the square of its bound.
 const INSIDE: f64 = 1e-9;
 /// From this sweep on a jump that was none doubles the wait for the next.
-const LATE: u32 = 200;
+const LATE_SWEEP: u32 = 200;
 
 /// When to jump, and what to go back to.
 pub(super) struct Newton {
@@ -63,32 +63,32 @@ pub(super) struct Newton {
     /// Multipliers and change per sweep before a jump on trial.
     before: Option<(Vec<[f64; 3]>, f64)>,
     /// Whether the next jump, or the one on trial, is cut.
-    cut: bool,
+    damped: bool,
 }
 
 /// `δλ = a − G·δw` of one block.
 #[derive(Clone, Copy, Default)]
-struct Answer {
+struct Linearization {
     a: [f64; 3],
     g: [[f64; 3]; 3],
 }
 
 impl Newton {
-    pub fn new(momentum: &Momentum) -> Newton {
-        let size = momentum.size();
-        let wait = FIRST + size as u32 / 2;
-        Newton { size, due: if size <= MOST_FREEDOMS { wait } else { u32::MAX }, wait, before: None, cut: false }
+    pub fn new(extrapolation: &Extrapolation) -> Newton {
+        let size = extrapolation.size();
+        let wait = FIRST_WAIT + size as u32 / 2;
+        Newton { size, due: if size <= MAX_DOFS { wait } else { u32::MAX }, wait, before: None, damped: false }
     }
 
     /// After the sweep `sweeps.start` that changed row velocities by `change`, of those up to `sweeps.end` that may follow: whether the multipliers jumped, or went back from a jump that was
     /// none. The velocities are then to be made anew.
-    pub fn after(
+    pub fn try_step(
         &mut self,
         sweeps: Range<u32>,
         change: f64,
         locals: &mut [Local],
         rows: &Rows,
-        momentum: &Momentum,
+        extrapolation: &Extrapolation,
         du: &[f64],
     ) -> bool {
         let (sweep, left) = (sweeps.start, sweeps.len() as u32);
@@ -96,24 +96,24 @@ impl Newton {
             return false;
         }
         if let Some((lambda, before)) = self.before.take()
-            && (change.is_nan() || change > WORTH * before)
+            && (change.is_nan() || change > WORTHWHILE * before)
         {
-            let worse = change.is_nan() || change >= before * if self.cut { LEEWAY } else { 1.0 };
+            let worse = change.is_nan() || change >= before * if self.damped { ALLOWED_GROWTH } else { 1.0 };
             if worse {
                 locals.iter_mut().zip(lambda).for_each(|(local, lambda)| local.lambda = lambda);
-                self.wait *= if sweep > LATE && self.cut { 2 } else { 1 };
-                self.cut = !self.cut;
+                self.wait *= if sweep > LATE_SWEEP && self.damped { 2 } else { 1 };
+                self.damped = !self.damped;
             }
-            self.due = sweep + if worse && self.cut { 1 } else { self.wait };
+            self.due = sweep + if worse && self.damped { 1 } else { self.wait };
             return worse;
         }
-        let trial = if self.cut { LONG_TRIAL } else { TRIAL };
+        let trial = if self.damped { LONG_TRIAL_SWEEPS } else { TRIAL_SWEEPS };
         if left <= trial {
             return false;
         }
         let lambda = locals.iter().map(|local| local.lambda).collect();
         self.due = sweep + trial;
-        if jump(self.size, self.cut, locals, rows, momentum, du) {
+        if newton_step(self.size, self.damped, locals, rows, extrapolation, du) {
             self.before = Some((lambda, change));
             return true;
         }
@@ -124,24 +124,32 @@ impl Newton {
 
 /// One jump of all multipliers, back within their bounds, or cut where the first of them comes to its bound; whether the system could be solved. `du` is
 /// that of the multipliers.
-fn jump(size: usize, cut: bool, locals: &mut [Local], rows: &Rows, momentum: &Momentum, du: &[f64]) -> bool {
+fn newton_step(
+    size: usize,
+    damped: bool,
+    locals: &mut [Local],
+    rows: &Rows,
+    extrapolation: &Extrapolation,
+    du: &[f64],
+) -> bool {
     let Some(epsilon) = proximal(locals) else { return false };
     let mut matrix = DMatrix::identity(size, size);
     let mut right = DVector::zeros(size);
-    let answers: Vec<Answer> = locals.iter().map(|local| answer(local, rows, du, epsilon)).collect();
-    for (local, answer) in locals.iter().zip(&answers) {
-        gather(local, answer, rows, momentum, &mut matrix, &mut right);
+    let linearizations: Vec<Linearization> =
+        locals.iter().map(|local| linearization(local, rows, du, epsilon)).collect();
+    for (local, linearization) in locals.iter().zip(&linearizations) {
+        assemble(local, linearization, rows, extrapolation, &mut matrix, &mut right);
     }
     if !matrix.lu().solve_mut(&mut right) || !right.iter().all(|x| x.is_finite()) {
         return false;
     }
     let changes: Vec<[f64; 3]> = locals
         .iter()
-        .zip(&answers)
-        .map(|(local, answer)| change_of(local, answer, rows, momentum, right.as_slice()))
+        .zip(&linearizations)
+        .map(|(local, linearization)| multiplier_change(local, linearization, rows, extrapolation, right.as_slice()))
         .collect();
-    let share = if cut {
-        locals.iter().zip(&changes).map(|(local, change)| room(local, change)).fold(1.0, f64::min)
+    let share = if damped {
+        locals.iter().zip(&changes).map(|(local, change)| max_fraction(local, change)).fold(1.0, f64::min)
     } else {
         1.0
     };
@@ -153,29 +161,35 @@ fn jump(size: usize, cut: bool, locals: &mut [Local], rows: &Rows, momentum: &Mo
 }
 
 /// `δλ` of one block.
-fn change_of(local: &Local, answer: &Answer, rows: &Rows, momentum: &Momentum, du: &[f64]) -> [f64; 3] {
+fn multiplier_change(
+    local: &Local,
+    linearization: &Linearization,
+    rows: &Rows,
+    extrapolation: &Extrapolation,
+    du: &[f64],
+) -> [f64; 3] {
     let n = local.block.set.rows();
     let mut velocity = [0.0; 3];
     for side in local.block.sides() {
-        let change = &du[momentum.place(side.u)..][..side.dof as usize];
+        let change = &du[extrapolation.place(side.u)..][..side.dof as usize];
         (0..n).for_each(|k| velocity[k] += crate::rows::dot(rows.response(side, k), change));
     }
     let mut change = [0.0; 3];
     for k in 0..n {
-        change[k] = answer.a[k] - (0..n).map(|j| answer.g[k][j] * velocity[j]).sum::<f64>();
+        change[k] = linearization.a[k] - (0..n).map(|j| linearization.g[k][j] * velocity[j]).sum::<f64>();
     }
     change
 }
 
 /// How much of a change a contact's multipliers can take until the normal is 0, or until they leave the cone if they are inside.
-fn room(local: &Local, change: &[f64; 3]) -> f64 {
-    let (Step::Contact(contact), [n, x, y]) = (&local.step, local.lambda) else { return 1.0 };
+fn max_fraction(local: &Local, change: &[f64; 3]) -> f64 {
+    let (BlockSolver::Contact(contact), [n, x, y]) = (&local.step, local.lambda) else { return 1.0 };
     let lifts = if n > 0.0 && change[0] < -n { -n / change[0] } else { 1.0 };
     // |λ_t + α δ_t|² = μ² (λ_n + α δ_n)²
     let square = contact.mu * contact.mu;
     let inside = square * n * n - x * x - y * y;
     if inside <= INSIDE * square * n * n {
-        let (turn, most) = ((change[1] * change[1] + change[2] * change[2]).sqrt(), TURN * contact.mu * n);
+        let (turn, most) = ((change[1] * change[1] + change[2] * change[2]).sqrt(), MAX_TURN * contact.mu * n);
         return lifts.min(if turn > most && most > 0.0 { most / turn } else { 1.0 });
     }
     let a = change[1] * change[1] + change[2] * change[2] - square * change[0] * change[0];
@@ -189,41 +203,43 @@ fn room(local: &Local, change: &[f64; 3]) -> f64 {
 /// `ε`; `None` where nothing responds.
 fn proximal(locals: &[Local]) -> Option<f64> {
     let diagonal = |local: &Local| match &local.step {
-        Step::Dead => None,
-        Step::Scalar(scalar) => Some(scalar.k - scalar.compliance),
-        Step::Contact(contact) => Some(contact.k.m00),
+        BlockSolver::Unresponsive => None,
+        BlockSolver::Scalar(scalar) => Some(scalar.k - scalar.compliance),
+        BlockSolver::Contact(contact) => Some(contact.k.m00),
     };
     let (sum, count) = locals.iter().filter_map(diagonal).fold((0.0, 0.0), |(s, n), k| (s + k, n + 1.0));
     (sum > 0.0).then(|| PROXIMAL * sum / count)
 }
 
-fn answer(local: &Local, rows: &Rows, du: &[f64], epsilon: f64) -> Answer {
+fn linearization(local: &Local, rows: &Rows, du: &[f64], epsilon: f64) -> Linearization {
     let velocity = |k: usize| local.c[k] + rows.row_velocity(local.block, k, du);
-    let mut answer = Answer::default();
+    let mut linearization = Linearization::default();
     match &local.step {
-        Step::Dead => {}
-        Step::Scalar(scalar) => {
+        BlockSolver::Unresponsive => {}
+        BlockSolver::Scalar(scalar) => {
             let old = local.lambda[0];
             let w = velocity(0) + scalar.compliance * old;
             let trial = old - w / scalar.k;
             if trial <= scalar.lo || trial >= scalar.hi {
-                answer.a[0] = if trial <= scalar.lo { scalar.lo - old } else { scalar.hi - old };
+                linearization.a[0] = if trial <= scalar.lo { scalar.lo - old } else { scalar.hi - old };
             } else {
-                answer.g[0][0] = 1.0 / (epsilon + scalar.compliance);
-                answer.a[0] = -w * answer.g[0][0];
+                linearization.g[0][0] = 1.0 / (epsilon + scalar.compliance);
+                linearization.a[0] = -w * linearization.g[0][0];
             }
         }
-        Step::Contact(contact) => answer = of_contact(contact, local.lambda, [0, 1, 2].map(velocity), epsilon),
+        BlockSolver::Contact(contact) => {
+            linearization = linearize_contact(contact, local.lambda, [0, 1, 2].map(velocity), epsilon)
+        }
     }
-    answer
+    linearization
 }
 
-fn of_contact(contact: &Contact, old: [f64; 3], w: [f64; 3], epsilon: f64) -> Answer {
-    let (k, mu, mut answer) = (&contact.k, contact.mu, Answer::default());
+fn linearize_contact(contact: &ContactBlock, old: [f64; 3], w: [f64; 3], epsilon: f64) -> Linearization {
+    let (k, mu, mut linearization) = (&contact.k, contact.mu, Linearization::default());
     let normal = old[0] - w[0] / k.m00;
     if normal <= 0.0 {
-        answer.a = old.map(|x| -x);
-        return answer;
+        linearization.a = old.map(|x| -x);
+        return linearization;
     }
     let stiff = 1.0 / epsilon;
     let mean = 0.5 * (k.m11 + k.m22);
@@ -232,45 +248,46 @@ fn of_contact(contact: &Contact, old: [f64; 3], w: [f64; 3], epsilon: f64) -> An
     let size = (trial[0] * trial[0] + trial[1] * trial[1]).sqrt();
     if size <= mu * normal {
         for i in 0..3 {
-            answer.g[i][i] = stiff;
-            answer.a[i] = -stiff * w[i];
+            linearization.g[i][i] = stiff;
+            linearization.a[i] = -stiff * w[i];
         }
-        return answer;
+        return linearization;
     }
     let (t, s) = ([trial[0] / size, trial[1] / size], [-trial[1] / size, trial[0] / size]);
     let kappa = (mu * old[0] / size).min(1.0);
     let r = [mu * old[0] * t[0] - old[1], mu * old[0] * t[1] - old[2]];
     let across = 1.0 / (1.0 - kappa + epsilon * rho);
-    answer.g[0][0] = stiff;
-    answer.a[0] = -stiff * w[0];
-    let (along, aside) = (mu * answer.a[0] + r[0] * t[0] + r[1] * t[1], across * (r[0] * s[0] + r[1] * s[1]));
+    linearization.g[0][0] = stiff;
+    linearization.a[0] = -stiff * w[0];
+    let (along, aside) = (mu * linearization.a[0] + r[0] * t[0] + r[1] * t[1], across * (r[0] * s[0] + r[1] * s[1]));
     for i in 0..2 {
-        answer.g[i + 1] = [mu * stiff * t[i], kappa * rho * across * s[i] * s[0], kappa * rho * across * s[i] * s[1]];
-        answer.a[i + 1] = along * t[i] + aside * s[i];
+        linearization.g[i + 1] =
+            [mu * stiff * t[i], kappa * rho * across * s[i] * s[0], kappa * rho * across * s[i] * s[1]];
+        linearization.a[i + 1] = along * t[i] + aside * s[i];
     }
-    answer
+    linearization
 }
 
 /// Adds `Y G Yᵀ` and `Y a` of one block.
-fn gather(
+fn assemble(
     local: &Local,
-    answer: &Answer,
+    linearization: &Linearization,
     rows: &Rows,
-    momentum: &Momentum,
+    extrapolation: &Extrapolation,
     matrix: &mut DMatrix<f64>,
     right: &mut DVector<f64>,
 ) {
     let n = local.block.set.rows();
     for side in local.block.sides() {
-        let (at, d) = (momentum.place(side.u), side.dof as usize);
+        let (at, d) = (extrapolation.place(side.u), side.dof as usize);
         for k in 0..n {
             let y = rows.response(side, k);
-            right.as_mut_slice()[at..at + d].iter_mut().zip(y).for_each(|(r, y)| *r += y * answer.a[k]);
+            right.as_mut_slice()[at..at + d].iter_mut().zip(y).for_each(|(r, y)| *r += y * linearization.a[k]);
             for other in local.block.sides() {
-                let from = momentum.place(other.u);
-                for j in (0..n).filter(|&j| answer.g[k][j] != 0.0) {
+                let from = extrapolation.place(other.u);
+                for j in (0..n).filter(|&j| linearization.g[k][j] != 0.0) {
                     for (column, x) in rows.response(other, j).iter().enumerate() {
-                        let share = answer.g[k][j] * x;
+                        let share = linearization.g[k][j] * x;
                         matrix.column_mut(from + column).as_mut_slice()[at..at + d]
                             .iter_mut()
                             .zip(y)

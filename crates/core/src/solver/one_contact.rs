@@ -19,12 +19,12 @@ const COUPLED: f64 = 0.5;
 const SLIDE_STEPS: u32 = 12;
 
 /// A contact with what its own block of `K` gives.
-pub(super) struct Contact {
+pub(super) struct ContactBlock {
     pub mu: f64,
     /// Its own block of `K`.
-    pub k: Symmetric,
+    pub k: Symmetric3,
     /// `K⁻¹`, absent where a direction has no response.
-    inverse: Option<Symmetric>,
+    inverse: Option<Symmetric3>,
     /// `1/λ_max(K_tt)`; 0 where no tangent has a response.
     rho: f64,
     /// Whether `μ·|k_nt|` comes near `k_nn`.
@@ -33,7 +33,7 @@ pub(super) struct Contact {
 
 /// A symmetric 3×3 matrix; 0 is the normal, 1 and 2 are the tangents.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Symmetric {
+pub(super) struct Symmetric3 {
     pub m00: f64,
     pub m10: f64,
     pub m20: f64,
@@ -42,15 +42,15 @@ pub(super) struct Symmetric {
     pub m22: f64,
 }
 
-impl Contact {
+impl ContactBlock {
     /// The contact whose own block of `K` is `k`.
-    pub fn new(k: Symmetric, mu: f64) -> Contact {
+    pub fn new(k: Symmetric3, mu: f64) -> ContactBlock {
         let mean = 0.5 * (k.m11 + k.m22);
         let half = 0.5 * (k.m11 - k.m22);
         let largest = mean + (half * half + k.m21 * k.m21).sqrt();
         let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
         let coupled = mu * mu * (k.m10 * k.m10 + k.m20 * k.m20) > COUPLED * COUPLED * k.m00 * k.m00;
-        Contact { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho, coupled }
+        ContactBlock { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho, coupled }
     }
 
     /// Whether a contact without multipliers stays so at normal velocity `w_n`, whatever the tangents do: where `μ·|k_nt| ≤ k_nn/2`, sticking would
@@ -77,14 +77,14 @@ impl Contact {
     /// The answers without sticking: the rarer ones in a pile.
     fn open_or_slide(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         if !self.coupled {
-            return self.descend(old, w);
+            return self.projected_step(old, w);
         }
         let own = self.k.times(old);
         let b = [w[0] - own[0], w[1] - own[1], w[2] - own[2]];
         if b[0] >= 0.0 {
             return [0.0; 3];
         }
-        self.slide(old, b).unwrap_or_else(|| self.descend(old, w))
+        self.slide(old, b).unwrap_or_else(|| self.projected_step(old, w))
     }
 
     /// The sliding answer, searched from the direction of the multipliers so far, from that of `b_t`, and from across it.
@@ -124,7 +124,7 @@ impl Contact {
 
     /// One projected step: `λ_n ← max(0, λ_n − w_n/k_nn)`, then
     /// `λ_t ← Π(λ_t − ρ·w_t)` onto the disc of radius `μ·λ_n`.
-    fn descend(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+    fn projected_step(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let normal = (old[0] - w[0] / self.k.m00).max(0.0);
         let dn = normal - old[0];
         self.bounded([
@@ -149,10 +149,10 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
     (size > f64::MIN_POSITIVE).then(|| [v[0] / size, v[1] / size])
 }
 
-impl Symmetric {
+impl Symmetric3 {
     /// The own block of `K` of a block of three rows.
-    pub fn own(rows: &Rows, block: &Block) -> Symmetric {
-        let mut k = Symmetric::default();
+    pub fn own(rows: &Rows, block: &Block) -> Symmetric3 {
+        let mut k = Symmetric3::default();
         for side in block.sides() {
             let dof = side.dof as usize;
             let y = &rows.y[side.y as usize..][..3 * dof];
@@ -184,9 +184,9 @@ impl Symmetric {
     }
 
     /// `None` where it is singular to working precision.
-    fn inverse(&self) -> Option<Symmetric> {
-        let Symmetric { m00, m10, m20, m11, m21, m22 } = *self;
-        let cofactors = Symmetric {
+    fn inverse(&self) -> Option<Symmetric3> {
+        let Symmetric3 { m00, m10, m20, m11, m21, m22 } = *self;
+        let cofactors = Symmetric3 {
             m00: m11 * m22 - m21 * m21,
             m10: m20 * m21 - m10 * m22,
             m20: m10 * m21 - m20 * m11,
@@ -199,8 +199,8 @@ impl Symmetric {
         (determinant > 1e-12 * scale.powi(3)).then(|| cofactors.scaled(1.0 / determinant))
     }
 
-    fn scaled(self, s: f64) -> Symmetric {
-        Symmetric {
+    fn scaled(self, s: f64) -> Symmetric3 {
+        Symmetric3 {
             m00: s * self.m00,
             m10: s * self.m10,
             m20: s * self.m20,

@@ -11,11 +11,12 @@ mod scalar;
 mod soft;
 mod stubborn;
 
-use super::{Accuracy, Outcome, RowSolver};
+use super::{RowSolver, SolveReport, SolverSettings};
 use crate::rows::{RowSet, Rows};
 
 /// As far as rounding lets an iteration go.
-pub(super) const FAR: Accuracy = Accuracy { sweeps: 200_000, relaxations: u32::MAX, tolerance: 1e-14 };
+pub(super) const FAR: SolverSettings =
+    SolverSettings { max_sweeps: 200_000, max_relaxations: u32::MAX, tolerance: 1e-14 };
 
 /// A repeatable stream of numbers (splitmix64).
 pub(super) struct Random(pub u64);
@@ -113,14 +114,14 @@ pub(super) struct Solved {
     pub du: Vec<f64>,
     /// `c + (K + R)·λ`, by the dense `K + R`.
     pub w: Vec<f64>,
-    pub outcome: Outcome,
+    pub outcome: SolveReport,
 }
 
 /// Solves everything as one island from nothing, and checks that `du` is `Y·λ`.
-pub(super) fn solve(solver: &dyn RowSolver, rows: &Rows, c: &[f64], accuracy: Accuracy) -> Solved {
+pub(super) fn solve(solver: &dyn RowSolver, rows: &Rows, c: &[f64], settings: SolverSettings) -> Solved {
     let blocks = all(rows);
     let (mut lambda, mut du) = (vec![0.0; rows.len], vec![0.0; rows.dof]);
-    let outcome = solver.solve(rows, &blocks, c, &mut lambda, &mut du, accuracy);
+    let outcome = solver.solve(rows, &blocks, c, &mut lambda, &mut du, settings);
     let (k, n) = (rows.dense(&blocks), rows.len);
     let w: Vec<f64> = (0..n).map(|i| c[i] + (0..n).map(|j| k[i * n + j] * lambda[j]).sum::<f64>()).collect();
     let size = c.iter().fold(1.0, |a: f64, c| a.max(c.abs()));

@@ -57,13 +57,13 @@ impl<T: Scalar> ArticulatedInertia<T> {
 
     /// `IA s` of a turn about the axis `s`: `[J s; Hᵀ s]`.
     #[inline(always)]
-    pub fn times_turn(&self, s: Vector<T>) -> Force<T> {
+    pub fn times_angular(&self, s: Vector<T>) -> Force<T> {
         Force { torque: self.rotational * s, force: self.coupling_transposed_times(s) }
     }
 
     /// `IA s` of a slide along `s`: `[H s; M s]`.
     #[inline(always)]
-    pub fn times_slide(&self, s: Vector<T>) -> Force<T> {
+    pub fn times_linear(&self, s: Vector<T>) -> Force<T> {
         Force { torque: self.coupling_times(s), force: self.mass * s }
     }
 

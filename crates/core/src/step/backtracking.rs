@@ -23,18 +23,18 @@
 use super::contacts::{
     Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten,
 };
-use super::hold::{self, Held};
+use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::impact::{self, Candidate};
-use super::locate::{Bracket, LimitRole, Role, SLOW, Watch};
-use super::{Frame, Stepper, TimeStepping, Workspace, closing, projection, reach};
-use crate::detect::Touch;
+use super::limit_correction::{self, ActiveLimit};
+use super::{StepContext, Stepper, TimeStepping, Workspace, joint_correction, projection, unreachable_joints};
+use crate::detect::ContactConstraint;
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
-use crate::pair::Reach;
+use crate::pair::PredictionMode;
+use crate::part_state::Wrench;
 use crate::rows::RowSet;
 use crate::settings::Integrator;
-use crate::site::Wrench;
-use crate::solver::Accuracy;
+use crate::solver::SolverSettings;
 use crate::view::Entry;
 use crate::world::{Core, StepError};
 
@@ -43,11 +43,11 @@ use crate::world::{Core, StepError};
 pub struct Backtracking {
     work: Workspace,
     /// Contacts and limits of the state tried.
-    after: Vec<Touch>,
+    after: Vec<ContactConstraint>,
     limits_after: Vec<Limit>,
     watch: Watch,
     /// Limits that push in this sub-step, and where their rows at its end are made.
-    held: Vec<Held>,
+    held: Vec<ActiveLimit>,
     probe: Workspace,
     adaptive: Adaptive,
     /// Error of every constraint row that is not to be taken back in this sub-step.
@@ -69,7 +69,7 @@ impl Stepper for Backtracking {
         "backtracking"
     }
 
-    fn step(&mut self, frame: Frame) -> Result<(), StepError> {
+    fn step(&mut self, frame: StepContext) -> Result<(), StepError> {
         let core = frame.core;
         let dt = core.settings.dt;
         let (mut left, end) = (dt, core.time + dt);
@@ -101,11 +101,11 @@ impl Stepper for Backtracking {
 impl Backtracking {
     /// Contacts, rows and smooth accelerations at the present state; overlap beyond the contact tolerance is projected out first.
     fn gather(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
-        detect(core, left, Reach::Relative, &mut self.work.touches);
+        detect(core, left, PredictionMode::Relative, &mut self.work.contact_constraints);
         build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = |t: &RowTarget| t.set == RowSet::HalfLine && off(t.error);
-        if self.work.targets.iter().any(drifted) || self.work.touches.iter().any(|t| off(t.contact.gap)) {
+        if self.work.targets.iter().any(drifted) || self.work.contact_constraints.iter().any(|t| off(t.contact.gap)) {
             projection::project(
                 core,
                 &mut self.work,
@@ -113,31 +113,32 @@ impl Backtracking {
                 core.settings.recovery_speed * left,
                 1e-2 * core.settings.contact_tolerance,
             )?;
-            core.motion().refresh();
-            detect(core, left, Reach::Relative, &mut self.work.touches);
+            core.integration().refresh();
+            detect(core, left, PredictionMode::Relative, &mut self.work.contact_constraints);
         }
         let recovery = core.settings.recovery_speed * left;
-        self.kept = reach::left(&self.work, |i| self.work.targets[i].error, recovery);
+        self.kept = unreachable_joints::left(&self.work, |i| self.work.targets[i].error, recovery);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
-        core.motion().evaluate(time, &mut self.work.dp);
+        core.integration().evaluate(time, &mut self.work.dp);
         core.check_finite(&self.work.dp)?;
         build_rows(core, &mut self.work, Level::Acceleration, 0.5 * left)
     }
 
     fn roles(&mut self, core: &Core) {
         let s = &core.settings;
-        let role = |touch: &Touch| {
-            let lasts = core.warm.carries(&touch.key) && touch.contact.gap <= s.drift_tolerance;
-            let touches = lasts || touch.contact.gap <= s.contact_tolerance;
-            let speed =
-                touch.velocity(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).dot(&touch.contact.normal);
+        let role = |constraint: &ContactConstraint| {
+            let lasts = core.warm.carries(&constraint.key) && constraint.contact.gap <= s.drift_tolerance;
+            let touching = lasts || constraint.contact.gap <= s.contact_tolerance;
+            let speed = constraint
+                .velocity(&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize])
+                .dot(&constraint.contact.normal);
             let allowed =
-                if lasts || (touches && speed.abs() < SLOW) { s.drift_tolerance } else { s.contact_tolerance };
-            Role { lasts, touches, allowed: allowed.max(-touch.contact.gap + s.contact_tolerance) }
+                if lasts || (touching && speed.abs() < SLOW) { s.drift_tolerance } else { s.contact_tolerance };
+            Role { lasts, touching, allowed: allowed.max(-constraint.contact.gap + s.contact_tolerance) }
         };
         self.watch.roles.clear();
-        self.watch.roles.extend(self.work.touches.iter().map(role));
+        self.watch.roles.extend(self.work.contact_constraints.iter().map(role));
     }
 
     /// Thesis `ResolveImpacts`; whether anything was struck, so that other contacts may be near now.
@@ -145,17 +146,19 @@ impl Backtracking {
         let work = &mut self.work;
         let s = core.settings;
         let candidates: Vec<Candidate> = work
-            .touches
+            .contact_constraints
             .iter()
             .zip(&self.watch.roles)
-            .map(|(touch, role)| {
-                let pressing =
-                    (-touch.acceleration(&core.sites[touch.a as usize], &core.sites[touch.b as usize]).x).max(0.0);
+            .map(|(constraint, role)| {
+                let pressing = (-constraint
+                    .acceleration(&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize])
+                    .x)
+                    .max(0.0);
                 let rebound =
                     (2.0 * pressing * if role.lasts { s.drift_tolerance } else { s.contact_tolerance }).sqrt();
                 let rest_speed =
-                    (rebound / touch.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
-                Candidate { takes_part: role.touches, rest_speed, restitution: touch.restitution }
+                    (rebound / constraint.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
+                Candidate { takes_part: role.touching, rest_speed, restitution: constraint.restitution }
             })
             .collect();
         let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);
@@ -173,7 +176,7 @@ impl Backtracking {
     fn resolve_contacts(&mut self, core: &mut Core, left: f64) -> Result<Vec<f64>, StepError> {
         let mut dp = std::mem::take(&mut self.work.dp);
         let time = core.time;
-        core.motion().evaluate(time, &mut dp);
+        core.integration().evaluate(time, &mut dp);
         let work = &mut self.work;
         let mut u = Vec::new();
         whiten(core, &dp, 1.0, &mut u, &mut work.du_force);
@@ -183,20 +186,21 @@ impl Backtracking {
         let acceleration: Vec<f64> = gyroscopic(core).iter().zip(&work.du_force).map(|(g, rate)| rate - g).collect();
         row_velocities(&work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
         let mut keep = vec![true; work.rows.blocks.len()];
-        for (i, (touch, role)) in work.touches.iter().zip(&self.watch.roles).enumerate() {
+        for (i, (constraint, role)) in work.contact_constraints.iter().zip(&self.watch.roles).enumerate() {
             let range = work.rows.blocks[i].range();
-            let acceleration = touch.acceleration(&core.sites[touch.a as usize], &core.sites[touch.b as usize]);
+            let acceleration = constraint
+                .acceleration(&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize]);
             for (k, row) in range.clone().enumerate() {
                 work.c[row] = acceleration[k] + velocity[row] / left;
             }
-            work.c[range.start] += touch.contact.gap.max(0.0) / (left * left);
-            keep[i] = role.touches && (role.lasts || velocity[range.start] < 1e-7);
+            work.c[range.start] += constraint.contact.gap.max(0.0) / (left * left);
+            keep[i] = role.touching && (role.lasts || velocity[range.start] < 1e-7);
         }
         self.watch_limits(core, &velocity, &mut keep);
         let work = &mut self.work;
-        let touches = work.touches.len();
+        let contact_constraints = work.contact_constraints.len();
         for (i, target) in work.targets.iter().enumerate() {
-            let row = work.rows.blocks[touches + i].row as usize;
+            let row = work.rows.blocks[contact_constraints + i].row as usize;
             // rows are those of the middle of the step, and go on turning for the other half
             work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / left;
             if target.set == RowSet::HalfLine {
@@ -205,14 +209,14 @@ impl Backtracking {
         }
         warm_start(core, work, 1.0);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
-        let s = core.settings.accuracy;
-        let accuracy = Accuracy {
-            sweeps: s.sweeps.max(2000),
-            relaxations: s.relaxations.max(1_000_000),
+        let s = core.settings.solver_settings;
+        let solver_settings = SolverSettings {
+            max_sweeps: s.max_sweeps.max(2000),
+            max_relaxations: s.max_relaxations.max(1_000_000),
             tolerance: s.tolerance / left,
         };
-        let ray = solve(core, work, accuracy, left, |b| keep[b]);
-        self.held = hold::pushing(work);
+        let ray = solve(core, work, solver_settings, left, |b| keep[b]);
+        self.held = limit_correction::pushing(work);
         let mut held = vec![0.0; core.dof];
         if ray {
             // no force at the acceleration level keeps the contacts: an impulse without collision does
@@ -221,25 +225,29 @@ impl Backtracking {
         } else {
             hold_forces(core, work, &mut held);
         }
-        core.publish(&work.touches, impulses(work, &work.lambda).map(|f| f * left), impulses(work, &work.lambda));
+        core.publish(
+            &work.contact_constraints,
+            impulses(work, &work.lambda).map(|f| f * left),
+            impulses(work, &work.lambda),
+        );
         Ok(held)
     }
 
     /// What limits do in the sub-step: those that are located act once they are reached, the others act ahead. `velocity` has the rows' velocities,
     /// `work.c` their accelerations.
     fn watch_limits(&mut self, core: &Core, velocity: &[f64], keep: &mut [bool]) {
-        let (work, touches, watch) = (&self.work, self.work.touches.len(), &mut self.watch);
+        let (work, contact_constraints, watch) = (&self.work, self.work.contact_constraints.len(), &mut self.watch);
         watch.limits.clear();
         let mut located = vec![false; work.targets.len()];
         for limit in &work.limits {
             let (mut rate, mut acceleration) = (0.0, 0.0);
             if let Some(i) = limit.target.map(|i| i as usize) {
-                let row = work.rows.blocks[touches + i].row as usize;
+                let row = work.rows.blocks[contact_constraints + i].row as usize;
                 (rate, acceleration) = (velocity[row], work.c[row] + work.targets[i].bias_acceleration);
             }
             let role = LimitRole::new(limit, rate, acceleration, &core.settings);
             if let Some(i) = limit.target.map(|i| i as usize) {
-                (located[i], keep[touches + i]) = (true, role.acts());
+                (located[i], keep[contact_constraints + i]) = (true, role.acts());
             }
             watch.limits.push(role);
         }
@@ -247,7 +255,7 @@ impl Backtracking {
         for (target, block) in work
             .targets
             .iter()
-            .zip(&work.rows.blocks[touches..])
+            .zip(&work.rows.blocks[contact_constraints..])
             .zip(&located)
             .filter_map(|(t, located)| (!located).then_some(t))
         {
@@ -265,8 +273,11 @@ impl Backtracking {
         let start = core.x.to_vec();
         let floor = core.settings.dt * FLOOR;
         let tolerance = core.settings.contact_tolerance;
-        let mut bracket = Bracket::new(self.watch.nearest(&self.work.touches, tolerance));
-        let mut h = self.watch.first_guess(&self.work.touches, &core.sites, left).clamp(floor.min(left), left);
+        let mut bracket = Bracket::new(self.watch.nearest(&self.work.contact_constraints, tolerance));
+        let mut h = self
+            .watch
+            .first_guess(&self.work.contact_constraints, &core.part_states, left)
+            .clamp(floor.min(left), left);
         loop {
             h = self.go_to(core, &start, h)?;
             let deepest = core.report.max_penetration;
@@ -276,22 +287,22 @@ impl Backtracking {
             let stuck = core.report.tries >= TRIES;
             if landed || floored || (stuck && f >= -tolerance) {
                 core.report.floor_hits += floored as u32;
-                if self.adaptive.path.goes_beyond(h) {
+                if self.adaptive.path.extends_beyond(h) {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
-                core.let_go();
+                core.clear_contact_forces();
                 let reach = core.settings.drift_tolerance;
-                hold::hold(core, &mut self.probe, &self.held, h, reach)?;
-                closing::refresh_at(core, &start);
-                closing::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
+                limit_correction::hold(core, &mut self.probe, &self.held, h, reach)?;
+                joint_correction::refresh_at(core, &start);
+                joint_correction::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }
             core.report.max_penetration = deepest;
             if stuck {
                 core.x.copy_from_slice(&start);
-                core.let_go();
-                core.motion().refresh();
+                core.clear_contact_forces();
+                core.integration().refresh();
                 return Ok(0.0);
             }
             h = bracket.narrow(h, f, f < -tolerance).max(floor.min(left));
@@ -301,14 +312,14 @@ impl Backtracking {
     /// The state `h` after `start`: from the dense output where this sub-step has been integrated that far, else by the integrator. How far it came.
     fn go_to(&mut self, core: &mut Core, start: &[f64], h: f64) -> Result<f64, StepError> {
         if self.adaptive.path.reaches(h) {
-            self.adaptive.path.write(&mut core.motion(), h);
+            self.adaptive.path.write(&mut core.integration(), h);
             return Ok(h);
         }
         core.x.copy_from_slice(start);
-        core.motion().refresh();
+        core.integration().refresh();
         let (time, integrator) = (core.time, core.settings.integrator);
         self.adaptive.set(&core.settings, core.inner_step, core.report.inner_steps);
-        let came = core.motion().integrate(integrator, time, h, &mut self.work.dp, &mut self.adaptive)?;
+        let came = core.integration().integrate(integrator, time, h, &mut self.work.dp, &mut self.adaptive)?;
         if integrator == Integrator::DormandPrince {
             core.inner_step = self.adaptive.step;
             core.report.inner_steps = self.adaptive.steps;
@@ -332,7 +343,7 @@ impl Backtracking {
             }
             core.x.copy_from_slice(self.adaptive.path.before(h).1);
             self.adaptive.set(&core.settings, length, core.report.inner_steps);
-            self.adaptive.integrate(&mut core.motion(), time + from, at - from, &mut self.work.dp, false)?;
+            self.adaptive.integrate(&mut core.integration(), time + from, at - from, &mut self.work.dp, false)?;
             core.report.inner_steps = self.adaptive.steps;
             core.check_finite(&self.work.dp)?;
             let off = self.margin(core, at)?;
@@ -343,7 +354,7 @@ impl Backtracking {
             at -= off / slope;
         }
         core.x.copy_from_slice(&dense);
-        core.motion().evaluate(time + h, &mut self.work.dp);
+        core.integration().evaluate(time + h, &mut self.work.dp);
         core.check_finite(&self.work.dp)?;
         Ok(h)
     }
@@ -351,9 +362,14 @@ impl Backtracking {
     /// The margin of the present state, `h` after the start of the sub-step: one try.
     fn margin(&mut self, core: &mut Core, h: f64) -> Result<f64, StepError> {
         core.report.tries += 1;
-        detect(core, 0.0, Reach::Relative, &mut self.after);
+        detect(core, 0.0, PredictionMode::Relative, &mut self.after);
         limits(core, core.time + h, &mut self.limits_after)?;
-        Ok(self.watch.margin(&self.work.touches, &self.after, &self.limits_after, core.settings.contact_tolerance))
+        Ok(self.watch.margin(
+            &self.work.contact_constraints,
+            &self.after,
+            &self.limits_after,
+            core.settings.contact_tolerance,
+        ))
     }
 }
 
@@ -363,24 +379,26 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
     recover(core, &work.du, held);
     core.held_wrenches.clear();
     let on_links = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
-    if work.touches.is_empty() || !core.table.iter().any(on_links) {
+    if work.contact_constraints.is_empty() || !core.table.iter().any(on_links) {
         return;
     }
     let mut joined = vec![0.0; core.dof];
-    work.rows.blocks[work.touches.len()..]
+    work.rows.blocks[work.contact_constraints.len()..]
         .iter()
         .for_each(|block| work.rows.apply_block(block, &work.lambda, &mut joined));
     let mut generalized = vec![0.0; core.dof];
     recover(core, &joined, &mut generalized);
     for entry in core.table.iter().filter(|e| on_links(e)) {
-        held[entry.span.v.clone()].copy_from_slice(&generalized[entry.span.v.clone()]);
+        held[entry.state_range.v.clone()].copy_from_slice(&generalized[entry.state_range.v.clone()]);
     }
-    core.held_wrenches.resize(core.sites.len(), Wrench::default());
-    for (touch, force) in work.touches.iter().zip(impulses(work, &work.lambda)) {
-        for (site, point, force) in [(touch.a, touch.contact.point, force), (touch.b, touch.point_b(), -force)] {
-            if on_links(&core.table.slots[core.owners[site as usize].id]) {
-                let arm = point - core.sites[site as usize].position();
-                let wrench = &mut core.held_wrenches[site as usize];
+    core.held_wrenches.resize(core.part_states.len(), Wrench::default());
+    for (constraint, force) in work.contact_constraints.iter().zip(impulses(work, &work.lambda)) {
+        for (part_state, point, force) in
+            [(constraint.a, constraint.contact.point, force), (constraint.b, constraint.point_b(), -force)]
+        {
+            if on_links(&core.table.slots[core.owners[part_state as usize].id]) {
+                let arm = point - core.part_states[part_state as usize].position();
+                let wrench = &mut core.held_wrenches[part_state as usize];
                 wrench.force += force;
                 wrench.torque += arm.cross(&force);
             }
@@ -392,5 +410,5 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
 fn push_to(core: &mut Core, after: &[f64], before: &[f64]) {
     let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
     push(core, &change, &mut Vec::new());
-    core.motion().refresh();
+    core.integration().refresh();
 }

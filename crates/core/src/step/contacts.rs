@@ -1,23 +1,23 @@
 //! From touches to rows, and from multipliers back to momentum: what both steppers share.
 
-use super::closing;
+use super::joint_correction;
 use super::projection::Projection;
-use crate::detect::{Detector, Touch};
-use crate::motion::coast;
+use crate::detect::{ContactConstraint, Detector};
+use crate::motion::free_motion;
 use crate::object::{Integratable, Level, RowTarget};
-use crate::pair::Reach;
+use crate::pair::PredictionMode;
+use crate::part_state::PartState;
 use crate::row_builder::{RowBuilder, RowKind, constraints};
 use crate::rows::{RowSet, Rows};
-use crate::site::Site;
-use crate::solver::{Accuracy, Islands, residual};
+use crate::solver::{Islands, SolverSettings, residual};
 use crate::view::{ObjectId, WorldView};
 use crate::world::{Core, StepError};
 use tumble_collide::Vec3;
 
-/// Buffers of a step, kept from one to the next. Rows of touches come first, in the order of `touches`, then those of constraints.
+/// Buffers of a step, kept from one to the next. Rows of touches come first, in the order of `contact_constraints`, then those of constraints.
 #[derive(Default)]
 pub(crate) struct Workspace {
-    pub touches: Vec<Touch>,
+    pub contact_constraints: Vec<ContactConstraint>,
     pub rows: Rows,
     pub islands: Islands,
     /// Row velocities that come from led and static sides.
@@ -62,13 +62,13 @@ pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(),
         gravity: core.settings.gravity,
         implicit: core.implicit,
         x: &core.x,
-        sites: &core.sites,
+        part_states: &core.part_states,
         table: &core.table,
     };
     let mut gaps = Vec::new();
     for (place, (_, entry, constraint)) in constraints(&core.table).enumerate() {
         gaps.clear();
-        constraint.gaps(&entry.span, &view, &mut gaps);
+        constraint.gaps(&entry.state_range, &view, &mut gaps);
         if gaps.iter().any(|gap| !gap.is_finite()) {
             return Err(StepError::Row {
                 object: entry.object.name().to_string(),
@@ -85,18 +85,18 @@ pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(),
 }
 
 /// Finds the contacts within reach of the next `horizon` seconds.
-pub(crate) fn detect(core: &mut Core, horizon: f64, reach: Reach, out: &mut Vec<Touch>) {
+pub(crate) fn detect(core: &mut Core, horizon: f64, prediction: PredictionMode, out: &mut Vec<ContactConstraint>) {
     let mut detector = Detector {
         table: &core.table,
         owners: &core.owners,
-        sites: &core.sites,
+        part_states: &core.part_states,
         settings: &core.settings,
         pair_materials: &core.pair_materials,
         broad: core.broad.as_mut(),
         scratch: &mut core.detect_scratch,
-        stirred: &mut core.sleepers.stirred,
+        wake_requests: &mut core.sleepers.wake_requests,
     };
-    detector.detect(horizon, reach, out);
+    detector.detect(horizon, prediction, out);
     let deepest = out.iter().map(|t| -t.contact.gap).fold(0.0, f64::max);
     core.report.max_penetration = core.report.max_penetration.max(deepest);
     core.report.contacts = out.len() as u32;
@@ -105,7 +105,7 @@ pub(crate) fn detect(core: &mut Core, horizon: f64, reach: Reach, out: &mut Vec<
 /// State and sites at another moment of the step.
 pub(crate) struct Moment {
     pub x: Vec<f64>,
-    pub sites: Vec<Site>,
+    pub part_states: Vec<PartState>,
     /// Seconds from the present.
     pub ahead: f64,
 }
@@ -114,20 +114,20 @@ pub(crate) struct Moment {
 fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
     let start = core.x.to_vec();
     for entry in core.table.iter() {
-        let x = &mut core.x[entry.span.x.clone()];
+        let x = &mut core.x[entry.state_range.x.clone()];
         match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
             Some(body) => {
-                let mut v = vec![0.0; entry.span.v.len()];
+                let mut v = vec![0.0; entry.state_range.v.len()];
                 body.velocity(x, &mut v);
-                body.drift(x, &v, ahead);
+                body.integrate_positions(x, &v, ahead);
             }
-            None => coast(entry, x, ahead),
+            None => free_motion(entry, x, ahead),
         }
     }
-    core.motion().refresh();
-    let moment = Moment { x: core.x.to_vec(), sites: core.sites.clone(), ahead };
+    core.integration().refresh();
+    let moment = Moment { x: core.x.to_vec(), part_states: core.part_states.clone(), ahead };
     core.x.copy_from_slice(&start);
-    core.motion().refresh();
+    core.integration().refresh();
     moment
 }
 
@@ -143,8 +143,8 @@ pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ah
     let middle = look_ahead(core, ahead);
     lay_rows(core, work, level, Some(&middle))?;
     let mut present = Vec::new();
-    if work.targets.iter().any(closing::is_joint) {
-        let (errors, made) = closing::middle(core, level, ahead)?;
+    if work.targets.iter().any(joint_correction::is_joint) {
+        let (errors, made) = joint_correction::middle(core, level, ahead)?;
         adopt(core, work, made);
         present = errors;
     }
@@ -163,7 +163,7 @@ pub(crate) fn lay_rows(
     level: Level,
     moment: Option<&Moment>,
 ) -> Result<(), StepError> {
-    lay_touches(core, work);
+    lay_contact_rows(core, work);
     let mut problem = None;
     let mut builder = RowBuilder {
         rows: &mut work.rows,
@@ -172,18 +172,19 @@ pub(crate) fn lay_rows(
         kinds: &mut work.kinds,
         table: &core.table,
         x: &core.x,
-        sites: &core.sites,
+        part_states: &core.part_states,
         problem: &mut problem,
         owner: ObjectId::default(),
     };
-    let (x, sites, ahead) = moment.map_or((&core.x[..], &core.sites, 0.0), |m| (&m.x[..], &m.sites, m.ahead));
-    builder.sites = sites;
+    let (x, part_states, ahead) =
+        moment.map_or((&core.x[..], &core.part_states, 0.0), |m| (&m.x[..], &m.part_states, m.ahead));
+    builder.part_states = part_states;
     let view = WorldView {
         time: core.time + ahead,
         gravity: core.settings.gravity,
         implicit: core.implicit,
         x,
-        sites,
+        part_states,
         table: &core.table,
     };
     let mut first = std::mem::take(&mut work.first);
@@ -191,7 +192,7 @@ pub(crate) fn lay_rows(
     for (id, entry, constraint) in constraints(&core.table) {
         first.push(builder.targets.len());
         builder.owner = id;
-        constraint.rows(&entry.span, &view, level, &mut builder);
+        constraint.rows(&entry.state_range, &view, level, &mut builder);
         if let Some(why) = builder.problem.take() {
             return Err(StepError::Row { object: entry.object.name().to_string(), why });
         }
@@ -209,7 +210,7 @@ fn make_room(work: &mut Workspace) {
 }
 
 /// The rows of the touches, and no others.
-fn lay_touches(core: &Core, work: &mut Workspace) {
+fn lay_contact_rows(core: &Core, work: &mut Workspace) {
     work.rows.clear(core.dof);
     work.bias.clear();
     work.targets.clear();
@@ -221,22 +222,26 @@ fn lay_touches(core: &Core, work: &mut Workspace) {
         kinds: &mut work.kinds,
         table: &core.table,
         x: &core.x,
-        sites: &core.sites,
+        part_states: &core.part_states,
         problem: &mut None,
         owner: ObjectId::default(),
     };
-    for touch in &work.touches {
-        let set = if touch.friction > 0.0 { RowSet::Cone { mu: touch.friction } } else { RowSet::HalfLine };
+    for constraint in &work.contact_constraints {
+        let set = if constraint.friction > 0.0 { RowSet::Cone { mu: constraint.friction } } else { RowSet::HalfLine };
         builder.rows.push_block(set);
         builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
-        let axes = &touch.frame.axes[..set.rows()];
-        for (site, point, sign) in [(touch.a, touch.contact.point, 1.0), (touch.b, touch.point_b(), -1.0)] {
-            let (owner, index) = (core.owners[site as usize], site as usize);
+        let axes = &constraint.frame.axes[..set.rows()];
+        for (part_state, point, sign) in
+            [(constraint.a, constraint.contact.point, 1.0), (constraint.b, constraint.point_b(), -1.0)]
+        {
+            let (owner, index) = (core.owners[part_state as usize], part_state as usize);
             let entry = &core.table.slots[owner.id];
-            let pinned = core.pinned_sites().filter(|_| entry.moves());
+            let pinned = core.pinned_part_states().filter(|_| entry.moves());
             // the arm stays as it was found: the lowest point of a ball that spins does not turn with it
-            let point = pinned.map_or(point, |sites| point + sites[index].position() - core.sites[index].position());
-            builder.sites = pinned.unwrap_or(&core.sites);
+            let point = pinned.map_or(point, |part_states| {
+                point + part_states[index].position() - core.part_states[index].position()
+            });
+            builder.part_states = pinned.unwrap_or(&core.part_states);
             builder.point_side(entry, owner.part as usize, &point, axes, sign);
         }
     }
@@ -244,7 +249,7 @@ fn lay_touches(core: &Core, work: &mut Workspace) {
 
 /// The touches' rows, and after them the constraints' rows of another workspace.
 fn adopt(core: &Core, work: &mut Workspace, made: Workspace) {
-    lay_touches(core, work);
+    lay_contact_rows(core, work);
     for block in &made.rows.blocks {
         work.rows.push_soft(block.set, block.compliance);
         for side in block.sides() {
@@ -281,10 +286,10 @@ fn present_errors(core: &Core, work: &mut Workspace, ahead: f64) {
     let mut u = vec![0.0; core.dof];
     for entry in core.table.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.whiten(&core.x[entry.span.x.clone()], &mut u[entry.span.v.clone()]);
+            body.whiten(&core.x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
         }
     }
-    for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&mut work.targets) {
+    for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&mut work.targets) {
         let velocity = work.bias[block.row as usize] + work.rows.row_velocity(block, 0, &u);
         target.error += ahead * (0.5 * ahead * target.bias_acceleration - (velocity - target.velocity));
     }
@@ -295,9 +300,9 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
     zero(u, core.dof);
     zero(du, core.dof);
     for entry in core.table.iter().filter(|e| e.moves()) {
-        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         let x = core.pinned().unwrap_or(&core.x);
-        body.whiten(&x[entry.span.x.clone()], &mut u[v.clone()]);
+        body.whiten(&x[entry.state_range.x.clone()], &mut u[v.clone()]);
         body.whiten_rate(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
@@ -305,13 +310,13 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
 
 /// What `h` seconds of coasting add to the whitened velocity of objects whose state holds velocities, from where they are pinned. Rows of joints
 /// are to hold at the end of the step, and aim ahead by it; a contact's point does not go with the part as it turns, and does not.
-pub(crate) fn coasting(core: &Core, h: f64) -> Vec<f64> {
+pub(crate) fn free_motion_change(core: &Core, h: f64) -> Vec<f64> {
     let mut out = vec![0.0; core.dof];
     let Some(middle) = core.pinned() else { return out };
     for entry in core.table.iter().filter(|e| e.moves()) {
         let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
-        let (v, mut rate) = (entry.span.v.clone(), vec![0.0; entry.span.v.len()]);
-        body.coasting_rate(&middle[entry.span.x.clone()], &mut rate);
+        let (v, mut rate) = (entry.state_range.v.clone(), vec![0.0; entry.state_range.v.len()]);
+        body.free_motion_rate(&middle[entry.state_range.x.clone()], &mut rate);
         rate.iter_mut().for_each(|r| *r *= h);
         body.whiten_rate(&rate, &mut out[v]);
     }
@@ -322,9 +327,9 @@ pub(crate) fn coasting(core: &Core, h: f64) -> Vec<f64> {
 pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
     let (mut out, x) = (vec![0.0; core.dof], core.pinned().unwrap_or(&core.x));
     for entry in core.table.iter().filter(|e| e.moves()) {
-        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         let mut turning = vec![0.0; v.len()];
-        body.gyroscopic(&x[entry.span.x.clone()], &mut turning);
+        body.gyroscopic(&x[entry.state_range.x.clone()], &mut turning);
         body.whiten_rate(&turning, &mut out[v]);
     }
     out
@@ -341,7 +346,7 @@ pub(crate) fn recover(core: &Core, du: &[f64], j: &mut [f64]) {
     j.fill(0.0);
     for entry in core.table.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.recover(&du[entry.span.v.clone()], &mut j[entry.span.v.clone()]);
+            body.recover(&du[entry.state_range.v.clone()], &mut j[entry.state_range.v.clone()]);
         }
     }
 }
@@ -350,9 +355,9 @@ pub(crate) fn recover(core: &Core, du: &[f64], j: &mut [f64]) {
 pub(crate) fn push(core: &mut Core, du: &[f64], dp: &mut Vec<f64>) {
     zero(dp, core.dof);
     for entry in core.table.iter().filter(|e| e.moves()) {
-        let (Some(body), v) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         body.unwhiten_rate(&du[v.clone()], &mut dp[v.clone()]);
-        body.kick(&mut core.x[entry.span.x.clone()], &dp[v], 1.0);
+        body.kick(&mut core.x[entry.state_range.x.clone()], &dp[v], 1.0);
     }
 }
 
@@ -363,18 +368,16 @@ pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
 
 /// The same along the rows of a step, which is how joints are closed: momenta stay, and what that does to the energy the next step undoes.
 pub(crate) fn shift(core: &mut Core, u: &[f64], h: f64) {
-    each_displaced(
-        core,
-        u,
-        |body, x, v| if body.holds_velocity() { body.displace(x, v, h) } else { body.drift(x, v, h) },
-    );
+    each_displaced(core, u, |body, x, v| {
+        if body.holds_velocity() { body.displace(x, v, h) } else { body.integrate_positions(x, v, h) }
+    });
 }
 
 /// `v += L⁻¹·u`.
 pub(crate) fn unwhiten_onto(core: &Core, u: &[f64], v: &mut [f64]) {
     let mut velocity = Vec::new();
     for entry in core.table.iter().filter(|e| e.moves()) {
-        let (Some(body), range) = (entry.object.integratable(), entry.span.v.clone()) else { continue };
+        let (Some(body), range) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         zero(&mut velocity, range.len());
         body.unwhiten(&u[range.clone()], &mut velocity);
         v[range].iter_mut().zip(&velocity).for_each(|(v, more)| *v += more);
@@ -384,11 +387,11 @@ pub(crate) fn unwhiten_onto(core: &Core, u: &[f64], v: &mut [f64]) {
 fn each_displaced(core: &mut Core, u: &[f64], go: impl Fn(&dyn Integratable, &mut [f64], &[f64])) {
     let mut velocity = Vec::new();
     for entry in core.table.iter().filter(|e| e.moves()) {
-        let (Some(body), u) = (entry.object.integratable(), &u[entry.span.v.clone()]) else { continue };
+        let (Some(body), u) = (entry.object.integratable(), &u[entry.state_range.v.clone()]) else { continue };
         if u.iter().any(|u| *u != 0.0) {
             zero(&mut velocity, u.len());
             body.unwhiten(u, &mut velocity);
-            go(body, &mut core.x[entry.span.x.clone()], &velocity);
+            go(body, &mut core.x[entry.state_range.x.clone()], &velocity);
         }
     }
 }
@@ -405,7 +408,7 @@ pub(crate) fn row_velocities(rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f
 pub(crate) fn solve(
     core: &mut Core,
     work: &mut Workspace,
-    accuracy: Accuracy,
+    solver_settings: SolverSettings,
     unit: f64,
     keep: impl Fn(usize) -> bool,
 ) -> bool {
@@ -413,7 +416,7 @@ pub(crate) fn solve(
     work.islands.build(&work.rows, keep);
     let mut ray = false;
     for blocks in work.islands.iter() {
-        let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, accuracy);
+        let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, solver_settings);
         core.report.solved(outcome, unit * residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
         ray |= outcome.ray;
     }
@@ -423,9 +426,9 @@ pub(crate) fn solve(
 /// Multipliers from last time, turned into the present contact frames and scaled; what is no longer allowed by the cone is left to the solver.
 pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
     let mut place = 0;
-    for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
-        if let Some(impulse) = core.warm.get(&touch.key, &mut place) {
-            for (row, axis) in block.range().zip(&touch.frame.axes) {
+    for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
+        if let Some(impulse) = core.warm.get(&constraint.key, &mut place) {
+            for (row, axis) in block.range().zip(&constraint.frame.axes) {
                 work.lambda[row] = scale * axis.dot(&impulse);
             }
             work.lambda[block.row as usize] = work.lambda[block.row as usize].max(0.0);
@@ -435,8 +438,7 @@ pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
 
 /// The impulse on A of each touch, world axes, for given multipliers.
 pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Iterator<Item = Vec3> + 'a {
-    work.touches
-        .iter()
-        .zip(&work.rows.blocks)
-        .map(|(touch, block)| block.range().zip(&touch.frame.axes).map(|(row, axis)| lambda[row] * axis).sum())
+    work.contact_constraints.iter().zip(&work.rows.blocks).map(|(constraint, block)| {
+        block.range().zip(&constraint.frame.axes).map(|(row, axis)| lambda[row] * axis).sum()
+    })
 }

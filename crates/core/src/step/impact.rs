@@ -17,7 +17,7 @@
 use super::contacts::{Workspace, row_velocities, zero};
 use crate::object::RowTarget;
 use crate::rows::{Block, RowSet, Rows};
-use crate::solver::{Accuracy, RowSolver, residual};
+use crate::solver::{RowSolver, SolverSettings, residual};
 use crate::world::Core;
 
 /// What the phase is told of each touch.
@@ -47,7 +47,7 @@ pub(crate) fn resolve(
     u: &mut [f64],
     total: &mut [f64],
 ) {
-    let (set, reach) = (core.settings.accuracy, core.settings.contact_tolerance);
+    let (set, reach) = (core.settings.solver_settings, core.settings.contact_tolerance);
     let mut c = Vec::new();
     for pass in 0..=cap {
         row_velocities(&work.rows, &work.bias, u, &mut c);
@@ -65,9 +65,9 @@ pub(crate) fn resolve(
         }
         core.report.impact_passes += 1;
         let fastest = c.iter().fold(0.0, |f: f64, c| f.max(c.abs()));
-        let accuracy = Accuracy {
-            sweeps: set.sweeps.max(1000),
-            relaxations: set.relaxations.max(100_000),
+        let solver_settings = SolverSettings {
+            max_sweeps: set.max_sweeps.max(1000),
+            max_relaxations: set.max_relaxations.max(100_000),
             tolerance: PRECISION * fastest,
         };
         let last = pass == cap || !(0..candidates.len()).any(bounces);
@@ -75,7 +75,7 @@ pub(crate) fn resolve(
             (0..candidates.len()).map(|i| if last { candidates[i].takes_part } else { approach(i) }).collect();
         let bounce: Vec<f64> =
             (0..candidates.len()).map(|i| if !last && bounces(i) { candidates[i].restitution } else { 0.0 }).collect();
-        reflect(core, work, &c, &member, &bounce, accuracy);
+        reflect(core, work, &c, &member, &bounce, solver_settings);
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
         total.iter_mut().zip(&work.lambda).for_each(|(t, l)| *t += l);
         if last {
@@ -91,18 +91,25 @@ fn at_stop(t: &RowTarget, reach: f64) -> bool {
 
 /// Velocities of the constraints' rows against their targets.
 fn aim_constraints(work: &Workspace, c: &mut [f64]) {
-    for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
+    for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets) {
         c[block.row as usize] -= target.velocity;
     }
 }
 
 /// One pass: leaves the multipliers in `work.lambda` and their effect in `work.du`.
-fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bounce: &[f64], accuracy: Accuracy) {
-    let touches = work.touches.len();
+fn reflect(
+    core: &mut Core,
+    work: &mut Workspace,
+    c: &[f64],
+    member: &[bool],
+    bounce: &[f64],
+    solver_settings: SolverSettings,
+) {
+    let contact_constraints = work.contact_constraints.len();
     let (targets, reach) = (&work.targets, core.settings.contact_tolerance);
     work.islands.build(&work.rows, |b| {
         let takes_part = |t: &RowTarget| (t.set == RowSet::Equality && t.compliance == 0.0) || at_stop(t, reach);
-        if b < touches { member[b] } else { takes_part(&targets[b - touches]) }
+        if b < contact_constraints { member[b] } else { takes_part(&targets[b - contact_constraints]) }
     });
     work.c.copy_from_slice(c);
     for (block, bounce) in work.rows.blocks.iter().zip(bounce) {
@@ -111,18 +118,18 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], member: &[bool], bo
     work.lambda.fill(0.0);
     zero(&mut work.du, core.dof);
     for blocks in work.islands.iter() {
-        let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, accuracy);
+        let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, solver_settings);
         core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
         let bounces = blocks.iter().any(|&b| bounce.get(b as usize).is_some_and(|e| *e > 0.0));
         // Where something led or a motor takes part, energy may rightly grow.
-        let led = |&b: &u32| {
-            let target = (b as usize).checked_sub(touches).map_or(0.0, |i| targets[i].velocity);
+        let kinematic = |&b: &u32| {
+            let target = (b as usize).checked_sub(contact_constraints).map_or(0.0, |i| targets[i].velocity);
             target != 0.0 || work.rows.blocks[b as usize].range().any(|row| work.bias[row] != 0.0)
         };
-        let guard = !blocks.iter().any(led);
+        let guard = !blocks.iter().any(kinematic);
         let scale: f64 = rows_of(&work.rows, blocks).map(|i| (work.lambda[i] * c[i]).abs()).sum();
         if guard && bounces && work_done(&work.rows, blocks, c, &work.lambda, &work.du) > 1e-12 * scale {
-            blend(core.solver.as_ref(), &work.rows, blocks, c, &mut work.lambda, &mut work.du, accuracy);
+            blend(core.solver.as_ref(), &work.rows, blocks, c, &mut work.lambda, &mut work.du, solver_settings);
         }
     }
 }
@@ -150,7 +157,7 @@ fn blend(
     c: &[f64],
     lambda: &mut [f64],
     du: &mut [f64],
-    accuracy: Accuracy,
+    solver_settings: SolverSettings,
 ) {
     let energy_bounce = work_done(rows, blocks, c, lambda, du);
     let bounce: Vec<f64> = rows_of(rows, blocks).map(|i| lambda[i]).collect();
@@ -158,7 +165,7 @@ fn blend(
     for side in blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides()) {
         du[side.u as usize..(side.u + side.dof) as usize].fill(0.0);
     }
-    solver.solve(rows, blocks, c, lambda, du, accuracy);
+    solver.solve(rows, blocks, c, lambda, du, solver_settings);
     let energy_plastic = work_done(rows, blocks, c, lambda, du).min(0.0);
     let plastic_velocity = blocks.iter().flat_map(|&b| {
         let block = &rows.blocks[b as usize];

@@ -1,19 +1,19 @@
 //! One frame of simulated time, by either of two steppers.
 
 mod backtracking;
-mod closing;
 mod contacts;
-mod flight;
-mod hold;
+mod event_location;
 mod impact;
-mod locate;
+mod joint_correction;
+mod limit_correction;
 mod projection;
-mod reach;
+mod time_of_impact;
 mod time_stepping;
+mod unreachable_joints;
 
 pub use backtracking::Backtracking;
 pub(crate) use contacts::Workspace;
-pub(crate) use flight::{coasted, meet as meet_at};
+pub(crate) use time_of_impact::{pose_after_free_motion, shift_to_impact};
 pub use time_stepping::TimeStepping;
 
 use crate::world::{Core, StepError};
@@ -23,7 +23,7 @@ pub trait Stepper: Send + Sync {
     /// The name that `--stepper` takes.
     fn name(&self) -> &'static str;
     /// Advances by one frame. On an error the world puts state and time back.
-    fn step(&mut self, frame: Frame) -> Result<(), StepError>;
+    fn step(&mut self, frame: StepContext) -> Result<(), StepError>;
     /// An independent copy.
     fn fork(&self) -> Box<dyn Stepper>;
 }
@@ -41,6 +41,6 @@ pub fn stepper_by_name(name: &str) -> Option<Box<dyn Stepper>> {
 }
 
 /// The inside of a world, lent to a stepper for one frame.
-pub struct Frame<'a> {
+pub struct StepContext<'a> {
     pub(crate) core: &'a mut Core,
 }

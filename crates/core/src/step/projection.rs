@@ -9,11 +9,11 @@
 //! Limits that tell their gap at any state (of joints, of rods) are asked for it at the end of the step, in place of `gap + h·J·v̄`: as links swing
 //! about each other a joint does not move by the mean of its two velocities.
 
-use super::closing::{self, refresh_at};
 use super::contacts::{Workspace, displace, limits};
+use super::joint_correction::{self, refresh_at};
 use crate::object::RowTarget;
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, RowSolver};
+use crate::solver::{GaussSeidel, RowSolver, SolverSettings};
 use crate::world::{Core, StepError};
 
 /// What is to be projected.
@@ -36,7 +36,7 @@ pub(crate) fn project(
     let in_place = matches!(displacement, Displacement::InPlace);
     let h = if let Displacement::Step { h, .. } = displacement { h } else { 1.0 };
     for (b, block) in work.rows.blocks.iter().enumerate() {
-        let target = b.checked_sub(work.touches.len()).map_or(0.0, |i| work.targets[i].velocity);
+        let target = b.checked_sub(work.contact_constraints.len()).map_or(0.0, |i| work.targets[i].velocity);
         work.c[block.row as usize] = match displacement {
             Displacement::Step { mean, .. } => {
                 work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean) - target
@@ -48,11 +48,11 @@ pub(crate) fn project(
         ask_limits(core, work, start, h)?;
     }
     // in place, joints stay as they are: what is open of them is closed at the end of the sub-step
-    let (touches, hold) = (work.touches.len(), core.settings.stabilize_positions && !in_place);
+    let (contact_constraints, hold) = (work.contact_constraints.len(), core.settings.stabilize_positions && !in_place);
     let violation = |b: usize, c: &[f64]| -> f64 {
         let v = c[work.rows.blocks[b].row as usize];
-        match (work.touches.get(b), b.checked_sub(touches).map(|i| work.targets[i])) {
-            (Some(touch), _) => -(allowed(touch.contact.gap, recovery) + h * v),
+        match (work.contact_constraints.get(b), b.checked_sub(contact_constraints).map(|i| work.targets[i])) {
+            (Some(constraint), _) => -(allowed(constraint.contact.gap, recovery) + h * v),
             (None, Some(t)) if t.compliance > 0.0 => 0.0,
             (None, Some(t)) if t.set == RowSet::Equality && hold => (t.error.clamp(-recovery, recovery) + h * v).abs(),
             (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
@@ -68,9 +68,11 @@ pub(crate) fn project(
     let targets = &work.targets;
     // a motor has no place to hold, and a spring may be anywhere
     let rigid = |t: &RowTarget| t.compliance == 0.0 && !matches!(t.set, RowSet::Interval { .. });
-    work.islands.build(&work.rows, |b| b < touches || rigid(&targets[b - touches]));
-    let waits = |t: &RowTarget| closing::is_joint(t) && t.velocity == 0.0;
-    let closed_later = |&b: &u32| !in_place && (b as usize) >= touches && waits(&targets[b as usize - touches]);
+    work.islands.build(&work.rows, |b| b < contact_constraints || rigid(&targets[b - contact_constraints]));
+    let waits = |t: &RowTarget| joint_correction::is_joint(t) && t.velocity == 0.0;
+    let closed_later = |&b: &u32| {
+        !in_place && (b as usize) >= contact_constraints && waits(&targets[b as usize - contact_constraints])
+    };
     for blocks in work.islands.iter() {
         if blocks.iter().all(closed_later) {
             continue;
@@ -78,14 +80,14 @@ pub(crate) fn project(
         let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
         if worst > least {
             // the rows of a body's limits and contacts lean on each other through all its links, and a pile's do not
-            let jointed = blocks.iter().any(|&b| b as usize >= touches);
-            let most = if jointed { core.settings.accuracy.sweeps } else { 0 };
-            let accuracy = Accuracy {
-                sweeps: core.settings.projection_sweeps.max(most),
-                relaxations: u32::MAX,
+            let jointed = blocks.iter().any(|&b| b as usize >= contact_constraints);
+            let most = if jointed { core.settings.solver_settings.max_sweeps } else { 0 };
+            let solver_settings = SolverSettings {
+                max_sweeps: core.settings.projection_sweeps.max(most),
+                max_relaxations: u32::MAX,
                 tolerance: 0.1 * least / h,
             };
-            GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, accuracy);
+            GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, solver_settings);
         }
     }
     displace(core, &p.du, h);
@@ -95,8 +97,8 @@ pub(crate) fn project(
 
 /// Makes `h·c` of the limits what the step did to their gaps, where one is near enough to be passed. Sites and caches are those of `start` before and after.
 fn ask_limits(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64) -> Result<(), StepError> {
-    let touches = work.touches.len();
-    let row = |target: u32| work.rows.blocks[touches + target as usize].row as usize;
+    let contact_constraints = work.contact_constraints.len();
+    let row = |target: u32| work.rows.blocks[contact_constraints + target as usize].row as usize;
     let near = |target: u32| {
         work.targets[target as usize].error <= core.settings.drift_tolerance + 2.0 * h * work.c[row(target)].abs()
     };
@@ -104,7 +106,7 @@ fn ask_limits(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64) -> R
         return Ok(());
     }
     let (pinned, mut ends) = (core.lift_pin(), Vec::new());
-    core.motion().refresh();
+    core.integration().refresh();
     limits(core, core.time + h, &mut ends)?;
     core.pin_again(pinned);
     refresh_at(core, start);
@@ -135,9 +137,9 @@ impl Projection {
         self.rows.clear(work.rows.dof);
         self.c.clear();
         for (b, block) in work.rows.blocks.iter().enumerate() {
-            let (set, error) = match work.touches.get(b) {
-                Some(touch) => (RowSet::HalfLine, allowed(touch.contact.gap, recovery)),
-                None => match work.targets[b - work.touches.len()] {
+            let (set, error) = match work.contact_constraints.get(b) {
+                Some(constraint) => (RowSet::HalfLine, allowed(constraint.contact.gap, recovery)),
+                None => match work.targets[b - work.contact_constraints.len()] {
                     t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
                     t => (t.set, t.error.clamp(-recovery, recovery)),
                 },

@@ -21,16 +21,17 @@
 //! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
 
 use super::contacts::{
-    build_rows, coasting, detect, gyroscopic, impulses, push, row_velocities, shift, solve, warm_start, whiten, zero,
+    build_rows, detect, free_motion_change, gyroscopic, impulses, push, row_velocities, shift, solve, warm_start,
+    whiten, zero,
 };
 use super::impact::{self, Candidate};
 use super::projection::{self, Displacement};
-use super::{Frame, Stepper, Workspace, flight};
-use super::{closing, hold, reach};
-use crate::detect::Touch;
-use crate::motion::coast;
+use super::{StepContext, Stepper, Workspace, time_of_impact};
+use super::{joint_correction, limit_correction, unreachable_joints};
+use crate::detect::ContactConstraint;
+use crate::motion::free_motion;
 use crate::object::Level;
-use crate::pair::Reach;
+use crate::pair::PredictionMode;
 use crate::rows::RowSet;
 use crate::view::Entry;
 use crate::world::{Core, StepError};
@@ -42,7 +43,7 @@ pub struct TimeStepping {
     probe: Workspace,
     x0: Vec<f64>,
     /// Share of the step before the first impact, per coordinate; negative where there is none.
-    share: Vec<f64>,
+    impact_fraction: Vec<f64>,
     candidates: Vec<Candidate>,
     /// Impact impulse per row.
     impact: Vec<f64>,
@@ -76,7 +77,7 @@ impl Stepper for TimeStepping {
         "time_stepping"
     }
 
-    fn step(&mut self, frame: Frame) -> Result<(), StepError> {
+    fn step(&mut self, frame: StepContext) -> Result<(), StepError> {
         let core = frame.core;
         let h = core.settings.dt / core.settings.substeps as f64;
         (0..core.settings.substeps).try_for_each(|_| self.substep(core, h))
@@ -92,8 +93,8 @@ impl TimeStepping {
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
         core.implicit = true;
         self.smooth_forces(core, h)?;
-        detect(core, h, Reach::Each, &mut self.work.touches);
-        flight::time_contacts(core, h, &mut self.work.touches);
+        detect(core, h, PredictionMode::Each, &mut self.work.contact_constraints);
+        time_of_impact::time_contacts(core, h, &mut self.work.contact_constraints);
         build_rows(core, &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
@@ -112,14 +113,14 @@ impl TimeStepping {
         core.x.clone_into(&mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.time;
-        let mut motion = core.motion();
-        motion.coast(0.5 * h);
+        let mut motion = core.integration();
+        motion.free_motion(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
-        motion.take_off_coasting(&mut self.work.dp);
+        motion.subtract_free_motion(&mut self.work.dp);
         core.check_finite(&self.work.dp)?;
         core.pin();
         core.x.copy_from_slice(&self.x0);
-        core.motion().refresh();
+        core.integration().refresh();
         Ok(())
     }
 
@@ -135,45 +136,45 @@ impl TimeStepping {
     ) -> Result<(), StepError> {
         let work = &mut self.work;
         after.clone_from(u);
-        self.share.clear();
-        self.share.resize(core.dof, -1.0);
+        self.impact_fraction.clear();
+        self.impact_fraction.resize(core.dof, -1.0);
         zero(&mut self.impact, work.rows.len);
         self.candidates.clear();
-        if work.touches.iter().all(|t| t.restitution <= 0.0) {
+        if work.contact_constraints.iter().all(|t| t.restitution <= 0.0) {
             return Ok(());
         }
-        let (before, gain, mut meets) = (&mut self.buffers.before, &mut self.buffers.gain, Vec::new());
+        let (before, gain, mut impact_fractions) = (&mut self.buffers.before, &mut self.buffers.gain, Vec::new());
         row_velocities(&work.rows, &work.bias, u, before);
         zero(gain, work.rows.len);
         work.rows.add_velocity(du_force, gain);
-        for (touch, block) in work.touches.iter().zip(&work.rows.blocks) {
-            let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], touch.contact.gap);
+        for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
+            let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], constraint.contact.gap);
             let rest_speed = (-dv).max(impact::SLOWEST_BOUNCE);
-            let share = if touch.restitution > 0.0 {
+            let impact_fraction = if constraint.restitution > 0.0 {
                 meeting(gap / h, v, dv).filter(|s| -(v + s * dv) > rest_speed)
             } else {
                 None
             };
             for i in block.sides().iter().flat_map(|s| s.u..s.u + s.dof) {
-                let slot = &mut self.share[i as usize];
-                *slot = share.map_or(*slot, |s| if *slot < 0.0 { s } else { slot.min(s) });
+                let slot = &mut self.impact_fraction[i as usize];
+                *slot = impact_fraction.map_or(*slot, |s| if *slot < 0.0 { s } else { slot.min(s) });
             }
-            meets.push(share);
+            impact_fractions.push(impact_fraction);
             self.candidates.push(Candidate {
                 takes_part: gap <= core.settings.drift_tolerance,
                 rest_speed,
-                restitution: touch.restitution,
+                restitution: constraint.restitution,
             });
         }
-        if self.share.iter().all(|s| *s < 0.0) {
+        if self.impact_fraction.iter().all(|s| *s < 0.0) {
             return Ok(());
         }
-        self.first_impacts(&meets);
+        self.first_impacts(&impact_fractions);
         self.pin_at_impacts(core, h);
         let work = &mut self.work;
         build_rows(core, work, Level::Velocity { h }, 0.5 * h)?;
         whiten(core, &work.dp, h, u, du_force);
-        let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.share[i].max(0.0) * du_force[i]).collect();
+        let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
         after.clone_from(&at_impact);
         impact::resolve(core, work, &self.candidates, IMPACT_PASSES, after, &mut self.impact);
         (0..u.len()).for_each(|i| after[i] = u[i] + (after[i] - at_impact[i]));
@@ -184,15 +185,15 @@ impl TimeStepping {
     fn pin_at_impacts(&self, core: &mut Core, h: f64) {
         let mut x = std::mem::take(&mut core.pinned.0);
         for entry in core.table.iter().filter(|e| !in_the_middle(e)) {
-            let share = entry.span.v.clone().next().map_or(-1.0, |i| self.share[i]);
-            if share >= 0.0 {
-                let x = &mut x[entry.span.x.clone()];
-                x.copy_from_slice(&self.x0[entry.span.x.clone()]);
-                coast(entry, x, h * share);
+            let impact_fraction = entry.state_range.v.clone().next().map_or(-1.0, |i| self.impact_fraction[i]);
+            if impact_fraction >= 0.0 {
+                let x = &mut x[entry.state_range.x.clone()];
+                x.copy_from_slice(&self.x0[entry.state_range.x.clone()]);
+                free_motion(entry, x, h * impact_fraction);
             }
         }
         core.pinned.0 = x;
-        core.motion().refresh();
+        core.integration().refresh();
     }
 
     /// What was struck may now reach what it did not before: finds those contacts too, and lays the rows anew. They push this step (nothing is
@@ -203,26 +204,31 @@ impl TimeStepping {
         }
         let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
         push(core, &change, &mut Vec::new());
-        core.motion().refresh();
+        core.integration().refresh();
         let mut found = Vec::new();
-        detect(core, h, Reach::Each, &mut found);
+        detect(core, h, PredictionMode::Each, &mut found);
         core.x.copy_from_slice(&self.x0);
-        core.motion().refresh();
+        core.integration().refresh();
         let work = &mut self.work;
-        let old: Vec<[u32; 4]> = work.touches.iter().map(|t| t.key.pair).collect();
+        let old: Vec<[u32; 4]> = work.contact_constraints.iter().map(|t| t.key.pair).collect();
         found.retain(|t| old.binary_search(&t.key.pair).is_err());
         if found.is_empty() {
             return Ok(());
         }
-        let mut filed: Vec<(Touch, Candidate, Vec<f64>)> = Vec::new();
-        for ((touch, candidate), block) in work.touches.drain(..).zip(&self.candidates).zip(&work.rows.blocks) {
-            filed.push((touch, *candidate, self.impact[block.range()].to_vec()));
+        let mut filed: Vec<(ContactConstraint, Candidate, Vec<f64>)> = Vec::new();
+        for ((constraint, candidate), block) in
+            work.contact_constraints.drain(..).zip(&self.candidates).zip(&work.rows.blocks)
+        {
+            filed.push((constraint, *candidate, self.impact[block.range()].to_vec()));
         }
-        let fresh =
-            |t: &Touch| Candidate { takes_part: false, rest_speed: impact::SLOWEST_BOUNCE, restitution: t.restitution };
+        let fresh = |t: &ContactConstraint| Candidate {
+            takes_part: false,
+            rest_speed: impact::SLOWEST_BOUNCE,
+            restitution: t.restitution,
+        };
         filed.extend(found.into_iter().map(|t| (t.clone(), fresh(&t), Vec::new())));
-        filed.sort_by_key(|(touch, ..)| touch.key.pair);
-        work.touches.extend(filed.iter().map(|(touch, ..)| touch.clone()));
+        filed.sort_by_key(|(constraint, ..)| constraint.key.pair);
+        work.contact_constraints.extend(filed.iter().map(|(constraint, ..)| constraint.clone()));
         self.candidates = filed.iter().map(|(_, candidate, _)| *candidate).collect();
         build_rows(core, work, Level::Velocity { h }, 0.5 * h)?;
         zero(&mut self.impact, work.rows.len);
@@ -234,22 +240,27 @@ impl TimeStepping {
 
     /// Who takes part in the impacts: those that are the first of both their bodies, and what touches them. A later one waits for the next
     /// step; an island without an impact is left alone.
-    fn first_impacts(&mut self, meets: &[Option<f64>]) {
+    fn first_impacts(&mut self, impact_fractions: &[Option<f64>]) {
         let work = &mut self.work;
         let first = |i: usize| {
             let sides = work.rows.blocks[i].sides();
-            meets[i].is_some_and(|s| sides.iter().all(|side| s <= self.share[side.u as usize] + 1e-9))
+            impact_fractions[i]
+                .is_some_and(|s| sides.iter().all(|side| s <= self.impact_fraction[side.u as usize] + 1e-9))
         };
-        let strikes: Vec<bool> = (0..meets.len()).map(first).collect();
+        let strikes: Vec<bool> = (0..impact_fractions.len()).map(first).collect();
         for (candidate, strikes) in self.candidates.iter_mut().zip(&strikes) {
             candidate.takes_part |= strikes;
         }
-        let (candidates, touches) = (&mut self.candidates, work.touches.len());
-        work.islands.build(&work.rows, |b| b >= touches || candidates[b].takes_part);
+        let (candidates, contact_constraints) = (&mut self.candidates, work.contact_constraints.len());
+        work.islands.build(&work.rows, |b| b >= contact_constraints || candidates[b].takes_part);
         for blocks in
             work.islands.iter().filter(|blocks| !blocks.iter().any(|&b| strikes.get(b as usize) == Some(&true)))
         {
-            blocks.iter().map(|&b| b as usize).filter(|b| *b < touches).for_each(|b| candidates[b].takes_part = false);
+            blocks
+                .iter()
+                .map(|&b| b as usize)
+                .filter(|b| *b < contact_constraints)
+                .for_each(|b| candidates[b].takes_part = false);
         }
     }
 
@@ -261,75 +272,79 @@ impl TimeStepping {
         let keep = &mut self.buffers.keep;
         keep.clear();
         keep.resize(work.rows.blocks.len(), true);
-        for (i, touch) in work.touches.iter().enumerate() {
-            let (row, gap) = (work.rows.blocks[i].row as usize, touch.contact.gap);
+        for (i, constraint) in work.contact_constraints.iter().enumerate() {
+            let (row, gap) = (work.rows.blocks[i].row as usize, constraint.contact.gap);
             let struck = self.impact[row] > 0.0;
             if !struck
                 && gap > core.settings.drift_tolerance
-                && touch.restitution > 0.0
+                && constraint.restitution > 0.0
                 && work.c[row] < -2.0 * self.candidates[i].rest_speed
             {
                 keep[i] = gap + h * work.c[row] >= 0.0;
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / h };
         }
-        let (turning, coasting) =
-            if work.targets.is_empty() { Default::default() } else { (gyroscopic(core), coasting(core, 0.5 * h)) };
-        for (block, target) in work.rows.blocks[work.touches.len()..].iter().zip(&work.targets) {
-            work.c[block.row as usize] +=
-                work.rows.row_velocity(block, 0, &coasting) - 0.5 * h * work.rows.row_velocity(block, 0, &turning);
+        let (turning, free_motion_change) = if work.targets.is_empty() {
+            Default::default()
+        } else {
+            (gyroscopic(core), free_motion_change(core, 0.5 * h))
+        };
+        for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets) {
+            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &free_motion_change)
+                - 0.5 * h * work.rows.row_velocity(block, 0, &turning);
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
             work.c[block.row as usize] += reach + turning - target.velocity;
         }
         warm_start(core, work, h);
-        solve(core, work, core.settings.accuracy, 1.0, |b| keep[b]);
+        solve(core, work, core.settings.solver_settings, 1.0, |b| keep[b]);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
     }
 
     /// Writes the state at the end of the step.
     fn commit(&mut self, core: &mut Core, h: f64, u0: &[f64], u1: &[f64], du_force: &[f64]) -> Result<(), StepError> {
-        let share = |i: usize| if self.share[i] < 0.0 { 0.5 } else { self.share[i] };
+        let impact_fraction = |i: usize| if self.impact_fraction[i] < 0.0 { 0.5 } else { self.impact_fraction[i] };
         let Buffers { change, dp, parabola, rest, mean, total, .. } = &mut self.buffers;
         let write = |out: &mut Vec<f64>, of: &dyn Fn(usize) -> f64| {
             out.clear();
             out.extend((0..u0.len()).map(of));
         };
         write(change, &|i| u1[i] - u0[i]);
-        let before = |e: &Entry| e.span.v.clone().next().filter(|_| !in_the_middle(e)).map_or(0.5, share);
+        let before =
+            |e: &Entry| e.state_range.v.clone().next().filter(|_| !in_the_middle(e)).map_or(0.5, impact_fraction);
         for entry in core.table.iter() {
-            coast(entry, &mut core.x[entry.span.x.clone()], h * before(entry));
+            free_motion(entry, &mut core.x[entry.state_range.x.clone()], h * before(entry));
         }
         push(core, change, dp);
         for entry in core.table.iter() {
-            coast(entry, &mut core.x[entry.span.x.clone()], h * (1.0 - before(entry)));
+            free_motion(entry, &mut core.x[entry.state_range.x.clone()], h * (1.0 - before(entry)));
         }
-        write(parabola, &|i| (share(i) - 0.5) * du_force[i]);
+        write(parabola, &|i| (impact_fraction(i) - 0.5) * du_force[i]);
         rest.clone_from(parabola);
-        for i in core.table.iter().filter(|e| in_the_middle(e)).flat_map(|e| e.span.v.clone()) {
-            rest[i] -= (share(i) - 0.5) * change[i];
+        for i in core.table.iter().filter(|e| in_the_middle(e)).flat_map(|e| e.state_range.v.clone()) {
+            rest[i] -= (impact_fraction(i) - 0.5) * change[i];
         }
         shift(core, rest, h);
-        write(mean, &|i| share(i) * u0[i] + (1.0 - share(i)) * u1[i] + parabola[i]);
+        write(mean, &|i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
         let recovery = core.settings.recovery_speed * h;
         let least = core.settings.contact_tolerance;
         projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean, h }, recovery, least)?;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
         core.publish(
-            &self.work.touches,
+            &self.work.contact_constraints,
             impulses(&self.work, total),
             impulses(&self.work, &self.work.lambda).map(|i| i / h),
         );
-        let kept = reach::left(&self.work, |i| self.work.targets[i].error, recovery);
-        closing::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
+        let kept = unreachable_joints::left(&self.work, |i| self.work.targets[i].error, recovery);
+        joint_correction::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         core.unpin();
         if !self.work.limits.is_empty() {
-            core.motion().refresh();
-            let passed = hold::passed(core, &mut self.probe, h)?;
-            hold::hold(core, &mut self.probe, &passed, h, recovery)?;
+            core.integration().refresh();
+            let passed = limit_correction::passed(core, &mut self.probe, h)?;
+            limit_correction::hold(core, &mut self.probe, &passed, h, recovery)?;
         }
         core.check_finite(dp)
     }

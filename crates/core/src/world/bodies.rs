@@ -2,8 +2,8 @@
 
 use super::{World, WorldError};
 use crate::object::{Integratable, Object};
+use crate::part_state::PartState;
 use crate::rigid::{RigidBody, orientation, vec3};
-use crate::site::Site;
 use crate::view::{Mode, ObjectId, Status};
 use tumble_collide::{Pose, Vec3};
 
@@ -39,9 +39,9 @@ impl World {
     }
 
     /// Takes an object out of the world's doings, or back in; its state stays.
-    pub fn set_alive(&mut self, id: ObjectId, alive: bool) -> Result<(), WorldError> {
+    pub fn set_enabled(&mut self, id: ObjectId, enabled: bool) -> Result<(), WorldError> {
         self.core.wake(id);
-        self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.alive = alive;
+        self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.enabled = enabled;
         Ok(())
     }
 
@@ -58,33 +58,33 @@ impl World {
     }
 
     /// The site of one part: pose, velocity, acceleration.
-    pub fn site(&self, id: ObjectId, part: usize) -> Option<&Site> {
+    pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
         let entry = self.core.table.slots.get(id)?;
-        self.core.sites[entry.span.site.clone()].get(part)
+        self.core.part_states[entry.state_range.parts.clone()].get(part)
     }
 
     /// Pose of the frame by which a part is placed: that of a rigid body, of whose mesh the file's frame is kept (its site is at the center of mass);
     /// the site's for any other part.
     pub fn pose(&self, id: ObjectId, part: usize) -> Option<Pose> {
-        let pose = self.site(id, part)?.pose;
+        let pose = self.part_state(id, part)?.pose;
         Some(self.get::<RigidBody>(id).map_or(pose, |body| body.frame_of(&pose)))
     }
 
     /// An object's slice of the state.
     pub fn state_of(&self, id: ObjectId) -> Option<&[f64]> {
-        Some(&self.core.x[self.core.table.slots.get(id)?.span.x.clone()])
+        Some(&self.core.x[self.core.table.slots.get(id)?.state_range.x.clone()])
     }
 
     /// Writes an object's slice of the state, all of it (see the object's type for what the numbers mean). Refused where it is no state of it.
     pub fn write_state_of(&mut self, id: ObjectId, x: &[f64]) -> Result<(), WorldError> {
         self.core.wake(id);
         let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
-        let accepted = |body: &dyn Integratable| x.len() == entry.span.x.len() && body.accepts(x);
+        let accepted = |body: &dyn Integratable| x.len() == entry.state_range.x.len() && body.accepts(x);
         if !entry.object.integratable().is_some_and(accepted) {
             return Err(WorldError::BadState(entry.object.name().to_string()));
         }
-        self.core.x[entry.span.x.clone()].copy_from_slice(x);
-        self.core.motion().refresh_one(id);
+        self.core.x[entry.state_range.x.clone()].copy_from_slice(x);
+        self.core.integration().refresh_one(id);
         Ok(())
     }
 
@@ -93,7 +93,7 @@ impl World {
         self.edit_rigid(id, |body, x| {
             let mut v = [0.0; 6];
             body.velocity(x, &mut v);
-            let pose = body.site_of(&pose);
+            let pose = body.center_pose_of(&pose);
             x[..3].copy_from_slice(pose.translation.vector.as_slice());
             x[3..7].copy_from_slice(pose.rotation.coords.as_slice());
             body.write_velocity(x, &v);
@@ -114,7 +114,7 @@ impl World {
             return Err(WorldError::NotFinite(name));
         }
         self.edit_rigid(id, |body, x| {
-            let target = body.site_of(&target);
+            let target = body.center_pose_of(&target);
             let v = (target.translation.vector - vec3(x)) / dt;
             let w = (target.rotation * orientation(x).inverse()).scaled_axis() / dt;
             body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]);
@@ -124,7 +124,7 @@ impl World {
     /// Applies a force (N) at a world point of one part during the next frame.
     pub fn apply_force(&mut self, id: ObjectId, part: usize, force: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[force, *point])?;
-        let arm = point - self.core.sites[index].position();
+        let arm = point - self.core.part_states[index].position();
         self.core.applied[index].force += force;
         self.core.applied[index].torque += arm.cross(&force);
         Ok(())
@@ -141,13 +141,13 @@ impl World {
     pub fn apply_generalized(&mut self, id: ObjectId, forces: &[f64]) -> Result<(), WorldError> {
         let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.object.name().to_string();
-        if forces.len() != entry.span.v.len() {
-            return Err(WorldError::Freedoms { name: name(), dof: entry.span.v.len(), given: forces.len() });
+        if forces.len() != entry.state_range.v.len() {
+            return Err(WorldError::Freedoms { name: name(), dof: entry.state_range.v.len(), given: forces.len() });
         }
         if forces.iter().any(|x| !x.is_finite()) {
             return Err(WorldError::NotFinite(name()));
         }
-        let applied = &mut self.core.applied_generalized[entry.span.v.clone()];
+        let applied = &mut self.core.applied_generalized[entry.state_range.v.clone()];
         applied.iter_mut().zip(forces).for_each(|(applied, force)| *applied += force);
         Ok(())
     }
@@ -163,25 +163,25 @@ impl World {
         else {
             return Ok(());
         };
-        let dof = entry.span.v.len();
+        let dof = entry.state_range.v.len();
         let (mut y, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof]);
-        collidable.test_impulse(part, &core.sites[index], point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
+        collidable.test_impulse(part, &core.part_states[index], point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
         let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
         body.unwhiten_rate(&du, &mut dp);
-        body.kick(&mut core.x[entry.span.x.clone()], &dp, 1.0);
-        core.motion().refresh_one(id);
+        body.kick(&mut core.x[entry.state_range.x.clone()], &dp, 1.0);
+        core.integration().refresh_one(id);
         Ok(())
     }
 
     pub(super) fn part(&self, id: ObjectId, part: usize, numbers: &[Vec3]) -> Result<usize, WorldError> {
         let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
-        if part >= entry.span.site.len() {
+        if part >= entry.state_range.parts.len() {
             return Err(WorldError::NoPart { name: entry.object.name().to_string(), part });
         }
         if numbers.iter().flat_map(|v| v.iter()).any(|x| !x.is_finite()) {
             return Err(WorldError::NotFinite(entry.object.name().to_string()));
         }
-        Ok(entry.span.site.start + part)
+        Ok(entry.state_range.parts.start + part)
     }
 
     fn edit_rigid(&mut self, id: ObjectId, edit: impl FnOnce(&RigidBody, &mut [f64])) -> Result<(), WorldError> {
@@ -191,13 +191,13 @@ impl World {
         let any: &dyn std::any::Any = entry.object.as_ref();
         let body =
             any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.object.name().to_string()))?;
-        let mut x = core.x[entry.span.x.clone()].to_vec();
+        let mut x = core.x[entry.state_range.x.clone()].to_vec();
         edit(body, &mut x);
         if !body.accepts(&x) {
             return Err(WorldError::BadState(entry.object.name().to_string()));
         }
-        core.x[entry.span.x.clone()].copy_from_slice(&x);
-        core.motion().refresh_one(id);
+        core.x[entry.state_range.x.clone()].copy_from_slice(&x);
+        core.integration().refresh_one(id);
         Ok(())
     }
 }

@@ -1,11 +1,11 @@
 //! The inside of a world: what the steppers work on.
 
-use super::flat::State;
-use crate::detect::{Owner, Scratch, Touch, WarmStarts};
-use crate::motion::Motion;
+use super::state_memory::State;
+use crate::detect::{ContactConstraint, DetectorBuffers, Owner, WarmStarts};
+use crate::motion::IntegrationContext;
 use crate::pair_material::PairMaterials;
+use crate::part_state::{Forces, PartState, Wrench};
 use crate::settings::{Settings, StepReport};
-use crate::site::{Forces, Site, Wrench};
 use crate::sleep::Sleepers;
 use crate::solver::RowSolver;
 use crate::view::{Entry, ObjectId, Table};
@@ -90,7 +90,7 @@ pub struct Core {
     pub(crate) table: Table,
     pub(crate) x: State,
     pub(crate) dof: usize,
-    pub(crate) sites: Vec<Site>,
+    pub(crate) part_states: Vec<PartState>,
     pub(crate) owners: Vec<Owner>,
     pub(crate) applied: Vec<Wrench>,
     pub(crate) applied_generalized: Vec<f64>,
@@ -100,16 +100,16 @@ pub struct Core {
     /// Contact forces that hold over the sub-step, per site, of objects whose state holds velocities; empty for none.
     pub(crate) held_wrenches: Vec<Wrench>,
     /// Where the caches of what moves are kept, whatever state is refreshed; empty for none. And the sites there.
-    pub(crate) pinned: (Vec<f64>, Vec<Site>),
+    pub(crate) pinned: (Vec<f64>, Vec<PartState>),
     /// Memory of what was pinned last, for the next.
-    pub(crate) unpinned: (Vec<f64>, Vec<Site>),
+    pub(crate) unpinned: (Vec<f64>, Vec<PartState>),
     pub(crate) forces: Forces,
     pub(crate) settings: Settings,
     pub(crate) pair_materials: PairMaterials,
     pub(crate) time: f64,
     pub(crate) frame: u64,
     pub(crate) broad: Box<dyn BroadPhase>,
-    pub(crate) detect_scratch: Scratch,
+    pub(crate) detect_scratch: DetectorBuffers,
     pub(crate) solver: Box<dyn RowSolver>,
     pub(crate) warm: WarmStarts,
     pub(crate) contacts: Vec<ContactPoint>,
@@ -122,7 +122,7 @@ pub struct Core {
 
 impl Core {
     /// No contact or joint forces hold any more.
-    pub(crate) fn let_go(&mut self) {
+    pub(crate) fn clear_contact_forces(&mut self) {
         self.held.fill(0.0);
         self.held_wrenches.clear();
     }
@@ -132,7 +132,7 @@ impl Core {
     pub(crate) fn pin(&mut self) {
         self.pinned = std::mem::take(&mut self.unpinned);
         self.x.clone_into(&mut self.pinned.0);
-        self.pinned.1.clone_from(&self.sites);
+        self.pinned.1.clone_from(&self.part_states);
     }
 
     /// Lets the caches follow again from the next refresh on.
@@ -141,11 +141,11 @@ impl Core {
     }
 
     /// The same for a while; what was pinned, to be put back.
-    pub(crate) fn lift_pin(&mut self) -> (Vec<f64>, Vec<Site>) {
+    pub(crate) fn lift_pin(&mut self) -> (Vec<f64>, Vec<PartState>) {
         std::mem::take(&mut self.pinned)
     }
 
-    pub(crate) fn pin_again(&mut self, pinned: (Vec<f64>, Vec<Site>)) {
+    pub(crate) fn pin_again(&mut self, pinned: (Vec<f64>, Vec<PartState>)) {
         self.pinned = pinned;
     }
 
@@ -155,15 +155,15 @@ impl Core {
     }
 
     /// The sites of the pinned caches; only those of what moves are there.
-    pub(crate) fn pinned_sites(&self) -> Option<&Vec<Site>> {
+    pub(crate) fn pinned_part_states(&self) -> Option<&Vec<PartState>> {
         Some(&self.pinned.1).filter(|x| !x.is_empty())
     }
 
-    pub(crate) fn motion(&mut self) -> Motion<'_> {
-        Motion {
+    pub(crate) fn integration(&mut self) -> IntegrationContext<'_> {
+        IntegrationContext {
             table: &mut self.table,
             x: &mut self.x,
-            sites: &mut self.sites,
+            part_states: &mut self.part_states,
             forces: &mut self.forces,
             gravity: self.settings.gravity,
             implicit: self.implicit,
@@ -172,21 +172,22 @@ impl Core {
             held: &self.held,
             held_wrenches: &self.held_wrenches,
             pinned: &self.pinned.0,
-            pinned_sites: &mut self.pinned.1,
+            pinned_part_states: &mut self.pinned.1,
         }
     }
 
     /// Shows the contacts of the sub-step and files their forces as warm starts.
     pub(crate) fn publish(
         &mut self,
-        touches: &[Touch],
+        contact_constraints: &[ContactConstraint],
         impulses: impl Iterator<Item = Vec3>,
         forces: impl Iterator<Item = Vec3>,
     ) {
         self.contacts.clear();
-        for ((touch, impulse), force) in touches.iter().zip(impulses).zip(forces) {
-            let (a, b) = (self.owners[touch.a as usize], self.owners[touch.b as usize]);
-            let velocity = touch.velocity(&self.sites[touch.a as usize], &self.sites[touch.b as usize]);
+        for ((constraint, impulse), force) in contact_constraints.iter().zip(impulses).zip(forces) {
+            let (a, b) = (self.owners[constraint.a as usize], self.owners[constraint.b as usize]);
+            let velocity =
+                constraint.velocity(&self.part_states[constraint.a as usize], &self.part_states[constraint.b as usize]);
             self.contacts.push(ContactPoint {
                 a: a.id,
                 part_a: a.part as usize,
@@ -195,14 +196,18 @@ impl Core {
                 velocity,
                 impulse,
                 force,
-                point: touch.contact.point,
-                normal: touch.contact.normal,
-                depth: -touch.contact.gap,
+                point: constraint.contact.point,
+                normal: constraint.contact.normal,
+                depth: -constraint.contact.gap,
             });
         }
         let contacts = &self.contacts;
         self.warm.replace(
-            touches.iter().zip(contacts).filter(|(_, c)| c.force != Vec3::zeros()).map(|(t, c)| (t.key, c.force)),
+            contact_constraints
+                .iter()
+                .zip(contacts)
+                .filter(|(_, c)| c.force != Vec3::zeros())
+                .map(|(t, c)| (t.key, c.force)),
         );
     }
 
@@ -212,13 +217,14 @@ impl Core {
         self.report.substeps += 1;
         for entry in self.table.iter().filter(|e| e.moves()) {
             if let Some(body) = entry.object.integratable() {
-                body.stabilize(&mut self.x[entry.span.x.clone()], h);
+                body.stabilize(&mut self.x[entry.state_range.x.clone()], h);
             }
         }
-        self.motion().refresh();
-        let moves = |s: &Site| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
+        self.integration().refresh();
+        let moves = |s: &PartState| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
         let fine = |e: &&Entry| {
-            self.x[e.span.x.clone()].iter().all(|x| x.is_finite()) && self.sites[e.span.site.clone()].iter().all(moves)
+            self.x[e.state_range.x.clone()].iter().all(|x| x.is_finite())
+                && self.part_states[e.state_range.parts.clone()].iter().all(moves)
         };
         let bad = self.table.iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
@@ -226,20 +232,21 @@ impl Core {
 
     /// Stops forces and impulses that are not numbers, and objects that cannot move.
     pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
-        let trouble = |e: &Entry| {
+        let singularity = |e: &Entry| {
             Some(StepError::Singular {
-                why: e.object.integratable()?.trouble()?,
+                why: e.object.integratable()?.singularity()?,
                 object: e.object.name().to_string(),
                 time: self.time,
             })
         };
-        if let Some(error) = self.table.iter().filter(|e| e.moves()).find_map(trouble) {
+        if let Some(error) = self.table.iter().filter(|e| e.moves()).find_map(singularity) {
             return Err(error);
         }
-        let accelerates = |s: &Site| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
+        let accelerates =
+            |s: &PartState| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
         let fine = |e: &&Entry| {
-            dp[e.span.v.clone()].iter().all(|x| x.is_finite())
-                && self.sites[e.span.site.clone()].iter().all(accelerates)
+            dp[e.state_range.v.clone()].iter().all(|x| x.is_finite())
+                && self.part_states[e.state_range.parts.clone()].iter().all(accelerates)
         };
         let bad = self.table.iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "the force on it")))

@@ -2,7 +2,7 @@
 
 use super::{World, WorldError};
 use crate::object::SyncError;
-use crate::site::Site;
+use crate::part_state::PartState;
 use crate::view::ObjectId;
 use tumble_collide::Pose;
 
@@ -28,17 +28,17 @@ pub enum MirrorError {
 impl World {
     /// Shows an object's parts at these poses, one per part. They are at rest, and the state stays what it was: the next step or change of state puts
     /// the parts back to where the state says. For a world that is drawn and never stepped.
-    pub fn show_at(&mut self, id: ObjectId, poses: &[Pose]) -> Result<(), WorldError> {
+    pub fn set_displayed_poses(&mut self, id: ObjectId, poses: &[Pose]) -> Result<(), WorldError> {
         let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
-        let (name, span) = (entry.object.name(), entry.span.site.clone());
-        if poses.len() != span.len() {
-            return Err(WorldError::NoPart { name: name.to_string(), part: poses.len().min(span.len()) });
+        let (name, state_range) = (entry.object.name(), entry.state_range.parts.clone());
+        if poses.len() != state_range.len() {
+            return Err(WorldError::NoPart { name: name.to_string(), part: poses.len().min(state_range.len()) });
         }
         if poses.iter().any(|p| !p.translation.vector.iter().chain(p.rotation.coords.iter()).all(|x| x.is_finite())) {
             return Err(WorldError::NotFinite(name.to_string()));
         }
-        for (site, pose) in self.core.sites[span].iter_mut().zip(poses) {
-            *site = Site { pose: *pose, ..Site::default() };
+        for (part_state, pose) in self.core.part_states[state_range].iter_mut().zip(poses) {
+            *part_state = PartState { pose: *pose, ..PartState::default() };
         }
         Ok(())
     }
@@ -48,7 +48,7 @@ impl World {
         let Some(entry) = self.core.table.slots.get(id) else { return false };
         let sync = entry.object.net_sync();
         if let Some(sync) = sync {
-            sync.get_data(&entry.span, &self.view(), out);
+            sync.get_data(&entry.state_range, &self.view(), out);
         }
         sync.is_some()
     }
@@ -60,14 +60,14 @@ impl World {
         let entry = core.table.slots.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.object.name().to_string();
         let sync = entry.object.net_sync().ok_or_else(|| MirrorError::NotSynchronizable(name()))?;
-        sync.read_data(data, &mut core.x[entry.span.x.clone()])
+        sync.read_data(data, &mut core.x[entry.state_range.x.clone()])
             .map_err(|why| MirrorError::Message { name: name(), why })?;
-        core.motion().refresh_one(id);
+        core.integration().refresh_one(id);
         Ok(())
     }
 
     /// Sets the time that a copy shows, s. A time that is not finite is left out.
-    pub fn show_time(&mut self, time: f64) {
+    pub fn set_displayed_time(&mut self, time: f64) {
         if time.is_finite() {
             self.core.time = time;
         }

@@ -3,30 +3,30 @@
 mod bodies;
 mod checkpoint;
 mod core;
-mod flat;
 mod mirror;
 mod overlaps;
 mod pair_materials;
-mod pull;
+mod pick;
 mod snapshot;
+mod state_memory;
 
 pub use self::core::{ContactPoint, Core, StepError};
 pub use checkpoint::Checkpoint;
-pub use flat::StateHold;
 pub use mirror::MirrorError;
 pub use overlaps::Overlap;
-pub use pull::Pull;
+pub use pick::PickForce;
 pub use snapshot::SnapshotError;
+pub use state_memory::StateMemoryHold;
 
-use crate::detect::{Owner, Scratch, WarmStarts};
+use crate::detect::{DetectorBuffers, Owner, WarmStarts};
 use crate::object::{Energy, Momentum, Object};
 use crate::pair_material::PairMaterials;
+use crate::part_state::{Forces, PartState, StateRange, StateSizes, Wrench};
 use crate::rigid::{BodyError, RigidBody};
 use crate::settings::{Settings, SettingsError, StepReport};
-use crate::site::{Dims, Forces, Site, Span, Wrench};
 use crate::sleep::Sleepers;
 use crate::solver::{GaussSeidel, RowSolver};
-use crate::step::{Frame, Stepper, TimeStepping};
+use crate::step::{StepContext, Stepper, TimeStepping};
 use crate::view::{Entry, Mode, ObjectId, Status, Table, WorldView};
 use crate::visual::Visual;
 use std::collections::BTreeMap;
@@ -54,14 +54,14 @@ pub enum WorldError {
     #[error("'{0}' is not a rigid body")]
     NotRigid(String),
     /// Every collidable part has one row in the site table.
-    #[error("'{name}' has {parts} collidable parts and {sites} sites; the numbers must be equal")]
+    #[error("'{name}' has {parts} collidable parts and {part_states} sites; the numbers must be equal")]
     Parts {
         /// Object.
         name: String,
         /// Parts that its `Collidable` names.
         parts: usize,
-        /// Sites that its `Dims` name.
-        sites: usize,
+        /// Sites that its `StateSizes` name.
+        part_states: usize,
     },
     /// The object has no such part.
     #[error("'{name}' has no part {part}")]
@@ -109,7 +109,7 @@ impl World {
             table: Table::default(),
             x: Default::default(),
             dof: 0,
-            sites: Vec::new(),
+            part_states: Vec::new(),
             owners: Vec::new(),
             applied: Vec::new(),
             applied_generalized: Vec::new(),
@@ -124,7 +124,7 @@ impl World {
             time: 0.0,
             frame: 0,
             broad: Box::<SweepAndPrune>::default(),
-            detect_scratch: Scratch::default(),
+            detect_scratch: DetectorBuffers::default(),
             solver: Box::new(GaussSeidel),
             warm: WarmStarts::default(),
             contacts: Vec::new(),
@@ -152,9 +152,14 @@ impl World {
         self.core.solver = solver;
     }
 
-    /// Names of the stepper and the solver in use.
-    pub fn methods(&self) -> (&'static str, &'static str) {
-        (self.stepper.name(), self.core.solver.name())
+    /// Returns the name of the stepper in use.
+    pub fn stepper_name(&self) -> &'static str {
+        self.stepper.name()
+    }
+
+    /// Returns the name of the solver in use.
+    pub fn solver_name(&self) -> &'static str {
+        self.core.solver.name()
     }
 
     /// The constants in use.
@@ -177,22 +182,22 @@ impl World {
         core.x.clone_into(&mut self.before);
         self.warm_before.clone_from(&core.warm);
         let (time, inner_step) = (core.time, core.inner_step);
-        let sites = if core.sleepers.groups.is_empty() { Vec::new() } else { core.sites.clone() };
+        let part_states = if core.sleepers.groups.is_empty() { Vec::new() } else { core.part_states.clone() };
         let outcome = loop {
             core.report = StepReport::default();
-            core.let_go();
+            core.clear_contact_forces();
             core.detect_scratch.forget();
-            let outcome = self.stepper.step(Frame { core });
-            if outcome.is_err() || !core.stirred() {
+            let outcome = self.stepper.step(StepContext { core });
+            if outcome.is_err() || !core.needs_wake() {
                 break outcome;
             }
             core.x.copy_from_slice(&self.before);
             core.unpin();
-            core.sites.clone_from(&sites);
+            core.part_states.clone_from(&part_states);
             (core.time, core.inner_step) = (time, inner_step);
             core.warm.clone_from(&self.warm_before);
-            core.motion().refresh();
-            core.wake_stirred();
+            core.integration().refresh();
+            core.wake_requested();
         };
         if outcome.is_ok() {
             core.fall_asleep();
@@ -205,8 +210,8 @@ impl World {
             core.unpin();
             (core.time, core.inner_step) = (time, inner_step);
             core.warm.clone_from(&self.warm_before);
-            core.sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
-            core.motion().refresh();
+            core.part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
+            core.integration().refresh();
             return Err(error);
         }
         core.frame += 1;
@@ -244,8 +249,8 @@ impl World {
     }
 
     /// The site table.
-    pub fn sites(&self) -> &[Site] {
-        &self.core.sites
+    pub fn part_states(&self) -> &[PartState] {
+        &self.core.part_states
     }
 
     /// A read-only view, as objects get it.
@@ -256,7 +261,7 @@ impl World {
             gravity: c.settings.gravity,
             implicit: false,
             x: &c.x,
-            sites: &c.sites,
+            part_states: &c.part_states,
             table: &c.table,
         }
     }
@@ -295,14 +300,14 @@ impl World {
 
     fn moving(&self) -> impl Iterator<Item = (&[f64], &dyn crate::object::Integratable)> {
         let moving = self.core.table.iter().filter(|e| e.dynamic());
-        moving.filter_map(|e| Some((&self.core.x[e.span.x.clone()], e.object.integratable()?)))
+        moving.filter_map(|e| Some((&self.core.x[e.state_range.x.clone()], e.object.integratable()?)))
     }
 
-    /// Adds an object; it moves unless it is a [fixture](RigidBody::fixture), which is static, or [`set_mode`](Self::set_mode) says otherwise.
+    /// Adds an object; it moves unless it is a [fixture](RigidBody::fixed), which is static, or [`set_mode`](Self::set_mode) says otherwise.
     pub fn add(&mut self, object: impl Object) -> Result<ObjectId, WorldError> {
         let any: &dyn std::any::Any = &object;
-        let fixture = any.downcast_ref::<RigidBody>().is_some_and(RigidBody::is_fixture);
-        self.add_boxed(Box::new(object), if fixture { Mode::Static } else { Mode::Dynamic })
+        let fixed = any.downcast_ref::<RigidBody>().is_some_and(RigidBody::is_fixed);
+        self.add_boxed(Box::new(object), if fixed { Mode::Static } else { Mode::Dynamic })
     }
 
     /// Adds an object that never moves.
@@ -325,35 +330,39 @@ impl World {
         }
         let core = &mut self.core;
         let parts = object.collidable().map_or(0, |c| c.parts());
-        let dims = object.integratable().map_or(Dims { x: 0, dof: 0, sites: parts }, |i| i.dims());
-        if object.collidable().is_some() && dims.sites != parts {
-            return Err(WorldError::Parts { name, parts, sites: dims.sites });
+        let state_sizes = object.integratable().map_or(StateSizes { x: 0, dof: 0, parts: parts }, |i| i.state_sizes());
+        if object.collidable().is_some() && state_sizes.parts != parts {
+            return Err(WorldError::Parts { name, parts, part_states: state_sizes.parts });
         }
-        let span = Span {
-            x: core.x.len()..core.x.len() + dims.x,
-            v: core.dof..core.dof + dims.dof,
-            site: core.sites.len()..core.sites.len() + dims.sites,
+        let state_range = StateRange {
+            x: core.x.len()..core.x.len() + state_sizes.x,
+            v: core.dof..core.dof + state_sizes.dof,
+            parts: core.part_states.len()..core.part_states.len() + state_sizes.parts,
         };
-        core.x.resize(span.x.end);
+        core.x.resize(state_range.x.end);
         if let Some(body) = object.integratable() {
-            body.write_initial(&mut core.x[span.x.clone()]);
+            body.write_initial(&mut core.x[state_range.x.clone()]);
         }
-        if core.x[span.x.clone()].iter().any(|x| !x.is_finite()) {
-            core.x.resize(span.x.start);
+        if core.x[state_range.x.clone()].iter().any(|x| !x.is_finite()) {
+            core.x.resize(state_range.x.start);
             return Err(WorldError::NotFinite(name));
         }
-        core.dof = span.v.end;
+        core.dof = state_range.v.end;
         core.held.resize(core.dof, 0.0);
         core.applied_generalized.resize(core.dof, 0.0);
-        core.sites.resize(span.site.end, Site::default());
-        core.applied.resize(span.site.end, Wrench::default());
+        core.part_states.resize(state_range.parts.end, PartState::default());
+        core.applied.resize(state_range.parts.end, Wrench::default());
         let serial = core.next_serial;
         core.next_serial += 1;
-        let id =
-            core.table.slots.insert(Entry::new(object, span.clone(), Status { mode, ..Status::default() }, serial));
+        let id = core.table.slots.insert(Entry::new(
+            object,
+            state_range.clone(),
+            Status { mode, ..Status::default() },
+            serial,
+        ));
         core.table.order.push(id);
-        core.owners.extend((0..dims.sites).map(|part| Owner { id, part: part as u32, serial }));
-        core.motion().refresh_one(id);
+        core.owners.extend((0..state_sizes.parts).map(|part| Owner { id, part: part as u32, serial }));
+        core.integration().refresh_one(id);
         self.names.insert(name, id);
         Ok(id)
     }
@@ -365,24 +374,24 @@ impl World {
         let gone = core.table.slots.remove(id).ok_or(WorldError::Stale)?;
         self.names.remove(gone.object.name());
         core.table.order.retain(|&other| other != id);
-        core.x.cut(gone.span.x.clone());
-        core.sites.drain(gone.span.site.clone());
-        core.owners.drain(gone.span.site.clone());
-        core.applied.drain(gone.span.site.clone());
-        core.dof -= gone.span.v.len();
+        core.x.cut(gone.state_range.x.clone());
+        core.part_states.drain(gone.state_range.parts.clone());
+        core.owners.drain(gone.state_range.parts.clone());
+        core.applied.drain(gone.state_range.parts.clone());
+        core.dof -= gone.state_range.v.len();
         core.held.truncate(core.dof);
-        core.applied_generalized.drain(gone.span.v.clone());
-        let (dx, dv, ds) = (gone.span.x.len(), gone.span.v.len(), gone.span.site.len());
+        core.applied_generalized.drain(gone.state_range.v.clone());
+        let (dx, dv, ds) = (gone.state_range.x.len(), gone.state_range.v.len(), gone.state_range.parts.len());
         for &other in &core.table.order {
-            let span = &mut core.table.slots[other].span;
-            if span.x.start >= gone.span.x.end
-                && span.v.start >= gone.span.v.end
-                && span.site.start >= gone.span.site.end
+            let state_range = &mut core.table.slots[other].state_range;
+            if state_range.x.start >= gone.state_range.x.end
+                && state_range.v.start >= gone.state_range.v.end
+                && state_range.parts.start >= gone.state_range.parts.end
             {
-                *span = Span {
-                    x: span.x.start - dx..span.x.end - dx,
-                    v: span.v.start - dv..span.v.end - dv,
-                    site: span.site.start - ds..span.site.end - ds,
+                *state_range = StateRange {
+                    x: state_range.x.start - dx..state_range.x.end - dx,
+                    v: state_range.v.start - dv..state_range.v.end - dv,
+                    parts: state_range.parts.start - ds..state_range.parts.end - ds,
                 };
             }
         }
@@ -400,7 +409,7 @@ impl World {
                 table: c.table.clone(),
                 x: c.x.fork(),
                 dof: c.dof,
-                sites: c.sites.clone(),
+                part_states: c.part_states.clone(),
                 owners: c.owners.clone(),
                 applied: c.applied.clone(),
                 applied_generalized: c.applied_generalized.clone(),
@@ -415,7 +424,7 @@ impl World {
                 time: c.time,
                 frame: c.frame,
                 broad: Box::<SweepAndPrune>::default(),
-                detect_scratch: Scratch::default(),
+                detect_scratch: DetectorBuffers::default(),
                 solver: c.solver.fork(),
                 warm: c.warm.clone(),
                 contacts: c.contacts.clone(),

@@ -1,6 +1,6 @@
 //! Which objects reach into each other as the world stands.
 
-use crate::detect::meet;
+use crate::detect::may_collide;
 use crate::view::{Entry, Mode, ObjectId};
 use crate::world::World;
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ impl World {
     /// The pairs of objects that may meet and reach into each other by more than `depth` metres, in the order in which they were added. Changes nothing, and
     /// costs a detection of contacts.
     pub fn overlaps(&self, depth: f64) -> Vec<Overlap> {
-        let parts = self.meeting_parts();
+        let parts = self.overlapping_parts();
         let mut broad = SweepAndPrune::default();
         let places: BTreeMap<u32, usize> =
             parts.iter().enumerate().map(|(n, part)| (broad.insert(&part.bounds(), part.moves()), n)).collect();
@@ -49,11 +49,11 @@ impl World {
         deepest.into_values().collect()
     }
 
-    fn meeting_parts(&self) -> Vec<Part<'_>> {
-        let entries = self.core.table.iter().filter(|e| e.status.alive && e.status.collidable);
+    fn overlapping_parts(&self) -> Vec<Part<'_>> {
+        let entries = self.core.table.iter().filter(|e| e.status.enabled && e.status.collidable);
         let parts = entries.filter_map(|entry| Some((entry, entry.object.collidable()?))).flat_map(|(entry, body)| {
-            entry.span.site.clone().enumerate().filter_map(move |(part, site)| {
-                Some(Part { entry, part, shape: body.shape(part)?, pose: self.core.sites[site].pose })
+            entry.state_range.parts.clone().enumerate().filter_map(move |(part, part_state)| {
+                Some(Part { entry, part, shape: body.shape(part)?, pose: self.core.part_states[part_state].pose })
             })
         });
         parts.collect()
@@ -61,7 +61,7 @@ impl World {
 
     /// The greatest depth of the contacts of two parts that may meet, if they overlap.
     fn depth_of(&self, a: &Part<'_>, b: &Part<'_>) -> Option<f64> {
-        if !meet(a.entry, a.part, b.entry, b.part, &self.core.sites) {
+        if !may_collide(a.entry, a.part, b.entry, b.part, &self.core.part_states) {
             return None;
         }
         let (of_a, of_b) = (a.entry.object.collidable()?, b.entry.object.collidable()?);
@@ -82,6 +82,6 @@ impl Part<'_> {
     }
 
     fn id(&self, world: &World) -> ObjectId {
-        world.core.owners[self.entry.span.site.start + self.part].id
+        world.core.owners[self.entry.state_range.parts.start + self.part].id
     }
 }

@@ -6,8 +6,8 @@
 
 use super::World;
 use crate::detect::WarmStarts;
-use crate::site::Wrench;
-use crate::sleep::{Group, Sleepers, Still};
+use crate::part_state::Wrench;
+use crate::sleep::{RestTimer, SleepGroup, Sleepers};
 use crate::view::Status;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Vec3;
@@ -53,7 +53,7 @@ struct Snapshot {
     warm: WarmStarts,
     /// Inner step of the adaptive integrator, s.
     inner_step: f64,
-    groups: Vec<Group>,
+    groups: Vec<SleepGroup>,
 }
 
 #[derive(Serialize, Deserialize, PartialEq)]
@@ -63,7 +63,7 @@ struct Saved {
     serial: u32,
     status: Status,
     asleep: bool,
-    still: Still,
+    rest_timer: RestTimer,
 }
 
 impl Saved {
@@ -91,7 +91,7 @@ impl World {
             next_serial: c.next_serial,
             objects: self.inventory(),
             x: c.x.to_vec(),
-            accelerations: c.sites.iter().map(|s| six(&s.angular_acceleration, &s.acceleration)).collect(),
+            accelerations: c.part_states.iter().map(|s| six(&s.angular_acceleration, &s.acceleration)).collect(),
             applied: c.applied.iter().map(|w| six(&w.torque, &w.force)).collect(),
             applied_generalized: c.applied_generalized.clone(),
             warm: c.warm.clone(),
@@ -119,32 +119,32 @@ impl World {
         for (i, object) in saved.objects.iter().enumerate() {
             let entry = &mut core.table.slots[core.table.order[i]];
             (entry.status, entry.serial, entry.asleep) = (object.status, object.serial, object.asleep);
-            entry.still.clone_from(&object.still);
-            core.owners[entry.span.site.clone()].iter_mut().for_each(|o| o.serial = object.serial);
+            entry.rest_timer.clone_from(&object.rest_timer);
+            core.owners[entry.state_range.parts.clone()].iter_mut().for_each(|o| o.serial = object.serial);
         }
-        for (site, a) in core.sites.iter_mut().zip(&saved.accelerations) {
-            (site.angular_acceleration, site.acceleration) = halves(a);
+        for (part_state, a) in core.part_states.iter_mut().zip(&saved.accelerations) {
+            (part_state.angular_acceleration, part_state.acceleration) = halves(a);
         }
         for (wrench, w) in core.applied.iter_mut().zip(&saved.applied) {
             let (torque, force) = halves(w);
             *wrench = Wrench { torque, force };
         }
         core.applied_generalized = saved.applied_generalized;
-        core.sleepers = Sleepers { groups: saved.groups, stirred: Vec::new() };
+        core.sleepers = Sleepers { groups: saved.groups, wake_requests: Vec::new() };
         core.contacts.clear();
-        core.let_go();
-        core.motion().refresh();
+        core.clear_contact_forces();
+        core.integration().refresh();
         Ok(())
     }
 
     fn inventory(&self) -> Vec<Saved> {
         let saved = |e: &crate::view::Entry| Saved {
             name: e.object.name().to_string(),
-            sizes: [e.span.x.len() as u32, e.span.v.len() as u32, e.span.site.len() as u32],
+            sizes: [e.state_range.x.len() as u32, e.state_range.v.len() as u32, e.state_range.parts.len() as u32],
             serial: e.serial,
             status: e.status,
             asleep: e.asleep,
-            still: e.still.clone(),
+            rest_timer: e.rest_timer.clone(),
         };
         self.core.table.iter().map(saved).collect()
     }
@@ -160,7 +160,7 @@ impl World {
         }
         let c = &self.core;
         let sizes = |s: &Snapshot| [s.x.len(), s.accelerations.len(), s.applied.len(), s.applied_generalized.len()];
-        if sizes(saved) != [c.x.len(), c.sites.len(), c.sites.len(), c.dof] {
+        if sizes(saved) != [c.x.len(), c.part_states.len(), c.part_states.len(), c.dof] {
             return Err(SnapshotError::Format("its tables have the wrong lengths".into()));
         }
         let numbers = saved
@@ -171,20 +171,22 @@ impl World {
             .chain(saved.applied.iter().flatten());
         let steps = saved.time.is_finite() && saved.inner_step.is_finite() && saved.inner_step >= 0.0;
         let finite = steps && numbers.copied().all(f64::is_finite) && saved.warm.finite();
-        let states =
-            c.table.iter().all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.span.x.clone()])));
+        let states = c
+            .table
+            .iter()
+            .all(|e| e.object.integratable().is_none_or(|body| body.accepts(&saved.x[e.state_range.x.clone()])));
         if !(finite && states) {
             return Err(SnapshotError::NotFinite);
         }
         let mut members: Vec<u32> = saved.groups.iter().flat_map(|g| &g.members).copied().collect();
         members.sort_unstable();
-        let still = saved
+        let rest_timer = saved
             .objects
             .iter()
-            .flat_map(|o| o.still.from.iter().flatten().chain([&o.still.since]))
+            .flat_map(|o| o.rest_timer.from.iter().flatten().chain([&o.rest_timer.since]))
             .all(|x| x.is_finite());
         let asleep = saved.objects.iter().filter(|o| o.asleep).map(|o| o.serial);
-        if !(still && saved.groups.iter().all(Group::sound) && asleep.eq(members)) {
+        if !(rest_timer && saved.groups.iter().all(SleepGroup::sound) && asleep.eq(members)) {
             return Err(SnapshotError::Format("its sleepers do not add up".into()));
         }
         let counts = saved.objects.is_sorted_by(|a, b| a.serial < b.serial)

@@ -142,9 +142,9 @@ proptest! {
     #[test]
     fn articulated_inertia_is_its_six_by_six((ia, dense) in articulated(), m in motion(), r in vector(), s in vector(), d in 0.0..2.0f64) {
         prop_assert!(close(of_force(ia.times(m)), dense * of_motion(m)));
-        prop_assert!(close(of_force(ia.times_turn(s)), dense * six(s, Vector::default())));
-        prop_assert!(close(of_force(ia.times_slide(s)), dense * six(Vector::default(), s)));
-        let u = ia.times_turn(s);
+        prop_assert!(close(of_force(ia.times_angular(s)), dense * six(s, Vector::default())));
+        prop_assert!(close(of_force(ia.times_linear(s)), dense * six(Vector::default(), s)));
+        let u = ia.times_angular(s);
         let less = dense - d * of_force(u) * of_force(u).transpose();
         prop_assert!((of_force(ia.minus_square(u, d).times(m)) - less * of_motion(m)).amax() < 1e-12 * (1.0 + less.amax() * 20.0));
         // X = [1 0; −r× 1] by its columns.

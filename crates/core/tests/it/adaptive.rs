@@ -21,11 +21,13 @@ impl Object for Drive {
 }
 
 impl ForceGenerator for Drive {
-    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
-        let (Some(site), Some(span)) = (view.site(self.0, 0), view.span(self.0)) else { return };
-        let (force, torque) = (self.1)(view.time, &site.pose.rotation);
-        out.wrenches[span.site.start].force += force;
-        out.wrenches[span.site.start].torque += torque;
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        let (Some(part_state), Some(state_range)) = (view.part_state(self.0, 0), view.state_range(self.0)) else {
+            return;
+        };
+        let (force, torque) = (self.1)(view.time, &part_state.pose.rotation);
+        out.wrenches[state_range.parts.start].force += force;
+        out.wrenches[state_range.parts.start].torque += torque;
     }
 }
 
@@ -52,9 +54,12 @@ impl Object for Spring {
 }
 
 impl ForceGenerator for Spring {
-    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
-        let (Some(site), Some(span)) = (view.site(self.on, 0), view.span(self.on)) else { return };
-        out.wrenches[span.site.start].force += self.k * (self.to - site.position()) - self.c * site.velocity;
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        let (Some(part_state), Some(state_range)) = (view.part_state(self.on, 0), view.state_range(self.on)) else {
+            return;
+        };
+        out.wrenches[state_range.parts.start].force +=
+            self.k * (self.to - part_state.position()) - self.c * part_state.velocity;
     }
 }
 
@@ -91,7 +96,7 @@ fn torque(t: f64, q: &Quat) -> (Vec3, Vec3) {
 }
 
 fn attitude(world: &World, id: ObjectId) -> Quat {
-    world.site(id, 0).unwrap().pose.rotation
+    world.part_state(id, 0).unwrap().pose.rotation
 }
 
 /// Attitude and position at 2 s, by frames of `dt` that are one inner step each.
@@ -257,7 +262,7 @@ fn strokes_against_a_wall_are_located_within_inner_steps() {
     let mut world = adaptive(0.1, 1e-10);
     let wall = Pose::new(Vec3::new(0.6, 0.0, 0.0), Vec3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
     world
-        .add_static(RigidBody::fixture("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall))
+        .add_static(RigidBody::fixed("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall))
         .unwrap();
     let body =
         RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().surface(1.0, 0.0).at(Pose::translation(-1.0, 0.0, 0.0));
@@ -293,9 +298,7 @@ fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
         let mut world = adaptive(0.1, tolerance);
         let wall = Pose::new(Vec3::new(0.6, 0.0, 0.0), Vec3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
         world
-            .add_static(
-                RigidBody::fixture("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall),
-            )
+            .add_static(RigidBody::fixed("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall))
             .unwrap();
         let body = RigidBody::with_mass("ball", sphere(0.1), 2.0)
             .unwrap()
@@ -481,10 +484,10 @@ fn what_is_led_keeps_its_velocity() {
         .unwrap();
     world.add(Spring { name: "spring".into(), on: ball, to: Vec3::new(5.0, 1.0, 0.0), k: 30.0, c: 0.1 }).unwrap();
     run(&mut world, 2.0);
-    let site = *world.site(led, 0).unwrap();
-    assert!((site.position() - 2.0 * v).norm() < 1e-14 && (site.velocity - v).norm() < 1e-15);
-    assert!((site.angular_velocity - w).norm() < 1e-13, "it turns with {}", site.angular_velocity);
-    assert!(angle(&site.pose.rotation, &Quat::from_scaled_axis(2.0 * w)) < 1e-13);
+    let part_state = *world.part_state(led, 0).unwrap();
+    assert!((part_state.position() - 2.0 * v).norm() < 1e-14 && (part_state.velocity - v).norm() < 1e-15);
+    assert!((part_state.angular_velocity - w).norm() < 1e-13, "it turns with {}", part_state.angular_velocity);
+    assert!(angle(&part_state.pose.rotation, &Quat::from_scaled_axis(2.0 * w)) < 1e-13);
 }
 
 #[test]

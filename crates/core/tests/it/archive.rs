@@ -24,8 +24,8 @@ fn everything(stepper: &str) -> World {
         })
         .collect();
     let at = Vec3::new(0.0, 0.0, 0.5);
-    world.add(Closure::point_at("joint", &world, Some((ids[0], 0)), Some((ids[1], 0)), at).unwrap()).unwrap();
-    world.add(Closure::hinge_at("loose", &world, Some((gone, 0)), None, at, Vec3::z()).unwrap()).unwrap();
+    world.add(LoopJoint::spherical_at("joint", &world, Some((ids[0], 0)), Some((ids[1], 0)), at).unwrap()).unwrap();
+    world.add(LoopJoint::revolute_at("loose", &world, Some((gone, 0)), None, at, Vec3::z()).unwrap()).unwrap();
     world.remove(gone).unwrap();
     let mut links = ModelBuilder::new();
     let mut last = None;
@@ -36,19 +36,19 @@ fn everything(stepper: &str) -> World {
     }
     let mut chain = ArticulatedBody::new("chain", links.build().unwrap()).at(Pose::translation(2.0, 0.0, 2.0));
     chain.add_collider("link1", Collider::new(shapes[3].clone(), Pose::translation(0.0, 0.0, -0.2))).unwrap();
-    chain.keep_apart("link0", "link3").unwrap();
+    chain.exclude_collisions("link0", "link3").unwrap();
     let motion = Playback::new(vec![0.0, 0.3, 1.0], vec![0.0, 0.4, -0.2]).unwrap();
     let drive = Drive::Playback { motion: motion.into(), limit: 20.0 };
-    chain.set_freedom(0, Freedom { drive, damping: 0.1, ..Freedom::default() }).unwrap();
-    chain.set_freedom(1, Freedom { limits: Some([-0.3, 0.2]), friction: 0.05, ..Freedom::default() }).unwrap();
-    chain.couple(Coupling { freedom: 5, of: 1, multiplier: 0.5, offset: 0.1 }).unwrap();
+    chain.set_dof(0, DofSettings { drive, damping: 0.1, ..DofSettings::default() }).unwrap();
+    chain.set_dof(1, DofSettings { limits: Some([-0.3, 0.2]), friction: 0.05, ..DofSettings::default() }).unwrap();
+    chain.couple(Coupling { dof: 5, of: 1, multiplier: 0.5, offset: 0.1 }).unwrap();
     world.add(chain).unwrap();
     world.set_pair_material(ids[2], ids[0], PairMaterial { restitution: Some(0.7), friction: Some(0.1) }).unwrap();
     world
         .set_pair_material(PairSide::Material(3), (ids[4], 0), PairMaterial { restitution: None, friction: Some(0.9) })
         .unwrap();
     world.set_mode(ids[9], Mode::Kinematic).unwrap();
-    world.set_alive(ids[8], false).unwrap();
+    world.set_enabled(ids[8], false).unwrap();
     world
 }
 
@@ -66,7 +66,10 @@ fn an_archived_world_goes_the_same_way() {
                 assert_eq!(other.save(), world.save(), "{stepper}: frame {frame}");
                 assert_eq!(other.archive(&[]).unwrap(), world.archive(&[]).unwrap());
                 assert_eq!(other.contacts().len(), world.contacts().len());
-                assert_eq!((other.methods(), other.settings()), (world.methods(), world.settings()));
+                assert_eq!(
+                    ((other.stepper_name(), other.solver_name()), other.settings()),
+                    ((world.stepper_name(), world.solver_name()), world.settings())
+                );
                 let mut ours = world.fork();
                 for _ in 0..100 {
                     ours.step().unwrap();
@@ -114,7 +117,7 @@ impl Object for Lift {
 }
 
 impl ForceGenerator for Lift {
-    fn apply(&self, _me: &Span, _view: &WorldView, out: &mut Forces) {
+    fn apply(&self, _me: &StateRange, _view: &WorldView, out: &mut Forces) {
         out.wrenches.iter_mut().for_each(|w| w.force.z += 1.0);
     }
 }
@@ -160,10 +163,11 @@ fn visual_meshes_need_no_file_any_more() {
     let read = sheet.clone();
     let there = std::sync::Arc::new(VisualMesh::read_by("sheet", move || Ok(read.clone().into())));
     let gone = std::sync::Arc::new(VisualMesh::read_by("gone", || Err("no file".into())));
-    let mesh = |mesh: &std::sync::Arc<VisualMesh>| Visual::mesh(0, Pose::identity(), mesh.clone(), Look::default());
+    let mesh =
+        |mesh: &std::sync::Arc<VisualMesh>| Visual::mesh(0, Pose::identity(), mesh.clone(), Appearance::default());
     let instead = |of: &std::sync::Arc<VisualMesh>| Visual {
         stands_in_for: vec![of.clone()],
-        ..Visual::shape(0, Pose::identity(), sphere(0.1), Look::default())
+        ..Visual::shape(0, Pose::identity(), sphere(0.1), Appearance::default())
     };
     let visuals = vec![mesh(&there), mesh(&there), mesh(&gone), instead(&there), instead(&gone)];
     let mut world = world("time_stepping", 1.0 / 240.0);

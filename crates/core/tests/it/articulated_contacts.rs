@@ -4,7 +4,7 @@ use crate::articulated_world::{adaptive, hinged, loose_chain, rod, run, world};
 use crate::common::{ground, sphere};
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::{
-    ArticulatedBody, Collider, Freedom, Integrator, Joint, LinkMass, Material, ModelBuilder, ObjectId, RigidBody,
+    ArticulatedBody, Collider, DofSettings, Integrator, Joint, LinkMass, Material, ModelBuilder, ObjectId, RigidBody,
     Settings, World,
 };
 
@@ -48,7 +48,7 @@ fn a_floating_link_and_a_rigid_body_are_the_same_thing() {
             *passes = world.step().unwrap().impact_passes;
         }
         assert_eq!(passes[0], passes[1]);
-        let [a, b] = [0, 1].map(|i| *pair[i].0.site(pair[i].1, 0).unwrap());
+        let [a, b] = [0, 1].map(|i| *pair[i].0.part_state(pair[i].1, 0).unwrap());
         worst_place =
             worst_place.max((a.position() - b.position()).norm()).max(a.pose.rotation.angle_to(&b.pose.rotation));
         let [a, b] = [0, 1].map(|i| pair[i].0.momentum());
@@ -85,7 +85,7 @@ fn the_same_contact_gives_the_same_impulse() {
 fn a_chain_that_slides_off_a_sphere_comes_to_rest() {
     let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
     ground(&mut world, 0.0, 0.5);
-    world.add_static(RigidBody::fixture("ball", sphere(0.3)).at(Pose::translation(0.0, 0.0, 0.6))).unwrap();
+    world.add_static(RigidBody::fixed("ball", sphere(0.3)).at(Pose::translation(0.0, 0.0, 0.6))).unwrap();
     let id = world.add(loose_chain(16, Vec3::new(0.03, 0.01, 1.0), 0.5)).unwrap();
     let (start, mut highest): (f64, f64) = (world.energy().total(), 0.0);
     for _ in 0..240 * 5 {
@@ -105,7 +105,7 @@ fn a_chain_that_slides_off_a_sphere_comes_to_rest() {
 /// The end of each link is the joint of the next: exact, because joints are coordinates.
 fn joined(world: &World, id: ObjectId, links: usize) {
     for i in 1..links {
-        let [above, below] = [i - 1, i].map(|l| world.site(id, l).unwrap().pose);
+        let [above, below] = [i - 1, i].map(|l| world.part_state(id, l).unwrap().pose);
         let gap = above.translation.vector + above.rotation * Vec3::new(0.1, 0.0, 0.0) - below.translation.vector;
         assert!(gap.norm() < 1e-13, "joint {i}: {gap:?}");
     }
@@ -115,7 +115,7 @@ fn joined(world: &World, id: ObjectId, links: usize) {
 fn a_chain_drapes_over_a_sphere() {
     for stepper in ["time_stepping", "backtracking"] {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
-        world.add_static(RigidBody::fixture("ball", sphere(0.3)).surface(0.0, 1.0)).unwrap();
+        world.add_static(RigidBody::fixed("ball", sphere(0.3)).surface(0.0, 1.0)).unwrap();
         let id = world.add(loose_chain(10, Vec3::new(0.0, 0.0, 0.33), 1.0)).unwrap();
         let mut last = 0.0;
         run(&mut world, if stepper == "backtracking" { 2.0 } else { 8.0 });
@@ -126,7 +126,7 @@ fn a_chain_drapes_over_a_sphere() {
         let up: f64 = world.contacts().iter().map(|c| if c.a == id { c.force.z } else { -c.force.z }).sum();
         println!("{stepper}: kinetic energy {last:.1e} J, held up by {up:.6} N");
         assert!(last < 1e-12 && (up - 10.0 * 0.05 * 9.81).abs() < 1e-6, "{stepper}: {last} {up}");
-        assert!(world.site(id, 0).unwrap().position().z < 0.1, "its ends hang down");
+        assert!(world.part_state(id, 0).unwrap().position().z < 0.1, "its ends hang down");
         joined(&world, id, 10);
         assert!(world.report().max_penetration < 1e-3);
     }
@@ -170,11 +170,11 @@ fn folding(own: bool, apart: bool) -> (World, ObjectId) {
         body.add_collider(&format!("link {i}"), Collider::new(shape, Pose::translation(0.0, 0.0, -0.2))).unwrap();
     }
     for i in 0..2 {
-        body.set_freedom(i, Freedom { friction: 100.0, ..Freedom::default() }).unwrap();
+        body.set_dof(i, DofSettings { friction: 100.0, ..DofSettings::default() }).unwrap();
     }
     body.self_collision = own;
     if apart {
-        body.keep_apart("link 0", "link 2").unwrap();
+        body.exclude_collisions("link 0", "link 2").unwrap();
     }
     let id = world.add(body).unwrap();
     for _ in 0..240 * 3 {
@@ -213,8 +213,8 @@ fn a_ball_at_rest_on_a_held_arm_loads_its_joint() {
     )
     .unwrap();
     // weights at 0.2 and 0.3 m: 9.81·(0.2 + 0.3) = 4.905 N·m
-    let hold = |friction| Freedom { friction, ..Freedom::default() };
-    body.set_freedom(0, hold(4.95)).unwrap();
+    let hold = |friction| DofSettings { friction, ..DofSettings::default() };
+    body.set_dof(0, hold(4.95)).unwrap();
     let table = world.add(body).unwrap();
     let cube = RigidBody::with_mass("cube", Shape::cuboid(Vec3::repeat(0.05)).unwrap(), 1.0)
         .unwrap()
@@ -222,7 +222,7 @@ fn a_ball_at_rest_on_a_held_arm_loads_its_joint() {
     world.add(cube).unwrap();
     run(&mut world, 3.0);
     assert!(world.state_of(table).unwrap()[0].abs() < 1e-6, "{:?}", world.state_of(table));
-    world.get_mut::<ArticulatedBody>(table).unwrap().set_freedom(0, hold(4.85)).unwrap();
+    world.get_mut::<ArticulatedBody>(table).unwrap().set_dof(0, hold(4.85)).unwrap();
     run(&mut world, 1.0);
     assert!(world.state_of(table).unwrap()[0] > 1e-3, "{:?}", world.state_of(table));
 }
@@ -263,7 +263,7 @@ fn a_link_is_kept_apart_from_the_base_it_does_not_hang_on() {
         body.add_collider("stand", Collider::new(sphere(0.3), Pose::translation(0.0, 0.0, 0.2))).unwrap();
         body.add_collider("link 1", Collider::new(sphere(0.05), Pose::translation(0.0, 0.0, -0.35))).unwrap();
         if apart {
-            body.keep_apart("link 1", "stand").unwrap();
+            body.exclude_collisions("link 1", "stand").unwrap();
         }
         world.add(body).unwrap();
         let met = (0..480)

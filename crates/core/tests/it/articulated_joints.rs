@@ -4,16 +4,16 @@ use crate::articulated_world::{adaptive, chain, hinged, rod, run, world};
 use std::sync::Arc;
 use tumble_core::collide::{Mat3, Pose, Vec3};
 use tumble_core::{
-    ArticulatedBody, Coupling, Drive, Freedom, Integrator, Joint, LinkMass, ModelBuilder, Playback, Settings, Spring,
-    StepError, World,
+    ArticulatedBody, Coupling, DofSettings, Drive, Integrator, Joint, LinkMass, ModelBuilder, Playback, Settings,
+    Spring, StepError, World,
 };
 
 /// No gravity, and one rod of 1 kg and 0.6 m: its moment of inertia about the joint is 0.12 kg·m².
-fn arm(stepper: &str, freedom: Freedom) -> World {
+fn arm(stepper: &str, dof: DofSettings) -> World {
     let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
     world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
     let mut body = ArticulatedBody::new("arm", hinged(1, 0.6, rod(1.0, 0.6)));
-    body.set_freedom(0, freedom).unwrap();
+    body.set_dof(0, dof).unwrap();
     world.add(body).unwrap();
     world
 }
@@ -26,8 +26,8 @@ fn state(world: &World) -> &[f64] {
 fn a_limit_is_not_passed_in_time_stepping() {
     let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
     let mut body = chain(2, 1.5);
-    body.set_freedom(0, Freedom { limits: Some([-0.3, 2.0]), ..Freedom::default() }).unwrap();
-    body.set_freedom(1, Freedom { limits: Some([-1.0, 1.0]), ..Freedom::default() }).unwrap();
+    body.set_dof(0, DofSettings { limits: Some([-0.3, 2.0]), ..DofSettings::default() }).unwrap();
+    body.set_dof(1, DofSettings { limits: Some([-1.0, 1.0]), ..DofSettings::default() }).unwrap();
     world.add(body).unwrap();
     let (mut worst, mut reached): (f64, bool) = (0.0, false);
     for _ in 0..240 * 10 {
@@ -45,7 +45,7 @@ fn a_limit_is_found_in_time_by_backtracking() {
     for integrator in [Integrator::Verlet, Integrator::DormandPrince] {
         let mut world = world(1.0 / 60.0, "backtracking", integrator);
         let mut body = chain(1, 1.5);
-        body.set_freedom(0, Freedom { limits: Some([0.3, 2.0]), ..Freedom::default() }).unwrap();
+        body.set_dof(0, DofSettings { limits: Some([0.3, 2.0]), ..DofSettings::default() }).unwrap();
         world.add(body).unwrap();
         let mut worst: f64 = 0.0;
         for _ in 0..120 {
@@ -63,7 +63,7 @@ fn a_limit_is_found_in_time_by_backtracking() {
 #[test]
 fn a_torque_gives_its_acceleration() {
     for stepper in ["time_stepping", "backtracking"] {
-        let mut world = arm(stepper, Freedom::default());
+        let mut world = arm(stepper, DofSettings::default());
         for _ in 0..240 {
             world.apply_generalized(world.ids()[0], &[0.06]).unwrap();
             world.step().unwrap();
@@ -73,7 +73,7 @@ fn a_torque_gives_its_acceleration() {
         world.step().unwrap();
         assert!((state(&world)[1] - v).abs() < 1e-12, "{stepper}: the torque is for one frame");
     }
-    let mut world = arm("time_stepping", Freedom::default());
+    let mut world = arm("time_stepping", DofSettings::default());
     let id = world.ids()[0];
     assert!(world.apply_generalized(id, &[1.0, 2.0]).is_err() && world.apply_generalized(id, &[f64::NAN]).is_err());
 }
@@ -81,7 +81,7 @@ fn a_torque_gives_its_acceleration() {
 #[test]
 fn damping_decays_and_a_spring_swings() {
     // v = v0·exp(−c·t/I) with c/I = 2/s; implicit Euler is (1 + h·c/I)^−n, exactly
-    let damped = Freedom { damping: 0.24, ..Freedom::default() };
+    let damped = DofSettings { damping: 0.24, ..DofSettings::default() };
     for (stepper, want) in [("time_stepping", (1.0_f64 + 2.0 / 240.0).powi(-240)), ("backtracking", (-2.0_f64).exp())] {
         let mut world = arm(stepper, damped.clone());
         world.set_settings(Settings { integrator: Integrator::DormandPrince, ..*world.settings() }).unwrap();
@@ -90,7 +90,7 @@ fn damping_decays_and_a_spring_swings() {
         run(&mut world, 1.0);
         assert!((state(&world)[1] - want).abs() < 1e-4 * want, "{stepper}: {} {want}", state(&world)[1]);
     }
-    let mut world = arm("time_stepping", Freedom { damping: 1e6, ..Freedom::default() });
+    let mut world = arm("time_stepping", DofSettings { damping: 1e6, ..DofSettings::default() });
     let id = world.ids()[0];
     world.write_state_of(id, &[0.0, 1.0]).unwrap();
     run(&mut world, 0.1);
@@ -98,9 +98,9 @@ fn damping_decays_and_a_spring_swings() {
     // a spring of k = 0.12·(2π)² swings once a second
     let mut world = arm(
         "time_stepping",
-        Freedom {
+        DofSettings {
             spring: Some(Spring { stiffness: 0.12 * 4.0 * std::f64::consts::PI.powi(2), rest: 0.2 }),
-            ..Freedom::default()
+            ..DofSettings::default()
         },
     );
     let start = world.energy().total();
@@ -112,7 +112,7 @@ fn damping_decays_and_a_spring_swings() {
 #[test]
 fn dry_friction_holds_up_to_its_torque_and_slows_by_it() {
     for stepper in ["time_stepping", "backtracking"] {
-        let mut world = arm(stepper, Freedom { friction: 0.06, ..Freedom::default() });
+        let mut world = arm(stepper, DofSettings { friction: 0.06, ..DofSettings::default() });
         let id = world.ids()[0];
         for _ in 0..240 {
             world.apply_generalized(id, &[0.0599]).unwrap();
@@ -136,12 +136,12 @@ fn drives_hold_turn_and_keep_to_their_torque() {
         // gravity off: a position drive comes to its target, stiff or soft
         let position =
             Drive::Position { stiffness: 30.0, damping: 4.0, target: 0.7, velocity: 0.0, limit: f64::INFINITY };
-        let mut world = arm(stepper, Freedom { drive: position, ..Freedom::default() });
+        let mut world = arm(stepper, DofSettings { drive: position, ..DofSettings::default() });
         run(&mut world, 4.0);
         assert!((state(&world)[0] - 0.7).abs() < 1e-6, "{stepper}: {:?}", state(&world));
         let mut world = arm(
             stepper,
-            Freedom { drive: Drive::Velocity { target: 0.5, limit: f64::INFINITY }, ..Freedom::default() },
+            DofSettings { drive: Drive::Velocity { target: 0.5, limit: f64::INFINITY }, ..DofSettings::default() },
         );
         run(&mut world, 2.0);
         assert!(
@@ -155,14 +155,14 @@ fn drives_hold_turn_and_keep_to_their_torque() {
             Drive::Position { stiffness: 1e5, damping: 10.0, target: 50.0, velocity: 0.0, limit: 0.06 },
             Drive::Playback { motion: Arc::new(Playback::new(vec![0.0, 1.0], vec![0.0, 100.0]).unwrap()), limit: 0.06 },
         ] {
-            let mut world = arm(stepper, Freedom { drive: drive.clone(), ..Freedom::default() });
+            let mut world = arm(stepper, DofSettings { drive: drive.clone(), ..DofSettings::default() });
             run(&mut world, 1.0);
             assert!((state(&world)[1] - 0.5).abs() < 1e-6, "{stepper} {drive:?}: {:?}", state(&world));
         }
     }
     // as stiff as can be: k·h² is 10⁴ times the inertia
     let stiff = Drive::Position { stiffness: 1e8, damping: 1e5, target: 0.7, velocity: 0.0, limit: f64::INFINITY };
-    let mut world = arm("time_stepping", Freedom { drive: stiff, ..Freedom::default() });
+    let mut world = arm("time_stepping", DofSettings { drive: stiff, ..DofSettings::default() });
     run(&mut world, 2.0);
     assert!((state(&world)[0] - 0.7).abs() < 1e-6, "{:?}", state(&world));
 }
@@ -176,9 +176,12 @@ fn a_recorded_motion_is_followed_exactly() {
     for stepper in ["time_stepping", "backtracking"] {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
         let mut body = chain(2, 0.0);
-        body.set_freedom(
+        body.set_dof(
             0,
-            Freedom { drive: Drive::Playback { motion: wave.clone(), limit: f64::INFINITY }, ..Freedom::default() },
+            DofSettings {
+                drive: Drive::Playback { motion: wave.clone(), limit: f64::INFINITY },
+                ..DofSettings::default()
+            },
         )
         .unwrap();
         world.add(body).unwrap();
@@ -197,7 +200,7 @@ fn a_coupled_joint_follows() {
     for stepper in ["time_stepping", "backtracking"] {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
         let mut body = chain(3, 1.0).with_positions(&[1.0, 0.3, -1.9]).unwrap();
-        body.couple(Coupling { freedom: 2, of: 0, multiplier: -2.0, offset: 0.1 }).unwrap();
+        body.couple(Coupling { dof: 2, of: 0, multiplier: -2.0, offset: 0.1 }).unwrap();
         world.add(body).unwrap();
         let start = world.energy().total();
         let (mut worst, mut swing): (f64, f64) = (0.0, 0.0);
@@ -211,7 +214,7 @@ fn a_coupled_joint_follows() {
         assert!(worst < 1e-6, "{stepper}: {worst}");
     }
     let mut body = chain(2, 0.0);
-    assert!(body.couple(Coupling { freedom: 0, of: 0, multiplier: 1.0, offset: 0.0 }).is_err());
+    assert!(body.couple(Coupling { dof: 0, of: 0, multiplier: 1.0, offset: 0.0 }).is_err());
 }
 
 /// Three hinges in one place on massless links, about z, y and x.
@@ -249,7 +252,7 @@ fn a_stack_of_hinges_is_a_ball_joint_away_from_its_lock() {
     // the same top on a ball joint: same place of the top after a while, by two sets of coordinates
     let mut stacked = adaptive(1.0 / 60.0, 1e-10);
     let a = stacked.add(gimbals(0.3).with_velocities(&[1.0, 0.5, 2.0]).unwrap()).unwrap();
-    let site = *stacked.site(a, 2).unwrap();
+    let part_state = *stacked.part_state(a, 2).unwrap();
     let mut builder = ModelBuilder::new();
     let top = LinkMass {
         mass: 1.0,
@@ -257,9 +260,9 @@ fn a_stack_of_hinges_is_a_ball_joint_away_from_its_lock() {
         inertia: Mat3::from_diagonal(&Vec3::new(0.01, 0.01, 0.02)),
     };
     builder.link("top", None, Joint::Spherical, Pose::identity(), top);
-    let spin = site.pose.rotation.inverse_transform_vector(&site.angular_velocity);
+    let spin = part_state.pose.rotation.inverse_transform_vector(&part_state.angular_velocity);
     let body = ArticulatedBody::new("top", builder.build().unwrap())
-        .with_positions(site.pose.rotation.coords.as_slice())
+        .with_positions(part_state.pose.rotation.coords.as_slice())
         .unwrap();
     let mut whole = adaptive(1.0 / 60.0, 1e-10);
     let b = whole.add(body.with_velocities(spin.as_slice()).unwrap()).unwrap();
@@ -267,7 +270,7 @@ fn a_stack_of_hinges_is_a_ball_joint_away_from_its_lock() {
         run(&mut stacked, 1.0 / 60.0);
         run(&mut whole, 1.0 / 60.0);
     }
-    let (a, b) = (stacked.site(a, 2).unwrap(), whole.site(b, 0).unwrap());
+    let (a, b) = (stacked.part_state(a, 2).unwrap(), whole.part_state(b, 0).unwrap());
     assert!(a.pose.rotation.angle_to(&b.pose.rotation) < 1e-7, "{}", a.pose.rotation.angle_to(&b.pose.rotation));
 }
 
@@ -276,20 +279,20 @@ fn rubbish_is_told() {
     let model = || hinged(2, 0.2, rod(1.0, 0.2));
     let mut body = ArticulatedBody::new("arm", model());
     let wrong = [
-        Freedom { damping: -1.0, ..Freedom::default() },
-        Freedom { friction: f64::NAN, ..Freedom::default() },
-        Freedom { limits: Some([1.0, -1.0]), ..Freedom::default() },
-        Freedom { drive: Drive::Velocity { target: 1.0, limit: -1.0 }, ..Freedom::default() },
-        Freedom {
+        DofSettings { damping: -1.0, ..DofSettings::default() },
+        DofSettings { friction: f64::NAN, ..DofSettings::default() },
+        DofSettings { limits: Some([1.0, -1.0]), ..DofSettings::default() },
+        DofSettings { drive: Drive::Velocity { target: 1.0, limit: -1.0 }, ..DofSettings::default() },
+        DofSettings {
             drive: Drive::Position { stiffness: 0.0, damping: 0.0, target: 0.0, velocity: 0.0, limit: 1.0 },
-            ..Freedom::default()
+            ..DofSettings::default()
         },
     ];
-    for freedom in wrong {
-        let error = body.set_freedom(1, freedom.clone()).unwrap_err().to_string();
+    for dof in wrong {
+        let error = body.set_dof(1, dof.clone()).unwrap_err().to_string();
         assert!(error.contains("'arm'") && error.contains("'link 1'"), "{error}");
     }
-    assert!(body.set_freedom(7, Freedom::default()).is_err());
+    assert!(body.set_dof(7, DofSettings::default()).is_err());
     assert!(ArticulatedBody::new("arm", model()).with_positions(&[0.0]).is_err());
     assert!(ArticulatedBody::new("arm", model()).with_velocities(&[0.0, f64::INFINITY]).is_err());
     let mut builder = ModelBuilder::new();

@@ -186,8 +186,8 @@ fn the_mass_matrix_is_that_of_the_kinetic_energy() {
                 + 0.5 * w.dot(&(link.mass.inertia * w));
         }
         assert!((half / kinetic - 1.0).abs() < 1e-9, "{half} {kinetic}");
-        let told = energy(&case.model, &case.kin, &G).kinetic;
-        assert!((told / half - 1.0).abs() < 1e-12, "{told} {half}");
+        let recorded = energy(&case.model, &case.kin, &G).kinetic;
+        assert!((recorded / half - 1.0).abs() < 1e-12, "{recorded} {half}");
     }
 }
 

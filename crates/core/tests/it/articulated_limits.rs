@@ -2,7 +2,7 @@
 
 use crate::articulated_world::rod;
 use tumble_core::collide::{Pose, Vec3};
-use tumble_core::{ArticulatedBody, Freedom, Joint, ModelBuilder, Settings, World};
+use tumble_core::{ArticulatedBody, DofSettings, Joint, ModelBuilder, Settings, World};
 
 /// Six rods of 0.2 m on hinges about y and x in turn: the first turns freely, the others within ±0.4 rad.
 fn whip(rates: &[f64; 6]) -> ArticulatedBody {
@@ -14,7 +14,7 @@ fn whip(rates: &[f64; 6]) -> ArticulatedBody {
         parent = Some(builder.link(format!("link {i}"), parent, Joint::revolute(axis), placement, rod(1.0, 0.2)));
     }
     let mut body = ArticulatedBody::new("whip", builder.build().unwrap()).with_velocities(rates).unwrap();
-    (1..6).for_each(|i| body.set_freedom(i, Freedom { limits: Some([-0.4, 0.4]), ..Freedom::default() }).unwrap());
+    (1..6).for_each(|i| body.set_dof(i, DofSettings { limits: Some([-0.4, 0.4]), ..DofSettings::default() }).unwrap());
     body
 }
 

@@ -22,11 +22,11 @@ fn rises(world: &mut World, seconds: f64) -> Vec<f64> {
     let n = world.get::<ArticulatedBody>(id).unwrap().model().positions();
     let dt = world.settings().dt;
     let mut found = Vec::new();
-    let look = |world: &World| (world.state_of(id).unwrap()[0], world.state_of(id).unwrap()[n]);
-    let mut before = look(world);
+    let appearance = |world: &World| (world.state_of(id).unwrap()[0], world.state_of(id).unwrap()[n]);
+    let mut before = appearance(world);
     while world.time() < seconds {
         run(world, dt);
-        let after = look(world);
+        let after = appearance(world);
         if before.0 < 0.0 && after.0 >= 0.0 {
             let at = |s: f64| {
                 let (m0, m1, d) = (dt * before.1, dt * after.1, after.0 - before.0);
@@ -110,8 +110,8 @@ fn a_cone_is_swung_at_its_own_pace() {
     let mut world = adaptive(1.0 / 60.0, 1e-10);
     let id = world.add(body.with_velocities(spin.as_slice()).unwrap()).unwrap();
     run(&mut world, 10.0);
-    let site = world.site(id, 0).unwrap();
-    let down = site.pose.rotation * Vec3::new(0.0, 0.0, -1.0);
+    let part_state = world.part_state(id, 0).unwrap();
+    let down = part_state.pose.rotation * Vec3::new(0.0, 0.0, -1.0);
     let start = q * Vec3::new(0.0, 0.0, -1.0);
     let want = nalgebra::UnitQuaternion::from_scaled_axis(Vec3::new(0.0, 0.0, pace * 10.0)) * start;
     assert!((down - want).norm() < 1e-6, "{down:?} {want:?}");

@@ -29,15 +29,15 @@ impl Object for Pin {
 }
 
 /// Position and centripetal acceleration of one end of a bar.
-fn end(site: &Site, x: f64) -> (Vec3, Vec3) {
-    let (arm, spin) = (site.pose.rotation * Vec3::new(x, 0.0, 0.0), site.angular_velocity);
-    (site.position() + arm, spin.cross(&spin.cross(&arm)))
+fn end(part_state: &PartState, x: f64) -> (Vec3, Vec3) {
+    let (arm, spin) = (part_state.pose.rotation * Vec3::new(x, 0.0, 0.0), part_state.angular_velocity);
+    (part_state.position() + arm, spin.cross(&spin.cross(&arm)))
 }
 
 impl Constraint for Pin {
-    fn rows(&self, _me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+    fn rows(&self, _me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
         let of = |part: Result<ObjectId, Vec3>, x: f64| {
-            part.map_or_else(|p| (p, Vec3::zeros()), |id| end(view.site(id, 0).unwrap(), x))
+            part.map_or_else(|p| (p, Vec3::zeros()), |id| end(view.part_state(id, 0).unwrap(), x))
         };
         let ((a, a_turning), (b, b_turning)) = (of(self.a, HALF), of(self.b, -HALF));
         for k in 0..3 {
@@ -71,7 +71,7 @@ fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (Wo
         bars.push(world.add(body.at(at).moving(Vec3::new(0.0, 0.3 * angle.cos(), 0.0), Vec3::zeros())).unwrap());
         world.set_collidable(bars[i], false).unwrap();
     }
-    let hook = |bar: usize, x: f64| end(world.site(bars[bar], 0).unwrap(), x).0;
+    let hook = |bar: usize, x: f64| end(world.part_state(bars[bar], 0).unwrap(), x).0;
     let hooks = [hook(0, -HALF), hook(count - 1, HALF)];
     let part = |i: usize| if (1..=count).contains(&i) { Ok(bars[i - 1]) } else { Err(hooks[i.min(1)]) };
     for i in 0..=count {
@@ -84,7 +84,7 @@ fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (Wo
 
 /// Largest distance between ends that are pinned together, metres.
 fn apart(world: &World, bars: &[ObjectId]) -> f64 {
-    let of = |i: usize, x: f64| end(world.site(bars[i], 0).unwrap(), x).0;
+    let of = |i: usize, x: f64| end(world.part_state(bars[i], 0).unwrap(), x).0;
     (1..bars.len()).map(|i| (of(i - 1, HALF) - of(i, -HALF)).norm()).fold(0.0, f64::max)
 }
 

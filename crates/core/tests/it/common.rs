@@ -17,13 +17,13 @@ pub fn no_gravity(mut world: World) -> World {
 }
 
 pub fn ground(world: &mut World, restitution: f64, friction: f64) -> ObjectId {
-    world.add_static(RigidBody::fixture("ground", Shape::half_space()).surface(restitution, friction)).unwrap()
+    world.add_static(RigidBody::fixed("ground", Shape::half_space()).surface(restitution, friction)).unwrap()
 }
 
 /// Ground tilted about y so that downhill is +x.
 pub fn slope(world: &mut World, angle: f64, friction: f64) -> ObjectId {
     let pose = Pose::rotation(Vec3::new(0.0, angle, 0.0));
-    world.add_static(RigidBody::fixture("slope", Shape::half_space()).surface(0.0, friction).at(pose)).unwrap()
+    world.add_static(RigidBody::fixed("slope", Shape::half_space()).surface(0.0, friction).at(pose)).unwrap()
 }
 
 pub fn sphere(radius: f64) -> Shape {
@@ -35,11 +35,11 @@ pub fn cube(edge: f64) -> Shape {
 }
 
 pub fn position(world: &World, id: ObjectId) -> Vec3 {
-    world.site(id, 0).unwrap().position()
+    world.part_state(id, 0).unwrap().position()
 }
 
 pub fn velocity(world: &World, id: ObjectId) -> Vec3 {
-    world.site(id, 0).unwrap().velocity
+    world.part_state(id, 0).unwrap().velocity
 }
 
 /// Slides a cube at 5 m/s, μ = 0.5; distance and time of its stop (time from the last two speeds), and the largest gap under it.

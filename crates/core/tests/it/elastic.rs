@@ -10,7 +10,7 @@ fn room(world: &mut World, half: f64, restitution: f64, friction: f64) {
     let turns = [(0.0, 0.0), (PI, 0.0), (FRAC_PI_2, 0.0), (-FRAC_PI_2, 0.0), (0.0, FRAC_PI_2), (0.0, -FRAC_PI_2)];
     for (k, (x, y)) in turns.into_iter().enumerate() {
         let rotation = Pose::rotation(Vec3::new(x, y, 0.0)).rotation;
-        let wall = RigidBody::fixture(format!("wall{k}"), Shape::half_space()).surface(restitution, friction);
+        let wall = RigidBody::fixed(format!("wall{k}"), Shape::half_space()).surface(restitution, friction);
         world.add_static(wall.at(Pose::from_parts((rotation * Vec3::new(0.0, 0.0, -half)).into(), rotation))).unwrap();
     }
 }

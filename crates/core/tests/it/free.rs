@@ -58,14 +58,14 @@ fn integrators_converge_at_their_order() {
             (0..(2.0 / dt).round() as usize).for_each(|_| {
                 world.step().unwrap();
             });
-            world.site(id, 0).unwrap().pose.rotation
+            world.part_state(id, 0).unwrap().pose.rotation
         };
         let reference = {
             let (mut w, id) = tumbling(Integrator::Rk4, "backtracking", 1.0 / 3840.0);
             (0..7680).for_each(|_| {
                 w.step().unwrap();
             });
-            w.site(id, 0).unwrap().pose.rotation
+            w.part_state(id, 0).unwrap().pose.rotation
         };
         let (coarse, fine) = (at(1.0 / 120.0).angle_to(&reference), at(1.0 / 240.0).angle_to(&reference));
         let measured = (coarse / fine).log2();
@@ -102,7 +102,7 @@ fn damping_is_exponential() {
         world.step().unwrap();
     });
     assert!((velocity(&world, id).x - (-1.4f64).exp()).abs() < 1e-10);
-    assert!((world.site(id, 0).unwrap().angular_velocity.z - (-0.6f64).exp()).abs() < 1e-10);
+    assert!((world.part_state(id, 0).unwrap().angular_velocity.z - (-0.6f64).exp()).abs() < 1e-10);
 }
 
 /// A spring between a body and the origin: a force generator of a user's own.
@@ -122,9 +122,11 @@ impl Object for Spring {
 }
 
 impl ForceGenerator for Spring {
-    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
-        let (Some(site), Some(span)) = (view.site(self.0, 0), view.span(self.0)) else { return };
-        out.add_at(span.site.start, site, -self.1 * site.position(), &site.position());
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        let (Some(part_state), Some(state_range)) = (view.part_state(self.0, 0), view.state_range(self.0)) else {
+            return;
+        };
+        out.add_at(state_range.parts.start, part_state, -self.1 * part_state.position(), &part_state.position());
     }
 }
 

@@ -89,9 +89,12 @@ fn a_sliding_sphere_ends_rolling_at_five_sevenths() {
         (0..480).for_each(|_| {
             world.step().unwrap();
         });
-        let site = world.site(id, 0).unwrap();
-        assert!((site.velocity.x / (15.0 / 7.0) - 1.0).abs() < 1e-6, "{stepper}: {} m/s", site.velocity.x);
-        assert!((site.angular_velocity.y * 0.1 / site.velocity.x - 1.0).abs() < 1e-6, "{stepper}: does not roll");
+        let part_state = world.part_state(id, 0).unwrap();
+        assert!((part_state.velocity.x / (15.0 / 7.0) - 1.0).abs() < 1e-6, "{stepper}: {} m/s", part_state.velocity.x);
+        assert!(
+            (part_state.angular_velocity.y * 0.1 / part_state.velocity.x - 1.0).abs() < 1e-6,
+            "{stepper}: does not roll"
+        );
     }
 }
 
@@ -109,6 +112,6 @@ fn a_spinning_sphere_does_not_sink() {
             world.step().unwrap();
         });
         assert!((position(&world, id).z - 0.5).abs() < 1e-8, "{stepper}: centre at {}", position(&world, id).z);
-        assert!((world.site(id, 0).unwrap().angular_velocity.x - 20.0).abs() < 1e-9);
+        assert!((world.part_state(id, 0).unwrap().angular_velocity.x - 20.0).abs() < 1e-9);
     }
 }

@@ -38,13 +38,13 @@ impl Object for Pendulum {
 }
 
 impl Integratable for Pendulum {
-    fn dims(&self) -> Dims {
-        Dims { x: 2, dof: 1, sites: 0 }
+    fn state_sizes(&self) -> StateSizes {
+        StateSizes { x: 2, dof: 1, parts: 0 }
     }
     fn write_initial(&self, x: &mut [f64]) {
         x.copy_from_slice(&[self.angle, self.rate]);
     }
-    fn accumulate_forces(&self, me: &Span, view: &WorldView, out: &mut Forces) {
+    fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces) {
         out.generalized[me.v.start] -= self.pull * view.x[me.x.start].sin();
     }
     fn velocity(&self, x: &[f64], v: &mut [f64]) {
@@ -56,14 +56,14 @@ impl Integratable for Pendulum {
     fn derivative(&self, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         dp[0] = f.generalized[0];
     }
-    fn accelerations(&self, _x: &[f64], _dp: &[f64], _sites: &mut [Site]) {}
+    fn accelerations(&self, _x: &[f64], _dp: &[f64], _sites: &mut [PartState]) {}
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
         x[1] += h * dp[0];
     }
-    fn coast(&self, x: &mut [f64], h: f64) {
+    fn free_motion(&self, x: &mut [f64], h: f64) {
         x[0] += h * x[1];
     }
-    fn drift(&self, x: &mut [f64], v: &[f64], h: f64) {
+    fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         x[0] += h * v[0];
     }
     fn whiten(&self, x: &[f64], u: &mut [f64]) {
@@ -87,12 +87,12 @@ impl Integratable for Pendulum {
 }
 
 impl Constraint for Pendulum {
-    fn rows(&self, me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+    fn rows(&self, me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
         let (owner, angle) = (out.owner(), view.x[me.x.start]);
         out.row(RowTarget::new(RowSet::HalfLine, angle - self.stops[0])).on_coordinates(owner, &[1.0]);
         out.row(RowTarget::new(RowSet::HalfLine, self.stops[1] - angle)).on_coordinates(owner, &[-1.0]);
     }
-    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+    fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
         let angle = view.x[me.x.start];
         if self.located {
             out.extend([angle - self.stops[0], self.stops[1] - angle]);
@@ -238,7 +238,7 @@ fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
         )
         .with_positions(&[0.8, -0.3])
         .unwrap();
-        body.set_freedom(0, Freedom { limits: Some([0.6, 2.0]), ..Freedom::default() }).unwrap();
+        body.set_dof(0, DofSettings { limits: Some([0.6, 2.0]), ..DofSettings::default() }).unwrap();
         let id = world.add(body).unwrap();
         let (mut arrived, mut swing, mut off, mut drift, mut tries) = (None, [f64::MAX, f64::MIN], 0.0f64, 0.0f64, 0);
         for frame in 0..1200 {

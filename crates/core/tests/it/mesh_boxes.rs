@@ -27,10 +27,14 @@ fn a_mesh_box_on_a_plane_does_not_rock() {
             ground(&mut world, 0.0, 0.5);
             let id = add(&mut world, "box", &mesh_cube(0.5), Pose::new(Vec3::z() * height, turn));
             run(&mut world, 2.0);
-            let site = world.site(id, 0).unwrap();
-            let (spin, speed) = (site.angular_velocity.norm(), site.velocity.norm());
+            let part_state = world.part_state(id, 0).unwrap();
+            let (spin, speed) = (part_state.angular_velocity.norm(), part_state.velocity.norm());
             assert!(spin < 1e-6 && speed < 1e-6, "{stepper}, from {height}: {spin} rad/s, {speed} m/s");
-            assert!((site.position().z - 0.25).abs() < 2e-4, "{stepper}, from {height}: at {}", site.position().z);
+            assert!(
+                (part_state.position().z - 0.25).abs() < 2e-4,
+                "{stepper}, from {height}: at {}",
+                part_state.position().z
+            );
         }
     }
 }
@@ -66,8 +70,8 @@ fn a_mesh_box_rests_on_another_however_it_lies() {
                 let upper = add(&mut world, "upper", &upper, pose);
                 run(&mut world, 2.0);
                 for id in [lower, upper] {
-                    let site = world.site(id, 0).unwrap();
-                    let (spin, speed) = (site.angular_velocity.norm(), site.velocity.norm());
+                    let part_state = world.part_state(id, 0).unwrap();
+                    let (spin, speed) = (part_state.angular_velocity.norm(), part_state.velocity.norm());
                     assert!(spin < 1e-6 && speed < 1e-6, "{stepper}, {shift} m, {yaw} rad: {spin} rad/s, {speed} m/s");
                 }
                 assert!((position(&world, upper) - pose.translation.vector).norm() < 1e-4, "{stepper}, {shift}, {yaw}");
@@ -85,7 +89,7 @@ fn a_cylinder_stands_and_rolls_on_a_block() {
             Shape::mesh(TriMesh::box_(Vec3::new(5.0, 1.0, 0.1)), &TreeSettings::octree()).unwrap(),
         ] {
             let mut world = world(stepper, 1.0 / 60.0);
-            world.add_static(RigidBody::fixture("floor", block).surface(0.0, 0.5)).unwrap();
+            world.add_static(RigidBody::fixed("floor", block).surface(0.0, 0.5)).unwrap();
             let shape = Shape::cylinder(0.1, 0.2).unwrap();
             let standing = add(&mut world, "standing", &shape, Pose::translation(-2.0, 0.5, 0.3));
             let lying = Pose::new(Vec3::new(-2.0, 0.0, 0.2), Vec3::x() * std::f64::consts::FRAC_PI_2);
@@ -93,16 +97,20 @@ fn a_cylinder_stands_and_rolls_on_a_block() {
             // rolls at 1 m/s: turns at 10 rad/s
             let rolling = world.add(body.moving(Vec3::x(), Vec3::y() * 10.0)).unwrap();
             run(&mut world, 2.0);
-            let site = world.site(standing, 0).unwrap();
+            let part_state = world.part_state(standing, 0).unwrap();
             // the solver leaves this tall body's contacts with a residual of some 1e-4 m/s
-            assert!((site.position() - Vec3::new(-2.0, 0.5, 0.3)).norm() < 2e-3, "{stepper}: {:?}", site.pose);
-            assert!((site.pose.rotation * Vec3::z()).z > 1.0 - 1e-6, "{stepper}: {:?}", site.pose);
-            let site = world.site(rolling, 0).unwrap();
-            let off = site.position() - Vec3::new(0.0, 0.0, 0.2);
             assert!(
-                off.norm() < 2e-3 && (site.velocity - Vec3::x()).norm() < 2e-3,
+                (part_state.position() - Vec3::new(-2.0, 0.5, 0.3)).norm() < 2e-3,
+                "{stepper}: {:?}",
+                part_state.pose
+            );
+            assert!((part_state.pose.rotation * Vec3::z()).z > 1.0 - 1e-6, "{stepper}: {:?}", part_state.pose);
+            let part_state = world.part_state(rolling, 0).unwrap();
+            let off = part_state.position() - Vec3::new(0.0, 0.0, 0.2);
+            assert!(
+                off.norm() < 2e-3 && (part_state.velocity - Vec3::x()).norm() < 2e-3,
                 "{stepper}: {off:?} {:?}",
-                site.velocity
+                part_state.velocity
             );
         }
     }

@@ -24,19 +24,19 @@ fn off(a: &Vec3, b: &Vec3) -> f64 {
 fn farthest(world: &World, id: ObjectId, part: usize, file: &[Vec3], frame: &Pose) -> f64 {
     let shape = world.object(id).unwrap().collidable().unwrap().shape(part).unwrap();
     let Shape::Mesh(mesh) = shape else { panic!("a mesh") };
-    let site = world.site(id, part).unwrap().pose;
+    let part_state = world.part_state(id, part).unwrap().pose;
     let at = |pose: &Pose, v: &Vec3| (pose * Point3::from(*v)).coords;
-    mesh.mesh().vertices.iter().zip(file).map(|(v, f)| off(&at(&site, v), &at(frame, f))).fold(0.0, f64::max)
+    mesh.mesh().vertices.iter().zip(file).map(|(v, f)| off(&at(&part_state, v), &at(frame, f))).fold(0.0, f64::max)
 }
 
 #[test]
 fn a_body_is_placed_by_the_frame_of_its_file() {
     let (shape, file) = corner_cube();
     let (half, pose) = (Vec3::repeat(0.5), turned());
-    for fixture in [false, true] {
+    for fixed in [false, true] {
         let mut world = world("time_stepping", 1.0 / 240.0);
-        let body = match fixture {
-            true => RigidBody::fixture("cube", shape.clone()),
+        let body = match fixed {
+            true => RigidBody::fixed("cube", shape.clone()),
             false => RigidBody::with_mass("cube", shape.clone(), 2.0).unwrap(),
         };
         let body = body.at(pose);
@@ -82,7 +82,7 @@ fn it_spins_about_its_centre_of_mass() {
 fn a_kinematic_body_brings_its_frame_to_the_target() {
     let (shape, file) = corner_cube();
     let mut world = world("time_stepping", 1.0 / 240.0);
-    let id = world.add_boxed(Box::new(RigidBody::fixture("cube", shape)), Mode::Kinematic).unwrap();
+    let id = world.add_boxed(Box::new(RigidBody::fixed("cube", shape)), Mode::Kinematic).unwrap();
     let target =
         Pose::from_parts(Vec3::new(0.01, 0.02, -0.03).into(), UnitQuaternion::from_euler_angles(0.02, 0.0, 0.01));
     world.move_to(id, target).unwrap();
@@ -115,6 +115,6 @@ fn what_a_body_carries_is_placed_in_its_frame() {
     let mut world = world("time_stepping", 1.0 / 240.0);
     let id = world.add(body.with_camera(mount)).unwrap();
     let mounted = &world.object(id).unwrap().camera().unwrap().cameras()[0];
-    let eye = world.site(id, 0).unwrap().pose * mounted.pose;
+    let eye = world.part_state(id, 0).unwrap().pose * mounted.pose;
     assert!(off(&eye.translation.vector, &(turned() * at).translation.vector) < 1e-14);
 }

@@ -43,21 +43,21 @@ fn falls(mode: ContactMode, rest: f64, name: &str, mesh: &TriMesh, turn: Vec3, h
             let report = world.step().unwrap();
             deepest = deepest.max(report.max_penetration);
             touched += (report.contacts > 0) as usize;
-            let site = world.site(id, 0).unwrap();
+            let part_state = world.part_state(id, 0).unwrap();
             if frame + 240 < frames {
-                there = site.position();
+                there = part_state.position();
                 continue;
             }
             let speed = corners
                 .iter()
-                .map(|c| site.velocity_at(&(site.position() + site.pose.rotation * c)).norm())
+                .map(|c| part_state.velocity_at(&(part_state.position() + part_state.pose.rotation * c)).norm())
                 .fold(0.0, f64::max);
             fastest = fastest.max(speed);
             assert!(speed < rest, "{stepper}, {mode:?}: '{name}' moves at {speed} m/s after {} s", world.time());
             assert!(
-                (site.position() - there).norm() < 5e-4,
+                (part_state.position() - there).norm() < 5e-4,
                 "{stepper}: '{name}' wandered by {} m",
-                (site.position() - there).norm()
+                (part_state.position() - there).norm()
             );
         }
         println!("{stepper}, {mode:?}: '{name}' at rest moves at {fastest:.1e} m/s; deepest {deepest:.1e} m");

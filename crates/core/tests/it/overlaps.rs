@@ -18,7 +18,7 @@ fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
 
 /// How deep two objects are in each other, metres, by their contacts.
 fn depth(world: &World, shapes: [&Shape; 2], ids: [ObjectId; 2]) -> f64 {
-    let [a, b] = ids.map(|id| world.site(id, 0).unwrap().pose);
+    let [a, b] = ids.map(|id| world.part_state(id, 0).unwrap().pose);
     let mut found = Vec::new();
     collide::contacts(shapes[0], &a, shapes[1], &b, 0.0, &mut found);
     found.iter().map(|c| -c.gap).fold(0.0, f64::max)
@@ -35,7 +35,7 @@ fn come_apart(label: &str, [a, b]: [&Shape; 2], off: Pose, apart: impl Fn(&Pose,
             fastest = ids.iter().map(|id| velocity(&world, *id).norm()).fold(fastest, f64::max);
         }
         let left = depth(&world, [a, b], ids);
-        let [pa, pb] = ids.map(|id| world.site(id, 0).unwrap().pose);
+        let [pa, pb] = ids.map(|id| world.part_state(id, 0).unwrap().pose);
         assert!(left < 1e-3 && apart(&pa, &pb), "{stepper}, {label}: {left} m are left, {pa:?} {pb:?}");
         assert!(fastest < 3.0, "{stepper}, {label}: {fastest} m/s");
     }
@@ -122,7 +122,7 @@ fn a_press_does_not_trap_a_cube() {
     for stepper in STEPPERS {
         let (mut world, shape) = (world(stepper, 1.0 / 60.0), mesh_cube());
         let a = add(&mut world, "free", &shape, Pose::identity());
-        world.add_static(RigidBody::fixture("under", shape.clone()).at(Pose::translation(0.0, 0.0, -1.0))).unwrap();
+        world.add_static(RigidBody::fixed("under", shape.clone()).at(Pose::translation(0.0, 0.0, -1.0))).unwrap();
         let press = RigidBody::with_mass("press", shape.clone(), 1.0)
             .unwrap()
             .at(Pose::translation(0.0, 0.0, 1.2))
@@ -148,7 +148,7 @@ fn fast_cubes_do_not_go_through_a_thin_plate() {
                 (seed >> 11) as f64 / (1_u64 << 52) as f64 * 3.0 - 3.0
             });
             let mut world = no_gravity(world("time_stepping", 1.0 / 240.0));
-            world.add_static(RigidBody::fixture("plate", plate.clone())).unwrap();
+            world.add_static(RigidBody::fixed("plate", plate.clone())).unwrap();
             let body =
                 RigidBody::with_mass("cube", cube.clone(), 1.0).unwrap().at(Pose::new(Vec3::new(0.1, 0.07, 3.0), turn));
             let id = world.add(body.moving(Vec3::z() * -speed, Vec3::zeros())).unwrap();

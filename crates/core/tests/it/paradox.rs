@@ -11,7 +11,7 @@ fn a_squeezed_body_ends_on_a_ray_which_is_reported_and_survived() {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         world.set_solver(solver::by_name("lcp").unwrap());
         for (name, side) in [("left", -1.0), ("right", 1.0)] {
-            let jaw = RigidBody::fixture(name, cube(0.4)).surface(0.0, 0.5).at(Pose::translation(0.3 * side, 0.0, 0.0));
+            let jaw = RigidBody::fixed(name, cube(0.4)).surface(0.0, 0.5).at(Pose::translation(0.3 * side, 0.0, 0.0));
             let jaw = world.add(jaw).unwrap();
             world.set_mode(jaw, Mode::Kinematic).unwrap();
             world.set_velocity(jaw, Vec3::new(-0.1 * side, 0.0, 0.0), Vec3::zeros()).unwrap();

@@ -14,7 +14,7 @@ fn billiard(world: &mut World, name: &str, at: [f64; 3], v: f64) -> ObjectId {
 
 /// A plate that is led, its top at z = 0.1.
 fn led_plate(world: &mut World) -> ObjectId {
-    let plate = RigidBody::fixture("plate", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.5);
+    let plate = RigidBody::fixed("plate", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.5);
     world.add_boxed(Box::new(plate), Mode::Kinematic).unwrap()
 }
 
@@ -73,7 +73,7 @@ fn a_body_that_lands_elsewhere_does_not_lift_a_box_off_a_led_plate() {
         for v in [0.0, 0.5] {
             let mut world = world(stepper, 1.0 / 60.0);
             world
-                .add_static(RigidBody::fixture("ground", Shape::half_space()).at(Pose::translation(0.0, 0.0, -1.0)))
+                .add_static(RigidBody::fixed("ground", Shape::half_space()).at(Pose::translation(0.0, 0.0, -1.0)))
                 .unwrap();
             let plate = led_plate(&mut world);
             let body = box_on_plate(&mut world);
@@ -167,7 +167,7 @@ fn a_frozen_table_that_was_spinning_does_not_drag_what_lies_on_it() {
             });
             let moved = (position(&world, body) - Vec3::new(0.6, 0.0, 0.2)).norm();
             assert!(moved < 1e-9 && velocity(&world, body).norm() < 1e-9, "{stepper} {spin:?}: moved by {moved:e} m");
-            assert!(world.site(table, 0).unwrap().pose == Pose::identity(), "{stepper}: the table turned");
+            assert!(world.part_state(table, 0).unwrap().pose == Pose::identity(), "{stepper}: the table turned");
         }
     }
 }
@@ -221,7 +221,7 @@ fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
         let mut world = world(stepper, 1.0 / 240.0);
         let lying = Pose::rotation(Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
         world
-            .add_static(RigidBody::fixture("capsule", Shape::capsule(0.1, 5.0).unwrap()).surface(0.0, 0.0).at(lying))
+            .add_static(RigidBody::fixed("capsule", Shape::capsule(0.1, 5.0).unwrap()).surface(0.0, 0.0).at(lying))
             .unwrap();
         let ball = sliding_ball(&mut world, 0.0);
         for frame in 0..60 {
@@ -261,7 +261,7 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
     for stepper in STEPPERS {
         let mut world = world(stepper, h);
         world
-            .add_static(RigidBody::fixture("table", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.0))
+            .add_static(RigidBody::fixed("table", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.0))
             .unwrap();
         let ball = sliding_ball(&mut world, 1.0 - 60.5 * 3.0 * h);
         for frame in 0..120 {
@@ -295,7 +295,7 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
 fn slide_over_a_seam(stepper: &str) {
     let mut world = world(stepper, 1.0 / 240.0);
     for (name, x) in [("left", 0.0), ("right", 2.0)] {
-        let table = RigidBody::fixture(name, Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.0);
+        let table = RigidBody::fixed(name, Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.0);
         world.add_static(table.at(Pose::translation(x, 0.0, 0.0))).unwrap();
     }
     let ball = sliding_ball(&mut world, 0.503);
@@ -352,7 +352,7 @@ fn energy_never_grows_in_impacts_with_friction_whether_or_not_something_is_led_f
                 let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6), Vec3::new(0.0, 0.2 + 0.03 * s, 0.0));
                 let rod = world.add(rod.at(pose).moving(Vec3::new(6.0 - 0.3 * s, 0.0, -2.0), Vec3::zeros())).unwrap();
                 if led {
-                    let far = RigidBody::fixture("far", sphere(0.1)).at(Pose::translation(50.0, 50.0, 50.0));
+                    let far = RigidBody::fixed("far", sphere(0.1)).at(Pose::translation(50.0, 50.0, 50.0));
                     world.add_boxed(Box::new(far), Mode::Kinematic).unwrap();
                 }
                 let start = world.energy().total();

@@ -30,7 +30,7 @@ fn a_chain_that_bounces_in_a_box_gains_no_energy() {
         let turns = [(0.0, 0.0), (PI, 0.0), (FRAC_PI_2, 0.0), (-FRAC_PI_2, 0.0), (0.0, FRAC_PI_2), (0.0, -FRAC_PI_2)];
         for (k, (x, y)) in turns.into_iter().enumerate() {
             let rotation = Pose::rotation(Vec3::new(x, y, 0.0)).rotation;
-            let wall = RigidBody::fixture(format!("wall{k}"), Shape::half_space()).surface(1.0, 0.0);
+            let wall = RigidBody::fixed(format!("wall{k}"), Shape::half_space()).surface(1.0, 0.0);
             world
                 .add_static(wall.at(Pose::from_parts((rotation * Vec3::new(0.0, 0.0, -0.6)).into(), rotation)))
                 .unwrap();
@@ -51,7 +51,7 @@ fn what_is_led_past_its_limit_goes_on_freely() {
     // the limit cannot push what is led: every frame ran into the cap on tries
     let mut world = no_gravity(world(1.0 / 60.0, "backtracking", Integrator::Verlet));
     let mut body = chain(2, 0.0).with_velocities(&[1.0, 0.0]).unwrap();
-    body.set_freedom(0, Freedom { limits: Some([-0.1, 0.1]), ..Freedom::default() }).unwrap();
+    body.set_dof(0, DofSettings { limits: Some([-0.1, 0.1]), ..DofSettings::default() }).unwrap();
     let id = world.add_boxed(Box::new(body), Mode::Kinematic).unwrap();
     for _ in 0..30 {
         let report = *world.step().unwrap();
@@ -70,9 +70,9 @@ fn a_link_is_kept_apart_from_the_base() {
     for link in ["base", "lower"] {
         body.add_collider(link, Collider::new(Shape::sphere(0.1).unwrap(), Pose::identity())).unwrap();
     }
-    let meet = |body: &ArticulatedBody| body.collidable().unwrap().parts_meet(3, 4);
+    let meet = |body: &ArticulatedBody| body.collidable().unwrap().parts_collide(3, 4);
     assert!(meet(&body));
-    body.keep_apart("base", "lower").unwrap();
+    body.exclude_collisions("base", "lower").unwrap();
     assert!(!meet(&body));
 }
 
@@ -94,7 +94,7 @@ fn a_box_on_a_turning_arm_that_is_led_stays_on_its_circle() {
     for _ in 0..480 {
         world.step().unwrap();
     }
-    let place = world.site(id, 0).unwrap().position();
+    let place = world.part_state(id, 0).unwrap().position();
     let (creep, behind) = (place.xy().norm() - 0.6, place.y.atan2(place.x) - 2.0);
     assert!(creep.abs() < 1e-4 && behind.abs() < 1e-3, "{creep:e} m, {behind:e} rad");
 }

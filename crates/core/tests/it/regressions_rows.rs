@@ -25,8 +25,8 @@ impl Object for AlongX {
 }
 
 impl Constraint for AlongX {
-    fn rows(&self, _me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder) {
-        let p = view.site(self.body, 0).unwrap().position();
+    fn rows(&self, _me: &StateRange, view: &WorldView, level: Level, out: &mut RowBuilder) {
+        let p = view.part_state(self.body, 0).unwrap().position();
         let mut target = self.target;
         match (&mut target.set, level) {
             // a force; over a step it is an impulse
@@ -271,10 +271,10 @@ impl Object for Pin {
 }
 
 impl Constraint for Pin {
-    fn rows(&self, _me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
-        let site = view.site(self.0, 0).unwrap();
-        let (arm, spin) = (site.pose.rotation * END, site.angular_velocity);
-        let p = site.position() + arm;
+    fn rows(&self, _me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+        let part_state = view.part_state(self.0, 0).unwrap();
+        let (arm, spin) = (part_state.pose.rotation * END, part_state.angular_velocity);
+        let p = part_state.position() + arm;
         let centripetal = spin.cross(&spin.cross(&arm));
         for k in 0..3 {
             let target =
@@ -305,11 +305,11 @@ fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
     let mut worst = Spun { energy: 0.0, drift: 0.0, speed: 0.0 };
     for _ in 0..(2.0 / dt).round() as usize {
         world.step().unwrap();
-        let site = world.site(rod, 0).unwrap();
-        let p = site.position() + site.pose.rotation * END;
+        let part_state = world.part_state(rod, 0).unwrap();
+        let p = part_state.position() + part_state.pose.rotation * END;
         worst.energy = worst.energy.max((world.energy().total() / start - 1.0).abs());
         worst.drift = worst.drift.max((p - END).norm());
-        worst.speed = worst.speed.max(site.velocity_at(&p).norm());
+        worst.speed = worst.speed.max(part_state.velocity_at(&p).norm());
     }
     println!(
         "{stepper} at {dt:.6} s: energy off by {:.3e}, drift {:.3e} m, pin speed {:.3e} m/s",

@@ -188,7 +188,7 @@ impl Object for Gust {
 }
 
 impl ForceGenerator for Gust {
-    fn apply(&self, _me: &Span, view: &WorldView, out: &mut Forces) {
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
         let blows = if view.time > 2.0 { 80.0 } else { 1.0 };
         out.wrenches.iter_mut().skip(1).for_each(|w| w.force.x += blows);
     }
@@ -229,7 +229,7 @@ fn what_pauses_or_creeps_stays_awake() {
         let bob = RigidBody::with_mass("bob", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 0.3, 2.0));
         let bob = world.add(bob).unwrap();
         let hinge =
-            Closure::hinge_at("hinge", &world, Some((bob, 0)), None, Vec3::new(5.0, 0.0, 3.0), Vec3::x()).unwrap();
+            LoopJoint::revolute_at("hinge", &world, Some((bob, 0)), None, Vec3::new(5.0, 0.0, 3.0), Vec3::x()).unwrap();
         world.add(hinge).unwrap();
         let roller = RigidBody::with_mass("roller", sphere(0.2), 1.0)
             .unwrap()
@@ -257,7 +257,7 @@ fn joints_hold_an_island_together() {
             -0.5 * i as f64,
         ));
         let id = world.add(rod).unwrap();
-        let pin = Closure::hinge_at(
+        let pin = LoopJoint::revolute_at(
             format!("pin{i}"),
             &world,
             Some((id, 0)),

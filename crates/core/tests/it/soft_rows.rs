@@ -30,8 +30,8 @@ impl Object for Drive {
 }
 
 impl Constraint for Drive {
-    fn rows(&self, _me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
-        let p = view.site(self.body, 0).unwrap().position();
+    fn rows(&self, _me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+        let p = view.part_state(self.body, 0).unwrap().position();
         let gain = self.damping + self.h * self.stiffness;
         let target = RowTarget {
             compliance: 1.0 / (self.h * gain),
@@ -126,7 +126,7 @@ fn a_compliance_that_is_none_is_refused() {
         }
     }
     impl Constraint for Row {
-        fn rows(&self, _me: &Span, _view: &WorldView, _level: Level, out: &mut RowBuilder) {
+        fn rows(&self, _me: &StateRange, _view: &WorldView, _level: Level, out: &mut RowBuilder) {
             let target = RowTarget { compliance: self.1, ..RowTarget::new(RowSet::Equality, 0.0) };
             out.row(target).on_point(self.0, 0, &Vec3::zeros(), &Vec3::x(), 1.0);
         }

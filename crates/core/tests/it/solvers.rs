@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
-use tumble_core::solver::{Accuracy, NAMES, by_name};
+use tumble_core::solver::{NAMES, SolverSettings, by_name};
 use tumble_core::*;
 
 fn set(world: &mut World, solver: &str) {
@@ -63,7 +63,7 @@ fn pile(stepper: &str) -> World {
     let mut world = world(stepper, 1.0 / 240.0);
     world
         .set_settings(Settings {
-            accuracy: Accuracy { sweeps: 200_000, relaxations: u32::MAX, tolerance: 1e-12 },
+            solver_settings: SolverSettings { max_sweeps: 200_000, max_relaxations: u32::MAX, tolerance: 1e-12 },
             ..*world.settings()
         })
         .unwrap();
@@ -93,7 +93,7 @@ fn pivoting_and_gauss_seidel_agree_on_a_frictionless_pile() {
             world.step().unwrap();
             assert!(world.contacts().len() > 30, "{} contacts", world.contacts().len());
             assert!(world.report().residual < 1e-8, "{stepper}, {solver}: residual {:e}", world.report().residual);
-            world.sites().iter().flat_map(|s| [s.velocity, s.angular_velocity]).collect()
+            world.part_states().iter().flat_map(|s| [s.velocity, s.angular_velocity]).collect()
         };
         let (pivoting, sweeping) = (speeds("lcp_pyramid"), speeds("gauss_seidel"));
         let apart = pivoting.iter().zip(&sweeping).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);

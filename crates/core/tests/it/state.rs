@@ -80,7 +80,7 @@ fn objects_come_and_go_in_mid_run() {
     run(&mut world, 30);
     let gone = world.find("body5").unwrap();
     world.remove(gone).unwrap();
-    assert!(world.object(gone).is_none() && world.site(gone, 0).is_none());
+    assert!(world.object(gone).is_none() && world.part_state(gone, 0).is_none());
     assert!(matches!(world.set_mode(gone, Mode::Static), Err(WorldError::Stale)));
     let added = world
         .add(RigidBody::with_mass("late", sphere(0.1), 1.0).unwrap().at(Pose::translation(3.0, 0.0, 1.0)))
@@ -88,7 +88,7 @@ fn objects_come_and_go_in_mid_run() {
     assert_ne!(gone, added);
     run(&mut world, 120);
     assert!((position(&world, added).z - 0.1).abs() < 1e-6, "the late one landed");
-    assert!(matches!(world.add(RigidBody::fixture("late", sphere(1.0))), Err(WorldError::DuplicateName(_))));
+    assert!(matches!(world.add(RigidBody::fixed("late", sphere(1.0))), Err(WorldError::DuplicateName(_))));
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn a_kinematic_body_follows_its_motion_and_pushes() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.0);
-        let pusher = RigidBody::fixture("pusher", cube(0.4)).surface(0.0, 0.0).at(Pose::translation(-1.0, 0.0, 0.2));
+        let pusher = RigidBody::fixed("pusher", cube(0.4)).surface(0.0, 0.0).at(Pose::translation(-1.0, 0.0, 0.2));
         let pusher = world.add(pusher).unwrap();
         world.set_mode(pusher, Mode::Kinematic).unwrap();
         world.set_velocity(pusher, Vec3::new(2.0, 0.0, 0.0), Vec3::zeros()).unwrap();
@@ -149,7 +149,7 @@ fn a_kinematic_body_follows_its_motion_and_pushes() {
         let target = Pose::new(Vec3::new(0.5, 0.5, 0.7), Vec3::new(0.0, 0.3, 1.0));
         world.move_to(pusher, target).unwrap();
         run(&mut world, 1);
-        let reached = world.site(pusher, 0).unwrap().pose;
+        let reached = world.part_state(pusher, 0).unwrap().pose;
         assert!(
             (reached.inverse() * target).translation.vector.norm() < 1e-12
                 && reached.rotation.angle_to(&target.rotation) < 1e-7
@@ -167,7 +167,7 @@ fn switches_take_a_body_out_and_back_in() {
     world.set_collidable(id, false).unwrap();
     run(&mut world, 60);
     assert!((position(&world, id).z - (0.1 - 0.5 * G)).abs() < 1e-9, "falls through");
-    world.set_alive(id, false).unwrap();
+    world.set_enabled(id, false).unwrap();
     let there = position(&world, id);
     run(&mut world, 60);
     assert_eq!(position(&world, id), there, "stands still");
@@ -181,7 +181,7 @@ fn user_forces_act_for_one_frame_and_impulses_at_once() {
     run(&mut world, 2);
     assert!((velocity(&world, id).x - 0.02).abs() < 1e-14);
     // τ = r × f = (0, 0.5, 0) × (4, 0, 0) = (0, 0, −2); I = 2/5·2·0.25 = 0.2
-    assert!((world.site(id, 0).unwrap().angular_velocity.z + 0.1).abs() < 1e-12);
+    assert!((world.part_state(id, 0).unwrap().angular_velocity.z + 0.1).abs() < 1e-12);
     world.apply_impulse(id, 0, Vec3::new(0.0, 1.0, 0.0), &position(&world, id)).unwrap();
     assert!((velocity(&world, id).y - 0.5).abs() < 1e-14);
     assert!(world.apply_force(id, 0, Vec3::new(f64::NAN, 0.0, 0.0), &Vec3::zeros()).is_err());
@@ -199,13 +199,13 @@ fn a_state_that_is_not_finite_is_reported_with_its_object() {
 #[test]
 fn kinds_that_do_not_meet_pass_through_each_other() {
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
-    let ghost = CollisionKind::new(5).unwrap();
-    let mut add = |name: &str, x: f64, v: f64, kind: CollisionKind, meets: u64| {
+    let ghost = CollisionGroup::new(5).unwrap();
+    let mut add = |name: &str, x: f64, v: f64, group: CollisionGroup, mask: u64| {
         let mut body = RigidBody::with_mass(name, sphere(0.5), 1.0).unwrap().surface(1.0, 0.0);
-        (body.kind, body.meets) = (kind, meets);
+        (body.group, body.mask) = (group, mask);
         world.add(body.at(Pose::translation(x, 0.0, 0.0)).moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
     };
-    let solid = CollisionKind::default();
+    let solid = CollisionGroup::default();
     let ids = [
         add("a", -2.0, 1.0, solid, !ghost.bit()),
         add("ghost", 0.0, 0.0, ghost, u64::MAX),
@@ -215,7 +215,7 @@ fn kinds_that_do_not_meet_pass_through_each_other() {
     // b meets the ghost at t = 1 s, x = 1 and stops; the ghost flies off at -1 m/s through a; a meets b at t = 2 s, x = 0 and stops.
     let x: Vec<f64> = ids.iter().map(|id| position(&world, *id).x).collect();
     assert!(x.iter().zip([0.0, -2.0, 2.0]).all(|(x, e)| (x - e).abs() < 1e-9), "{x:?}");
-    assert!(CollisionKind::new(64).is_none());
+    assert!(CollisionGroup::new(64).is_none());
 }
 
 #[test]
@@ -225,7 +225,11 @@ fn a_body_in_another_process_is_kept_in_step_by_messages() {
     let mut replica = messy("time_stepping");
     for (&theirs, &ours) in world.ids().iter().zip(replica.ids().to_vec().iter()) {
         let (view, mut message) = (world.view(), Vec::new());
-        world.object(theirs).unwrap().net_sync().unwrap().get_data(view.span(theirs).unwrap(), &view, &mut message);
+        world.object(theirs).unwrap().net_sync().unwrap().get_data(
+            view.state_range(theirs).unwrap(),
+            &view,
+            &mut message,
+        );
         let mut x = replica.state_of(ours).unwrap().to_vec();
         let sync = replica.object(ours).unwrap().net_sync().unwrap();
         assert_eq!(sync.read_data(&message[1..], &mut x), Err(SyncError::Length { got: 103, wanted: 104 }));

@@ -11,7 +11,7 @@ fn a_standing_cylinder_does_not_creep() {
         let mut world = world(stepper, 1.0 / 240.0);
         let block = Shape::cuboid(Vec3::new(0.5, 0.5, 0.1)).unwrap();
         world
-            .add_static(RigidBody::fixture("block", block).surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, -0.1)))
+            .add_static(RigidBody::fixed("block", block).surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, -0.1)))
             .unwrap();
         let cylinder =
             RigidBody::with_mass("cylinder", Shape::cylinder(0.05, 0.15).unwrap(), 1.0).unwrap().surface(0.0, 0.5);
@@ -19,8 +19,8 @@ fn a_standing_cylinder_does_not_creep() {
         let start = position(&world, id);
         for _ in 0..480 {
             world.step().unwrap();
-            let site = world.site(id, 0).unwrap();
-            let speed = site.velocity.norm() + 0.16 * site.angular_velocity.norm();
+            let part_state = world.part_state(id, 0).unwrap();
+            let speed = part_state.velocity.norm() + 0.16 * part_state.angular_velocity.norm();
             assert!(speed < 1e-6, "{stepper}: {speed} m/s after {} s", world.time());
         }
         let creep = (position(&world, id) - start).norm();

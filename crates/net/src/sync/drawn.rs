@@ -29,8 +29,8 @@ impl Drawn {
     }
 
     #[inline]
-    pub fn alive(&mut self, alive: bool) {
-        self.0.push(alive as u8);
+    pub fn enabled(&mut self, enabled: bool) {
+        self.0.push(enabled as u8);
     }
 
     /// A pose as it is drawn: positions as they are, rotations in the renderer's precision. Poses that differ as they travel differ here.

@@ -7,7 +7,7 @@ use super::viewer::{exact_pose, put_exact_pose};
 use super::wire::{Bytes, Fault, put_f64, put_name};
 use std::sync::Arc;
 use tumble_collide::{Shape, TriMesh, Vec3};
-use tumble_core::{Drawn, Look, Visual, VisualGeometry, VisualMesh, World};
+use tumble_core::{Appearance, Drawn, Visual, VisualGeometry, VisualMesh, World};
 
 /// Most pictures of one object.
 pub const MAX_VISUALS: usize = 4096;
@@ -25,7 +25,7 @@ pub(crate) fn put_looks(out: &mut Vec<u8>, visuals: &[Visual], base: &World) {
         out.extend((visual.part as u32).to_le_bytes());
         put_exact_pose(out, &visual.pose);
         put_geometry(out, drawn, base);
-        put_look(out, &visual.look);
+        put_look(out, &visual.appearance);
     }
 }
 
@@ -93,11 +93,11 @@ fn put_mesh(out: &mut Vec<u8>, mesh: &TriMesh) {
     out.extend(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()));
 }
 
-fn put_look(out: &mut Vec<u8>, look: &Look) {
-    let [r, g, b] = look.color;
-    out.extend([r, g, b, look.roughness, look.metallic].iter().flat_map(|x| x.to_le_bytes()));
-    put_text(out, &look.shader);
-    let properties = &look.properties[..look.properties.len().min(MAX_PROPERTIES)];
+fn put_look(out: &mut Vec<u8>, appearance: &Appearance) {
+    let [r, g, b] = appearance.color;
+    out.extend([r, g, b, appearance.roughness, appearance.metallic].iter().flat_map(|x| x.to_le_bytes()));
+    put_text(out, &appearance.shader);
+    let properties = &appearance.properties[..appearance.properties.len().min(MAX_PROPERTIES)];
     out.push(properties.len() as u8);
     for (name, value) in properties {
         put_text(out, name);
@@ -126,7 +126,7 @@ pub(crate) fn get_looks(bytes: &[u8], parts: usize, base: &World) -> Result<Vec<
         }
         let pose = exact_pose(&mut rest)?;
         let geometry = get_geometry(&mut rest, base)?;
-        visuals.push(Visual { part, pose, geometry, look: get_look(&mut rest)?, stands_in_for: Vec::new() });
+        visuals.push(Visual { part, pose, geometry, appearance: get_look(&mut rest)?, stands_in_for: Vec::new() });
     }
     rest.end()?;
     Ok(visuals)
@@ -174,7 +174,7 @@ fn get_mesh(rest: &mut Bytes<'_>) -> Result<TriMesh, Fault> {
     Ok(TriMesh { vertices, triangles })
 }
 
-fn get_look(rest: &mut Bytes<'_>) -> Result<Look, Fault> {
+fn get_look(rest: &mut Bytes<'_>) -> Result<Appearance, Fault> {
     let mut shares = [0.0f32; 5];
     for x in &mut shares {
         *x = f32::from_le_bytes(rest.array()?);
@@ -186,7 +186,7 @@ fn get_look(rest: &mut Bytes<'_>) -> Result<Look, Fault> {
     let shader = text(rest)?;
     let count = rest.u8()?;
     let properties = (0..count).map(|_| Ok((text(rest)?, rest.f64()?))).collect::<Result<_, Fault>>()?;
-    Ok(Look { color: [r, g, b], roughness, metallic, shader, properties, ..Look::default() })
+    Ok(Appearance { color: [r, g, b], roughness, metallic, shader, properties, ..Appearance::default() })
 }
 
 fn text(rest: &mut Bytes<'_>) -> Result<String, Fault> {

@@ -138,15 +138,15 @@ impl Mirror {
         if entry.kind == EntryKind::Exact && world.object(id).is_none_or(|o| o.net_sync().is_none()) {
             return Err(unfit("takes no messages"));
         }
-        let here = world.view().span(id).map_or(0, |span| span.site.len());
+        let here = world.view().state_range(id).map_or(0, |span| span.parts.len());
         if here != parts as usize {
             return Err(unfit(&format!("has {here} parts here and {parts} on the server")));
         }
-        let _ = world.set_alive(id, entry.alive);
+        let _ = world.set_enabled(id, entry.enabled);
         if still {
             let mut stand = Vec::new();
             read_poses(poses, parts, &mut stand)?;
-            world.show_at(id, &stand).map_err(|why| unfit(&why.to_string()))?;
+            world.set_displayed_poses(id, &stand).map_err(|why| unfit(&why.to_string()))?;
         }
         Ok(Slot { id: Some(id), kind: entry.kind, still, parts })
     }
@@ -192,15 +192,15 @@ impl Mirror {
         let viewer = viewer.ok_or(Fault::Malformed("no viewer"))?;
         self.tell(&told)?;
         for (id, range) in shown {
-            let alive = !range.is_empty();
-            if self.world.status(id).is_some_and(|s| s.alive != alive) {
-                let _ = self.world.set_alive(id, alive); // ids of our own list are there
+            let enabled = !range.is_empty();
+            if self.world.status(id).is_some_and(|s| s.enabled != enabled) {
+                let _ = self.world.set_enabled(id, enabled); // ids of our own list are there
             }
-            if alive {
-                let _ = self.world.show_at(id, &poses[range]); // as many as there are parts, and finite
+            if enabled {
+                let _ = self.world.set_displayed_poses(id, &poses[range]); // as many as there are parts, and finite
             }
         }
-        self.world.show_time(time_s);
+        self.world.set_displayed_time(time_s);
         (self.viewer, self.frame, self.poses) = (viewer, frame, poses);
         Ok(())
     }
@@ -218,7 +218,7 @@ impl Mirror {
             }
         }
         for (id, _) in told {
-            let _ = self.world.set_alive(*id, true);
+            let _ = self.world.set_enabled(*id, true);
         }
         Ok(())
     }
@@ -231,9 +231,9 @@ impl Mirror {
                 drawn.bytes(|out| self.viewer.write(out));
                 continue;
             };
-            let alive = self.world.status(id).is_some_and(|s| s.alive);
-            drawn.alive(alive);
-            if alive {
+            let enabled = self.world.status(id).is_some_and(|s| s.enabled);
+            drawn.enabled(enabled);
+            if enabled {
                 self.see(id, slot, &mut drawn);
             }
         }
@@ -249,9 +249,13 @@ impl Mirror {
             });
             return;
         }
-        let sites =
-            self.world.view().span(id).and_then(|span| self.world.sites().get(span.site.clone())).unwrap_or_default();
-        sites.iter().for_each(|site| drawn.pose(&site.pose));
+        let part_states = self
+            .world
+            .view()
+            .state_range(id)
+            .and_then(|span| self.world.part_states().get(span.parts.clone()))
+            .unwrap_or_default();
+        part_states.iter().for_each(|part_state| drawn.pose(&part_state.pose));
     }
 
     fn hash_table(&mut self) {
@@ -259,7 +263,7 @@ impl Mirror {
         for slot in &self.slots {
             let Some(id) = slot.id else { continue };
             drawn.name(self.world.object(id).map_or("", |o| o.name()));
-            drawn.alive(slot.still && self.world.status(id).is_some_and(|s| s.alive));
+            drawn.enabled(slot.still && self.world.status(id).is_some_and(|s| s.enabled));
             if slot.still {
                 self.see(id, slot, &mut drawn);
             }
@@ -269,7 +273,7 @@ impl Mirror {
 }
 
 fn has_parts(world: &World, id: ObjectId) -> bool {
-    world.view().span(id).is_some_and(|span| !span.site.is_empty())
+    world.view().state_range(id).is_some_and(|span| !span.parts.is_empty())
 }
 
 /// Appends as many poses as there are parts.

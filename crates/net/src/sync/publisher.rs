@@ -58,7 +58,7 @@ struct Row {
     /// Fixed, and sent as poses: in the list and in no state.
     still: bool,
     /// Whether it is alive, of a still one.
-    alive: bool,
+    enabled: bool,
     parts: usize,
     /// Poses of a still one, as the world has them.
     poses: Vec<Pose>,
@@ -113,11 +113,11 @@ impl Publisher {
         put_state_head(&mut state, self.revision, moving);
         let mut saturated = 0;
         for (index, row) in self.rows.iter().enumerate().filter(|(_, row)| !row.still) {
-            let alive = world.status(row.id).is_some_and(|s| s.alive);
-            drawn.alive(alive);
+            let enabled = world.status(row.id).is_some_and(|s| s.enabled);
+            drawn.enabled(enabled);
             let mut fine = Ok(());
             put_record(&mut state, index, |out| {
-                if alive {
+                if enabled {
                     fine = put_row(out, row, world, &mut drawn, &mut saturated);
                 }
             });
@@ -137,7 +137,7 @@ impl Publisher {
             let Some(status) = world.status(row.id) else { return false };
             let fixed = status.mode == Mode::Static;
             fixed == row.fixed
-                && (!row.still || status.alive == row.alive && poses(world, row.id).eq(row.poses.iter().copied()))
+                && (!row.still || status.enabled == row.enabled && poses(world, row.id).eq(row.poses.iter().copied()))
         };
         world.ids() == self.ids && self.rows.iter().all(same)
     }
@@ -145,13 +145,13 @@ impl Publisher {
     /// What of an object travels: kind, whether it is still, whether it is alive, parts. `None`: nothing.
     fn class(&self, world: &World, id: ObjectId) -> Option<(EntryKind, bool, bool, usize)> {
         let (object, status) = (world.object(id)?, world.status(id)?);
-        let parts = world.view().span(id)?.site.len();
+        let parts = world.view().state_range(id)?.parts.len();
         let known = self.base.object(id).is_some();
         let exact = known && object.net_sync().is_some() && (self.exact || parts == 0);
         match (exact, parts) {
-            (true, _) => Some((EntryKind::Exact, false, status.alive, parts)),
+            (true, _) => Some((EntryKind::Exact, false, status.enabled, parts)),
             (false, 0) => None,
-            _ => Some((EntryKind::Poses, status.mode == Mode::Static, status.alive, parts)),
+            _ => Some((EntryKind::Poses, status.mode == Mode::Static, status.enabled, parts)),
         }
     }
 
@@ -160,10 +160,10 @@ impl Publisher {
         self.revision = self.revision.wrapping_add(1);
         self.rows.clear();
         for &id in world.ids() {
-            if let Some((kind, still, alive, parts)) = self.class(world, id) {
+            if let Some((kind, still, enabled, parts)) = self.class(world, id) {
                 let poses = if still { poses(world, id).collect() } else { Vec::new() };
                 let fixed = world.status(id).is_some_and(|s| s.mode == Mode::Static);
-                self.rows.push(Row { id, kind, fixed, still, alive, parts, poses });
+                self.rows.push(Row { id, kind, fixed, still, enabled, parts, poses });
             }
         }
         self.ids = world.ids().to_vec();
@@ -179,7 +179,7 @@ impl Publisher {
             }
             fits(&format!("parts of '{name}'"), row.parts, u16::MAX as usize)?;
             drawn.name(name);
-            drawn.alive(row.still && row.alive);
+            drawn.enabled(row.still && row.enabled);
             body.clear();
             if row.still {
                 put_row(&mut body, row, world, &mut drawn, &mut 0)?;
@@ -190,7 +190,7 @@ impl Publisher {
             let entry = Entry {
                 name,
                 kind: row.kind,
-                alive: row.alive,
+                enabled: row.enabled,
                 still: row.still,
                 described,
                 parts: row.parts as u16,
@@ -201,7 +201,7 @@ impl Publisher {
         let viewer = Entry {
             name: VIEWER_NAME,
             kind: EntryKind::Viewer,
-            alive: true,
+            enabled: true,
             still: false,
             described: false,
             parts: 0,
@@ -244,8 +244,9 @@ fn put_row(
 }
 
 fn poses(world: &World, id: ObjectId) -> impl Iterator<Item = Pose> + '_ {
-    let sites = world.view().span(id).and_then(|span| world.sites().get(span.site.clone())).unwrap_or_default();
-    sites.iter().map(|site| site.pose)
+    let part_states =
+        world.view().state_range(id).and_then(|span| world.part_states().get(span.parts.clone())).unwrap_or_default();
+    part_states.iter().map(|part_state| part_state.pose)
 }
 
 fn fits(what: &str, is: usize, most: usize) -> Result<(), PublishError> {

@@ -1,7 +1,7 @@
 //! An object that is drawn and nothing else: what came by name, and the scene file has not.
 
 use tumble_collide::{Shape, Vec3};
-use tumble_core::{Collidable, CollisionKind, Material, Object, Renderable, Site, Visual};
+use tumble_core::{Collidable, CollisionGroup, Material, Object, PartState, Renderable, Visual};
 
 /// Parts with pictures, which stand where they are shown.
 #[derive(Clone)]
@@ -42,15 +42,15 @@ impl Collidable for Puppet {
         Material::default()
     }
 
-    fn kind(&self, _: usize) -> CollisionKind {
-        CollisionKind::default()
+    fn collision_group(&self, _: usize) -> CollisionGroup {
+        CollisionGroup::default()
     }
 
-    fn collides_with(&self, _: usize, _: CollisionKind) -> bool {
+    fn collides_with(&self, _: usize, _: CollisionGroup) -> bool {
         false
     }
 
-    fn test_impulse(&self, _: usize, _: &Site, _: &Vec3, _: &[Vec3], _: f64, _: &mut [f64]) {}
+    fn test_impulse(&self, _: usize, _: &PartState, _: &Vec3, _: &[Vec3], _: f64, _: &mut [f64]) {}
 }
 
 impl Renderable for Puppet {

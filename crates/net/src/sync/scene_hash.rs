@@ -4,7 +4,7 @@ use super::viewer::put_exact_pose;
 use super::wire::{put_f64, put_name};
 use std::path::Path;
 use tumble_collide::{Shape, TriMesh};
-use tumble_core::{Drawn, Look, World};
+use tumble_core::{Appearance, Drawn, World};
 
 /// The BLAKE3 of a scene: the text of its file (lights, camera, sky), and everything in the world as it makes it that can be seen: names, modes, poses,
 /// shapes with every corner of every mesh, looks (textures by the names of their files). So a mesh file that differs is found even where the scene file is the same.
@@ -18,8 +18,10 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
         let Some(object) = world.object(id) else { continue };
         put_name(&mut out, object.name());
         out.extend(format!("{:?}", world.status(id)).bytes());
-        let parts = world.view().span(id).map_or(0, |span| span.site.len());
-        (0..parts).filter_map(|part| world.site(id, part)).for_each(|site| put_exact_pose(&mut out, &site.pose));
+        let parts = world.view().state_range(id).map_or(0, |span| span.parts.len());
+        (0..parts)
+            .filter_map(|part| world.part_state(id, part))
+            .for_each(|part_state| put_exact_pose(&mut out, &part_state.pose));
         for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
             let Some(drawn) = visual.drawn() else { continue };
             out.extend((visual.part as u64).to_le_bytes());
@@ -31,9 +33,13 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
                 Drawn::Shape(other) => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
             }
             // a texture by its file's name: the folder is another one on another machine
-            let texture =
-                visual.look.texture.as_deref().and_then(|path| path.file_name()).map(|name| Path::new(name).into());
-            out.extend(format!("{:?}", Look { texture, ..visual.look.clone() }).bytes());
+            let texture = visual
+                .appearance
+                .texture
+                .as_deref()
+                .and_then(|path| path.file_name())
+                .map(|name| Path::new(name).into());
+            out.extend(format!("{:?}", Appearance { texture, ..visual.appearance.clone() }).bytes());
         }
         hasher.update(&(out.len() as u64).to_le_bytes());
         hasher.update(&out);

@@ -40,7 +40,7 @@ pub struct Entry<'a> {
     /// What of it travels.
     pub kind: EntryKind,
     /// Whether a still object is there; of others the state says.
-    pub alive: bool,
+    pub enabled: bool,
     /// It does not move: its poses are here and in no state.
     pub still: bool,
     /// It is not in the scene file: how it looks is here.
@@ -58,7 +58,7 @@ impl Entry<'_> {
         out.extend((4 + self.body.len() as u64).to_le_bytes());
         let flag = |on: bool, bit: u8| if on { bit } else { 0 };
         out.push(self.kind as u8);
-        out.push(flag(self.alive, ALIVE) | flag(self.still, STILL) | flag(self.described, DESCRIBED));
+        out.push(flag(self.enabled, ALIVE) | flag(self.still, STILL) | flag(self.described, DESCRIBED));
         out.extend(self.parts.to_le_bytes());
         out.extend(self.body);
     }
@@ -121,11 +121,11 @@ fn entry<'a>(rest: &mut Bytes<'a>) -> Result<Entry<'a>, Fault> {
     if flags & !(ALIVE | STILL | DESCRIBED) != 0 {
         return Err(Fault::Malformed("a flag that there is not"));
     }
-    let [alive, still, described] = [ALIVE, STILL, DESCRIBED].map(|bit| flags & bit != 0);
+    let [enabled, still, described] = [ALIVE, STILL, DESCRIBED].map(|bit| flags & bit != 0);
     if (still || described) && kind == EntryKind::Viewer {
         return Err(Fault::Malformed("a viewer that is still or described"));
     }
-    Ok(Entry { name, kind, alive, still, described, parts, body: body.0 })
+    Ok(Entry { name, kind, enabled, still, described, parts, body: body.0 })
 }
 
 /// Appends what stands before the records of a state.

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tumble_collide::{Pose, Shape, TriMesh, Vec3};
-use tumble_core::{Detail, Drawn, Look, Visual, VisualGeometry, World};
+use tumble_core::{Appearance, Detail, Drawn, Visual, VisualGeometry, World};
 use tumble_scene::{LightKind, LightSpec, MeshSource, SceneFile};
 use unwrap::Unwrapped;
 
@@ -117,18 +117,20 @@ impl Drawing {
             if overlays.sleep { Some(sleep_colors(world)) } else { overlays.islands.then(|| island_colors(world)) };
         for &id in world.ids() {
             let Some(object) = world.object(id) else { continue };
-            if !world.status(id).is_some_and(|s| s.alive) {
+            if !world.status(id).is_some_and(|s| s.enabled) {
                 continue;
             }
             for mount in object.light().map_or(&[][..], |l| l.lights()) {
                 list.lights.extend(
-                    world.site(id, mount.part).map(|site| views::carried_light(mount, &(site.pose * mount.pose))),
+                    world
+                        .part_state(id, mount.part)
+                        .map(|part_state| views::carried_light(mount, &(part_state.pose * mount.pose))),
                 );
             }
             let tint = tints.as_ref().and_then(|tints| tints.get(&id)).copied();
             for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
-                let Some(site) = world.site(id, visual.part) else { continue };
-                self.place(&mut list, &mut placed, object.name(), visual, &(site.pose * visual.pose), tint)?;
+                let Some(part_state) = world.part_state(id, visual.part) else { continue };
+                self.place(&mut list, &mut placed, object.name(), visual, &(part_state.pose * visual.pose), tint)?;
             }
         }
         self.spheres = list.spheres.len();
@@ -147,13 +149,13 @@ impl Drawing {
         tint: Option<[f32; 3]>,
     ) -> Result<(), RenderError> {
         let Some(drawn) = visual.drawn() else { return Ok(()) };
-        let detail = self.detail.unwrap_or(visual.look.detail);
+        let detail = self.detail.unwrap_or(visual.appearance.detail);
         let mut material = match tint {
             Some(color) => Material::matte(color),
-            None => surface::of_appearance(&visual.look, name),
+            None => surface::of_appearance(&visual.appearance, name),
         };
         if detail == Detail::Full && tint.is_none() {
-            material.texture = self.texture(list, placed, &visual.look)?;
+            material.texture = self.texture(list, placed, &visual.appearance)?;
         } else {
             material = Material { pattern: Pattern::Plain, clearcoat: 0.0, ..material };
         }
@@ -256,7 +258,7 @@ impl Drawing {
         &mut self,
         list: &mut DrawList,
         placed: &mut Placed,
-        look: &Look,
+        look: &Appearance,
     ) -> Result<Option<Texture>, RenderError> {
         let Some(path) = &look.texture else { return Ok(None) };
         let repeat_m =

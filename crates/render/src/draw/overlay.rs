@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
 use tumble_core::collide::{Pose, Shape, UnionFind, Vec3};
-use tumble_core::{ArticulatedBody, Closure, ClosureKind, ContactPoint, Joint, Mode, ObjectId, World};
+use tumble_core::{ArticulatedBody, ContactPoint, Joint, LoopJoint, LoopJointKind, Mode, ObjectId, World};
 
 /// Which overlays to draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,10 +115,10 @@ impl DebugDraw {
             }
         }
         for &id in world.ids().iter().filter(|_| self.velocities) {
-            let Some(site) = world.site(id, 0).filter(|s| s.velocity.norm() > 1e-3) else { continue };
+            let Some(part_state) = world.part_state(id, 0).filter(|s| s.velocity.norm() > 1e-3) else { continue };
             list.arrow(
-                Point3::from(small(&site.position())),
-                small(&(VELOCITY_ARROW_S * site.velocity)),
+                Point3::from(small(&part_state.position())),
+                small(&(VELOCITY_ARROW_S * part_state.velocity)),
                 DebugStyle::new([0.1, 0.9, 0.3]).width(3.0).on_top(),
             );
         }
@@ -139,8 +139,8 @@ fn frames(world: &World, list: &mut DrawList, length: f32) {
     for &id in world.ids() {
         let visuals = world.object(id).and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
         let parts: BTreeSet<usize> = visuals.iter().map(|v| v.part).collect();
-        for site in parts.into_iter().filter_map(|part| world.site(id, part)) {
-            let pose: Isometry3<f32> = site.pose.cast();
+        for part_state in parts.into_iter().filter_map(|part| world.part_state(id, part)) {
+            let pose: Isometry3<f32> = part_state.pose.cast();
             for (axis, color) in [[0.9, 0.1, 0.1], [0.1, 0.75, 0.15], [0.15, 0.3, 1.0]].into_iter().enumerate() {
                 let end = pose * Point3::from(Vector3::ith(axis, length));
                 list.line(pose.translation.vector.into(), end, DebugStyle::new(color).width(2.5).on_top());
@@ -165,9 +165,10 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
     for &id in world.ids() {
         if let Some(body) = world.get::<ArticulatedBody>(id) {
             for (link, l) in body.model().links().iter().enumerate() {
-                let Some(site) = world.site(id, link) else { continue };
-                let (at, along) =
-                    (Point3::from(small(&site.position())), |axis: &Vec3| Some(small(&(site.pose.rotation * axis))));
+                let Some(part_state) = world.part_state(id, link) else { continue };
+                let (at, along) = (Point3::from(small(&part_state.position())), |axis: &Vec3| {
+                    Some(small(&(part_state.pose.rotation * axis)))
+                });
                 match &l.joint {
                     Joint::Revolute { axis } => joint(at, along(axis), REVOLUTE_COLOR),
                     Joint::Prismatic { axis } => joint(at, along(axis), PRISMATIC_COLOR),
@@ -176,19 +177,19 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
                 }
             }
         }
-        if let Some(closure) = world.get::<Closure>(id) {
-            for side in closure.sides() {
+        if let Some(loop_joint) = world.get::<LoopJoint>(id) {
+            for side in loop_joint.sides() {
                 let carrier = match side.part {
-                    Some((of, part)) => world.site(of, part).map(|site| site.pose),
+                    Some((of, part)) => world.part_state(of, part).map(|part_state| part_state.pose),
                     None => Some(Pose::identity()),
                 };
                 let Some(frame) = carrier.map(|pose| pose * side.frame) else { continue };
                 let axis = Some(small(&(frame.rotation * Vec3::z())));
                 let at = Point3::from(small(&frame.translation.vector));
-                match closure.kind() {
-                    ClosureKind::Hinge => joint(at, axis, REVOLUTE_COLOR),
-                    ClosureKind::Slider => joint(at, axis, PRISMATIC_COLOR),
-                    ClosureKind::Point | ClosureKind::Weld => joint(at, None, SPHERICAL_COLOR),
+                match loop_joint.kind() {
+                    LoopJointKind::Revolute => joint(at, axis, REVOLUTE_COLOR),
+                    LoopJointKind::Prismatic => joint(at, axis, PRISMATIC_COLOR),
+                    LoopJointKind::Spherical | LoopJointKind::Fixed => joint(at, None, SPHERICAL_COLOR),
                 }
             }
         }
@@ -198,7 +199,7 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
 /// Returns a color for each dynamic object: the same for all objects of an island. Objects without contact and joint are gray.
 pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moves = |id: ObjectId| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic);
-    let closures = world.ids().iter().filter_map(|&id| world.get::<Closure>(id)).filter_map(|c| {
+    let loop_joints = world.ids().iter().filter_map(|&id| world.get::<LoopJoint>(id)).filter_map(|c| {
         let [a, b] = c.sides();
         Some((a.part?.0, b.part?.0))
     });
@@ -207,7 +208,7 @@ pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moving: Vec<ObjectId> = world.ids().iter().copied().filter(|&id| moves(id)).collect();
     let index: BTreeMap<ObjectId, u32> = moving.iter().copied().zip(0..).collect();
     let mut sets = UnionFind::new(moving.len());
-    for (a, b) in contacts.chain(closures) {
+    for (a, b) in contacts.chain(loop_joints) {
         if let (Some(&a), Some(&b)) = (index.get(&a), index.get(&b)) {
             sets.union(a, b);
         }
@@ -228,9 +229,12 @@ const REST_SPEED: f64 = 5e-3;
 /// Blue-grey for each dynamic object that sleeps, olive for those that stand still awake, orange for those that move.
 pub(super) fn sleep_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moving = world.ids().iter().copied().filter(|&id| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic));
-    let parts = |id| (0..).map_while(move |part| world.site(id, part));
-    let still =
-        |id| parts(id).all(|site| site.velocity.norm() < REST_SPEED && site.angular_velocity.norm() < REST_SPEED);
+    let parts = |id| (0..).map_while(move |part| world.part_state(id, part));
+    let still = |id| {
+        parts(id).all(|part_state| {
+            part_state.velocity.norm() < REST_SPEED && part_state.angular_velocity.norm() < REST_SPEED
+        })
+    };
     let color = |id| match (world.asleep(id), still(id)) {
         (true, _) => [0.32, 0.42, 0.60],
         (_, true) => [0.50, 0.58, 0.30],
@@ -255,12 +259,14 @@ fn trees(world: &World, list: &mut DrawList, level: u32) {
     for &id in world.ids() {
         let Some(collidable) = world.object(id).and_then(|o| o.collidable()) else { continue };
         for part in 0..collidable.parts() {
-            let (Some(site), Some(tree)) = (world.site(id, part), collidable.shape(part).and_then(Shape::tree)) else {
+            let (Some(part_state), Some(tree)) =
+                (world.part_state(id, part), collidable.shape(part).and_then(Shape::tree))
+            else {
                 continue;
             };
             let shown = tree.nodes().iter().filter(|n| n.level == level || (n.is_leaf() && n.level < level));
             for (node, color) in shown.zip(SHELL_COLORS.iter().cycle()) {
-                let center = site.pose * nalgebra::Point3::from(node.center);
+                let center = part_state.pose * nalgebra::Point3::from(node.center);
                 list.shell(
                     Point3::from(small(&center.coords)),
                     node.radius as f32,

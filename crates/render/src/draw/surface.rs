@@ -1,10 +1,10 @@
 //! Looks, as objects and scene files give them, made materials.
 
 use crate::{Material, Pattern};
-use tumble_core::Look;
+use tumble_core::Appearance;
 
 /// The material of a look. A ball's number is the one at the end of the body's name (`ball_12`); none leaves the spots blank.
-pub(super) fn of_appearance(appearance: &Look, name: &str) -> Material {
+pub(super) fn of_appearance(appearance: &Appearance, name: &str) -> Material {
     let mut numbers = Numbers { second: [1.0; 3], scale_m: 0.1, offset_m: 0.0, name };
     let mut clearcoat = 0.0;
     // of equal names the first counts
@@ -31,7 +31,7 @@ pub(super) fn of_appearance(appearance: &Look, name: &str) -> Material {
 }
 
 /// The material of a look in a scene file.
-pub(super) fn of_spec(appearance: &tumble_scene::Look) -> Material {
+pub(super) fn of_spec(appearance: &tumble_scene::Appearance) -> Material {
     let numbers = Numbers {
         second: appearance.second_color.map(|c| c as f32),
         scale_m: appearance.pattern_scale_m as f32,

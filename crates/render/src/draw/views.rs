@@ -33,15 +33,17 @@ impl DrawList {
     pub fn views(&self, world: &World) -> Vec<NamedView> {
         let mut out = vec![NamedView { name: SCENE.into(), camera: self.camera }];
         for &id in world.ids() {
-            let Some(object) = world.object(id).filter(|_| world.status(id).is_some_and(|s| s.alive)) else { continue };
+            let Some(object) = world.object(id).filter(|_| world.status(id).is_some_and(|s| s.enabled)) else {
+                continue;
+            };
             for mount in object.camera().map_or(&[][..], |c| c.cameras()) {
-                let Some(site) = world.site(id, mount.part) else { continue };
+                let Some(part_state) = world.part_state(id, mount.part) else { continue };
                 let name = if mount.name.is_empty() {
                     object.name().to_string()
                 } else {
                     format!("{}/{}", object.name(), mount.name)
                 };
-                out.push(NamedView { name, camera: seen_from(mount, &(site.pose * mount.pose)) });
+                out.push(NamedView { name, camera: seen_from(mount, &(part_state.pose * mount.pose)) });
             }
         }
         out

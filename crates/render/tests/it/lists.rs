@@ -337,7 +337,7 @@ fn a_mesh_is_drawn_in_the_frame_of_its_file() {
     let id = world.find("cube").expect("the cube");
     let pose = world.pose(id, 0).expect("its pose");
     assert!((pose.translation.vector - Vector3::new(3.0, -2.0, 5.0)).norm() < 1e-14, "{pose}");
-    let center = world.site(id, 0).expect("its site").position();
+    let center = world.part_state(id, 0).expect("its site").position();
     assert!((center - Vector3::new(2.5, -1.5, 5.5)).norm() < 1e-14, "a quarter turn takes (½, ½, ½) to (-½, ½, ½)");
     let list = Drawing::new(&scene).list(&world, &DebugDraw::default()).expect("a list");
     let instance = &list.instances[0];

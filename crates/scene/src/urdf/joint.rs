@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use tumble_core::Joint;
-use tumble_core::articulated::Freedom;
+use tumble_core::articulated::DofSettings;
 use tumble_core::collide::{Pose, Vec3};
 
 use super::link::read_origin;
@@ -45,7 +45,7 @@ pub(crate) struct JointElement {
     pub(crate) placement: Pose,
     /// Unit axis; the normal of a planar joint.
     pub(crate) axis: Vec3,
-    pub(crate) freedom: Freedom,
+    pub(crate) freedom: DofSettings,
     pub(crate) effort: Option<f64>,
     pub(crate) speed: Option<f64>,
     pub(crate) mimic: Option<Mimic>,
@@ -106,7 +106,7 @@ impl JointElement {
 
     /// A joint with this one's constants.
     pub(crate) fn with_effects(&self, joint: JointSpec) -> JointSpec {
-        let freedom = if joint.kind == Joint::Fixed { Freedom::default() } else { self.freedom.clone() };
+        let freedom = if joint.kind == Joint::Fixed { DofSettings::default() } else { self.freedom.clone() };
         JointSpec { freedom, effort: self.effort, speed: self.speed, ..joint }
     }
 }
@@ -156,7 +156,7 @@ fn read_axis(joint: &Element<'_, '_>) -> Vec3 {
 }
 
 /// `<limit>` and `<dynamics>`: what acts, effort, speed.
-fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (Freedom, Option<f64>, Option<f64>) {
+fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (DofSettings, Option<f64>, Option<f64>) {
     let bounded = matches!(kind, Kind::Revolute | Kind::Prismatic);
     let limit = match bounded {
         true => joint.required(
@@ -179,7 +179,7 @@ fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (Freedom, Option<f64>, Op
     let open = lower == f64::NEG_INFINITY && upper == f64::INFINITY;
     let limits = (bounded && limit.is_some() && !open).then_some([lower, upper]);
     (
-        Freedom { limits, damping: constant("damping"), friction: constant("friction"), ..Freedom::default() },
+        DofSettings { limits, damping: constant("damping"), friction: constant("friction"), ..DofSettings::default() },
         most("effort"),
         most("velocity"),
     )

@@ -51,7 +51,7 @@ pub use spheres::{LinkSpheres, SphereOptions, SphereRobot, spherize};
 use joint::JointElement;
 use link::{Context, LinkElement, read_color};
 use tree::TreeBuilder;
-use tumble_core::articulated::{ArticulatedBody, Freedom, LinkMass, MOST_LINKS, Model, ModelError};
+use tumble_core::articulated::{ArticulatedBody, DofSettings, LinkMass, MAX_LINKS, Model, ModelError};
 use xml::Element;
 
 /// Most bytes of a URDF: 64 MiB.
@@ -167,7 +167,7 @@ pub struct UrdfModel {
     /// Names of its joints, one for each of [`Model::links`]: in the order of the coordinates. That of a floating root is the root link's.
     pub joints: Vec<String>,
     /// Limits, damping and dry friction of its degrees of freedom, in the order of the velocities.
-    pub freedoms: Vec<Freedom>,
+    pub freedoms: Vec<DofSettings>,
     /// What is to be said of the file.
     pub notes: Vec<String>,
 }
@@ -291,8 +291,8 @@ fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot
         names.insert(link.name.clone(), number);
         note_unique(robot.log, &mut taken, "link", &link.name, &link.span);
     }
-    if elements.is_empty() || elements.len() > MOST_LINKS {
-        robot.problem(format_args!("has {} links", elements.len()), format!("wanted 1 to {MOST_LINKS}"));
+    if elements.is_empty() || elements.len() > MAX_LINKS {
+        robot.problem(format_args!("has {} links", elements.len()), format!("wanted 1 to {MAX_LINKS}"));
         return None;
     }
     let joints: Vec<JointElement> =

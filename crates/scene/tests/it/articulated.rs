@@ -54,7 +54,7 @@ fn the_example_of_every_key_means_what_it_says() {
     assert_eq!(crane.links[first].placement.translation.vector, Vec3::new(0.0, 0.0, -0.15));
     assert!((first + 1..=last).all(|k| crane.links[k].parent == Some(k - 1)));
     assert!((first + 1..=last).all(|k| crane.links[k].placement.translation.vector == Vec3::new(0.0, 0.0, -0.06)));
-    assert_eq!(crane.keep_apart, [[0, last]]);
+    assert_eq!(crane.exclude_collisions, [[0, last]]);
     assert_ne!(crane.links[first].shapes[0].surface.look.color, crane.links[first + 1].shapes[0].surface.look.color);
 
     let LinkMassSpec::Given(hook) = link("hook").mass else { panic!("the hook's mass is given") };

@@ -2,7 +2,7 @@
 
 use tumble_core::articulated::{ArticulatedBody, Drive};
 use tumble_core::collide::Vec3;
-use tumble_core::{Closure, World};
+use tumble_core::{LoopJoint, World};
 use tumble_scene::SceneFile;
 
 fn world(text: &str) -> (World, Vec<String>) {
@@ -27,15 +27,15 @@ fn the_example_of_every_key_becomes_a_world_that_steps() {
     let rope = 20.0 * 1200.0 * std::f64::consts::PI * (4e-6 + 4.0 / 3.0 * 1e-6);
     assert!((crane.model().mass() - (40.0 + 72.0 + 5.0 + 2.0 + 0.3 + 0.5 + rope)).abs() < 1e-9);
     // base turned by 90° about z, jib by 0.3, trolley 1 m out
-    let at = world.site(world.find("crane").unwrap(), 1).unwrap().position();
+    let at = world.part_state(world.find("crane").unwrap(), 1).unwrap().position();
     let out = Vec3::new(-0.3_f64.sin(), 0.3_f64.cos(), 0.0);
     assert!((at - (out + Vec3::new(0.0, 0.0, 2.0))).norm() < 1e-12, "{at:?}");
     let sling = world.find("sling").unwrap();
-    assert!(world.get::<Closure>(sling).unwrap().misfit(&world.view()).unwrap().distance < 1e-12);
+    assert!(world.get::<LoopJoint>(sling).unwrap().position_error(&world.view()).unwrap().distance < 1e-12);
     for _ in 0..20 {
         world.step().unwrap();
     }
-    assert!(world.get::<Closure>(sling).unwrap().misfit(&world.view()).unwrap().distance < 1e-4);
+    assert!(world.get::<LoopJoint>(sling).unwrap().position_error(&world.view()).unwrap().distance < 1e-4);
 }
 
 #[test]
@@ -109,8 +109,9 @@ fn closures_of_every_kind_join_links_bodies_and_the_world() {
             world.step().unwrap();
         }
         for name in ["c", "w"] {
-            let misfit = world.get::<Closure>(world.find(name).unwrap()).unwrap().misfit(&world.view()).unwrap();
-            assert!(misfit.distance < 1e-4 && misfit.angle < 1e-4, "{kind} {name}: {misfit:?}");
+            let position_error =
+                world.get::<LoopJoint>(world.find(name).unwrap()).unwrap().position_error(&world.view()).unwrap();
+            assert!(position_error.distance < 1e-4 && position_error.angle < 1e-4, "{kind} {name}: {position_error:?}");
         }
     }
 }
@@ -129,12 +130,12 @@ fn a_urdf_in_a_scene_takes_its_start_and_drives_from_the_scene() {
     let (world, _) = SceneFile::parse(&text(keys), &name).unwrap().build().unwrap();
     let arm = body(&world, "arm");
     assert_eq!(
-        arm.freedoms()[0].drive,
+        arm.dofs()[0].drive,
         Drive::Position { stiffness: 20.0, damping: 0.0, target: 0.5, velocity: 0.0, limit: 7.0 }
     );
-    assert_eq!(arm.freedoms()[0].limits, Some([-1.0, 1.0]));
+    assert_eq!(arm.dofs()[0].limits, Some([-1.0, 1.0]));
     assert_eq!(world.state_of(world.find("arm").unwrap()).unwrap(), [0.5, 0.0]);
-    assert_eq!(world.site(world.find("arm").unwrap(), 0).unwrap().position(), Vec3::new(0.0, 0.0, 3.0));
+    assert_eq!(world.part_state(world.find("arm").unwrap(), 0).unwrap().position(), Vec3::new(0.0, 0.0, 3.0));
 
     let lines = |keys: &str| SceneFile::parse(&text(keys), &name).unwrap_err().to_string().replace(&name, "s");
     assert_eq!(

@@ -45,7 +45,7 @@ fn the_word_decides_what_touches() {
             world.step().unwrap();
         });
         let id = world.find("ball").unwrap();
-        world.site(id, 0).unwrap().position().z
+        world.part_state(id, 0).unwrap().position().z
     };
     let (surface, spheres) = (rests("contacts = \"surface\""), rests("contacts = \"spheres\""));
     // between the ball through the vertices and the one through the middles of the faces

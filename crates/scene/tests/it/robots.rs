@@ -74,11 +74,11 @@ fn joints_are_those_of_the_files() {
                 Joint::Revolute { axis } | Joint::Prismatic { axis } => axis,
                 _ => panic!("{name}: {joint} is a {:?}", link.joint),
             };
-            let limits = body.freedoms()[link.v].limits.unwrap();
+            let limits = body.dofs()[link.v].limits.unwrap();
             let dynamics = same.dynamics.clone().unwrap_or_default();
             assert_eq!(axis.as_slice(), same.axis.xyz.0, "{name}: {joint}");
             assert_eq!(limits, [same.limit.lower, same.limit.upper], "{name}: {joint}");
-            assert_eq!(body.freedoms()[link.v].damping, dynamics.damping, "{name}: {joint}");
+            assert_eq!(body.dofs()[link.v].damping, dynamics.damping, "{name}: {joint}");
         }
     }
     std::fs::remove_dir_all(&folder).unwrap();
@@ -123,7 +123,7 @@ pub fn urdf_files(folder: &Path) -> Vec<PathBuf> {
 fn a_panda_falls_into_its_limits_and_stays_whole() {
     let Some(robots) = robots() else { return };
     let (body, _) = load(robots.join(ROBOTS[0].1), &UrdfOptions::default()).unwrap();
-    let limits: Vec<[f64; 2]> = body.freedoms().iter().map(|f| f.limits.unwrap()).collect();
+    let limits: Vec<[f64; 2]> = body.dofs().iter().map(|f| f.limits.unwrap()).collect();
     let middle: Vec<f64> = limits.iter().map(|[lower, upper]| 0.5 * (lower + upper)).collect();
     let body = body.with_positions(&middle).unwrap();
     let mut world = World::new(Settings { dt: 1.0 / 240.0, ..Settings::default() }).unwrap();

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tumble_core::articulated::Freedom;
+use tumble_core::articulated::DofSettings;
 use tumble_core::collide::{Mat3, Shape, TriMesh, Vec3};
 use tumble_core::{Drawn, Joint, Object};
 use tumble_scene::urdf::{CollisionMeshes, MissingMeshes, UrdfModel, UrdfOptions, load, parse_model};
@@ -93,13 +93,16 @@ fn an_arm_is_a_body_with_what_acts_on_it() {
     let folder = Folder::new("arm");
     let (body, notes) = load(folder.write("arm.urdf", ARM), &UrdfOptions::default()).unwrap();
     assert_eq!(notes, Vec::<String>::new());
-    let [shoulder, slide, wheel] = body.freedoms() else { panic!() };
-    assert_eq!(*shoulder, Freedom { limits: Some([-1.5, 2.0]), damping: 0.25, friction: 0.5, ..Freedom::default() });
+    let [shoulder, slide, wheel] = body.dofs() else { panic!() };
+    assert_eq!(
+        *shoulder,
+        DofSettings { limits: Some([-1.5, 2.0]), damping: 0.25, friction: 0.5, ..DofSettings::default() }
+    );
     assert_eq!(slide.limits, Some([0.0, 0.2]));
-    assert_eq!(*wheel, Freedom::default());
+    assert_eq!(*wheel, DofSettings::default());
     let visuals = body.renderable().unwrap().visuals();
     assert_eq!(visuals.len(), 1);
-    assert_eq!(visuals[0].look.color, [0.8, 0.1, 0.1]);
+    assert_eq!(visuals[0].appearance.color, [0.8, 0.1, 0.1]);
     // links, base, then colliders in the order of the file: plate, sphere, capsule
     let collidable = body.collidable().unwrap();
     assert_eq!(collidable.parts(), 3 + 1 + 3);
@@ -330,7 +333,7 @@ fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
         load(folder.write("r.urdf", &text), &UrdfOptions { floating: true, ..UrdfOptions::default() }).unwrap();
     let first = body.model().links().len() + 1;
     let collidable = body.collidable().unwrap();
-    let meet = |a: usize, b: usize| collidable.parts_meet(first + a, first + b);
+    let meet = |a: usize, b: usize| collidable.parts_collide(first + a, first + b);
     // 0.2 m between second neighbours: b reaches 0.12 and d 0.09, the others 0.04
     assert!(!meet(0, 1) && !meet(1, 2) && !meet(2, 3) && !meet(3, 4), "joined, one pair through a stack");
     assert!(!meet(2, 4), "overlap");

@@ -175,7 +175,7 @@ fn a_world_that_is_only_drawn_builds_no_tree_and_no_field() {
         built += shapes(&stepped).filter(|shape| shape.is_built()).count();
         assert_eq!(shapes(&stepped).count(), shapes(&drawn).count());
         assert!(!shapes(&drawn).any(Shape::is_built), "{}", scene.file);
-        let poses = |world: &World| -> Vec<_> { world.sites().iter().map(|site| site.pose).collect() };
+        let poses = |world: &World| -> Vec<_> { world.part_states().iter().map(|site| site.pose).collect() };
         assert_eq!(poses(&stepped), poses(&drawn), "{}", scene.file);
     }
     assert!(built > 0, "scenes with meshes are among them");

@@ -52,7 +52,7 @@ impl Bodies {
         let mut bodies = Bodies::default();
         for (k, user) in viewer.users.iter().enumerate() {
             let mut add = |name: String, shape: Shape, pose: Pose, drawn: bool| {
-                let body = RigidBody::fixture(name, shape).at(pose);
+                let body = RigidBody::fixed(name, shape).at(pose);
                 // the capsule is not drawn: the user stands in it
                 let body = if drawn { body } else { body.drawn_as(Vec::new()) };
                 world.add_boxed(Box::new(body), Mode::Kinematic).map_err(|e| failed(&e))

@@ -111,7 +111,7 @@ fn joined_hash(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
         [&f.warp_file, &f.blend_file].into_iter().for_each(|file| put(&file.as_deref().map_or([0; 32], content)));
     }
     let textures: std::collections::BTreeSet<_> =
-        world.visuals().filter_map(|visual| visual.look.texture.clone()).collect();
+        world.visuals().filter_map(|visual| visual.appearance.texture.clone()).collect();
     // by names of files, as the scene's hash has them: folders differ between machines
     let mut textures: Vec<_> =
         textures.iter().map(|path| (path.file_name().unwrap_or_default().as_encoded_bytes(), content(path))).collect();

@@ -7,7 +7,7 @@ use super::bodies::{Bodies, Hand};
 use crate::failure::Failure;
 use std::collections::BTreeMap;
 use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::{ObjectId, Pull, World, WorldError};
+use tumble::dynamics::{ObjectId, PickForce, World, WorldError};
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{Input, Viewer};
 use tumble::scene::cave::{Cave, Screen};
@@ -60,7 +60,7 @@ pub struct Users {
 
 /// What a wand holds.
 struct Held {
-    pull: Pull,
+    pull: PickForce,
     /// From the wand's origin, along its ray, m.
     distance: f64,
 }
@@ -108,7 +108,7 @@ impl Users {
             }
             if let Some(held) = self.held.get_mut(&device) {
                 held.pull.target = origin + direction * held.distance;
-                world.pull(&held.pull).map_err(failed)?;
+                world.pick(&held.pull).map_err(failed)?;
             }
         }
         self.bodies.follow(&self.viewer, |user| self.hands(user), world, dt).map_err(failed)
@@ -170,13 +170,13 @@ fn grasp(world: &World, bodies: &Bodies, origin: &Vec3, direction: &Vec3) -> Opt
     let mut first: Option<(ObjectId, usize, f64)> = None;
     for &id in world.ids().iter().filter(|id| !bodies.has(**id)) {
         let Some(renderable) =
-            world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.alive))
+            world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.enabled))
         else {
             continue;
         };
         for visual in renderable.visuals() {
-            let Some(site) = world.site(id, visual.part) else { continue };
-            let Some(distance) = visual.ray(&site.pose, origin, direction) else { continue };
+            let Some(part_state) = world.part_state(id, visual.part) else { continue };
+            let Some(distance) = visual.ray(&part_state.pose, origin, direction) else { continue };
             if first.is_none_or(|(_, _, nearest)| distance < nearest) {
                 first = Some((id, visual.part, distance));
             }
@@ -184,8 +184,8 @@ fn grasp(world: &World, bodies: &Bodies, origin: &Vec3, direction: &Vec3) -> Opt
     }
     let (id, part, distance) = first?;
     let moves = world.status(id)?.moves() && world.object(id)?.collidable().is_some_and(|c| c.part_moves(part));
-    let site = world.site(id, part).filter(|_| moves)?;
+    let part_state = world.part_state(id, part).filter(|_| moves)?;
     let target = origin + direction * distance;
-    let point = site.pose.rotation.inverse() * (target - site.position());
-    Some(Held { pull: Pull { id, part, point, target, frequency: PULL_RAD_PER_S }, distance })
+    let point = part_state.pose.rotation.inverse() * (target - part_state.position());
+    Some(Held { pull: PickForce { id, part, point, target, frequency: PULL_RAD_PER_S }, distance })
 }

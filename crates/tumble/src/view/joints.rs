@@ -4,7 +4,7 @@
 //! The drives hold all joints with sliders: critically damped, of [`FREQUENCY`] in proportion to the inertia that the joint moves at that moment (the
 //! diagonal of the mass matrix), within the joint's effort.
 
-use tumble::dynamics::articulated::{ArticulatedBody, Drive, Freedom, Kinematics, MassMatrix};
+use tumble::dynamics::articulated::{ArticulatedBody, DofSettings, Drive, Kinematics, MassMatrix};
 use tumble::dynamics::{ObjectId, World, WorldError};
 use tumble::render::Slider;
 use tumble::scene::SceneFile;
@@ -47,7 +47,7 @@ impl Joints {
             let Some(id) = world.find(&spec.name) else { continue };
             let Some(body) = world.get::<ArticulatedBody>(id) else { continue };
             let place = |link: usize| {
-                let freedom = body.freedom_of(&spec.links[link].name)?;
+                let freedom = body.dof_of(&spec.links[link].name)?;
                 Some((freedom, body.position_of(freedom)?))
             };
             for (number, link) in spec.links.iter().enumerate().filter(|(_, link)| link.joint.mimic.is_none()) {
@@ -153,9 +153,9 @@ impl Joints {
                 None => joint.own.clone(),
             };
             if let Some(body) = world.get_mut::<ArticulatedBody>(joint.body) {
-                let freedom = Freedom { drive, ..body.freedoms()[joint.freedom].clone() };
+                let freedom = DofSettings { drive, ..body.dofs()[joint.freedom].clone() };
                 // gains and targets are finite and positive; a joint that refuses them keeps what it has
-                let _ = body.set_freedom(joint.freedom, freedom);
+                let _ = body.set_dof(joint.freedom, freedom);
             }
         }
     }

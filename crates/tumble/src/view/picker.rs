@@ -2,7 +2,7 @@
 
 use super::view_mode::Ray;
 use tumble::collide::Vec3;
-use tumble::dynamics::{ObjectId, Pull, World, WorldError};
+use tumble::dynamics::{ObjectId, PickForce, World, WorldError};
 use tumble::render::{DebugStyle, DrawList};
 
 /// Frequency of the spring, rad/s: the hand has what it pulls after a third of a second, and what hangs from it is 4 cm below.
@@ -10,7 +10,7 @@ pub const FREQUENCY: f64 = 15.0;
 
 /// What is held, and where it is wanted.
 pub struct Picker {
-    pull: Pull,
+    pull: PickForce,
     /// Depth along the line of sight at which the hand is, m.
     depth_m: f64,
 }
@@ -20,11 +20,11 @@ impl Picker {
     pub fn pick(world: &World, ray: &Ray) -> Option<Picker> {
         let (id, part, distance) = first_seen(world, ray)?;
         let moves = world.status(id)?.moves() && world.object(id)?.collidable().is_some_and(|c| c.part_moves(part));
-        let site = world.site(id, part).filter(|_| moves)?;
+        let part_state = world.part_state(id, part).filter(|_| moves)?;
         let target = ray.origin + ray.direction * distance;
-        let point = site.pose.rotation.inverse() * (target - site.position());
+        let point = part_state.pose.rotation.inverse() * (target - part_state.position());
         Some(Picker {
-            pull: Pull { id, part, point, target, frequency: FREQUENCY },
+            pull: PickForce { id, part, point, target, frequency: FREQUENCY },
             depth_m: distance * ray.direction.dot(&ray.axis),
         })
     }
@@ -44,13 +44,13 @@ impl Picker {
 
     /// Pulls during the next step.
     pub fn pull(&self, world: &mut World) -> Result<(), WorldError> {
-        world.pull(&self.pull).map(drop)
+        world.pick(&self.pull).map(drop)
     }
 
     /// Whose body it is, the point that is held, and where it is wanted, world axes, m.
     pub fn picked(&self, world: &World) -> Option<(String, Vec3, Vec3)> {
-        let site = world.site(self.pull.id, self.pull.part)?;
-        let point = site.pose.rotation * self.pull.point + site.position();
+        let part_state = world.part_state(self.pull.id, self.pull.part)?;
+        let point = part_state.pose.rotation * self.pull.point + part_state.position();
         Some((world.object(self.pull.id)?.name().to_string(), point, self.pull.target))
     }
 
@@ -70,13 +70,13 @@ fn first_seen(world: &World, ray: &Ray) -> Option<(ObjectId, usize, f64)> {
     let mut first: Option<(ObjectId, usize, f64)> = None;
     for &id in world.ids() {
         let Some(renderable) =
-            world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.alive))
+            world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.enabled))
         else {
             continue;
         };
         for visual in renderable.visuals() {
-            let Some(site) = world.site(id, visual.part) else { continue };
-            let Some(distance) = visual.ray(&site.pose, &ray.origin, &ray.direction) else { continue };
+            let Some(part_state) = world.part_state(id, visual.part) else { continue };
+            let Some(distance) = visual.ray(&part_state.pose, &ray.origin, &ray.direction) else { continue };
             if first.is_none_or(|(_, _, nearest)| distance < nearest) {
                 first = Some((id, visual.part, distance));
             }

@@ -24,7 +24,7 @@ fn height(world: &World, name: &str) -> f64 {
 }
 
 fn place(world: &World, name: &str) -> Vec3 {
-    world.site(world.find(name).unwrap(), 0).unwrap().position()
+    world.part_state(world.find(name).unwrap(), 0).unwrap().position()
 }
 
 /// How far the joints of a body are past their limits, rad.
@@ -32,7 +32,7 @@ fn past_limits(world: &World, name: &str) -> f64 {
     let (body, q, _) = body(world, name);
     let links = body.model().links().iter().filter(|link| link.joint.dof() == 1);
     links
-        .filter_map(|link| body.freedoms()[link.v].limits.map(|[lo, hi]| (lo - q[link.q]).max(q[link.q] - hi)))
+        .filter_map(|link| body.dofs()[link.v].limits.map(|[lo, hi]| (lo - q[link.q]).max(q[link.q] - hi)))
         .fold(f64::MIN, f64::max)
 }
 
@@ -137,7 +137,7 @@ fn robot_follows_its_recording_within_its_torques_and_moves_the_blocks_as_its_pa
         deepest = deepest.max(world.step().unwrap().max_penetration);
         past = past.max(past_limits(&world, "arm"));
         let (arm, q, v) = body(&world, "arm");
-        for (i, freedom) in arm.freedoms().iter().enumerate() {
+        for (i, freedom) in arm.dofs().iter().enumerate() {
             let Drive::Playback { motion, limit } = &freedom.drive else { panic!("joint {i} has no recording") };
             assert_eq!(*limit, efforts[i]);
             off = off.max((q[i] - motion.at(world.time()).0).abs());
@@ -147,7 +147,7 @@ fn robot_follows_its_recording_within_its_torques_and_moves_the_blocks_as_its_pa
         let qdd: Vec<f64> = v.iter().zip(&before).map(|(a, b)| (a - b) / h).collect();
         inverse_dynamics(arm.model(), (&mut kin, &mut work), &Vec3::new(0.0, 0.0, -G), q, v, &qdd, &[], &mut torque);
         for i in 0..6 {
-            used[i] = used[i].max((torque[i] + arm.freedoms()[i].damping * v[i]).abs() / efforts[i]);
+            used[i] = used[i].max((torque[i] + arm.dofs()[i].damping * v[i]).abs() / efforts[i]);
         }
         for (seconds, wanted) in [(3.75, Vec3::new(0.445, -0.33, 0.012)), (9.25, Vec3::new(0.37, 0.064, 0.012))] {
             if frame == (seconds / h).round() as usize {

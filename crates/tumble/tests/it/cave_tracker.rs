@@ -67,7 +67,7 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
     assert_eq!(server.facet.viewer().users[0].head.translation.vector, Vec3::new(0.0, 0.0, 1.5));
     let hand = |server: &Server, side: &str| {
         let world = server.facet.world();
-        world.site(world.find(&format!("user 0 {side} hand")).unwrap(), 0).unwrap().position()
+        world.part_state(world.find(&format!("user 0 {side} hand")).unwrap(), 0).unwrap().position()
     };
     // a quarter turn to the left about z, half a metre to the right; both hands beside the ball, in one bundle
     let half = std::f32::consts::FRAC_1_SQRT_2;
@@ -157,7 +157,7 @@ fn keys_stretch_out_a_hand() {
     let mut server = Server::start(&folder, &scene, &cave, &["--push"]);
     let right = |server: &Server| {
         let world = server.facet.world();
-        world.site(world.find("user 0 right hand").unwrap(), 0).unwrap().position()
+        world.part_state(world.find("user 0 right hand").unwrap(), 0).unwrap().position()
     };
     server.show_until(5, |_| {});
     assert!((right(&server) - Vec3::new(0.15, 0.0, 0.8)).norm() < 1e-4);

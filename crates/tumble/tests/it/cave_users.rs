@@ -181,7 +181,7 @@ impl Server {
 
     pub fn ball(&self) -> Vec3 {
         let world = self.facet.world();
-        world.site(world.find("ball").unwrap(), 0).unwrap().position()
+        world.part_state(world.find("ball").unwrap(), 0).unwrap().position()
     }
 
     fn cave(&self) -> Vec3 {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 use tumble::collide::Vec3;
-use tumble::dynamics::{ArticulatedBody, Site, World};
+use tumble::dynamics::{ArticulatedBody, PartState, World};
 use tumble::scene::{SceneFile, resolve_scene};
 
 const G: f64 = 9.81;
@@ -16,14 +16,14 @@ fn build(scene: &SceneFile) -> World {
 }
 
 /// A link's frame: its joint.
-fn link<'w>(world: &'w World, object: &str, link: &str) -> &'w Site {
+fn link<'w>(world: &'w World, object: &str, link: &str) -> &'w PartState {
     let id = world.find(object).unwrap();
     let index = world.get::<ArticulatedBody>(id).unwrap().model().link(link).unwrap();
-    world.site(id, index).unwrap()
+    world.part_state(id, index).unwrap()
 }
 
-fn turned(site: &Site, v: Vec3) -> Vec3 {
-    site.pose.rotation * v
+fn turned(part_state: &PartState, v: Vec3) -> Vec3 {
+    part_state.pose.rotation * v
 }
 
 /// Complete elliptic integral of the first kind of modulus `k`, by the arithmetic-geometric mean.
@@ -41,9 +41,9 @@ fn period(reduced_length: f64, amplitude_deg: f64) -> f64 {
 }
 
 /// Angle of a hanging link about +y, rad, and its rate.
-fn swing(site: &Site) -> (f64, f64) {
-    let down = turned(site, -Vec3::z());
-    ((-down.x).atan2(-down.z), site.angular_velocity.y)
+fn swing(part_state: &PartState) -> (f64, f64) {
+    let down = turned(part_state, -Vec3::z());
+    ((-down.x).atan2(-down.z), part_state.angular_velocity.y)
 }
 
 /// Where the cubic through two states `(θ, θ̇)`, `h` apart, is 0; as a part of `h`.
@@ -148,11 +148,11 @@ fn ring(k: usize) -> String {
 
 /// Moment of gravity about the hook on the chain and the ball, N·m.
 fn weight_moment(world: &World) -> Vec3 {
-    let ball = world.site(world.find("ball").unwrap(), 0).unwrap().position();
+    let ball = world.part_state(world.find("ball").unwrap(), 0).unwrap().position();
     let mut moment = (ball - HOOK) * 6.0;
     for k in 0..32 {
-        let site = link(world, "chain", &ring(k));
-        moment += (site.position() + turned(site, Vec3::new(0.0, 0.0, -0.046)) - HOOK) * 0.2;
+        let part_state = link(world, "chain", &ring(k));
+        moment += (part_state.position() + turned(part_state, Vec3::new(0.0, 0.0, -0.046)) - HOOK) * 0.2;
     }
     moment.cross(&Vec3::new(0.0, 0.0, -G))
 }
@@ -176,7 +176,7 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
         let energy = world.energy().total();
         rise = rise.max(energy - before);
         before = energy;
-        let x = world.site(ball, 0).unwrap().position();
+        let x = world.part_state(ball, 0).unwrap().position();
         landed |= x.z < 0.26;
         if !landed {
             off = off.max((about_hook(&world) - expected).norm());
@@ -202,8 +202,8 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
     assert!(open < 1e-12, "joints open by {open:e} m");
     assert!(rise < 1e-12 * start, "energy rises by {rise:e} J in a frame");
     assert!(off < 1e-3 * begin, "the moment about the hook is off by {off:e} N·m·s");
-    let away =
-        (0..32).map(|k| (link(&world, "chain", &ring(k)).position() - world.site(ball, 0).unwrap().position()).norm());
+    let away = (0..32)
+        .map(|k| (link(&world, "chain", &ring(k)).position() - world.part_state(ball, 0).unwrap().position()).norm());
     assert!(away.fold(f64::INFINITY, f64::min) > 0.5, "the ball has come off the chain");
 }
 
@@ -240,7 +240,7 @@ fn piston_follows_the_slider_crank_formula_without_drift() {
                 open = open.max((end - piston - Vec3::new(0.0, end.y - piston.y, 0.0)).norm());
             }
         }
-        let method = world.methods().0;
+        let method = world.stepper_name();
         println!(
             "{method}, {seconds} s: pistons off by {off:?} m in each half, rods by {open:e} m, crank by {late:?} rad"
         );

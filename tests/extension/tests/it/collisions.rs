@@ -90,7 +90,7 @@ fn a_bead_at_the_lowest_point_swaps_velocities_with_a_ball() {
 fn a_particle_lands_and_rests() {
     for stepper in STEPPERS {
         let mut world = world(stepper, true);
-        world.add_static(RigidBody::fixture("ground", Shape::half_space())).unwrap();
+        world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
         let id =
             world.add(Particle::new("particle", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.0, 0.5), Vec3::zeros())).unwrap();
         step(&mut world, 240);
@@ -110,7 +110,7 @@ fn new_kinds_are_saved_and_restored() {
     for stepper in STEPPERS {
         let build = || {
             let mut world = world(stepper, true);
-            world.add_static(RigidBody::fixture("ground", Shape::half_space()).surface(0.5, 0.3)).unwrap();
+            world.add_static(RigidBody::fixed("ground", Shape::half_space()).surface(0.5, 0.3)).unwrap();
             world
                 .add(
                     Particle::new("particle", 2.0, sphere(0.1))

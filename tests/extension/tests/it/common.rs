@@ -26,11 +26,11 @@ pub fn step(world: &mut World, frames: usize) {
 }
 
 pub fn position(world: &World, id: ObjectId) -> Vec3 {
-    world.site(id, 0).unwrap().position()
+    world.part_state(id, 0).unwrap().position()
 }
 
 pub fn velocity(world: &World, id: ObjectId) -> Vec3 {
-    world.site(id, 0).unwrap().velocity
+    world.part_state(id, 0).unwrap().velocity
 }
 
 /// Runs for `seconds` and returns the mean period of `x` of an object, from its first to its last rise through 0 (interpolated), and the

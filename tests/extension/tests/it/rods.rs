@@ -132,7 +132,7 @@ fn all_solvers_agree_on_equality_rows() {
             world
         };
         let first = run(NAMES[0]);
-        assert!(first.sites().iter().all(|s| s.velocity.norm() > 0.1), "they swing");
+        assert!(first.part_states().iter().all(|s| s.velocity.norm() > 0.1), "they swing");
         for solver in &NAMES[1..] {
             let other = run(solver);
             let apart = first.state().iter().zip(other.state()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

@@ -2,12 +2,12 @@
 
 use super::{Bodies, FAR, Random, Solved, UP, distance, free, solve};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, Islands, LcpPyramid, LcpSliding, RowSolver, residual};
+use crate::solver::{GaussSeidel, Islands, LcpPyramid, LcpSliding, RowSolver, SolverSettings, residual};
 
 const WEIGHT: f64 = 9.81 / 60.0;
 
 /// Bodies in a random mess of contacts, each between two bodies or with the ground, some of them twice.
-pub(super) fn mess(random: &mut Random, set: impl Fn(&mut Random) -> RowSet) -> (Rows, Vec<f64>) {
+pub(super) fn random_rows(random: &mut Random, set: impl Fn(&mut Random) -> RowSet) -> (Rows, Vec<f64>) {
     let count = 1 + random.index(4);
     let mass: Vec<f64> = (0..count).map(|_| random.real(0.5, 3.0)).collect();
     let inertia = mass.iter().map(|m| [0.1 * m, 0.15 * m, 0.2 * m]).collect();
@@ -45,7 +45,7 @@ fn pivoting_and_relaxation_agree_without_friction() {
     let mut random = Random(11);
     let mut compared = 0;
     for _ in 0..200 {
-        let (rows, c) = mess(&mut random, |_| RowSet::HalfLine);
+        let (rows, c) = random_rows(&mut random, |_| RowSet::HalfLine);
         let relaxed = solve(&GaussSeidel, &rows, &c, FAR);
         let wrong = residual(&rows, &super::all(&rows), &c, &relaxed.lambda, &relaxed.du);
         for solver in [&LcpPyramid as &dyn RowSolver, &LcpSliding] {
@@ -67,8 +67,8 @@ fn pivoting_and_relaxation_agree_without_friction() {
 fn a_cone_without_friction_is_a_half_line() {
     let seeds = 20..60;
     for seed in seeds {
-        let (cones, c) = mess(&mut Random(seed), |_| RowSet::Cone { mu: 0.0 });
-        let (lines, c_lines) = mess(&mut Random(seed), |_| RowSet::HalfLine);
+        let (cones, c) = random_rows(&mut Random(seed), |_| RowSet::Cone { mu: 0.0 });
+        let (lines, c_lines) = random_rows(&mut Random(seed), |_| RowSet::HalfLine);
         let (a, b) = (solve(&LcpPyramid, &cones, &c, FAR), solve(&LcpSliding, &lines, &c_lines, FAR));
         assert!(distance(&a.du, &b.du) < 1e-9);
     }
@@ -94,7 +94,7 @@ fn the_pyramid_holds_on_random_frictional_contacts() {
     let mut random = Random(12);
     let mut iterations = 0;
     for _ in 0..200 {
-        let (rows, c) = mess(&mut random, |r| RowSet::Cone { mu: r.real(0.0, 1.5) });
+        let (rows, c) = random_rows(&mut random, |r| RowSet::Cone { mu: r.real(0.0, 1.5) });
         let solved = solve(&LcpPyramid, &rows, &c, FAR);
         assert!(solved.outcome.converged && !solved.outcome.ray, "{:?}", solved.outcome);
         check_pyramid(&rows, &solved);
@@ -108,7 +108,7 @@ fn the_pyramid_holds_on_random_frictional_contacts() {
 fn the_sliding_form_holds_on_random_frictional_contacts() {
     let mut random = Random(13);
     for _ in 0..200 {
-        let (rows, c) = mess(&mut random, |r| RowSet::Cone { mu: r.real(0.0, 1.5) });
+        let (rows, c) = random_rows(&mut random, |r| RowSet::Cone { mu: r.real(0.0, 1.5) });
         let solved = solve(&LcpSliding, &rows, &c, FAR);
         assert!(solved.outcome.converged && !solved.outcome.ray, "{:?}", solved.outcome);
         for block in &rows.blocks {
@@ -135,7 +135,7 @@ fn all_kinds_of_rows_are_solved_together() {
     let mut random = Random(16);
     let mut at_an_end = 0;
     for _ in 0..200 {
-        let (rows, c) = mess(&mut random, |r| match r.index(8) {
+        let (rows, c) = random_rows(&mut random, |r| match r.index(8) {
             0 => RowSet::Equality,
             1 => RowSet::HalfLine,
             2 | 3 => RowSet::Interval { lo: r.real(-0.5, 0.0), hi: r.real(0.0, 0.5) },
@@ -251,7 +251,7 @@ fn walls_that_touch_are_no_contradiction_and_walls_that_crush_are() {
         &LcpPyramid,
         &bodies.rows,
         &vec![-1.0; bodies.rows.len],
-        Accuracy { sweeps: 10, relaxations: u32::MAX, tolerance: 1e-9 },
+        SolverSettings { max_sweeps: 10, max_relaxations: u32::MAX, tolerance: 1e-9 },
     );
     assert!(crushed.outcome.ray && !crushed.outcome.converged);
     assert!(crushed.lambda.iter().all(|l| l.is_finite() && *l >= 0.0));
@@ -259,7 +259,7 @@ fn walls_that_touch_are_no_contradiction_and_walls_that_crush_are() {
 
 #[test]
 fn the_same_problem_gives_the_same_bits() {
-    let make = || mess(&mut Random(99), |_| RowSet::Cone { mu: 0.7 });
+    let make = || random_rows(&mut Random(99), |_| RowSet::Cone { mu: 0.7 });
     let ((rows, c), (again, c_again)) = (make(), make());
     let (a, b) = (solve(&LcpPyramid, &rows, &c, FAR), solve(LcpPyramid.fork().as_ref(), &again, &c_again, FAR));
     assert!(a.lambda.iter().zip(&b.lambda).all(|(a, b)| a.to_bits() == b.to_bits()));

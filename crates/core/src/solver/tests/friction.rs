@@ -1,6 +1,6 @@
 //! Friction where its answer is known: a block on a slope, a ball on a plane, fixed points of relaxation.
 
-use super::contact::mess;
+use super::contact::random_rows;
 use super::{Bodies, FAR, Random, UP, all, distance, free, solve};
 use crate::rows::RowSet;
 use crate::solver::{GaussSeidel, LcpPyramid, LcpSliding, RowSolver, residual};
@@ -105,7 +105,7 @@ fn what_relaxation_converges_to_is_a_coulomb_solution() {
     let mut random = Random(22);
     let mut converged = 0;
     for _ in 0..200 {
-        let (rows, c) = mess(&mut random, |r| RowSet::Cone { mu: r.real(0.0, 1.0) });
+        let (rows, c) = random_rows(&mut random, |r| RowSet::Cone { mu: r.real(0.0, 1.0) });
         let solved = solve(&GaussSeidel, &rows, &c, FAR);
         if !solved.outcome.converged {
             continue;

@@ -26,10 +26,11 @@ fn tangle(random: &mut Random) -> Rows {
 fn flood(rows: &Rows, keep: impl Fn(usize) -> bool) -> Vec<Vec<u32>> {
     let touch =
         |a: usize, b: usize| rows.blocks[a].sides().iter().any(|s| rows.blocks[b].sides().iter().any(|t| s.u == t.u));
-    let alive: Vec<usize> = (0..rows.blocks.len()).filter(|&b| keep(b) && !rows.blocks[b].sides().is_empty()).collect();
+    let enabled: Vec<usize> =
+        (0..rows.blocks.len()).filter(|&b| keep(b) && !rows.blocks[b].sides().is_empty()).collect();
     let mut seen = vec![false; rows.blocks.len()];
     let mut islands = Vec::new();
-    for &start in &alive {
+    for &start in &enabled {
         if seen[start] {
             continue;
         }
@@ -37,7 +38,7 @@ fn flood(rows: &Rows, keep: impl Fn(usize) -> bool) -> Vec<Vec<u32>> {
         let mut island = vec![start];
         let mut next = 0;
         while next < island.len() {
-            for &b in &alive {
+            for &b in &enabled {
                 if !seen[b] && touch(island[next], b) {
                     seen[b] = true;
                     island.push(b);

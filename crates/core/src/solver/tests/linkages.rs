@@ -2,11 +2,11 @@
 
 use super::{Bodies, Random, Solved, UP, all, distance, free, solve};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, DIRECT_ROWS, GaussSeidel, LcpPyramid, residual};
+use crate::solver::{GaussSeidel, LcpPyramid, MAX_DIRECT_ROWS, SolverSettings, residual};
 use nalgebra::{DMatrix, DVector};
 
 /// What a step is given by default.
-const STEP: Accuracy = Accuracy { sweeps: 200, relaxations: 20_000, tolerance: 1e-9 };
+const STEP: SolverSettings = SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 };
 const GRAVITY: [f64; 6] = [0.0, 0.0, 0.0, 0.0, 0.0, -9.81 / 60.0];
 
 /// Bars of 0.2 m along the sides of a regular polygon in a vertical plane (`closed`), or along a line.
@@ -158,9 +158,9 @@ fn linkages_among_other_rows_agree_with_pivoting() {
             (0..4).for_each(|b| chain.pin(Some(ring + (b + 3) % 4), ring + b));
         }
         for _ in 0..1 + random.index(12) {
-            let (a, b, reach) = (random.index(12), random.index(12), random.real(0.01, 1.0));
+            let (a, b, bound) = (random.index(12), random.index(12), random.real(0.01, 1.0));
             let set = match random.index(4) {
-                0 => RowSet::Interval { lo: -reach, hi: reach },
+                0 => RowSet::Interval { lo: -bound, hi: bound },
                 1 => RowSet::HalfLine,
                 _ => RowSet::Cone { mu: 0.0 },
             };
@@ -171,8 +171,12 @@ fn linkages_among_other_rows_agree_with_pivoting() {
             }
         }
         let (rows, c) = (&chain.bodies.rows, chain.pulled());
-        let relaxed =
-            solve(&GaussSeidel, rows, &c, Accuracy { tolerance: 1e-12, sweeps: 20_000, relaxations: u32::MAX });
+        let relaxed = solve(
+            &GaussSeidel,
+            rows,
+            &c,
+            SolverSettings { tolerance: 1e-12, max_sweeps: 20_000, max_relaxations: u32::MAX },
+        );
         let pivoted = solve(&LcpPyramid, rows, &c, STEP);
         assert!(relaxed.outcome.converged && pivoted.outcome.converged, "{:?}", relaxed.outcome);
         assert!(distance(&relaxed.du, &pivoted.du) < 1e-7, "{}", distance(&relaxed.du, &pivoted.du));
@@ -205,14 +209,18 @@ fn contradicting_joints_do_not_pass_for_solved() {
 /// Larger linkages are relaxed row by row: slower, and still nearer to the answer with more sweeps.
 #[test]
 fn a_linkage_that_is_too_large_is_relaxed() {
-    let links = DIRECT_ROWS / 3;
+    let links = MAX_DIRECT_ROWS / 3;
     let small = Chain::hang(vec![1.0; links]);
     check(&small.bodies.rows, &small.pulled(), 1e-9, 1);
     let large = Chain::hang(vec![1.0; links + 1]);
     let c = large.pulled();
     let left = |sweeps: u32| {
-        let solved =
-            solve(&GaussSeidel, &large.bodies.rows, &c, Accuracy { sweeps, relaxations: u32::MAX, tolerance: 1e-9 });
+        let solved = solve(
+            &GaussSeidel,
+            &large.bodies.rows,
+            &c,
+            SolverSettings { max_sweeps: sweeps, max_relaxations: u32::MAX, tolerance: 1e-9 },
+        );
         residual(&large.bodies.rows, &all(&large.bodies.rows), &c, &solved.lambda, &solved.du)
     };
     let (few, many) = (left(25), left(2000));

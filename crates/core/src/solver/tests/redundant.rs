@@ -2,9 +2,9 @@
 
 use super::{Bodies, Random, UP, all, free, solve};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, RowSolver, residual};
+use crate::solver::{GaussSeidel, RowSolver, SolverSettings, residual};
 
-const USUAL: Accuracy = Accuracy { sweeps: 200, relaxations: 20_000, tolerance: 1e-9 };
+const USUAL: SolverSettings = SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 };
 const IMPULSE: f64 = 1.55 * 9.81 / 240.0;
 
 /// A bowling pin on its foot: on the middle of it and on five points of the rim.

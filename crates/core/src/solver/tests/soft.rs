@@ -108,9 +108,9 @@ fn relaxation_and_pivoting_agree_on_soft_rows() {
         let count = 2 + random.index(4);
         let mut bodies = Bodies::cubes((0..count).map(|_| random.real(0.5, 5.0)).collect(), 0.5);
         for _ in 0..3 + random.index(8) {
-            let reach = random.real(0.1, 2.0);
+            let bound = random.real(0.1, 2.0);
             let (set, soft) = match random.index(6) {
-                0 | 1 => (RowSet::Interval { lo: -reach, hi: reach }, true),
+                0 | 1 => (RowSet::Interval { lo: -bound, hi: bound }, true),
                 2 => (RowSet::Equality, true),
                 3 => (RowSet::HalfLine, true),
                 4 => (RowSet::Equality, false),

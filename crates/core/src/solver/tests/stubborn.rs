@@ -2,7 +2,7 @@
 
 use super::{Bodies, UP, all, distance};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, GaussSeidel, RowSolver, residual};
+use crate::solver::{GaussSeidel, RowSolver, SolverSettings, residual};
 
 /// A block on two feet, one closer to its centre, that are asked for accelerations which differ along the line between them: no force gives that, so the
 /// feet are braced against each other until the one that carries less slides.
@@ -16,8 +16,8 @@ fn of_two_feet_that_conflict_the_one_that_carries_less_slides() {
     for conflict in [1e-2, 1e-4, 1e-6] {
         let c = [-9.81, -conflict, 0.0, -9.81, 0.0, 0.0];
         let (mut lambda, mut du) = (vec![0.0; 6], vec![0.0; 6]);
-        let accuracy = Accuracy { sweeps: 2000, relaxations: 1_000_000, tolerance: 1e-9 };
-        let outcome = GaussSeidel.solve(&bodies.rows, &all(&bodies.rows), &c, &mut lambda, &mut du, accuracy);
+        let settings = SolverSettings { max_sweeps: 2000, max_relaxations: 1_000_000, tolerance: 1e-9 };
+        let outcome = GaussSeidel.solve(&bodies.rows, &all(&bodies.rows), &c, &mut lambda, &mut du, settings);
         // levers, and Coulomb at the foot that slides
         let (light, heavy) = (9.81 * near / (near + far), 9.81 * far / (near + far));
         let slides = [light, mu * light, 0.0, heavy, -mu * light, 0.0];
@@ -51,14 +51,15 @@ fn recorded_problems_are_solved() {
         }
         let blocks = all(&rows);
         let mut du = vec![0.0; 200];
-        let accuracy = Accuracy { sweeps: head[0] as u32, relaxations: head[1] as u32, tolerance: head[2] };
-        let outcome = GaussSeidel.solve(&rows, &blocks, &c, &mut lambda, &mut du, accuracy);
+        let settings =
+            SolverSettings { max_sweeps: head[0] as u32, max_relaxations: head[1] as u32, tolerance: head[2] };
+        let outcome = GaussSeidel.solve(&rows, &blocks, &c, &mut lambda, &mut du, settings);
         let left = residual(&rows, &blocks, &c, &lambda, &du);
         assert!(
-            outcome.converged && left < 20.0 * accuracy.tolerance,
+            outcome.converged && left < 20.0 * settings.tolerance,
             "{} contacts: {outcome:?}, {left} of {}",
             blocks.len(),
-            accuracy.tolerance
+            settings.tolerance
         );
         count += 1;
     }

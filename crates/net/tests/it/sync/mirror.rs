@@ -4,7 +4,7 @@ use super::stage::{scene, viewer};
 use std::sync::Arc;
 use tumble_core::collide::TriMesh;
 use tumble_core::collide::{Pose, Quat, Shape, Vec3};
-use tumble_core::{Drawn, Look, Mode, Object, RigidBody, Visual, VisualMesh, World};
+use tumble_core::{Appearance, Drawn, Mode, Object, RigidBody, Visual, VisualMesh, World};
 use tumble_net::sync::quantise::{POSITION_ERROR_M, ROTATION_ERROR_RAD};
 use tumble_net::sync::wire::Fault;
 use tumble_net::sync::{Mirror, Publisher, VIEWER_NAME};
@@ -49,9 +49,9 @@ impl Pair {
         for name in names(&self.world) {
             let (here, there) = (self.mirror.world(), &self.world);
             let (a, b) = (here.find(&name).unwrap(), there.find(&name).unwrap());
-            assert_eq!(here.status(a).unwrap().alive, there.status(b).unwrap().alive, "{name}");
-            if there.status(b).unwrap().alive {
-                let (a, b) = (here.site(a, 0).unwrap().pose, there.site(b, 0).unwrap().pose);
+            assert_eq!(here.status(a).unwrap().enabled, there.status(b).unwrap().enabled, "{name}");
+            if there.status(b).unwrap().enabled {
+                let (a, b) = (here.part_state(a, 0).unwrap().pose, there.part_state(b, 0).unwrap().pose);
                 assert!((a.translation.vector - b.translation.vector).amax() <= POSITION_ERROR_M, "{name}");
                 assert!(a.rotation.angle_to(&b.rotation) <= ROTATION_ERROR_RAD + 3e-8, "{name}"); // an arc cosine loses 2e-8 near 0
             }
@@ -95,11 +95,11 @@ fn a_replica_is_exact() {
 fn objects_come_and_go() {
     let mut pair = Pair::new(false);
     pair.send();
-    let look = Look {
+    let appearance = Appearance {
         color: [0.1, 0.2, 0.3],
         shader: "checker".into(),
         properties: vec![("squares".into(), 8.0)],
-        ..Look::default()
+        ..Appearance::default()
     };
     let spun = Pose::from_parts(Vec3::new(1.0, 2.0, 3.0).into(), Quat::from_scaled_axis(Vec3::new(0.3, -0.2, 0.9)));
     for (k, shape) in [
@@ -111,7 +111,7 @@ fn objects_come_and_go() {
     .into_iter()
     .enumerate()
     {
-        let visual = Visual::shape(0, spun, shape.clone().unwrap(), look.clone());
+        let visual = Visual::shape(0, spun, shape.clone().unwrap(), appearance.clone());
         let body = RigidBody::with_mass(format!("new {k}"), shape.unwrap(), 1.0).unwrap();
         pair.world.add(body.at(spun).drawn_as(vec![visual])).unwrap();
         assert!(pair.send(), "an object more");
@@ -143,13 +143,13 @@ fn what_is_switched_off_or_moved_by_hand_is_seen_so() {
     let mut pair = Pair::new(false);
     pair.send();
     let [ball, post] = ["ball 1", "post"].map(|name| pair.world.find(name).unwrap());
-    pair.world.set_alive(ball, false).unwrap();
+    pair.world.set_enabled(ball, false).unwrap();
     assert!(!pair.send(), "what moves may die without a new list");
-    pair.world.set_alive(ball, true).unwrap();
+    pair.world.set_enabled(ball, true).unwrap();
     pair.send();
     pair.world.set_pose(post, Pose::translation(-3.0, 0.0, 1.0)).unwrap();
     assert!(pair.send(), "what is still has moved");
-    pair.world.set_alive(post, false).unwrap();
+    pair.world.set_enabled(post, false).unwrap();
     assert!(pair.send());
     pair.world.set_mode(ball, Mode::Static).unwrap();
     assert!(pair.send());
@@ -196,12 +196,13 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
     // an open one, which is drawn and nothing else
     let sheet = TriMesh { vertices: [Vec3::zeros(), Vec3::x(), Vec3::y()].to_vec(), triangles: vec![[0, 1, 2]] };
     let open = Arc::new(VisualMesh::new("sheet", sheet.clone()).unwrap());
-    let drawn = [0.0, 1.0].map(|z| Visual::mesh(0, Pose::translation(0.0, 0.0, z), open.clone(), Look::default()));
+    let drawn =
+        [0.0, 1.0].map(|z| Visual::mesh(0, Pose::translation(0.0, 0.0, z), open.clone(), Appearance::default()));
     let lost = Visual::mesh(
         0,
         Pose::identity(),
         Arc::new(VisualMesh::read_by("lost", || Err("gone".into()))),
-        Look::default(),
+        Appearance::default(),
     );
     world.add(body("tent", &shape).drawn_as(drawn.into_iter().chain([lost]).collect())).unwrap();
     publisher.publish(&world, &viewer(0), 3).unwrap();
@@ -266,7 +267,7 @@ fn the_hash_of_a_scene_sees_what_can_be_seen() {
     let find = |w: &World, name: &str| w.find(name).unwrap();
     let up = |w: &mut World| w.set_pose(find(w, "ball 0"), Pose::translation(0.0, 0.0, 1.0 + f64::EPSILON)).unwrap();
     let gone = |w: &mut World| drop(w.remove(find(w, "post")).unwrap());
-    let dead = |w: &mut World| w.set_alive(find(w, "post"), false).unwrap();
+    let dead = |w: &mut World| w.set_enabled(find(w, "post"), false).unwrap();
     let wider = |w: &mut World| {
         let id = find(w, "ball 4");
         w.remove(id).unwrap();
@@ -286,8 +287,8 @@ fn the_hash_of_a_scene_does_not_see_folders() {
     let hash = |texture: &str| {
         let mut world = scene();
         let shape = Shape::sphere(0.1).unwrap();
-        let look = Look { texture: Some(std::path::Path::new(texture).into()), ..Look::default() };
-        let visual = Visual::shape(0, Pose::identity(), shape.clone(), look);
+        let appearance = Appearance { texture: Some(std::path::Path::new(texture).into()), ..Appearance::default() };
+        let visual = Visual::shape(0, Pose::identity(), shape.clone(), appearance);
         world.add(RigidBody::with_mass("textured", shape, 1.0).unwrap().drawn_as(vec![visual])).unwrap();
         tumble_net::sync::scene_hash("text", &world)
     };

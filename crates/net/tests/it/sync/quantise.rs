@@ -21,7 +21,7 @@ fn through(pose: Pose) -> Pose {
     mirror.apply_state(1, there.time(), &published.state).unwrap();
     assert_eq!(mirror.hash(), published.hash);
     let body = mirror.world().find("b").unwrap();
-    mirror.world().site(body, 0).unwrap().pose
+    mirror.world().part_state(body, 0).unwrap().pose
 }
 
 fn random(dice: &mut Dice) -> Pose {

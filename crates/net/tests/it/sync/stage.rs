@@ -15,9 +15,9 @@ pub const MS: Duration = Duration::from_millis(1);
 /// Balls that fall on a floor, a box that slides, a post that stands.
 pub fn scene() -> World {
     let mut world = World::new(Settings { dt: 1.0 / 60.0, ..Settings::default() }).unwrap();
-    world.add_static(RigidBody::fixture("ground", Shape::half_space())).unwrap();
+    world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
     world
-        .add_static(RigidBody::fixture("post", Shape::capsule(0.1, 1.0).unwrap()).at(Pose::translation(3.0, 0.0, 1.0)))
+        .add_static(RigidBody::fixed("post", Shape::capsule(0.1, 1.0).unwrap()).at(Pose::translation(3.0, 0.0, 1.0)))
         .unwrap();
     for k in 0..5 {
         let ball = RigidBody::with_mass(format!("ball {k}"), Shape::sphere(0.1).unwrap(), 1.0).unwrap();

@@ -20,13 +20,13 @@
 //! | `p̈`, `α` | accelerations with all generalized velocities held: `ω × (ω × r)` of a rigid body, and what the joints above a link add |
 //! | `θ` | the angle between `z_A` and `z_B` |
 //!
-//! Velocities and biases are exact in any pose; those of `place` and `line` are the derivatives of their errors (`s(p_A)` has the arm on which
+//! Velocities and biases are exact in any pose; those of `coincident_origins` and `origin_on_line` are the derivatives of their errors (`s(p_A)` has the arm on which
 //! B's axes turn). A rotation's error is exact to first order and zero only where it should be: the projection goes there in Newton steps.
 
 use crate::object::{Constraint, Level, Object, RowTarget};
+use crate::part_state::{PartState, StateRange};
 use crate::row_builder::RowBuilder;
 use crate::rows::RowSet;
-use crate::site::{Site, Span};
 use crate::view::{ObjectId, WorldView};
 use crate::world::World;
 use nalgebra::{RealField, Rotation3, Translation3};
@@ -37,15 +37,15 @@ mod tests;
 
 /// What a closure holds together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum ClosureKind {
+pub enum LoopJointKind {
     /// The frames' origins: a ball joint. Three rows.
-    Point,
+    Spherical,
     /// The origins and the z axes: one rotation is left. Five rows.
-    Hinge,
+    Revolute,
     /// Both frames altogether. Six rows.
-    Weld,
+    Fixed,
     /// All but the way along the z axes: a piston in its cylinder. Five rows.
-    Slider,
+    Prismatic,
 }
 
 /// One side of a closure: a frame fixed to a part, or to the world.
@@ -71,7 +71,7 @@ impl Anchor {
 
 /// Why a closure was not made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ClosureError {
+pub enum LoopJointError {
     /// Both sides are the world.
     #[error("closure '{0}' joins the world to itself; one side must be a part of an object")]
     NoPart(String),
@@ -96,7 +96,7 @@ pub enum ClosureError {
 
 /// How far the two sides are from where they should be.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Misfit {
+pub struct PositionError {
     /// Distance, metres: of the origins, or across the line of a slider.
     pub distance: f64,
     /// Angle, rad: between the frames, or the axes of a hinge; 0 for a point.
@@ -106,98 +106,103 @@ pub struct Misfit {
 /// A joint between two parts of any objects. It has no state. Where a side is gone or not alive it makes no rows.
 ///
 /// ```
-/// # use tumble_core::{Closure, RigidBody, Settings, World, collide::{Shape, Vec3}};
+/// # use tumble_core::{LoopJoint, RigidBody, Settings, World, collide::{Shape, Vec3}};
 /// # let mut world = World::new(Settings::default())?;
 /// # let door = world.add(RigidBody::with_mass("door", Shape::cuboid(Vec3::new(0.4, 0.02, 1.0))?, 20.0)?)?;
 /// # let (point, axis) = (Vec3::new(-0.4, 0.0, 0.0), Vec3::z());
-/// let hinge = Closure::hinge_at("hinge", &world, Some((door, 0)), None, point, axis)?;
+/// let hinge = LoopJoint::revolute_at("hinge", &world, Some((door, 0)), None, point, axis)?;
 /// world.add(hinge)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Closure {
+pub struct LoopJoint {
     name: String,
-    kind: ClosureKind,
+    kind: LoopJointKind,
     a: Anchor,
     b: Anchor,
 }
 
-type Part = Option<(ObjectId, usize)>;
+type PartRef = Option<(ObjectId, usize)>;
 
-impl Closure {
+impl LoopJoint {
     /// Joins two frames. They need not meet: the projection brings them together at [`recovery_speed`](crate::Settings::recovery_speed).
-    pub fn new(name: impl Into<String>, kind: ClosureKind, a: Anchor, b: Anchor) -> Result<Closure, ClosureError> {
+    pub fn new(
+        name: impl Into<String>,
+        kind: LoopJointKind,
+        a: Anchor,
+        b: Anchor,
+    ) -> Result<LoopJoint, LoopJointError> {
         let name = name.into();
         if a.part.is_none() && b.part.is_none() {
-            return Err(ClosureError::NoPart(name));
+            return Err(LoopJointError::NoPart(name));
         }
         if a.part == b.part {
-            return Err(ClosureError::SamePart(name));
+            return Err(LoopJointError::SamePart(name));
         }
         if [a, b].iter().any(|side| side.frame.to_homogeneous().iter().any(|x| !x.is_finite())) {
-            return Err(ClosureError::NotFinite(name));
+            return Err(LoopJointError::NotFinite(name));
         }
-        Ok(Closure { name, kind, a, b })
+        Ok(LoopJoint { name, kind, a, b })
     }
 
     /// Joins two parts as they stand at a world point (m): a ball joint.
-    pub fn point_at(
+    pub fn spherical_at(
         name: impl Into<String>,
         world: &World,
-        a: Part,
-        b: Part,
+        a: PartRef,
+        b: PartRef,
         point: Vec3,
-    ) -> Result<Closure, ClosureError> {
-        Closure::at(name.into(), ClosureKind::Point, world, [a, b], point, Vec3::z())
+    ) -> Result<LoopJoint, LoopJointError> {
+        LoopJoint::at(name.into(), LoopJointKind::Spherical, world, [a, b], point, Vec3::z())
     }
 
     /// Joins two parts as they stand by a hinge at a world point (m) about a world axis (of any length but 0).
-    pub fn hinge_at(
+    pub fn revolute_at(
         name: impl Into<String>,
         world: &World,
-        a: Part,
-        b: Part,
+        a: PartRef,
+        b: PartRef,
         point: Vec3,
         axis: Vec3,
-    ) -> Result<Closure, ClosureError> {
-        Closure::at(name.into(), ClosureKind::Hinge, world, [a, b], point, axis)
+    ) -> Result<LoopJoint, LoopJointError> {
+        LoopJoint::at(name.into(), LoopJointKind::Revolute, world, [a, b], point, axis)
     }
 
     /// Joins two parts as they stand; a world point (m) says where, which matters only for how errors are told.
-    pub fn weld_at(
+    pub fn fixed_at(
         name: impl Into<String>,
         world: &World,
-        a: Part,
-        b: Part,
+        a: PartRef,
+        b: PartRef,
         point: Vec3,
-    ) -> Result<Closure, ClosureError> {
-        Closure::at(name.into(), ClosureKind::Weld, world, [a, b], point, Vec3::z())
+    ) -> Result<LoopJoint, LoopJointError> {
+        LoopJoint::at(name.into(), LoopJointKind::Fixed, world, [a, b], point, Vec3::z())
     }
 
     /// Lets two parts as they stand slide along a world axis (of any length but 0) through a world point (m), and do nothing else.
-    pub fn slider_at(
+    pub fn prismatic_at(
         name: impl Into<String>,
         world: &World,
-        a: Part,
-        b: Part,
+        a: PartRef,
+        b: PartRef,
         point: Vec3,
         axis: Vec3,
-    ) -> Result<Closure, ClosureError> {
-        Closure::at(name.into(), ClosureKind::Slider, world, [a, b], point, axis)
+    ) -> Result<LoopJoint, LoopJointError> {
+        LoopJoint::at(name.into(), LoopJointKind::Prismatic, world, [a, b], point, axis)
     }
 
     fn at(
         name: String,
-        kind: ClosureKind,
+        kind: LoopJointKind,
         world: &World,
-        parts: [Part; 2],
+        parts: [PartRef; 2],
         point: Vec3,
         axis: Vec3,
-    ) -> Result<Closure, ClosureError> {
+    ) -> Result<LoopJoint, LoopJointError> {
         if point.iter().chain(axis.iter()).any(|x| !x.is_finite()) {
-            return Err(ClosureError::NotFinite(name));
+            return Err(LoopJointError::NotFinite(name));
         }
-        let Some(z) = axis.try_normalize(0.0) else { return Err(ClosureError::Axis(name)) };
+        let Some(z) = axis.try_normalize(0.0) else { return Err(LoopJointError::Axis(name)) };
         let x = z.cross(&Vec3::ith(z.iamin(), 1.0)).normalize();
         let axes = Mat3::from_columns(&[x, z.cross(&x), z]);
         let rotation = Quat::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
@@ -205,15 +210,16 @@ impl Closure {
         let mut sides = [Anchor::world(frame); 2];
         for (side, part) in sides.iter_mut().zip(parts) {
             if let Some((id, part)) = part {
-                let site = world.site(id, part).ok_or_else(|| ClosureError::Gone { name: name.clone(), part })?;
-                *side = Anchor::on(id, part, site.pose.inverse() * frame);
+                let part_state =
+                    world.part_state(id, part).ok_or_else(|| LoopJointError::Gone { name: name.clone(), part })?;
+                *side = Anchor::on(id, part, part_state.pose.inverse() * frame);
             }
         }
-        Closure::new(name, kind, sides[0], sides[1])
+        LoopJoint::new(name, kind, sides[0], sides[1])
     }
 
     /// What it holds.
-    pub fn kind(&self) -> ClosureKind {
+    pub fn kind(&self) -> LoopJointKind {
         self.kind
     }
 
@@ -223,40 +229,41 @@ impl Closure {
     }
 
     /// How far the sides are apart in a view of the world; `None` where it makes no rows.
-    pub fn misfit(&self, view: &WorldView) -> Option<Misfit> {
-        let pair = Pair { a: End::of(&self.a, view)?, b: End::of(&self.b, view)? };
+    pub fn position_error(&self, view: &WorldView) -> Option<PositionError> {
+        let pair = EndPair { a: JointEnd::of(&self.a, view)?, b: JointEnd::of(&self.b, view)? };
         let mut d = pair.a.p() - pair.b.p();
-        if self.kind == ClosureKind::Slider {
+        if self.kind == LoopJointKind::Prismatic {
             let z = pair.b.axis(2);
             d -= z * z.dot(&d);
         }
         let angle = match self.kind {
-            ClosureKind::Point => 0.0,
-            ClosureKind::Hinge => pair.tilt().norm(),
-            ClosureKind::Weld | ClosureKind::Slider => pair.twist().norm(),
+            LoopJointKind::Spherical => 0.0,
+            LoopJointKind::Revolute => pair.axis_deviation().norm(),
+            LoopJointKind::Fixed | LoopJointKind::Prismatic => pair.rotation_error().norm(),
         };
-        Some(Misfit { distance: d.norm(), angle })
+        Some(PositionError { distance: d.norm(), angle })
     }
 }
 
 /// One side as it is in a view.
-struct End {
-    part: Part,
+struct JointEnd {
+    part: PartRef,
     /// Its accelerations are those without any force.
-    site: Site,
+    part_state: PartState,
     frame: Pose,
 }
 
-impl End {
-    fn of(anchor: &Anchor, view: &WorldView) -> Option<End> {
+impl JointEnd {
+    fn of(anchor: &Anchor, view: &WorldView) -> Option<JointEnd> {
         let Some((id, part)) = anchor.part else {
-            return Some(End { part: None, site: Site::default(), frame: anchor.frame });
+            return Some(JointEnd { part: None, part_state: PartState::default(), frame: anchor.frame });
         };
-        view.status(id).filter(|s| s.alive)?;
+        view.status(id).filter(|s| s.enabled)?;
         // a part that is not there is left to the row, which refuses it by name
-        let mut site = view.site(id, part).copied().unwrap_or_default();
-        (site.angular_acceleration, site.acceleration) = (site.bias_angular_acceleration, site.bias_acceleration);
-        Some(End { part: Some((id, part)), frame: site.pose * anchor.frame, site })
+        let mut part_state = view.part_state(id, part).copied().unwrap_or_default();
+        (part_state.angular_acceleration, part_state.acceleration) =
+            (part_state.bias_angular_acceleration, part_state.bias_acceleration);
+        Some(JointEnd { part: Some((id, part)), frame: part_state.pose * anchor.frame, part_state })
     }
 
     fn p(&self) -> Vec3 {
@@ -268,36 +275,36 @@ impl End {
     }
 
     /// `p̈` of its own point at `p`.
-    fn coasting(&self, p: &Vec3) -> Vec3 {
-        self.site.acceleration_following(p, &self.site.velocity_at(p))
+    fn bias_acceleration_at(&self, p: &Vec3) -> Vec3 {
+        self.part_state.acceleration_following(p, &self.part_state.velocity_at(p))
     }
 }
 
-struct Pair {
-    a: End,
-    b: End,
+struct EndPair {
+    a: JointEnd,
+    b: JointEnd,
 }
 
-impl Pair {
-    fn sides(&self) -> [(&End, f64); 2] {
+impl EndPair {
+    fn sides(&self) -> [(&JointEnd, f64); 2] {
         [(&self.a, 1.0), (&self.b, -1.0)]
     }
 
     fn omega(&self) -> Vec3 {
-        self.a.site.angular_velocity - self.b.site.angular_velocity
+        self.a.part_state.angular_velocity - self.b.part_state.angular_velocity
     }
 
     fn alpha(&self) -> Vec3 {
-        self.a.site.angular_acceleration - self.b.site.angular_acceleration
+        self.a.part_state.angular_acceleration - self.b.part_state.angular_acceleration
     }
 
     /// `log(R_A·R_Bᵀ)`, world axes.
-    fn twist(&self) -> Vec3 {
+    fn rotation_error(&self) -> Vec3 {
         (self.a.frame.rotation * self.b.frame.rotation.inverse()).scaled_axis()
     }
 
     /// The rotation vector that takes `z_B` to `z_A` the short way.
-    fn tilt(&self) -> Vec3 {
+    fn axis_deviation(&self) -> Vec3 {
         let (za, zb) = (self.a.axis(2), self.b.axis(2));
         let (cross, cos) = (zb.cross(&za), zb.dot(&za));
         let sin = cross.norm();
@@ -309,29 +316,29 @@ impl Pair {
     }
 
     /// The origins at the same place.
-    fn place(&self, out: &mut RowBuilder) {
+    fn coincident_origins(&self, out: &mut RowBuilder) {
         let (pa, pb) = (self.a.p(), self.b.p());
-        let (error, bias) = (pa - pb, self.a.coasting(&pa) - self.b.coasting(&pb));
+        let (error, bias) = (pa - pb, self.a.bias_acceleration_at(&pa) - self.b.bias_acceleration_at(&pb));
         for (k, e) in WORLD_AXES.iter().enumerate() {
             self.translation(out, [&pa, &pb], e, error[k], bias[k]);
         }
     }
 
     /// A's origin on the line through B's origin along `z_B`.
-    fn line(&self, out: &mut RowBuilder) {
-        let (p, site_b) = (self.a.p(), &self.b.site);
-        let (d, rate) = (p - self.b.p(), self.a.site.velocity_at(&p));
-        let slip = rate - site_b.velocity_at(&p);
-        let slip_rate = self.a.coasting(&p) - site_b.acceleration_following(&p, &rate);
+    fn origin_on_line(&self, out: &mut RowBuilder) {
+        let (p, state_b) = (self.a.p(), &self.b.part_state);
+        let (d, rate) = (p - self.b.p(), self.a.part_state.velocity_at(&p));
+        let slip = rate - state_b.velocity_at(&p);
+        let slip_rate = self.a.bias_acceleration_at(&p) - state_b.acceleration_following(&p, &rate);
         for t in [self.b.axis(0), self.b.axis(1)] {
-            let bias = t.dot(&slip_rate) + site_b.angular_velocity.cross(&t).dot(&slip);
+            let bias = t.dot(&slip_rate) + state_b.angular_velocity.cross(&t).dot(&slip);
             self.translation(out, [&p, &p], &t, t.dot(&d), bias);
         }
     }
 
     /// No rotation between the frames.
-    fn turn(&self, out: &mut RowBuilder) {
-        let (error, bias) = (self.twist(), self.alpha());
+    fn equal_rotations(&self, out: &mut RowBuilder) {
+        let (error, bias) = (self.rotation_error(), self.alpha());
         for (k, e) in WORLD_AXES.iter().enumerate() {
             self.rotation(out, e, error[k], bias[k]);
         }
@@ -339,9 +346,9 @@ impl Pair {
 
     /// `z_A` along `z_B`.
     fn axis(&self, out: &mut RowBuilder) {
-        let (error, omega, alpha) = (self.tilt(), self.omega(), self.alpha());
+        let (error, omega, alpha) = (self.axis_deviation(), self.omega(), self.alpha());
         for t in [self.b.axis(0), self.b.axis(1)] {
-            let bias = t.dot(&alpha) + self.b.site.angular_velocity.cross(&t).dot(&omega);
+            let bias = t.dot(&alpha) + self.b.part_state.angular_velocity.cross(&t).dot(&omega);
             self.rotation(out, &t, t.dot(&error), bias);
         }
     }
@@ -367,7 +374,7 @@ impl Pair {
 
 const WORLD_AXES: [Vec3; 3] = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
 
-impl Object for Closure {
+impl Object for LoopJoint {
     fn name(&self) -> &str {
         &self.name
     }
@@ -381,23 +388,23 @@ impl Object for Closure {
     }
 }
 
-impl Constraint for Closure {
+impl Constraint for LoopJoint {
     fn partners(&self, out: &mut Vec<ObjectId>) -> bool {
         out.extend([&self.a, &self.b].into_iter().filter_map(|end| end.part).map(|(id, _)| id));
         true
     }
 
-    fn rows(&self, _me: &Span, view: &WorldView, _level: Level, out: &mut RowBuilder) {
-        let (Some(a), Some(b)) = (End::of(&self.a, view), End::of(&self.b, view)) else { return };
-        let pair = Pair { a, b };
+    fn rows(&self, _me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
+        let (Some(a), Some(b)) = (JointEnd::of(&self.a, view), JointEnd::of(&self.b, view)) else { return };
+        let pair = EndPair { a, b };
         match self.kind {
-            ClosureKind::Slider => pair.line(out),
-            _ => pair.place(out),
+            LoopJointKind::Prismatic => pair.origin_on_line(out),
+            _ => pair.coincident_origins(out),
         }
         match self.kind {
-            ClosureKind::Point => {}
-            ClosureKind::Hinge => pair.axis(out),
-            ClosureKind::Weld | ClosureKind::Slider => pair.turn(out),
+            LoopJointKind::Spherical => {}
+            LoopJointKind::Revolute => pair.axis(out),
+            LoopJointKind::Fixed | LoopJointKind::Prismatic => pair.equal_rotations(out),
         }
     }
 }

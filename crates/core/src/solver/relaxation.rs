@@ -7,14 +7,14 @@
 /// Sweeps of a window.
 const WINDOW: u32 = 50;
 /// A window whose least change is more than this share of the one's before got nowhere.
-const NOWHERE: f64 = 0.99;
+const STAGNATION: f64 = 0.99;
 /// Shares, one after the other.
-const SHARES: [f64; 3] = [1.0, 0.5, 0.7];
+const FACTORS: [f64; 3] = [1.0, 0.5, 0.7];
 
 /// How far each block goes.
-pub(super) struct Pace {
+pub(super) struct Relaxation {
     /// Of the way to its own solution that each block goes.
-    pub share: f64,
+    pub factor: f64,
     /// Sweeps that are not judged.
     first: u32,
     /// Least change of a row velocity in a sweep of this window and of the one before.
@@ -24,23 +24,23 @@ pub(super) struct Pace {
     turn: usize,
 }
 
-impl Pace {
+impl Relaxation {
     /// The first sweeps, so many, are not judged.
-    pub fn new(first: u32) -> Pace {
-        Pace { share: SHARES[0], first, least: f64::INFINITY, before: f64::INFINITY, turn: 0 }
+    pub fn new(first: u32) -> Relaxation {
+        Relaxation { factor: FACTORS[0], first, least: f64::INFINITY, before: f64::INFINITY, turn: 0 }
     }
 
     /// Takes note of the change of a sweep.
-    pub fn note(&mut self, sweep: u32, change: f64) {
+    pub fn record(&mut self, sweep: u32, change: f64) {
         if change < self.least {
             self.least = change;
         }
         if sweep <= self.first || !sweep.is_multiple_of(WINDOW) {
             return;
         }
-        if self.least > NOWHERE * self.before {
-            self.turn = if self.turn + 1 < SHARES.len() { self.turn + 1 } else { 1 };
-            self.share = SHARES[self.turn];
+        if self.least > STAGNATION * self.before {
+            self.turn = if self.turn + 1 < FACTORS.len() { self.turn + 1 } else { 1 };
+            self.factor = FACTORS[self.turn];
         }
         (self.before, self.least) = (self.least, f64::INFINITY);
     }

@@ -11,9 +11,9 @@
 //! closes is dropped. One that does takes the normal and the lever arms of that moment, and the gap that free motion closes by then.
 
 use crate::collidable::{Collidable, ContactFrame};
-use crate::detect::Touch;
+use crate::detect::ContactConstraint;
+use crate::part_state::PartState;
 use crate::rotation::turn;
-use crate::site::Site;
 use crate::world::Core;
 use nalgebra::Translation3;
 use tumble_collide::{Contact, NormalFrom, Pose, Shape, Vec3};
@@ -21,36 +21,38 @@ use tumble_collide::{Contact, NormalFrom, Pose, Shape, Vec3};
 /// A relative displacement of less than this share of the smaller body leaves the normal of the start good enough.
 const SHORT: f64 = 0.1;
 /// Looks at most between the meeting and the end of the step.
-const MOST_SAMPLES: f64 = 32.0;
+const MAX_SAMPLES: f64 = 32.0;
 /// Advances at most; what has not met by then is near enough.
 const ADVANCES: u32 = 12;
 
 /// Follows every touch of fast bodies that is apart by more than the drift tolerance and closes within `h`; drops those that miss.
-pub(super) fn time_contacts(core: &Core, h: f64, touches: &mut Vec<Touch>) {
+pub(super) fn time_contacts(core: &Core, h: f64, contact_constraints: &mut Vec<ContactConstraint>) {
     let near = core.settings.drift_tolerance;
     let mut found = Vec::new();
-    touches.retain_mut(|touch| {
-        let (a, b) = (&core.sites[touch.a as usize], &core.sites[touch.b as usize]);
-        let (Some(shape_a), Some(shape_b)) = (shape(core, touch.a), shape(core, touch.b)) else { return true };
+    contact_constraints.retain_mut(|constraint| {
+        let (a, b) = (&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize]);
+        let (Some(shape_a), Some(shape_b)) = (shape(core, constraint.a), shape(core, constraint.b)) else {
+            return true;
+        };
         let size = shape_a.bounding_radius().min(shape_b.bounding_radius());
         if h * (a.velocity - b.velocity).norm() < SHORT * size {
             return true;
         }
-        if closing_time(touch.contact.gap, &touch.contact, a, b, 0.0).is_none_or(|t| t > h) {
+        if closing_time(constraint.contact.gap, &constraint.contact, a, b, 0.0).is_none_or(|t| t > h) {
             return true;
         }
         if shape_a.has_tree() || shape_b.has_tree() {
             return true; // a tree's contacts come and go with its leaves
         }
         let (side_a, side_b) = ((shape_a, a), (shape_b, b));
-        let Some((time, contact)) = follow(touch, side_a, side_b, h, near, &mut found) else { return false };
+        let Some((time, contact)) = follow(constraint, side_a, side_b, h, near, &mut found) else { return false };
         let rounded =
             matches!(contact.normal_from, NormalFrom::CorePoints | NormalFrom::LineOfA(_) | NormalFrom::LineOfB(_));
-        let samples = (h * (a.velocity - b.velocity).norm() / (SHORT * size)).min(MOST_SAMPLES).ceil();
+        let samples = (h * (a.velocity - b.velocity).norm() / (SHORT * size)).min(MAX_SAMPLES).ceil();
         let end = if rounded { glance(side_a, side_b, time, h, samples, near, &mut found) } else { None };
         let (time, contact) = end.map_or((time, contact), |end| (h, end));
         if time > 0.0 {
-            meet(touch, &contact, a, b, time);
+            shift_to_impact(constraint, &contact, a, b, time);
         }
         true
     });
@@ -59,8 +61,8 @@ pub(super) fn time_contacts(core: &Core, h: f64, touches: &mut Vec<Touch>) {
 /// Where bodies that have met at `time` go on to the end of the step without overlap, as a ball does that rolls over the seam of two boxes, the
 /// contact of the end holds: its normal is not that of the edge which the ball never strikes. `None` where they overlap on the way.
 fn glance(
-    a: (&Shape, &Site),
-    b: (&Shape, &Site),
+    a: (&Shape, &PartState),
+    b: (&Shape, &PartState),
     time: f64,
     h: f64,
     samples: f64,
@@ -71,7 +73,14 @@ fn glance(
     for sample in 1..=samples as u32 {
         let t = time + (h - time) * sample as f64 / samples;
         found.clear();
-        tumble_collide::contacts(a.0, &coasted(a.1, t), b.0, &coasted(b.1, t), near, found);
+        tumble_collide::contacts(
+            a.0,
+            &pose_after_free_motion(a.1, t),
+            b.0,
+            &pose_after_free_motion(b.1, t),
+            near,
+            found,
+        );
         end = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied();
         if end.is_none_or(|contact| contact.gap < -near) {
             return None;
@@ -80,32 +89,32 @@ fn glance(
     end
 }
 
-fn shape(core: &Core, site: u32) -> Option<&Shape> {
-    let owner = core.owners[site as usize];
+fn shape(core: &Core, part_state: u32) -> Option<&Shape> {
+    let owner = core.owners[part_state as usize];
     let body: &dyn Collidable = core.table.slots[owner.id].object.collidable()?;
     body.shape(owner.part as usize)
 }
 
 /// The moment at which the touch has closed to `near`, and the contact there; `None` where it does not within `h`.
 fn follow(
-    touch: &Touch,
-    a: (&Shape, &Site),
-    b: (&Shape, &Site),
+    constraint: &ContactConstraint,
+    a: (&Shape, &PartState),
+    b: (&Shape, &PartState),
     h: f64,
     near: f64,
     found: &mut Vec<Contact>,
 ) -> Option<(f64, Contact)> {
-    let (mut time, mut contact) = (0.0, touch.contact);
+    let (mut time, mut contact) = (0.0, constraint.contact);
     for _ in 0..if contact.gap <= near { 0 } else { ADVANCES } {
         // aim at half the distance that counts as near, so that the last advance is not for ever short of it
         time += closing_time(contact.gap - 0.5 * near, &contact, a.1, b.1, time)?;
         if time > h {
             return None;
         }
-        let (pose_a, pose_b) = (coasted(a.1, time), coasted(b.1, time));
+        let (pose_a, pose_b) = (pose_after_free_motion(a.1, time), pose_after_free_motion(b.1, time));
         found.clear();
-        tumble_collide::contacts(a.0, &pose_a, b.0, &pose_b, touch.contact.gap + near, found);
-        let same = found.iter().find(|c| c.feature == touch.contact.feature);
+        tumble_collide::contacts(a.0, &pose_a, b.0, &pose_b, constraint.contact.gap + near, found);
+        let same = found.iter().find(|c| c.feature == constraint.contact.feature);
         let nearest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap));
         contact = *same.or(nearest)?;
         if contact.gap <= near {
@@ -116,8 +125,8 @@ fn follow(
 }
 
 /// Time from `t` on until `gap` closes along the contact's normal in free motion.
-fn closing_time(gap: f64, contact: &Contact, a: &Site, b: &Site, t: f64) -> Option<f64> {
-    let spin = |s: &Site| s.velocity_at(&contact.point) - s.velocity;
+fn closing_time(gap: f64, contact: &Contact, a: &PartState, b: &PartState, t: f64) -> Option<f64> {
+    let spin = |s: &PartState| s.velocity_at(&contact.point) - s.velocity;
     let v = contact.normal.dot(&(a.velocity - b.velocity + t * (a.acceleration - b.acceleration) + spin(a) - spin(b)));
     let acceleration = contact.normal.dot(&(a.acceleration - b.acceleration));
     if gap <= 0.0 {
@@ -129,22 +138,28 @@ fn closing_time(gap: f64, contact: &Contact, a: &Site, b: &Site, t: f64) -> Opti
 }
 
 /// A pose after `t` seconds of free motion.
-pub(crate) fn coasted(site: &Site, t: f64) -> Pose {
-    let position = site.position() + t * site.velocity + 0.5 * t * t * site.acceleration;
-    Pose::from_parts(Translation3::from(position), turn(&site.pose.rotation, &site.angular_velocity, t))
+pub(crate) fn pose_after_free_motion(part_state: &PartState, t: f64) -> Pose {
+    let position = part_state.position() + t * part_state.velocity + 0.5 * t * t * part_state.acceleration;
+    Pose::from_parts(Translation3::from(position), turn(&part_state.pose.rotation, &part_state.angular_velocity, t))
 }
 
 /// Gives the touch the contact of the moment `t`, seen from the start: lever arms of then, and the gap that free motion closes by then.
-pub(crate) fn meet(touch: &mut Touch, contact: &Contact, a: &Site, b: &Site, t: f64) {
-    let moved = |s: &Site| coasted(s, t).translation.vector - s.position();
+pub(crate) fn shift_to_impact(
+    constraint: &mut ContactConstraint,
+    contact: &Contact,
+    a: &PartState,
+    b: &PartState,
+    t: f64,
+) {
+    let moved = |s: &PartState| pose_after_free_motion(s, t).translation.vector - s.position();
     let (move_a, move_b): (Vec3, Vec3) = (moved(a), moved(b));
     let closed = contact.normal.dot(&(move_a - move_b));
-    touch.contact = Contact {
+    constraint.contact = Contact {
         point: contact.point - move_a,
         gap: contact.gap - closed,
-        feature: touch.contact.feature,
+        feature: constraint.contact.feature,
         ..*contact
     };
-    touch.offset = move_a - move_b;
-    touch.frame = ContactFrame::new(contact.point, contact.normal);
+    constraint.offset = move_a - move_b;
+    constraint.frame = ContactFrame::new(contact.point, contact.normal);
 }

@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 /// What acts on one degree of freedom. Of a spherical or floating joint only damping and dry friction apply: its freedoms have no single position.
 #[derive(Clone, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub struct Freedom {
+pub struct DofSettings {
     /// Least and greatest position, rad or m.
     pub limits: Option<[f64; 2]>,
     /// Viscous damping, N·m·s/rad or N·s/m, at least 0.
@@ -86,7 +86,7 @@ pub enum Drive {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Coupling {
     /// Velocity coordinate that follows.
-    pub freedom: usize,
+    pub dof: usize,
     /// Velocity coordinate that it follows.
     pub of: usize,
     /// Ratio.
@@ -95,9 +95,9 @@ pub struct Coupling {
     pub offset: f64,
 }
 
-impl Freedom {
+impl DofSettings {
     /// What is out of its range, if anything: which constant, its value, what would be right.
-    pub(super) fn fault(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
+    pub(super) fn range_error(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
         let least =
             |what, value: f64| (!(value.is_finite() && value >= 0.0)).then_some((what, value, "finite and at least 0"));
         let finite = |what, value: f64| (!value.is_finite()).then_some((what, value, "finite"));

@@ -10,10 +10,10 @@ struct Led {
     world: World,
     chain: ObjectId,
     hand: ObjectId,
-    closure: ObjectId,
+    loop_joint: ObjectId,
     links: usize,
     /// What was last said of it.
-    reported: Option<OutOfReach>,
+    reported: Option<UnreachableJoint>,
 }
 
 const LENGTH: f64 = 0.2;
@@ -35,18 +35,18 @@ impl Led {
             .collect();
         let chain = ArticulatedBody::new("chain", hinged(links, LENGTH, rod(1.0, LENGTH))).with_positions(&q).unwrap();
         let chain = world.add(chain).unwrap();
-        let last = world.site(chain, links - 1).unwrap().pose;
+        let last = world.part_state(chain, links - 1).unwrap().pose;
         let end = last.translation.vector - LENGTH * (last.rotation * Vec3::z());
-        let mut hand = RigidBody::fixture("hand", sphere(0.01)).at(Pose::translation(end.x, end.y, end.z));
-        hand.meets = 0;
+        let mut hand = RigidBody::fixed("hand", sphere(0.01)).at(Pose::translation(end.x, end.y, end.z));
+        hand.mask = 0;
         let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
-        let pin = Closure::point_at("pin", &world, Some((chain, links - 1)), Some((hand, 0)), end).unwrap();
-        let closure = world.add(pin).unwrap();
-        Led { world, chain, hand, closure, links, reported: None }
+        let pin = LoopJoint::spherical_at("pin", &world, Some((chain, links - 1)), Some((hand, 0)), end).unwrap();
+        let loop_joint = world.add(pin).unwrap();
+        Led { world, chain, hand, loop_joint, links, reported: None }
     }
 
-    fn misfit(&self) -> f64 {
-        self.world.get::<Closure>(self.closure).unwrap().misfit(&self.world.view()).unwrap().distance
+    fn position_error(&self) -> f64 {
+        self.world.get::<LoopJoint>(self.loop_joint).unwrap().position_error(&self.world.view()).unwrap().distance
     }
 
     /// Fastest joint, rad/s.
@@ -56,15 +56,15 @@ impl Led {
 
     /// Leads the hand for so many seconds; the fastest joint and the largest misfit on the way.
     fn lead(&mut self, velocity: Vec3, seconds: f64) -> (f64, f64) {
-        let (mut fastest, mut misfit): (f64, f64) = (0.0, 0.0);
+        let (mut fastest, mut position_error): (f64, f64) = (0.0, 0.0);
         for _ in 0..(seconds * 240.0).round() as usize {
             self.world.set_velocity(self.hand, velocity, Vec3::zeros()).unwrap();
             let report = *self.world.step().unwrap();
-            self.reported = report.out_of_reach.or(self.reported);
+            self.reported = report.unreachable_joint.or(self.reported);
             fastest = fastest.max(self.fastest());
-            misfit = misfit.max(self.misfit());
+            position_error = position_error.max(self.position_error());
         }
-        (fastest, misfit)
+        (fastest, position_error)
     }
 }
 
@@ -88,15 +88,16 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
                 let (across, _) = led.lead(speed * along, 1.0);
                 let (out, _) = led.lead(speed * along, 1.0);
                 let hand = position(&led.world, led.hand);
-                let (misfit, expected, reported) = (led.misfit(), lag(&hand, reach), led.reported.unwrap());
-                let end = led.world.site(led.chain, links - 1).unwrap().pose;
+                let (position_error, expected, reported) =
+                    (led.position_error(), lag(&hand, reach), led.reported.unwrap());
+                let end = led.world.part_state(led.chain, links - 1).unwrap().pose;
                 let bent = (end.rotation * -Vec3::z()).angle(&Vec3::new(hand.x, 0.0, hand.z));
                 let (back, _) = led.lead(-speed * along, 2.0);
                 let (rest, _) = led.lead(Vec3::zeros(), 0.5);
                 println!(
-                    "{name}: {across:.1} rad/s across, {out:.2} out, {back:.1} back; lags {misfit:.6} m, {:.1e} off, {bent:.1e} rad; closed to {:.1e} m, {rest:.1e} rad/s",
-                    misfit - expected,
-                    led.misfit()
+                    "{name}: {across:.1} rad/s across, {out:.2} out, {back:.1} back; lags {position_error:.6} m, {:.1e} off, {bent:.1e} rad; closed to {:.1e} m, {rest:.1e} rad/s",
+                    position_error - expected,
+                    led.position_error()
                 );
                 // across the plane nothing is in reach from the start: there the chain is still coming to lie straight
                 let straight = if along.y == 0.0 { 4.0 * speed / LENGTH } else { crossing(links) };
@@ -105,11 +106,14 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
                     "{name}: {across}, {out}, {back} rad/s"
                 );
                 assert!(
-                    (misfit - expected).abs() < 1e-3 && bent < 3e-2,
-                    "{name}: {misfit} m for {expected} m, bent by {bent} rad"
+                    (position_error - expected).abs() < 1e-3 && bent < 3e-2,
+                    "{name}: {position_error} m for {expected} m, bent by {bent} rad"
                 );
-                assert!(reported.closure == led.closure && reported.distance == misfit, "{name}: {reported:?}");
-                assert!(led.misfit() < 2e-9, "{name}: open by {:e} m", led.misfit());
+                assert!(
+                    reported.loop_joint == led.loop_joint && reported.distance == position_error,
+                    "{name}: {reported:?}"
+                );
+                assert!(led.position_error() < 2e-9, "{name}: open by {:e} m", led.position_error());
             }
         }
     }
@@ -123,17 +127,17 @@ fn rigid_bars_pinned_in_a_row_share_what_is_out_of_reach() {
             let mut body =
                 RigidBody::with_mass(format!("bar {i}"), Shape::cuboid(Vec3::new(0.1, 0.01, 0.01)).unwrap(), 1.0)
                     .unwrap();
-            body.meets = 0;
+            body.mask = 0;
             body.at(Pose::translation(0.1 + 0.2 * i as f64, 0.0, 0.0))
         };
         let bars: Vec<ObjectId> = (0..3).map(|i| world.add(bar(i)).unwrap()).collect();
-        let mut hand = RigidBody::fixture("hand", sphere(0.01)).at(Pose::translation(0.6, 0.0, 0.0));
-        hand.meets = 0;
+        let mut hand = RigidBody::fixed("hand", sphere(0.01)).at(Pose::translation(0.6, 0.0, 0.0));
+        hand.mask = 0;
         let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
         let parts = [None, Some((bars[0], 0)), Some((bars[1], 0)), Some((bars[2], 0)), Some((hand, 0))];
         let pins: Vec<ObjectId> = (0..4)
             .map(|i| {
-                let pin = Closure::point_at(
+                let pin = LoopJoint::spherical_at(
                     format!("pin {i}"),
                     &world,
                     parts[i],
@@ -148,14 +152,16 @@ fn rigid_bars_pinned_in_a_row_share_what_is_out_of_reach() {
         for velocity in [0.5, -0.5, 0.0] {
             for _ in 0..240 {
                 world.set_velocity(hand, Vec3::new(velocity, 0.0, 0.0), Vec3::zeros()).unwrap();
-                said = said.max(world.step().unwrap().out_of_reach.map_or(0.0, |o| o.distance));
-                fastest =
-                    bars.iter().map(|id| world.site(*id, 0).unwrap().angular_velocity.norm()).fold(fastest, f64::max);
+                said = said.max(world.step().unwrap().unreachable_joint.map_or(0.0, |o| o.distance));
+                fastest = bars
+                    .iter()
+                    .map(|id| world.part_state(*id, 0).unwrap().angular_velocity.norm())
+                    .fold(fastest, f64::max);
             }
         }
         let open = pins
             .iter()
-            .map(|id| world.get::<Closure>(*id).unwrap().misfit(&world.view()).unwrap().distance)
+            .map(|id| world.get::<LoopJoint>(*id).unwrap().position_error(&world.view()).unwrap().distance)
             .fold(0.0, f64::max);
         assert!(fastest < 2.0 * (4.0 * 0.5 * 240.0 / 0.2f64).sqrt(), "{stepper}: {fastest} rad/s");
         assert!(said > 0.5 / 4.0 - 1e-3 && said < 0.5, "{stepper}: {said} m is said, of 0.5 m shared by four pins");

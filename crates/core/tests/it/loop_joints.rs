@@ -18,22 +18,22 @@ pub fn bar(name: &str, from: Vec3, to: Vec3) -> RigidBody {
     let shape = Shape::cuboid(Vec3::new(0.5 * d.norm(), 0.01, 0.01)).unwrap();
     let pose = Pose::new(0.5 * (from + to), AXIS * d.z.atan2(d.x));
     let mut bar = RigidBody::with_mass(name, shape, d.norm()).unwrap().at(pose);
-    bar.meets = 0;
+    bar.mask = 0;
     bar
 }
 
 pub fn hinge(world: &mut World, name: &str, a: ObjectId, b: Option<ObjectId>, point: Vec3, axis: Vec3) -> ObjectId {
-    let hinge = Closure::hinge_at(name, world, Some((a, 0)), b.map(|b| (b, 0)), point, axis).unwrap();
+    let hinge = LoopJoint::revolute_at(name, world, Some((a, 0)), b.map(|b| (b, 0)), point, axis).unwrap();
     world.add(hinge).unwrap()
 }
 
 /// The end of a bar, from its pose alone: `side` −½ or ½.
 fn end(world: &World, bar: ObjectId, length: f64, side: f64) -> Vec3 {
-    world.site(bar, 0).unwrap().pose * nalgebra::Point3::new(side * length, 0.0, 0.0) - nalgebra::Point3::origin()
+    world.part_state(bar, 0).unwrap().pose * nalgebra::Point3::new(side * length, 0.0, 0.0) - nalgebra::Point3::origin()
 }
 
 fn angle(world: &World, bar: ObjectId) -> f64 {
-    let x = world.site(bar, 0).unwrap().pose.rotation * Vec3::x();
+    let x = world.part_state(bar, 0).unwrap().pose.rotation * Vec3::x();
     x.z.atan2(x.x)
 }
 
@@ -168,12 +168,12 @@ fn engine(world: &mut World, crank: ObjectId) -> ObjectId {
     let (pin, gudgeon) = (Vec3::new(CRANK, 0.0, 0.0), Vec3::new(piston(0.0), 0.0, 0.0));
     let rod = world.add(bar("rod", pin, gudgeon)).unwrap();
     let mut slug = RigidBody::with_mass("piston", cube(0.05), 0.5).unwrap().at(Pose::from(gudgeon));
-    slug.meets = 0;
+    slug.mask = 0;
     let piston = world.add(slug).unwrap();
     hinge(world, "crank pin", rod, Some(crank), pin, AXIS);
     hinge(world, "gudgeon pin", piston, Some(rod), gudgeon, AXIS);
     world
-        .add(Closure::slider_at("cylinder", world, Some((piston, 0)), None, Vec3::zeros(), Vec3::x()).unwrap())
+        .add(LoopJoint::prismatic_at("cylinder", world, Some((piston, 0)), None, Vec3::zeros(), Vec3::x()).unwrap())
         .unwrap();
     piston
 }
@@ -214,7 +214,7 @@ fn a_wheel_that_is_led_drives_the_piston_as_asked() {
     let spin = 10.0;
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / RATE);
-        let wheel = RigidBody::fixture("wheel", sphere(0.12)).moving(Vec3::zeros(), Vec3::new(0.0, -spin, 0.0));
+        let wheel = RigidBody::fixed("wheel", sphere(0.12)).moving(Vec3::zeros(), Vec3::new(0.0, -spin, 0.0));
         let wheel = world.add_boxed(Box::new(wheel), Mode::Kinematic).unwrap();
         world.set_collidable(wheel, false).unwrap();
         let piston_id = engine(&mut world, wheel);
@@ -257,10 +257,10 @@ fn a_linkage_that_strikes_the_ground_stays_closed_and_out_of_it() {
             for id in linkage.bars {
                 // bars overlap at their pins: they meet the ground alone
                 let body: &mut RigidBody = linkage.world.get_mut(id).unwrap();
-                (body.kind, body.meets) = (CollisionKind::new(1).unwrap(), CollisionKind::default().bit());
+                (body.group, body.mask) = (CollisionGroup::new(1).unwrap(), CollisionGroup::default().bit());
                 (body.material.restitution, body.material.friction) = (restitution, friction);
             }
-            let floor = RigidBody::fixture("floor", Shape::half_space())
+            let floor = RigidBody::fixed("floor", Shape::half_space())
                 .surface(restitution, friction)
                 .at(Pose::translation(0.0, 0.0, -0.12));
             linkage.world.add_static(floor).unwrap();
@@ -290,7 +290,10 @@ fn joints_that_cannot_close_do_not_open_others() {
         let stuck = linkage.world.add(bar("stuck", Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.2, 1.0, 0.0))).unwrap();
         for (i, place) in [Vec3::new(0.1, 1.0, 0.0), Vec3::new(0.11, 1.0, 0.0)].into_iter().enumerate() {
             let sides = (Anchor::on(stuck, 0, Pose::identity()), Anchor::world(Pose::from(place)));
-            linkage.world.add(Closure::new(format!("weld {i}"), ClosureKind::Weld, sides.0, sides.1).unwrap()).unwrap();
+            linkage
+                .world
+                .add(LoopJoint::new(format!("weld {i}"), LoopJointKind::Fixed, sides.0, sides.1).unwrap())
+                .unwrap();
         }
         let worst = run(&mut linkage, 5.0);
         println!("{stepper}, beside a box welded to two places: {worst:?}");

@@ -1,7 +1,7 @@
 //! Single joints made by closures: pendulums, welds, doors on two hinges, and what happens where a side is gone.
 
-use crate::closures::{AXIS, bar, hinge};
 use crate::common::*;
+use crate::loop_joints::{AXIS, bar, hinge};
 use std::f64::consts::PI;
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::*;
@@ -21,8 +21,8 @@ fn measured(stepper: &str, rate: f64, amplitude: f64) -> f64 {
     let rod = world.add(bar("bar", Vec3::zeros(), 0.6 * Vec3::new(amplitude.sin(), 0.0, -amplitude.cos()))).unwrap();
     hinge(&mut world, "hinge", rod, None, Vec3::zeros(), AXIS);
     let state = |world: &World| {
-        let (p, site) = (position(world, rod), world.site(rod, 0).unwrap());
-        (p.x.atan2(-p.z), -site.angular_velocity.y)
+        let (p, part_state) = (position(world, rod), world.part_state(rod, 0).unwrap());
+        (p.x.atan2(-p.z), -part_state.angular_velocity.y)
     };
     let mut downs = Vec::new();
     let mut before = state(&world);
@@ -100,12 +100,12 @@ fn a_weld_of_two_bodies_is_one_body() {
                 let mut body = RigidBody::with_mass(format!("box {i}"), Shape::cuboid(half).unwrap(), m)
                     .unwrap()
                     .at(Pose::from(c));
-                body.meets = 0;
+                body.mask = 0;
                 world.add(body.moving(push + spin.cross(&(c - center)), spin)).unwrap()
             })
             .collect();
-        let weld =
-            Closure::weld_at("weld", &world, Some((ids[0], 0)), Some((ids[1], 0)), Vec3::new(0.3, 0.1, 0.05)).unwrap();
+        let weld = LoopJoint::fixed_at("weld", &world, Some((ids[0], 0)), Some((ids[1], 0)), Vec3::new(0.3, 0.1, 0.05))
+            .unwrap();
         let weld = world.add(weld).unwrap();
         let about_center = |world: &World| {
             let (m, c) = (
@@ -124,22 +124,22 @@ fn a_weld_of_two_bodies_is_one_body() {
             fall = fall.max((c - (center + push * t - Vec3::z() * (0.5 * G * t * t))).norm());
             angular = angular.max((l - start.2).norm() / start.2.norm());
             // one body: ω = R·I⁻¹·Rᵀ·L with the summed inertia
-            let site = world.site(ids[0], 0).unwrap();
-            let r = site.pose.rotation.to_rotation_matrix().into_inner();
+            let part_state = world.part_state(ids[0], 0).unwrap();
+            let r = part_state.pose.rotation.to_rotation_matrix().into_inner();
             let omega = r * inertia.try_inverse().unwrap() * r.transpose() * l;
-            inertial = inertial.max((site.angular_velocity - omega).norm());
+            inertial = inertial.max((part_state.angular_velocity - omega).norm());
             kept = kept.max((world.energy().total() - energy).abs() / spun);
         }
-        let misfit = world.get::<Closure>(weld).unwrap().misfit(&world.view()).unwrap();
+        let position_error = world.get::<LoopJoint>(weld).unwrap().position_error(&world.view()).unwrap();
         println!(
-            "{stepper}: centre off by {fall:.1e} m, L by {angular:.1e}, ω by {inertial:.1e} rad/s, energy by {kept:.1e} of the spin, {misfit:?}"
+            "{stepper}: centre off by {fall:.1e} m, L by {angular:.1e}, ω by {inertial:.1e} rad/s, energy by {kept:.1e} of the spin, {position_error:?}"
         );
         assert!(fall < 1e-9, "{stepper}: the centre leaves the parabola by {fall:e} m");
         // impulses keep it; moving the bodies together, with their momenta held, is of third order in a step
         assert!(angular < 1e-5, "{stepper}: angular momentum changes by {angular:e}");
         assert!(inertial < 1e-7, "{stepper}: ω is {inertial:e} rad/s off that of one body");
         assert!(kept < 1e-4, "{stepper}: energy changes by {kept:e} of the spin's");
-        assert!(misfit.distance < 2e-9 && misfit.angle < 2e-9, "{stepper}: {misfit:?}");
+        assert!(position_error.distance < 2e-9 && position_error.angle < 2e-9, "{stepper}: {position_error:?}");
     }
 }
 
@@ -152,7 +152,7 @@ fn door(stepper: &str, solver: &str, hinges: usize) -> (World, ObjectId) {
     let (axis, foot) = (Vec3::new(0.1, 0.2, 1.0).normalize(), Vec3::new(-0.4, 0.0, -0.8));
     let spin = 4.0 * axis;
     let mut body = RigidBody::new("door", shape, 10.0, inertia).unwrap().moving(spin.cross(&-foot), spin);
-    body.meets = 0;
+    body.mask = 0;
     let id = world.add(body).unwrap();
     for i in 0..hinges {
         hinge(&mut world, &format!("hinge {i}"), id, None, foot + 0.8 * i as f64 * axis, axis);
@@ -190,12 +190,12 @@ fn where_a_side_is_gone_or_not_alive_nothing_is_held() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         let post =
-            world.add_static(RigidBody::fixture("post", sphere(0.1)).at(Pose::translation(0.0, 0.0, 1.0))).unwrap();
+            world.add_static(RigidBody::fixed("post", sphere(0.1)).at(Pose::translation(0.0, 0.0, 1.0))).unwrap();
         let ball = world
             .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.5)))
             .unwrap();
         let joint =
-            Closure::weld_at("weld", &world, Some((ball, 0)), Some((post, 0)), Vec3::new(0.0, 0.0, 0.7)).unwrap();
+            LoopJoint::fixed_at("weld", &world, Some((ball, 0)), Some((post, 0)), Vec3::new(0.0, 0.0, 0.7)).unwrap();
         let joint = world.add(joint).unwrap();
         let falls = |world: &mut World| {
             let before = position(world, ball).z;
@@ -205,8 +205,8 @@ fn where_a_side_is_gone_or_not_alive_nothing_is_held() {
             before - position(world, ball).z
         };
         assert!(falls(&mut world).abs() < 1e-9, "{stepper}: it hangs");
-        world.set_alive(post, false).unwrap();
-        assert!(world.get::<Closure>(joint).unwrap().misfit(&world.view()).is_none());
+        world.set_enabled(post, false).unwrap();
+        assert!(world.get::<LoopJoint>(joint).unwrap().position_error(&world.view()).is_none());
         assert!((falls(&mut world) - 0.5 * G * 0.01).abs() < 1e-9, "{stepper}: it falls when the post is not alive");
         world.remove(post).unwrap();
         world.set_velocity(ball, Vec3::zeros(), Vec3::zeros()).unwrap();
@@ -219,23 +219,30 @@ fn closures_that_cannot_be_are_refused() {
     let mut world = world("time_stepping", 1.0 / 240.0);
     let ball = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap()).unwrap();
     let (here, side) = (Vec3::zeros(), Some((ball, 0)));
-    assert_eq!(Closure::point_at("j", &world, None, None, here).unwrap_err(), ClosureError::NoPart("j".into()));
-    assert_eq!(Closure::point_at("j", &world, side, side, here).unwrap_err(), ClosureError::SamePart("j".into()));
+    assert_eq!(LoopJoint::spherical_at("j", &world, None, None, here).unwrap_err(), LoopJointError::NoPart("j".into()));
     assert_eq!(
-        Closure::point_at("j", &world, Some((ball, 3)), None, here).unwrap_err(),
-        ClosureError::Gone { name: "j".into(), part: 3 }
+        LoopJoint::spherical_at("j", &world, side, side, here).unwrap_err(),
+        LoopJointError::SamePart("j".into())
     );
     assert_eq!(
-        Closure::point_at("j", &world, side, None, Vec3::new(f64::NAN, 0.0, 0.0)).unwrap_err(),
-        ClosureError::NotFinite("j".into())
+        LoopJoint::spherical_at("j", &world, Some((ball, 3)), None, here).unwrap_err(),
+        LoopJointError::Gone { name: "j".into(), part: 3 }
     );
     assert_eq!(
-        Closure::hinge_at("j", &world, side, None, here, Vec3::zeros()).unwrap_err(),
-        ClosureError::Axis("j".into())
+        LoopJoint::spherical_at("j", &world, side, None, Vec3::new(f64::NAN, 0.0, 0.0)).unwrap_err(),
+        LoopJointError::NotFinite("j".into())
     );
-    let wrong =
-        Closure::new("j", ClosureKind::Weld, Anchor::on(ball, 3, Pose::identity()), Anchor::world(Pose::identity()))
-            .unwrap();
+    assert_eq!(
+        LoopJoint::revolute_at("j", &world, side, None, here, Vec3::zeros()).unwrap_err(),
+        LoopJointError::Axis("j".into())
+    );
+    let wrong = LoopJoint::new(
+        "j",
+        LoopJointKind::Fixed,
+        Anchor::on(ball, 3, Pose::identity()),
+        Anchor::world(Pose::identity()),
+    )
+    .unwrap();
     world.add(wrong).unwrap();
     assert_eq!(
         world.step().unwrap_err().to_string(),
@@ -251,9 +258,9 @@ fn a_joint_that_starts_open_closes_at_the_recovery_speed() {
         let ball = world
             .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.3, 0.0, 0.0)))
             .unwrap();
-        let joint = Closure::new(
+        let joint = LoopJoint::new(
             "joint",
-            ClosureKind::Weld,
+            LoopJointKind::Fixed,
             Anchor::on(ball, 0, Pose::identity()),
             Anchor::world(Pose::identity()),
         )
@@ -285,11 +292,11 @@ fn hinged_boxes_come_to_rest_on_the_ground() {
             world.add(body.at(Pose::translation(x, 0.0, 0.3)).surface(0.0, 0.5)).unwrap()
         });
         let joint = hinge(&mut world, "hinge", ids[0], Some(ids[1]), Vec3::new(0.0, 0.0, 0.3), Vec3::y());
-        let mut worst = Misfit::default();
+        let mut worst = PositionError::default();
         for _ in 0..480 {
             world.step().unwrap();
-            let now = world.get::<Closure>(joint).unwrap().misfit(&world.view()).unwrap();
-            worst = Misfit { distance: worst.distance.max(now.distance), angle: worst.angle.max(now.angle) };
+            let now = world.get::<LoopJoint>(joint).unwrap().position_error(&world.view()).unwrap();
+            worst = PositionError { distance: worst.distance.max(now.distance), angle: worst.angle.max(now.angle) };
         }
         println!(
             "{stepper}: {worst:?}, {:e} deep, heights {:?}",

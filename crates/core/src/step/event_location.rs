@@ -4,9 +4,9 @@
 //! margin is within the tolerance on either side has landed.
 
 use super::contacts::Limit;
-use crate::detect::Touch;
+use crate::detect::ContactConstraint;
+use crate::part_state::PartState;
 use crate::settings::Settings;
-use crate::site::Site;
 
 /// A margin of at least this is not measured, metres.
 const FAR: f64 = 1e-4;
@@ -17,7 +17,7 @@ pub(super) const SLOW: f64 = 1e-3;
 #[derive(Clone, Copy)]
 pub(super) struct Role {
     pub lasts: bool,
-    pub touches: bool,
+    pub touching: bool,
     /// Depth that does not make the step go back, metres.
     pub allowed: f64,
 }
@@ -29,7 +29,7 @@ pub(super) struct LimitRole {
     gap: f64,
     rate: f64,
     acceleration: f64,
-    touches: bool,
+    touching: bool,
     allowed: f64,
 }
 
@@ -37,8 +37,8 @@ impl LimitRole {
     /// `rate` and `acceleration` are those of the gap; without a force of the limit's own.
     pub fn new(limit: &Limit, rate: f64, acceleration: f64, s: &Settings) -> LimitRole {
         let slow = rate.abs() < SLOW;
-        let touches = limit.gap <= s.contact_tolerance || (slow && limit.gap <= s.drift_tolerance);
-        let allowed = match (touches, slow) {
+        let touching = limit.gap <= s.contact_tolerance || (slow && limit.gap <= s.drift_tolerance);
+        let allowed = match (touching, slow) {
             (true, _) if limit.target.is_none() => f64::INFINITY, // there is no row to hold it
             (true, true) => s.drift_tolerance,
             _ => s.contact_tolerance,
@@ -48,14 +48,14 @@ impl LimitRole {
             gap: limit.gap,
             rate,
             acceleration,
-            touches,
+            touching,
             allowed: allowed.max(s.contact_tolerance - limit.gap),
         }
     }
 
     /// Whether its force belongs to the sub-step that begins: it is reached and not left.
     pub fn acts(&self) -> bool {
-        self.touches && self.rate < SLOW
+        self.touching && self.rate < SLOW
     }
 }
 
@@ -70,28 +70,42 @@ pub(super) struct Watch {
 
 impl Watch {
     /// Where the parabola of the first nearing contact or limit closes, s; `left` at most.
-    pub fn first_guess(&self, touches: &[Touch], sites: &[Site], left: f64) -> f64 {
-        let contacts = touches.iter().zip(&self.roles).filter(|(_, role)| !role.touches).filter_map(|(touch, _)| {
-            let (a, b) = (&sites[touch.a as usize], &sites[touch.b as usize]);
-            closing(touch.contact.gap, touch.velocity(a, b).dot(&touch.contact.normal), touch.acceleration(a, b).x)
-        });
-        let limits = self.limits.iter().filter(|l| !l.touches).filter_map(|l| closing(l.gap, l.rate, l.acceleration));
+    pub fn first_guess(&self, contact_constraints: &[ContactConstraint], part_states: &[PartState], left: f64) -> f64 {
+        let contacts = contact_constraints.iter().zip(&self.roles).filter(|(_, role)| !role.touching).filter_map(
+            |(constraint, _)| {
+                let (a, b) = (&part_states[constraint.a as usize], &part_states[constraint.b as usize]);
+                closing(
+                    constraint.contact.gap,
+                    constraint.velocity(a, b).dot(&constraint.contact.normal),
+                    constraint.acceleration(a, b).x,
+                )
+            },
+        );
+        let limits = self.limits.iter().filter(|l| !l.touching).filter_map(|l| closing(l.gap, l.rate, l.acceleration));
         contacts.chain(limits).chain(self.guesses.iter().copied()).fold(left, f64::min)
     }
 
     /// Least gap of what does not touch yet.
-    pub fn nearest(&self, touches: &[Touch], tolerance: f64) -> f64 {
-        let contacts = touches.iter().zip(&self.roles).filter(|(_, r)| !r.touches).map(|(t, _)| t.contact.gap);
-        let limits = self.limits.iter().filter(|l| !l.touches).map(|l| l.gap);
+    pub fn nearest(&self, contact_constraints: &[ContactConstraint], tolerance: f64) -> f64 {
+        let contacts =
+            contact_constraints.iter().zip(&self.roles).filter(|(_, r)| !r.touching).map(|(t, _)| t.contact.gap);
+        let limits = self.limits.iter().filter(|l| !l.touching).map(|l| l.gap);
         contacts.chain(limits).fold(FAR, f64::min).max(tolerance)
     }
 
     /// How far a tried state, with the contacts and limits `after`, is from the first crossing. `before` are the contacts of the start.
-    pub fn margin(&self, before: &[Touch], after: &[Touch], limits: &[Limit], tolerance: f64) -> f64 {
-        let contact = |touch: &Touch| {
-            let pair = before.partition_point(|t| t.key.pair < touch.key.pair);
-            let same = before[pair..].iter().zip(&self.roles[pair..]).take_while(|(t, _)| t.key.pair == touch.key.pair);
-            touch.contact.gap + same.map(|(_, r)| r.allowed).fold(tolerance, f64::max) - tolerance
+    pub fn margin(
+        &self,
+        before: &[ContactConstraint],
+        after: &[ContactConstraint],
+        limits: &[Limit],
+        tolerance: f64,
+    ) -> f64 {
+        let contact = |constraint: &ContactConstraint| {
+            let pair = before.partition_point(|t| t.key.pair < constraint.key.pair);
+            let same =
+                before[pair..].iter().zip(&self.roles[pair..]).take_while(|(t, _)| t.key.pair == constraint.key.pair);
+            constraint.contact.gap + same.map(|(_, r)| r.allowed).fold(tolerance, f64::max) - tolerance
         };
         let limit = |limit: &Limit| {
             let role = self.limits.binary_search_by_key(&limit.key, |l| l.key).ok();

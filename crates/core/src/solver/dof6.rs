@@ -5,7 +5,7 @@ use crate::rows::{Block, Rows, dot6};
 
 /// Where a block of one or two sides of six freedoms finds its numbers.
 #[derive(Clone, Copy)]
-pub(super) struct Six {
+pub(super) struct Dof6 {
     /// First index of each side's stretch of `du`; of one side alone, twice the same.
     u: [u32; 2],
     /// First index of each side's responses, likewise.
@@ -14,12 +14,12 @@ pub(super) struct Six {
 }
 
 /// The responses of `K` rows, and what they meet.
-type Meeting<'a, const K: usize> = (&'a [[f64; 6]; K], &'a [f64; 6]);
+type SideData<'a, const K: usize> = (&'a [[f64; 6]; K], &'a [f64; 6]);
 
 /// Both sides of a block of `K` rows; the second is absent, or there.
 pub(super) struct Sides<'a, const K: usize> {
-    first: Meeting<'a, K>,
-    second: Option<Meeting<'a, K>>,
+    first: SideData<'a, K>,
+    second: Option<SideData<'a, K>>,
 }
 
 impl<const K: usize> Sides<'_, K> {
@@ -31,12 +31,12 @@ impl<const K: usize> Sides<'_, K> {
     }
 }
 
-impl Six {
+impl Dof6 {
     /// `None` where a side has another number of freedoms.
-    pub fn of(block: &Block) -> Option<Six> {
+    pub fn of(block: &Block) -> Option<Dof6> {
         match block.sides() {
-            [a, b] if a.dof == 6 && b.dof == 6 => Some(Six { u: [a.u, b.u], y: [a.y, b.y], alone: false }),
-            [a] if a.dof == 6 => Some(Six { u: [a.u; 2], y: [a.y; 2], alone: true }),
+            [a, b] if a.dof == 6 && b.dof == 6 => Some(Dof6 { u: [a.u, b.u], y: [a.y, b.y], alone: false }),
+            [a] if a.dof == 6 => Some(Dof6 { u: [a.u; 2], y: [a.y; 2], alone: true }),
             _ => None,
         }
     }

@@ -14,32 +14,32 @@
 //! A limit that would have let go within the sub-step is held to its end. Where contacts push in the same island velocities are left to them.
 
 use super::Workspace;
-use super::closing::is_joint;
 use super::contacts::{build_rows, limits, push, row_velocities, shift, whiten, zero};
+use super::joint_correction::is_joint;
 use crate::object::Level;
 use crate::rows::RowSet;
-use crate::solver::{Accuracy, GaussSeidel, RowSolver};
+use crate::solver::{GaussSeidel, RowSolver, SolverSettings};
 use crate::world::{Core, StepError};
 
 /// A limit that pushes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Held {
+pub(super) struct ActiveLimit {
     pub key: [u32; 2],
     /// Whether a contact pushes in its island.
     pub with_contacts: bool,
 }
 
 /// The limits that pushed in the solve that was just made in `work`; sorted by key.
-pub(super) fn pushing(work: &Workspace) -> Vec<Held> {
-    let touches = work.touches.len();
+pub(super) fn pushing(work: &Workspace) -> Vec<ActiveLimit> {
+    let contact_constraints = work.contact_constraints.len();
     let force = |b: usize| work.lambda[work.rows.blocks[b].row as usize];
     let mut held = Vec::new();
     for blocks in work.islands.iter() {
-        let with_contacts = blocks.iter().any(|&b| (b as usize) < touches && force(b as usize) != 0.0);
+        let with_contacts = blocks.iter().any(|&b| (b as usize) < contact_constraints && force(b as usize) != 0.0);
         for limit in &work.limits {
-            let block = limit.target.map(|t| t + touches as u32);
+            let block = limit.target.map(|t| t + contact_constraints as u32);
             if block.is_some_and(|b| blocks.contains(&b) && force(b as usize) > 0.0) {
-                held.push(Held { key: limit.key, with_contacts });
+                held.push(ActiveLimit { key: limit.key, with_contacts });
             }
         }
     }
@@ -48,20 +48,31 @@ pub(super) fn pushing(work: &Workspace) -> Vec<Held> {
 }
 
 /// The limits that are passed at the present state, `h` seconds after the present time: their place alone is to be put right.
-pub(super) fn passed(core: &mut Core, probe: &mut Workspace, h: f64) -> Result<Vec<Held>, StepError> {
+pub(super) fn passed(core: &mut Core, probe: &mut Workspace, h: f64) -> Result<Vec<ActiveLimit>, StepError> {
     let time = core.time + h;
     limits(core, time, &mut probe.limits)?;
     let least = core.settings.contact_tolerance;
-    Ok(probe.limits.iter().filter(|l| l.gap < -least).map(|l| Held { key: l.key, with_contacts: true }).collect())
+    Ok(probe
+        .limits
+        .iter()
+        .filter(|l| l.gap < -least)
+        .map(|l| ActiveLimit { key: l.key, with_contacts: true })
+        .collect())
 }
 
 /// Closes the limits `held` at the present state, `h` seconds after the present time; those that are off by more than `reach` are left alone: they have
 /// let go, or are to come back at a bounded speed. Sites and caches are left at the present.
-pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64, reach: f64) -> Result<(), StepError> {
+pub(super) fn hold(
+    core: &mut Core,
+    probe: &mut Workspace,
+    held: &[ActiveLimit],
+    h: f64,
+    reach: f64,
+) -> Result<(), StepError> {
     if held.is_empty() {
         return Ok(());
     }
-    core.motion().refresh();
+    core.integration().refresh();
     let time = core.time;
     core.time += h;
     let laid = build_rows(core, probe, Level::Acceleration, 0.0);
@@ -87,15 +98,15 @@ pub(super) fn hold(core: &mut Core, probe: &mut Workspace, held: &[Held], h: f64
     let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
     for blocks in probe.islands.iter().filter(|blocks| blocks.iter().any(|&b| chosen[b as usize])) {
         for (c, tolerance, du) in
-            [(&place, 1e-3 * s.contact_tolerance, &mut dx), (&speed, s.accuracy.tolerance, &mut dv)]
+            [(&place, 1e-3 * s.contact_tolerance, &mut dx), (&speed, s.solver_settings.tolerance, &mut dv)]
         {
             zero(&mut probe.lambda, probe.rows.len);
-            let accuracy = Accuracy { sweeps: 100, relaxations: u32::MAX, tolerance };
-            GaussSeidel.solve(&probe.rows, blocks, c, &mut probe.lambda, du, accuracy);
+            let solver_settings = SolverSettings { max_sweeps: 100, max_relaxations: u32::MAX, tolerance };
+            GaussSeidel.solve(&probe.rows, blocks, c, &mut probe.lambda, du, solver_settings);
         }
     }
     shift(core, &dx, 1.0);
     push(core, &dv, &mut Vec::new());
-    core.motion().refresh();
+    core.integration().refresh();
     Ok(())
 }

@@ -2,7 +2,7 @@
 //!
 //! Who shows the state to others without copying it, as the Python module does, wants memory that neither moves nor goes away under a reader.
 //! So the numbers are only ever written where they are; when an object comes or goes they move to new memory, and the old is left to those who
-//! [hold](World::hold_state) it. There is no way to put another vector in their place.
+//! [hold](World::hold_state_memory) it. There is no way to put another vector in their place.
 
 use super::World;
 use std::ops::{Deref, DerefMut, Range};
@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// A hold on the memory of a state: while it lives that memory is not given back.
 #[derive(Debug, Default)]
-pub struct StateHold {
+pub struct StateMemoryHold {
     /// The memory, after the world has left it.
     left: Mutex<Vec<f64>>,
 }
@@ -19,7 +19,7 @@ pub struct StateHold {
 #[derive(Default)]
 pub(crate) struct State {
     numbers: Vec<f64>,
-    hold: Option<Arc<StateHold>>,
+    hold: Option<Arc<StateMemoryHold>>,
     aside: Option<Vec<f64>>,
 }
 
@@ -82,11 +82,11 @@ impl State {
 impl World {
     /// Keeps the memory that the state lies in: it stays there, and is written there by every call that moves something, until an object is added or
     /// removed or the world is dropped; then it stays as it was last for as long as the hold lives. Calls of the same state give the same hold.
-    pub fn hold_state(&mut self) -> Arc<StateHold> {
+    pub fn hold_state_memory(&mut self) -> Arc<StateMemoryHold> {
         self.core.x.hold.get_or_insert_default().clone()
     }
 
-    /// Where the state lies, and how many numbers it has; see [`hold_state`](Self::hold_state). Who reads through it has to see to it that no call
+    /// Where the state lies, and how many numbers it has; see [`hold_state_memory`](Self::hold_state_memory). Who reads through it has to see to it that no call
     /// changes the world meanwhile.
     pub fn state_address(&mut self) -> (*const f64, usize) {
         let x = &mut self.core.x;
@@ -94,8 +94,8 @@ impl World {
         (shown.as_mut_ptr(), shown.len())
     }
 
-    /// Leaves the held memory as it is, and works on a copy until [`show_state`](Self::show_state): readers then see the state as it was.
-    pub fn set_state_aside(&mut self) {
+    /// Leaves the held memory as it is, and works on a copy until [`thaw_state_memory`](Self::thaw_state_memory): readers then see the state as it was.
+    pub fn freeze_state_memory(&mut self) {
         let x = &mut self.core.x;
         if x.hold.is_some() && x.aside.is_none() {
             let copy = x.numbers.clone();
@@ -104,7 +104,7 @@ impl World {
     }
 
     /// Writes the state to the memory that was put aside, and works there again.
-    pub fn show_state(&mut self) {
+    pub fn thaw_state_memory(&mut self) {
         let x = &mut self.core.x;
         if let Some(mut shown) = x.aside.take() {
             shown.copy_from_slice(&x.numbers);

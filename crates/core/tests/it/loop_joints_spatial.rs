@@ -55,14 +55,14 @@ fn bennett(stepper: &str, first: f64) -> Bennett {
     let bars = [0, 1, 2, 3].map(|bar| {
         let shape = Shape::cuboid(Vec3::new(0.5 * sizes(bar).0, 0.01, 0.02)).unwrap();
         let mut body = RigidBody::with_mass(format!("bar {bar}"), shape, 1.0).unwrap().at(frames[bar] * center(bar));
-        body.meets = 0;
+        body.mask = 0;
         // the last one is the ground
         if bar == 3 { world.add_static(body).unwrap() } else { world.add(body).unwrap() }
     });
     let hinges = (0..4).map(|bar| {
         let joint = &frames[bar];
         let (one, other) = ((bars[bar], 0), (bars[(bar + 3) % 4], 0));
-        let hinge = Closure::hinge_at(
+        let hinge = LoopJoint::revolute_at(
             format!("hinge {bar}"),
             &world,
             Some(one),
@@ -80,7 +80,7 @@ fn bennett(stepper: &str, first: f64) -> Bennett {
 impl Bennett {
     /// Angle about a hinge, from the poses of the two bars alone.
     fn angle(&self, bar: usize) -> f64 {
-        let frame = |bar: usize| self.world.site(self.bars[bar], 0).unwrap().pose * center(bar).inverse();
+        let frame = |bar: usize| self.world.part_state(self.bars[bar], 0).unwrap().pose * center(bar).inverse();
         let before = (bar + 3) % 4;
         let x = ((frame(before) * along(before)).inverse() * frame(bar)).rotation * Vec3::x();
         x.y.atan2(x.x)
@@ -92,13 +92,13 @@ fn bennetts_linkage_moves_as_its_closed_form_says() {
     for stepper in STEPPERS {
         let mut linkage = bennett(stepper, 1.0);
         let start = linkage.world.energy().total();
-        let (mut gap, mut off, mut energy, mut kinetic) = (Misfit::default(), 0.0f64, 0.0f64, 0.0f64);
+        let (mut gap, mut off, mut energy, mut kinetic) = (PositionError::default(), 0.0f64, 0.0f64, 0.0f64);
         let mut range = (f64::MAX, f64::MIN);
         for _ in 0..240 * 20 {
             linkage.world.step().unwrap();
             for id in &linkage.hinges {
-                let now = linkage.world.get::<Closure>(*id).unwrap().misfit(&linkage.world.view()).unwrap();
-                gap = Misfit { distance: gap.distance.max(now.distance), angle: gap.angle.max(now.angle) };
+                let now = linkage.world.get::<LoopJoint>(*id).unwrap().position_error(&linkage.world.view()).unwrap();
+                gap = PositionError { distance: gap.distance.max(now.distance), angle: gap.angle.max(now.angle) };
             }
             let angles = [0, 1, 2, 3].map(|bar| linkage.angle(bar));
             // tan(θ/2) may be anything, its sine and cosine not

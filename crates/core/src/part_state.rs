@@ -5,29 +5,29 @@ use tumble_collide::{Pose, Vec3};
 
 /// How many numbers an object needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Dims {
+pub struct StateSizes {
     /// Length of its stretch of the state `X`.
     pub x: usize,
     /// Degrees of freedom: length of its generalized velocity `v` and of its whitened velocity `u`.
     pub dof: usize,
     /// Rows in the site table: one per collidable part.
-    pub sites: usize,
+    pub parts: usize,
 }
 
 /// An object's place in the world's tables, told by the world.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Span {
+pub struct StateRange {
     /// Its stretch of the state `X`.
     pub x: Range<usize>,
     /// Its stretch of generalized velocities, forces and whitened velocities.
     pub v: Range<usize>,
     /// Its rows of the site table.
-    pub site: Range<usize>,
+    pub parts: Range<usize>,
 }
 
 /// One collidable part as readers see it: springs, boids, the detector, the renderer. World axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Site {
+pub struct PartState {
     /// Pose of the part's frame in the world, `X_WB`.
     pub pose: Pose,
     /// Angular velocity, rad/s.
@@ -45,10 +45,10 @@ pub struct Site {
     pub bias_acceleration: Vec3,
 }
 
-impl Default for Site {
-    fn default() -> Site {
+impl Default for PartState {
+    fn default() -> PartState {
         let zero = Vec3::zeros();
-        Site {
+        PartState {
             pose: Pose::identity(),
             angular_velocity: zero,
             velocity: zero,
@@ -60,7 +60,7 @@ impl Default for Site {
     }
 }
 
-impl Site {
+impl PartState {
     /// Position of the frame's origin, metres.
     pub fn position(&self) -> Vec3 {
         self.pose.translation.vector
@@ -105,14 +105,17 @@ pub struct Forces {
 
 impl Forces {
     /// Adds a force (N, world axes) that acts at world point `p` on row `index` of the site table.
-    pub fn add_at(&mut self, index: usize, site: &Site, force: Vec3, p: &Vec3) {
+    pub fn add_at(&mut self, index: usize, part_state: &PartState, force: Vec3, p: &Vec3) {
         let wrench = &mut self.wrenches[index];
         wrench.force += force;
-        wrench.torque += (p - site.position()).cross(&force);
+        wrench.torque += (p - part_state.position()).cross(&force);
     }
 
-    pub(crate) fn slice(&self, span: &Span) -> ForceSlice<'_> {
-        ForceSlice { wrenches: &self.wrenches[span.site.clone()], generalized: &self.generalized[span.v.clone()] }
+    pub(crate) fn slice(&self, state_range: &StateRange) -> ForceSlice<'_> {
+        ForceSlice {
+            wrenches: &self.wrenches[state_range.parts.clone()],
+            generalized: &self.generalized[state_range.v.clone()],
+        }
     }
 }
 

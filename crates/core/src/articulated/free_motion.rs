@@ -15,7 +15,7 @@ use super::joint::Joint;
 use super::model::Model;
 
 /// Moves `x = [q, v]` by `h` seconds of free motion.
-pub(super) fn coast(model: &Model, working: &mut Working, x: &mut [f64], h: f64) {
+pub(super) fn free_motion(model: &Model, working: &mut Working, x: &mut [f64], h: f64) {
     let n = model.positions();
     if h == 0.0 || x[n..].iter().all(|v| *v == 0.0) {
         return;

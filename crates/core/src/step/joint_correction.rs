@@ -18,10 +18,10 @@
 
 use super::Workspace;
 use super::contacts::{lay_rows, push, row_velocities, shift, unwhiten_onto, whiten, zero};
-use super::reach;
+use super::unreachable_joints;
 use crate::object::{Integratable, Level, RowTarget};
 use crate::rows::{RowSet, Rows};
-use crate::solver::{Accuracy, DIRECT_ROWS, GaussSeidel, RowSolver};
+use crate::solver::{GaussSeidel, MAX_DIRECT_ROWS, RowSolver, SolverSettings};
 use crate::view::Entry;
 use crate::world::{Core, StepError};
 use std::ops::Range;
@@ -55,35 +55,35 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     lay_rows(core, &mut rows, level, None)?;
     let errors: Vec<f64> = rows.targets.iter().map(|t| t.error).collect();
     let (start, time, pinned) = (core.x.to_vec(), core.time, core.lift_pin());
-    core.motion().coast(ahead);
-    core.motion().refresh();
+    core.integration().free_motion(ahead);
+    core.integration().refresh();
     core.time += ahead;
     // what is open is asked for half-way closer: whether that is out of reach shows here
     let closer = if core.settings.stabilize_positions { core.settings.recovery_speed * ahead } else { 0.0 };
-    let aims = |closer: f64, rows: &Workspace| reach::left(rows, |i| errors[i], closer);
+    let aims = |closer: f64, rows: &Workspace| unreachable_joints::left(rows, |i| errors[i], closer);
     let aim = aims(closer, &rows);
     let mut far = onto(core, &mut rows, level, &aim);
     if far.as_ref().is_ok_and(|far| far.is_empty())
-        && Piece::all(core, &mut rows).iter().any(|p| p.direct() && reach::weak(&rows, &p.rows))
+        && Piece::all(core, &mut rows).iter().any(|p| p.direct() && unreachable_joints::weak(&rows, &p.rows))
     {
         let mut end = Workspace::default();
         let middle = core.x.to_vec();
-        core.motion().coast(ahead);
-        core.motion().refresh();
+        core.integration().free_motion(ahead);
+        core.integration().refresh();
         core.time += ahead;
         lay_rows(core, &mut end, level, None)?;
         let aim = aims(2.0 * closer, &end);
         far = onto(core, &mut end, level, &aim);
         core.x.copy_from_slice(&middle);
-        core.motion().refresh();
+        core.integration().refresh();
     }
     map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
     core.time = time;
     core.x.copy_from_slice(&start);
     core.pin_again(pinned);
-    core.motion().refresh();
+    core.integration().refresh();
     map_sides(core, &mut rows, |body, j, y| body.respond(j, y));
-    reach::soften(&mut rows, &far?, reach::GIVING);
+    unreachable_joints::soften(&mut rows, &far?, unreachable_joints::GIVING);
     Ok((errors, rows))
 }
 
@@ -93,7 +93,7 @@ fn by_start(core: &Core) -> Vec<&Entry> {
 }
 
 fn entry_at<'e>(entries: &[&'e Entry], u: u32) -> Option<&'e Entry> {
-    entries.binary_search_by_key(&(u as usize), |e| e.span.v.start).ok().map(|i| entries[i])
+    entries.binary_search_by_key(&(u as usize), |e| e.state_range.v.start).ok().map(|i| entries[i])
 }
 
 /// Replaces what every row holds of every side.
@@ -137,7 +137,7 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
         }
         core.x.clone_into(&mut kept);
         shift(core, &dx, 1.0);
-        core.motion().refresh();
+        core.integration().refresh();
         lay_rows(core, probe, level, None)?;
     }
     let mut far: Vec<u32> = pieces
@@ -165,7 +165,7 @@ pub(super) fn close(
     let (arrived, mut moved) = (core.x.to_vec(), vec![0.0; core.dof]);
     let mut pieces = Piece::all(core, work);
     let mut probe = Workspace::default();
-    let mut open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
+    let mut open = JointErrors::measure(core, work, &mut probe, step, kept, &pushed)?;
     pieces.iter_mut().for_each(|piece| piece.left = open.of(piece));
     loop {
         pieces
@@ -178,7 +178,7 @@ pub(super) fn close(
         open.newton(core, &mut probe, &pieces, &mut moved);
         refresh_at(core, start);
         open.chord(core, work, &pieces, &mut moved);
-        open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
+        open = JointErrors::measure(core, work, &mut probe, step, kept, &pushed)?;
         let mut worse = false;
         for piece in pieces.iter_mut().filter(|p| !p.done) {
             let (left, was) = (open.of(piece), piece.left);
@@ -205,13 +205,13 @@ pub(super) fn close(
             piece.chord &= share < SLOW;
         }
         if worse {
-            open = Open::measure(core, work, &mut probe, step, kept, &pushed)?;
+            open = JointErrors::measure(core, work, &mut probe, step, kept, &pushed)?;
         }
     }
     let far = core.settings.contact_tolerance / open.least.0;
     for piece in pieces.iter().filter(|p| p.direct() && p.left.0 > far) {
-        reach::go_as_moved(core, &piece.stretches, [start, &arrived], &moved, step.0);
-        reach::report(core, &probe, &piece.rows);
+        unreachable_joints::go_as_moved(core, &piece.stretches, [start, &arrived], &moved, step.0);
+        unreachable_joints::report(core, &probe, &piece.rows);
     }
     refresh_at(core, start);
     Ok(())
@@ -239,8 +239,8 @@ struct Piece {
 
 impl Piece {
     fn all(core: &Core, work: &mut Workspace) -> Vec<Piece> {
-        let (touches, targets) = (work.touches.len(), &work.targets);
-        work.islands.build(&work.rows, |b| b >= touches && is_joint(&targets[b - touches]));
+        let (contact_constraints, targets) = (work.contact_constraints.len(), &work.targets);
+        work.islands.build(&work.rows, |b| b >= contact_constraints && is_joint(&targets[b - contact_constraints]));
         let entries = by_start(core);
         let piece = |blocks: &[u32]| {
             let mut starts: Vec<u32> =
@@ -250,10 +250,10 @@ impl Piece {
             let stretches = starts
                 .iter()
                 .filter_map(|u| entry_at(&entries, *u))
-                .map(|e| (e.span.x.clone(), e.span.v.clone()))
+                .map(|e| (e.state_range.x.clone(), e.state_range.v.clone()))
                 .collect();
-            let rounds = if blocks.len() > DIRECT_ROWS { FEW_ROUNDS } else { ROUNDS };
-            let rows = blocks.iter().map(|b| b - touches as u32).collect();
+            let rounds = if blocks.len() > MAX_DIRECT_ROWS { FEW_ROUNDS } else { ROUNDS };
+            let rows = blocks.iter().map(|b| b - contact_constraints as u32).collect();
             let left = (f64::INFINITY, f64::INFINITY);
             Piece {
                 blocks: blocks.to_vec(),
@@ -282,7 +282,7 @@ impl Piece {
 
     /// Whether it is small enough to be solved directly: what is not may be open because there was too little time.
     fn direct(&self) -> bool {
-        self.blocks.len() <= DIRECT_ROWS
+        self.blocks.len() <= MAX_DIRECT_ROWS
     }
 
     /// Goes shorter ways from now on.
@@ -293,7 +293,7 @@ impl Piece {
 
     /// Gives its rows, in `probe`, the compliance for such an error: they may not agree.
     fn soften(&self, probe: &mut Workspace, error: f64) {
-        reach::soften(probe, &self.rows, (SOFT.0 * error).min(SOFT.1) * self.damping);
+        unreachable_joints::soften(probe, &self.rows, (SOFT.0 * error).min(SOFT.1) * self.damping);
     }
 
     /// Whether only its place is closed in this round.
@@ -309,14 +309,14 @@ impl Piece {
 
 /// How far each constraint row is off at the present state; 0 where that is to stay.
 #[derive(Default)]
-struct Open {
+struct JointErrors {
     place: Vec<f64>,
     speed: Vec<f64>,
     /// What counts as closed: metres (or radians) and metres per second.
     least: (f64, f64),
 }
 
-impl Open {
+impl JointErrors {
     /// Sites and caches are left at the present, whose rows come in `probe`. Nothing is open where they are not those of `work`.
     fn measure(
         core: &mut Core,
@@ -325,9 +325,9 @@ impl Open {
         step: (f64, Level),
         kept: &[f64],
         pushed: &[bool],
-    ) -> Result<Open, StepError> {
+    ) -> Result<JointErrors, StepError> {
         let pinned = core.lift_pin();
-        let open = Open::measure_here(core, work, probe, step, kept, pushed);
+        let open = JointErrors::measure_here(core, work, probe, step, kept, pushed);
         core.pin_again(pinned);
         open
     }
@@ -339,16 +339,16 @@ impl Open {
         step: (f64, Level),
         kept: &[f64],
         pushed: &[bool],
-    ) -> Result<Open, StepError> {
-        core.motion().refresh();
+    ) -> Result<JointErrors, StepError> {
+        core.integration().refresh();
         let time = core.time;
         core.time += step.0;
         let laid = lay_rows(core, probe, step.1, None);
         core.time = time;
         laid?;
         let n = work.targets.len();
-        let least = (1e-2 * core.settings.contact_tolerance, core.settings.accuracy.tolerance.max(FINEST));
-        let mut open = Open { place: vec![0.0; n], speed: vec![0.0; n], least };
+        let least = (1e-2 * core.settings.contact_tolerance, core.settings.solver_settings.tolerance.max(FINEST));
+        let mut open = JointErrors { place: vec![0.0; n], speed: vec![0.0; n], least };
         if probe.targets.len() != n {
             return Ok(open);
         }
@@ -370,11 +370,11 @@ impl Open {
 
     /// A round with the rows of the step, in the caches that they were built with.
     fn chord(&self, core: &mut Core, work: &Workspace, pieces: &[Piece], moved: &mut [f64]) {
-        let touches = work.touches.len();
+        let contact_constraints = work.contact_constraints.len();
         self.apply(
             core,
             &work.rows,
-            touches,
+            contact_constraints,
             pieces.iter().filter(|p| !p.done && p.chord).map(|p| (&p.blocks[..], p.moves_first())),
             moved,
         );
@@ -398,13 +398,13 @@ impl Open {
         &self,
         core: &mut Core,
         rows: &Rows,
-        touches: usize,
+        contact_constraints: usize,
         pieces: impl Iterator<Item = (&'p [u32], bool)>,
         moved: &mut [f64],
     ) {
         let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
         let mut c = [vec![0.0; rows.len], vec![0.0; rows.len]];
-        for (i, block) in rows.blocks[touches..].iter().enumerate() {
+        for (i, block) in rows.blocks[contact_constraints..].iter().enumerate() {
             (c[0][block.row as usize], c[1][block.row as usize]) = (self.place[i], self.speed[i]);
         }
         for (blocks, moves_first) in pieces {
@@ -426,13 +426,14 @@ impl Open {
 /// joints lack in velocity.
 fn pushed(work: &mut Workspace) -> Vec<bool> {
     let mut pushed = vec![false; work.rows.dof];
-    if work.touches.is_empty() {
+    if work.contact_constraints.is_empty() {
         return pushed;
     }
     work.islands.build(&work.rows, |_| true);
     for blocks in work.islands.iter() {
         let pushes = |&b: &u32| {
-            (b as usize) < work.touches.len() && work.lambda[work.rows.blocks[b as usize].row as usize] != 0.0
+            (b as usize) < work.contact_constraints.len()
+                && work.lambda[work.rows.blocks[b as usize].row as usize] != 0.0
         };
         if blocks.iter().any(pushes) {
             let sides = blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides());
@@ -445,14 +446,14 @@ fn pushed(work: &mut Workspace) -> Vec<bool> {
 fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64) {
     let mut lambda = Vec::new();
     zero(&mut lambda, rows.len);
-    let accuracy = Accuracy { sweeps: SWEEPS, relaxations: u32::MAX, tolerance };
-    GaussSeidel.solve(rows, blocks, c, &mut lambda, du, accuracy);
+    let solver_settings = SolverSettings { max_sweeps: SWEEPS, max_relaxations: u32::MAX, tolerance };
+    GaussSeidel.solve(rows, blocks, c, &mut lambda, du, solver_settings);
 }
 
 /// Sites and caches of a state that is not the present one.
 pub(super) fn refresh_at(core: &mut Core, x: &[f64]) {
     let now = core.x.to_vec();
     core.x.copy_from_slice(x);
-    core.motion().refresh();
+    core.integration().refresh();
     core.x.copy_from_slice(&now);
 }

@@ -2,7 +2,7 @@
 
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    ArticulatedBody, Collider, Joint, LinkMass, ModelBuilder, ObjectId, Pull, RigidBody, Settings, World,
+    ArticulatedBody, Collider, Joint, LinkMass, ModelBuilder, ObjectId, PickForce, RigidBody, Settings, World,
 };
 
 const OMEGA: f64 = 10.0;
@@ -15,15 +15,15 @@ fn world(gravity: f64, dt: f64) -> World {
     World::new(Settings { gravity: Vec3::new(0.0, 0.0, -gravity), dt, ..Settings::default() }).unwrap()
 }
 
-fn held(world: &World, pull: &Pull) -> Vec3 {
-    let site = world.site(pull.id, pull.part).unwrap();
-    site.pose.rotation * pull.point + site.position()
+fn held(world: &World, pick: &PickForce) -> Vec3 {
+    let part_state = world.part_state(pick.id, pick.part).unwrap();
+    part_state.pose.rotation * pick.point + part_state.position()
 }
 
-fn drag(world: &mut World, pull: &Pull, seconds: f64) {
+fn drag(world: &mut World, pick: &PickForce, seconds: f64) {
     let steps = (seconds / world.settings().dt).round() as usize;
     for _ in 0..steps {
-        world.pull(pull).unwrap();
+        world.pick(pick).unwrap();
         world.step().unwrap();
     }
 }
@@ -39,11 +39,11 @@ fn a_middle_that_is_pulled_follows_the_critically_damped_spring() {
     for mass in [1e-3, 1e3] {
         let mut world = world(0.0, 1e-3);
         let id = crate_of(&mut world, mass);
-        let pull = Pull { id, part: 0, point: Vec3::zeros(), target: Vec3::new(1.0, 0.0, 5.0), frequency: OMEGA };
+        let pick = PickForce { id, part: 0, point: Vec3::zeros(), target: Vec3::new(1.0, 0.0, 5.0), frequency: OMEGA };
         for tenths in 1..=5 {
-            drag(&mut world, &pull, 0.1);
+            drag(&mut world, &pick, 0.1);
             let wt = OMEGA * 0.1 * tenths as f64;
-            let left = (pull.target - held(&world, &pull)).x;
+            let left = (pick.target - held(&world, &pick)).x;
             assert!((left - (1.0 + wt) * (-wt).exp()).abs() < 0.01, "{mass} kg: {left} m left at ωt = {wt}");
         }
     }
@@ -55,13 +55,13 @@ fn a_body_hangs_at_rest_below_the_hand_by_g_over_omega_squared() {
     let id = crate_of(&mut world, 20.0);
     // held at a corner: it turns until the corner is straight above the middle
     let corner = Vec3::new(0.3, 0.2, 0.1);
-    let pull = Pull { id, part: 0, point: corner, target: Vec3::new(0.3, 0.2, 5.1), frequency: OMEGA };
+    let pick = PickForce { id, part: 0, point: corner, target: Vec3::new(0.3, 0.2, 5.1), frequency: OMEGA };
     // its swings die slowly: sideways the corner is light, and the spring in proportion
-    drag(&mut world, &pull, 150.0);
-    let (point, middle) = (held(&world, &pull), world.site(id, 0).unwrap().position());
+    drag(&mut world, &pick, 150.0);
+    let (point, middle) = (held(&world, &pick), world.part_state(id, 0).unwrap().position());
     // the implicit step asks for (1 + ωh)² times that distance
     let sag = 9.81 / (OMEGA * OMEGA) * (1.0 + OMEGA / 240.0f64).powi(2);
-    assert_near("sag", (pull.target - point).z, sag, 1e-6);
+    assert_near("sag", (pick.target - point).z, sag, 1e-6);
     assert_near("aside", (point - middle).xy().norm(), 0.0, 1e-4);
     assert_near("arm", (point - middle).z, corner.norm(), 1e-6);
     assert!(world.energy().kinetic < 1e-6);
@@ -72,10 +72,15 @@ fn a_pull_is_stable_at_any_length_of_the_step() {
     for dt in [0.001, 1.0 / 60.0, 0.1, 1.0] {
         let mut world = world(0.0, dt);
         let id = crate_of(&mut world, 2.0);
-        let pull =
-            Pull { id, part: 0, point: Vec3::new(0.3, 0.0, 0.0), target: Vec3::new(0.0, 2.0, 5.0), frequency: OMEGA };
-        drag(&mut world, &pull, 200.0 * dt.max(0.05));
-        let left = (pull.target - held(&world, &pull)).norm();
+        let pick = PickForce {
+            id,
+            part: 0,
+            point: Vec3::new(0.3, 0.0, 0.0),
+            target: Vec3::new(0.0, 2.0, 5.0),
+            frequency: OMEGA,
+        };
+        drag(&mut world, &pick, 200.0 * dt.max(0.05));
+        let left = (pick.target - held(&world, &pick)).norm();
         assert!(left < 1e-3, "dt {dt}: {left} m left");
     }
 }
@@ -83,14 +88,15 @@ fn a_pull_is_stable_at_any_length_of_the_step() {
 #[test]
 fn what_cannot_move_is_not_pulled_and_what_is_gone_is_told() {
     let mut world = world(9.81, 0.01);
-    let ground = world.add_static(RigidBody::fixture("ground", Shape::half_space())).unwrap();
-    let pull = Pull { id: ground, part: 0, point: Vec3::zeros(), target: Vec3::new(0.0, 0.0, 9.0), frequency: OMEGA };
-    assert_eq!(world.pull(&pull).unwrap().force, Vec3::zeros());
+    let ground = world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
+    let pick =
+        PickForce { id: ground, part: 0, point: Vec3::zeros(), target: Vec3::new(0.0, 0.0, 9.0), frequency: OMEGA };
+    assert_eq!(world.pick(&pick).unwrap().force, Vec3::zeros());
     let id = crate_of(&mut world, 1.0);
-    assert!(world.pull(&Pull { id, part: 1, ..pull }).is_err(), "no such part");
-    assert!(world.pull(&Pull { id, target: Vec3::repeat(f64::NAN), ..pull }).is_err(), "not finite");
+    assert!(world.pick(&PickForce { id, part: 1, ..pick }).is_err(), "no such part");
+    assert!(world.pick(&PickForce { id, target: Vec3::repeat(f64::NAN), ..pick }).is_err(), "not finite");
     world.remove(id).unwrap();
-    assert!(world.pull(&Pull { id, ..pull }).is_err(), "gone");
+    assert!(world.pick(&PickForce { id, ..pick }).is_err(), "gone");
 }
 
 #[test]
@@ -104,10 +110,15 @@ fn a_pendulum_swings_to_the_hand_in_the_plane_in_which_it_can() {
     let mut body = ArticulatedBody::new("pendulum", builder.build().unwrap());
     body.add_collider("rod", Collider::new(Shape::sphere(0.05).unwrap(), Pose::translation(0.0, 0.0, -0.5))).unwrap();
     let id = world.add(body).unwrap();
-    let pull =
-        Pull { id, part: 0, point: Vec3::new(0.0, 0.0, -0.5), target: Vec3::new(0.7, 0.4, -0.7), frequency: OMEGA };
-    drag(&mut world, &pull, 5.0);
-    let point = held(&world, &pull);
+    let pick = PickForce {
+        id,
+        part: 0,
+        point: Vec3::new(0.0, 0.0, -0.5),
+        target: Vec3::new(0.7, 0.4, -0.7),
+        frequency: OMEGA,
+    };
+    drag(&mut world, &pick, 5.0);
+    let point = held(&world, &pick);
     let side = 0.5 * 0.5f64.sqrt();
     assert_near("x", point.x, side, 1e-4);
     assert_near("y", point.y, 0.0, 1e-12);

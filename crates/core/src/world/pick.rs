@@ -22,7 +22,7 @@
 
 use super::{World, WorldError};
 use crate::collidable::Collidable;
-use crate::site::{Site, Wrench};
+use crate::part_state::{PartState, Wrench};
 use crate::view::ObjectId;
 use nalgebra::Matrix3;
 use tumble_collide::Vec3;
@@ -32,7 +32,7 @@ const CLOSED: f64 = 1e9;
 
 /// What is pulled, where at, where to, how hard.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pull {
+pub struct PickForce {
     /// The object.
     pub id: ObjectId,
     /// Its part.
@@ -51,23 +51,23 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError::Stale`], [`WorldError::NoPart`], [`WorldError::NotFinite`].
-    pub fn pull(&mut self, pull: &Pull) -> Result<Wrench, WorldError> {
-        let index = self.part(pull.id, pull.part, &[pull.point, pull.target, Vec3::repeat(pull.frequency)])?;
-        self.core.wake(pull.id);
-        let entry = &self.core.table.slots[pull.id];
-        let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pull.part)) else {
+    pub fn pick(&mut self, pick: &PickForce) -> Result<Wrench, WorldError> {
+        let index = self.part(pick.id, pick.part, &[pick.point, pick.target, Vec3::repeat(pick.frequency)])?;
+        self.core.wake(pick.id);
+        let entry = &self.core.table.slots[pick.id];
+        let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pick.part)) else {
             return Ok(Wrench::default());
         };
-        let (site, dof, h) = (self.core.sites[index], entry.span.v.len(), self.core.settings.dt);
-        let held = site.pose.rotation * pull.point + site.position();
-        let (v, omega) = (site.velocity_at(&held), pull.frequency.max(0.0));
-        let wanted = (v + (pull.target - held) * (h * omega * omega)) / (1.0 + h * omega).powi(2);
-        let impulses = responses(collidable, pull.part, &site, dof, &held, [Vec3::x(), Vec3::y(), Vec3::z()]);
+        let (part_state, dof, h) = (self.core.part_states[index], entry.state_range.v.len(), self.core.settings.dt);
+        let held = part_state.pose.rotation * pick.point + part_state.position();
+        let (v, omega) = (part_state.velocity_at(&held), pick.frequency.max(0.0));
+        let wanted = (v + (pick.target - held) * (h * omega * omega)) / (1.0 + h * omega).powi(2);
+        let impulses = responses(collidable, pick.part, &part_state, dof, &held, [Vec3::x(), Vec3::y(), Vec3::z()]);
         let force = mass(&impulses, dof) * (wanted - v) / h;
-        let slowed = site.angular_velocity * (1.0 / (1.0 + 0.5 * h * omega) - 1.0);
-        let torque = mass(&couples(collidable, pull.part, &site, dof), dof) * slowed / h;
-        self.apply_force(pull.id, pull.part, force, &held)?;
-        self.apply_torque(pull.id, pull.part, torque)?;
+        let slowed = part_state.angular_velocity * (1.0 / (1.0 + 0.5 * h * omega) - 1.0);
+        let torque = mass(&couples(collidable, pick.part, &part_state, dof), dof) * slowed / h;
+        self.apply_force(pick.id, pick.part, force, &held)?;
+        self.apply_torque(pick.id, pick.part, torque)?;
         Ok(Wrench { torque, force })
     }
 }
@@ -76,23 +76,23 @@ impl World {
 fn responses(
     collidable: &dyn Collidable,
     part: usize,
-    site: &Site,
+    part_state: &PartState,
     dof: usize,
     point: &Vec3,
     axes: [Vec3; 3],
 ) -> Vec<f64> {
     let mut y = vec![0.0; 3 * dof];
-    collidable.test_impulse(part, site, point, &axes, 1.0, &mut y);
+    collidable.test_impulse(part, part_state, point, &axes, 1.0, &mut y);
     y
 }
 
 /// The same of unit couples about x, y and z: a force along the next axis but one, an arm of 1 m along the next, and the force's opposite without it.
-fn couples(collidable: &dyn Collidable, part: usize, site: &Site, dof: usize) -> Vec<f64> {
+fn couples(collidable: &dyn Collidable, part: usize, part_state: &PartState, dof: usize) -> Vec<f64> {
     let mut z = vec![0.0; 3 * dof];
     for (k, row) in z.chunks_exact_mut(dof.max(1)).enumerate() {
         let (arm, axis) = (Vec3::ith((k + 1) % 3, 1.0), Vec3::ith((k + 2) % 3, 1.0));
-        collidable.test_impulse(part, site, &(site.position() + arm), &[axis], 1.0, row);
-        collidable.test_impulse(part, site, &site.position(), &[axis], -1.0, row);
+        collidable.test_impulse(part, part_state, &(part_state.position() + arm), &[axis], 1.0, row);
+        collidable.test_impulse(part, part_state, &part_state.position(), &[axis], -1.0, row);
     }
     z
 }

@@ -8,22 +8,22 @@
 use tumble_collide::{Mat3, Pose, Shape, Vec3};
 
 /// A box that turns with its part: a half-space has no extent, and one axis.
-pub(crate) struct Oriented {
+pub(crate) struct OrientedBox {
     center: Vec3,
     half: Vec3,
     axes: Mat3,
     bounded: bool,
 }
 
-impl Oriented {
-    pub fn around(shape: &Shape, pose: &Pose) -> Oriented {
+impl OrientedBox {
+    pub fn around(shape: &Shape, pose: &Pose) -> OrientedBox {
         let axes = *pose.rotation.to_rotation_matrix().matrix();
         if matches!(shape, Shape::HalfSpace) {
-            return Oriented { center: pose.translation.vector, half: Vec3::zeros(), axes, bounded: false };
+            return OrientedBox { center: pose.translation.vector, half: Vec3::zeros(), axes, bounded: false };
         }
         let own = shape.aabb(&Pose::identity());
         let center = pose.translation.vector + axes * (0.5 * (own.min + own.max));
-        Oriented { center, half: 0.5 * (own.max - own.min), axes, bounded: true }
+        OrientedBox { center, half: 0.5 * (own.max - own.min), axes, bounded: true }
     }
 
     fn extent(&self, n: &Vec3) -> f64 {
@@ -32,7 +32,7 @@ impl Oriented {
 }
 
 /// Whether some unit direction `n`, from B to A, has a gap above `closing(n)` along it. Of two half-spaces, no.
-pub(crate) fn apart(a: &Oriented, b: &Oriented, closing: impl Fn(&Vec3) -> f64) -> bool {
+pub(crate) fn are_separated(a: &OrientedBox, b: &OrientedBox, closing: impl Fn(&Vec3) -> f64) -> bool {
     let off = a.center - b.center;
     let gap = |n: Vec3| {
         let n = if n.dot(&off) < 0.0 { -n } else { n };
@@ -54,7 +54,7 @@ pub(crate) fn apart(a: &Oriented, b: &Oriented, closing: impl Fn(&Vec3) -> f64) 
     }
 }
 
-fn beyond(plane: &Oriented, body: &Oriented, closing: f64) -> bool {
+fn beyond(plane: &OrientedBox, body: &OrientedBox, closing: f64) -> bool {
     let n = plane.axes.column(2).into_owned();
     n.dot(&(body.center - plane.center)) - body.extent(&n) > closing
 }

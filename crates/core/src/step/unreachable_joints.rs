@@ -24,9 +24,9 @@
 //! | `⊖` | displacement, generalized velocity times seconds |
 
 use super::Workspace;
-use super::closing::is_joint;
+use super::joint_correction::is_joint;
 use crate::row_builder::{RowKind, constraints};
-use crate::settings::OutOfReach;
+use crate::settings::UnreachableJoint;
 use crate::solver::smallest_pivot;
 use crate::world::Core;
 use std::ops::Range;
@@ -61,13 +61,13 @@ fn alike(work: &Workspace) -> Vec<Range<usize>> {
 
 /// Gives the rows of the targets named a compliance: `share` of the largest response among those like them.
 pub(super) fn soften(work: &mut Workspace, targets: &[u32], share: f64) {
-    let touches = work.touches.len();
+    let contact_constraints = work.contact_constraints.len();
     if !targets.is_empty() {
         let references = references(work);
         targets
             .iter()
             .map(|&i| i as usize)
-            .for_each(|i| work.rows.blocks[touches + i].compliance = share * references[i]);
+            .for_each(|i| work.rows.blocks[contact_constraints + i].compliance = share * references[i]);
     }
 }
 
@@ -75,7 +75,7 @@ pub(super) fn soften(work: &mut Workspace, targets: &[u32], share: f64) {
 fn references(work: &Workspace) -> Vec<f64> {
     let mut out = vec![0.0; work.targets.len()];
     for range in alike(work) {
-        let own = |i: usize| work.rows.own(&work.rows.blocks[work.touches.len() + i], 0, 0);
+        let own = |i: usize| work.rows.own(&work.rows.blocks[work.contact_constraints.len() + i], 0, 0);
         let most = range.clone().map(own).fold(0.0, f64::max);
         out[range].fill(most);
     }
@@ -114,16 +114,16 @@ pub(super) fn go_as_moved(
     moved: &[f64],
     h: f64,
 ) {
-    for entry in core.table.iter().filter(|e| e.moves() && stretches.iter().any(|(x, _)| *x == e.span.x)) {
+    for entry in core.table.iter().filter(|e| e.moves() && stretches.iter().any(|(x, _)| *x == e.state_range.x)) {
         let Some(body) = entry.object.integratable() else { continue };
-        let (mut v, mut first) = (vec![0.0; entry.span.v.len()], vec![0.0; entry.span.v.len()]);
-        body.velocity(&start[entry.span.x.clone()], &mut first);
-        body.velocity(&arrived[entry.span.x.clone()], &mut v);
+        let (mut v, mut first) = (vec![0.0; entry.state_range.v.len()], vec![0.0; entry.state_range.v.len()]);
+        body.velocity(&start[entry.state_range.x.clone()], &mut first);
+        body.velocity(&arrived[entry.state_range.x.clone()], &mut v);
         v.iter_mut()
             .zip(&first)
-            .zip(&moved[entry.span.v.clone()])
+            .zip(&moved[entry.state_range.v.clone()])
             .for_each(|((v, first), moved)| *v = 0.5 * (*v + first) + moved / h);
-        body.write_velocity(&mut core.x[entry.span.x.clone()], &v);
+        body.write_velocity(&mut core.x[entry.state_range.x.clone()], &v);
     }
 }
 
@@ -131,12 +131,12 @@ pub(super) fn go_as_moved(
 pub(super) fn report(core: &mut Core, probe: &Workspace, targets: &[u32]) {
     let ids: Vec<_> = constraints(&core.table).map(|(id, ..)| id).collect();
     for range in alike(probe).into_iter().filter(|r| targets.binary_search(&(r.start as u32)).is_ok()) {
-        let Some(&closure) = ids.get(probe.first.partition_point(|&f| f <= range.start) - 1) else { continue };
+        let Some(&loop_joint) = ids.get(probe.first.partition_point(|&f| f <= range.start) - 1) else { continue };
         let size = range.clone().map(|i| probe.targets[i].error.powi(2)).sum::<f64>().sqrt();
         let by = if probe.kinds[range.start] == RowKind::Rotation { [0.0, size] } else { [size, 0.0] };
-        let worst = core.report.out_of_reach.map_or([0.0; 2], |o| [o.distance, o.angle]);
+        let worst = core.report.unreachable_joint.map_or([0.0; 2], |o| [o.distance, o.angle]);
         if by[0] > worst[0] || (worst[0] == 0.0 && by[1] > worst[1]) {
-            core.report.out_of_reach = Some(OutOfReach { closure, distance: by[0], angle: by[1] });
+            core.report.unreachable_joint = Some(UnreachableJoint { loop_joint, distance: by[0], angle: by[1] });
         }
     }
 }

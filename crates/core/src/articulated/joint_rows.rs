@@ -1,58 +1,59 @@
-//! The rows that joints make: limits, dry friction, drives, couplings (equations in `freedom.rs`).
+//! The rows that joints make: limits, dry friction, drives, couplings (equations in `dof.rs`).
 
 use super::body::ArticulatedBody;
-use super::freedom::{Drive, Freedom};
+use super::dof::{DofSettings, Drive};
 use crate::object::{Constraint, Level, RowTarget};
+use crate::part_state::StateRange;
 use crate::row_builder::RowBuilder;
 use crate::rows::RowSet;
-use crate::site::Span;
 use crate::view::WorldView;
 
 /// Where rows are at the acceleration level a drive ends so far before a limit, radians or metres: further than the stepper finds it in time.
-const AT_LIMIT: f64 = 1e-6;
+const LIMIT_MARGIN: f64 = 1e-6;
 
 /// A freedom with its place: coordinate of its velocity, position (0 where it has none) and velocity.
-struct Place<'a> {
+struct DofState<'a> {
     index: usize,
     q: f64,
     v: f64,
-    freedom: &'a Freedom,
+    settings: &'a DofSettings,
 }
 
 impl ArticulatedBody {
     /// Whether anything on its joints becomes a row.
     pub(super) fn has_rows(&self) -> bool {
-        let rows = |f: &Freedom| f.limits.is_some() || f.friction > 0.0 || f.damping > 0.0 || f.drive != Drive::None;
-        !self.couplings.is_empty() || self.freedoms().iter().any(rows)
+        let rows =
+            |f: &DofSettings| f.limits.is_some() || f.friction > 0.0 || f.damping > 0.0 || f.drive != Drive::None;
+        !self.couplings.is_empty() || self.dofs().iter().any(rows)
     }
 
-    fn places<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = Place<'a>> {
+    fn dof_states<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = DofState<'a>> {
         let n = self.model.positions();
         self.model.links().iter().flat_map(move |link| {
             (0..link.joint.dof()).map(move |k| {
                 let index = link.v + k;
                 let q = if link.joint.dof() == 1 { x[link.q] } else { 0.0 };
-                Place { index, q, v: x[n + index], freedom: &self.freedoms()[index] }
+                DofState { index, q, v: x[n + index], settings: &self.dofs()[index] }
             })
         })
     }
 
     /// Adds the forces of springs and, where rows are not implicit, of damping and position drives.
     pub(super) fn joint_forces(&self, x: &[f64], implicit: bool, out: &mut [f64]) {
-        for Place { index, q, v, freedom } in self.places(x) {
-            out[index] += freedom.spring_force(q) + if implicit { 0.0 } else { freedom.explicit_force(q, v) };
+        for DofState { index, q, v, settings } in self.dof_states(x) {
+            out[index] += settings.spring_force(q) + if implicit { 0.0 } else { settings.explicit_force(q, v) };
         }
     }
 
     /// Energy of the springs, J.
     pub(super) fn spring_energy(&self, x: &[f64]) -> f64 {
-        let energy = |p: Place| p.freedom.spring.map_or(0.0, |s| 0.5 * s.stiffness * (p.q - s.rest).powi(2));
-        self.places(x).map(energy).sum()
+        let energy = |p: DofState| p.settings.spring.map_or(0.0, |s| 0.5 * s.stiffness * (p.q - s.rest).powi(2));
+        self.dof_states(x).map(energy).sum()
     }
 
     /// Errors of the limits, in the order of their rows: lower, then upper, of each freedom.
     fn limit_errors<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = (usize, f64, f64)> {
-        self.places(x).filter_map(|p| p.freedom.limits.map(|l| (p, l))).flat_map(|(p, [lo, hi])| {
+        self.dof_states(x).filter_map(|p| p.settings.limits.map(|l| (p, l))).flat_map(|(p, [lo, hi])| {
             let errors = [(p.index, 1.0, p.q - lo), (p.index, -1.0, hi - p.q)];
             errors.into_iter().filter(|(_, _, error)| error.is_finite())
         })
@@ -60,25 +61,25 @@ impl ArticulatedBody {
 }
 
 impl Constraint for ArticulatedBody {
-    fn rows(&self, me: &Span, view: &WorldView, level: Level, out: &mut RowBuilder) {
+    fn rows(&self, me: &StateRange, view: &WorldView, level: Level, out: &mut RowBuilder) {
         let x = &view.x[me.x.clone()];
         let mut maker = RowMaker { unit: vec![0.0; self.model.dof()], level, out };
         for (index, sign, error) in self.limit_errors(x) {
             maker.row(RowTarget::new(RowSet::HalfLine, error), &[(index, sign)]);
         }
-        for place in self.places(x) {
-            maker.friction(&place);
-            maker.damping(&place);
-            maker.drive(&place, view.time);
+        for dof_state in self.dof_states(x) {
+            maker.friction(&dof_state);
+            maker.damping(&dof_state);
+            maker.drive(&dof_state, view.time);
         }
         for c in &self.couplings {
-            let position = |freedom| self.position_of(freedom).map_or(0.0, |q| x[q]);
-            let error = position(c.freedom) - c.multiplier * position(c.of) - c.offset;
-            maker.row(RowTarget::new(RowSet::Equality, error), &[(c.freedom, 1.0), (c.of, -c.multiplier)]);
+            let position = |dof| self.position_of(dof).map_or(0.0, |q| x[q]);
+            let error = position(c.dof) - c.multiplier * position(c.of) - c.offset;
+            maker.row(RowTarget::new(RowSet::Equality, error), &[(c.dof, 1.0), (c.of, -c.multiplier)]);
         }
     }
 
-    fn gaps(&self, me: &Span, view: &WorldView, out: &mut Vec<f64>) {
+    fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
         out.extend(self.limit_errors(&view.x[me.x.clone()]).map(|(_, _, error)| error));
     }
 
@@ -115,36 +116,37 @@ impl RowMaker<'_, '_> {
         RowSet::Interval { lo: -most, hi: most }
     }
 
-    fn friction(&mut self, p: &Place) {
-        if p.freedom.friction > 0.0 {
-            self.row(RowTarget::new(self.bounded(p.freedom.friction), 0.0), &[(p.index, 1.0)]);
+    fn friction(&mut self, p: &DofState) {
+        if p.settings.friction > 0.0 {
+            self.row(RowTarget::new(self.bounded(p.settings.friction), 0.0), &[(p.index, 1.0)]);
         }
     }
 
-    fn damping(&mut self, p: &Place) {
-        if let (Some(h), true) = (self.level.step(), p.freedom.damping > 0.0) {
-            let soft = RowTarget { compliance: 1.0 / (h * p.freedom.damping), ..RowTarget::new(RowSet::Equality, 0.0) };
+    fn damping(&mut self, p: &DofState) {
+        if let (Some(h), true) = (self.level.step(), p.settings.damping > 0.0) {
+            let soft =
+                RowTarget { compliance: 1.0 / (h * p.settings.damping), ..RowTarget::new(RowSet::Equality, 0.0) };
             self.row(soft, &[(p.index, 1.0)]);
         }
     }
 
     /// The speed that a drive may ask for: none beyond the joint's limits, which hold whatever the drive's strength. At the end of a step it is just there.
-    fn within_limits(&self, p: &Place, target: f64) -> f64 {
-        let Some([lo, hi]) = p.freedom.limits else { return target };
+    fn within_limits(&self, p: &DofState, target: f64) -> f64 {
+        let Some([lo, hi]) = p.settings.limits else { return target };
         let (down, up) = match self.level.step() {
             // the view is that of the middle of the step
             Some(h) => ((lo - (p.q - 0.5 * h * p.v)) / h, (hi - (p.q - 0.5 * h * p.v)) / h),
             None => (
-                if p.q - lo > AT_LIMIT { f64::NEG_INFINITY } else { 0.0 },
-                if hi - p.q > AT_LIMIT { f64::INFINITY } else { 0.0 },
+                if p.q - lo > LIMIT_MARGIN { f64::NEG_INFINITY } else { 0.0 },
+                if hi - p.q > LIMIT_MARGIN { f64::INFINITY } else { 0.0 },
             ),
         };
         target.max(down.min(0.0)).min(up.max(0.0))
     }
 
-    fn drive(&mut self, p: &Place, time: f64) {
+    fn drive(&mut self, p: &DofState, time: f64) {
         let hard = |limit: f64| limit.is_infinite();
-        match &p.freedom.drive {
+        match &p.settings.drive {
             Drive::None => {}
             Drive::Position { stiffness, damping, target, velocity, limit } => {
                 let Some(h) = self.level.step() else { return };

@@ -1,7 +1,7 @@
 //! Closures between links of articulated bodies, and between links and rigid bodies: the same linkage cut open at different pins.
 
-use crate::closures::{AXIS, FourBar, GROUND, LENGTHS, bar, hinge, pins};
 use crate::common::*;
+use crate::loop_joints::{AXIS, FourBar, GROUND, LENGTHS, bar, hinge, pins};
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::*;
 
@@ -34,16 +34,16 @@ struct Opened {
     world: World,
     crank: (ObjectId, usize),
     rocker: (ObjectId, usize),
-    closures: Vec<ObjectId>,
+    loop_joints: Vec<ObjectId>,
 }
 
 /// All three bars in one chain, closed by a hinge at the ground.
 fn one_chain(stepper: &str) -> Opened {
     let mut world = world(stepper, 1.0 / RATE);
     let chain = world.add(chain("chain", &[0, 1, 2])).unwrap();
-    let foot = Closure::hinge_at("foot", &world, Some((chain, 2)), None, GROUND, AXIS).unwrap();
-    let closures = vec![world.add(foot).unwrap()];
-    Opened { world, crank: (chain, 0), rocker: (chain, 2), closures }
+    let foot = LoopJoint::revolute_at("foot", &world, Some((chain, 2)), None, GROUND, AXIS).unwrap();
+    let loop_joints = vec![world.add(foot).unwrap()];
+    Opened { world, crank: (chain, 0), rocker: (chain, 2), loop_joints }
 }
 
 /// Crank and coupler in a chain, the rocker a rigid body.
@@ -52,9 +52,9 @@ fn chain_and_body(stepper: &str) -> Opened {
     let (_, b) = pins(CRANK);
     let chain = world.add(chain("chain", &[0, 1])).unwrap();
     let rocker = world.add(bar("rocker", b, GROUND)).unwrap();
-    let pin = Closure::hinge_at("pin", &world, Some((rocker, 0)), Some((chain, 1)), b, AXIS).unwrap();
-    let closures = vec![world.add(pin).unwrap(), hinge(&mut world, "foot", rocker, None, GROUND, AXIS)];
-    Opened { world, crank: (chain, 0), rocker: (rocker, 0), closures }
+    let pin = LoopJoint::revolute_at("pin", &world, Some((rocker, 0)), Some((chain, 1)), b, AXIS).unwrap();
+    let loop_joints = vec![world.add(pin).unwrap(), hinge(&mut world, "foot", rocker, None, GROUND, AXIS)];
+    Opened { world, crank: (chain, 0), rocker: (rocker, 0), loop_joints }
 }
 
 #[test]
@@ -66,12 +66,14 @@ fn a_linkage_cut_open_anywhere_moves_the_same() {
             let (mut gap, mut off, mut energy, mut kinetic, mut lost) = (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0);
             for _ in 0..(20.0 * RATE) as usize {
                 open.world.step().unwrap();
-                for id in &open.closures {
-                    gap = gap.max(open.world.get::<Closure>(*id).unwrap().misfit(&open.world.view()).unwrap().distance);
+                for id in &open.loop_joints {
+                    gap = gap.max(
+                        open.world.get::<LoopJoint>(*id).unwrap().position_error(&open.world.view()).unwrap().distance,
+                    );
                 }
-                let x = open.world.site(open.crank.0, open.crank.1).unwrap().pose.rotation * Vec3::x();
+                let x = open.world.part_state(open.crank.0, open.crank.1).unwrap().pose.rotation * Vec3::x();
                 let (_, b) = pins(turn(x));
-                let rocker = open.world.site(open.rocker.0, open.rocker.1).unwrap().pose.rotation * Vec3::x();
+                let rocker = open.world.part_state(open.rocker.0, open.rocker.1).unwrap().pose.rotation * Vec3::x();
                 off = off.max((rocker - (GROUND - b) / LENGTHS[2]).norm());
                 lost = open.world.energy().total() - start;
                 energy = energy.max(lost.abs());
@@ -100,7 +102,7 @@ fn a_chain_closed_at_its_end_and_three_joined_bars_are_the_same_machine() {
                 bars.world.step().unwrap();
                 chain.world.step().unwrap();
                 let rotations = [(&bars.world, bars.bars[0], 0), (&chain.world, chain.crank.0, 0)]
-                    .map(|(w, id, part)| w.site(id, part).unwrap().pose.rotation);
+                    .map(|(w, id, part)| w.part_state(id, part).unwrap().pose.rotation);
                 worst = worst.max(rotations[0].angle_to(&rotations[1]));
             }
             worst

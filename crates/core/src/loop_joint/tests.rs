@@ -1,9 +1,9 @@
 //! Rows against finite differences: errors, velocities and biases of every kind, on moving, led and standing bodies.
 
 use super::*;
+use crate::part_state::StateSizes;
 use crate::rigid::RigidBody;
 use crate::rows::Rows;
-use crate::site::Dims;
 use crate::view::{Entry, Mode, Status, Table};
 use tumble_collide::Shape;
 
@@ -12,12 +12,12 @@ struct Pairing {
     table: Table,
     ids: Vec<ObjectId>,
     x: Vec<f64>,
-    sites: Vec<Site>,
+    part_states: Vec<PartState>,
     dof: usize,
 }
 
 /// What a closure says at a state.
-struct Told {
+struct RecordedRows {
     errors: Vec<f64>,
     velocities: Vec<f64>,
     biases: Vec<f64>,
@@ -25,22 +25,24 @@ struct Told {
 
 impl Pairing {
     fn new(bodies: Vec<(RigidBody, Mode)>) -> Pairing {
-        let mut all = Pairing { table: Table::default(), ids: Vec::new(), x: Vec::new(), sites: Vec::new(), dof: 0 };
+        let mut all =
+            Pairing { table: Table::default(), ids: Vec::new(), x: Vec::new(), part_states: Vec::new(), dof: 0 };
         for (serial, (body, mode)) in bodies.into_iter().enumerate() {
-            let Some(Dims { x, dof, sites }) = (&body as &dyn Object).integratable().map(|i| i.dims()) else {
+            let Some(StateSizes { x, dof, parts }) = (&body as &dyn Object).integratable().map(|i| i.state_sizes())
+            else {
                 continue;
             };
-            let span = Span {
+            let state_range = StateRange {
                 x: all.x.len()..all.x.len() + x,
                 v: all.dof..all.dof + dof,
-                site: all.sites.len()..all.sites.len() + sites,
+                parts: all.part_states.len()..all.part_states.len() + parts,
             };
-            all.x.resize(span.x.end, 0.0);
-            all.sites.resize(span.site.end, Site::default());
-            all.dof = span.v.end;
-            crate::object::Integratable::write_initial(&body, &mut all.x[span.x.clone()]);
+            all.x.resize(state_range.x.end, 0.0);
+            all.part_states.resize(state_range.parts.end, PartState::default());
+            all.dof = state_range.v.end;
+            crate::object::Integratable::write_initial(&body, &mut all.x[state_range.x.clone()]);
             let status = Status { mode, ..Status::default() };
-            let id = all.table.slots.insert(Entry::new(Box::new(body), span, status, serial as u32));
+            let id = all.table.slots.insert(Entry::new(Box::new(body), state_range, status, serial as u32));
             all.table.order.push(id);
             all.ids.push(id);
         }
@@ -53,28 +55,28 @@ impl Pairing {
             table: self.table.clone(),
             ids: self.ids.clone(),
             x: self.x.clone(),
-            sites: self.sites.clone(),
+            part_states: self.part_states.clone(),
             dof: self.dof,
         };
-        let Pairing { table, x, sites, .. } = &mut next;
+        let Pairing { table, x, part_states, .. } = &mut next;
         table.for_each_mut(|entry| {
-            let x = &mut x[entry.span.x.clone()];
+            let x = &mut x[entry.state_range.x.clone()];
             if let (Some(body), true) = (entry.object.integratable(), entry.status.mode != Mode::Static) {
-                let mut v = vec![0.0; entry.span.v.len()];
+                let mut v = vec![0.0; entry.state_range.v.len()];
                 body.velocity(x, &mut v);
-                body.drift(x, &v, t);
+                body.integrate_positions(x, &v, t);
                 body.write_velocity(x, &v);
             }
-            let sites = &mut sites[entry.span.site.clone()];
-            entry.object.refresh(x, sites);
+            let part_states = &mut part_states[entry.state_range.parts.clone()];
+            entry.object.refresh(x, part_states);
             if entry.status.mode == Mode::Static {
-                sites.iter_mut().for_each(|s| *s = Site { pose: s.pose, ..Site::default() });
+                part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
             }
         });
         next
     }
 
-    fn tell(&self, rows_of: impl FnOnce(&WorldView, &mut RowBuilder)) -> Told {
+    fn record(&self, rows_of: impl FnOnce(&WorldView, &mut RowBuilder)) -> RecordedRows {
         let (mut rows, mut bias, mut targets, mut kinds, mut problem) =
             (Rows::default(), Vec::new(), Vec::new(), Vec::new(), None);
         rows.clear(self.dof);
@@ -83,7 +85,7 @@ impl Pairing {
             gravity: Vec3::zeros(),
             implicit: true,
             x: &self.x,
-            sites: &self.sites,
+            part_states: &self.part_states,
             table: &self.table,
         };
         let mut out = RowBuilder {
@@ -93,7 +95,7 @@ impl Pairing {
             kinds: &mut kinds,
             table: &self.table,
             x: &self.x,
-            sites: &self.sites,
+            part_states: &self.part_states,
             problem: &mut problem,
             owner: ObjectId::default(),
         };
@@ -102,19 +104,19 @@ impl Pairing {
         let mut u = vec![0.0; self.dof];
         for entry in self.table.iter() {
             if let Some(body) = entry.object.integratable() {
-                body.whiten(&self.x[entry.span.x.clone()], &mut u[entry.span.v.clone()]);
+                body.whiten(&self.x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
             }
         }
         rows.add_velocity(&u, &mut bias);
-        Told {
+        RecordedRows {
             errors: targets.iter().map(|t| t.error).collect(),
             velocities: bias,
             biases: targets.iter().map(|t| t.bias_acceleration).collect(),
         }
     }
 
-    fn tell_closure(&self, closure: &Closure) -> Told {
-        self.tell(|view, out| closure.rows(&Span::default(), view, Level::Acceleration, out))
+    fn record_loop_joint(&self, loop_joint: &LoopJoint) -> RecordedRows {
+        self.record(|view, out| loop_joint.rows(&StateRange::default(), view, Level::Acceleration, out))
     }
 }
 
@@ -143,8 +145,12 @@ fn pairing(modes: [Mode; 2], offset: Vec3) -> (Pairing, [Anchor; 2]) {
     (pairing, anchors)
 }
 
-const KINDS: [(ClosureKind, usize); 4] =
-    [(ClosureKind::Point, 3), (ClosureKind::Hinge, 5), (ClosureKind::Weld, 6), (ClosureKind::Slider, 5)];
+const KINDS: [(LoopJointKind, usize); 4] = [
+    (LoopJointKind::Spherical, 3),
+    (LoopJointKind::Revolute, 5),
+    (LoopJointKind::Fixed, 6),
+    (LoopJointKind::Prismatic, 5),
+];
 const MODES: [[Mode; 2]; 4] = [
     [Mode::Dynamic, Mode::Dynamic],
     [Mode::Dynamic, Mode::Kinematic],
@@ -159,11 +165,11 @@ fn velocities_are_the_rates_of_errors_and_biases_the_rates_of_velocities() {
         for modes in MODES {
             let (pairing, [a, b]) = pairing(modes, Vec3::new(0.3, -0.2, 0.4));
             // with a static or led side; and with the world in its place
-            let world = Anchor::world(pairing.sites[1].pose * b.frame);
+            let world = Anchor::world(pairing.part_states[1].pose * b.frame);
             let sides = if modes[1] == Mode::Static { vec![(a, b), (a, world), (world, a)] } else { vec![(a, b)] };
             for (a, b) in sides {
-                let closure = Closure::new("joint", kind, a, b).unwrap();
-                let [before, now, after] = [-t, 0.0, t].map(|t| pairing.after(t).tell_closure(&closure));
+                let loop_joint = LoopJoint::new("joint", kind, a, b).unwrap();
+                let [before, now, after] = [-t, 0.0, t].map(|t| pairing.after(t).record_loop_joint(&loop_joint));
                 assert_eq!(now.errors.len(), rows);
                 for i in 0..rows {
                     let rate = (after.errors[i] - before.errors[i]) / (2.0 * t);
@@ -190,15 +196,15 @@ fn a_row_on_a_rotation_has_the_angular_velocity_along_its_axis() {
         let (pairing, _) = pairing(modes, Vec3::zeros());
         for axis in [Vec3::z(), Vec3::new(0.6, -0.8, 0.0), Vec3::new(1.0, 2.0, -2.0) / 3.0] {
             let row = |ends: &[(usize, f64)]| {
-                let told = pairing.tell(|_, out| {
+                let recorded = pairing.record(|_, out| {
                     let row = out.row(RowTarget::new(RowSet::Equality, 0.0));
                     ends.iter().for_each(|&(i, sign)| {
                         row.on_rotation(pairing.ids[i], 0, &axis, sign);
                     });
                 });
-                told.velocities[0]
+                recorded.velocities[0]
             };
-            let spin = |i: usize| pairing.sites[i].angular_velocity.dot(&axis);
+            let spin = |i: usize| pairing.part_states[i].angular_velocity.dot(&axis);
             assert!((row(&[(0, 1.0), (1, -2.0)]) - (spin(0) - 2.0 * spin(1))).abs() < 1e-13, "{modes:?}");
             // both sides on one part: nothing is left
             assert!(row(&[(0, 1.0), (0, -1.0)]).abs() < 1e-13, "{modes:?}");
@@ -213,16 +219,16 @@ fn errors_of_rotations_are_the_rotation_that_is_left() {
     for turn in [Vec3::new(1e-6, -2e-6, 3e-6), Vec3::new(0.5, 1.0, -0.3)] {
         let turned = Pose::from_parts(frame.translation, Quat::from_scaled_axis(turn) * frame.rotation);
         let pairing = Pairing::new(vec![(body("a", turned, Vec3::zeros(), Vec3::zeros()), Mode::Dynamic)]).after(0.0);
-        let told = |kind| {
-            pairing.tell_closure(
-                &Closure::new("joint", kind, Anchor::on(pairing.ids[0], 0, Pose::identity()), Anchor::world(frame))
+        let recorded = |kind| {
+            pairing.record_loop_joint(
+                &LoopJoint::new("joint", kind, Anchor::on(pairing.ids[0], 0, Pose::identity()), Anchor::world(frame))
                     .unwrap(),
             )
         };
-        let weld = told(ClosureKind::Weld);
+        let weld = recorded(LoopJointKind::Fixed);
         assert!((Vec3::from_column_slice(&weld.errors[3..]) - turn).norm() < 1e-12, "{:?}", weld.errors);
         // a hinge does not see the turn about its axis: z_B and the tilt make z_A
-        let hinge = told(ClosureKind::Hinge);
+        let hinge = recorded(LoopJointKind::Revolute);
         let tilt = frame.rotation * Vec3::new(hinge.errors[3], hinge.errors[4], 0.0);
         let reached = Quat::from_scaled_axis(tilt) * (frame.rotation * Vec3::z());
         assert!((reached - turned.rotation * Vec3::z()).norm() < 1e-12);
