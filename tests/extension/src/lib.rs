@@ -2,11 +2,11 @@
 //!
 //! | object | integrates | collides | constrains | acts |
 //! |---|---|---|---|---|
-//! | [`Particle`] | 3 freedoms, state `[x, P]` | a sphere that cannot turn | | |
-//! | [`Bead`] | 1 freedom on a cycloid, inertia depends on the angle | a sphere | itself: a stop on the wire | |
+//! | [`Particle`] | 3 degrees of freedom, state `[x, P]` | a sphere that cannot turn | | |
+//! | [`Bead`] | 1 degree of freedom on a cycloid, inertia depends on the angle | a sphere | itself: a stop on the wire | |
 //! | [`Rod`] | | | two objects, or one and a point: fixed distance, or a rope | |
 //! | [`Lookout`] | as a particle | | | carries a camera and a lamp |
-//! | [`Wind`] | | | | drag on everything it is told of |
+//! | [`Wind`] | | | | drag on the listed objects |
 
 mod bead;
 mod lookout;

@@ -1,17 +1,17 @@
 //! A massless rod or rope between two points: one row.
 //!
 //! ```text
-//! d = p_a − p_b,  n = d/|d|      row velocity n·(v_a − v_b)      J̇·v = |v_⊥|²/|d|, and what the points' own motion brings
+//! d = p_a − p_b,  n = d/|d|      row velocity n·(v_a − v_b)      J̇·v = |v_⊥|²/|d|, plus the bias of the points' own motion
 //! rod:  |d| = length (equality)           rope:  length − |d| ≥ 0 (one-sided; the row looks inwards)
 //! ```
 
 use tumble_core::collide::Vec3;
 use tumble_core::{Constraint, Level, Object, ObjectId, RowBuilder, RowTarget, StateRange, WorldView, rows::RowSet};
 
-/// What an end is fixed to.
+/// The anchor of an end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum End {
-    /// The origin of part 0 of an object: the centre of mass of a rigid body.
+    /// The origin of part 0 of an object: the center of mass of a rigid body.
     Object(ObjectId),
     /// A point of the world, m.
     Point(Vec3),

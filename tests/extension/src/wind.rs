@@ -1,4 +1,4 @@
-//! Wind: a force that follows what it blows on. Drag `F = −c·(v − w)` at the origin of every part of the objects it is told of.
+//! Wind: drag `F = −c·(v − w)` at the origin of every part of the listed objects.
 
 use tumble_core::collide::Vec3;
 use tumble_core::{ForceGenerator, Forces, Object, ObjectId, StateRange, WorldView};
@@ -11,7 +11,7 @@ pub struct Wind {
     pub velocity: Vec3,
     /// Drag coefficient, N·s/m, at least 0.
     pub drag: f64,
-    /// What it blows on; ids of objects that are gone are passed over.
+    /// The objects it acts on; ids of removed objects are ignored.
     pub on: Vec<ObjectId>,
 }
 

@@ -19,7 +19,7 @@ fn period() -> f64 {
     2.0 * PI * (LENGTH / G).sqrt() * (1.0 + AMPLITUDE.powi(2) / 16.0 + 11.0 * AMPLITUDE.powi(4) / 3072.0)
 }
 
-/// A pendulum of a particle (its own kind of object) or of a rigid body hung by its centre, which then moves the same.
+/// A pendulum of a particle (its own kind of object) or of a rigid body hung by its center, which then moves the same.
 fn pendulum(stepper: &str, rigid: bool) -> (World, ObjectId) {
     let mut world = world(stepper, true);
     let id = if rigid {
