@@ -1,20 +1,22 @@
 //! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
 
+use crate::clone_by_field::clone_by_field;
 use crate::collidable::{ContactFrame, Material};
 use crate::pair::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::pair_material::PairMaterials;
 use crate::part_state::PartState;
 use crate::settings::Settings;
 use crate::step::shift_to_impact;
-use crate::view::{Entry, Mode, ObjectId, Table};
+use crate::view::{Entry, Mode, ObjectId, Objects};
 use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
 
-/// Who owns a row of the site table.
+/// The object of a row of the part table, and the part of it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Owner {
     pub id: ObjectId,
+    /// Place of the object in the order of adding.
+    pub place: u32,
     pub part: u32,
-    pub serial: u32,
 }
 
 /// Names a contact across steps.
@@ -45,16 +47,7 @@ pub(crate) struct WarmStarts {
     entries: Vec<(ContactKey, [f64; 3])>,
 }
 
-impl Clone for WarmStarts {
-    fn clone(&self) -> WarmStarts {
-        WarmStarts { entries: self.entries.clone() }
-    }
-
-    /// Into the memory that is there: a world does this every frame.
-    fn clone_from(&mut self, from: &WarmStarts) {
-        self.entries.clone_from(&from.entries);
-    }
-}
+clone_by_field!(WarmStarts { entries });
 
 impl WarmStarts {
     /// Takes out what is filed under the keys that `which` picks.
@@ -152,7 +145,7 @@ struct BroadPhaseProxy {
 
 /// What the detector reads.
 pub(crate) struct Detector<'a> {
-    pub table: &'a Table,
+    pub objects: Objects<'a>,
     pub owners: &'a [Owner],
     pub part_states: &'a [PartState],
     pub settings: &'a Settings,
@@ -160,7 +153,7 @@ pub(crate) struct Detector<'a> {
     pub broad: &'a mut dyn BroadPhase,
     pub scratch: &'a mut DetectorBuffers,
     /// Serials of sleepers that something comes near.
-    pub wake_requests: &'a mut Vec<u32>,
+    pub needs_wake: &'a mut Vec<u32>,
 }
 
 impl Detector<'_> {
@@ -186,7 +179,7 @@ impl Detector<'_> {
         s.motion_bounds.clear();
         s.gathered.clear();
         let mut registered = s.registered.iter().peekable();
-        for entry in self.table.iter().filter(|e| e.status.enabled && e.status.collidable) {
+        for entry in self.objects.iter().filter(|e| e.status.enabled && e.status.collidable) {
             let Some(collidable) = entry.object.collidable() else { continue };
             for (part, index) in entry.state_range.parts.clone().enumerate() {
                 let Some(shape) = collidable.shape(part) else { continue };
@@ -240,8 +233,8 @@ impl Detector<'_> {
     ) {
         let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
         let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
-        let (entry_a, entry_b) = (&self.table.slots[owner_a.id], &self.table.slots[owner_b.id]);
-        if !may_collide(entry_a, owner_a.part as usize, entry_b, owner_b.part as usize, self.part_states) {
+        let [entry_a, entry_b] = [owner_a, owner_b].map(|owner| self.objects.at(owner.place as usize));
+        if !may_collide(&entry_a, owner_a.part as usize, &entry_b, owner_b.part as usize, self.part_states) {
             return;
         }
         let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
@@ -266,13 +259,13 @@ impl Detector<'_> {
         let first = out.len();
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
             // the frame will be done again with it awake
-            self.wake_requests.extend((!found.is_empty()).then_some(sleeper.serial));
+            self.needs_wake.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
         let surface_a = (owner_a.id, part_a, body_a.material(part_a));
         let surface_b = (owner_b.id, part_b, body_b.material(part_b));
         let Material { restitution, friction, .. } = self.pair_materials.combine(self.settings, surface_a, surface_b);
-        let pair = [owner_a.serial, owner_a.part, owner_b.serial, owner_b.part];
+        let pair = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
         let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
         let mut frame_of = |contact: &Contact| {
             if contact.normal != frame.axes[0] {
@@ -312,8 +305,8 @@ fn across(v: Vec3, along: &Vec3) -> Vec3 {
 /// Whether two parts are to be tested: one of them moves (or is led towards a sleeper), and both kinds say yes.
 pub(crate) fn may_collide(a: &Entry, part_a: usize, b: &Entry, part_b: usize, part_states: &[PartState]) -> bool {
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
-    let stirs = a.asleep && b.approaches(part_states) || b.asleep && a.approaches(part_states);
-    if !(stirs || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
+    let wakes = a.asleep && b.approaches(part_states) || b.asleep && a.approaches(part_states);
+    if !(wakes || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
         return false;
     }
     if a.serial == b.serial && !ca.parts_collide(part_a, part_b) {

@@ -20,6 +20,7 @@
 
 pub mod archive;
 pub mod articulated;
+mod clone_by_field;
 mod collidable;
 mod detect;
 mod integrators;
@@ -68,6 +69,6 @@ pub use tumble_collide as collide;
 pub use view::{Mode, ObjectId, Status, WorldView};
 pub use visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use world::{
-    Checkpoint, ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World,
-    WorldError,
+    ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World, WorldError,
+    WorldState,
 };

@@ -11,13 +11,14 @@
 use crate::integrators::Adaptive;
 use crate::part_state::{Forces, PartState, Wrench};
 use crate::settings::Integrator;
-use crate::view::{Entry, Mode, ObjectId, Table, WorldView};
-use crate::world::StepError;
+use crate::view::{Entry, Mode, ObjectId, Objects, Table, WorldView};
+use crate::world::{ObjectState, StepError};
 use tumble_collide::Vec3;
 
 /// What the integrators work on, borrowed from the world.
 pub(crate) struct IntegrationContext<'a> {
     pub table: &'a mut Table,
+    pub states: &'a [ObjectState],
     pub x: &'a mut [f64],
     pub part_states: &'a mut [PartState],
     pub forces: &'a mut Forces,
@@ -40,21 +41,24 @@ pub(crate) struct IntegrationContext<'a> {
 impl IntegrationContext<'_> {
     /// Writes sites and caches from the state. What is static or not alive is at rest, whatever momentum it keeps.
     pub fn refresh(&mut self) {
-        let (x, part_states) = (&self.x[..], &mut *self.part_states);
-        let (pinned, pinned_part_states) = (self.pinned, &mut *self.pinned_part_states);
-        self.table.for_each_mut(|e| {
-            refresh(e, x, part_states);
-            if !pinned.is_empty() && e.moves() {
-                refresh(e, pinned, pinned_part_states);
+        for place in 0..self.states.len() {
+            refresh(self.table, self.states, place, self.x, self.part_states);
+            if !self.pinned.is_empty() && self.table.with(self.states).at(place).moves() {
+                refresh(self.table, self.states, place, self.pinned, self.pinned_part_states);
             }
-        });
+        }
     }
 
     /// The same for one object.
     pub fn refresh_one(&mut self, id: ObjectId) {
-        if let Some(entry) = self.table.slots.get_mut(id) {
-            refresh(entry, self.x, self.part_states);
+        if let Some(place) = self.table.place(id) {
+            refresh(self.table, self.states, place, self.x, self.part_states);
         }
+    }
+
+    /// Returns the objects with their switches.
+    pub fn objects(&self) -> Objects<'_> {
+        self.table.with(self.states)
     }
 
     /// Forces at the present state and time `t`: rate of momentum of every object into `dp`, accelerations into the sites.
@@ -76,21 +80,21 @@ impl IntegrationContext<'_> {
             implicit: self.implicit,
             x: self.x,
             part_states: self.part_states,
-            table: self.table,
+            objects: self.table.with(self.states),
         };
-        for entry in self.table.iter().filter(|e| e.status.enabled) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.status.enabled) {
             if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {
-                body.accumulate_forces(&entry.state_range, &view, self.forces);
+                body.accumulate_forces(entry.state_range, &view, self.forces);
             }
             if let Some(force) = entry.object.force() {
-                force.apply(&entry.state_range, &view, self.forces);
+                force.apply(entry.state_range, &view, self.forces);
             }
         }
         dp.fill(0.0);
-        for entry in self.table.iter() {
+        for entry in self.table.with(self.states).iter() {
             let Some(body) = entry.object.integratable() else { continue };
             let (state_range, part_states) =
-                (&entry.state_range, &mut self.part_states[entry.state_range.parts.clone()]);
+                (entry.state_range, &mut self.part_states[entry.state_range.parts.clone()]);
             if entry.moves() {
                 let dp = &mut dp[state_range.v.clone()];
                 body.derivative(&self.x[state_range.x.clone()], &self.forces.slice(state_range), dp);
@@ -106,15 +110,15 @@ impl IntegrationContext<'_> {
 
     /// Every object that moves goes on freely for `h`; what is led follows its velocity.
     pub fn free_motion(&mut self, h: f64) {
-        for entry in self.table.iter() {
-            free_motion(entry, &mut self.x[entry.state_range.x.clone()], h);
+        for entry in self.table.with(self.states).iter() {
+            free_motion(&entry, &mut self.x[entry.state_range.x.clone()], h);
         }
     }
 
     /// Leaves of the rates what the coasts of a splitting do not do by themselves.
     pub fn subtract_free_motion(&self, dp: &mut [f64]) {
         let mut rate = Vec::new();
-        for entry in self.table.iter().filter(|e| e.moves()) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
             let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
             rate.resize(entry.state_range.v.len(), 0.0);
             body.free_motion_rate(&self.x[entry.state_range.x.clone()], &mut rate);
@@ -123,7 +127,7 @@ impl IntegrationContext<'_> {
     }
 
     fn kick(&mut self, dp: &[f64], h: f64) {
-        for entry in self.table.iter().filter(|e| e.moves()) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
             if let Some(body) = entry.object.integratable() {
                 body.kick(&mut self.x[entry.state_range.x.clone()], &dp[entry.state_range.v.clone()], h);
             }
@@ -133,7 +137,7 @@ impl IntegrationContext<'_> {
     /// Generalized velocities of everything that moves or is led; zero elsewhere.
     pub fn velocities(&self, v: &mut [f64]) {
         v.fill(0.0);
-        for entry in self.table.iter().filter(|e| e.status.enabled && e.status.mode != Mode::Static) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.status.enabled && e.status.mode != Mode::Static) {
             if let Some(body) = entry.object.integratable() {
                 body.velocity(&self.x[entry.state_range.x.clone()], &mut v[entry.state_range.v.clone()]);
             }
@@ -141,7 +145,12 @@ impl IntegrationContext<'_> {
     }
 
     fn integrate_positions(&mut self, v: &[f64], h: f64) {
-        for entry in self.table.iter().filter(|e| e.status.enabled && e.status.mode != Mode::Static && !e.asleep) {
+        for entry in self
+            .table
+            .with(self.states)
+            .iter()
+            .filter(|e| e.status.enabled && e.status.mode != Mode::Static && !e.asleep)
+        {
             let (x, v) = (&mut self.x[entry.state_range.x.clone()], &v[entry.state_range.v.clone()]);
             if let Some(body) = entry.object.integratable() {
                 body.integrate_positions(x, v, h);
@@ -229,14 +238,16 @@ impl IntegrationContext<'_> {
 
     /// What is led has one velocity over the whole step.
     fn keep_kinematic_velocities(&self, kinematic: &[f64], v: &mut [f64]) {
-        for entry in self.table.iter().filter(|e| e.status.mode == Mode::Kinematic) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.status.mode == Mode::Kinematic) {
             v[entry.state_range.v.clone()].copy_from_slice(&kinematic[entry.state_range.v.clone()]);
         }
     }
 
     /// What is led keeps the velocity it started with, whatever the stages made of it.
     fn restore_kinematic_velocities(&mut self, start: &[f64]) {
-        for entry in self.table.iter().filter(|e| e.status.enabled && e.status.mode == Mode::Kinematic) {
+        for entry in
+            self.table.with(self.states).iter().filter(|e| e.status.enabled && e.status.mode == Mode::Kinematic)
+        {
             let Some(body) = entry.object.integratable() else { continue };
             let mut v = vec![0.0; entry.state_range.v.len()];
             body.velocity(&start[entry.state_range.x.clone()], &mut v);
@@ -245,10 +256,11 @@ impl IntegrationContext<'_> {
     }
 }
 
-fn refresh(entry: &mut Entry, x: &[f64], part_states: &mut [PartState]) {
-    let part_states = &mut part_states[entry.state_range.parts.clone()];
-    entry.object.refresh(&x[entry.state_range.x.clone()], part_states);
-    if entry.status.mode == Mode::Static || !entry.status.enabled {
+fn refresh(table: &mut Table, states: &[ObjectState], place: usize, x: &[f64], part_states: &mut [PartState]) {
+    let (placed, status) = (&mut table.placed[place], states[place].status);
+    let part_states = &mut part_states[placed.state_range.parts.clone()];
+    placed.object.refresh(&x[placed.state_range.x.clone()], part_states);
+    if status.mode == Mode::Static || !status.enabled {
         part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
     }
 }

@@ -80,7 +80,7 @@ impl PartState {
 }
 
 /// Torque about a site's origin and force, world axes, N·m and N.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Wrench {
     /// Torque about the origin of the site's frame.
     pub torque: Vec3,

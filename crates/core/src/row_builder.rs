@@ -4,7 +4,7 @@ use crate::collidable::ContactFrame;
 use crate::object::{Constraint, Integratable, RowTarget};
 use crate::part_state::PartState;
 use crate::rows::{RowSet, Rows};
-use crate::view::{Entry, Mode, ObjectId, Table};
+use crate::view::{Entry, Mode, ObjectId, Objects};
 use tumble_collide::Vec3;
 
 /// What a row's velocity is of: rows of one kind in one constraint have one unit.
@@ -32,7 +32,7 @@ pub struct RowBuilder<'a> {
     pub(crate) targets: &'a mut Vec<RowTarget>,
     /// Of each target.
     pub(crate) kinds: &'a mut Vec<RowKind>,
-    pub(crate) table: &'a Table,
+    pub(crate) objects: Objects<'a>,
     pub(crate) x: &'a [f64],
     pub(crate) part_states: &'a [PartState],
     pub(crate) problem: &'a mut Option<String>,
@@ -67,24 +67,24 @@ impl RowBuilder<'_> {
 
     /// Adds `sign ·` the velocity along `axis` of the material point of one part that is at world point `p`.
     pub fn on_point(&mut self, id: ObjectId, part: usize, p: &Vec3, axis: &Vec3, sign: f64) -> &mut Self {
-        let table = self.table;
+        let objects = self.objects;
         if !self.open(p.iter().chain(axis.iter())) {
             return self;
         }
-        self.on_part(table.slots.get(id), part, |row, entry| row.point_side(entry, part, p, &[*axis], sign));
+        self.on_part(objects.get(id), part, |row, entry| row.point_side(entry, part, p, &[*axis], sign));
         self
     }
 
     /// Adds `sign ·` the angular velocity of one part along the unit vector `axis`. Said by a couple of test impulses, which every part answers:
     /// for unit `b ⟂ c` with `b × c = axis` it is `(v(p + b) − v(p))·c`, exactly.
     pub fn on_rotation(&mut self, id: ObjectId, part: usize, axis: &Vec3, sign: f64) -> &mut Self {
-        let table = self.table;
+        let objects = self.objects;
         if !self.open(axis.iter()) {
             return self;
         }
         self.is_of(RowKind::Rotation);
         let [_, b, c] = ContactFrame::new(Vec3::zeros(), *axis).axes;
-        self.on_part(table.slots.get(id), part, |row, entry| {
+        self.on_part(objects.get(id), part, |row, entry| {
             let p = row.part_states[entry.state_range.parts.start + part].position();
             row.point_side(entry, part, &(p + b), &[c], sign) && row.point_side(entry, part, &p, &[c], -sign)
         });
@@ -96,9 +96,9 @@ impl RowBuilder<'_> {
     }
 
     /// Lets `add` put its side of the row; refuses the row where the object is gone, has no such part, or is a third.
-    fn on_part(&mut self, entry: Option<&Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
+    fn on_part(&mut self, entry: Option<Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
         let Some(entry) = entry else { return self.refuse("a row names an object that is not in the world".into()) };
-        if part >= entry.state_range.parts.len() || !add(self, entry) {
+        if part >= entry.state_range.parts.len() || !add(self, &entry) {
             self.refuse(format!(
                 "'{}' has no part {part} that answers impulses, or the row names a third object",
                 entry.object.name()
@@ -108,18 +108,18 @@ impl RowBuilder<'_> {
 
     /// Adds `Σ j_k · v_k` over the generalized velocities of one object.
     pub fn on_coordinates(&mut self, id: ObjectId, jacobian: &[f64]) -> &mut Self {
-        let table = self.table;
+        let objects = self.objects;
         if !self.open(jacobian.iter()) {
             return self;
         }
         self.is_of(RowKind::Coordinate);
-        let Some(entry) = table.slots.get(id) else {
+        let Some(entry) = objects.get(id) else {
             self.refuse("a row names an object that is not in the world".into());
             return self;
         };
         let done = entry.object.integratable().filter(|i| i.state_sizes().dof == jacobian.len()).is_some_and(|i| {
             if !entry.moves() {
-                return self.kinematic_coordinates(entry, i, jacobian);
+                return self.kinematic_coordinates(&entry, i, jacobian);
             }
             let mut y = vec![0.0; jacobian.len()];
             i.respond(jacobian, &mut y);
@@ -179,8 +179,8 @@ impl RowBuilder<'_> {
 }
 
 /// The constraints of the table in the order in which they were added; without those that hold nothing but an object that nothing moves.
-pub(crate) fn constraints(table: &Table) -> impl Iterator<Item = (ObjectId, &Entry, &dyn Constraint)> {
-    let entries = table.order.iter().map(|&id| (id, &table.slots[id]));
+pub(crate) fn constraints<'a>(objects: Objects<'a>) -> impl Iterator<Item = (ObjectId, Entry<'a>, &'a dyn Constraint)> {
+    let entries = objects.table.order.iter().copied().zip(objects.iter());
     entries
         .filter(|(_, e)| e.status.enabled)
         .filter_map(|(id, e)| Some((id, e, e.object.constraint().filter(|c| e.moves() || !c.on_itself())?)))

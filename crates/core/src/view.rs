@@ -2,7 +2,7 @@
 
 use crate::object::Object;
 use crate::part_state::{PartState, StateRange};
-use crate::sleep::RestTimer;
+use crate::world::ObjectState;
 use slotmap::{SlotMap, new_key_type};
 use tumble_collide::Vec3;
 
@@ -47,62 +47,118 @@ impl Status {
     }
 }
 
-/// An object and its place.
-pub(crate) struct Entry {
-    pub object: Box<dyn Object>,
-    pub state_range: StateRange,
+/// An object, the ranges of its numbers in the world's tables, and its switches.
+#[derive(Clone, Copy)]
+pub(crate) struct Entry<'a> {
+    pub object: &'a dyn Object,
+    pub state_range: &'a StateRange,
     pub status: Status,
-    /// Never used twice in a world: what warm starts are filed under.
+    /// Never used twice in a world: warm starts are filed under it.
     pub serial: u32,
-    /// Left out of the steps until something stirs it.
+    /// Left out of the steps until something wakes it.
     pub asleep: bool,
-    pub rest_timer: RestTimer,
 }
 
-impl Entry {
-    pub fn new(object: Box<dyn Object>, state_range: StateRange, status: Status, serial: u32) -> Entry {
-        Entry { object, state_range, status, serial, asleep: false, rest_timer: RestTimer::default() }
-    }
-
-    /// Whether it takes part in dynamics: dynamic, alive, and with a state; awake or asleep.
+impl Entry<'_> {
+    /// Returns whether it takes part in dynamics: dynamic, alive, and with a state; awake or asleep.
     pub fn dynamic(&self) -> bool {
         self.status.moves() && !self.state_range.v.is_empty()
     }
 
-    /// Whether forces and impulses move it: dynamic and awake.
+    /// Returns whether forces and impulses move it: dynamic and awake.
     pub fn moves(&self) -> bool {
         self.dynamic() && !self.asleep
     }
 }
 
-impl Clone for Entry {
-    fn clone(&self) -> Entry {
-        let (asleep, rest_timer) = (self.asleep, self.rest_timer.clone());
-        Entry {
-            asleep,
-            rest_timer,
-            ..Entry::new(self.object.fork(), self.state_range.clone(), self.status, self.serial)
-        }
+/// An object and the ranges of its numbers in the world's tables.
+pub(crate) struct Placed {
+    pub object: Box<dyn Object>,
+    pub state_range: StateRange,
+}
+
+impl Clone for Placed {
+    fn clone(&self) -> Placed {
+        Placed { object: self.object.fork(), state_range: self.state_range.clone() }
     }
 }
 
-/// All objects, addressed by id and walked in the order in which they were added.
+/// The objects of a world, in the order in which they were added, and their ids. Nothing in it changes in a step but the objects'
+/// caches.
 #[derive(Clone, Default)]
 pub(crate) struct Table {
-    pub slots: SlotMap<ObjectId, Entry>,
+    pub placed: Vec<Placed>,
+    /// Ids in the same order.
     pub order: Vec<ObjectId>,
+    places: SlotMap<ObjectId, usize>,
 }
 
 impl Table {
-    pub fn iter(&self) -> impl Iterator<Item = &Entry> {
-        self.order.iter().map(|&id| &self.slots[id])
+    /// Returns the place of an object in the order of adding.
+    pub fn place(&self, id: ObjectId) -> Option<usize> {
+        self.places.get(id).copied()
     }
 
-    /// Walks the objects that a step moves, and lets them change their caches.
-    pub fn for_each_mut(&mut self, mut f: impl FnMut(&mut Entry)) {
-        for &id in &self.order {
-            f(&mut self.slots[id]);
+    /// Returns an object and its ranges.
+    pub fn get(&self, id: ObjectId) -> Option<&Placed> {
+        Some(&self.placed[self.place(id)?])
+    }
+
+    /// Adds an object behind all others.
+    pub fn push(&mut self, object: Box<dyn Object>, state_range: StateRange) -> ObjectId {
+        let id = self.places.insert(self.placed.len());
+        self.placed.push(Placed { object, state_range });
+        self.order.push(id);
+        id
+    }
+
+    /// Removes an object; those behind it move up by one place. Ranges stay as they are.
+    pub fn remove(&mut self, id: ObjectId) -> Option<(usize, Placed)> {
+        let gone = self.places.remove(id)?;
+        self.order.remove(gone);
+        for (place, other) in self.order.iter().enumerate().skip(gone) {
+            self.places[*other] = place;
         }
+        Some((gone, self.placed.remove(gone)))
+    }
+
+    /// Joins the objects with their switches.
+    pub fn with<'a>(&'a self, states: &'a [ObjectState]) -> Objects<'a> {
+        Objects { table: self, states }
+    }
+}
+
+/// The objects of a world with their switches.
+#[derive(Clone, Copy)]
+pub(crate) struct Objects<'a> {
+    pub table: &'a Table,
+    pub states: &'a [ObjectState],
+}
+
+impl<'a> Objects<'a> {
+    /// Walks them in the order in which they were added.
+    pub fn iter(self) -> impl Iterator<Item = Entry<'a>> + Clone {
+        self.table.placed.iter().zip(self.states).map(|(placed, state)| entry(placed, state))
+    }
+
+    /// Returns the object at a place in the order of adding.
+    pub fn at(self, place: usize) -> Entry<'a> {
+        entry(&self.table.placed[place], &self.states[place])
+    }
+
+    /// Returns an object by id.
+    pub fn get(self, id: ObjectId) -> Option<Entry<'a>> {
+        Some(self.at(self.table.place(id)?))
+    }
+}
+
+fn entry<'a>(placed: &'a Placed, state: &ObjectState) -> Entry<'a> {
+    Entry {
+        object: placed.object.as_ref(),
+        state_range: &placed.state_range,
+        status: state.status,
+        serial: state.serial,
+        asleep: state.asleep,
     }
 }
 
@@ -119,13 +175,13 @@ pub struct WorldView<'a> {
     pub x: &'a [f64],
     /// The site table at this stage.
     pub part_states: &'a [PartState],
-    pub(crate) table: &'a Table,
+    pub(crate) objects: Objects<'a>,
 }
 
 impl WorldView<'_> {
     /// An object by id.
     pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
-        self.table.slots.get(id).map(|e| e.object.as_ref())
+        self.objects.get(id).map(|e| e.object)
     }
 
     /// An object by id, as its own type.
@@ -136,7 +192,7 @@ impl WorldView<'_> {
 
     /// Where an object's numbers lie.
     pub fn state_range(&self, id: ObjectId) -> Option<&StateRange> {
-        self.table.slots.get(id).map(|e| &e.state_range)
+        self.objects.get(id).map(|e| e.state_range)
     }
 
     /// The site of one part.
@@ -146,16 +202,16 @@ impl WorldView<'_> {
 
     /// An object's switches.
     pub fn status(&self, id: ObjectId) -> Option<Status> {
-        self.table.slots.get(id).map(|e| e.status)
+        self.objects.get(id).map(|e| e.status)
     }
 
     /// Whether an object sleeps (see [`Sleep`](crate::Sleep)).
     pub fn asleep(&self, id: ObjectId) -> bool {
-        self.table.slots.get(id).is_some_and(|e| e.asleep)
+        self.objects.get(id).is_some_and(|e| e.asleep)
     }
 
     /// All ids in the order in which the objects were added.
     pub fn ids(&self) -> &[ObjectId] {
-        &self.table.order
+        &self.objects.table.order
     }
 }

@@ -13,7 +13,7 @@ use crate::view::View;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::{Arc, Mutex, MutexGuard};
-use tumble::dynamics::{Checkpoint, ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, WorldView, Wrench};
+use tumble::dynamics::{ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, WorldView, Wrench};
 
 /// A Python object that is called, which rows are whose, and what it raised.
 struct Code {
@@ -161,8 +161,6 @@ struct Attached {
 pub struct Extension {
     forces: Vec<ObjectId>,
     behaviours: Vec<Attached>,
-    /// Where the world was before the frame; its memory is used again.
-    before: Checkpoint,
 }
 
 impl Extension {
@@ -174,11 +172,7 @@ impl Extension {
     /// For a fork of the world.
     pub fn fork(&self) -> Extension {
         let attached = |a: &Attached| Attached { code: a.code.fork("act"), bodies: a.bodies.clone() };
-        Extension {
-            forces: self.forces.clone(),
-            behaviours: self.behaviours.iter().map(attached).collect(),
-            before: Checkpoint::default(),
-        }
+        Extension { forces: self.forces.clone(), behaviours: self.behaviours.iter().map(attached).collect() }
     }
 }
 
@@ -192,19 +186,11 @@ impl Inner {
         if raised.is_empty() { Ok(()) } else { Err(raised.swap_remove(0).into()) }
     }
 
-    /// One frame with behaviours before it and forces in it. Where one raises, the world is as it was before.
+    /// Steps by one frame, with behaviours before it and forces in it.
     pub fn extended_frame(&mut self) -> Result<()> {
-        // what could not be forked
-        self.take_raised()?;
-        self.world.checkpoint(&mut self.extension.before);
-        let outcome = self.behave().and_then(|()| {
-            let outcome = self.frame();
-            self.take_raised().map(|()| outcome)
-        });
-        outcome.unwrap_or_else(|raised| {
-            self.world.roll_back(&self.extension.before);
-            Err(raised)
-        })
+        self.behave()?;
+        let outcome = self.frame();
+        self.take_raised().and(outcome)
     }
 
     fn behave(&mut self) -> Result<()> {
@@ -315,7 +301,7 @@ impl Inner {
 
     /// Takes all forces and behaviours out, for who drops them.
     pub fn take_extension(&mut self) -> impl Send + use<> {
-        let Extension { forces, behaviours, .. } = std::mem::take(&mut self.extension);
+        let Extension { forces, behaviours } = std::mem::take(&mut self.extension);
         let forces: Vec<Option<Box<dyn Object>>> = forces.into_iter().map(|id| self.world.remove(id).ok()).collect();
         (forces, behaviours)
     }

@@ -8,7 +8,7 @@ use crate::state::Shown;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tumble::dynamics::{ObjectId, World};
+use tumble::dynamics::{ObjectId, World, WorldState};
 use tumble::scene::{SceneFile, overlap_notes, visual_notes};
 
 /// A world and what belongs to it on Python's side.
@@ -29,6 +29,8 @@ pub struct Inner {
     pub notes: Vec<String>,
     /// Which bodies overlap, as last asked before the first step.
     pub overlaps: Vec<String>,
+    /// The state before the frame; its memory is used again.
+    before: WorldState,
     /// Whether a panic left it half-way.
     pub broken: bool,
 }
@@ -45,6 +47,7 @@ impl Inner {
             shown: Shown::default(),
             notes: Vec::new(),
             overlaps: Vec::new(),
+            before: WorldState::default(),
             broken: false,
         }
     }
@@ -60,6 +63,7 @@ impl Inner {
             shown: Shown::default(),
             notes: self.notes.clone(),
             overlaps: self.overlaps.clone(),
+            before: WorldState::default(),
             broken: false,
         }
     }
@@ -69,12 +73,21 @@ impl Inner {
         self.extension.is_empty() && self.shown.alive(py)
     }
 
-    /// One frame.
+    /// Steps by one frame. On an error the world is as it was before, and has none of the frame's forces.
     pub fn step(&mut self) -> Result<()> {
-        if self.extension.is_empty() { self.frame() } else { self.extended_frame() }
+        self.take_raised()?; // by a `fork`
+        if self.efforts.is_empty() && self.extension.is_empty() {
+            return self.frame();
+        }
+        self.world.checkpoint(&mut self.before);
+        let outcome = if self.extension.is_empty() { self.frame() } else { self.extended_frame() };
+        if outcome.is_err() {
+            self.world.roll_back(&self.before);
+        }
+        outcome
     }
 
-    /// One frame of the world alone.
+    /// Steps the world alone by one frame, under the generalized forces on articulated bodies.
     pub fn frame(&mut self) -> Result<()> {
         for (&id, effort) in &self.efforts {
             self.world.apply_generalized(id, effort)?;

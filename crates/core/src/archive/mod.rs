@@ -1,10 +1,10 @@
-//! A whole world as bytes: everything that [`save`](World::save) leaves to the scene, and the snapshot itself.
+//! A whole world as bytes: its objects, its settings and its [`WorldState`].
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleA3`; the last is the number of the format | 8 |
+//! | `tumbleA4`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
-//! | settings, methods, shapes, visual meshes, objects, pairs, snapshot, contacts, report in postcard | any |
+//! | settings, methods, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
 //! The same world gives the same bytes. Objects of kinds of their own are written by name alone; the caller makes them anew. Shapes that objects
 //! share are written once and are shared again; meshes that are only drawn are read for it, so that no file is needed later. The order of objects is kept, ids are not: they are new.
@@ -16,7 +16,7 @@ use crate::settings::{Settings, StepReport};
 use crate::solver::{self, RowSolver};
 use crate::step::{Stepper, stepper_by_name};
 use crate::view::{Mode, ObjectId};
-use crate::world::{ContactPoint, World};
+use crate::world::{ContactPoint, World, WorldState};
 use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint};
 use bodies::{ArticulatedRecord, RigidRecord};
 use records::{
@@ -28,7 +28,7 @@ use tumble_collide::Shape;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What an archive of a world begins with. The number is raised with every change of what is in it.
-const HEAD: &[u8; 8] = b"tumbleA3";
+const HEAD: &[u8; 8] = b"tumbleA4";
 
 /// Why an archive was not written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -65,7 +65,7 @@ struct Archive {
     meshes: Vec<MeshRecord>,
     objects: Vec<Record>,
     pairs: Vec<PairRecord>,
-    snapshot: Vec<u8>,
+    state: WorldState,
     contacts: Vec<ContactRecord>,
     report: ReportRecord,
 }
@@ -112,7 +112,7 @@ impl World {
             meshes: tables.meshes.list,
             objects,
             pairs,
-            snapshot: self.save(),
+            state: self.state_value().clone(),
             contacts: self.contacts().iter().map(|c| ContactRecord::of(c, &indices)).collect(),
             report: ReportRecord::of(self.report(), &indices),
         };
@@ -143,7 +143,7 @@ impl World {
             ids.push(world.add_boxed(object, Mode::Dynamic).map_err(damaged)?);
         }
         archive.pairs.into_iter().try_for_each(|pair| pair.put(&mut world, &ids)).map_err(damaged)?;
-        world.restore(&archive.snapshot).map_err(damaged)?;
+        world.restore_state(&archive.state).map_err(damaged)?;
         let contacts = archive.contacts.into_iter().map(|c| c.contact(&ids)).collect();
         world.publish(contacts, archive.report.report(&ids));
         Ok(world)

@@ -193,7 +193,7 @@ impl Adaptive {
         let w = &mut self.work;
         let n = w.kinematic.len();
         let mut worst = Worst { error: 0.0, object: 0 };
-        for (object, entry) in motion.table.iter().enumerate().filter(|(_, e)| e.moves()) {
+        for (object, entry) in motion.objects().iter().enumerate().filter(|(_, e)| e.moves()) {
             let Some(body) = entry.object.integratable() else { continue };
             let (x, v) = (entry.state_range.x.clone(), entry.state_range.v.clone());
             // e_v = M⁻¹·e_Π: the velocity that the error is, at the end of the step
@@ -224,13 +224,13 @@ impl Adaptive {
         w.start.copy_from_slice(motion.x);
         w.k.swap(0, STAGES - 1);
         w.k[0][..n].copy_from_slice(&w.velocity);
-        for entry in motion.table.iter().filter(|e| is_kinematic(e)) {
+        for entry in motion.objects().iter().filter(|e| is_kinematic(e)) {
             w.k[0][entry.state_range.v.clone()].copy_from_slice(&w.kinematic[entry.state_range.v.clone()]);
         }
     }
 
     fn tolerance_error(&self, motion: &IntegrationContext, time: f64, step: f64, worst: Worst) -> StepError {
-        let Some(entry) = motion.table.iter().nth(worst.object) else {
+        let Some(entry) = motion.objects().iter().nth(worst.object) else {
             unreachable!("the object was found in this table")
         };
         let object = entry.object.name().to_string();
@@ -259,7 +259,7 @@ impl IntegrationContext<'_> {
     pub(super) fn displace(&mut self, start: &[f64], y: &[f64], kinematic_velocity: &[f64]) {
         self.x.copy_from_slice(start);
         let (theta, pi) = y.split_at(kinematic_velocity.len());
-        for entry in self.table.iter().filter(|e| e.moves() || is_kinematic(e)) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.moves() || is_kinematic(e)) {
             let Some(body) = entry.object.integratable() else { continue };
             let (x, v) = (&mut self.x[entry.state_range.x.clone()], entry.state_range.v.clone());
             if entry.moves() {
@@ -274,13 +274,13 @@ impl IntegrationContext<'_> {
 
     /// Turns velocities at the displacement `Θ` into rates of `Θ`.
     fn pull_back(&self, theta: &[f64], v: &mut [f64], kinematic_velocity: &[f64]) {
-        for entry in self.table.iter() {
+        for entry in self.table.with(self.states).iter() {
             let (Some(body), state_range) = (entry.object.integratable(), entry.state_range.v.clone()) else {
                 continue;
             };
             if entry.moves() {
                 body.pull_back(&theta[state_range.clone()], &mut v[state_range]);
-            } else if is_kinematic(entry) {
+            } else if is_kinematic(&entry) {
                 v[state_range.clone()].copy_from_slice(&kinematic_velocity[state_range]);
             }
         }

@@ -7,7 +7,8 @@ use crate::part_state::{Forces, PartState, StateRange, Wrench};
 use crate::rigid::RigidBody;
 use crate::rotation;
 use crate::settings::Settings;
-use crate::view::{Entry, Status, Table, WorldView};
+use crate::view::{Table, WorldView};
+use crate::world::ObjectState;
 use tumble_collide::{Mat3, Quat, Shape, Vec3};
 
 /// A spring that pulls part 0 of the first object to the origin and twists it.
@@ -38,6 +39,7 @@ impl ForceGenerator for Spring {
 /// A world of one body and its spring, without steppers.
 struct Bench {
     table: Table,
+    states: [ObjectState; 2],
     x: Vec<f64>,
     part_states: Vec<PartState>,
     forces: Forces,
@@ -57,12 +59,12 @@ impl Bench {
         let state_ranges =
             [StateRange { x: 0..13, v: 0..6, parts: 0..1 }, StateRange { x: 13..13, v: 6..6, parts: 1..1 }];
         let objects: [Box<dyn Object>; 2] = [Box::new(body), Box::new(Spring)];
-        for (serial, (object, state_range)) in (0..).zip(objects.into_iter().zip(state_ranges)) {
-            let id = table.slots.insert(Entry::new(object, state_range, Status::default(), serial));
-            table.order.push(id);
+        for (object, state_range) in objects.into_iter().zip(state_ranges) {
+            table.push(object, state_range);
         }
         Bench {
             table,
+            states: Default::default(),
             x,
             part_states: vec![PartState::default()],
             forces: Forces::default(),
@@ -74,6 +76,7 @@ impl Bench {
     fn integration(&mut self) -> IntegrationContext<'_> {
         IntegrationContext {
             table: &mut self.table,
+            states: &self.states,
             x: &mut self.x,
             part_states: &mut self.part_states,
             forces: &mut self.forces,

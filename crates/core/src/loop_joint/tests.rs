@@ -4,12 +4,14 @@ use super::*;
 use crate::part_state::StateSizes;
 use crate::rigid::RigidBody;
 use crate::rows::Rows;
-use crate::view::{Entry, Mode, Status, Table};
+use crate::view::{Mode, Status, Table};
+use crate::world::ObjectState;
 use tumble_collide::Shape;
 
 /// Two bodies of one part each in a table, their state and sites.
 struct Pairing {
     table: Table,
+    states: Vec<ObjectState>,
     ids: Vec<ObjectId>,
     x: Vec<f64>,
     part_states: Vec<PartState>,
@@ -25,8 +27,14 @@ struct RecordedRows {
 
 impl Pairing {
     fn new(bodies: Vec<(RigidBody, Mode)>) -> Pairing {
-        let mut all =
-            Pairing { table: Table::default(), ids: Vec::new(), x: Vec::new(), part_states: Vec::new(), dof: 0 };
+        let mut all = Pairing {
+            table: Table::default(),
+            states: Vec::new(),
+            ids: Vec::new(),
+            x: Vec::new(),
+            part_states: Vec::new(),
+            dof: 0,
+        };
         for (serial, (body, mode)) in bodies.into_iter().enumerate() {
             let Some(StateSizes { x, dof, parts }) = (&body as &dyn Object).integratable().map(|i| i.state_sizes())
             else {
@@ -42,9 +50,8 @@ impl Pairing {
             all.dof = state_range.v.end;
             crate::object::Integratable::write_initial(&body, &mut all.x[state_range.x.clone()]);
             let status = Status { mode, ..Status::default() };
-            let id = all.table.slots.insert(Entry::new(Box::new(body), state_range, status, serial as u32));
-            all.table.order.push(id);
-            all.ids.push(id);
+            all.states.push(ObjectState { serial: serial as u32, status, ..ObjectState::default() });
+            all.ids.push(all.table.push(Box::new(body), state_range));
         }
         all
     }
@@ -53,15 +60,16 @@ impl Pairing {
     fn after(&self, t: f64) -> Pairing {
         let mut next = Pairing {
             table: self.table.clone(),
+            states: self.states.clone(),
             ids: self.ids.clone(),
             x: self.x.clone(),
             part_states: self.part_states.clone(),
             dof: self.dof,
         };
-        let Pairing { table, x, part_states, .. } = &mut next;
-        table.for_each_mut(|entry| {
+        let Pairing { table, states, x, part_states, .. } = &mut next;
+        for (entry, state) in table.placed.iter_mut().zip(states) {
             let x = &mut x[entry.state_range.x.clone()];
-            if let (Some(body), true) = (entry.object.integratable(), entry.status.mode != Mode::Static) {
+            if let (Some(body), true) = (entry.object.integratable(), state.status.mode != Mode::Static) {
                 let mut v = vec![0.0; entry.state_range.v.len()];
                 body.velocity(x, &mut v);
                 body.integrate_positions(x, &v, t);
@@ -69,10 +77,10 @@ impl Pairing {
             }
             let part_states = &mut part_states[entry.state_range.parts.clone()];
             entry.object.refresh(x, part_states);
-            if entry.status.mode == Mode::Static {
+            if state.status.mode == Mode::Static {
                 part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
             }
-        });
+        }
         next
     }
 
@@ -86,14 +94,14 @@ impl Pairing {
             implicit: true,
             x: &self.x,
             part_states: &self.part_states,
-            table: &self.table,
+            objects: self.table.with(&self.states),
         };
         let mut out = RowBuilder {
             rows: &mut rows,
             bias: &mut bias,
             targets: &mut targets,
             kinds: &mut kinds,
-            table: &self.table,
+            objects: self.table.with(&self.states),
             x: &self.x,
             part_states: &self.part_states,
             problem: &mut problem,
@@ -102,7 +110,7 @@ impl Pairing {
         rows_of(&view, &mut out);
         assert_eq!(problem, None);
         let mut u = vec![0.0; self.dof];
-        for entry in self.table.iter() {
+        for entry in self.table.with(&self.states).iter() {
             if let Some(body) = entry.object.integratable() {
                 body.whiten(&self.x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
             }

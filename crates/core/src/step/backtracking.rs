@@ -72,7 +72,7 @@ impl Stepper for Backtracking {
     fn step(&mut self, frame: StepContext) -> Result<(), StepError> {
         let core = frame.core;
         let dt = core.settings.dt;
-        let (mut left, end) = (dt, core.time + dt);
+        let (mut left, end) = (dt, core.state.time + dt);
         while left > 1e-12 * dt {
             if core.report.tries >= TRIES {
                 core.report.floor_hits += 1;
@@ -89,7 +89,7 @@ impl Stepper for Backtracking {
             let held = self.resolve_contacts(core, left)?;
             left -= self.advance(core, &held, left)?;
         }
-        core.time = end; // whatever the sub-steps add up to
+        core.state.time = end; // whatever the sub-steps add up to
         Ok(())
     }
 
@@ -119,7 +119,7 @@ impl Backtracking {
         let recovery = core.settings.recovery_speed * left;
         self.kept = unreachable_joints::left(&self.work, |i| self.work.targets[i].error, recovery);
         self.work.dp.resize(core.dof, 0.0);
-        let time = core.time;
+        let time = core.state.time;
         core.integration().evaluate(time, &mut self.work.dp);
         core.check_finite(&self.work.dp)?;
         build_rows(core, &mut self.work, Level::Acceleration, 0.5 * left)
@@ -128,7 +128,7 @@ impl Backtracking {
     fn roles(&mut self, core: &Core) {
         let s = &core.settings;
         let role = |constraint: &ContactConstraint| {
-            let lasts = core.warm.carries(&constraint.key) && constraint.contact.gap <= s.drift_tolerance;
+            let lasts = core.state.warm.carries(&constraint.key) && constraint.contact.gap <= s.drift_tolerance;
             let touching = lasts || constraint.contact.gap <= s.contact_tolerance;
             let speed = constraint
                 .velocity(&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize])
@@ -175,7 +175,7 @@ impl Backtracking {
     /// Thesis `ResolveContacts`: the generalized contact forces that hold over the sub-step.
     fn resolve_contacts(&mut self, core: &mut Core, left: f64) -> Result<Vec<f64>, StepError> {
         let mut dp = std::mem::take(&mut self.work.dp);
-        let time = core.time;
+        let time = core.state.time;
         core.integration().evaluate(time, &mut dp);
         let work = &mut self.work;
         let mut u = Vec::new();
@@ -270,7 +270,7 @@ impl Backtracking {
     fn advance(&mut self, core: &mut Core, held: &[f64], left: f64) -> Result<f64, StepError> {
         core.held.copy_from_slice(held);
         self.adaptive.path.clear();
-        let start = core.x.to_vec();
+        let start = core.state.x.to_vec();
         let floor = core.settings.dt * FLOOR;
         let tolerance = core.settings.contact_tolerance;
         let mut bracket = Bracket::new(self.watch.nearest(&self.work.contact_constraints, tolerance));
@@ -300,7 +300,7 @@ impl Backtracking {
             }
             core.report.max_penetration = deepest;
             if stuck {
-                core.x.copy_from_slice(&start);
+                core.state.x.copy_from_slice(&start);
                 core.clear_contact_forces();
                 core.integration().refresh();
                 return Ok(0.0);
@@ -315,13 +315,13 @@ impl Backtracking {
             self.adaptive.path.write(&mut core.integration(), h);
             return Ok(h);
         }
-        core.x.copy_from_slice(start);
+        core.state.x.copy_from_slice(start);
         core.integration().refresh();
-        let (time, integrator) = (core.time, core.settings.integrator);
-        self.adaptive.set(&core.settings, core.inner_step, core.report.inner_steps);
+        let (time, integrator) = (core.state.time, core.settings.integrator);
+        self.adaptive.set(&core.settings, core.state.inner_step, core.report.inner_steps);
         let came = core.integration().integrate(integrator, time, h, &mut self.work.dp, &mut self.adaptive)?;
         if integrator == Integrator::DormandPrince {
-            core.inner_step = self.adaptive.step;
+            core.state.inner_step = self.adaptive.step;
             core.report.inner_steps = self.adaptive.steps;
         }
         core.check_finite(&self.work.dp)?;
@@ -332,7 +332,7 @@ impl Backtracking {
     /// full order, and forces and accelerations of its own. Where that one has not landed, because the two differ by more than the contact
     /// tolerance, the moment is corrected; if that does not help (or `f` is not known) the dense state stays. The time taken.
     fn settle(&mut self, core: &mut Core, h: f64, bracket: &Bracket, f: f64) -> Result<f64, StepError> {
-        let (dense, tolerance, time) = (core.x.to_vec(), core.settings.contact_tolerance, core.time);
+        let (dense, tolerance, time) = (core.state.x.to_vec(), core.settings.contact_tolerance, core.state.time);
         let deepest = core.report.max_penetration;
         let slope = bracket.slope(h, f);
         let (from, length) = (self.adaptive.path.before(h).0, self.adaptive.path.length(h));
@@ -341,7 +341,7 @@ impl Backtracking {
             if !(at > from && at <= from + length && f.is_finite()) {
                 break;
             }
-            core.x.copy_from_slice(self.adaptive.path.before(h).1);
+            core.state.x.copy_from_slice(self.adaptive.path.before(h).1);
             self.adaptive.set(&core.settings, length, core.report.inner_steps);
             self.adaptive.integrate(&mut core.integration(), time + from, at - from, &mut self.work.dp, false)?;
             core.report.inner_steps = self.adaptive.steps;
@@ -353,7 +353,7 @@ impl Backtracking {
             core.report.max_penetration = deepest;
             at -= off / slope;
         }
-        core.x.copy_from_slice(&dense);
+        core.state.x.copy_from_slice(&dense);
         core.integration().evaluate(time + h, &mut self.work.dp);
         core.check_finite(&self.work.dp)?;
         Ok(h)
@@ -363,7 +363,7 @@ impl Backtracking {
     fn margin(&mut self, core: &mut Core, h: f64) -> Result<f64, StepError> {
         core.report.tries += 1;
         detect(core, 0.0, PredictionMode::Relative, &mut self.after);
-        limits(core, core.time + h, &mut self.limits_after)?;
+        limits(core, core.state.time + h, &mut self.limits_after)?;
         Ok(self.watch.margin(
             &self.work.contact_constraints,
             &self.after,
@@ -379,7 +379,7 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
     recover(core, &work.du, held);
     core.held_wrenches.clear();
     let on_links = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
-    if work.contact_constraints.is_empty() || !core.table.iter().any(on_links) {
+    if work.contact_constraints.is_empty() || !core.objects().iter().any(|e| on_links(&e)) {
         return;
     }
     let mut joined = vec![0.0; core.dof];
@@ -388,7 +388,7 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
         .for_each(|block| work.rows.apply_block(block, &work.lambda, &mut joined));
     let mut generalized = vec![0.0; core.dof];
     recover(core, &joined, &mut generalized);
-    for entry in core.table.iter().filter(|e| on_links(e)) {
+    for entry in core.objects().iter().filter(|e| on_links(e)) {
         held[entry.state_range.v.clone()].copy_from_slice(&generalized[entry.state_range.v.clone()]);
     }
     core.held_wrenches.resize(core.part_states.len(), Wrench::default());
@@ -396,7 +396,7 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
         for (part_state, point, force) in
             [(constraint.a, constraint.contact.point, force), (constraint.b, constraint.point_b(), -force)]
         {
-            if on_links(&core.table.slots[core.owners[part_state as usize].id]) {
+            if on_links(&core.objects().at(core.owners[part_state as usize].place as usize)) {
                 let arm = point - core.part_states[part_state as usize].position();
                 let wrench = &mut core.held_wrenches[part_state as usize];
                 wrench.force += force;

@@ -61,14 +61,14 @@ pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(),
         time,
         gravity: core.settings.gravity,
         implicit: core.implicit,
-        x: &core.x,
+        x: &core.state.x,
         part_states: &core.part_states,
-        table: &core.table,
+        objects: core.objects(),
     };
     let mut gaps = Vec::new();
-    for (place, (_, entry, constraint)) in constraints(&core.table).enumerate() {
+    for (place, (_, entry, constraint)) in constraints(core.objects()).enumerate() {
         gaps.clear();
-        constraint.gaps(&entry.state_range, &view, &mut gaps);
+        constraint.gaps(entry.state_range, &view, &mut gaps);
         if gaps.iter().any(|gap| !gap.is_finite()) {
             return Err(StepError::Row {
                 object: entry.object.name().to_string(),
@@ -87,14 +87,14 @@ pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(),
 /// Finds the contacts within reach of the next `horizon` seconds.
 pub(crate) fn detect(core: &mut Core, horizon: f64, prediction: PredictionMode, out: &mut Vec<ContactConstraint>) {
     let mut detector = Detector {
-        table: &core.table,
+        objects: core.table.with(&core.state.objects),
         owners: &core.owners,
         part_states: &core.part_states,
         settings: &core.settings,
         pair_materials: &core.pair_materials,
         broad: core.broad.as_mut(),
         scratch: &mut core.detect_scratch,
-        wake_requests: &mut core.sleepers.wake_requests,
+        needs_wake: &mut core.needs_wake,
     };
     detector.detect(horizon, prediction, out);
     let deepest = out.iter().map(|t| -t.contact.gap).fold(0.0, f64::max);
@@ -112,21 +112,22 @@ pub(crate) struct Moment {
 
 /// State and sites in `ahead` seconds if no momentum changes (or no velocity, of objects whose state holds velocities); caches stay at the present.
 fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
-    let start = core.x.to_vec();
-    for entry in core.table.iter() {
-        let x = &mut core.x[entry.state_range.x.clone()];
+    let start = core.state.x.to_vec();
+    let (objects, x) = core.objects_and_x();
+    for entry in objects.iter() {
+        let x = &mut x[entry.state_range.x.clone()];
         match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
             Some(body) => {
                 let mut v = vec![0.0; entry.state_range.v.len()];
                 body.velocity(x, &mut v);
                 body.integrate_positions(x, &v, ahead);
             }
-            None => free_motion(entry, x, ahead),
+            None => free_motion(&entry, x, ahead),
         }
     }
     core.integration().refresh();
-    let moment = Moment { x: core.x.to_vec(), part_states: core.part_states.clone(), ahead };
-    core.x.copy_from_slice(&start);
+    let moment = Moment { x: core.state.x.to_vec(), part_states: core.part_states.clone(), ahead };
+    core.state.x.copy_from_slice(&start);
     core.integration().refresh();
     moment
 }
@@ -136,7 +137,7 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
 /// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Where there are joints that state is brought back onto them first. The
 /// errors are told for the present state all the same.
 pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ahead: f64) -> Result<(), StepError> {
-    if ahead <= 0.0 || constraints(&core.table).next().is_none() {
+    if ahead <= 0.0 || constraints(core.objects()).next().is_none() {
         lay_rows(core, work, level, None)?;
         return locate_limits(core, work);
     }
@@ -170,29 +171,29 @@ pub(crate) fn lay_rows(
         bias: &mut work.bias,
         targets: &mut work.targets,
         kinds: &mut work.kinds,
-        table: &core.table,
-        x: &core.x,
+        objects: core.objects(),
+        x: &core.state.x,
         part_states: &core.part_states,
         problem: &mut problem,
         owner: ObjectId::default(),
     };
     let (x, part_states, ahead) =
-        moment.map_or((&core.x[..], &core.part_states, 0.0), |m| (&m.x[..], &m.part_states, m.ahead));
+        moment.map_or((&core.state.x[..], &core.part_states, 0.0), |m| (&m.x[..], &m.part_states, m.ahead));
     builder.part_states = part_states;
     let view = WorldView {
-        time: core.time + ahead,
+        time: core.state.time + ahead,
         gravity: core.settings.gravity,
         implicit: core.implicit,
         x,
         part_states,
-        table: &core.table,
+        objects: core.objects(),
     };
     let mut first = std::mem::take(&mut work.first);
     first.clear();
-    for (id, entry, constraint) in constraints(&core.table) {
+    for (id, entry, constraint) in constraints(core.objects()) {
         first.push(builder.targets.len());
         builder.owner = id;
-        constraint.rows(&entry.state_range, &view, level, &mut builder);
+        constraint.rows(entry.state_range, &view, level, &mut builder);
         if let Some(why) = builder.problem.take() {
             return Err(StepError::Row { object: entry.object.name().to_string(), why });
         }
@@ -220,8 +221,8 @@ fn lay_contact_rows(core: &Core, work: &mut Workspace) {
         bias: &mut work.bias,
         targets: &mut work.targets,
         kinds: &mut work.kinds,
-        table: &core.table,
-        x: &core.x,
+        objects: core.objects(),
+        x: &core.state.x,
         part_states: &core.part_states,
         problem: &mut None,
         owner: ObjectId::default(),
@@ -235,14 +236,14 @@ fn lay_contact_rows(core: &Core, work: &mut Workspace) {
             [(constraint.a, constraint.contact.point, 1.0), (constraint.b, constraint.point_b(), -1.0)]
         {
             let (owner, index) = (core.owners[part_state as usize], part_state as usize);
-            let entry = &core.table.slots[owner.id];
+            let entry = core.objects().at(owner.place as usize);
             let pinned = core.pinned_part_states().filter(|_| entry.moves());
             // the arm stays as it was found: the lowest point of a ball that spins does not turn with it
             let point = pinned.map_or(point, |part_states| {
                 point + part_states[index].position() - core.part_states[index].position()
             });
             builder.part_states = pinned.unwrap_or(&core.part_states);
-            builder.point_side(entry, owner.part as usize, &point, axes, sign);
+            builder.point_side(&entry, owner.part as usize, &point, axes, sign);
         }
     }
 }
@@ -265,7 +266,7 @@ fn adopt(core: &Core, work: &mut Workspace, made: Workspace) {
 
 /// Gives one-sided rows the gap that their constraint tells for the present state.
 fn locate_limits(core: &Core, work: &mut Workspace) -> Result<(), StepError> {
-    limits(core, core.time, &mut work.limits)?;
+    limits(core, core.state.time, &mut work.limits)?;
     let first = &work.first;
     for of_one in work.limits.chunk_by_mut(|a, b| a.key[0] == b.key[0]) {
         let place = of_one[0].key[0] as usize;
@@ -284,9 +285,9 @@ fn locate_limits(core: &Core, work: &mut Workspace) -> Result<(), StepError> {
 /// Takes back from the errors of the constraints what free motion does to them in `ahead` seconds, to second order.
 fn present_errors(core: &Core, work: &mut Workspace, ahead: f64) {
     let mut u = vec![0.0; core.dof];
-    for entry in core.table.iter().filter(|e| e.moves()) {
+    for entry in core.objects().iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.whiten(&core.x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
+            body.whiten(&core.state.x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
         }
     }
     for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&mut work.targets) {
@@ -299,9 +300,9 @@ fn present_errors(core: &Core, work: &mut Workspace, ahead: f64) {
 pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut Vec<f64>) {
     zero(u, core.dof);
     zero(du, core.dof);
-    for entry in core.table.iter().filter(|e| e.moves()) {
+    for entry in core.objects().iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
-        let x = core.pinned().unwrap_or(&core.x);
+        let x = core.pinned().unwrap_or(&core.state.x);
         body.whiten(&x[entry.state_range.x.clone()], &mut u[v.clone()]);
         body.whiten_rate(&dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
@@ -313,7 +314,7 @@ pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut
 pub(crate) fn free_motion_change(core: &Core, h: f64) -> Vec<f64> {
     let mut out = vec![0.0; core.dof];
     let Some(middle) = core.pinned() else { return out };
-    for entry in core.table.iter().filter(|e| e.moves()) {
+    for entry in core.objects().iter().filter(|e| e.moves()) {
         let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
         let (v, mut rate) = (entry.state_range.v.clone(), vec![0.0; entry.state_range.v.len()]);
         body.free_motion_rate(&middle[entry.state_range.x.clone()], &mut rate);
@@ -325,8 +326,8 @@ pub(crate) fn free_motion_change(core: &Core, h: f64) -> Vec<f64> {
 
 /// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
 pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
-    let (mut out, x) = (vec![0.0; core.dof], core.pinned().unwrap_or(&core.x));
-    for entry in core.table.iter().filter(|e| e.moves()) {
+    let (mut out, x) = (vec![0.0; core.dof], core.pinned().unwrap_or(&core.state.x));
+    for entry in core.objects().iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         let mut turning = vec![0.0; v.len()];
         body.gyroscopic(&x[entry.state_range.x.clone()], &mut turning);
@@ -344,7 +345,7 @@ pub(crate) fn zero(v: &mut Vec<f64>, n: usize) {
 /// The generalized impulse (or force) that a change `du` of whitened velocity (or acceleration) means.
 pub(crate) fn recover(core: &Core, du: &[f64], j: &mut [f64]) {
     j.fill(0.0);
-    for entry in core.table.iter().filter(|e| e.moves()) {
+    for entry in core.objects().iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
             body.recover(&du[entry.state_range.v.clone()], &mut j[entry.state_range.v.clone()]);
         }
@@ -354,10 +355,11 @@ pub(crate) fn recover(core: &Core, du: &[f64], j: &mut [f64]) {
 /// Changes the whitened velocity of the state by `du`; `dp` is the momentum (or velocity) that this is.
 pub(crate) fn push(core: &mut Core, du: &[f64], dp: &mut Vec<f64>) {
     zero(dp, core.dof);
-    for entry in core.table.iter().filter(|e| e.moves()) {
+    let (objects, x) = core.objects_and_x();
+    for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         body.unwhiten_rate(&du[v.clone()], &mut dp[v.clone()]);
-        body.kick(&mut core.x[entry.state_range.x.clone()], &dp[v], 1.0);
+        body.kick(&mut x[entry.state_range.x.clone()], &dp[v], 1.0);
     }
 }
 
@@ -376,7 +378,7 @@ pub(crate) fn shift(core: &mut Core, u: &[f64], h: f64) {
 /// `v += L⁻¹·u`.
 pub(crate) fn unwhiten_onto(core: &Core, u: &[f64], v: &mut [f64]) {
     let mut velocity = Vec::new();
-    for entry in core.table.iter().filter(|e| e.moves()) {
+    for entry in core.objects().iter().filter(|e| e.moves()) {
         let (Some(body), range) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         zero(&mut velocity, range.len());
         body.unwhiten(&u[range.clone()], &mut velocity);
@@ -386,12 +388,13 @@ pub(crate) fn unwhiten_onto(core: &Core, u: &[f64], v: &mut [f64]) {
 
 fn each_displaced(core: &mut Core, u: &[f64], go: impl Fn(&dyn Integratable, &mut [f64], &[f64])) {
     let mut velocity = Vec::new();
-    for entry in core.table.iter().filter(|e| e.moves()) {
+    let (objects, x) = core.objects_and_x();
+    for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), u) = (entry.object.integratable(), &u[entry.state_range.v.clone()]) else { continue };
         if u.iter().any(|u| *u != 0.0) {
             zero(&mut velocity, u.len());
             body.unwhiten(u, &mut velocity);
-            go(body, &mut core.x[entry.state_range.x.clone()], &velocity);
+            go(body, &mut x[entry.state_range.x.clone()], &velocity);
         }
     }
 }
@@ -427,7 +430,7 @@ pub(crate) fn solve(
 pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
     let mut place = 0;
     for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
-        if let Some(impulse) = core.warm.get(&constraint.key, &mut place) {
+        if let Some(impulse) = core.state.warm.get(&constraint.key, &mut place) {
             for (row, axis) in block.range().zip(&constraint.frame.axes) {
                 work.lambda[row] = scale * axis.dot(&impulse);
             }

@@ -54,10 +54,10 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
     let mut rows = Workspace::default();
     lay_rows(core, &mut rows, level, None)?;
     let errors: Vec<f64> = rows.targets.iter().map(|t| t.error).collect();
-    let (start, time, pinned) = (core.x.to_vec(), core.time, core.lift_pin());
+    let (start, time, pinned) = (core.state.x.to_vec(), core.state.time, core.lift_pin());
     core.integration().free_motion(ahead);
     core.integration().refresh();
-    core.time += ahead;
+    core.state.time += ahead;
     // what is open is asked for half-way closer: whether that is out of reach shows here
     let closer = if core.settings.stabilize_positions { core.settings.recovery_speed * ahead } else { 0.0 };
     let aims = |closer: f64, rows: &Workspace| unreachable_joints::left(rows, |i| errors[i], closer);
@@ -67,19 +67,19 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
         && Piece::all(core, &mut rows).iter().any(|p| p.direct() && unreachable_joints::weak(&rows, &p.rows))
     {
         let mut end = Workspace::default();
-        let middle = core.x.to_vec();
+        let middle = core.state.x.to_vec();
         core.integration().free_motion(ahead);
         core.integration().refresh();
-        core.time += ahead;
+        core.state.time += ahead;
         lay_rows(core, &mut end, level, None)?;
         let aim = aims(2.0 * closer, &end);
         far = onto(core, &mut end, level, &aim);
-        core.x.copy_from_slice(&middle);
+        core.state.x.copy_from_slice(&middle);
         core.integration().refresh();
     }
     map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
-    core.time = time;
-    core.x.copy_from_slice(&start);
+    core.state.time = time;
+    core.state.x.copy_from_slice(&start);
     core.pin_again(pinned);
     core.integration().refresh();
     map_sides(core, &mut rows, |body, j, y| body.respond(j, y));
@@ -88,11 +88,11 @@ pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f
 }
 
 /// What moves, in the order of its coordinates, in which it was added too.
-fn by_start(core: &Core) -> Vec<&Entry> {
-    core.table.iter().filter(|e| e.moves()).collect()
+fn by_start(core: &Core) -> Vec<Entry<'_>> {
+    core.objects().iter().filter(|e| e.moves()).collect()
 }
 
-fn entry_at<'e>(entries: &[&'e Entry], u: u32) -> Option<&'e Entry> {
+fn entry_at<'e>(entries: &[Entry<'e>], u: u32) -> Option<Entry<'e>> {
     entries.binary_search_by_key(&(u as usize), |e| e.state_range.v.start).ok().map(|i| entries[i])
 }
 
@@ -115,7 +115,7 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
     let least = 1e-2 * core.settings.contact_tolerance;
     lay_rows(core, probe, level, None)?;
     let mut pieces = Piece::all(core, probe);
-    let mut kept = core.x.to_vec();
+    let mut kept = core.state.x.to_vec();
     while probe.targets.len() == errors.len() && pieces.iter().any(|p| !p.done) {
         let off: Vec<f64> = probe.targets.iter().zip(errors).map(|(t, e)| t.error - e).collect();
         let mut dx = vec![0.0; core.dof];
@@ -123,7 +123,7 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
             let worst = piece.largest(&off);
             piece.rounds = piece.rounds.saturating_sub(1);
             if worst > piece.left.0 {
-                piece.copy(&kept, &mut core.x); // it was better before
+                piece.copy(&kept, &mut core.state.x); // it was better before
                 piece.damp();
                 piece.done |= piece.rounds == 0;
                 continue;
@@ -135,7 +135,7 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
                 solve(&probe.rows, &piece.rows, &off, &mut dx, 0.1 * least);
             }
         }
-        core.x.clone_into(&mut kept);
+        kept.copy_from_slice(&core.state.x);
         shift(core, &dx, 1.0);
         core.integration().refresh();
         lay_rows(core, probe, level, None)?;
@@ -162,7 +162,7 @@ pub(super) fn close(
         return Ok(());
     }
     let pushed = pushed(work);
-    let (arrived, mut moved) = (core.x.to_vec(), vec![0.0; core.dof]);
+    let (arrived, mut moved) = (core.state.x.to_vec(), vec![0.0; core.dof]);
     let mut pieces = Piece::all(core, work);
     let mut probe = Workspace::default();
     let mut open = JointErrors::measure(core, work, &mut probe, step, kept, &pushed)?;
@@ -174,7 +174,7 @@ pub(super) fn close(
         if pieces.iter().all(|p| p.done) {
             break;
         }
-        let (before, moved_before) = (core.x.to_vec(), moved.clone());
+        let (before, moved_before) = (core.state.x.to_vec(), moved.clone());
         open.newton(core, &mut probe, &pieces, &mut moved);
         refresh_at(core, start);
         open.chord(core, work, &pieces, &mut moved);
@@ -185,7 +185,7 @@ pub(super) fn close(
             piece.rounds -= 1;
             if was.0 > 1.0 && left.1 > was.1.max(1.0) && !piece.place_first {
                 // with the place rows change, and velocities along them: one after the other
-                piece.copy(&before, &mut core.x);
+                piece.copy(&before, &mut core.state.x);
                 piece.forget(&moved_before, &mut moved);
                 (worse, piece.place_first) = (true, true);
                 continue;
@@ -195,7 +195,7 @@ pub(super) fn close(
                 piece.left = left;
                 piece.damping = (piece.damping / DAMPING.1).max(1.0);
             } else {
-                piece.copy(&before, &mut core.x);
+                piece.copy(&before, &mut core.state.x);
                 piece.forget(&moved_before, &mut moved);
                 worse = true;
                 if !piece.chord {
@@ -341,10 +341,10 @@ impl JointErrors {
         pushed: &[bool],
     ) -> Result<JointErrors, StepError> {
         core.integration().refresh();
-        let time = core.time;
-        core.time += step.0;
+        let time = core.state.time;
+        core.state.time += step.0;
         let laid = lay_rows(core, probe, step.1, None);
-        core.time = time;
+        core.state.time = time;
         laid?;
         let n = work.targets.len();
         let least = (1e-2 * core.settings.contact_tolerance, core.settings.solver_settings.tolerance.max(FINEST));
@@ -452,8 +452,8 @@ fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64)
 
 /// Sites and caches of a state that is not the present one.
 pub(super) fn refresh_at(core: &mut Core, x: &[f64]) {
-    let now = core.x.to_vec();
-    core.x.copy_from_slice(x);
+    let now = core.state.x.to_vec();
+    core.state.x.copy_from_slice(x);
     core.integration().refresh();
-    core.x.copy_from_slice(&now);
+    core.state.x.copy_from_slice(&now);
 }

@@ -49,7 +49,7 @@ pub(super) fn pushing(work: &Workspace) -> Vec<ActiveLimit> {
 
 /// The limits that are passed at the present state, `h` seconds after the present time: their place alone is to be put right.
 pub(super) fn passed(core: &mut Core, probe: &mut Workspace, h: f64) -> Result<Vec<ActiveLimit>, StepError> {
-    let time = core.time + h;
+    let time = core.state.time + h;
     limits(core, time, &mut probe.limits)?;
     let least = core.settings.contact_tolerance;
     Ok(probe
@@ -73,10 +73,10 @@ pub(super) fn hold(
         return Ok(());
     }
     core.integration().refresh();
-    let time = core.time;
-    core.time += h;
+    let time = core.state.time;
+    core.state.time += h;
     let laid = build_rows(core, probe, Level::Acceleration, 0.0);
-    core.time = time;
+    core.state.time = time;
     laid?;
     whiten(core, &vec![0.0; core.dof], 0.0, &mut probe.u, &mut probe.du_force);
     row_velocities(&probe.rows, &probe.bias, &probe.u, &mut probe.c);

@@ -107,7 +107,7 @@ fn ask_limits(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64) -> R
     }
     let (pinned, mut ends) = (core.lift_pin(), Vec::new());
     core.integration().refresh();
-    limits(core, core.time + h, &mut ends)?;
+    limits(core, core.state.time + h, &mut ends)?;
     core.pin_again(pinned);
     refresh_at(core, start);
     for (limit, end) in work.limits.iter().zip(ends).filter(|(limit, end)| limit.key == end.key) {

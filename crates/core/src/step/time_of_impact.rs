@@ -91,7 +91,7 @@ fn glance(
 
 fn shape(core: &Core, part_state: u32) -> Option<&Shape> {
     let owner = core.owners[part_state as usize];
-    let body: &dyn Collidable = core.table.slots[owner.id].object.collidable()?;
+    let body: &dyn Collidable = core.table.placed[owner.place as usize].object.collidable()?;
     body.shape(owner.part as usize)
 }
 

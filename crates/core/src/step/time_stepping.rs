@@ -110,16 +110,16 @@ impl TimeStepping {
 
     /// Rate of momentum at the midpoint into `work.dp`; state and caches are left at the start.
     fn smooth_forces(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
-        core.x.clone_into(&mut self.x0);
+        core.state.x[..].clone_into(&mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
-        let time = core.time;
+        let time = core.state.time;
         let mut motion = core.integration();
         motion.free_motion(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.subtract_free_motion(&mut self.work.dp);
         core.check_finite(&self.work.dp)?;
         core.pin();
-        core.x.copy_from_slice(&self.x0);
+        core.state.x.copy_from_slice(&self.x0);
         core.integration().refresh();
         Ok(())
     }
@@ -184,12 +184,12 @@ impl TimeStepping {
     /// Pins what meets something where it does so.
     fn pin_at_impacts(&self, core: &mut Core, h: f64) {
         let mut x = std::mem::take(&mut core.pinned.0);
-        for entry in core.table.iter().filter(|e| !in_the_middle(e)) {
+        for entry in core.objects().iter().filter(|e| !in_the_middle(e)) {
             let impact_fraction = entry.state_range.v.clone().next().map_or(-1.0, |i| self.impact_fraction[i]);
             if impact_fraction >= 0.0 {
                 let x = &mut x[entry.state_range.x.clone()];
                 x.copy_from_slice(&self.x0[entry.state_range.x.clone()]);
-                free_motion(entry, x, h * impact_fraction);
+                free_motion(&entry, x, h * impact_fraction);
             }
         }
         core.pinned.0 = x;
@@ -207,7 +207,7 @@ impl TimeStepping {
         core.integration().refresh();
         let mut found = Vec::new();
         detect(core, h, PredictionMode::Each, &mut found);
-        core.x.copy_from_slice(&self.x0);
+        core.state.x.copy_from_slice(&self.x0);
         core.integration().refresh();
         let work = &mut self.work;
         let old: Vec<[u32; 4]> = work.contact_constraints.iter().map(|t| t.key.pair).collect();
@@ -314,16 +314,18 @@ impl TimeStepping {
         write(change, &|i| u1[i] - u0[i]);
         let before =
             |e: &Entry| e.state_range.v.clone().next().filter(|_| !in_the_middle(e)).map_or(0.5, impact_fraction);
-        for entry in core.table.iter() {
-            free_motion(entry, &mut core.x[entry.state_range.x.clone()], h * before(entry));
+        let (objects, x) = core.objects_and_x();
+        for entry in objects.iter() {
+            free_motion(&entry, &mut x[entry.state_range.x.clone()], h * before(&entry));
         }
         push(core, change, dp);
-        for entry in core.table.iter() {
-            free_motion(entry, &mut core.x[entry.state_range.x.clone()], h * (1.0 - before(entry)));
+        let (objects, x) = core.objects_and_x();
+        for entry in objects.iter() {
+            free_motion(&entry, &mut x[entry.state_range.x.clone()], h * (1.0 - before(&entry)));
         }
         write(parabola, &|i| (impact_fraction(i) - 0.5) * du_force[i]);
         rest.clone_from(parabola);
-        for i in core.table.iter().filter(|e| in_the_middle(e)).flat_map(|e| e.state_range.v.clone()) {
+        for i in core.objects().iter().filter(|e| in_the_middle(e)).flat_map(|e| e.state_range.v.clone()) {
             rest[i] -= (impact_fraction(i) - 0.5) * change[i];
         }
         shift(core, rest, h);

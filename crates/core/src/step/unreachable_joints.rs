@@ -114,7 +114,8 @@ pub(super) fn go_as_moved(
     moved: &[f64],
     h: f64,
 ) {
-    for entry in core.table.iter().filter(|e| e.moves() && stretches.iter().any(|(x, _)| *x == e.state_range.x)) {
+    let (objects, x) = core.objects_and_x();
+    for entry in objects.iter().filter(|e| e.moves() && stretches.iter().any(|(range, _)| *range == e.state_range.x)) {
         let Some(body) = entry.object.integratable() else { continue };
         let (mut v, mut first) = (vec![0.0; entry.state_range.v.len()], vec![0.0; entry.state_range.v.len()]);
         body.velocity(&start[entry.state_range.x.clone()], &mut first);
@@ -123,13 +124,13 @@ pub(super) fn go_as_moved(
             .zip(&first)
             .zip(&moved[entry.state_range.v.clone()])
             .for_each(|((v, first), moved)| *v = 0.5 * (*v + first) + moved / h);
-        body.write_velocity(&mut core.x[entry.state_range.x.clone()], &v);
+        body.write_velocity(&mut x[entry.state_range.x.clone()], &v);
     }
 }
 
 /// Files the joint among the targets named that is furthest open, by the rows of `probe`.
 pub(super) fn report(core: &mut Core, probe: &Workspace, targets: &[u32]) {
-    let ids: Vec<_> = constraints(&core.table).map(|(id, ..)| id).collect();
+    let ids: Vec<_> = constraints(core.objects()).map(|(id, ..)| id).collect();
     for range in alike(probe).into_iter().filter(|r| targets.binary_search(&(r.start as u32)).is_ok()) {
         let Some(&loop_joint) = ids.get(probe.first.partition_point(|&f| f <= range.start) - 1) else { continue };
         let size = range.clone().map(|i| probe.targets[i].error.powi(2)).sum::<f64>().sqrt();

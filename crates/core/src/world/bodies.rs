@@ -10,7 +10,7 @@ use tumble_collide::{Pose, Vec3};
 impl World {
     /// An object by id.
     pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
-        self.core.table.slots.get(id).map(|e| e.object.as_ref())
+        self.core.table.get(id).map(|placed| placed.object.as_ref())
     }
 
     /// An object by id, as its own type.
@@ -22,34 +22,39 @@ impl World {
     /// An object's constants, to be changed between steps. What of it is state lies in the world.
     pub fn get_mut<T: Object>(&mut self, id: ObjectId) -> Option<&mut T> {
         self.core.wake(id);
-        let object: &mut dyn std::any::Any = self.core.table.slots.get_mut(id)?.object.as_mut();
+        let place = self.core.table.place(id)?;
+        let object: &mut dyn std::any::Any = self.core.table.placed[place].object.as_mut();
         object.downcast_mut()
     }
 
     /// An object's switches.
     pub fn status(&self, id: ObjectId) -> Option<Status> {
-        self.core.table.slots.get(id).map(|e| e.status)
+        self.core.objects().get(id).map(|e| e.status)
     }
 
     /// Switches an object between static, kinematic and dynamic.
     pub fn set_mode(&mut self, id: ObjectId, mode: Mode) -> Result<(), WorldError> {
-        self.core.wake(id);
-        self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.mode = mode;
+        self.status_mut(id)?.mode = mode;
         Ok(())
     }
 
     /// Takes an object out of the world's doings, or back in; its state stays.
     pub fn set_enabled(&mut self, id: ObjectId, enabled: bool) -> Result<(), WorldError> {
-        self.core.wake(id);
-        self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.enabled = enabled;
+        self.status_mut(id)?.enabled = enabled;
         Ok(())
     }
 
     /// Switches an object's collisions.
     pub fn set_collidable(&mut self, id: ObjectId, collidable: bool) -> Result<(), WorldError> {
-        self.core.wake(id);
-        self.core.table.slots.get_mut(id).ok_or(WorldError::Stale)?.status.collidable = collidable;
+        self.status_mut(id)?.collidable = collidable;
         Ok(())
+    }
+
+    /// Wakes an object and gives its switches.
+    fn status_mut(&mut self, id: ObjectId) -> Result<&mut Status, WorldError> {
+        self.core.wake(id);
+        let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
+        Ok(&mut self.core.state.objects[place].status)
     }
 
     /// Whether an object sleeps (see [`Sleep`](crate::Sleep)); what is done to it wakes it.
@@ -59,7 +64,7 @@ impl World {
 
     /// The site of one part: pose, velocity, acceleration.
     pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
-        let entry = self.core.table.slots.get(id)?;
+        let entry = self.core.table.get(id)?;
         self.core.part_states[entry.state_range.parts.clone()].get(part)
     }
 
@@ -72,18 +77,18 @@ impl World {
 
     /// An object's slice of the state.
     pub fn state_of(&self, id: ObjectId) -> Option<&[f64]> {
-        Some(&self.core.x[self.core.table.slots.get(id)?.state_range.x.clone()])
+        Some(&self.core.state.x[self.core.table.get(id)?.state_range.x.clone()])
     }
 
     /// Writes an object's slice of the state, all of it (see the object's type for what the numbers mean). Refused where it is no state of it.
     pub fn write_state_of(&mut self, id: ObjectId, x: &[f64]) -> Result<(), WorldError> {
         self.core.wake(id);
-        let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let accepted = |body: &dyn Integratable| x.len() == entry.state_range.x.len() && body.accepts(x);
         if !entry.object.integratable().is_some_and(accepted) {
             return Err(WorldError::BadState(entry.object.name().to_string()));
         }
-        self.core.x[entry.state_range.x.clone()].copy_from_slice(x);
+        self.core.state.x[entry.state_range.x.clone()].copy_from_slice(x);
         self.core.integration().refresh_one(id);
         Ok(())
     }
@@ -125,21 +130,21 @@ impl World {
     pub fn apply_force(&mut self, id: ObjectId, part: usize, force: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[force, *point])?;
         let arm = point - self.core.part_states[index].position();
-        self.core.applied[index].force += force;
-        self.core.applied[index].torque += arm.cross(&force);
+        self.core.state.applied[index].force += force;
+        self.core.state.applied[index].torque += arm.cross(&force);
         Ok(())
     }
 
     /// Applies a torque (N·m, world axes) to one part during the next frame.
     pub fn apply_torque(&mut self, id: ObjectId, part: usize, torque: Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[torque])?;
-        self.core.applied[index].torque += torque;
+        self.core.state.applied[index].torque += torque;
         Ok(())
     }
 
     /// Applies generalized forces during the next frame, one per degree of freedom of the object: joint torques (N·m) and forces (N).
     pub fn apply_generalized(&mut self, id: ObjectId, forces: &[f64]) -> Result<(), WorldError> {
-        let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.object.name().to_string();
         if forces.len() != entry.state_range.v.len() {
             return Err(WorldError::Freedoms { name: name(), dof: entry.state_range.v.len(), given: forces.len() });
@@ -147,9 +152,14 @@ impl World {
         if forces.iter().any(|x| !x.is_finite()) {
             return Err(WorldError::NotFinite(name()));
         }
-        let applied = &mut self.core.applied_generalized[entry.state_range.v.clone()];
+        let applied = &mut self.core.state.applied_generalized[entry.state_range.v.clone()];
         applied.iter_mut().zip(forces).for_each(|(applied, force)| *applied += force);
         Ok(())
+    }
+
+    /// Removes the forces that were applied for the next frame.
+    pub fn clear_applied(&mut self) {
+        self.core.state.clear_applied();
     }
 
     /// Applies an impulse (N·s) at a world point of one part, at once.
@@ -157,7 +167,8 @@ impl World {
         let index = self.part(id, part, &[impulse, *point])?;
         self.core.wake(id);
         let core = &mut self.core;
-        let entry = &core.table.slots[id];
+        let (objects, x) = (core.table.with(&core.state.objects), &mut core.state.x);
+        let entry = objects.get(id).ok_or(WorldError::Stale)?;
         let (Some(collidable), Some(body), true) =
             (entry.object.collidable(), entry.object.integratable(), entry.moves())
         else {
@@ -168,13 +179,13 @@ impl World {
         collidable.test_impulse(part, &core.part_states[index], point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
         let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
         body.unwhiten_rate(&du, &mut dp);
-        body.kick(&mut core.x[entry.state_range.x.clone()], &dp, 1.0);
+        body.kick(&mut x[entry.state_range.x.clone()], &dp, 1.0);
         core.integration().refresh_one(id);
         Ok(())
     }
 
     pub(super) fn part(&self, id: ObjectId, part: usize, numbers: &[Vec3]) -> Result<usize, WorldError> {
-        let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         if part >= entry.state_range.parts.len() {
             return Err(WorldError::NoPart { name: entry.object.name().to_string(), part });
         }
@@ -187,16 +198,16 @@ impl World {
     fn edit_rigid(&mut self, id: ObjectId, edit: impl FnOnce(&RigidBody, &mut [f64])) -> Result<(), WorldError> {
         self.core.wake(id);
         let core = &mut self.core;
-        let entry = core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        let entry = core.table.get(id).ok_or(WorldError::Stale)?;
         let any: &dyn std::any::Any = entry.object.as_ref();
         let body =
             any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.object.name().to_string()))?;
-        let mut x = core.x[entry.state_range.x.clone()].to_vec();
+        let mut x = core.state.x[entry.state_range.x.clone()].to_vec();
         edit(body, &mut x);
         if !body.accepts(&x) {
             return Err(WorldError::BadState(entry.object.name().to_string()));
         }
-        core.x[entry.state_range.x.clone()].copy_from_slice(&x);
+        core.state.x[entry.state_range.x.clone()].copy_from_slice(&x);
         core.integration().refresh_one(id);
         Ok(())
     }

@@ -1,15 +1,14 @@
 //! The inside of a world: what the steppers work on.
 
-use super::state_memory::State;
-use crate::detect::{ContactConstraint, DetectorBuffers, Owner, WarmStarts};
+use super::state::WorldState;
+use crate::detect::{ContactConstraint, DetectorBuffers, Owner};
 use crate::motion::IntegrationContext;
 use crate::pair_material::PairMaterials;
 use crate::part_state::{Forces, PartState, Wrench};
 use crate::settings::{Settings, StepReport};
-use crate::sleep::Sleepers;
 use crate::solver::RowSolver;
-use crate::view::{Entry, ObjectId, Table};
-use tumble_collide::{BroadPhase, Vec3};
+use crate::view::{Entry, ObjectId, Objects, Table};
+use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
 
 /// Why a step stopped. [`World::step`](crate::World::step) puts state and time back to where they were before the frame.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -85,15 +84,16 @@ pub struct ContactPoint {
     pub force: Vec3,
 }
 
-/// Everything of a world but its stepper.
+/// A world without its stepper: the model, its state, what follows from the state, and the working memory of a step.
 pub struct Core {
     pub(crate) table: Table,
-    pub(crate) x: State,
+    pub(crate) settings: Settings,
+    pub(crate) pair_materials: PairMaterials,
+    pub(crate) solver: Box<dyn RowSolver>,
+    pub(crate) state: WorldState,
     pub(crate) dof: usize,
     pub(crate) part_states: Vec<PartState>,
     pub(crate) owners: Vec<Owner>,
-    pub(crate) applied: Vec<Wrench>,
-    pub(crate) applied_generalized: Vec<f64>,
     /// See [`WorldView::implicit`](crate::WorldView::implicit).
     pub(crate) implicit: bool,
     pub(crate) held: Vec<f64>,
@@ -104,23 +104,75 @@ pub struct Core {
     /// Memory of what was pinned last, for the next.
     pub(crate) unpinned: (Vec<f64>, Vec<PartState>),
     pub(crate) forces: Forces,
-    pub(crate) settings: Settings,
-    pub(crate) pair_materials: PairMaterials,
-    pub(crate) time: f64,
-    pub(crate) frame: u64,
     pub(crate) broad: Box<dyn BroadPhase>,
     pub(crate) detect_scratch: DetectorBuffers,
-    pub(crate) solver: Box<dyn RowSolver>,
-    pub(crate) warm: WarmStarts,
     pub(crate) contacts: Vec<ContactPoint>,
     pub(crate) report: StepReport,
-    pub(crate) next_serial: u32,
-    pub(crate) sleepers: Sleepers,
-    /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
-    pub(crate) inner_step: f64,
+    /// Serials of sleepers that the frame disturbs.
+    pub(crate) needs_wake: Vec<u32>,
 }
 
 impl Core {
+    /// Returns a core without contacts, whose part table is yet to be written.
+    pub(super) fn new(table: Table, settings: Settings, solver: Box<dyn RowSolver>, state: WorldState) -> Core {
+        let (dof, parts) = (state.applied_generalized.len(), state.applied.len());
+        let mut owners = Vec::with_capacity(parts);
+        for (place, (placed, &id)) in (0..).zip(table.placed.iter().zip(&table.order)) {
+            owners.extend((0..).zip(placed.state_range.parts.clone()).map(|(part, _)| Owner { id, place, part }));
+        }
+        Core {
+            table,
+            settings,
+            pair_materials: PairMaterials::default(),
+            solver,
+            state,
+            dof,
+            part_states: vec![PartState::default(); parts],
+            owners,
+            implicit: false,
+            held: vec![0.0; dof],
+            held_wrenches: Vec::new(),
+            pinned: Default::default(),
+            unpinned: Default::default(),
+            forces: Forces::default(),
+            broad: Box::<SweepAndPrune>::default(),
+            detect_scratch: DetectorBuffers::default(),
+            contacts: Vec::new(),
+            report: StepReport::default(),
+            needs_wake: Vec::new(),
+        }
+    }
+
+    /// Returns a copy with working memory of its own.
+    pub(super) fn fork(&self) -> Core {
+        Core {
+            pair_materials: self.pair_materials.clone(),
+            part_states: self.part_states.clone(),
+            contacts: self.contacts.clone(),
+            report: self.report,
+            ..Core::new(self.table.clone(), self.settings, self.solver.fork(), self.state.clone())
+        }
+    }
+
+    /// Returns the objects with their switches.
+    pub(crate) fn objects(&self) -> Objects<'_> {
+        self.table.with(&self.state.objects)
+    }
+
+    /// Returns the objects with their switches, beside their numbers in `X` to be changed.
+    pub(crate) fn objects_and_x(&mut self) -> (Objects<'_>, &mut [f64]) {
+        (self.table.with(&self.state.objects), &mut self.state.x)
+    }
+
+    /// Writes a state of these objects over the present one, and everything that follows from it.
+    pub(crate) fn set_state(&mut self, state: &WorldState) {
+        self.state.clone_from(state);
+        self.unpin();
+        self.clear_contact_forces();
+        self.state.write_accelerations(&mut self.part_states);
+        self.integration().refresh();
+    }
+
     /// No contact or joint forces hold any more.
     pub(crate) fn clear_contact_forces(&mut self) {
         self.held.fill(0.0);
@@ -131,7 +183,7 @@ impl Core {
     /// follow the state.
     pub(crate) fn pin(&mut self) {
         self.pinned = std::mem::take(&mut self.unpinned);
-        self.x.clone_into(&mut self.pinned.0);
+        self.state.x[..].clone_into(&mut self.pinned.0);
         self.pinned.1.clone_from(&self.part_states);
     }
 
@@ -162,13 +214,14 @@ impl Core {
     pub(crate) fn integration(&mut self) -> IntegrationContext<'_> {
         IntegrationContext {
             table: &mut self.table,
-            x: &mut self.x,
+            states: &self.state.objects,
+            x: &mut self.state.x,
             part_states: &mut self.part_states,
             forces: &mut self.forces,
             gravity: self.settings.gravity,
             implicit: self.implicit,
-            applied: &self.applied,
-            applied_generalized: &self.applied_generalized,
+            applied: &self.state.applied,
+            applied_generalized: &self.state.applied_generalized,
             held: &self.held,
             held_wrenches: &self.held_wrenches,
             pinned: &self.pinned.0,
@@ -202,7 +255,7 @@ impl Core {
             });
         }
         let contacts = &self.contacts;
-        self.warm.replace(
+        self.state.warm.replace(
             contact_constraints
                 .iter()
                 .zip(contacts)
@@ -213,46 +266,47 @@ impl Core {
 
     /// Counts time, lets objects put right what they must, writes the sites anew and checks the state.
     pub(crate) fn finish_substep(&mut self, h: f64) -> Result<(), StepError> {
-        self.time += h;
+        self.state.time += h;
         self.report.substeps += 1;
-        for entry in self.table.iter().filter(|e| e.moves()) {
+        let (objects, x) = self.objects_and_x();
+        for entry in objects.iter().filter(|e| e.moves()) {
             if let Some(body) = entry.object.integratable() {
-                body.stabilize(&mut self.x[entry.state_range.x.clone()], h);
+                body.stabilize(&mut x[entry.state_range.x.clone()], h);
             }
         }
         self.integration().refresh();
         let moves = |s: &PartState| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
-        let fine = |e: &&Entry| {
-            self.x[e.state_range.x.clone()].iter().all(|x| x.is_finite())
+        let fine = |e: &Entry| {
+            self.state.x[e.state_range.x.clone()].iter().all(|x| x.is_finite())
                 && self.part_states[e.state_range.parts.clone()].iter().all(moves)
         };
-        let bad = self.table.iter().find(|e| !fine(e));
+        let bad = self.objects().iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
     }
 
     /// Stops forces and impulses that are not numbers, and objects that cannot move.
     pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
-        let singularity = |e: &Entry| {
+        let singularity = |e: Entry| {
             Some(StepError::Singular {
                 why: e.object.integratable()?.singularity()?,
                 object: e.object.name().to_string(),
-                time: self.time,
+                time: self.state.time,
             })
         };
-        if let Some(error) = self.table.iter().filter(|e| e.moves()).find_map(singularity) {
+        if let Some(error) = self.objects().iter().filter(|e| e.moves()).find_map(singularity) {
             return Err(error);
         }
         let accelerates =
             |s: &PartState| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
-        let fine = |e: &&Entry| {
+        let fine = |e: &Entry| {
             dp[e.state_range.v.clone()].iter().all(|x| x.is_finite())
                 && self.part_states[e.state_range.parts.clone()].iter().all(accelerates)
         };
-        let bad = self.table.iter().find(|e| !fine(e));
+        let bad = self.objects().iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "the force on it")))
     }
 
     fn not_finite(&self, object: &str, what: &'static str) -> StepError {
-        StepError::NotFinite { object: object.to_string(), what, time: self.time }
+        StepError::NotFinite { object: object.to_string(), what, time: self.state.time }
     }
 }

@@ -29,7 +29,7 @@ impl World {
     /// Shows an object's parts at these poses, one per part. They are at rest, and the state stays what it was: the next step or change of state puts
     /// the parts back to where the state says. For a world that is drawn and never stepped.
     pub fn set_displayed_poses(&mut self, id: ObjectId, poses: &[Pose]) -> Result<(), WorldError> {
-        let entry = self.core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let (name, state_range) = (entry.object.name(), entry.state_range.parts.clone());
         if poses.len() != state_range.len() {
             return Err(WorldError::NoPart { name: name.to_string(), part: poses.len().min(state_range.len()) });
@@ -45,7 +45,7 @@ impl World {
 
     /// Appends the object's message for its copies elsewhere (thesis `GetData`); `false` where it has none.
     pub fn get_data(&self, id: ObjectId, out: &mut Vec<u8>) -> bool {
-        let Some(entry) = self.core.table.slots.get(id) else { return false };
+        let Some(entry) = self.core.table.get(id) else { return false };
         let sync = entry.object.net_sync();
         if let Some(sync) = sync {
             sync.get_data(&entry.state_range, &self.view(), out);
@@ -57,10 +57,10 @@ impl World {
     pub fn read_data(&mut self, id: ObjectId, data: &[u8]) -> Result<(), MirrorError> {
         self.core.wake(id);
         let core = &mut self.core;
-        let entry = core.table.slots.get(id).ok_or(WorldError::Stale)?;
+        let entry = core.table.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.object.name().to_string();
         let sync = entry.object.net_sync().ok_or_else(|| MirrorError::NotSynchronizable(name()))?;
-        sync.read_data(data, &mut core.x[entry.state_range.x.clone()])
+        sync.read_data(data, &mut core.state.x[entry.state_range.x.clone()])
             .map_err(|why| MirrorError::Message { name: name(), why })?;
         core.integration().refresh_one(id);
         Ok(())
@@ -69,7 +69,7 @@ impl World {
     /// Sets the time that a copy shows, s. A time that is not finite is left out.
     pub fn set_displayed_time(&mut self, time: f64) {
         if time.is_finite() {
-            self.core.time = time;
+            self.core.state.time = time;
         }
     }
 }

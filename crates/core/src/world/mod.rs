@@ -1,36 +1,34 @@
 //! The world: objects in, frames out (the thesis's `Engine`, §IV.B).
 
 mod bodies;
-mod checkpoint;
 mod core;
 mod mirror;
 mod overlaps;
 mod pair_materials;
 mod pick;
 mod snapshot;
+mod state;
 mod state_memory;
 
 pub use self::core::{ContactPoint, Core, StepError};
-pub use checkpoint::Checkpoint;
 pub use mirror::MirrorError;
 pub use overlaps::Overlap;
 pub use pick::PickForce;
 pub use snapshot::SnapshotError;
+pub(crate) use state::ObjectState;
+pub use state::WorldState;
 pub use state_memory::StateMemoryHold;
 
-use crate::detect::{DetectorBuffers, Owner, WarmStarts};
+use crate::detect::Owner;
 use crate::object::{Energy, Momentum, Object};
-use crate::pair_material::PairMaterials;
-use crate::part_state::{Forces, PartState, StateRange, StateSizes, Wrench};
+use crate::part_state::{PartState, StateRange, StateSizes};
 use crate::rigid::{BodyError, RigidBody};
 use crate::settings::{Settings, SettingsError, StepReport};
-use crate::sleep::Sleepers;
 use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{StepContext, Stepper, TimeStepping};
-use crate::view::{Entry, Mode, ObjectId, Status, Table, WorldView};
+use crate::view::{Mode, ObjectId, Placed, Status, Table, WorldView};
 use crate::visual::Visual;
 use std::collections::BTreeMap;
-use tumble_collide::SweepAndPrune;
 
 /// Why an object was not added or found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -95,51 +93,23 @@ pub enum WorldError {
 pub struct World {
     core: Core,
     stepper: Box<dyn Stepper>,
-    /// State before the frame, for when it fails.
-    before: Vec<f64>,
-    warm_before: WarmStarts,
+    /// The state before the frame: a frame that fails, or that wakes a sleeper, is rolled back to it.
+    before: WorldState,
+    /// Contacts of the frame before, for a frame that fails.
+    contacts_before: Vec<ContactPoint>,
     names: BTreeMap<String, ObjectId>,
 }
 
 impl World {
-    /// An empty world with the default solver (`gauss_seidel`) and stepper (`time_stepping`).
+    /// Returns an empty world with the default solver (`gauss_seidel`) and stepper (`time_stepping`).
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
-        let core = Core {
-            table: Table::default(),
-            x: Default::default(),
-            dof: 0,
-            part_states: Vec::new(),
-            owners: Vec::new(),
-            applied: Vec::new(),
-            applied_generalized: Vec::new(),
-            implicit: false,
-            held: Vec::new(),
-            held_wrenches: Vec::new(),
-            pinned: Default::default(),
-            unpinned: Default::default(),
-            forces: Forces::default(),
-            settings,
-            pair_materials: PairMaterials::default(),
-            time: 0.0,
-            frame: 0,
-            broad: Box::<SweepAndPrune>::default(),
-            detect_scratch: DetectorBuffers::default(),
-            solver: Box::new(GaussSeidel),
-            warm: WarmStarts::default(),
-            contacts: Vec::new(),
-            report: StepReport::default(),
-            next_serial: 0,
-            sleepers: Sleepers::default(),
-            inner_step: 0.0,
-        };
-        Ok(World {
-            core,
-            stepper: Box::<TimeStepping>::default(),
-            before: Vec::new(),
-            warm_before: WarmStarts::default(),
-            names: BTreeMap::new(),
-        })
+        let core = Core::new(Table::default(), settings, Box::new(GaussSeidel), WorldState::default());
+        Ok(World::of(core, Box::<TimeStepping>::default(), BTreeMap::new()))
+    }
+
+    fn of(core: Core, stepper: Box<dyn Stepper>, names: BTreeMap<String, ObjectId>) -> World {
+        World { core, stepper, before: WorldState::default(), contacts_before: Vec::new(), names }
     }
 
     /// Replaces the stepper.
@@ -175,57 +145,74 @@ impl World {
         Ok(())
     }
 
-    /// Advances by one frame. On an error state and time are as they were before it; the forces applied for the frame are spent either way.
+    /// Advances by one frame; forces applied for the frame are spent.
+    ///
+    /// # Errors
+    /// [`StepError`]. The world is then as it was before: [`save`](Self::save) writes the same bytes. Forces applied for the frame are
+    /// still applied; [`clear_applied`](Self::clear_applied) removes them.
     pub fn step(&mut self) -> Result<&StepReport, StepError> {
         let core = &mut self.core;
+        self.before.clone_from(&core.state);
+        std::mem::swap(&mut self.contacts_before, &mut core.contacts);
+        let report_before = std::mem::take(&mut core.report);
+        core.needs_wake.clear();
         core.wake_disturbed();
-        core.x.clone_into(&mut self.before);
-        self.warm_before.clone_from(&core.warm);
-        let (time, inner_step) = (core.time, core.inner_step);
-        let part_states = if core.sleepers.groups.is_empty() { Vec::new() } else { core.part_states.clone() };
-        let outcome = loop {
-            core.report = StepReport::default();
+        loop {
+            let requests = core.needs_wake.len();
             core.clear_contact_forces();
             core.detect_scratch.forget();
-            let outcome = self.stepper.step(StepContext { core });
-            if outcome.is_err() || !core.needs_wake() {
-                break outcome;
+            if let Err(error) = self.stepper.step(StepContext { core }) {
+                core.set_state(&self.before);
+                std::mem::swap(&mut self.contacts_before, &mut core.contacts);
+                core.report = report_before;
+                return Err(error);
             }
-            core.x.copy_from_slice(&self.before);
-            core.unpin();
-            core.part_states.clone_from(&part_states);
-            (core.time, core.inner_step) = (time, inner_step);
-            core.warm.clone_from(&self.warm_before);
-            core.integration().refresh();
+            core.request_wake_by_load();
+            if core.needs_wake.len() == requests {
+                break;
+            }
+            core.set_state(&self.before);
+            core.report = StepReport::default();
+            core.wake_disturbed();
             core.wake_requested();
-        };
-        if outcome.is_ok() {
-            core.fall_asleep();
-            core.report.asleep = core.table.iter().filter(|e| e.asleep).count() as u32;
         }
-        core.applied.fill(Wrench::default());
-        core.applied_generalized.fill(0.0);
-        if let Err(error) = outcome {
-            core.x.copy_from_slice(&self.before);
-            core.unpin();
-            (core.time, core.inner_step) = (time, inner_step);
-            core.warm.clone_from(&self.warm_before);
-            core.part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
-            core.integration().refresh();
-            return Err(error);
-        }
-        core.frame += 1;
+        core.fall_asleep();
+        core.report.asleep = core.objects().iter().filter(|e| e.asleep).count() as u32;
+        core.state.clear_applied();
+        core.state.keep_accelerations(&core.part_states);
+        core.state.frame += 1;
         Ok(&core.report)
+    }
+
+    /// Writes the present state to `at`, whose memory is used again.
+    pub fn checkpoint(&self, at: &mut WorldState) {
+        at.clone_from(&self.core.state);
+    }
+
+    /// Goes back to the state at a [`checkpoint`](Self::checkpoint); there are no contacts until the next step. Constants of objects and
+    /// settings stay as they are. Returns false, and changes nothing, if objects were added or removed since.
+    pub fn roll_back(&mut self, to: &WorldState) -> bool {
+        let fits = self.core.state.fits(to);
+        if fits {
+            self.core.set_state(to);
+            self.core.contacts.clear();
+        }
+        fits
+    }
+
+    /// Everything that the next step reads.
+    pub(crate) fn state_value(&self) -> &WorldState {
+        &self.core.state
     }
 
     /// Simulated time, s.
     pub fn time(&self) -> f64 {
-        self.core.time
+        self.core.state.time
     }
 
     /// Frames stepped since the world was made.
     pub fn frame(&self) -> u64 {
-        self.core.frame
+        self.core.state.frame
     }
 
     /// The report of the last step.
@@ -245,7 +232,7 @@ impl World {
 
     /// The flat state `X`.
     pub fn state(&self) -> &[f64] {
-        &self.core.x
+        &self.core.state.x
     }
 
     /// The site table.
@@ -257,12 +244,12 @@ impl World {
     pub fn view(&self) -> WorldView<'_> {
         let c = &self.core;
         WorldView {
-            time: c.time,
+            time: c.state.time,
             gravity: c.settings.gravity,
             implicit: false,
-            x: &c.x,
+            x: &c.state.x,
             part_states: &c.part_states,
-            table: &c.table,
+            objects: c.objects(),
         }
     }
 
@@ -278,7 +265,7 @@ impl World {
 
     /// All visuals, object by object in the order of adding.
     pub fn visuals(&self) -> impl Iterator<Item = &Visual> {
-        self.core.table.iter().filter_map(|e| e.object.renderable()).flat_map(|renderable| renderable.visuals())
+        self.core.objects().iter().filter_map(|e| e.object.renderable()).flat_map(|renderable| renderable.visuals())
     }
 
     /// Mechanical energy of everything that moves, J.
@@ -299,8 +286,8 @@ impl World {
     }
 
     fn moving(&self) -> impl Iterator<Item = (&[f64], &dyn crate::object::Integratable)> {
-        let moving = self.core.table.iter().filter(|e| e.dynamic());
-        moving.filter_map(|e| Some((&self.core.x[e.state_range.x.clone()], e.object.integratable()?)))
+        let moving = self.core.objects().iter().filter(|e| e.dynamic());
+        moving.filter_map(|e| Some((&self.core.state.x[e.state_range.x.clone()], e.object.integratable()?)))
     }
 
     /// Adds an object; it moves unless it is a [fixture](RigidBody::fixed), which is static, or [`set_mode`](Self::set_mode) says otherwise.
@@ -335,33 +322,25 @@ impl World {
             return Err(WorldError::Parts { name, parts, part_states: state_sizes.parts });
         }
         let state_range = StateRange {
-            x: core.x.len()..core.x.len() + state_sizes.x,
+            x: core.state.x.len()..core.state.x.len() + state_sizes.x,
             v: core.dof..core.dof + state_sizes.dof,
             parts: core.part_states.len()..core.part_states.len() + state_sizes.parts,
         };
-        core.x.resize(state_range.x.end);
+        core.state.x.resize(state_range.x.end);
         if let Some(body) = object.integratable() {
-            body.write_initial(&mut core.x[state_range.x.clone()]);
+            body.write_initial(&mut core.state.x[state_range.x.clone()]);
         }
-        if core.x[state_range.x.clone()].iter().any(|x| !x.is_finite()) {
-            core.x.resize(state_range.x.start);
+        if core.state.x[state_range.x.clone()].iter().any(|x| !x.is_finite()) {
+            core.state.x.resize(state_range.x.start);
             return Err(WorldError::NotFinite(name));
         }
+        let id = core.table.push(object, state_range.clone());
         core.dof = state_range.v.end;
         core.held.resize(core.dof, 0.0);
-        core.applied_generalized.resize(core.dof, 0.0);
         core.part_states.resize(state_range.parts.end, PartState::default());
-        core.applied.resize(state_range.parts.end, Wrench::default());
-        let serial = core.next_serial;
-        core.next_serial += 1;
-        let id = core.table.slots.insert(Entry::new(
-            object,
-            state_range.clone(),
-            Status { mode, ..Status::default() },
-            serial,
-        ));
-        core.table.order.push(id);
-        core.owners.extend((0..state_sizes.parts).map(|part| Owner { id, part: part as u32, serial }));
+        let place = core.state.objects.len() as u32;
+        core.owners.extend((0..state_sizes.parts).map(|part| Owner { id, place, part: part as u32 }));
+        core.state.add(Status { mode, ..Status::default() }, &state_range);
         core.integration().refresh_one(id);
         self.names.insert(name, id);
         Ok(id)
@@ -371,72 +350,29 @@ impl World {
     pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
         self.core.wake(id);
         let core = &mut self.core;
-        let gone = core.table.slots.remove(id).ok_or(WorldError::Stale)?;
+        let (place, gone) = core.table.remove(id).ok_or(WorldError::Stale)?;
         self.names.remove(gone.object.name());
-        core.table.order.retain(|&other| other != id);
-        core.x.cut(gone.state_range.x.clone());
+        core.state.remove(place, &gone.state_range);
         core.part_states.drain(gone.state_range.parts.clone());
         core.owners.drain(gone.state_range.parts.clone());
-        core.applied.drain(gone.state_range.parts.clone());
         core.dof -= gone.state_range.v.len();
         core.held.truncate(core.dof);
-        core.applied_generalized.drain(gone.state_range.v.clone());
         let (dx, dv, ds) = (gone.state_range.x.len(), gone.state_range.v.len(), gone.state_range.parts.len());
-        for &other in &core.table.order {
-            let state_range = &mut core.table.slots[other].state_range;
-            if state_range.x.start >= gone.state_range.x.end
-                && state_range.v.start >= gone.state_range.v.end
-                && state_range.parts.start >= gone.state_range.parts.end
-            {
-                *state_range = StateRange {
-                    x: state_range.x.start - dx..state_range.x.end - dx,
-                    v: state_range.v.start - dv..state_range.v.end - dv,
-                    parts: state_range.parts.start - ds..state_range.parts.end - ds,
-                };
-            }
+        for Placed { state_range, .. } in &mut core.table.placed[place..] {
+            *state_range = StateRange {
+                x: state_range.x.start - dx..state_range.x.end - dx,
+                v: state_range.v.start - dv..state_range.v.end - dv,
+                parts: state_range.parts.start - ds..state_range.parts.end - ds,
+            };
         }
-        core.warm.forget(gone.serial);
+        core.owners[gone.state_range.parts.start..].iter_mut().for_each(|owner| owner.place -= 1);
         core.pair_materials.forget(id);
         core.contacts.retain(|c| c.a != id && c.b != id);
         Ok(gone.object)
     }
 
-    /// An independent copy: same state, same future.
+    /// Returns an independent copy: same state, same future.
     pub fn fork(&self) -> World {
-        let c = &self.core;
-        World {
-            core: Core {
-                table: c.table.clone(),
-                x: c.x.fork(),
-                dof: c.dof,
-                part_states: c.part_states.clone(),
-                owners: c.owners.clone(),
-                applied: c.applied.clone(),
-                applied_generalized: c.applied_generalized.clone(),
-                implicit: c.implicit,
-                pinned: Default::default(),
-                unpinned: Default::default(),
-                held: c.held.clone(),
-                held_wrenches: c.held_wrenches.clone(),
-                forces: c.forces.clone(),
-                settings: c.settings,
-                pair_materials: c.pair_materials.clone(),
-                time: c.time,
-                frame: c.frame,
-                broad: Box::<SweepAndPrune>::default(),
-                detect_scratch: DetectorBuffers::default(),
-                solver: c.solver.fork(),
-                warm: c.warm.clone(),
-                contacts: c.contacts.clone(),
-                report: c.report,
-                next_serial: c.next_serial,
-                sleepers: c.sleepers.clone(),
-                inner_step: c.inner_step,
-            },
-            stepper: self.stepper.fork(),
-            before: Vec::new(),
-            warm_before: WarmStarts::default(),
-            names: self.names.clone(),
-        }
+        World::of(self.core.fork(), self.stepper.fork(), self.names.clone())
     }
 }

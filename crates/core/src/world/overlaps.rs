@@ -19,7 +19,7 @@ pub struct Overlap {
 
 /// A part that takes part.
 struct Part<'w> {
-    entry: &'w Entry,
+    entry: Entry<'w>,
     part: usize,
     shape: &'w Shape,
     pose: Pose,
@@ -50,7 +50,7 @@ impl World {
     }
 
     fn overlapping_parts(&self) -> Vec<Part<'_>> {
-        let entries = self.core.table.iter().filter(|e| e.status.enabled && e.status.collidable);
+        let entries = self.core.objects().iter().filter(|e| e.status.enabled && e.status.collidable);
         let parts = entries.filter_map(|entry| Some((entry, entry.object.collidable()?))).flat_map(|(entry, body)| {
             entry.state_range.parts.clone().enumerate().filter_map(move |(part, part_state)| {
                 Some(Part { entry, part, shape: body.shape(part)?, pose: self.core.part_states[part_state].pose })
@@ -61,7 +61,7 @@ impl World {
 
     /// The greatest depth of the contacts of two parts that may meet, if they overlap.
     fn depth_of(&self, a: &Part<'_>, b: &Part<'_>) -> Option<f64> {
-        if !may_collide(a.entry, a.part, b.entry, b.part, &self.core.part_states) {
+        if !may_collide(&a.entry, a.part, &b.entry, b.part, &self.core.part_states) {
             return None;
         }
         let (of_a, of_b) = (a.entry.object.collidable()?, b.entry.object.collidable()?);

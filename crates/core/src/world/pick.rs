@@ -54,7 +54,7 @@ impl World {
     pub fn pick(&mut self, pick: &PickForce) -> Result<Wrench, WorldError> {
         let index = self.part(pick.id, pick.part, &[pick.point, pick.target, Vec3::repeat(pick.frequency)])?;
         self.core.wake(pick.id);
-        let entry = &self.core.table.slots[pick.id];
+        let entry = self.core.objects().get(pick.id).ok_or(WorldError::Stale)?;
         let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pick.part)) else {
             return Ok(Wrench::default());
         };

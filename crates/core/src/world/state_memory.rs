@@ -5,6 +5,7 @@
 //! [hold](World::hold_state_memory) it. There is no way to put another vector in their place.
 
 use super::World;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -15,39 +16,58 @@ pub struct StateMemoryHold {
     left: Mutex<Vec<f64>>,
 }
 
-/// The numbers of the state, who holds their memory, and that memory while it is put aside.
-#[derive(Default)]
-pub(crate) struct State {
+/// The numbers of the state, the hold on their memory, and that memory while it is put aside. A clone has memory of its own that
+/// nobody holds; `clone_from` writes into the memory that is there.
+#[derive(Debug, Default)]
+pub(crate) struct StateVector {
     numbers: Vec<f64>,
     hold: Option<Arc<StateMemoryHold>>,
     aside: Option<Vec<f64>>,
 }
 
-impl Deref for State {
+impl Deref for StateVector {
     type Target = [f64];
     fn deref(&self) -> &[f64] {
         &self.numbers
     }
 }
 
-impl DerefMut for State {
+impl DerefMut for StateVector {
     fn deref_mut(&mut self) -> &mut [f64] {
         &mut self.numbers
     }
 }
 
-impl Drop for State {
+impl Drop for StateVector {
     fn drop(&mut self) {
         self.leave(0);
     }
 }
 
-impl State {
-    /// The same numbers in memory of their own that nobody holds.
-    pub fn fork(&self) -> State {
-        State { numbers: self.numbers.clone(), hold: None, aside: None }
+impl Clone for StateVector {
+    fn clone(&self) -> StateVector {
+        StateVector { numbers: self.numbers.clone(), hold: None, aside: None }
     }
 
+    fn clone_from(&mut self, from: &StateVector) {
+        self.resize(from.len());
+        self.numbers.copy_from_slice(from);
+    }
+}
+
+impl Serialize for StateVector {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.numbers.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for StateVector {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<StateVector, D::Error> {
+        Ok(StateVector { numbers: Vec::deserialize(deserializer)?, hold: None, aside: None })
+    }
+}
+
+impl StateVector {
     /// Makes room at the end, filled with zeros, or cuts it off.
     pub fn resize(&mut self, len: usize) {
         if len != self.numbers.len() {
@@ -83,20 +103,20 @@ impl World {
     /// Keeps the memory that the state lies in: it stays there, and is written there by every call that moves something, until an object is added or
     /// removed or the world is dropped; then it stays as it was last for as long as the hold lives. Calls of the same state give the same hold.
     pub fn hold_state_memory(&mut self) -> Arc<StateMemoryHold> {
-        self.core.x.hold.get_or_insert_default().clone()
+        self.core.state.x.hold.get_or_insert_default().clone()
     }
 
     /// Where the state lies, and how many numbers it has; see [`hold_state_memory`](Self::hold_state_memory). Who reads through it has to see to it that no call
     /// changes the world meanwhile.
     pub fn state_address(&mut self) -> (*const f64, usize) {
-        let x = &mut self.core.x;
+        let x = &mut self.core.state.x;
         let shown = x.aside.as_mut().unwrap_or(&mut x.numbers);
         (shown.as_mut_ptr(), shown.len())
     }
 
     /// Leaves the held memory as it is, and works on a copy until [`thaw_state_memory`](Self::thaw_state_memory): readers then see the state as it was.
     pub fn freeze_state_memory(&mut self) {
-        let x = &mut self.core.x;
+        let x = &mut self.core.state.x;
         if x.hold.is_some() && x.aside.is_none() {
             let copy = x.numbers.clone();
             x.aside = Some(std::mem::replace(&mut x.numbers, copy));
@@ -105,7 +125,7 @@ impl World {
 
     /// Writes the state to the memory that was put aside, and works there again.
     pub fn thaw_state_memory(&mut self) {
-        let x = &mut self.core.x;
+        let x = &mut self.core.state.x;
         if let Some(mut shown) = x.aside.take() {
             shown.copy_from_slice(&x.numbers);
             x.numbers = shown;

@@ -180,10 +180,14 @@ fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
             (0..10).for_each(|_| {
                 world.step().unwrap();
             });
-            let before = (bits(&world), world.time().to_bits(), world.frame());
+            let (resting, before) = (world.save(), (bits(&world), world.time().to_bits(), world.frame()));
             world.apply_force(light, 0, Vec3::new(1e308, 0.0, 0.0), &Vec3::new(5.0, 0.0, 5.0)).unwrap();
+            let pushed = world.save();
             assert!(matches!(world.step(), Err(StepError::NotFinite { .. })), "{failing}");
             assert_eq!((bits(&world), world.time().to_bits(), world.frame()), before, "{failing}");
+            assert!(world.save() == pushed && pushed != resting, "{failing}: the force is still applied");
+            world.clear_applied();
+            assert!(world.save() == resting, "{failing}");
             assert!(
                 (velocity(&world, light).z + 10.0 * G * h).abs() < 1e-12,
                 "{failing}: the sites are those of the state"

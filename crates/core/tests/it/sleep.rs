@@ -298,3 +298,84 @@ fn saved_and_forked_sleepers_wake_to_the_same_bytes() {
         assert!(world.save() == after && fork.save() == after, "{stepper}");
     }
 }
+
+/// Adds a force that is not a number to a part of an object that is awake.
+struct Fault(ObjectId);
+
+impl Object for Fault {
+    fn name(&self) -> &str {
+        "fault"
+    }
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(Fault(self.0))
+    }
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        Some(self)
+    }
+}
+
+impl ForceGenerator for Fault {
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        let part = view.state_range(self.0).unwrap().parts.start;
+        out.wrenches[part].force.x += if view.asleep(self.0) { 0.0 } else { f64::NAN };
+    }
+}
+
+/// The ball wakes the stack within the frame that fails, so the frame is done a second time before it does.
+#[test]
+fn a_step_that_fails_after_it_woke_sleepers_leaves_every_byte_as_it_was() {
+    for stepper in STEPPERS {
+        let (mut world, ids) = bed(stepper);
+        let roller = RigidBody::with_mass("roller", sphere(0.2), 1.0).unwrap();
+        world.add(roller.at(Pose::translation(0.0, 5.0, 0.2)).moving(Vec3::x(), Vec3::zeros())).unwrap();
+        let ball = RigidBody::with_mass("ball", sphere(0.2), 5.0).unwrap();
+        let ball = ball.at(Pose::translation(-4.0, 0.1, 0.6)).moving(Vec3::new(6.0, 0.0, 2.0), Vec3::zeros());
+        let ball = world.add(ball).unwrap();
+        let mut ahead = world.fork();
+        while asleep(&ahead, &ids) == 3 {
+            run(&mut ahead, 1);
+        }
+        let frames = (ahead.frame() - world.frame()) as usize;
+        run(&mut world, frames - 1);
+        let fault = world.add(Fault(ids[0])).unwrap();
+        world.apply_force(ball, 0, Vec3::new(0.0, 1e-3, 0.0), &position(&world, ball)).unwrap();
+        world.apply_generalized(ball, &[1e-3; 6]).unwrap();
+        let mut twin = world.fork();
+        let (before, contacts, report) = (world.save(), world.contacts().to_vec(), *world.report());
+        assert!(asleep(&world, &ids) == 3 && !contacts.is_empty(), "{stepper}");
+        for _ in 0..2 {
+            let error = world.step().unwrap_err();
+            assert!(matches!(&error, StepError::NotFinite { object, .. } if object == "box0"), "{stepper}: {error}");
+            assert!(world.save() == before, "{stepper}: the state is another");
+            assert!(
+                world.contacts() == contacts && *world.report() == report && asleep(&world, &ids) == 3,
+                "{stepper}"
+            );
+        }
+        for world in [&mut world, &mut twin] {
+            world.remove(fault).map(drop).unwrap();
+            run(world, 30);
+            assert_eq!(asleep(world, &ids), 0, "{stepper}");
+        }
+        assert!(world.save() == twin.save(), "{stepper}: after a failed step a world goes another way");
+    }
+}
+
+#[test]
+fn a_checkpoint_holds_who_sleeps_and_is_refused_after_an_object_came() {
+    for stepper in STEPPERS {
+        let (mut world, ids) = bed(stepper);
+        let (mut checkpoint, before) = (WorldState::default(), world.save());
+        world.checkpoint(&mut checkpoint);
+        for _ in 0..2 {
+            world.apply_impulse(ids[2], 0, Vec3::new(50.0, 0.0, 0.0), &position(&world, ids[2])).unwrap();
+            run(&mut world, 30);
+            assert!(asleep(&world, &ids) == 0 && world.save() != before, "{stepper}");
+            assert!(world.roll_back(&checkpoint));
+            assert!(world.save() == before && asleep(&world, &ids) == 3, "{stepper}");
+        }
+        world.add(RigidBody::with_mass("late", sphere(0.2), 1.0).unwrap()).unwrap();
+        let now = world.save();
+        assert!(!world.roll_back(&checkpoint) && world.save() == now, "{stepper}");
+    }
+}

@@ -1,0 +1,145 @@
+//! The state of a world as one value.
+
+use super::state_memory::StateVector;
+use crate::clone_by_field::clone_by_field;
+use crate::detect::WarmStarts;
+use crate::part_state::{PartState, StateRange, Wrench};
+use crate::sleep::{RestTimer, SleepGroup};
+use crate::view::Status;
+use serde::{Deserialize, Serialize};
+use tumble_collide::Vec3;
+
+/// Objects that a world may have seen, at most; frames are capped by its square.
+const MAX_OBJECTS: u32 = 1 << 31;
+
+/// Everything that the next step of a world reads besides its objects' constants and its settings, and nothing else.
+///
+/// A fork clones it, [`World::checkpoint`](super::World::checkpoint) clones it into memory that is there, and
+/// [`World::save`](super::World::save) serializes it. All tables are in the order in which the objects were added.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct WorldState {
+    /// Simulated time, s.
+    pub(crate) time: f64,
+    /// Frames stepped.
+    pub(crate) frame: u64,
+    /// The serial that the next object gets.
+    pub(crate) next_serial: u32,
+    pub(crate) objects: Vec<ObjectState>,
+    /// The flat state `X`.
+    pub(crate) x: StateVector,
+    /// Angular (rad/s²), then linear acceleration (m/s²) of every part at the last evaluation of forces. Objects and the detector
+    /// read them before forces are evaluated again.
+    pub(crate) accelerations: Vec<[Vec3; 2]>,
+    /// What users apply to every part during the next frame.
+    pub(crate) applied: Vec<Wrench>,
+    /// What users apply to every degree of freedom during the next frame.
+    pub(crate) applied_generalized: Vec<f64>,
+    pub(crate) warm: WarmStarts,
+    /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
+    pub(crate) inner_step: f64,
+    /// The islands that sleep.
+    pub(crate) groups: Vec<SleepGroup>,
+}
+
+clone_by_field!(WorldState {
+    time,
+    frame,
+    next_serial,
+    objects,
+    x,
+    accelerations,
+    applied,
+    applied_generalized,
+    warm,
+    inner_step,
+    groups,
+});
+
+/// What of an object is state besides its numbers in `X`.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(crate) struct ObjectState {
+    /// Never used twice in a world: warm starts and sleepers are filed under it.
+    pub serial: u32,
+    pub status: Status,
+    /// Left out of the steps until something wakes it.
+    pub asleep: bool,
+    pub rest: RestTimer,
+}
+
+clone_by_field!(ObjectState { serial, status, asleep, rest });
+
+impl WorldState {
+    /// Returns the lengths of the tables by object, of `X`, by part and by degree of freedom.
+    pub(crate) fn sizes(&self) -> [usize; 5] {
+        [self.objects.len(), self.x.len(), self.accelerations.len(), self.applied.len(), self.applied_generalized.len()]
+    }
+
+    /// Adds an object of the given ranges at the end; its numbers in `X` are there already.
+    pub(crate) fn add(&mut self, status: Status, state_range: &StateRange) {
+        self.objects.push(ObjectState { serial: self.next_serial, status, asleep: false, rest: RestTimer::default() });
+        self.next_serial += 1;
+        self.accelerations.resize(state_range.parts.end, [Vec3::zeros(); 2]);
+        self.applied.resize(state_range.parts.end, Wrench::default());
+        self.applied_generalized.resize(state_range.v.end, 0.0);
+    }
+
+    /// Removes the object at `place`.
+    pub(crate) fn remove(&mut self, place: usize, state_range: &StateRange) {
+        let gone = self.objects.remove(place);
+        self.x.cut(state_range.x.clone());
+        self.accelerations.drain(state_range.parts.clone());
+        self.applied.drain(state_range.parts.clone());
+        self.applied_generalized.drain(state_range.v.clone());
+        self.warm.forget(gone.serial);
+    }
+
+    /// Returns whether both are states of the same objects.
+    pub(crate) fn fits(&self, other: &WorldState) -> bool {
+        let serials = other.objects.iter().map(|o| o.serial);
+        self.sizes() == other.sizes() && self.objects.iter().map(|o| o.serial).eq(serials)
+    }
+
+    /// Removes all applied forces.
+    pub(crate) fn clear_applied(&mut self) {
+        self.applied.fill(Wrench::default());
+        self.applied_generalized.fill(0.0);
+    }
+
+    /// Takes the accelerations of the part table over.
+    pub(crate) fn keep_accelerations(&mut self, part_states: &[PartState]) {
+        self.accelerations.clear();
+        self.accelerations.extend(part_states.iter().map(|s| [s.angular_acceleration, s.acceleration]));
+    }
+
+    /// Writes the accelerations into the part table.
+    pub(crate) fn write_accelerations(&self, part_states: &mut [PartState]) {
+        for (part_state, [angular, linear]) in part_states.iter_mut().zip(&self.accelerations) {
+            (part_state.angular_acceleration, part_state.acceleration) = (*angular, *linear);
+        }
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        let vectors =
+            self.accelerations.iter().flatten().chain(self.applied.iter().flat_map(|w| [&w.torque, &w.force]));
+        let mut numbers = self.x.iter().chain(&self.applied_generalized).chain(vectors.flat_map(|v| v.iter()));
+        let steps = self.time.is_finite() && self.inner_step.is_finite() && self.inner_step >= 0.0;
+        steps && numbers.all(|x| x.is_finite()) && self.warm.finite()
+    }
+
+    /// Returns whether the objects that sleep are those of its groups, and all numbers of sleepers are finite.
+    pub(crate) fn sleepers_are_sound(&self) -> bool {
+        let mut members: Vec<u32> = self.groups.iter().flat_map(|g| &g.members).copied().collect();
+        members.sort_unstable();
+        let asleep = self.objects.iter().filter(|o| o.asleep).map(|o| o.serial);
+        let timers = self.objects.iter().all(|o| o.rest.is_finite());
+        timers && self.groups.iter().all(SleepGroup::sound) && asleep.eq(members)
+    }
+
+    /// Returns whether serials ascend, nothing is counted too far, and warm starts are sorted.
+    pub(crate) fn counters_are_sound(&self) -> bool {
+        let serials = self.objects.is_sorted_by(|a, b| a.serial < b.serial)
+            && self.objects.iter().all(|o| o.serial < self.next_serial);
+        let most_frames = MAX_OBJECTS as u64 * MAX_OBJECTS as u64;
+        serials && self.next_serial < MAX_OBJECTS && self.frame < most_frames && self.warm.in_order()
+    }
+}
